@@ -1,0 +1,50 @@
+"""Arms: the frozen description of a serial chain, the papers' arms, and conversions from other forms.
+
+>>> import ikgym
+>>> ikgym.arms.get("varga7").joints
+7
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from ikgym.arms import faitli, khan, varga, zhang
+from ikgym.arms.arm import Arm
+from ikgym.arms.denavit_hartenberg import from_dh
+from ikgym.arms.urdf import from_urdf
+from ikgym.registry import Registry
+
+__all__ = ["Arm", "from_dh", "from_urdf", "get", "names", "register"]
+
+_registry: Registry[Arm] = Registry("arm")
+for _family in (varga, faitli, khan, zhang):
+    for _name, _make in _family.ARMS.items():
+        _registry.register(_name, _make)
+
+
+def get(name: str) -> Arm:
+    """The arm of a name.
+
+    Raises:
+        UnknownNameError: There is no such arm; the message has the nearest name.
+    """
+    return _registry.get(name)
+
+
+def names() -> tuple[str, ...]:
+    """The names of all arms."""
+    return _registry.names()
+
+
+def register(name: str, make: Callable[[], Arm]) -> None:
+    """Adds an arm of your own.
+
+    Args:
+        name: Its new name.
+        make: Called without arguments when the arm is first asked for.
+
+    Raises:
+        InvalidInputError: The name is taken.
+    """
+    _registry.register(name, make)

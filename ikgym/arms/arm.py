@@ -1,0 +1,222 @@
+"""The arm: a validated, frozen serial chain of revolute and prismatic joints."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from ikgym import kinematics
+from ikgym.exceptions import InvalidInputError
+from ikgym.kinematics import Chain
+from ikgym.validation import FloatArray, Frozen, float_array, frozen_array, read_only
+
+# An axis this close to unit length was meant to be one, and is scaled to it exactly.
+UNIT_TOLERANCE = 1e-6
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Arm(Frozen):
+    """A serial arm, ``H = H_1 … H_n · H_tool`` (Varga 2021, eq. 6; Khan 2020, eq. 3.12).
+
+    Each joint is ``H_i = Trans(offset_i) · Rot(axis_i, q_i)``, or ``Trans(offset_i + q_i · axis_i)`` where it
+    slides. All link frames are parallel to the base at q = 0; fixed rotations between links are absorbed into
+    the axes, the offsets and the tool's home orientation, which loses no generality. For arms in another form see
+    :func:`ikgym.arms.from_dh` and :func:`ikgym.arms.from_urdf`.
+
+    Args:
+        name: What the arm is called.
+        offsets: From the frame of the joint before to the joint, in [m]. Shape (n, 3).
+        axes: The joints' axes. Shape (n, 3). Unit vectors: an axis whose length differs from 1 by more than
+            1e-6 is an error, within that it is scaled to unit length.
+        prismatic: True where a joint slides, one entry a joint. All joints turn if it is left out.
+        tool: Tool point in the last frame, in [m]. Shape (3,).
+        tool_rotation: Orientation of the tool in the last frame. Shape (3, 3).
+        lower: Lower limits of the joints in [rad] or [m], -inf where there is none. Shape (n,). The limits are
+            data for solvers: nothing in the kinematics stops at them.
+        upper: Upper limits of the joints in [rad] or [m], inf where there is none. Shape (n,).
+        velocity_limit: Largest speeds of the joints in [rad/s] or [m/s], inf where there is none. Shape (n,).
+
+    Raises:
+        InvalidInputError: A shape, an axis, the tool's orientation or a limit is wrong.
+    """
+
+    name: str
+    offsets: FloatArray
+    axes: FloatArray
+    prismatic: Sequence[bool] = ()
+    tool: FloatArray = dataclasses.field(default_factory=lambda: np.zeros(3))
+    tool_rotation: FloatArray = dataclasses.field(default_factory=lambda: np.eye(3))
+    lower: FloatArray | None = None
+    upper: FloatArray | None = None
+    velocity_limit: FloatArray | None = None
+    chain: Chain = dataclasses.field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        offsets = frozen_array(f"offsets of arm {self.name!r}", self.offsets, (None, 3))
+        n = len(offsets)
+        if n == 0:
+            raise InvalidInputError(f"Arm {self.name!r}: expected at least one joint, got none.")
+        axes = read_only(_unit_axes(self.name, float_array(f"axes of arm {self.name!r}", self.axes, (n, 3))))
+        prismatic = (tuple(self.prismatic) or (False,) * n) if isinstance(self.prismatic, Iterable) else ()
+        if len(prismatic) != n or not all(isinstance(p, (bool, np.bool_)) for p in prismatic):
+            raise InvalidInputError(
+                f"prismatic of arm {self.name!r}: expected {n} truth values, one a joint, got {self.prismatic!r}."
+            )
+        tool = frozen_array(f"tool of arm {self.name!r}", self.tool, (3,))
+        tool_rotation = frozen_array(f"tool_rotation of arm {self.name!r}", self.tool_rotation, (3, 3))
+        if (
+            np.abs(tool_rotation @ tool_rotation.T - np.eye(3)).max() > UNIT_TOLERANCE
+            or np.linalg.det(tool_rotation) < 0.0
+        ):
+            raise InvalidInputError(
+                f"tool_rotation of arm {self.name!r}: expected a rotation matrix (orthogonal, determinant 1), "
+                f"got {tool_rotation.tolist()}."
+            )
+        lower = _limits(self.name, "lower", self.lower, n, -np.inf)
+        upper = _limits(self.name, "upper", self.upper, n, np.inf)
+        velocity_limit = _limits(self.name, "velocity_limit", self.velocity_limit, n, np.inf)
+        if (lower >= upper).any():
+            i = int(np.argmax(lower >= upper))
+            raise InvalidInputError(
+                f"Limits of arm {self.name!r}: expected lower < upper, got {lower[i]:g} and {upper[i]:g} at joint {i}."
+            )
+        if (velocity_limit <= 0.0).any():
+            raise InvalidInputError(
+                f"velocity_limit of arm {self.name!r}: expected numbers above 0, got {velocity_limit.tolist()}."
+            )
+        chain = Chain(offsets, axes, np.array(prismatic, dtype=np.bool_), tool, tool_rotation)
+        chain.prismatic.flags.writeable = False
+        for field, value in {
+            "offsets": offsets,
+            "axes": axes,
+            "prismatic": tuple(bool(p) for p in prismatic),
+            "tool": tool,
+            "tool_rotation": tool_rotation,
+            "lower": lower,
+            "upper": upper,
+            "velocity_limit": velocity_limit,
+            "chain": chain,
+        }.items():
+            object.__setattr__(self, field, value)
+
+    @property
+    def joints(self) -> int:
+        """The number of joints, n."""
+        return len(self.offsets)
+
+    def forward(self, q: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """Orientation and position of the tool.
+
+        Args:
+            q: Joint coordinates in [rad] or [m]. Shape (..., n).
+
+        Returns:
+            Rotation matrices of shape (..., 3, 3) and tool points in the base frame in [m], of shape (..., 3).
+
+        Raises:
+            InvalidInputError: q has the wrong length or is not finite.
+        """
+        rows, lead = self._rows(q)
+        rotation, position = np.empty((len(rows), 3, 3)), np.empty((len(rows), 3))
+        kinematics.forward_rows(self.chain, rows, rotation, position)
+        return rotation.reshape(*lead, 3, 3), position.reshape(*lead, 3)
+
+    def jacobian(self, q: npt.ArrayLike) -> FloatArray:
+        """The geometric Jacobian at the tool point, in the base frame.
+
+        Args:
+            q: Joint coordinates in [rad] or [m]. Shape (..., n).
+
+        Returns:
+            Linear rows first: [m/s] and [rad/s] per unit of joint velocity. Shape (..., 6, n).
+
+        Raises:
+            InvalidInputError: q has the wrong length or is not finite.
+        """
+        return self.forward_and_jacobian(q)[2]
+
+    def forward_and_jacobian(self, q: npt.ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """:meth:`forward` and :meth:`jacobian` in one pass.
+
+        Args:
+            q: Joint coordinates in [rad] or [m]. Shape (..., n).
+
+        Returns:
+            Rotations (..., 3, 3), positions (..., 3) in [m], Jacobians (..., 6, n).
+
+        Raises:
+            InvalidInputError: q has the wrong length or is not finite.
+        """
+        rows, lead = self._rows(q)
+        rotation, position = np.empty((len(rows), 3, 3)), np.empty((len(rows), 3))
+        jacobian = np.empty((len(rows), 6, self.joints))
+        kinematics.forward_and_jacobian_rows(self.chain, rows, rotation, position, jacobian)
+        return (
+            rotation.reshape(*lead, 3, 3),
+            position.reshape(*lead, 3),
+            jacobian.reshape(*lead, 6, self.joints),
+        )
+
+    def joint_points(self, q: npt.ArrayLike) -> FloatArray:
+        """Where each joint begins and ends, in the base frame; the two differ where a joint slides.
+
+        Args:
+            q: Joint coordinates in [rad] or [m]. Shape (n,).
+
+        Returns:
+            Points in [m]. Shape (n, 2, 3).
+
+        Raises:
+            InvalidInputError: q has the wrong length or is not finite.
+        """
+        out = np.empty((self.joints, 2, 3))
+        kinematics.joint_points(self.chain, float_array("q", q, (self.joints,)), out)
+        return out
+
+    def reach(self, travel: npt.ArrayLike) -> float:
+        """A radius around the base that the tool point never leaves, in [m].
+
+        Args:
+            travel: Largest absolute joint coordinates; only those of sliding joints count. Shape (n,).
+
+        Raises:
+            InvalidInputError: travel has the wrong length or is not finite.
+        """
+        sliding = float_array("travel", travel, (self.joints,))[self.chain.prismatic]
+        links = np.linalg.norm(self.offsets, axis=1).sum() + np.linalg.norm(self.tool)
+        return float(links + np.abs(sliding).sum())
+
+    def _rows(self, q: npt.ArrayLike) -> tuple[FloatArray, tuple[int, ...]]:
+        array = float_array("q", q)
+        if array.ndim == 0 or array.shape[-1] != self.joints:
+            raise InvalidInputError(f"q: expected shape (..., {self.joints}) for arm {self.name!r}, got {array.shape}.")
+        return array.reshape(-1, self.joints), array.shape[:-1]
+
+
+def _unit_axes(name: str, axes: FloatArray) -> FloatArray:
+    lengths: FloatArray = np.linalg.norm(axes, axis=1)
+    for i, length in enumerate(lengths):
+        if abs(length - 1.0) > UNIT_TOLERANCE:
+            what = "the zero vector" if length == 0.0 else f"{axes[i].tolist()} of length {length:.6g}"
+            raise InvalidInputError(
+                f"Axis of joint {i} of arm {name!r}: expected a unit vector, got {what}. Nothing is normalised for "
+                "you, since a wrong length most often is a slip; divide the axis by its length if it is meant."
+            )
+    return axes / lengths[:, None]
+
+
+def _limits(name: str, what: str, value: npt.ArrayLike | None, n: int, default: float) -> FloatArray:
+    """Limits may be infinite, unlike everything else."""
+    if value is None:
+        return read_only(np.full(n, default))
+    try:
+        raw = np.asarray(value)
+        # NumPy would read strings as numbers.
+        if raw.dtype.kind not in "fiu" or raw.shape != (n,) or np.isnan(raw).any():
+            raise ValueError
+    except (TypeError, ValueError):
+        raise InvalidInputError(f"{what} of arm {name!r}: expected {n} numbers, got {value!r}.") from None
+    return read_only(raw.astype(np.float64))

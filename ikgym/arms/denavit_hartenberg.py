@@ -1,0 +1,98 @@
+"""Arms from Denavit–Hartenberg tables, standard and modified."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from ikgym.arms.arm import Arm
+from ikgym.arms.home import from_home
+from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.validation import FloatArray, float_array
+
+CONVENTIONS = ("standard", "modified")
+
+
+def from_dh(
+    name: str,
+    a: npt.ArrayLike,
+    d: npt.ArrayLike,
+    alpha: npt.ArrayLike,
+    theta: npt.ArrayLike | None = None,
+    *,
+    prismatic: Sequence[bool] = (),
+    convention: str = "standard",
+    lower: npt.ArrayLike | None = None,
+    upper: npt.ArrayLike | None = None,
+    velocity_limit: npt.ArrayLike | None = None,
+) -> Arm:
+    """An arm from its Denavit–Hartenberg table.
+
+    A joint coordinate is added to ``theta`` of a revolute and to ``d`` of a prismatic joint.
+
+    Args:
+        name: What the arm is called.
+        a: Link lengths in [m]. Shape (n,).
+        d: Link offsets in [m]. Shape (n,).
+        alpha: Link twists in [rad]. Shape (n,).
+        theta: Joint angles at q = 0 in [rad], zeros if left out. Shape (n,).
+        prismatic: True where a joint slides, one entry a joint. All joints turn if it is left out.
+        convention: ``"standard"``: H_i = Rot_z(θ_i) Trans_z(d_i) Trans_x(a_i) Rot_x(α_i). ``"modified"``
+            (Craig): H_i = Rot_x(α_i) Trans_x(a_i) Rot_z(θ_i) Trans_z(d_i), where row i holds what Craig writes
+            as a_{i-1} and α_{i-1}.
+        lower: Lower limits of the joints in [rad] or [m]. Shape (n,).
+        upper: Upper limits of the joints in [rad] or [m]. Shape (n,).
+        velocity_limit: Largest speeds of the joints in [rad/s] or [m/s]. Shape (n,).
+
+    Returns:
+        The arm, in the one form that all arms have.
+
+    Raises:
+        InvalidInputError: The columns are of different lengths, or hold something else than finite numbers.
+        UnknownNameError: There is no such convention.
+    """
+    if convention not in CONVENTIONS:
+        raise UnknownNameError("Denavit–Hartenberg convention", convention, CONVENTIONS)
+    a = float_array(f"a of arm {name!r}", a, (None,))
+    n = len(a)
+    d = float_array(f"d of arm {name!r}", d, (n,))
+    alpha = float_array(f"alpha of arm {name!r}", alpha, (n,))
+    theta = np.zeros(n) if theta is None else float_array(f"theta of arm {name!r}", theta, (n,))
+    if n == 0:
+        raise InvalidInputError(f"Denavit–Hartenberg table of arm {name!r}: expected at least one row, got none.")
+
+    frame = np.eye(4)
+    axes, points = np.empty((n, 3)), np.empty((n, 3))
+    for i in range(n):
+        turn = _screw_z(theta[i], d[i])
+        link = _screw_x(alpha[i], a[i])
+        if convention == "modified":
+            frame = frame @ link
+        # The joint turns about, or slides along, the z axis of the frame in front of its own screw.
+        axes[i], points[i] = frame[:3, 2], frame[:3, 3]
+        frame = frame @ turn
+        if convention == "standard":
+            frame = frame @ link
+    return from_home(
+        name,
+        axes,
+        points,
+        prismatic,
+        rotation=frame[:3, :3],
+        position=frame[:3, 3],
+        lower=lower,
+        upper=upper,
+        velocity_limit=velocity_limit,
+    )
+
+
+def _screw_z(angle: float, shift: float) -> FloatArray:
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s, 0, 0], [s, c, 0, 0], [0, 0, 1, shift], [0, 0, 0, 1]])
+
+
+def _screw_x(angle: float, shift: float) -> FloatArray:
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[1, 0, 0, shift], [0, c, -s, 0], [0, s, c, 0], [0, 0, 0, 1]])

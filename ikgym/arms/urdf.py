@@ -1,0 +1,128 @@
+"""Arms from URDF files, read through Pinocchio."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from os import PathLike
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from ikgym.arms.arm import Arm
+from ikgym.arms.home import from_home
+from ikgym.arms.urdf_check import MOVING, UrdfJoint, read_chain
+from ikgym.exceptions import InvalidInputError, MissingDependencyError
+from ikgym.validation import FloatArray
+
+# Descriptions of whole humanoids take a few hundred kilobytes.
+MAX_BYTES = 16 * 2**20
+
+
+class _Home(NamedTuple):
+    """What is seen of the arm at q = 0, in the frame of the base link."""
+
+    axes: FloatArray
+    points: FloatArray
+    rotation: FloatArray
+    position: FloatArray
+
+
+def from_urdf(
+    path: str | PathLike[str], *, base: str | None = None, tip: str | None = None, name: str | None = None
+) -> Arm:
+    """An arm from the chain between two links of a URDF file.
+
+    Revolute, continuous, prismatic and fixed joints are read, with their limits; a continuous joint has none.
+    Joints off the chain, a gripper's for example, have no coordinate in the arm. Meshes are never opened.
+
+    An axis whose length differs from 1 by more than 1e-2 is an error; within that it is taken to be rounded,
+    and is scaled to unit length. Files with a DOCTYPE, of more than 16 MiB, or with more than 128 joints
+    between the two links are refused.
+
+    Args:
+        path: The file.
+        base: The link to begin at, whose frame becomes the base frame. The root link if it is left out.
+        tip: The link to end at, whose frame becomes the tool's. The only leaf below the base if it
+            is left out.
+        name: What the arm is called, the name of the robot in the file if it is left out.
+
+    Returns:
+        The arm. Lengths in [m], angles in [rad], as in the file.
+
+    Raises:
+        InvalidInputError: The file cannot be read, is no URDF, or has no such chain from base to tip.
+        UnknownNameError: There is no link of that name; the message has the nearest one.
+        MissingDependencyError: Pinocchio is not installed.
+    """
+    try:
+        robot, joints = read_chain(_content(path), base, tip)
+        moving = [joint for joint in joints if joint.kind in MOVING]
+        home = _home(joints)
+        return from_home(
+            robot if name is None else name,
+            home.axes,
+            home.points,
+            [joint.kind == "prismatic" for joint in moving],
+            home.rotation,
+            home.position,
+            lower=[joint.lower for joint in moving],
+            upper=[joint.upper for joint in moving],
+            velocity_limit=[joint.velocity for joint in moving],
+        )
+    except InvalidInputError as error:
+        raise InvalidInputError(f"{path}: {error}") from error
+
+
+def _content(path: str | PathLike[str]) -> bytes:
+    try:
+        with Path(path).open("rb") as file:
+            content = file.read(MAX_BYTES + 1)
+    except (OSError, TypeError, ValueError) as error:
+        raise InvalidInputError(f"expected a URDF file, got none that can be read: {error}.") from error
+    if len(content) > MAX_BYTES:
+        raise InvalidInputError(f"expected a URDF file of at most {MAX_BYTES} bytes, got more.")
+    return content
+
+
+def _home(joints: Sequence[UrdfJoint]) -> _Home:
+    try:
+        import pinocchio
+    except ImportError as error:
+        raise MissingDependencyError('URDF files need Pinocchio: pip install "ikgym[urdf]"') from error
+    try:
+        model = pinocchio.buildModelFromXML(_bare_urdf(joints))
+        data = model.createData()
+        # Columns of the Jacobian hold the axes, linear rows first. A single column comes as a plain vector.
+        jacobian = pinocchio.computeJointJacobians(model, data, pinocchio.neutral(model)).reshape(6, -1)
+        pinocchio.updateFramePlacements(model, data)
+        tip = data.oMf[model.getFrameId(f"link{len(joints)}")]
+    except Exception as error:  # whatever Pinocchio raises, it is about this file
+        raise InvalidInputError(f"expected a URDF that Pinocchio can read, got its error: {error}") from error
+    slides = np.array([joint.kind == "prismatic" for joint in joints if joint.kind in MOVING])
+    return _Home(
+        axes=np.where(slides, jacobian[:3], jacobian[3:]).T,
+        points=np.array([placement.translation for placement in data.oMi][1:]),
+        rotation=np.array(tip.rotation),
+        position=np.array(tip.translation),
+    )
+
+
+def _bare_urdf(joints: Sequence[UrdfJoint]) -> str:
+    """The chain and nothing else, written anew.
+
+    Two parsers may see one file differently: Pinocchio gets the numbers that were checked, and nothing that
+    was not, such as meshes, names and other branches.
+    """
+    links = [f'<link name="link{i}"/>' for i in range(len(joints) + 1)]
+    chain = [
+        f'<joint name="joint{i}" type="{joint.kind}"><parent link="link{i}"/><child link="link{i + 1}"/>'
+        f'<origin xyz="{_text(joint.xyz)}" rpy="{_text(joint.rpy)}"/><axis xyz="{_text(joint.axis)}"/>'
+        '<limit lower="0" upper="0" velocity="0" effort="0"/></joint>'
+        for i, joint in enumerate(joints)
+    ]
+    return f'<robot name="chain">{"".join(links + chain)}</robot>'
+
+
+def _text(numbers: Sequence[float]) -> str:
+    return " ".join(map(repr, numbers))

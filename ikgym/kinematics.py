@@ -1,0 +1,193 @@
+"""Kernels: forward kinematics and geometric Jacobian of a serial chain, in one pass.
+
+The chain is ``H = H_1 … H_n · H_tool`` with ``H_i = Trans(offset_i) · Rot(axis_i, q_i)``, or
+``Trans(offset_i + q_i · axis_i)`` for a prismatic joint (Varga 2021, eq. 6; Khan 2020, eq. 3.12 and 4.18). All
+link frames are parallel to the base at q = 0.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from ikgym.rotations import rodrigues
+
+
+class Chain(NamedTuple):
+    """An arm as its kernels see it.
+
+    Attributes:
+        offsets: From the frame of the joint before to the joint, in [m]. Shape (n, 3).
+        axes: Unit vectors in the joints' own frames. Shape (n, 3).
+        prismatic: True where a joint slides. Shape (n,).
+        tool: Tool point in the last frame, in [m]. Shape (3,).
+        tool_rotation: Orientation of the tool in the last frame. Shape (3, 3).
+    """
+
+    offsets: npt.NDArray[np.float64]
+    axes: npt.NDArray[np.float64]
+    prismatic: npt.NDArray[np.bool_]
+    tool: npt.NDArray[np.float64]
+    tool_rotation: npt.NDArray[np.float64]
+
+
+@njit(cache=True, nogil=True)
+def forward(chain, q, rotation, position):  # type: ignore[no-untyped-def]
+    """Forward kinematics of one configuration.
+
+    Args:
+        chain: The arm, a :class:`Chain`.
+        q: Joint coordinates in [rad] or [m]. Shape (n,).
+        rotation: Receives the orientation of the tool. Shape (3, 3).
+        position: Receives the tool point in the base frame in [m]. Shape (3,).
+    """
+    _walk(chain, q, rotation, position, np.empty((0, 0)))
+
+
+@njit(cache=True, nogil=True)
+def forward_and_jacobian(chain, q, rotation, position, jacobian):  # type: ignore[no-untyped-def]
+    """Forward kinematics and geometric Jacobian of one configuration.
+
+    Args:
+        chain: The arm, a :class:`Chain`.
+        q: Joint coordinates in [rad] or [m]. Shape (n,).
+        rotation: Receives the orientation of the tool. Shape (3, 3).
+        position: Receives the tool point in the base frame in [m]. Shape (3,).
+        jacobian: Receives the Jacobian at the tool point, in the base frame: rows 0-2 linear in [m/s], rows 3-5
+            angular in [rad/s], per unit of joint velocity. Shape (6, n).
+    """
+    _walk(chain, q, rotation, position, jacobian)
+    for i in range(q.shape[0]):
+        if chain.prismatic[i]:
+            continue
+        # The walk left the joint's own point in the linear rows: v = axis × (tool - joint).
+        x = position[0] - jacobian[0, i]
+        y = position[1] - jacobian[1, i]
+        z = position[2] - jacobian[2, i]
+        wx, wy, wz = jacobian[3, i], jacobian[4, i], jacobian[5, i]
+        jacobian[0, i] = wy * z - wz * y
+        jacobian[1, i] = wz * x - wx * z
+        jacobian[2, i] = wx * y - wy * x
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _walk(chain, q, rotation, position, jacobian):  # type: ignore[no-untyped-def]
+    """Goes along the chain; where ``jacobian`` has columns, leaves each joint's axis and point in them."""
+    offsets, axes, prismatic = chain.offsets, chain.axes, chain.prismatic
+    keep = jacobian.shape[1] > 0
+    # The orientation so far is kept in nine scalars, which stay in registers; an array would not.
+    r00, r01, r02 = 1.0, 0.0, 0.0
+    r10, r11, r12 = 0.0, 1.0, 0.0
+    r20, r21, r22 = 0.0, 0.0, 1.0
+    px, py, pz = 0.0, 0.0, 0.0
+    for i in range(q.shape[0]):
+        ox, oy, oz = offsets[i, 0], offsets[i, 1], offsets[i, 2]
+        ax, ay, az = axes[i, 0], axes[i, 1], axes[i, 2]
+        if prismatic[i]:
+            ox += q[i] * ax
+            oy += q[i] * ay
+            oz += q[i] * az
+        px += r00 * ox + r01 * oy + r02 * oz
+        py += r10 * ox + r11 * oy + r12 * oz
+        pz += r20 * ox + r21 * oy + r22 * oz
+        if keep:
+            wx = r00 * ax + r01 * ay + r02 * az
+            wy = r10 * ax + r11 * ay + r12 * az
+            wz = r20 * ax + r21 * ay + r22 * az
+            if prismatic[i]:
+                jacobian[0, i], jacobian[1, i], jacobian[2, i] = wx, wy, wz
+                jacobian[3, i], jacobian[4, i], jacobian[5, i] = 0.0, 0.0, 0.0
+            else:
+                jacobian[0, i], jacobian[1, i], jacobian[2, i] = px, py, pz
+                jacobian[3, i], jacobian[4, i], jacobian[5, i] = wx, wy, wz
+        if prismatic[i]:
+            continue
+        # Rodrigues' formula (Varga 2021, eq. 8), multiplied from the right.
+        s = math.sin(q[i])
+        half = math.sin(0.5 * q[i])
+        v = 2.0 * half * half
+        a00, a01, a02 = 1.0 - v * (ay * ay + az * az), v * ax * ay - s * az, v * ax * az + s * ay
+        a10, a11, a12 = v * ax * ay + s * az, 1.0 - v * (ax * ax + az * az), v * ay * az - s * ax
+        a20, a21, a22 = v * ax * az - s * ay, v * ay * az + s * ax, 1.0 - v * (ax * ax + ay * ay)
+        r00, r01, r02 = (
+            r00 * a00 + r01 * a10 + r02 * a20,
+            r00 * a01 + r01 * a11 + r02 * a21,
+            r00 * a02 + r01 * a12 + r02 * a22,
+        )
+        r10, r11, r12 = (
+            r10 * a00 + r11 * a10 + r12 * a20,
+            r10 * a01 + r11 * a11 + r12 * a21,
+            r10 * a02 + r11 * a12 + r12 * a22,
+        )
+        r20, r21, r22 = (
+            r20 * a00 + r21 * a10 + r22 * a20,
+            r20 * a01 + r21 * a11 + r22 * a21,
+            r20 * a02 + r21 * a12 + r22 * a22,
+        )
+    tx, ty, tz = chain.tool[0], chain.tool[1], chain.tool[2]
+    position[0] = px + r00 * tx + r01 * ty + r02 * tz
+    position[1] = py + r10 * tx + r11 * ty + r12 * tz
+    position[2] = pz + r20 * tx + r21 * ty + r22 * tz
+    tool_rotation = chain.tool_rotation
+    for j in range(3):
+        tx, ty, tz = tool_rotation[0, j], tool_rotation[1, j], tool_rotation[2, j]
+        rotation[0, j] = r00 * tx + r01 * ty + r02 * tz
+        rotation[1, j] = r10 * tx + r11 * ty + r12 * tz
+        rotation[2, j] = r20 * tx + r21 * ty + r22 * tz
+
+
+@njit(cache=True, nogil=True)
+def forward_rows(chain, q, rotation, position):  # type: ignore[no-untyped-def]
+    """:func:`forward` for N rows: ``q`` (N, n), ``rotation`` (N, 3, 3), ``position`` (N, 3)."""
+    for row in range(q.shape[0]):
+        forward(chain, q[row], rotation[row], position[row])
+
+
+@njit(cache=True, nogil=True)
+def forward_and_jacobian_rows(chain, q, rotation, position, jacobian):  # type: ignore[no-untyped-def]
+    """:func:`forward_and_jacobian` for N rows: as above, with ``jacobian`` (N, 6, n)."""
+    for row in range(q.shape[0]):
+        forward_and_jacobian(chain, q[row], rotation[row], position[row], jacobian[row])
+
+
+@njit(cache=True, nogil=True)
+def joint_points(chain, q, points):  # type: ignore[no-untyped-def]
+    """Where each joint begins and ends, for drawing.
+
+    Args:
+        chain: The arm, a :class:`Chain`.
+        q: Joint coordinates in [rad] or [m]. Shape (n,).
+        points: Receives per joint its point before and after its motion in [m]; they differ where the joint
+            slides. Shape (n, 2, 3).
+    """
+    rotation = np.eye(3)
+    here = np.zeros(3)
+    for i in range(q.shape[0]):
+        _shift(rotation, chain.offsets[i], 1.0, here)
+        points[i, 0] = here
+        if chain.prismatic[i]:
+            _shift(rotation, chain.axes[i], q[i], here)
+        else:
+            rotation = _product(rotation, rodrigues(chain.axes[i], q[i]))
+        points[i, 1] = here
+
+
+# Written out, since numba's matrix product needs SciPy.
+@njit(cache=True, nogil=True)
+def _shift(rotation, vector, length, point):  # type: ignore[no-untyped-def]
+    for i in range(3):
+        point[i] += length * (rotation[i, 0] * vector[0] + rotation[i, 1] * vector[1] + rotation[i, 2] * vector[2])
+
+
+@njit(cache=True, nogil=True)
+def _product(first, second):  # type: ignore[no-untyped-def]
+    out = np.zeros((3, 3))
+    for i in range(3):
+        for j in range(3):
+            for k in range(3):
+                out[i, j] += first[i, k] * second[k, j]
+    return out

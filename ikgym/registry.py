@@ -1,0 +1,53 @@
+"""A table of named things, each made when it is first asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Generic, TypeVar
+
+from ikgym.exceptions import InvalidInputError, UnknownNameError
+
+Member = TypeVar("Member")
+
+
+class Registry(Generic[Member]):
+    """Names and the makers behind them.
+
+    Args:
+        kind: What the members are called in messages, for example ``"arm"``.
+    """
+
+    def __init__(self, kind: str) -> None:
+        self.kind = kind
+        self._makers: dict[str, Callable[[], Member]] = {}
+        self._made: dict[str, Member] = {}
+
+    def register(self, name: str, make: Callable[[], Member]) -> None:
+        """Adds a member.
+
+        Args:
+            name: The new name.
+            make: Called without arguments, once, when the member is first asked for.
+
+        Raises:
+            InvalidInputError: The name is taken.
+        """
+        if name in self._makers:
+            raise InvalidInputError(f"The {self.kind} {name!r} is registered already.")
+        self._makers[name] = make
+
+    def names(self) -> tuple[str, ...]:
+        """All names, in the order of their registration."""
+        return tuple(self._makers)
+
+    def get(self, name: str) -> Member:
+        """The member of a name; the same object at every call.
+
+        Raises:
+            UnknownNameError: There is no such name; the message has the nearest one.
+        """
+        if not isinstance(name, str) or name not in self._makers:
+            raise UnknownNameError(self.kind, name, self._makers)
+        if name not in self._made:
+            self._made[name] = self._makers[name]()
+        return self._made[name]

@@ -1,0 +1,140 @@
+"""Checks of what users hand in: clear words where it is wrong, a read-only copy where it is right."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterable, Mapping
+from typing import Any, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from ikgym.exceptions import InvalidInputError, UnknownNameError
+
+FloatArray = npt.NDArray[np.float64]
+
+
+def float_array(name: str, value: npt.ArrayLike, shape: tuple[int | None, ...] | None = None) -> FloatArray:
+    """A fresh, C-contiguous float64 copy of finite numbers.
+
+    Args:
+        name: What the value is called in messages.
+        value: Anything that NumPy can cast to float64 without losing its meaning.
+        shape: The shape to insist on; None stands for any length. All shapes are right if it is left out.
+
+    Returns:
+        The copy. Shape as given.
+
+    Raises:
+        InvalidInputError: The value is no array of numbers, has another shape, or is not finite.
+    """
+    try:
+        raw = np.asarray(value)
+        if raw.dtype.kind not in "fiub":
+            raise TypeError
+        array = np.array(raw, dtype=np.float64, order="C")
+    except (TypeError, ValueError):
+        raise InvalidInputError(f"{name}: expected an array of real numbers, got {_shorten(value)}.") from None
+    if shape is not None and not _fits(array.shape, shape):
+        wanted = "(" + ", ".join("any" if n is None else str(n) for n in shape) + ("," if len(shape) == 1 else "") + ")"
+        raise InvalidInputError(f"{name}: expected shape {wanted}, got {array.shape}.")
+    if not np.isfinite(array).all():
+        raise InvalidInputError(f"{name}: expected finite numbers, got {_shorten(value)}.")
+    return array
+
+
+def frozen_array(name: str, value: npt.ArrayLike, shape: tuple[int | None, ...] | None = None) -> FloatArray:
+    """Like :func:`float_array`, and read-only."""
+    return read_only(float_array(name, value, shape))
+
+
+def read_only(array: FloatArray) -> FloatArray:
+    """The same array, with writing to it switched off."""
+    array.flags.writeable = False
+    return array
+
+
+def per_joint(name: str, value: npt.ArrayLike, n: int) -> FloatArray:
+    """One number for all joints, or one a joint, as a read-only array of shape (n,).
+
+    Raises:
+        InvalidInputError: There are as many numbers as neither, or one is not finite.
+    """
+    array = frozen_array(name, value)
+    return frozen_array(name, array, (n,)) if array.ndim else read_only(np.full(n, array))
+
+
+def number(name: str, value: float, *, above: float | None = None, at_least: float | None = None) -> float:
+    """A finite number within its bounds.
+
+    Raises:
+        InvalidInputError: The value is no finite number, or outside the bounds.
+    """
+    bound = f" above {above:g}" if above is not None else f" of at least {at_least:g}" if at_least is not None else ""
+    if isinstance(value, bool) or not isinstance(value, (int, float, np.integer, np.floating)):
+        raise InvalidInputError(f"{name}: expected a finite number{bound}, got {value!r}.")
+    out = float(value)
+    if (
+        not math.isfinite(out)
+        or (above is not None and not out > above)
+        or (at_least is not None and not out >= at_least)
+    ):
+        raise InvalidInputError(f"{name}: expected a finite number{bound}, got {out!r}.")
+    return out
+
+
+def whole_number(name: str, value: int, *, at_least: int) -> int:
+    """A whole number not below a bound.
+
+    Raises:
+        InvalidInputError: The value is no whole number, or below the bound.
+    """
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < at_least:
+        raise InvalidInputError(f"{name}: expected a whole number of at least {at_least}, got {value!r}.")
+    return int(value)
+
+
+def known_names(kind: str, given: Iterable[str], available: Iterable[str]) -> None:
+    """Insists that all names given are among those available.
+
+    Raises:
+        UnknownNameError: One is not; the message has the nearest match.
+    """
+    available = tuple(available)
+    for name in given:
+        if name not in available:
+            raise UnknownNameError(kind, name, available)
+
+
+class Frozen:
+    """Base of the frozen dataclasses: changed copies by name, and arrays that stay read-only when pickled."""
+
+    def replace(self, **changes: Any) -> Self:
+        """A copy with some fields changed, checked like a new one.
+
+        Raises:
+            UnknownNameError: There is no field of that name.
+            InvalidInputError: A new value is refused.
+        """
+        known_names(f"field of {type(self).__name__}", changes, self._fields())
+        return type(self)(**{**self._fields(), **changes})
+
+    def _fields(self) -> Mapping[str, Any]:
+        return {f.name: getattr(self, f.name) for f in dataclasses.fields(self) if f.init}  # type: ignore[arg-type]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _rebuild, (type(self), dict(self._fields()))
+
+
+def _rebuild(cls: type[Any], fields: dict[str, Any]) -> Any:
+    return cls(**fields)
+
+
+def _fits(shape: tuple[int, ...], wanted: tuple[int | None, ...]) -> bool:
+    return len(shape) == len(wanted) and all(w is None or n == w for n, w in zip(shape, wanted, strict=True))
+
+
+def _shorten(value: object, limit: int = 120) -> str:
+    text = " ".join(repr(value).split())
+    return text if len(text) <= limit else text[: limit - 1] + "…"

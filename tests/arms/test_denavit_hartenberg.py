@@ -1,0 +1,125 @@
+import numpy as np
+import pytest
+
+from ikgym import arms
+from ikgym.arms import from_dh
+from ikgym.exceptions import InvalidInputError, UnknownNameError
+
+
+def rot(axis, angle):
+    """Homogeneous rotation about coordinate axis 0 or 2."""
+    out = np.eye(4)
+    i, j = {0: (1, 2), 2: (0, 1)}[axis]
+    out[i, i] = out[j, j] = np.cos(angle)
+    out[i, j], out[j, i] = -np.sin(angle), np.sin(angle)
+    return out
+
+
+def trans(axis, length):
+    """Homogeneous shift along a coordinate axis."""
+    out = np.eye(4)
+    out[axis, 3] = length
+    return out
+
+
+def product(a, d, alpha, theta, prismatic, convention, q):
+    """The table read as its definition says."""
+    pose = np.eye(4)
+    for i, slides in enumerate(prismatic):
+        turn = rot(2, theta[i] + q[i] * (not slides)) @ trans(2, d[i] + q[i] * slides)
+        if convention == "standard":
+            pose = pose @ turn @ trans(0, a[i]) @ rot(0, alpha[i])
+        else:
+            pose = pose @ rot(0, alpha[i]) @ trans(0, a[i]) @ turn
+    return pose
+
+
+def agree(arm, q, pose):
+    rotation, position = arm.forward(q)
+    np.testing.assert_allclose(rotation, pose[:3, :3], rtol=0, atol=1e-14)
+    np.testing.assert_allclose(position, pose[:3, 3], rtol=0, atol=1e-14)
+
+
+@pytest.mark.parametrize("convention", ["standard", "modified"])
+@pytest.mark.parametrize(
+    "prismatic",
+    [(False,) * 4, (False, False, True, False), (True, True, True, False), (True, False, False, True)],
+    ids=lambda flags: "".join("rs"[flag] for flag in flags),
+)
+def test_a_table_is_the_product_of_its_matrices(prismatic, convention):
+    rng = np.random.default_rng(0)
+    a, d, alpha, theta = rng.uniform(-1, 1, (4, 4)) * [[1], [1], [np.pi], [np.pi]]
+    arm = from_dh("random", a, d, alpha, theta, prismatic=prismatic, convention=convention)
+    assert arm.prismatic == prismatic
+    for q in (np.zeros(4), *rng.uniform(-2, 2, (10, 4))):
+        agree(arm, q, product(a, d, alpha, theta, prismatic, convention, q))
+
+
+def test_a_scara_slides_along_its_flipped_z():
+    """Two parallel turning joints, a quill that points down, and a wrist."""
+    arm = from_dh(
+        "scara",
+        a=[0.4, 0.3, 0, 0],
+        d=[0.5, 0, 0, 0.1],
+        alpha=[0, np.pi, 0, 0],
+        prismatic=(False, False, True, False),
+    )
+    q1, q2, q3, q4 = q = np.array([0.3, -0.8, 0.2, 1.1])
+    rotation, position = arm.forward(q)
+    expected = [
+        0.4 * np.cos(q1) + 0.3 * np.cos(q1 + q2),
+        0.4 * np.sin(q1) + 0.3 * np.sin(q1 + q2),
+        0.5 - q3 - 0.1,
+    ]
+    np.testing.assert_allclose(position, expected, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(rotation, (rot(2, q1 + q2 - q4) @ rot(0, np.pi))[:3, :3], rtol=0, atol=1e-15)
+
+
+def test_one_puma_in_both_conventions():
+    puma = arms.get("puma560")
+    # Craig's rows hold the link before the joint; nothing is lost of the last link, which is all zeros.
+    modified = from_dh(
+        "puma560_modified",
+        a=[0, 0, 0.4318, 0.0203, 0, 0],
+        d=[0.67183, 0, 0.15005, 0.4318, 0, 0],
+        alpha=[0, np.pi / 2, 0, -np.pi / 2, np.pi / 2, -np.pi / 2],
+        convention="modified",
+    )
+    q = np.random.default_rng(0).uniform(-np.pi, np.pi, (20, 6))
+    for standard, craig in zip(puma.forward_and_jacobian(q), modified.forward_and_jacobian(q), strict=True):
+        np.testing.assert_allclose(standard, craig, rtol=0, atol=1e-14)
+
+
+def test_theta_is_where_the_coordinate_begins():
+    a, d, alpha, theta = [0.5, 0.4], [0.1, 0.2], [0.3, -0.6], np.array([0.7, -1.2])
+    plain, shifted = from_dh("plain", a, d, alpha), from_dh("shifted", a, d, alpha, theta)
+    q = np.random.default_rng(0).uniform(-np.pi, np.pi, (10, 2))
+    for one, other in zip(plain.forward(q + theta), shifted.forward(q), strict=True):
+        np.testing.assert_allclose(one, other, rtol=0, atol=1e-15)
+
+
+def test_limits_are_handed_on():
+    arm = from_dh("one", [1], [0], [0], lower=[-1], upper=[2], velocity_limit=[3])
+    np.testing.assert_array_equal([arm.lower, arm.upper, arm.velocity_limit], [[-1], [2], [3]])
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ({"a": [1, 2]}, r"d of arm 'one': expected shape \(2,\), got \(1,\)"),
+        ({"d": [0, 0]}, r"d of arm 'one': expected shape \(1,\), got \(2,\)"),
+        ({"alpha": [np.nan]}, "alpha of arm 'one': expected finite numbers"),
+        ({"theta": ["0"]}, "theta of arm 'one': expected an array of real numbers"),
+        ({"a": 1.0}, r"a of arm 'one': expected shape \(any,\), got \(\)"),
+        ({"a": [], "d": [], "alpha": []}, "expected at least one row, got none"),
+        ({"prismatic": (True, True)}, "prismatic of arm 'one': expected 1 truth values"),
+    ],
+)
+def test_bad_tables_are_refused(table, message):
+    with pytest.raises(InvalidInputError, match=message):
+        from_dh("one", **({"a": [1], "d": [0], "alpha": [0]} | table))
+
+
+def test_an_unknown_convention_is_answered_with_the_nearest():
+    with pytest.raises(UnknownNameError, match=r"'modfied'\. Did you mean 'modified'"):
+        from_dh("one", [1], [0], [0], convention="modfied")

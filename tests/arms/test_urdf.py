@@ -1,0 +1,443 @@
+import sys
+import threading
+from itertools import pairwise
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from ikgym import arms
+from ikgym.arms import from_urdf
+from ikgym.arms.urdf import MAX_BYTES
+from ikgym.exceptions import InvalidInputError, MissingDependencyError, UnknownNameError
+from tests.pinocchio_models import tool_state
+
+LIMIT = '<limit lower="-1.5" upper="2.5" velocity="3" effort="1"/>'
+
+
+def joint(name, parent, child, kind="revolute", inside=LIMIT):
+    ends = f'<parent link="{parent}"/><child link="{child}"/>'
+    return f'<joint name="{name}" type="{kind}">{ends}{inside}</joint>'
+
+
+def robot(*joints, links="abc", extra=""):
+    parts = [f"<link name={link!r}/>" for link in links] + list(joints)
+    return f'<robot name="r2">{"".join(parts)}{extra}</robot>'
+
+
+# A shifted base, every kind of joint with a turned origin, axes between the coordinate axes, a tool
+# with an orientation, a mesh that does not exist, and a gripper as a branch.
+ORIGIN = '<origin xyz="0.{0} -0.2 0.{1}" rpy="0.{1} -1.{0} 2.{0}"/>'
+WHOLE = robot(
+    joint("mount", "world", "base", "fixed", ORIGIN.format(1, 3)),
+    joint("turn", "base", "one", "revolute", ORIGIN.format(2, 4) + '<axis xyz="0 0 -1"/>' + LIMIT),
+    joint("spin", "one", "two", "continuous", ORIGIN.format(3, 5) + '<axis xyz="0.6 0 -0.8"/>'),
+    joint("elbow", "two", "three", "fixed", ORIGIN.format(4, 6)),
+    joint(
+        "slide",
+        "three",
+        "four",
+        "prismatic",
+        ORIGIN.format(5, 7) + '<axis xyz="0.577 -0.577 0.577"/><limit upper="0.8" velocity="0.1" effort="1"/>',
+    ),
+    joint("roll", "four", "five", "revolute", LIMIT),
+    joint("flange", "five", "tool", "fixed", ORIGIN.format(6, 8)),
+    joint("jaw", "five", "finger", "prismatic", LIMIT),
+    joint("jaw2", "five", "thumb", "prismatic", LIMIT + '<mimic joint="jaw"/>'),
+    joint("rope", "base", "bucket", "floating", ""),
+    links=("world", "base", "one", "two", "three", "four", "five", "tool", "finger", "thumb", "bucket"),
+    extra='<material name="steel"/><gazebo/>',
+).replace(
+    "<link name='two'/>",
+    "<link name='two'><visual><geometry><mesh filename='package://no/two.dae'/></geometry></visual></link>",
+)
+
+
+@pytest.fixture
+def write(tmp_path):
+    def write(content, name="arm.urdf"):
+        path = tmp_path / name
+        path.write_bytes(content if isinstance(content, bytes) else content.encode())
+        return path
+
+    return write
+
+
+def pinocchio_pose(xml, base, tip, coordinates):
+    """Where Pinocchio, reading the whole file, sees the tip from the base; coordinates by names of joints."""
+    model = pin.buildModelFromXML(xml)
+    data, q = model.createData(), pin.neutral(model)
+    for name, value in coordinates.items():
+        index = model.joints[model.getJointId(name)]
+        q[index.idx_q : index.idx_q + index.nq] = [np.cos(value), np.sin(value)] if index.nq == 2 else value
+    pin.framesForwardKinematics(model, data, q)
+    return data.oMf[model.getFrameId(base)].actInv(data.oMf[model.getFrameId(tip)])
+
+
+@pytest.mark.parametrize(
+    ("base", "tip", "moving"),
+    [
+        ("world", "tool", ["turn", "spin", "slide", "roll"]),
+        ("base", "tool", ["turn", "spin", "slide", "roll"]),
+        ("one", "five", ["spin", "slide", "roll"]),
+        ("two", "four", ["slide"]),
+        ("two", "finger", ["slide", "roll", "jaw"]),
+    ],
+)
+def test_forward_kinematics_is_that_of_pinocchio(write, base, tip, moving):
+    path = write(WHOLE)
+    arm = from_urdf(path, base=base, tip=tip)
+    assert arm.joints == len(moving)
+    for q in (np.zeros(arm.joints), *np.random.default_rng(0).uniform(-3, 3, (20, arm.joints))):
+        rotation, position = arm.forward(q)
+        expected = pinocchio_pose(WHOLE, base, tip, dict(zip(moving, q, strict=True)))
+        np.testing.assert_allclose(rotation, expected.rotation, rtol=0, atol=1e-12)
+        np.testing.assert_allclose(position, expected.translation, rtol=0, atol=1e-12)
+
+
+def test_jacobian_is_that_of_pinocchio(write):
+    xml = robot(
+        joint("turn", "a", "b", inside=ORIGIN.format(1, 2) + '<axis xyz="0 0.8 0.6"/>' + LIMIT),
+        joint("slide", "b", "c", "prismatic", ORIGIN.format(3, 4) + '<axis xyz="0 -1 0"/>' + LIMIT),
+    )
+    model, arm = pin.buildModelFromXML(xml), from_urdf(write(xml))
+    for q in np.random.default_rng(0).uniform(-3, 3, (20, 2)):
+        expected = tool_state(model, model.getFrameId("c"), q).jacobian
+        np.testing.assert_allclose(arm.jacobian(q), expected, rtol=0, atol=1e-12)
+
+
+def test_limits_and_kinds_are_read(write):
+    arm = from_urdf(write(WHOLE), tip="tool")
+    assert arm.name == "r2"
+    assert arm.prismatic == (False, False, True, False)
+    np.testing.assert_array_equal(arm.lower, [-1.5, -np.inf, 0, -1.5])
+    np.testing.assert_array_equal(arm.upper, [2.5, np.inf, 0.8, 2.5])
+    np.testing.assert_array_equal(arm.velocity_limit, [3, np.inf, 0.1, 3])
+
+
+def test_a_continuous_joint_keeps_its_velocity_limit_alone(write):
+    arm = from_urdf(write(robot(joint("j", "a", "b", "continuous"), links="ab")))
+    np.testing.assert_array_equal([arm.lower, arm.upper, arm.velocity_limit], [[-np.inf], [np.inf], [3]])
+
+
+def test_the_name_can_be_chosen_and_the_path_be_text(write):
+    assert from_urdf(str(write(robot(joint("j", "a", "b"), links="ab"))), name="mine").name == "mine"
+
+
+def test_a_joint_without_axis_turns_about_x(write):
+    arm = from_urdf(write(robot(joint("j", "a", "b"), links="ab")))
+    np.testing.assert_array_equal(arm.axes, [[1, 0, 0]])
+
+
+def test_a_rounded_axis_is_scaled_to_unit_length(write):
+    arm = from_urdf(write(robot(joint("j", "a", "b", inside='<axis xyz="0.71 0 -0.71"/>' + LIMIT), links="ab")))
+    np.testing.assert_allclose(arm.axes, [[np.sqrt(0.5), 0, -np.sqrt(0.5)]], rtol=0, atol=1e-15)
+
+
+def test_the_only_leaf_below_the_base_is_the_tip(write):
+    xml = robot(joint("left", "a", "b"), joint("right", "a", "c"), joint("wrist", "c", "d"), links="abcd")
+    assert from_urdf(write(xml), base="c").joints == 1
+    with pytest.raises(InvalidInputError, match="expected a tip, since there are several: 'b', 'd'"):
+        from_urdf(write(xml))
+
+
+def test_names_may_hold_anything_that_xml_can_hold(write):
+    xml = robot(joint("j&lt;1&gt;", "a &amp; b", "größe"), links=()).replace(
+        "</robot>", '<link name="a &amp; b"/><link name="größe"/></robot>'
+    )
+    assert from_urdf(write(xml), tip="größe").joints == 1
+    latin = b'<?xml version="1.0" encoding="latin-1"?>' + xml.encode("latin-1")
+    assert from_urdf(write(latin), tip="größe").joints == 1
+
+
+PAIR = (joint("j1", "a", "b"), joint("j2", "b", "c"))
+
+
+def with_joint(kind="revolute", inside=LIMIT):
+    return robot(joint("j1", "a", "b", kind, inside), links="ab")
+
+
+# What is wrong, the file, and what the message says.
+BAD_FILES = {
+    "empty": (
+        "",
+        "expected XML, got 0 bytes with a fault: no element found",
+    ),
+    "no xml": (
+        "rubbish",
+        "expected XML, got 7 bytes with a fault",
+    ),
+    "cut off": (
+        robot(*PAIR)[:-3],
+        "expected XML, .* fault",
+    ),
+    "not utf-8": (
+        b'<robot name="\xff\xfe"/>',
+        "expected XML, .* fault: not well-formed",
+    ),
+    "encoding": (
+        b'<?xml version="1.0" encoding="klingon"?><robot/>',
+        "fault: unknown encoding",
+    ),
+    "zero bytes": (
+        b"\x00" * 100,
+        "expected XML, got 100 bytes with a fault",
+    ),
+    "very deep": (
+        "<a>" * 10**6,
+        "expected XML, .* fault",
+    ),
+    "another root": (
+        "<sdf/>",
+        "expected the root element <robot>, got <sdf>",
+    ),
+    "xacro": (
+        '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="r"><xacro:macro name="m"/></robot>',
+        "expected a URDF, got macros of xacro; expand them",
+    ),
+    "no link": (
+        '<robot name="r"/>',
+        "expected at least one <link> in <robot>, got none",
+    ),
+    "no joint": (
+        robot(),
+        "expected at least one <joint> in <robot>, got none",
+    ),
+    "no name": (
+        robot(*PAIR).replace(' name="r2"', ""),
+        'robot: expected <robot name="…">',
+    ),
+    "links": (
+        robot(*PAIR, links="abca"),
+        "every link to have a name of its own, got two called 'a'",
+    ),
+    "joints": (
+        robot(joint("j", "a", "b"), joint("j", "b", "c")),
+        "every joint to have a name of its own, got two called 'j'",
+    ),
+    "nameless link": (
+        robot(*PAIR).replace("name='c'", ""),
+        'expected <link name="…">, got none',
+    ),
+    "unknown type": (
+        with_joint("hinge"),
+        "joint 'j1': expected type of <joint> to be one of 'revolute', .*'planar'; got 'hinge'",
+    ),
+    "no type": (
+        with_joint("").replace(' type=""', ""),
+        "joint 'j1': expected <joint type=\"…\">",
+    ),
+    "child nowhere": (
+        robot(*PAIR, links="ab"),
+        "joint 'j2': expected link of <child> to be one of 'a', 'b'; got 'c'",
+    ),
+    "parent nowhere": (
+        robot(*PAIR, links="bc"),
+        "joint 'j1': expected link of <parent> to be one of 'b', 'c'; got 'a'",
+    ),
+    "no child": (
+        with_joint().replace('<child link="b"/>', ""),
+        "'j1': expected a <child>, got none",
+    ),
+    "parent unnamed": (
+        with_joint().replace('<parent link="a"/>', "<parent/>"),
+        'expected <parent link="…">',
+    ),
+    "two limits": (
+        with_joint(inside=LIMIT + LIMIT),
+        "joint 'j1': expected one <limit>, got 2",
+    ),
+    "two parents": (
+        robot(*PAIR, joint("j3", "a", "c")),
+        "link 'c': expected one joint above it, got joint 'j2' and joint 'j3'",
+    ),
+    "cycle": (
+        robot(*PAIR, joint("j3", "c", "a")),
+        "a tree of links, got a loop of 'a', 'b', 'c'",
+    ),
+    "own parent": (
+        robot(joint("j1", "a", "a"), links="a"),
+        "got a loop of 'a'",
+    ),
+    "cycle apart": (
+        robot(joint("j1", "a", "b"), joint("j2", "c", "d"), joint("j3", "d", "c"), links="abcd"),
+        "got a loop of 'c', 'd'",
+    ),
+    "loose links": (
+        robot(*PAIR, links="abcde"),
+        "expected one link without a joint above it, got 'a', 'd', 'e'",
+    ),
+    "floating": (
+        with_joint("floating"),
+        "joint 'j1': expected one of 'revolute', .* got 'floating'",
+    ),
+    "planar": (
+        with_joint("planar"),
+        "joint 'j1': expected one of 'revolute', .* got 'planar'",
+    ),
+    "mimic": (
+        with_joint(inside=LIMIT + "<mimic joint='x'/>"),
+        "'j1': .* got one with <mimic>",
+    ),
+    "nothing moves": (
+        with_joint("fixed"),
+        "a joint that moves between links 'a' and 'b', got none",
+    ),
+    "no limit": (
+        with_joint(inside=""),
+        "joint 'j1': expected a <limit>, got none",
+    ),
+    "no slide limit": (
+        with_joint("prismatic", ""),
+        "joint 'j1': expected a <limit>, got none",
+    ),
+    "no velocity": (
+        with_joint(inside='<limit lower="-1" upper="1"/>'),
+        '<limit velocity="…">',
+    ),
+    "velocity 0": (
+        with_joint(inside='<limit upper="1" velocity="0"/>'),
+        "velocity limit above 0, got 0",
+    ),
+    "limits crossed": (
+        with_joint(inside='<limit lower="2" upper="1" velocity="1"/>'),
+        "joint 'j1': expected limits lower < upper, got 2 and 1",
+    ),
+    "limits left out": (
+        with_joint(inside='<limit velocity="1"/>'),
+        "expected limits lower < upper, got 0 and 0",
+    ),
+    "zero axis": (
+        with_joint(inside='<axis xyz="0 0 0"/>' + LIMIT),
+        r"axis of unit length, got \(0.0, 0.0, 0.0\)",
+    ),
+    "long axis": (
+        with_joint(inside='<axis xyz="0 0 2"/>' + LIMIT),
+        r"axis of unit length, got \(0.0, 0.0, 2.0\)",
+    ),
+    "∞": (
+        with_joint(inside=LIMIT.replace("2.5", "∞")),
+        "upper to be a finite number, got '∞'",
+    ),
+    "two": (
+        with_joint(inside=LIMIT.replace("3", "1 2")),
+        "velocity to be a finite number, got '1 2'",
+    ),
+}
+BAD_NUMBERS = ("0 0", "0 0 1 0", "", "nan 0 1", "0 inf 0", "0 0 1e999", "0 1_0 1", "0,0,1", "x y z")
+
+
+def refused(path, message):
+    with pytest.raises(InvalidInputError, match=rf"arm\.urdf: .*{message}"):
+        from_urdf(path)
+
+
+@pytest.mark.parametrize(("content", "message"), BAD_FILES.values(), ids=BAD_FILES)
+def test_bad_files_are_refused(write, content, message, capfd):
+    refused(write(content), message)
+    # All is found out before Pinocchio sees it, which would complain on its own.
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("numbers", BAD_NUMBERS)
+@pytest.mark.parametrize(("tag", "key"), [("origin", "xyz"), ("origin", "rpy"), ("axis", "xyz")])
+def test_bad_numbers_are_refused(write, tag, key, numbers):
+    path = write(with_joint(inside=f'<{tag} {key}="{numbers}"/>{LIMIT}'))
+    refused(path, f"joint 'j1': expected {key} to be 3 finite numbers, got '{numbers}'")
+
+
+ENTITIES = "".join(f"<!ENTITY {new} '{10 * f'&{old};'}'>" for old, new in pairwise("abcdefghijklmnopqrstuvwxyz"))
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        pytest.param(f"<!DOCTYPE r [<!ENTITY a 'a'>{ENTITIES}]><robot name='&z;'/>", id="entities without bound"),
+        pytest.param("<!DOCTYPE r [<!ENTITY x SYSTEM 'file:///etc/hostname'>]><robot name='&x;'/>", id="another file"),
+        pytest.param("<!DOCTYPE robot SYSTEM 'robot.dtd'><robot name='r'/>", id="external subset"),
+        pytest.param("<!DOCTYPE r [<!ENTITY a 'a'>]><robot/>".encode("utf-16"), id="utf-16"),
+    ],
+)
+def test_a_doctype_is_refused(write, content):
+    with pytest.raises(InvalidInputError, match=r"arm\.urdf: expected no DOCTYPE"):
+        from_urdf(write(content))
+
+
+def test_what_cannot_be_read_is_refused(tmp_path):
+    for path in (tmp_path, tmp_path / "missing.urdf", "bad\0name", 7.5, None):
+        with pytest.raises(InvalidInputError, match="expected a URDF file, got none that can be read"):
+            from_urdf(path)
+
+
+def test_a_huge_file_is_refused(tmp_path):
+    path = tmp_path / "huge.urdf"
+    with path.open("wb") as file:
+        file.truncate(MAX_BYTES + 1)
+    with pytest.raises(InvalidInputError, match=f"huge.urdf: expected a URDF file of at most {MAX_BYTES} bytes"):
+        from_urdf(path)
+
+
+def chain(count):
+    names = [f"l{i}" for i in range(count + 1)]
+    return robot(*(joint(f"j{i}", *names[i : i + 2]) for i in range(count)), links=names)
+
+
+def test_a_chain_that_would_overflow_the_stack_of_parsers_is_refused(write):
+    with pytest.raises(InvalidInputError, match="expected at most 128 joints from 'l0' to 'l20000', got 20000"):
+        from_urdf(write(chain(20_000)))
+    # The longest that is read, also on the small stack of a thread.
+    read = []
+    thread = threading.Thread(target=lambda: read.append(from_urdf(write(chain(128))).joints))
+    thread.start()
+    thread.join()
+    assert read == [128]
+
+
+def test_unknown_links_are_answered_with_the_nearest(write):
+    path = write(WHOLE)
+    with pytest.raises(UnknownNameError, match=r"no link 'tol'\. Did you mean 'tool'"):
+        from_urdf(path, tip="tol")
+    with pytest.raises(UnknownNameError, match=r"no link 'bas'\. Did you mean 'base'\? Available: world, base"):
+        from_urdf(path, base="bas", tip="tool")
+
+
+@pytest.mark.parametrize(("base", "tip"), [("finger", "tool"), ("tool", "base")])
+def test_a_base_that_is_not_above_the_tip_is_refused(write, base, tip):
+    with pytest.raises(InvalidInputError, match=f"expected a base above tip '{tip}', one of .*'world'; got '{base}'"):
+        from_urdf(write(WHOLE), base=base, tip=tip)
+
+
+def test_nothing_is_above_the_root(write):
+    with pytest.raises(InvalidInputError, match="expected a base above tip 'world', one of none; got 'tool'"):
+        from_urdf(write(WHOLE), base="tool", tip="world")
+
+
+def test_base_and_tip_must_differ(write):
+    with pytest.raises(InvalidInputError, match="a joint that moves between links 'one' and 'one', got none"):
+        from_urdf(write(WHOLE), base="one", tip="one")
+
+
+def test_errors_of_pinocchio_name_the_file(write, monkeypatch):
+    def fail(xml):
+        raise RuntimeError("out of order")
+
+    monkeypatch.setattr(pin, "buildModelFromXML", fail)
+    with pytest.raises(InvalidInputError, match=r"arm.urdf: .* Pinocchio .* out of order"):
+        from_urdf(write(robot(*PAIR)))
+
+
+def test_a_missing_pinocchio_is_named_with_its_remedy(write, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pinocchio", None)
+    with pytest.raises(MissingDependencyError, match=r'pip install "ikgym\[urdf\]"'):
+        from_urdf(write(robot(*PAIR)))
+
+
+def test_an_arm_from_a_file_can_be_registered(write):
+    path = write(robot(*PAIR))
+    arms.register("from a file", lambda: from_urdf(path, name="from a file"))
+    try:
+        assert arms.get("from a file").joints == 2
+    finally:
+        # The suites over the registry must not depend on the order of tests.
+        arms._registry._makers.pop("from a file")
+        arms._registry._made.pop("from a file")

@@ -1,0 +1,137 @@
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.linalg import expm
+from scipy.spatial.transform import Rotation
+
+from ikgym import rotations
+from ikgym.rotations import geodesic_angle, quaternion, rodrigues, rotation_vector
+
+# Along and between the coordinate axes, with both signs, and nearly along one.
+AXES = [
+    np.array(axis) / np.linalg.norm(axis)
+    for axis in (
+        *(sign * row for sign in (1.0, -1.0) for row in np.eye(3)),
+        (1, 1, 0), (-1, 1, 0), (0, 1, -1), (-1, 0, -1),
+        (1, 1, 1), (-1, 1, 1), (1, -1, 1), (-1, -1, -1),
+        (0.3, -0.5, 0.8), (-0.9, 0.1, -0.2), (1, 1e-9, 0), (-1e-9, 1e-9, -1),
+    )
+]  # fmt: skip
+TINY = [1e-150, 1e-16, 1e-12, 1e-9, 1e-8, 3e-6, 1e-3]
+MIDDLE = [0.1, 1.0, math.pi / 2, 2.0, 2 * math.pi / 3, 3.0]
+NEAR_HALF_TURN = [math.pi - d for d in (1e-3, 1e-6, 1e-9, 1e-12)]
+
+every_axis = pytest.mark.parametrize("axis", AXES, ids=lambda axis: np.array2string(axis, precision=1))
+
+unit_vectors = (
+    st.tuples(*3 * [st.floats(-1, 1)])
+    .map(np.array)
+    .filter(lambda v: np.linalg.norm(v) > 1e-3)
+    .map(lambda v: v / np.linalg.norm(v))
+)
+
+
+def cross_matrix(axis):
+    x, y, z = axis
+    return np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+
+
+@every_axis
+@pytest.mark.parametrize("angle", [0.0, *TINY, *MIDDLE, *NEAR_HALF_TURN, math.pi, 5.0, -0.7, -math.pi, 100.0])
+def test_rodrigues_is_the_matrix_exponential(axis, angle):
+    got = rodrigues(axis, angle)
+    np.testing.assert_allclose(got, Rotation.from_rotvec(angle * axis).as_matrix(), rtol=0, atol=3e-14)
+    if abs(angle) < 10:
+        np.testing.assert_allclose(got, expm(angle * cross_matrix(axis)), rtol=0, atol=1e-14)
+
+
+def test_rodrigues_turns_x_to_y_about_z():
+    np.testing.assert_allclose(rodrigues(np.array([0.0, 0, 1]), math.pi / 2) @ [1, 0, 0], [0, 1, 0], atol=1e-15)
+
+
+@every_axis
+@pytest.mark.parametrize("angle", TINY)
+def test_rotation_vector_of_a_tiny_angle_keeps_all_its_digits(axis, angle):
+    got = rotation_vector(rodrigues(axis, angle))
+    np.testing.assert_allclose(got, angle * axis, rtol=0, atol=1e-15 * angle)
+
+
+@every_axis
+@pytest.mark.parametrize("angle", [*MIDDLE, *NEAR_HALF_TURN])
+def test_rotation_vector_of_a_larger_angle(axis, angle):
+    np.testing.assert_allclose(rotation_vector(rodrigues(axis, angle)), angle * axis, rtol=0, atol=5e-15)
+
+
+@every_axis
+def test_rotation_vector_at_a_half_turn_is_the_axis_up_to_its_sign(axis):
+    exact = 2 * np.outer(axis, axis) - np.eye(3)
+    vector = rotation_vector(exact)
+    assert np.linalg.norm(vector) == pytest.approx(math.pi, abs=1e-14)
+    assert abs(vector @ axis) == pytest.approx(math.pi, abs=1e-14)
+
+
+def test_rotation_vector_at_rest_is_zero():
+    np.testing.assert_array_equal(rotation_vector(np.eye(3)), np.zeros(3))
+
+
+@given(unit_vectors, st.floats(0, math.pi))
+def test_rotation_vector_and_rodrigues_undo_each_other(axis, angle):
+    rotation = rodrigues(axis, angle)
+    vector = rotation_vector(rotation)
+    length = np.linalg.norm(vector)
+    assert length <= math.pi + 1e-15
+    assert length == pytest.approx(angle, abs=1e-14)
+    again = rodrigues(vector / length, length) if length > 0 else np.eye(3)
+    np.testing.assert_allclose(again, rotation, rtol=0, atol=1e-14)
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_rotation_vector_agrees_with_scipy(seed):
+    rotation = Rotation.random(rng=np.random.default_rng(seed))
+    np.testing.assert_allclose(rotation_vector(rotation.as_matrix()), rotation.as_rotvec(), rtol=0, atol=1e-13)
+
+
+@given(unit_vectors, st.floats(-math.pi, math.pi))
+def test_quaternion_is_of_unit_length_with_its_real_part_not_negative(axis, angle):
+    got = np.array(quaternion(rodrigues(axis, angle)))
+    sign = math.copysign(1.0, math.cos(angle / 2))
+    expected = sign * np.array([math.cos(angle / 2), *(math.sin(angle / 2) * axis)])
+    assert got[0] >= 0
+    assert np.linalg.norm(got) == pytest.approx(1, abs=1e-15)
+    # At a half turn both signs are right.
+    assert min(np.abs(got - expected).max(), np.abs(got + expected).max() if got[0] < 1e-12 else np.inf) < 1e-14
+
+
+@every_axis
+@pytest.mark.parametrize("angle", [0.0, *TINY, *MIDDLE, *NEAR_HALF_TURN, math.pi])
+def test_geodesic_angle_from_the_identity_keeps_all_its_digits(axis, angle):
+    rotation = rodrigues(axis, angle)
+    for ends in ((np.eye(3), rotation), (rotation, np.eye(3))):
+        assert geodesic_angle(*ends) == pytest.approx(angle, rel=3e-15, abs=0)
+
+
+@given(unit_vectors, st.floats(0, math.pi), unit_vectors, st.floats(0, math.pi))
+def test_geodesic_angle_does_not_depend_on_where_it_starts(axis, angle, other_axis, other_angle):
+    first = rodrigues(other_axis, other_angle)
+    assert geodesic_angle(first, rodrigues(axis, angle) @ first) == pytest.approx(angle, abs=1e-14)
+    assert geodesic_angle(first, first @ rodrigues(axis, angle)) == pytest.approx(angle, abs=1e-14)
+
+
+@given(unit_vectors, st.floats(-math.pi, math.pi))
+def test_geodesic_angle_to_itself_is_exactly_zero(axis, angle):
+    rotation = rodrigues(axis, angle)
+    assert geodesic_angle(rotation, rotation) == 0.0
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-9, 1.0, 3.0, math.pi])
+@every_axis
+def test_compiled_kernels_equal_plain_python(axis, angle, monkeypatch):
+    compiled = rodrigues(axis, angle)
+    vector, between = rotation_vector(compiled), geodesic_angle(np.eye(3), compiled)
+    monkeypatch.setattr(rotations, "quaternion", quaternion.py_func)
+    np.testing.assert_allclose(rodrigues.py_func(axis, angle), compiled, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(rotation_vector.py_func(compiled), vector, rtol=0, atol=1e-15)
+    assert geodesic_angle.py_func(np.eye(3), compiled) == pytest.approx(between, abs=1e-15)
