@@ -1,0 +1,116 @@
+"""The tracking cost: what every policy is scored by."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+
+from ikgym import cost_kernels
+from ikgym.cost_kernels import CostParameters
+from ikgym.exceptions import InvalidInputError
+from ikgym.validation import FloatArray, Frozen, float_array, number
+
+
+@dataclasses.dataclass(frozen=True)
+class TrackingCost(Frozen):
+    """The stage cost of a receding-horizon controller (Varga 2021, section III).
+
+    Per component j, ``Φ^X_j = |e_j / Δx|^P`` with P = 2 inside ``|e_j| <= Δx`` and ``P_X`` outside, and
+    ``Φ^U_j = |q̇_j / Δq̇|^P`` with ``P_in`` inside ``|q̇_j| <= Δq̇`` and ``P_out`` outside. Both are continuous;
+    their slopes jump where the exponent changes. Small errors and small velocities are nearly free, large ones
+    are very dear.
+
+    Args:
+        delta_x: Δx, the tracking error that counts as 1, in [m] and [rad] (or as a number, for parts of a
+            rotation matrix).
+        p_x: P_X, the exponent of errors above Δx.
+        delta_qdot: Δq̇, the joint velocity that counts as 1, in [rad/s] or [m/s].
+        p_out: The exponent of velocities above Δq̇.
+        p_in: The exponent of velocities up to Δq̇.
+
+    Raises:
+        InvalidInputError: Δx or Δq̇ is not above 0, or an exponent is below 1.
+    """
+
+    delta_x: float = 1e-3
+    p_x: float = 3.0
+    delta_qdot: float = 0.8
+    p_out: float = 4.0
+    p_in: float = 4.0
+
+    def __post_init__(self) -> None:
+        for name in ("delta_x", "delta_qdot"):
+            object.__setattr__(self, name, number(name, getattr(self, name), above=0.0))
+        for name in ("p_x", "p_out", "p_in"):
+            object.__setattr__(self, name, number(name, getattr(self, name), at_least=1.0))
+
+    @property
+    def parameters(self) -> CostParameters:
+        """The cost as its kernels see it."""
+        return CostParameters(self.delta_x, self.p_x, self.delta_qdot, self.p_out, self.p_in)
+
+    def tracking(self, error: npt.ArrayLike) -> FloatArray | float:
+        """Φ^X of a tracking error.
+
+        Args:
+            error: Error of the task coordinates. Shape (..., e).
+
+        Returns:
+            The cost, a float for one error. Shape (...).
+
+        Raises:
+            InvalidInputError: The error is no array of finite numbers.
+        """
+        return self._sum("error", error, cost_kernels.tracking)
+
+    def velocity(self, qdot: npt.ArrayLike) -> FloatArray | float:
+        """Φ^U of a joint velocity.
+
+        Args:
+            qdot: Joint velocity in [rad/s] or [m/s]. Shape (..., n).
+
+        Returns:
+            The cost, a float for one velocity. Shape (...).
+
+        Raises:
+            InvalidInputError: The velocity is no array of finite numbers.
+        """
+        return self._sum("qdot", qdot, cost_kernels.velocity)
+
+    def tracking_gradient(self, error: npt.ArrayLike) -> FloatArray:
+        """∂Φ^X/∂error. Shapes (..., e)."""
+        return self._map("error", error, cost_kernels.tracking_gradient)
+
+    def tracking_curvature(self, error: npt.ArrayLike) -> FloatArray:
+        """The diagonal of ∂²Φ^X/∂error². Shapes (..., e). At ``|e| = Δx`` that of the inside."""
+        return self._map("error", error, cost_kernels.tracking_curvature)
+
+    def velocity_gradient(self, qdot: npt.ArrayLike) -> FloatArray:
+        """∂Φ^U/∂q̇. Shapes (..., n)."""
+        return self._map("qdot", qdot, cost_kernels.velocity_gradient)
+
+    def velocity_curvature(self, qdot: npt.ArrayLike) -> FloatArray:
+        """The diagonal of ∂²Φ^U/∂q̇². Shapes (..., n). At rest inf if 1 < P_in < 2; at ``|q̇| = Δq̇`` the inside's."""
+        return self._map("qdot", qdot, cost_kernels.velocity_curvature)
+
+    def _sum(self, name: str, value: npt.ArrayLike, kernel: Callable[..., float]) -> FloatArray | float:
+        array = _rows(name, value)
+        out = np.array([kernel(self.parameters, row) for row in array.reshape(-1, array.shape[-1])])
+        return float(out[0]) if array.ndim == 1 else out.reshape(array.shape[:-1])
+
+    def _map(self, name: str, value: npt.ArrayLike, kernel: Callable[..., None]) -> FloatArray:
+        array = _rows(name, value)
+        out = np.empty_like(array)
+        for row, target in zip(array.reshape(-1, array.shape[-1]), out.reshape(-1, array.shape[-1]), strict=True):
+            kernel(self.parameters, row, target)
+        return out
+
+
+def _rows(name: str, value: npt.ArrayLike) -> FloatArray:
+    array = float_array(name, value)
+    if array.ndim == 0 or array.shape[-1] == 0:
+        raise InvalidInputError(f"{name}: expected shape (..., components), got {array.shape}.")
+    return array

@@ -1,0 +1,107 @@
+"""Kernels of the tracking cost: value, gradient and curvature of Φ^X and Φ^U (Varga 2021, section III)."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from numba import njit
+
+
+class CostParameters(NamedTuple):
+    """The shape of the cost; see :class:`ikgym.TrackingCost`."""
+
+    delta_x: float
+    p_x: float
+    delta_qdot: float
+    p_out: float
+    p_in: float
+
+
+# The exponent of small tracking errors is not a parameter: "the usual quadratic tracking rule".
+P_X_INSIDE = 2.0
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _power(x, p):  # type: ignore[no-untyped-def]
+    """The p-th power of x >= 0; whole exponents, the usual case, cost a few products instead of a call."""
+    if p == 2.0:
+        return x * x
+    if p == 3.0:
+        return x * x * x
+    if p == 4.0:
+        return (x * x) * (x * x)
+    if p == 1.0:
+        return x
+    if p == 0.0:
+        return 1.0
+    return x**p
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _value(x, delta, inside, outside):  # type: ignore[no-untyped-def]
+    r = abs(x) / delta
+    return _power(r, outside if r > 1.0 else inside)
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _slope(x, delta, inside, outside):  # type: ignore[no-untyped-def]
+    r = abs(x) / delta
+    p = outside if r > 1.0 else inside
+    slope = p * _power(r, p - 1.0) / delta
+    # At rest the cost is flat, also for p = 1, where any slope between -1/Δ and 1/Δ would do.
+    return slope if x > 0.0 else (-slope if x < 0.0 else 0.0)
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _bend(x, delta, inside, outside):  # type: ignore[no-untyped-def]
+    r = abs(x) / delta
+    p = outside if r > 1.0 else inside
+    if p == 1.0:
+        return 0.0
+    return p * (p - 1.0) * _power(r, p - 2.0) / (delta * delta)
+
+
+@njit(cache=True, nogil=True)
+def tracking(cost, error):  # type: ignore[no-untyped-def]
+    """Φ^X, the sum over the components of the tracking error. Shape of ``error`` (e,)."""
+    total = 0.0
+    for j in range(error.shape[0]):
+        total += _value(error[j], cost.delta_x, P_X_INSIDE, cost.p_x)
+    return total
+
+
+@njit(cache=True, nogil=True)
+def tracking_gradient(cost, error, out):  # type: ignore[no-untyped-def]
+    """∂Φ^X/∂error. Shapes (e,)."""
+    for j in range(error.shape[0]):
+        out[j] = _slope(error[j], cost.delta_x, P_X_INSIDE, cost.p_x)
+
+
+@njit(cache=True, nogil=True)
+def tracking_curvature(cost, error, out):  # type: ignore[no-untyped-def]
+    """The diagonal of ∂²Φ^X/∂error². Shapes (e,)."""
+    for j in range(error.shape[0]):
+        out[j] = _bend(error[j], cost.delta_x, P_X_INSIDE, cost.p_x)
+
+
+@njit(cache=True, nogil=True)
+def velocity(cost, qdot):  # type: ignore[no-untyped-def]
+    """Φ^U, the sum over all joints (the printed sum to 6 is a slip). Shape of ``qdot`` (n,)."""
+    total = 0.0
+    for j in range(qdot.shape[0]):
+        total += _value(qdot[j], cost.delta_qdot, cost.p_in, cost.p_out)
+    return total
+
+
+@njit(cache=True, nogil=True)
+def velocity_gradient(cost, qdot, out):  # type: ignore[no-untyped-def]
+    """∂Φ^U/∂q̇. Shapes (n,)."""
+    for j in range(qdot.shape[0]):
+        out[j] = _slope(qdot[j], cost.delta_qdot, cost.p_in, cost.p_out)
+
+
+@njit(cache=True, nogil=True)
+def velocity_curvature(cost, qdot, out):  # type: ignore[no-untyped-def]
+    """The diagonal of ∂²Φ^U/∂q̇². Shapes (n,)."""
+    for j in range(qdot.shape[0]):
+        out[j] = _bend(qdot[j], cost.delta_qdot, cost.p_in, cost.p_out)

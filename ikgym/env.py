@@ -1,0 +1,237 @@
+"""The environment: one arm tracks one nominal trajectory."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+import gymnasium as gym
+import numpy as np
+import numpy.typing as npt
+
+from ikgym import scenarios
+from ikgym.exceptions import InvalidInputError, ResetNeededError
+from ikgym.scenarios import Preview, Scenario
+from ikgym.simulation import Outcome
+from ikgym.simulator import Simulator
+from ikgym.spaces import action_space, observation_space
+from ikgym.validation import FloatArray, known_names
+
+Observation = dict[str, FloatArray]
+
+OBSERVED = ("q", "qdot", "pose", "nominal", "remaining")
+#: The keys of `info` after a step.
+REPORTED = ("tracking_cost", "velocity_cost", "position_error", "orientation_error", "clipped", "time")
+#: The keys that the options of a reset may have.
+OPTIONS = ("q",)
+
+
+class NotApplicable(np.float64):
+    """A NaN that equals itself, so that equal infos compare equal; what has no orientation has no error of it."""
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, NotApplicable)
+
+    __hash__ = np.float64.__hash__
+
+
+class RedundantIKEnv(gym.Env[Any, Any]):
+    """Trajectory tracking with a redundant robot arm.
+
+    ## Description
+    The tool of an arm is to follow a nominal trajectory that is known some steps ahead. At each step the policy
+    chooses the joint velocities, and pays for the tracking error and for high velocities: the stage cost of a
+    receding-horizon controller (Varga 2021). A scenario holds all that defines the problem.
+
+    ## Action space
+    | action | space | unit |
+    |---|---|---|
+    | joint velocity as a fraction of the scenario's `velocity_limit` | `Box(-1.0, 1.0, (n,), float32)` | 1 |
+
+    `velocity_limit` is in [rad/s], in [m/s] for a prismatic joint. An action outside the box is clipped, and
+    `info["clipped"]` says so. An action that is not finite or of a wrong shape is an error; the state stays as it
+    was.
+
+    ## Transition
+    q(k+1) = q(k) + Δt q̇(k) (Varga 2021, eq. 5), plus the scenario's disturbance, if it has one.
+
+    ## Observation space
+    A `Dict` of float64:
+
+    | key | shape | meaning | unit |
+    |---|---|---|---|
+    | `q` | (n,) | joint coordinates | [rad], [m] |
+    | `qdot` | (n,) | joint velocities last applied | [rad/s], [m/s] |
+    | `pose` | (m,) | measured task coordinates | [m], rotation parts 1 |
+    | `nominal` | (p, m) | nominal task coordinates ahead | [m], rotation parts 1 |
+    | `remaining` | (1,) | steps left in the episode | 1 |
+
+    `preview` = an int p gives X^N(k+1) … X^N(k+p); a tuple such as (1, 10, 40, 120) gives just those steps ahead.
+    The nominal goes on past the end of the episode. All bounds are finite and true: they follow from the start,
+    the velocity limit, the number of steps and the arm's reach.
+
+    ## Reward
+    −(Φ^X(X^N(k+1) − F(q(k+1))) + Φ^U(q̇(k))), minus the stage cost of the scenario's `TrackingCost`. Where a
+    scenario holds its nominal points for several steps, only the last step of each point costs anything.
+
+    ## Info
+    | key | meaning | unit |
+    |---|---|---|
+    | `tracking_cost` | Φ^X | 1 |
+    | `velocity_cost` | Φ^U | 1 |
+    | `position_error` | distance of the tool point from its nominal position | [m] |
+    | `orientation_error` | geodesic angle to the nominal orientation; NaN where the task has none | [rad] |
+    | `clipped` | whether the action left its box | bool |
+    | `time` | time since the start | [s] |
+
+    After a reset `info` is empty.
+
+    ## Starting state
+    The scenario's start, with no velocity. `reset(seed=…)` chooses the trajectory of a random scenario, see
+    `ikgym.scenarios.SPLITS` for the seeds; `reset(options={"q": …})` starts elsewhere, at most 2π [rad] or [m]
+    from home in each joint (or as far as the scenario's own start, if that is farther).
+
+    ## Episode end
+    Truncated by the environment itself after the scenario's `steps`; never terminated.
+
+    Args:
+        scenario: A scenario or the name of one, see `ikgym.scenarios.names()`.
+        preview: How many steps ahead the nominal coordinates are shown, or which ones.
+        render_mode: None, `"human"` (a window) or `"rgb_array"`.
+
+    Raises:
+        UnknownNameError: There is no such scenario.
+        InvalidInputError: The preview or the render mode is none.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["human", "rgb_array"], "render_fps": 50}  # type: ignore[misc]
+
+    def __init__(
+        self,
+        scenario: str | Scenario = "varga7-fast",
+        preview: Preview = 2,
+        render_mode: str | None = None,
+    ) -> None:
+        if render_mode is not None and render_mode not in self.metadata["render_modes"]:
+            raise InvalidInputError(
+                f"render_mode: expected None or one of {self.metadata['render_modes']}, got {render_mode!r}."
+            )
+        self.scenario = resolve(scenario)
+        self.render_mode = render_mode
+        self.observation_space = observation_space(self.scenario, preview)
+        self.action_space = action_space(self.scenario)
+        self._simulator = Simulator(self.scenario, None, preview)
+        self._step = -1  # no episode yet
+        self._steps, self._dt = self.scenario.steps, self.scenario.dt
+        self._has_orientation = self.scenario.task.has_orientation
+        self._renderer: Any = None if render_mode is None else _renderer(self.scenario, render_mode)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Begins an episode.
+
+        Args:
+            seed: Chooses the trajectory of a random scenario.
+            options: ``{"q": …}`` starts at other joint coordinates, in [rad] or [m]. Shape (n,).
+
+        Returns:
+            The first observation, and an empty info.
+
+        Raises:
+            UnknownNameError: There is no such option.
+            InvalidInputError: The start has a wrong shape, is not finite or out of range.
+        """
+        options = options or {}
+        known_names("option of reset", options, OPTIONS)
+        starts = self._simulator.checked_starts(options.get("q"))
+        super().reset(seed=seed)
+        self._simulator.reset(np.ones(1, dtype=np.bool_), [self.np_random], starts)
+        self._step = 0
+        out = self._simulator.observe()
+        if self._renderer is not None:
+            self._renderer.begin(self._simulator.nominal_positions(0))
+            self._draw_later(out)
+        return _observation(out), {}
+
+    def step(self, action: npt.NDArray[np.float32]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """Applies joint velocities for one time step; the class says what comes back.
+
+        Raises:
+            ResetNeededError: There is no episode, or it has ended.
+            InvalidInputError: The action is not finite or of a wrong shape; the state stays as it was.
+        """
+        if not 0 <= self._step < self._steps:
+            raise ResetNeededError(
+                "step() needs an episode: call reset() first."
+                if self._step < 0
+                else f"The episode has ended after {self._steps} steps: call reset() first."
+            )
+        out = self._simulator.step(action)
+        self._step += 1
+        tracking, velocity = float(out.tracking_cost[0]), float(out.velocity_cost[0])
+        info = {
+            "tracking_cost": tracking,
+            "velocity_cost": velocity,
+            "position_error": float(out.position_error[0]),
+            "orientation_error": float(out.orientation_error[0]) if self._has_orientation else NotApplicable("nan"),
+            "clipped": bool(out.clipped[0]),
+            "time": self._step * self._dt,
+        }
+        if self._renderer is not None:
+            self._draw_later(out)
+        return _observation(out), -(tracking + velocity), False, self._step == self._steps, info
+
+    def render(self) -> npt.NDArray[np.uint8] | None:
+        """Draws the arm, the nominal and the realised path, and the error over time.
+
+        Returns:
+            The picture in mode ``"rgb_array"``, of shape (height, width, 3); None in mode ``"human"``.
+
+        Raises:
+            ResetNeededError: There is no episode yet.
+        """
+        if self._renderer is None:
+            gym.logger.warn("render() draws nothing without a render_mode; give one to gym.make().")
+            return None
+        if self._step < 0:
+            raise ResetNeededError("render() needs an episode: call reset() first.")
+        picture: npt.NDArray[np.uint8] | None = self._renderer.draw()
+        return picture
+
+    def close(self) -> None:
+        """Closes the window, if there is one."""
+        if self._renderer is not None:
+            self._renderer.close()
+
+    def _draw_later(self, out: Outcome) -> None:
+        self._renderer.add(
+            out.q[0], float(out.position_error[0]), float(out.orientation_error[0]), self._step * self._dt
+        )
+        if self.render_mode == "human":
+            self._renderer.draw()
+
+
+def _renderer(scenario: Scenario, mode: str) -> Any:
+    # matplotlib is slow to import, and most environments never draw.
+    from ikgym.rendering import Renderer
+
+    return Renderer(scenario.arm, mode, title=scenario.name, has_orientation=scenario.task.has_orientation)
+
+
+def resolve(scenario: str | Scenario) -> Scenario:
+    """A scenario, or the one of a name.
+
+    Raises:
+        UnknownNameError: There is no such scenario.
+    """
+    return scenario if isinstance(scenario, Scenario) else scenarios.get(scenario)
+
+
+def _observation(out: Outcome) -> Observation:
+    return {
+        "q": out.q[0],
+        "qdot": out.qdot[0],
+        "pose": out.pose[0],
+        "nominal": out.nominal[0],
+        "remaining": out.remaining[0],
+    }

@@ -1,0 +1,56 @@
+"""Rows shared out to threads: compiled kernels release the interpreter lock, so plain threads do.
+
+Threads of our own instead of numba's parallel loops: those abort where two Python threads meet in them, or where
+a process forks after its first use, and both happen in the life of an environment.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+
+_pool: ThreadPoolExecutor | None = None
+
+
+def cores() -> int:
+    """The number of cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def in_chunks(work: Callable[[int, int], object], rows: int, grain: int) -> None:
+    """Runs ``work(start, stop)`` over all rows, in as many threads as there are cores.
+
+    Args:
+        work: Called with the first row of a chunk and the one after its last.
+        rows: The number of rows.
+        grain: Rows that are worth a thread; fewer are worked off in this one.
+    """
+    chunks = min(cores(), rows // max(grain, 1))
+    if chunks <= 1:
+        work(0, rows)
+        return
+    bounds = [rows * i // chunks for i in range(chunks + 1)]
+    others = [_threads().submit(work, bounds[i], bounds[i + 1]) for i in range(1, chunks)]
+    try:
+        work(bounds[0], bounds[1])
+    finally:
+        for future in others:
+            future.result()
+
+
+def _threads() -> ThreadPoolExecutor:
+    global _pool
+    if _pool is None:
+        _pool = ThreadPoolExecutor(max_workers=max(cores() - 1, 1), thread_name_prefix="ikgym")
+    return _pool
+
+
+def _forget() -> None:
+    """A forked child has the pool but none of its threads."""
+    global _pool
+    _pool = None
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_forget)

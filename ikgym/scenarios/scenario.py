@@ -1,0 +1,269 @@
+"""The scenario: everything that an environment, a solver or an oracle is built from, as one frozen object."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any, Self
+
+import numpy as np
+import numpy.typing as npt
+from gymnasium.utils import seeding
+
+from ikgym.arms import Arm
+from ikgym.cost import TrackingCost
+from ikgym.exceptions import InvalidInputError
+from ikgym.simulation import nominal_rows
+from ikgym.tasks import Task
+from ikgym.trajectories import Trajectory
+from ikgym.validation import FloatArray, Frozen, frozen_array, number, per_joint, whole_number
+
+# A start given by `options={"q": …}` may be this far from home in each joint, in [rad] or [m].
+START_RANGE = 2.0 * np.pi
+
+Preview = int | Sequence[int]
+
+
+@dataclasses.dataclass(frozen=True)
+class Disturbance(Frozen):
+    """What the drives add to the joint velocity that was asked for.
+
+    Args:
+        bias: A constant, in [rad/s] or [m/s]. A number, or one a joint.
+        noise: Bound of a uniform random part, drawn anew at each step, in [rad/s] or [m/s]. A number, or one a
+            joint.
+
+    Raises:
+        InvalidInputError: A number is not finite, or a bound negative.
+    """
+
+    bias: float | tuple[float, ...] = 0.0
+    noise: float | tuple[float, ...] = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("bias", "noise"):
+            value = frozen_array(name, getattr(self, name))
+            if value.ndim > 1 or (name == "noise" and (value < 0.0).any()):
+                raise InvalidInputError(
+                    f"{name}: expected a number of at least 0 or one a joint, got {value.tolist()}."
+                )
+            object.__setattr__(self, name, float(value) if value.ndim == 0 else tuple(value.tolist()))
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Scenario(Frozen):
+    """A tracking problem: arm, nominal trajectory, task coordinates, cost and time.
+
+    Args:
+        name: What the scenario is called.
+        arm: The arm that moves and is measured.
+        task: The task coordinates.
+        trajectory: The nominal trajectory. X^N(k) is where it stands at the time k Δt.
+        velocity_limit: The joint velocity that an action of 1 means, in [rad/s] or [m/s]. A number, or one a
+            joint.
+        cost: The stage cost.
+        dt: Δt in [s].
+        steps: Steps of an episode.
+        model: The arm that solvers know, and through which nominal joint paths are mapped; the arm itself if it
+            is left out.
+        start: Joint coordinates at the start in [rad] or [m], the nominal ones if left out. Shape (n,).
+        initial_pose: What is measured at the start, where it is not the arm's pose. Shape (m,).
+        iterations_per_point: Steps for which the nominal point 1, 2, … is held; the last number goes on. Errors
+            and costs of a point count at its last step.
+        disturbance: What the drives add to the joint velocity.
+        source: Where the scenario comes from.
+
+    Raises:
+        InvalidInputError: A value is out of its range, or arm, task and trajectory do not fit together.
+    """
+
+    name: str
+    arm: Arm
+    task: Task
+    trajectory: Trajectory
+    velocity_limit: FloatArray
+    cost: TrackingCost = dataclasses.field(default_factory=TrackingCost)
+    dt: float = 1e-3
+    steps: int = 1000
+    model: Arm = None  # type: ignore[assignment]  # the arm itself
+    start: FloatArray | None = None
+    initial_pose: FloatArray | None = None
+    iterations_per_point: int | tuple[int, ...] = (1,)
+    disturbance: Disturbance = dataclasses.field(default_factory=Disturbance)
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        def settle(field: str, value: object) -> None:
+            object.__setattr__(self, field, value)
+
+        for field, kind in {
+            "arm": Arm,
+            "task": Task,
+            "trajectory": Trajectory,
+            "cost": TrackingCost,
+            "disturbance": Disturbance,
+        }.items():
+            if not isinstance(getattr(self, field), kind):
+                raise InvalidInputError(
+                    f"{field} of scenario {self.name!r}: expected {kind.__name__}, got {getattr(self, field)!r}."
+                )
+        n = self.arm.joints
+        settle("model", self.arm if self.model is None else self.model)
+        if not isinstance(self.model, Arm) or self.model.joints != n:
+            raise InvalidInputError(
+                f"model of scenario {self.name!r}: expected an Arm with {n} joints, got {self.model!r}."
+            )
+        self.trajectory.check(self.model)
+        if self.task.has_orientation and not self.trajectory.has_orientation:
+            raise InvalidInputError(
+                f"Scenario {self.name!r}: task {self.task.name!r} needs orientations, the trajectory has none."
+            )
+        settle("velocity_limit", per_joint("velocity_limit", self.velocity_limit, n))
+        if (self.velocity_limit <= 0.0).any():
+            raise InvalidInputError(f"velocity_limit: expected numbers above 0, got {self.velocity_limit.tolist()}.")
+        settle("dt", number("dt", self.dt, above=0.0))
+        settle("steps", whole_number("steps", self.steps, at_least=1))
+        if self.start is not None:
+            settle("start", frozen_array("start", self.start, (n,)))
+        elif self.trajectory.joint_bound() is None:
+            raise InvalidInputError(f"Scenario {self.name!r}: a Cartesian trajectory needs a start.")
+        if self.initial_pose is not None:
+            settle("initial_pose", frozen_array("initial_pose", self.initial_pose, (self.task.size,)))
+        held = self._held()
+        if not held:
+            raise InvalidInputError("iterations_per_point: expected at least one number, got none.")
+        settle("iterations_per_point", tuple(whole_number("iterations_per_point", h, at_least=1) for h in held))
+        for name in ("bias", "noise"):
+            per_joint(name, getattr(self.disturbance, name), n)
+
+    def replace(self, **changes: Any) -> Self:
+        """A copy with some fields changed, checked like a new one; a new arm is its own model if none is given.
+
+        Raises:
+            UnknownNameError: There is no field of that name.
+            InvalidInputError: A new value is refused.
+        """
+        if "arm" in changes and self.model is self.arm:
+            changes.setdefault("model", None)
+        return super().replace(**changes)
+
+    @property
+    def joints(self) -> int:
+        """The number of joints, n."""
+        return self.arm.joints
+
+    @property
+    def random(self) -> bool:
+        """Whether the reset seed chooses the trajectory."""
+        return self.trajectory.random
+
+    def nominal(self, seed: int | None = None, preview: Preview = 0) -> FloatArray:
+        """The nominal task coordinates X^N(0), X^N(1), … of an episode, one row a step.
+
+        Args:
+            seed: The reset seed; needed where the scenario is random.
+            preview: How far past the end of the episode to go on, as in the environment.
+
+        Returns:
+            Task coordinates. Shape (steps + preview + 1, m).
+
+        Raises:
+            InvalidInputError: The scenario is random and there is no seed.
+        """
+        points = self.points(preview)
+        out = np.empty((points[-1] + 1, self.task.size))
+        nominal_rows(self.task.kind, self.frames(self._episode(seed), len(out)), out)
+        return out[points]
+
+    def nominal_joint_path(self, seed: int | None = None, preview: Preview = 0) -> FloatArray | None:
+        """The nominal joint coordinates of an episode, one row a step; None for a Cartesian trajectory.
+
+        Args:
+            seed: The reset seed; needed where the scenario is random.
+            preview: How far past the end of the episode to go on.
+
+        Returns:
+            Joint coordinates in [rad] or [m]. Shape (steps + preview + 1, n).
+
+        Raises:
+            InvalidInputError: The scenario is random and there is no seed.
+        """
+        points = self.points(preview)
+        path = self._episode(seed).joint_path(self.times(int(points[-1]) + 1))
+        return None if path is None else path[points]
+
+    def points(self, preview: Preview = 0) -> npt.NDArray[np.int64]:
+        """Which nominal point is the target after k steps.
+
+        Args:
+            preview: How far past the end of the episode to go on.
+
+        Returns:
+            Numbers of points. Shape (steps + preview + 1,).
+        """
+        last = self.steps + furthest(preview)
+        *first, usual = self._held()
+        ends = np.cumsum(first, dtype=np.int64)
+        rest = (last - (int(ends[-1]) if len(ends) else 0)) // usual + 1
+        lengths = np.concatenate([np.array(first, dtype=np.int64), np.full(max(rest, 0), usual)])
+        return np.concatenate([[0], np.repeat(np.arange(1, len(lengths) + 1), lengths)])[: last + 1]
+
+    def counted(self) -> npt.NDArray[np.bool_]:
+        """Whether errors and costs count after k steps: at the last step of each point, and of the episode.
+
+        Returns:
+            Truth values; the start does not count. Shape (steps + 1,).
+        """
+        points = self.points(1)
+        out: npt.NDArray[np.bool_] = points[1:] != points[:-1]
+        out[0], out[-1] = False, True
+        return out
+
+    def frames(self, trajectory: Trajectory, points: int) -> FloatArray:
+        """The nominal frames of one episode, one row a point; see :meth:`Trajectory.frames`.
+
+        Args:
+            trajectory: What was drawn for the episode.
+            points: How many points.
+
+        Returns:
+            Frames. Shape (points, 12), or (points, 3) where the task has no orientation.
+        """
+        frames = trajectory.frames(self.times(points), self.model)
+        return np.ascontiguousarray(frames if self.task.has_orientation else frames[:, -3:])
+
+    def times(self, points: int) -> FloatArray:
+        """When the trajectory is at its nominal points, in [s]. Shape (points,)."""
+        return np.arange(points, dtype=np.float64) * self.dt
+
+    def first_q(self, trajectory: Trajectory) -> FloatArray:
+        """The joint coordinates at the start of an episode in [rad] or [m]. Shape (n,).
+
+        Args:
+            trajectory: What was drawn for the episode.
+        """
+        path = trajectory.joint_path(np.zeros(1)) if self.start is None else self.start[None]
+        if path is None:
+            raise InvalidInputError(f"Scenario {self.name!r}: a Cartesian trajectory needs a start.")
+        start: FloatArray = path[0]
+        return start
+
+    def start_bound(self) -> FloatArray:
+        """Absolute joint coordinates that no start exceeds, in [rad] or [m]. Shape (n,)."""
+        known = self.trajectory.joint_bound() if self.start is None else np.abs(self.start)
+        usual = np.full(self.joints, START_RANGE)
+        return usual if known is None else np.maximum(usual, known)
+
+    def _held(self) -> tuple[int, ...]:
+        held = self.iterations_per_point
+        return tuple(held) if isinstance(held, (tuple, list)) else (held,)
+
+    def _episode(self, seed: int | None) -> Trajectory:
+        if self.random and seed is None:
+            raise InvalidInputError(f"Scenario {self.name!r} is random: a seed says which episode is meant.")
+        return self.trajectory.sample(seeding.np_random(seed)[0]) if self.random else self.trajectory
+
+
+def furthest(preview: Preview) -> int:
+    """How many steps a preview looks ahead."""
+    return int(preview) if isinstance(preview, (int, np.integer)) else max(preview, default=0)

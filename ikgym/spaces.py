@@ -1,0 +1,61 @@
+"""The spaces of a scenario, with bounds that are finite and true."""
+
+from __future__ import annotations
+
+import numpy as np
+from gymnasium import spaces
+
+from ikgym.scenarios import Scenario
+from ikgym.scenarios.scenario import Preview
+from ikgym.simulator import offsets
+from ikgym.validation import FloatArray
+
+# Rounding of sums over an episode and of products of rotations must not leave the box.
+SLACK = 1.0 + 1e-9
+
+
+def action_space(scenario: Scenario) -> spaces.Box:
+    """Joint velocities as fractions of the scenario's velocity limit. Shape (n,)."""
+    return spaces.Box(-1.0, 1.0, (scenario.joints,), np.float32)
+
+
+def observation_space(scenario: Scenario, preview: Preview) -> spaces.Dict:
+    """What a policy sees; the bounds follow from start, velocity limit, number of steps and reach.
+
+    Args:
+        scenario: The tracking problem.
+        preview: As in the environment.
+
+    Returns:
+        Boxes of float64: q (n,), qdot (n,), pose (m,), nominal (p, m), remaining (1,).
+
+    Raises:
+        InvalidInputError: The preview is none.
+    """
+    ahead = offsets(preview)
+    disturbance = np.abs(scenario.disturbance.bias) + np.abs(scenario.disturbance.noise)
+    travel = scenario.steps * scenario.dt * (scenario.velocity_limit + disturbance)
+    q = SLACK * (scenario.start_bound() + travel)
+    pose = _coordinate_bound(scenario, scenario.arm.reach(q))
+    if scenario.initial_pose is not None:
+        pose = np.maximum(pose, np.abs(scenario.initial_pose))
+    times = scenario.times(int(scenario.points(preview)[-1]) + 1)
+    nominal = _coordinate_bound(scenario, scenario.trajectory.reach(times, scenario.model))
+    return spaces.Dict(
+        {
+            "q": _box(q),
+            "qdot": _box(scenario.velocity_limit),
+            "pose": _box(pose),
+            "nominal": _box(np.tile(nominal, (len(ahead), 1))),
+            "remaining": spaces.Box(0.0, float(scenario.steps), (1,), np.float64),
+        }
+    )
+
+
+def _coordinate_bound(scenario: Scenario, reach: float) -> FloatArray:
+    """Parts of a rotation do not exceed 1, positions not the reach. Shape (m,)."""
+    return SLACK * np.array([1.0] * (scenario.task.size - 3) + [reach] * 3)
+
+
+def _box(bound: FloatArray) -> spaces.Box:
+    return spaces.Box(-bound, bound, dtype=np.float64)

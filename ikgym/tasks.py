@@ -1,0 +1,162 @@
+"""Task coordinates: the numbers in which a pose is prescribed, measured and compared."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import numpy.typing as npt
+
+from ikgym import task_kernels
+from ikgym.exceptions import InvalidInputError
+from ikgym.registry import Registry
+from ikgym.validation import FloatArray, Frozen, float_array
+
+
+@dataclasses.dataclass(frozen=True)
+class Task(Frozen):
+    """One choice of task coordinates.
+
+    Args:
+        name: What the task is called.
+        kind: Its number in the kernels.
+        size: Number of coordinates, m.
+        error_size: Number of components of the error, e.
+        has_orientation: Whether the orientation belongs to the task.
+    """
+
+    name: str
+    kind: int
+    size: int
+    error_size: int
+    has_orientation: bool
+
+    def coordinates(self, rotation: npt.ArrayLike, position: npt.ArrayLike) -> FloatArray:
+        """Task coordinates of poses.
+
+        Args:
+            rotation: Orientations. Shape (..., 3, 3).
+            position: Positions in [m]. Shape (..., 3).
+
+        Returns:
+            Coordinates. Shape (..., m).
+
+        Raises:
+            InvalidInputError: A shape is wrong, or a number not finite.
+        """
+        rotation, position = _array("rotation", rotation, (3, 3)), _array("position", position, (3,))
+        lead = position.shape[:-1]
+        if rotation.shape[:-2] != lead:
+            raise InvalidInputError(
+                f"rotation: expected shape {(*lead, 3, 3)}, as position has {position.shape}, got {rotation.shape}."
+            )
+        out = np.empty((*lead, self.size))
+        for index in np.ndindex(lead):
+            task_kernels.coordinates(self.kind, rotation[index], position[index], out[index])
+        return out
+
+    def error(self, nominal: npt.ArrayLike, coordinates: npt.ArrayLike) -> FloatArray:
+        """What is missing from coordinates to their nominal values.
+
+        Args:
+            nominal: Nominal coordinates. Shape (..., m).
+            coordinates: Coordinates. Shape (..., m).
+
+        Returns:
+            ``nominal - coordinates``, but for the task ``pose`` the position error in [m], then the rotation
+            vector of R* Rᵀ in [rad] (Zhang 2020, eq. 51-54). Shape (..., e).
+
+        Raises:
+            InvalidInputError: A shape is wrong, or a number not finite.
+        """
+        nominal, coordinates = np.broadcast_arrays(
+            _array("nominal", nominal, (self.size,)), _array("coordinates", coordinates, (self.size,))
+        )
+        nominal, coordinates = np.ascontiguousarray(nominal), np.ascontiguousarray(coordinates)
+        out = np.empty((*nominal.shape[:-1], self.error_size))
+        for index in np.ndindex(nominal.shape[:-1]):
+            task_kernels.error(self.kind, nominal[index], coordinates[index], out[index])
+        return out
+
+    def jacobian(self, rotation: npt.ArrayLike, jacobian: npt.ArrayLike) -> FloatArray:
+        """Derivative of the task coordinates by the joint coordinates.
+
+        For ``pose``, whose error is not a difference, this is the derivative of -error where the error is 0, that
+        is the geometric Jacobian; :meth:`error_jacobian` is exact everywhere.
+
+        Args:
+            rotation: Orientations. Shape (..., 3, 3).
+            jacobian: Geometric Jacobians, linear rows first. Shape (..., 6, n).
+
+        Returns:
+            Task Jacobians. Shape (..., e, n).
+
+        Raises:
+            InvalidInputError: A shape is wrong, or a number not finite.
+        """
+        rotation = _array("rotation", rotation, (3, 3))
+        geometric = float_array("jacobian", jacobian)
+        lead = rotation.shape[:-2]
+        if geometric.shape[:-1] != (*lead, 6):
+            raise InvalidInputError(
+                f"jacobian: expected shape {(*lead, 6, 'n')}, as rotation has {rotation.shape}, got {geometric.shape}."
+            )
+        out = np.empty((*lead, self.error_size, geometric.shape[-1]))
+        for index in np.ndindex(lead):
+            task_kernels.jacobian(self.kind, rotation[index], geometric[index], out[index])
+        return out
+
+    def error_jacobian(self, nominal: npt.ArrayLike, coordinates: npt.ArrayLike, jacobian: npt.ArrayLike) -> FloatArray:
+        """Derivative of the error by the joint coordinates, exact for errors of any size below π.
+
+        Args:
+            nominal: Nominal coordinates. Shape (m,).
+            coordinates: Coordinates. Shape (m,).
+            jacobian: Task Jacobian, as :meth:`jacobian` gives it. Shape (e, n).
+
+        Returns:
+            ∂error/∂q. Shape (e, n).
+
+        Raises:
+            InvalidInputError: A shape is wrong, or a number not finite.
+        """
+        task_jacobian = float_array("jacobian", jacobian, (self.error_size, None))
+        out = np.empty_like(task_jacobian)
+        task_kernels.error_jacobian(self.kind, self.error(nominal, coordinates), task_jacobian, out)
+        return out
+
+
+def _array(name: str, value: npt.ArrayLike, tail: tuple[int, ...]) -> FloatArray:
+    array = float_array(name, value)
+    if array.shape[-len(tail) :] != tail:
+        wanted = "(..., " + ", ".join(map(str, tail)) + ")"
+        raise InvalidInputError(f"{name}: expected shape {wanted}, got {array.shape}.")
+    return array
+
+
+_registry: Registry[Task] = Registry("task")
+for _task in (
+    # x, y, z in [m].
+    Task("position", task_kernels.POSITION, size=3, error_size=3, has_orientation=False),
+    # (O^A_12, O^A_13, O^A_23, r_1, r_2, r_3), O^A the skew part of the rotation (Varga 2021).
+    Task("skew", task_kernels.SKEW, size=6, error_size=6, has_orientation=True),
+    # The 9 numbers of the rotation, row by row, and the position (Khan 2020).
+    Task("matrix", task_kernels.MATRIX, size=12, error_size=12, has_orientation=True),
+    # Coordinates as in matrix; errors of the position and the rotation vector (Zhang 2020).
+    Task("pose", task_kernels.POSE, size=12, error_size=6, has_orientation=True),
+):
+    _registry.register(_task.name, lambda task=_task: task)  # type: ignore[misc]
+
+
+def get(name: str) -> Task:
+    """The task of a name.
+
+    Raises:
+        UnknownNameError: There is no such task; the message has the nearest name.
+    """
+    return _registry.get(name)
+
+
+def names() -> tuple[str, ...]:
+    """The names of all tasks."""
+    return _registry.names()

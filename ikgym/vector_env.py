@@ -1,0 +1,238 @@
+"""The native vector environment: many arms in one kernel."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import numpy.typing as npt
+from gymnasium.utils import seeding
+from gymnasium.vector import AutoresetMode
+from gymnasium.vector.utils import batch_space
+
+from ikgym.env import OPTIONS, Observation, RedundantIKEnv, resolve
+from ikgym.exceptions import InvalidInputError, ResetNeededError, UnknownNameError
+from ikgym.scenarios import Preview, Scenario
+from ikgym.simulation import Outcome
+from ikgym.simulator import Simulator
+from ikgym.spaces import action_space, observation_space
+from ikgym.validation import FloatArray, known_names, whole_number
+
+Flags = npt.NDArray[np.bool_]
+Infos = dict[str, Any]
+
+# A row that has begun no episode yet; it is stepped as little as one whose episode has ended.
+NO_EPISODE = -1
+
+
+class RedundantIKVectorEnv(gym.vector.VectorEnv[Observation, npt.NDArray[np.float32], npt.NDArray[Any]]):
+    """N times :class:`ikgym.RedundantIKEnv`, stepped by one compiled kernel.
+
+    Observation, action, reward, info and end of an episode are those of the single environment, with a leading
+    axis of N. Over whole episodes all of it is bit-identical to Gymnasium's `SyncVectorEnv`, in every autoreset
+    mode, with seeds seed + i.
+
+    | `autoreset_mode` | what happens to a row whose episode has ended |
+    |---|---|
+    | `NEXT_STEP` | the next step resets it: its action is ignored, its reward is 0, it has no info |
+    | `SAME_STEP` | it is reset at once: the last observation and info are in `final_obs` and `final_info` |
+    | `DISABLED` | it must be reset with a mask before the next step, which is an error otherwise |
+
+    `reset(options={"reset_mask": mask})` resets just the rows where the mask, a Boolean array of shape (N,), is
+    true; `options={"q": …}` starts elsewhere, with shape (n,) for all rows or (N, n).
+
+    Args:
+        num_envs: N.
+        scenario: A scenario or the name of one, see `ikgym.scenarios.names()`.
+        preview: How many steps ahead the nominal coordinates are shown, or which ones.
+        autoreset_mode: A mode of Gymnasium, or its value such as ``"SameStep"``.
+        render_mode: None; there is nothing to see of N arms. Make a single environment to render.
+
+    Raises:
+        UnknownNameError: There is no such scenario or autoreset mode.
+        InvalidInputError: N, the preview or the render mode is none.
+    """
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        scenario: str | Scenario = "varga7-fast",
+        preview: Preview = 2,
+        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+        render_mode: str | None = None,
+    ) -> None:
+        if render_mode is not None:
+            raise InvalidInputError(
+                f"render_mode: expected None for the vector environment, got {render_mode!r}; render a single one."
+            )
+        self.num_envs = whole_number("num_envs", num_envs, at_least=1)
+        self.autoreset_mode = _autoreset_mode(autoreset_mode)
+        self.metadata = {**RedundantIKEnv.metadata, "autoreset_mode": self.autoreset_mode}
+        self.scenario = resolve(scenario)
+        self.single_observation_space = observation_space(self.scenario, preview)
+        self.single_action_space = action_space(self.scenario)
+        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
+        self.action_space = batch_space(self.single_action_space, self.num_envs)
+        self._simulator = Simulator(self.scenario, self.num_envs, preview)
+        self._generators: list[np.random.Generator | None] = [None] * self.num_envs
+        self._seeds: list[int | None] = [None] * self.num_envs
+        self._begun = np.zeros(self.num_envs, dtype=np.bool_)
+        self._ended = np.zeros(self.num_envs, dtype=np.bool_)
+
+    @property  # type: ignore[misc]  # read-only and one a row, as SyncVectorEnv has it
+    def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override]
+        """The rows' generators, made from fresh entropy where there was no seed."""
+        return tuple(self._generator(row) for row in range(self.num_envs))
+
+    @property
+    def np_random_seed(self) -> tuple[int, ...]:  # type: ignore[override]
+        """The seeds of the rows' generators."""
+        self.np_random  # noqa: B018  # draws the seeds that are missing
+        return tuple(seed for seed in self._seeds if seed is not None)
+
+    def reset(
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: dict[str, Any] | None = None,
+    ) -> tuple[Observation, Infos]:
+        """Begins episodes, in all rows or in those of a mask.
+
+        Args:
+            seed: Row i is seeded with seed + i, or with the i-th of a sequence; None goes on with its generator.
+            options: ``{"reset_mask": …}`` of shape (N,), ``{"q": …}`` of shape (n,) or (N, n).
+
+        Returns:
+            The observations of all rows, and empty infos.
+
+        Raises:
+            UnknownNameError: There is no such option.
+            InvalidInputError: Seeds, mask or starts are of a wrong shape or type. Nothing has changed then.
+            ResetNeededError: The mask leaves out a row that has never been reset.
+        """
+        options = options or {}
+        known_names("option of reset", options, (*OPTIONS, "reset_mask"))
+        seeds = self._checked_seeds(seed)
+        mask = self._checked_mask(options.get("reset_mask"))
+        if not (self._begun | mask).all():
+            raise ResetNeededError("The first reset must begin episodes in all rows: leave out the reset_mask.")
+        starts = self._simulator.checked_starts(options.get("q"))
+        for row in np.flatnonzero(mask).tolist():
+            if seeds[row] is not None:
+                self._generators[row], self._seeds[row] = seeding.np_random(seeds[row])
+        self._begin(mask, starts)
+        return _observation(self._simulator.observe()), {}
+
+    def step(self, actions: npt.NDArray[np.float32]) -> tuple[Observation, FloatArray, Flags, Flags, Infos]:
+        """One step of all arms; the class of the single environment says what comes back.
+
+        Raises:
+            ResetNeededError: A row has no episode, or an ended one that nobody resets.
+            InvalidInputError: The actions are not finite or of a wrong shape. Nothing has changed then.
+        """
+        if not self._begun.all():
+            raise ResetNeededError("step() needs episodes: call reset() first.")
+        waiting = self._ended if self.autoreset_mode is AutoresetMode.NEXT_STEP else np.zeros_like(self._ended)
+        if self._ended.any() and self.autoreset_mode is AutoresetMode.DISABLED:
+            raise ResetNeededError(
+                f"The episodes of rows {np.flatnonzero(self._ended).tolist()} have ended and autoreset is disabled: "
+                "call reset(options={'reset_mask': …}) first."
+            )
+        stepping = ~waiting
+        out = self._simulator.step(actions, stepping)
+        rewards = -(out.tracking_cost + out.velocity_cost)
+        rewards[waiting] = 0.0
+        ended = stepping & (self._simulator.steps_made == self.scenario.steps)
+        same_step = self.autoreset_mode is AutoresetMode.SAME_STEP and bool(ended.any())
+        infos: Infos = {}
+        if same_step:
+            infos["final_obs"], infos["_final_obs"] = _rows_of(_observation(out), ended), ended.copy()
+            infos["final_info"], infos["_final_info"] = self._infos(out, ended), ended.copy()
+        infos.update(self._infos(out, stepping & ~ended if same_step else stepping))
+        beginning = ended if same_step else waiting
+        if beginning.any():
+            self._begin(beginning)
+            self._simulator.observe(beginning, out)
+        self._ended = np.zeros_like(ended) if same_step else ended
+        return _observation(out), rewards, np.zeros_like(ended), ended.copy(), infos
+
+    def _begin(self, mask: Flags, starts: FloatArray | None = None) -> None:
+        self._simulator.reset(mask, {row: self._generator(row) for row in np.flatnonzero(mask).tolist()}, starts)
+        self._begun |= mask
+        self._ended = self._ended & ~mask
+
+    def _infos(self, out: Outcome, rows: Flags) -> Infos:
+        """The infos of some rows, as Gymnasium's vector environments lay them out; zero in the others."""
+        if not rows.any():
+            return {}
+        columns = {
+            "tracking_cost": out.tracking_cost,
+            "velocity_cost": out.velocity_cost,
+            "position_error": out.position_error,
+            "orientation_error": out.orientation_error,
+            "clipped": out.clipped,
+            "time": self._simulator.steps_made * self.scenario.dt,
+        }
+        infos: Infos = {}
+        for key, column in columns.items():
+            infos[key] = np.where(rows, column, column.dtype.type(0))
+            infos[f"_{key}"] = rows.copy()
+        return infos
+
+    def _generator(self, row: int) -> np.random.Generator:
+        generator = self._generators[row]
+        if generator is None:
+            generator, self._seeds[row] = seeding.np_random()
+            self._generators[row] = generator
+        return generator
+
+    def _checked_seeds(self, seed: int | Sequence[int | None] | None) -> Sequence[int | None]:
+        if seed is None:
+            return [None] * self.num_envs
+        if isinstance(seed, (int, np.integer)):
+            first = whole_number("seed", seed, at_least=0)
+            return [first + row for row in range(self.num_envs)]
+        seeds = [None if s is None else whole_number("seed", s, at_least=0) for s in seed]
+        if len(seeds) != self.num_envs:
+            raise InvalidInputError(f"seed: expected {self.num_envs} seeds, one a row, got {len(seeds)}.")
+        return seeds
+
+    def _checked_mask(self, mask: Any) -> Flags:
+        if mask is None:
+            return np.ones(self.num_envs, dtype=np.bool_)
+        if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_ or mask.shape != (self.num_envs,):
+            raise InvalidInputError(
+                f"options['reset_mask']: expected a Boolean array of shape ({self.num_envs},), got {mask!r}."
+            )
+        if not mask.any():
+            raise InvalidInputError("options['reset_mask']: expected at least one true entry, got none.")
+        return mask
+
+
+def _autoreset_mode(mode: str | AutoresetMode) -> AutoresetMode:
+    if isinstance(mode, AutoresetMode):
+        return mode
+    try:
+        return AutoresetMode(mode)
+    except ValueError:
+        raise UnknownNameError("autoreset mode", mode, [m.value for m in AutoresetMode]) from None
+
+
+def _observation(out: Outcome) -> Observation:
+    return {
+        "q": out.q,
+        "qdot": out.qdot,
+        "pose": out.pose,
+        "nominal": out.nominal,
+        "remaining": out.remaining,
+    }
+
+
+def _rows_of(observation: Observation, rows: Flags) -> npt.NDArray[np.object_]:
+    """One observation a row, as `final_obs` has them; None in the rows that are not asked for."""
+    out = np.full(len(rows), None, dtype=object)
+    for row in np.flatnonzero(rows):
+        out[row] = {key: value[row].copy() for key, value in observation.items()}
+    return out

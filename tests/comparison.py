@@ -1,0 +1,29 @@
+"""Exact comparison of whatever environments return."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+
+def identical(a: Any, b: Any) -> bool:
+    """Whether two nested structures of dicts, arrays and scalars are the same bit for bit, types of arrays included.
+
+    NaN equals NaN; 0.0 and -0.0 differ.
+    """
+    if isinstance(a, dict) or isinstance(b, dict):
+        return (
+            isinstance(a, dict)
+            and isinstance(b, dict)
+            and a.keys() == b.keys()
+            and all(identical(a[key], b[key]) for key in a)
+        )
+    if isinstance(a, (tuple, list)):
+        return len(a) == len(b) and all(identical(x, y) for x, y in zip(a, b, strict=True))
+    a, b = np.asarray(a), np.asarray(b)
+    if a.dtype != b.dtype or a.shape != b.shape:
+        return False
+    if a.dtype == object:
+        return all(identical(x, y) for x, y in zip(a.ravel(), b.ravel(), strict=True))
+    return a.tobytes() == b.tobytes()

@@ -1,0 +1,385 @@
+"""The single environment against its specification, Gymnasium's checker and Stable-Baselines3's."""
+
+from __future__ import annotations
+
+import math
+import re
+import subprocess
+import sys
+import warnings
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env, data_equivalence
+from stable_baselines3.common.env_checker import check_env as sb3_check_env
+
+import ikgym
+from ikgym.env import OBSERVED, REPORTED, NotApplicable
+from ikgym.exceptions import InvalidInputError, ResetNeededError, UnknownNameError
+from tests.comparison import identical
+
+ALL = ikgym.scenarios.names()
+
+
+def make(scenario="varga7-fast", **kwargs):
+    return gym.make("RedundantIK-v0", scenario=scenario, **kwargs)
+
+
+@pytest.mark.parametrize("scenario", ALL)
+def test_gymnasium_check_env(scenario):
+    check_env(make(scenario).unwrapped)
+
+
+@pytest.mark.parametrize("scenario", ALL)
+def test_stable_baselines3_check_env(scenario):
+    """The contract's `nominal` of shape (p, m) earns one advice to flatten; flattened there is no warning at all."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        sb3_check_env(make(scenario).unwrapped)
+    assert [str(w.message)[:25] for w in caught] == ["Your observation nominal "]
+    sb3_check_env(gym.wrappers.FlattenObservation(make(scenario)))
+
+
+@pytest.mark.parametrize("scenario", ALL)
+def test_docstring_tables_are_the_spaces(scenario):
+    env = make(scenario, preview=(1, 4, 9)).unwrapped
+    rows = dict(re.findall(r"\| `(\w+)` \| \(([^)]*)\) \|", ikgym.RedundantIKEnv.__doc__))
+    sizes = {"n": env.scenario.joints, "m": env.scenario.task.size, "p": 3, "1": 1}
+    shapes = {key: tuple(sizes[s.strip()] for s in text.split(",") if s.strip()) for key, text in rows.items()}
+    assert shapes == {key: space.shape for key, space in env.observation_space.spaces.items()}
+    assert tuple(shapes) == OBSERVED
+    assert all(space.dtype == np.float64 for space in env.observation_space.spaces.values())
+    assert all(np.isfinite([space.low, space.high]).all() for space in env.observation_space.values())
+    action = re.search(r"`(Box\([^`]*)` \| 1 \|", ikgym.RedundantIKEnv.__doc__)[1]
+    assert str(env.action_space) == action.replace("n", str(sizes["n"])).replace(f"i{sizes['n']}", "in")
+    env.reset(seed=0)
+    info = env.step(np.zeros(sizes["n"], dtype=np.float32))[4]
+    table = ikgym.RedundantIKEnv.__doc__.split("## Info")[1].split("After a reset")[0]
+    assert tuple(re.findall(r"\| `(\w+)` \|", table)) == REPORTED == tuple(info)
+
+
+def by_hand(scenario, actions, seed):
+    """The specification, written with the public parts alone."""
+    q = scenario.first_q(scenario.trajectory) if not scenario.random else scenario.nominal_joint_path(seed)[0]
+    nominal = scenario.nominal(seed, 2)
+    for k, action in enumerate(actions):
+        qdot = np.clip(action.astype(np.float64), -1, 1) * scenario.velocity_limit
+        q = q + scenario.dt * qdot
+        coordinates = scenario.task.coordinates(*scenario.arm.forward(q))
+        error = scenario.task.error(nominal[k + 1], coordinates)
+        yield (
+            {
+                "q": q,
+                "qdot": qdot,
+                "pose": coordinates,
+                "nominal": nominal[k + 2 : k + 4],
+                "remaining": [scenario.steps - k - 1],
+            },
+            scenario.cost.tracking(error),
+            scenario.cost.velocity(qdot),
+            error,
+        )
+
+
+@pytest.mark.parametrize("name", [name for name in ALL if not name.startswith("khan8")])
+def test_steps_are_what_the_specification_says(name):
+    scenario = ikgym.scenarios.get(name).replace(steps=12)
+    env = make(scenario)
+    env.reset(seed=21)
+    actions = np.random.default_rng(3).uniform(-1.1, 1.1, (12, scenario.joints)).astype(np.float32)
+    for k, (observation, tracking, velocity, error) in enumerate(by_hand(scenario, actions, 21)):
+        got, reward, terminated, truncated, info = env.step(actions[k])
+        for key, value in observation.items():
+            np.testing.assert_allclose(got[key], value, rtol=1e-13, atol=1e-13, err_msg=key)
+        assert info["tracking_cost"] == pytest.approx(tracking, rel=1e-9)
+        assert info["velocity_cost"] == pytest.approx(velocity, rel=1e-12)
+        assert reward == -(info["tracking_cost"] + info["velocity_cost"])
+        assert info["clipped"] is bool((np.abs(actions[k]) > 1).any())
+        assert info["time"] == pytest.approx((k + 1) * scenario.dt)
+        position = error[:3] if scenario.task.name == "pose" else error[-3:]
+        assert info["position_error"] == pytest.approx(np.linalg.norm(position), rel=1e-9)
+        assert not terminated
+        assert truncated is (k == 11)
+
+
+def test_held_points_count_once():
+    """Nominal points 1, 2, 3 are held for 3, 2 and 2 steps."""
+    scenario = ikgym.scenarios.get("khan8-q1").replace(iterations_per_point=(3, 2), steps=7)
+    plain = scenario.replace(iterations_per_point=(1,)).nominal(preview=9)
+    env = make(scenario, preview=3)
+    observation, _ = env.reset(seed=0)
+    points = [0, 1, 1, 1, 2, 2, 3, 3, 4, 4, 5]
+    for k in range(8):
+        np.testing.assert_array_equal(observation["nominal"], plain[points[k + 1 : k + 4]])
+        if k == 7:
+            break
+        action = np.full(8, 0.01, dtype=np.float32)
+        observation, reward, *_, info = env.step(action)
+        last_of_its_point = k + 1 in (3, 5, 7)
+        assert (reward != 0.0) is last_of_its_point
+        assert (info["tracking_cost"] > 0) is (info["velocity_cost"] > 0) is last_of_its_point
+        assert info["position_error"] > 0
+
+
+def test_khan_holds_ten_points_for_60_steps_then_10():
+    points = ikgym.scenarios.get("khan8-q1").points(5)
+    lengths = np.bincount(points)
+    assert lengths[0] == 1
+    assert set(lengths[1:11]) == {60}
+    assert set(lengths[11:-1]) == {10}
+    assert ikgym.scenarios.get("khan8-q1").steps == 600 + 9990 * 10
+    assert points[100_500] == 10_000
+
+
+def test_khan_moves_and_measures_the_exact_arm_and_maps_nominals_through_the_model():
+    scenario = ikgym.scenarios.get("khan8-q1")
+    env = make(scenario)
+    observation, _ = env.reset()
+    exact, approximate = ikgym.arms.get("khan8"), ikgym.arms.get("khan8_approximate")
+    q = observation["q"]
+    np.testing.assert_array_equal(observation["pose"], scenario.task.coordinates(*exact.forward(q)))
+    first = scenario.task.coordinates(*approximate.forward([0.5 * np.sin(1e-3), 0, 0, 0, 0, 0, 0, 0]))
+    np.testing.assert_allclose(observation["nominal"][0], first, atol=1e-14)
+
+
+def test_zhang_helix_measures_zero_at_the_start_only():
+    env = make("zhang3-helix")
+    observation, _ = env.reset()
+    np.testing.assert_array_equal(observation["pose"], 0.0)
+    np.testing.assert_allclose(observation["nominal"][0], [4 + 3 * np.sin(np.pi / 25), 3 * np.cos(np.pi / 25), 5.01])
+    observation, *_, info = env.step(np.zeros(3, dtype=np.float32))
+    np.testing.assert_allclose(observation["pose"], [0, 0, 19], atol=1e-12)
+    assert math.isnan(info["orientation_error"])
+
+
+def test_not_applicable_equals_itself():
+    a, b = NotApplicable("nan"), NotApplicable("nan")
+    assert np.isnan(a)
+    assert data_equivalence({"x": a}, {"x": b}, exact=True)
+    assert a != np.float64(1.0)
+    assert np.zeros(1, dtype=type(a)).dtype == np.float64
+
+
+def test_orientation_error_is_the_geodesic_angle_beyond_a_right_angle():
+    """The skew part cannot tell θ from π - θ; the angle reported can."""
+    env = make("varga7-fast")
+    env.reset(options={"q": [0, 0, 0, 2.5, 0, 0, 0]})
+    *_, info = env.step(np.zeros(7, dtype=np.float32))
+    assert info["orientation_error"] == pytest.approx(2.5, abs=0.05)
+
+
+@pytest.mark.parametrize("seed", [0, 7])
+def test_seeds(seed):
+    a, b = (make("varga7-random").unwrapped for _ in range(2))
+    first = a.reset(seed=seed)
+    assert identical(first, b.reset(seed=seed))
+    assert not identical(first, b.reset(seed=seed + 1))
+    np.testing.assert_array_equal(first[0]["nominal"], a.scenario.nominal(seed, 2)[1:3])
+    # Without a seed the generator goes on: another episode, but the same one in both.
+    b.reset(seed=seed)
+    second = a.reset()
+    assert not identical(first, second)
+    assert identical(second, b.reset())
+
+
+def test_global_random_state_is_left_alone():
+    before = np.random.get_state()[1].copy()  # noqa: NPY002  # the legacy state is what must not change
+    env = make("varga7-random")
+    env.reset(seed=1)
+    env.step(np.zeros(7, dtype=np.float32))
+    np.testing.assert_array_equal(np.random.get_state()[1], before)  # noqa: NPY002
+
+
+ROLLOUT = """
+import hashlib, gymnasium as gym, numpy as np, ikgym
+scenario = ikgym.scenarios.get("varga7-random").replace(disturbance=ikgym.Disturbance(noise=0.2), steps=50)
+env = gym.make("RedundantIK-v0", scenario=scenario)
+digest = hashlib.sha256()
+observation, _ = env.reset(seed=9)
+rng = np.random.default_rng(0)
+for _ in range(50):
+    observation, reward, *_ = env.step(rng.uniform(-1, 1, 7).astype(np.float32))
+    digest.update(b"".join(value.tobytes() for value in observation.values()) + np.float64(reward).tobytes())
+print(digest.hexdigest())
+"""
+
+
+def test_rollouts_are_the_same_in_a_fresh_process(capsys):
+    exec(ROLLOUT, {})
+    here = capsys.readouterr().out
+    there = subprocess.run([sys.executable, "-c", ROLLOUT], capture_output=True, text=True, check=True).stdout
+    assert here == there
+    assert len(here.strip()) == 64
+
+
+def test_importing_changes_no_global_state():
+    code = (
+        "import warnings, numpy as np, gymnasium, matplotlib, os\n"
+        "before = (warnings.filters[:], np.geterr(), np.random.get_state()[1].tolist(), dict(os.environ),"
+        " dict(matplotlib.rcParams), gymnasium.logger.min_level)\n"
+        "import ikgym, baselines\n"
+        "after = (warnings.filters[:], np.geterr(), np.random.get_state()[1].tolist(), dict(os.environ),"
+        " dict(matplotlib.rcParams), gymnasium.logger.min_level)\n"
+        "assert before == after\n"
+        "import sys; assert 'matplotlib.pyplot' not in sys.modules and 'torch' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def _spawned_envs():
+    return gym.make("ikgym:RedundantIK-v0", scenario="varga7-random", preview=1)
+
+
+def test_spawned_workers():
+    envs = gym.vector.AsyncVectorEnv([_spawned_envs] * 2, context="spawn")
+    try:
+        observation, _ = envs.reset(seed=3)
+        here = make("varga7-random", preview=1)
+        assert identical(observation["nominal"][1], here.reset(seed=4)[0]["nominal"])
+        *_, infos = envs.step(np.zeros((2, 7), dtype=np.float32))
+        assert infos["_time"].all()
+    finally:
+        envs.close()
+
+
+def test_ids_and_arguments():
+    assert gym.make("ikgym:RedundantIK-v0").unwrapped.scenario.name == "varga7-fast"
+    assert gym.make_vec("ikgym:RedundantIK-v0", num_envs=2).num_envs == 2
+    observation, _ = make(preview=(1, 10, 40, 120)).reset()
+    full = ikgym.scenarios.get("varga7-fast").nominal(preview=120)
+    np.testing.assert_array_equal(observation["nominal"], full[[1, 10, 40, 120]])
+
+
+def test_nominal_goes_on_past_the_end():
+    scenario = ikgym.scenarios.get("varga7-fast")
+    short = scenario.replace(steps=4)
+    env = make(short, preview=5)
+    env.reset()
+    for _ in range(4):
+        observation, *_, truncated, _ = env.step(np.zeros(7, dtype=np.float32))
+    assert truncated
+    np.testing.assert_array_equal(observation["nominal"], scenario.nominal()[5:10])
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_bounds_are_true_at_the_worst(name):
+    """Full speed from the farthest start, for the whole episode."""
+    scenario = ikgym.scenarios.get(name)
+    scenario = scenario.replace(steps=min(scenario.steps, 400), disturbance=ikgym.Disturbance(bias=0.5, noise=0.5))
+    env = make(scenario, disable_env_checker=True)
+    bound = scenario.start_bound()
+    for sign in (-1, 1):
+        observation, _ = env.reset(seed=0, options={"q": sign * bound})
+        assert env.observation_space.contains(observation)
+        for _ in range(scenario.steps):
+            observation = env.step(np.full(scenario.joints, 2.0 * sign, dtype=np.float32))[0]
+            assert env.observation_space.contains(observation)
+
+
+@pytest.mark.parametrize(
+    ("action", "message"),
+    [
+        (np.zeros(6), r"expected shape \(7,\), got \(6,\)"),
+        (np.zeros((1, 7)), r"expected shape \(7,\), got \(1, 7\)"),
+        (0.0, r"expected shape \(7,\), got \(\)"),
+        (["a"] * 7, "expected numbers of shape"),
+        ([None] * 7, "expected numbers of shape"),
+        (np.zeros(7, dtype=complex), "expected numbers of shape"),
+        (np.array([0, 0, np.nan, 0, 0, 0, 0]), "expected finite numbers.*nan.*state is as it was"),
+        (np.array([0, 0, np.inf, 0, 0, 0, 0]), "expected finite numbers.*inf.*state is as it was"),
+    ],
+)
+def test_bad_actions_leave_the_state_as_it_was(action, message):
+    env = make().unwrapped
+    twin = make().unwrapped
+    good = np.full(7, 0.3, dtype=np.float32)
+    for e in (env, twin):
+        e.reset(seed=0)
+        e.step(good)
+    with pytest.raises(InvalidInputError, match=message):
+        env.step(action)
+    assert identical(env.step(good), twin.step(good))
+
+
+def test_float64_and_float32_actions_agree_and_lists_work():
+    rewards = []
+    for action in (np.full(7, 0.25, np.float32), np.full(7, 0.25), [0.25] * 7):
+        env = make()
+        env.reset(seed=0)
+        rewards.append(env.step(action)[1])
+    assert rewards[0] == rewards[1] == rewards[2]
+
+
+def test_clipping_is_said_and_done():
+    env = make()
+    env.reset()
+    observation, *_, info = env.step(np.array([1.5, -3, 0.5, 0, 0, 0, 0], dtype=np.float32))
+    assert info["clipped"] is True
+    np.testing.assert_array_equal(observation["qdot"], [20, -20, 10, 0, 0, 0, 0])
+
+
+def test_step_needs_an_episode():
+    env = make(ikgym.scenarios.get("varga7-fast").replace(steps=1)).unwrapped
+    action = np.zeros(7, dtype=np.float32)
+    with pytest.raises(ResetNeededError, match="call reset"):
+        env.step(action)
+    env.reset()
+    assert env.step(action)[3] is True
+    with pytest.raises(ResetNeededError, match="ended after 1 steps"):
+        env.step(action)
+    env.reset()
+    env.step(action)
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "message"),
+    [
+        ({"q": np.zeros(6)}, InvalidInputError, r"expected shape \(7,\), got \(6,\)"),
+        ({"q": [0, 0, np.nan, 0, 0, 0, 0]}, InvalidInputError, "finite"),
+        ({"q": "home"}, InvalidInputError, "array of real numbers"),
+        ({"q": np.full(7, 7.0)}, InvalidInputError, r"at most .*6\.2832"),
+        ({"Q": np.zeros(7)}, UnknownNameError, "option of reset 'Q'.*Available: q"),
+    ],
+)
+def test_bad_options_change_nothing(options, error, message):
+    env = make("varga7-random").unwrapped
+    env.reset(seed=5)
+    state = env.np_random.bit_generator.state
+    with pytest.raises(error, match=message):
+        env.reset(seed=6, options=options)
+    assert env.np_random.bit_generator.state == state
+    env.step(np.zeros(7, dtype=np.float32))
+
+
+@pytest.mark.parametrize("preview", [0, -1, True, 1.5, (), (0, 1), (3, 2), (2, 2), "2", (1, 2.5), None])
+def test_bad_previews(preview):
+    with pytest.raises(InvalidInputError, match="preview: expected a whole number of at least 1, or rising"):
+        ikgym.RedundantIKEnv(preview=preview)
+
+
+def test_unknown_scenario_and_argument():
+    with pytest.raises(UnknownNameError, match=r"There is no scenario 'varga7-fats'. Did you mean 'varga7-fast'\?"):
+        make("varga7-fats")
+    with pytest.raises(TypeError, match="scenaro"):
+        gym.make("RedundantIK-v0", scenaro="varga7-fast")
+
+
+def test_unseeded_first_reset_works():
+    assert set(make("varga7-random").reset()[0]) == set(OBSERVED)
+
+
+def test_check_env_would_notice():
+    """The checkers are no formality: an environment that hands out its own arrays is caught."""
+
+    class Sloppy(ikgym.RedundantIKEnv):
+        def reset(self, **kwargs):
+            self.kept = super().reset(**kwargs)
+            return self.kept
+
+        def step(self, action):
+            self.kept[0]["q"][:] = super().step(action)[0]["q"]
+            return self.kept[0], 0.0, False, False, {}
+
+    with pytest.raises((AssertionError, Exception), match="share"):
+        check_env(Sloppy())

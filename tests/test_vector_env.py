@@ -1,0 +1,208 @@
+"""The native vector environment is N single ones, bit for bit."""
+
+from __future__ import annotations
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.vector import AutoresetMode
+from gymnasium.wrappers.vector import RecordEpisodeStatistics
+
+import ikgym
+from ikgym.exceptions import InvalidInputError, ResetNeededError, UnknownNameError
+from tests.comparison import identical
+
+N = 3
+
+
+def pair(scenario, mode, preview=2, num_envs=N):
+    native = gym.make_vec("RedundantIK-v0", num_envs=num_envs, scenario=scenario, preview=preview, autoreset_mode=mode)
+    sync = gym.make_vec(
+        "RedundantIK-v0",
+        num_envs=num_envs,
+        scenario=scenario,
+        preview=preview,
+        vectorization_mode="sync",
+        vector_kwargs={"autoreset_mode": mode},
+    )
+    return native, sync
+
+
+def short(name, steps=7):
+    return ikgym.scenarios.get(name).replace(steps=steps)
+
+
+def noisy(name, steps=7):
+    return short(name, steps).replace(disturbance=ikgym.Disturbance(bias=0.1, noise=0.3))
+
+
+@pytest.mark.parametrize("mode", list(AutoresetMode), ids=lambda mode: mode.value)
+@pytest.mark.parametrize(
+    "scenario",
+    [short(name) for name in ikgym.scenarios.names()] + [noisy("varga7-random"), short("khan8-q1", 130)],
+    ids=lambda scenario: f"{scenario.name}-{scenario.steps}-{scenario.disturbance.noise}",
+)
+def test_bit_identical_to_sync_over_whole_episodes(scenario, mode):
+    native, sync = pair(scenario, mode, preview=(1, 3, 8))
+    assert native.metadata["autoreset_mode"] is mode
+    assert native.observation_space == sync.observation_space
+    assert native.action_space == sync.action_space
+    assert native.single_observation_space == sync.single_observation_space
+    rng = np.random.default_rng(1)
+    assert identical(native.reset(seed=11), sync.reset(seed=11))
+    ends = 0
+    for _ in range(3 * scenario.steps + 2):
+        actions = rng.uniform(-1.2, 1.2, native.action_space.shape).astype(np.float32)
+        got, wanted = native.step(actions), sync.step(actions)
+        assert identical(got, wanted)
+        assert native.observation_space.contains(got[0])
+        ended = got[3]
+        ends += int(ended.sum())
+        if mode is AutoresetMode.DISABLED and ended.any():
+            native_obs, sync_obs = (envs.reset(options={"reset_mask": ended.copy()}) for envs in (native, sync))
+            assert identical(native_obs, sync_obs)
+    assert ends >= 2 * N
+
+
+def test_partial_resets_by_mask_put_rows_out_of_step():
+    native, sync = pair(noisy("varga7-random", 9), AutoresetMode.DISABLED)
+    rng = np.random.default_rng(2)
+    identical(native.reset(seed=[5, None, 7]), sync.reset(seed=[5, None, 7]))
+    native.reset(seed=[5, 6, 7])
+    sync.reset(seed=[5, 6, 7])
+    for k in range(40):
+        if k % 4 == 3:
+            mask = np.zeros(N, dtype=bool)
+            mask[k % N] = True
+            seed = None if k % 8 == 3 else 100 + k
+            q = rng.uniform(-1, 1, 7)
+            both = [envs.reset(seed=seed, options={"reset_mask": mask.copy(), "q": q}) for envs in (native, sync)]
+        else:
+            actions = rng.uniform(-1, 1, (N, 7)).astype(np.float32)
+            both = [envs.step(actions) for envs in (native, sync)]
+            ended = both[0][3]
+            if ended.any():
+                for envs in (native, sync):
+                    envs.reset(options={"reset_mask": ended.copy()})
+        assert identical(*both)
+
+
+def test_mask_is_left_in_the_options_for_wrappers():
+    native, _ = pair(short("varga7-fast", 5), AutoresetMode.NEXT_STEP)
+    options = {"reset_mask": np.array([True, False, False])}
+    native.reset(seed=0)
+    native.reset(options=options)
+    assert list(options) == ["reset_mask"]
+
+
+def test_rows_count_and_threads_do_not_matter():
+    """Beyond a few hundred rows the kernel runs in several threads."""
+    scenario = noisy("varga7-random", 4)
+    many, few = (gym.make_vec("RedundantIK-v0", num_envs=n, scenario=scenario) for n in (1200, 5))
+    actions = np.random.default_rng(0).uniform(-1, 1, (1200, 7)).astype(np.float32)
+    assert identical(many.reset(seed=3)[0]["nominal"][:5], few.reset(seed=3)[0]["nominal"])
+    for _ in range(6):
+        a, b = many.step(actions), few.step(actions[:5])
+        for key in a[0]:
+            assert identical(a[0][key][:5], b[0][key])
+        assert identical(a[1][:5], b[1])
+
+
+@pytest.mark.parametrize("mode", list(AutoresetMode), ids=lambda mode: mode.value)
+def test_record_episode_statistics(mode):
+    steps = 5
+    envs = RecordEpisodeStatistics(pair(short("varga7-fast", steps), mode)[0])
+    envs.reset(seed=0)
+    returns = np.zeros(N)
+    for _ in range(steps):
+        _, rewards, _, truncated, infos = envs.step(np.full((N, 7), 0.1, dtype=np.float32))
+        returns += rewards
+    assert truncated.all()
+    info = infos["episode"]
+    np.testing.assert_array_equal(info["l"], steps)
+    np.testing.assert_allclose(info["r"], returns, rtol=1e-12)
+    if mode is AutoresetMode.DISABLED:
+        envs.reset(options={"reset_mask": np.array([True, True, False])})
+        np.testing.assert_array_equal(envs.env.unwrapped._simulator.steps_made, [0, 0, steps])
+
+
+def test_observations_are_fresh():
+    native, _ = pair(short("varga7-fast"), AutoresetMode.NEXT_STEP)
+    first, _ = native.reset(seed=0)
+    kept = {key: value.copy() for key, value in first.items()}
+    second = native.step(np.ones((N, 7), dtype=np.float32))[0]
+    assert identical(first, kept)
+    assert not any(np.shares_memory(first[key], second[key]) for key in first)
+
+
+def test_ignored_actions_may_be_anything_but_others_may_not():
+    native, _ = pair(short("varga7-fast", 2), AutoresetMode.NEXT_STEP)
+    native.reset(seed=0)
+    bad = np.zeros((N, 7), dtype=np.float32)
+    bad[1, 2] = np.nan
+    before = native._simulator._state.q.copy()
+    with pytest.raises(InvalidInputError, match="action of row 1: expected finite numbers"):
+        native.step(bad)
+    np.testing.assert_array_equal(native._simulator._state.q, before)
+    for _ in range(2):
+        native.step(np.zeros((N, 7), dtype=np.float32))
+    observation, rewards, _, truncated, infos = native.step(np.full((N, 7), np.nan, dtype=np.float32))
+    assert not truncated.any()
+    assert not rewards.any()
+    assert infos == {}
+    np.testing.assert_array_equal(observation["remaining"], 2.0)
+
+
+def test_step_needs_episodes():
+    native, _ = pair(short("varga7-fast", 2), AutoresetMode.DISABLED)
+    actions = np.zeros((N, 7), dtype=np.float32)
+    with pytest.raises(ResetNeededError, match="call reset"):
+        native.step(actions)
+    with pytest.raises(ResetNeededError, match="leave out the reset_mask"):
+        native.reset(options={"reset_mask": np.array([True, False, False])})
+    native.reset(seed=0)
+    native.step(actions)
+    native.step(actions)
+    with pytest.raises(ResetNeededError, match=r"rows \[0, 1, 2\] have ended and autoreset is disabled"):
+        native.step(actions)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"reset_mask": [True, False, True]}, "Boolean array of shape"),
+        ({"reset_mask": np.ones(N)}, "Boolean array of shape"),
+        ({"reset_mask": np.ones(N + 1, dtype=bool)}, "Boolean array of shape"),
+        ({"reset_mask": np.zeros(N, dtype=bool)}, "at least one true entry"),
+        ({"q": np.zeros(6)}, r"options\['q'\]: expected shape \(7,\)"),
+        ({"q": np.full(7, np.inf)}, "finite"),
+    ],
+)
+def test_bad_options(options, message):
+    native, _ = pair(short("varga7-fast"), AutoresetMode.NEXT_STEP)
+    native.reset(seed=0)
+    with pytest.raises(InvalidInputError, match=message):
+        native.reset(options=options)
+
+
+def test_bad_arguments():
+    with pytest.raises(UnknownNameError, match="Did you mean 'SameStep'"):
+        ikgym.RedundantIKVectorEnv(2, autoreset_mode="SamStep")
+    with pytest.raises(InvalidInputError, match="num_envs: expected a whole number of at least 1, got 0"):
+        ikgym.RedundantIKVectorEnv(0)
+    with pytest.raises(InvalidInputError, match="render a single one"):
+        ikgym.RedundantIKVectorEnv(2, render_mode="rgb_array")
+    envs = ikgym.RedundantIKVectorEnv(2)
+    with pytest.raises(InvalidInputError, match="expected 2 seeds, one a row, got 3"):
+        envs.reset(seed=[1, 2, 3])
+    with pytest.raises(UnknownNameError, match="Did you mean 'reset_mask'"):
+        envs.reset(options={"resetmask": np.ones(2, dtype=bool)})
+
+
+def test_seeds_and_generators():
+    envs = ikgym.RedundantIKVectorEnv(2, scenario="varga7-random")
+    envs.reset(seed=4)
+    assert envs.np_random_seed == (4, 5)
+    first = envs.reset()[0]["nominal"]
+    envs.reset(seed=4)
+    assert identical(envs.reset()[0]["nominal"], first)
