@@ -1,0 +1,72 @@
+"""Damped least squares: resolved rate with the deformation of Levenberg and Marquardt."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import ClassVar
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from baselines.linear_algebra import cholesky, cholesky_solve
+from baselines.policy import statuses
+from baselines.resolved_rate import ResolvedRate
+from ikgym.validation import FloatArray, number
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class DampedLeastSquares(ResolvedRate):
+    """Minimises ‖Δx − J Δq‖² + λ ‖Δq‖²: Δq = Jᵀ (J Jᵀ + λ I)⁻¹ Δx (Khan 2020, section 2; Zhang 2020, eq. 9).
+
+    Near a singularity the joint velocities stay bounded, at the price of a tracking error; away from one the error
+    is about λ / σ² of the shift, with σ the singular values of J.
+
+    Args:
+        problem: What the policy is told of the scenario.
+        gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
+        damping: λ, added to J Jᵀ as it is, not squared. In the square of the Jacobian's units, [m²] and [1]. Above 0.
+
+    Raises:
+        InvalidInputError: The gain or the damping is out of its range.
+    """
+
+    damping: float = 1e-3
+
+    name: ClassVar[str] = "dls"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "damping", number("damping", self.damping, above=0.0))
+
+    def invert(self, jacobian: FloatArray, shift: FloatArray) -> tuple[FloatArray, npt.NDArray[np.int64]]:
+        """See :meth:`ResolvedRate.invert`."""
+        out = np.empty((len(jacobian), jacobian.shape[2]))
+        damped_rows(jacobian, shift, self.damping, out)
+        return out, statuses(len(out))
+
+
+@njit(cache=True, nogil=True)
+def damped_rows(jacobian, shift, damping, out):  # type: ignore[no-untyped-def]
+    """Δq = Jᵀ (J Jᵀ + λ I)⁻¹ Δx, row by row: shapes (B, e, n), (B, e), a number, (B, n)."""
+    e, n = jacobian.shape[1], jacobian.shape[2]
+    gram, rhs = np.empty((e, e)), np.empty(e)
+    for row in range(jacobian.shape[0]):
+        j = jacobian[row]
+        for a in range(e):
+            for b in range(a + 1):
+                total = damping if a == b else 0.0
+                for k in range(n):
+                    total += j[a, k] * j[b, k]
+                gram[a, b] = total
+            rhs[a] = shift[row, a]
+        # Positive definite by the damping; if rounding says otherwise the damping is too small to count.
+        if not cholesky(gram):
+            out[row] = np.nan
+            continue
+        cholesky_solve(gram, rhs)
+        for k in range(n):
+            total = 0.0
+            for a in range(e):
+                total += j[a, k] * rhs[a]
+            out[row, k] = total

@@ -1,0 +1,262 @@
+"""A solver as a policy: the signature of Stable-Baselines3's `predict`, and memory that travels through `state`."""
+
+from __future__ import annotations
+
+import abc
+import dataclasses
+from collections.abc import Mapping
+from typing import Any, ClassVar, NamedTuple, Self
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from baselines.status import Status
+from ikgym.arms import Arm
+from ikgym.cost import TrackingCost
+from ikgym.exceptions import InvalidInputError
+from ikgym.scenarios import Scenario
+from ikgym.tasks import Task
+from ikgym.validation import FloatArray
+
+Observation = Mapping[str, npt.NDArray[np.floating[Any]]]
+Memory = tuple[npt.NDArray[Any], ...]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Problem:
+    """What a policy is told of a scenario: its model of the arm, which may differ from the arm that moves.
+
+    Args:
+        model: The arm as the solver knows it.
+        task: The task coordinates.
+        cost: The stage cost.
+        dt: Δt in [s].
+        velocity_limit: What an action of 1 means, in [rad/s] or [m/s]. Shape (n,).
+    """
+
+    model: Arm
+    task: Task
+    cost: TrackingCost
+    dt: float
+    velocity_limit: FloatArray
+
+    @classmethod
+    def of(cls, scenario: Scenario) -> Self:
+        """What a scenario tells."""
+        return cls(scenario.model, scenario.task, scenario.cost, scenario.dt, scenario.velocity_limit)
+
+
+class Batch(NamedTuple):
+    """Observations of B arms, as float64.
+
+    Attributes:
+        q: Joint coordinates in [rad] or [m]. Shape (B, n).
+        qdot: Joint velocities last applied, in [rad/s] or [m/s]. Shape (B, n).
+        pose: Measured task coordinates. Shape (B, m).
+        nominal: Nominal task coordinates ahead, X^N(k+1) first. Shape (B, p, m).
+        remaining: Steps left. Shape (B, 1).
+    """
+
+    q: FloatArray
+    qdot: FloatArray
+    pose: FloatArray
+    nominal: FloatArray
+    remaining: FloatArray
+
+
+class Solution(NamedTuple):
+    """What a solver answers.
+
+    Attributes:
+        qdot: Joint velocities in [rad/s] or [m/s]. Shape (B, n).
+        memory: What the solver wants back at the next step, each array with a leading axis of B.
+        status: Values of :class:`Status`. Shape (B,).
+        iterations: Iterations made. Shape (B,).
+    """
+
+    qdot: FloatArray
+    memory: Memory
+    status: npt.NDArray[np.int64]
+    iterations: npt.NDArray[np.int64]
+
+
+class Report(NamedTuple):
+    """What a solver says of its last step; read from the state by :meth:`SolverPolicy.report`."""
+
+    status: npt.NDArray[np.int64]
+    iterations: npt.NDArray[np.int64]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class SolverPolicy(abc.ABC):
+    """Base of all solvers: turns `solve` on a batch into Stable-Baselines3's `predict`.
+
+    A policy is a frozen dataclass: its fields behind ``problem`` are its parameters, and whatever changes from
+    step to step travels through ``state``. It never touches an environment.
+
+    Args:
+        problem: What the policy is told of the scenario.
+    """
+
+    problem: Problem
+
+    #: The name in the registry.
+    name: ClassVar[str]
+    #: Whether the policy knows more than its observation: a reference, not a contender.
+    reference: ClassVar[bool] = False
+
+    @classmethod
+    def for_scenario(cls, scenario: Scenario, **parameters: Any) -> Self:
+        """The policy for a scenario.
+
+        Args:
+            scenario: What is to be tracked; only what :class:`Problem` holds is passed on.
+            **parameters: The policy's own.
+
+        Raises:
+            InvalidInputError: A parameter is refused.
+        """
+        return cls(Problem.of(scenario), **parameters)
+
+    @classmethod
+    def parameter_names(cls) -> tuple[str, ...]:
+        """The names of the policy's parameters."""
+        return tuple(f.name for f in dataclasses.fields(cls) if f.name != "problem" and f.init and not f.kw_only)
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """The policy's parameters and their values."""
+        return {name: getattr(self, name) for name in self.parameter_names()}
+
+    @property
+    def preview(self) -> int:
+        """How many steps ahead the policy must be shown."""
+        return 1
+
+    def memory(self, rows: int) -> Memory:
+        """The memory at the start of an episode.
+
+        Args:
+            rows: B, the leading axis of each array.
+        """
+        del rows
+        return ()
+
+    @abc.abstractmethod
+    def solve(self, batch: Batch, memory: Memory) -> Solution:
+        """Joint velocities for a batch of observations.
+
+        Args:
+            batch: The observations, checked.
+            memory: As :meth:`memory` or the last call gave it; must not be changed in place.
+        """
+
+    def predict(
+        self,
+        observation: Observation,
+        state: Memory | None = None,
+        episode_start: npt.ArrayLike | None = None,
+        deterministic: bool = True,
+    ) -> tuple[npt.NDArray[np.float32], Memory]:
+        """Actions for observations, single or batched.
+
+        Args:
+            observation: As the environment gives it; single, or all arrays with a leading batch axis B.
+            state: What the last call returned; None at the first.
+            episode_start: True where an episode begins, and the memory is to be cleared. Shape (B,).
+            deterministic: Changes nothing; solvers do not draw at random.
+
+        Returns:
+            Actions within the environment's box, of shape (n,) or (B, n), and the state for the next call: status
+            and iterations (see :meth:`report`), then the solver's memory.
+
+        Raises:
+            InvalidInputError: The observation lacks something, has a wrong shape or is not finite, the preview is
+                too short, or the state belongs to another batch.
+        """
+        del deterministic
+        batch, single = self._batch(observation)
+        rows = len(batch.q)
+        memory = self._recall(state, episode_start, rows)
+        solution = self.solve(batch, memory)
+        action = solution.qdot / self.problem.velocity_limit
+        status, kept = solution.status, solution.memory
+        if not _finite(action):
+            lost = np.logical_not(np.isfinite(action).all(axis=1, keepdims=True))[:, 0]
+            action[lost] = 0.0
+            status = np.where(lost, int(Status.DIVERGED), status)
+            kept = _replace_rows(kept, self.memory(rows), lost)
+        answer: npt.NDArray[np.float32] = np.clip(action, -1.0, 1.0).astype(np.float32)
+        return answer[0] if single else answer, (status, solution.iterations, *kept)
+
+    @staticmethod
+    def report(state: Memory) -> Report:
+        """Status and iterations of the call that returned a state."""
+        return Report(state[0], state[1])
+
+    def _batch(self, observation: Observation) -> tuple[Batch, bool]:
+        try:
+            arrays = [np.ascontiguousarray(observation[key], dtype=np.float64) for key in Batch._fields]
+        except (KeyError, IndexError, TypeError, ValueError) as e:
+            keys = sorted(observation) if isinstance(observation, Mapping) else type(observation).__name__
+            raise InvalidInputError(
+                f"observation: expected a dict of number arrays with the keys {list(Batch._fields)}, got {keys} ({e})."
+            ) from None
+        single = arrays[0].ndim == 1
+        if single:
+            arrays = [a[None] for a in arrays]
+        batch = Batch(*arrays)
+        rows, n, m = len(batch.q), self.problem.model.joints, self.problem.task.size
+        ahead = batch.nominal.shape[1] if batch.nominal.ndim == 3 else self.preview
+        shapes = {"q": (n,), "qdot": (n,), "pose": (m,), "nominal": (ahead, m), "remaining": (1,)}
+        for (key, shape), array in zip(shapes.items(), batch, strict=True):
+            if array.shape != (rows, *shape):
+                lead = () if single else (rows,)
+                got = array.shape[1:] if single else array.shape
+                raise InvalidInputError(f"observation[{key!r}]: expected shape {(*lead, *shape)}, got {got}.")
+        if not (_finite(batch.q) and _finite(batch.qdot) and _finite(batch.pose) and _finite(batch.nominal)):
+            raise InvalidInputError("observation: expected finite numbers, got NaN or infinity.")
+        if batch.nominal.shape[1] < self.preview:
+            raise InvalidInputError(
+                f"{self.name} needs to be shown {self.preview} steps ahead, the observation has "
+                f"{batch.nominal.shape[1]}: make the environment with preview={self.preview}."
+            )
+        return batch, single
+
+    def _recall(self, state: Memory | None, episode_start: npt.ArrayLike | None, rows: int) -> Memory:
+        fresh = self.memory(rows)
+        if state is None:
+            return fresh
+        kept = state[2:]
+        if len(kept) != len(fresh) or any(k.shape != f.shape for k, f in zip(kept, fresh, strict=True)):
+            raise InvalidInputError(
+                f"state: expected what {self.name}.predict returned for a batch of {rows}, got arrays of shapes "
+                f"{[np.shape(k) for k in state]}."
+            )
+        if episode_start is None or not fresh:
+            return kept
+        starting = np.broadcast_to(np.asarray(episode_start, dtype=np.bool_), (rows,))
+        return _replace_rows(kept, fresh, starting) if starting.any() else kept
+
+
+def statuses(rows: int, status: Status = Status.CONVERGED) -> npt.NDArray[np.int64]:
+    """The same status for all rows. Shape (B,)."""
+    return np.full(rows, int(status))
+
+
+def _replace_rows(memory: Memory, fresh: Memory, rows: npt.NDArray[np.bool_]) -> Memory:
+    return tuple(np.where(rows.reshape(-1, *[1] * (k.ndim - 1)), f, k) for k, f in zip(memory, fresh, strict=True))
+
+
+@njit(cache=True, nogil=True)
+def _all_finite(values):  # type: ignore[no-untyped-def]
+    for value in values:  # noqa: SIM110  # compiled, the loop is faster than a generator
+        if not np.isfinite(value):
+            return False
+    return True
+
+
+def _finite(array: FloatArray) -> bool:
+    """Whether all numbers are finite, without the temporary array that NumPy makes."""
+    return bool(_all_finite(array.ravel()))

@@ -1,0 +1,57 @@
+"""All policies by name."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from baselines.dls import DampedLeastSquares
+from baselines.follow_nominal import FollowNominal
+from baselines.moore_penrose import MoorePenrose
+from baselines.policy import SolverPolicy
+from baselines.rhc_gradient import RecedingHorizonGradient
+from ikgym import scenarios
+from ikgym.exceptions import UnknownNameError
+from ikgym.scenarios import Scenario
+from ikgym.validation import known_names
+
+POLICIES: dict[str, type[SolverPolicy]] = {
+    policy.name: policy for policy in (MoorePenrose, DampedLeastSquares, RecedingHorizonGradient, FollowNominal)
+}
+
+
+def names() -> tuple[str, ...]:
+    """The names of all policies."""
+    return tuple(POLICIES)
+
+
+def get(name: str) -> type[SolverPolicy]:
+    """The class of a policy.
+
+    Raises:
+        UnknownNameError: There is no such policy; the message has the nearest name.
+    """
+    if name not in POLICIES:
+        raise UnknownNameError("policy", name, POLICIES)
+    return POLICIES[name]
+
+
+def make(name: str, scenario: str | Scenario, **parameters: Any) -> SolverPolicy:
+    """A policy for a scenario.
+
+    Args:
+        name: One of :func:`names`.
+        scenario: What is to be tracked, or its name. The policy is handed the scenario's model of the arm, not the
+            arm itself.
+        **parameters: The policy's own, see its class.
+
+    Returns:
+        The policy, with the `predict` of Stable-Baselines3.
+
+    Raises:
+        UnknownNameError: There is no such policy, scenario or parameter.
+        InvalidInputError: A parameter is refused, or the policy does not suit the scenario.
+    """
+    policy = get(name)
+    known_names(f"parameter of {name}", parameters, policy.parameter_names())
+    resolved = scenario if isinstance(scenario, Scenario) else scenarios.get(scenario)
+    return policy.for_scenario(resolved, **parameters)

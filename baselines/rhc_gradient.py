@@ -1,0 +1,173 @@
+"""Receding horizon by gradient descent, without Lagrange multipliers (Varga, Issa, Horváth, Tar 2021)."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import ClassVar
+
+import numpy as np
+from numba import njit
+
+from baselines.horizon import analytic_gradient, difference_gradient
+from baselines.policy import Batch, Memory, Solution, SolverPolicy
+from baselines.status import Status
+from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.validation import number, whole_number
+
+GRADIENTS = ("finite_difference", "analytic")
+_CONVERGED, _LIMIT, _DIVERGED = int(Status.CONVERGED), int(Status.ITERATION_LIMIT), int(Status.DIVERGED)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class RecedingHorizonGradient(SolverPolicy):
+    """Minimises the cost over a short horizon by gradient descent with an adaptive step (section III and IV).
+
+    The free variables are the HL - 1 joint velocities of the horizon; the first is applied, and all of them are the
+    start of the next horizon, unshifted. Before each step the norm of the gradient is tested against μ. The step
+    α grows by a factor where the norm fell and shrinks by it where the norm rose, within its bounds; it is kept
+    from horizon to horizon.
+
+    As printed, with ``alpha_max = 5e-4``, the descent diverges on the fast trajectory of the paper: on more than
+    half of the path α exceeds 2/λ_max of the Hessian. After the blow-up the difference of two huge costs is
+    exactly 0, which naive code takes for convergence; here the status is ``diverged``, the arm is stopped for one
+    step and the memory cleared. The default is therefore ``alpha_max = 1e-4``.
+
+    Args:
+        problem: What the policy is told of the scenario.
+        horizon: HL, the number of grid points with the present one. At least 2; HL - 1 steps must be shown ahead.
+        tolerance: μ, the norm of the gradient below which the descent stops, in [s/rad] or [s/m].
+        iterations: Most steps of one descent.
+        alpha_min: Smallest α.
+        alpha_max: Largest α.
+        alpha_factor: By what α grows or shrinks. At least 1.
+        gradient: ``"finite_difference"`` as in the paper, or ``"analytic"``.
+        difference: The finite difference of the joint velocities, in [rad/s] or [m/s].
+
+    Raises:
+        InvalidInputError: A parameter is out of its range.
+        UnknownNameError: There is no such gradient.
+    """
+
+    horizon: int = 3
+    tolerance: float = 20.0
+    iterations: int = 450
+    alpha_min: float = 1e-8
+    alpha_max: float = 1e-4
+    alpha_factor: float = 1.2
+    gradient: str = "finite_difference"
+    difference: float = 1e-3
+
+    name: ClassVar[str] = "rhc_gradient"
+
+    def __post_init__(self) -> None:
+        whole_number("horizon", self.horizon, at_least=2)
+        whole_number("iterations", self.iterations, at_least=1)
+        number("tolerance", self.tolerance, at_least=0.0)
+        number("alpha_min", self.alpha_min, above=0.0)
+        if number("alpha_max", self.alpha_max, above=0.0) < self.alpha_min:
+            raise InvalidInputError(
+                f"alpha_max: expected at least alpha_min = {self.alpha_min:g}, got {self.alpha_max:g}."
+            )
+        number("alpha_factor", self.alpha_factor, at_least=1.0)
+        number("difference", self.difference, above=0.0)
+        if self.gradient not in GRADIENTS:
+            raise UnknownNameError("gradient", self.gradient, GRADIENTS)
+
+    @property
+    def preview(self) -> int:
+        """Grid points 2 … HL lie ahead."""
+        return self.horizon - 1
+
+    def memory(self, rows: int) -> Memory:
+        """The joint velocities of the horizon, of shape (B, HL - 1, n), and α, of shape (B,)."""
+        return np.zeros((rows, self.horizon - 1, self.problem.model.joints)), np.full(rows, self.alpha_min)
+
+    def solve(self, batch: Batch, memory: Memory) -> Solution:
+        """See :meth:`SolverPolicy.solve`."""
+        problem = self.problem
+        plan, alpha = memory[0].copy(), memory[1].copy()
+        rows = len(plan)
+        status, iterations = np.empty(rows, dtype=np.int64), np.empty(rows, dtype=np.int64)
+        descend_rows(
+            problem.model.chain,
+            problem.task.kind,
+            problem.cost.parameters,
+            problem.dt,
+            problem.velocity_limit,
+            batch.q,
+            batch.nominal,
+            plan,
+            alpha,
+            self.tolerance,
+            self.iterations,
+            (self.alpha_min, self.alpha_max, self.alpha_factor),
+            self.difference if self.gradient == "finite_difference" else 0.0,
+            status,
+            iterations,
+        )
+        return Solution(plan[:, 0].copy(), (plan, alpha), status, iterations)
+
+
+@njit(cache=True, nogil=True)
+def descend_rows(  # type: ignore[no-untyped-def]
+    chain,
+    kind,
+    cost,
+    dt,
+    limit,
+    q,
+    nominal,
+    plan,
+    alpha,
+    tolerance,
+    most,
+    rule,
+    difference,
+    status,
+    iterations,
+):
+    """Gradient descent row by row; ``plan`` (B, HL - 1, n) and ``alpha`` (B,) are changed in place."""
+    gradient = np.empty(plan.shape[1:])
+    alpha_min, alpha_max, factor = rule
+    for row in range(plan.shape[0]):
+        qdot = plan[row]
+        first_cost, last_norm = 0.0, 0.0
+        status[row] = _LIMIT
+        step = 0
+        while True:
+            if difference > 0.0:
+                value = difference_gradient(chain, kind, cost, dt, q[row], nominal[row], qdot, difference, gradient)
+            else:
+                value = analytic_gradient(chain, kind, cost, dt, q[row], nominal[row], qdot, gradient)
+            norm = np.sqrt(np.sum(gradient * gradient))
+            if step == 0:
+                first_cost = value
+            if not (np.isfinite(value) and np.isfinite(norm)):
+                status[row] = _DIVERGED
+                break
+            if norm <= tolerance:
+                status[row] = _CONVERGED
+                break
+            if step == most:
+                break
+            if step > 0:
+                if norm < last_norm:
+                    alpha[row] *= factor
+                elif norm > last_norm:
+                    alpha[row] /= factor
+                alpha[row] = min(max(alpha[row], alpha_min), alpha_max)
+            last_norm = norm
+            for i in range(qdot.shape[0]):
+                for j in range(qdot.shape[1]):
+                    qdot[i, j] -= alpha[row] * gradient[i, j]
+            step += 1
+        iterations[row] = step
+        # A gradient of 0 beyond all limits, at a cost that has risen, is no minimum: the differences have drowned.
+        if status[row] != _DIVERGED and value > first_cost:
+            for i in range(qdot.shape[0]):
+                for j in range(qdot.shape[1]):
+                    if abs(qdot[i, j]) > limit[j]:
+                        status[row] = _DIVERGED
+        if status[row] == _DIVERGED:
+            qdot[:] = 0.0
+            alpha[row] = alpha_min

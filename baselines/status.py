@@ -1,0 +1,26 @@
+"""How a solve went. A failed solve is data, not an exception."""
+
+from __future__ import annotations
+
+import enum
+
+
+class Status(enum.IntEnum):
+    """What a solver says of one step, from good to bad.
+
+    A row of results has the worst status of its episode.
+    """
+
+    #: The solver found what it looks for; for a solver without iterations: its formula applied.
+    CONVERGED = 0
+    #: The iterations ran out first; the last iterate was used.
+    ITERATION_LIMIT = 1
+    #: The Jacobian had lost rank, and the directions lost were left out.
+    RANK_DEFICIENT = 2
+    #: The iterates blew up, or are no numbers; the arm was stopped for this step and the memory cleared.
+    DIVERGED = 3
+
+    @property
+    def label(self) -> str:
+        """The name in results, for example ``iteration_limit``."""
+        return self.name.lower()
