@@ -1,0 +1,247 @@
+"""The contract of all policies, over the registry."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from stable_baselines3.common.evaluation import evaluate_policy
+from stable_baselines3.common.monitor import Monitor
+from stable_baselines3.common.vec_env import DummyVecEnv
+
+import baselines
+import ikgym
+from baselines.policy import Problem, Solution, SolverPolicy, statuses
+from baselines.status import Status
+from ikgym.exceptions import InvalidInputError, UnknownNameError
+from tests.comparison import identical
+
+STEPS = 6
+
+
+@functools.cache
+def scenario(name):
+    return ikgym.scenarios.get(name).replace(steps=STEPS)
+
+
+def policy_for(name, on):
+    """The policy on a shortened scenario, or None where it does not suit."""
+    seed = {"seed": 1} if name == "follow_nominal" and scenario(on).random else {}
+    try:
+        return baselines.make(name, scenario(on), **seed)
+    except InvalidInputError:
+        assert name == "follow_nominal"
+        assert scenario(on).nominal_joint_path(1) is None
+        return None
+
+
+PAIRS = [(name, on) for name in baselines.names() for on in ikgym.scenarios.names()]
+contract = pytest.mark.parametrize(("name", "on"), PAIRS)
+
+
+def observations(on, preview, rows, seed=0):
+    """Observations on and off the nominal path."""
+    envs = gym.make_vec("RedundantIK-v0", num_envs=rows, scenario=scenario(on), preview=preview)
+    envs.reset(seed=seed)
+    rng = np.random.default_rng(seed)
+    for _ in range(STEPS - 1):
+        actions = rng.uniform(-0.05, 0.05, envs.action_space.shape).astype(np.float32)
+        yield envs.step(actions)[0]
+
+
+def row(observation, i):
+    return {key: value[i] for key, value in observation.items()}
+
+
+@contract
+def test_batch_equals_single_calls_and_memory_goes_by_rows(name, on):
+    policy = policy_for(name, on)
+    if policy is None:
+        return
+    rows = 3
+    states, batched = [None] * rows, None
+    for k, observation in enumerate(observations(on, policy.preview, rows)):
+        # Row 1 begins a new episode at every other step, row 2 at the third.
+        start = np.array([k == 0, k % 2 == 0, k in (0, 2)])
+        action, batched = policy.predict(observation, state=batched, episode_start=start)
+        assert action.dtype == np.float32
+        for i in range(rows):
+            single, states[i] = policy.predict(
+                row(observation, i), state=None if start[i] else states[i], episode_start=np.array([False])
+            )
+            assert identical(single, action[i])
+            assert all(identical(a[0], b[i]) for a, b in zip(states[i], batched, strict=True))
+
+
+@contract
+def test_actions_are_in_the_box_and_deterministic_changes_nothing(name, on):
+    policy = policy_for(name, on)
+    if policy is None:
+        return
+    space = ikgym.RedundantIKEnv(scenario(on)).action_space
+    state = None
+    for observation in observations(on, policy.preview, 1):
+        before = {key: value.copy() for key, value in observation.items()}
+        kept = None if state is None else tuple(array.copy() for array in state)
+        action, next_state = policy.predict(row(observation, 0), state=state, deterministic=True)
+        again, same = policy.predict(row(observation, 0), state=state, deterministic=False)
+        assert action in space
+        assert identical(action, again)
+        assert identical(next_state, same)
+        assert identical(observation, before)
+        assert state is None or identical(state, kept)
+        report = policy.report(next_state)
+        assert report.status[0] in set(Status)
+        assert report.iterations[0] >= 0
+        state = next_state
+
+
+@contract
+def test_a_policy_is_told_the_model_and_never_the_arm(name, on):
+    policy = policy_for(name, on)
+    if policy is None or policy.reference:
+        return
+    assert {f.name for f in dataclasses.fields(Problem)} == {"model", "task", "cost", "dt", "velocity_limit"}
+    assert policy.problem.model is scenario(on).model
+    values = [getattr(policy, f.name) for f in dataclasses.fields(policy) if f.name != "problem"]
+    assert not any(isinstance(value, (ikgym.Arm, ikgym.Scenario, gym.Env)) for value in values)
+
+
+@pytest.mark.parametrize("name", baselines.names())
+def test_works_inside_evaluate_policy_with_several_environments(name):
+    short = ikgym.scenarios.get("varga7-fast").replace(steps=40)
+    policy = baselines.make(name, short)
+
+    def make():
+        return Monitor(gym.make("RedundantIK-v0", scenario=short, preview=policy.preview))
+
+    several, lengths = evaluate_policy(policy, DummyVecEnv([make] * 3), 6, return_episode_rewards=True)
+    alone, _ = evaluate_policy(policy, make(), 1, return_episode_rewards=True)
+    assert lengths == [40] * 6
+    # A memory that were not cleared would show in the second episodes.
+    assert set(several) == set(alone)
+
+
+@pytest.mark.parametrize("name", baselines.names())
+def test_policies_are_frozen_and_say_their_parameters(name):
+    policy = baselines.make(name, "varga7-fast")
+    assert policy.name == name
+    assert set(policy.parameters) == set(policy.parameter_names())
+    for parameter in policy.parameters:
+        with pytest.raises(dataclasses.FrozenInstanceError):
+            setattr(policy, parameter, 0)
+    copy = baselines.make(name, "varga7-fast", **policy.parameters)
+    assert copy.parameters == policy.parameters
+
+
+def test_unknown_names():
+    with pytest.raises(UnknownNameError, match=r"no policy 'rhc_gradent'\. Did you mean 'rhc_gradient'\?"):
+        baselines.make("rhc_gradent", "varga7-fast")
+    with pytest.raises(UnknownNameError, match=r"no parameter of dls 'dampng'\. Did you mean 'damping'\?"):
+        baselines.make("dls", "varga7-fast", dampng=1.0)
+    with pytest.raises(UnknownNameError, match=r"no parameter of dls 'problem'"):
+        baselines.make("dls", "varga7-fast", problem=1.0)
+    with pytest.raises(UnknownNameError, match=r"no scenario 'varga7-fat'\. Did you mean 'varga7-fast'\?"):
+        baselines.make("dls", "varga7-fat")
+
+
+def test_too_short_a_preview_says_how_much():
+    policy = baselines.make("rhc_gradient", "varga7-fast", horizon=6)
+    observation, _ = gym.make("RedundantIK-v0", preview=2).reset()
+    with pytest.raises(InvalidInputError, match=r"needs to be shown 5 steps ahead.* has 2.*preview=5"):
+        policy.predict(observation)
+
+
+def good():
+    return gym.make("RedundantIK-v0", preview=2).reset()[0]
+
+
+@pytest.mark.parametrize(
+    ("spoil", "message"),
+    [
+        (lambda o: o.pop("pose"), "expected a dict of number arrays with the keys"),
+        (lambda o: o.update(q=np.zeros(6)), r"observation\['q'\]: expected shape \(7,\), got \(6,\)"),
+        (lambda o: o.update(q=np.zeros((2, 7))), r"observation\['qdot'\]: expected shape \(2, 7\)"),
+        (lambda o: o.update(nominal=np.zeros(6)), r"observation\['nominal'\]: expected shape"),
+        (lambda o: o.update(nominal=np.zeros((2, 5))), r"observation\['nominal'\]: expected shape \(2, 6\)"),
+        (lambda o: o.update(pose=np.full(6, np.nan)), "expected finite numbers"),
+        (lambda o: o.update(nominal=np.full((2, 6), np.inf)), "expected finite numbers"),
+        (lambda o: o.update(q=["a"] * 7), "expected a dict of number arrays"),
+    ],
+)
+def test_bad_observations(spoil, message):
+    observation = good()
+    spoil(observation)
+    with pytest.raises(InvalidInputError, match=message):
+        baselines.make("rhc_gradient", "varga7-fast").predict(observation)
+
+
+def test_no_observation_at_all():
+    with pytest.raises(InvalidInputError, match="expected a dict"):
+        baselines.make("dls", "varga7-fast").predict(np.zeros(7))
+
+
+def test_a_state_of_another_batch_or_policy_is_refused():
+    policy = baselines.make("rhc_gradient", "varga7-fast")
+    _, state = policy.predict(good())
+    batch = {key: np.stack([value] * 2) for key, value in good().items()}
+    with pytest.raises(InvalidInputError, match=r"state: expected what rhc_gradient.predict returned for a batch of 2"):
+        policy.predict(batch, state=state)
+    with pytest.raises(InvalidInputError, match=r"state: expected what dls.predict returned"):
+        baselines.make("dls", "varga7-fast").predict(good(), state=state)
+
+
+def test_float32_observations_do():
+    policy = baselines.make("dls", "varga7-fast")
+    action, _ = policy.predict({key: value.astype(np.float32) for key, value in good().items()})
+    np.testing.assert_allclose(action, policy.predict(good())[0], atol=1e-5)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Broken(SolverPolicy):
+    """Answers NaN in its second row."""
+
+    name = "broken"
+
+    def memory(self, rows):
+        return (np.zeros(rows),)
+
+    def solve(self, batch, memory):
+        qdot = np.zeros_like(batch.q)
+        qdot[1] = np.nan
+        return Solution(qdot, (memory[0] + 1.0,), statuses(len(qdot)), np.ones(len(qdot), dtype=np.int64))
+
+
+def test_no_nan_leaves_a_policy():
+    policy = Broken(Problem.of(scenario("varga7-fast")))
+    batch = {key: np.stack([value] * 3) for key, value in good().items()}
+    action, state = policy.predict(batch)
+    np.testing.assert_array_equal(action, 0.0)
+    assert policy.report(state).status.tolist() == [Status.CONVERGED, Status.DIVERGED, Status.CONVERGED]
+    assert state[2].tolist() == [1.0, 0.0, 1.0]
+
+
+class TestFollowNominal:
+    def test_tracks_to_rounding_where_model_and_arm_agree(self):
+        for on, seed in (("varga7-fast", None), ("varga7-random", 5)):
+            short = ikgym.scenarios.get(on).replace(steps=50)
+            policy = baselines.make("follow_nominal", short, seed=seed)
+            env = gym.make("RedundantIK-v0", scenario=short, preview=1)
+            observation, _ = env.reset(seed=seed)
+            for _ in range(50):
+                action, _ = policy.predict(observation)
+                observation, *_, info = env.step(action)
+                assert info["position_error"] < 1e-8  # what float32 actions leave
+
+    def test_is_marked_and_needs_a_joint_path_and_a_seed(self):
+        assert baselines.make("follow_nominal", "varga7-fast").reference
+        assert not baselines.make("dls", "varga7-fast").reference
+        with pytest.raises(InvalidInputError, match="'zhang3-helix' is given in Cartesian space"):
+            baselines.make("follow_nominal", "zhang3-helix")
+        with pytest.raises(InvalidInputError, match="a seed says which episode"):
+            baselines.make("follow_nominal", "varga7-random")
+        with pytest.raises(InvalidInputError, match="seed: expected a whole number"):
+            baselines.make("follow_nominal", "varga7-random", seed="x")

@@ -1,0 +1,107 @@
+"""The tracking cost against the paper's formula, and its derivatives against central differences."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ikgym import TrackingCost, cost_kernels
+from ikgym.exceptions import InvalidInputError
+
+COSTS = [
+    TrackingCost(),
+    TrackingCost(delta_x=0.02, p_x=2.5, delta_qdot=0.3, p_out=6, p_in=2),
+    TrackingCost(delta_x=1.0, p_x=1.0, delta_qdot=2.0, p_out=1.0, p_in=1.5),
+]
+numbers = st.floats(-50, 50, allow_nan=False)
+
+
+def printed(values, delta, inside, outside):
+    """Φ^X and Φ^U as they are printed (Varga 2021, section III)."""
+    return sum(abs(x / delta) ** outside if abs(x / delta) > 1 else abs(x / delta) ** inside for x in values)
+
+
+@pytest.mark.parametrize("cost", COSTS)
+@given(values=st.lists(numbers, min_size=1, max_size=7))
+def test_value_is_the_printed_formula(cost, values):
+    assert cost.tracking(values) == pytest.approx(printed(values, cost.delta_x, 2, cost.p_x), rel=1e-12)
+    assert cost.velocity(values) == pytest.approx(printed(values, cost.delta_qdot, cost.p_in, cost.p_out), rel=1e-12)
+
+
+def test_default_parameters_are_the_paper_s():
+    cost = TrackingCost()
+    assert (cost.delta_x, cost.p_x, cost.delta_qdot, cost.p_out, cost.p_in) == (1e-3, 3, 0.8, 4, 4)
+    assert cost.tracking([1e-3, -2e-3, 5e-4, 0, 0, 0]) == pytest.approx(1 + 8 + 0.25)
+    assert cost.velocity([0.8, -1.6, 0.4, 0, 0, 0, 0]) == pytest.approx(1 + 16 + 1 / 16)
+
+
+@pytest.mark.parametrize("cost", COSTS)
+@pytest.mark.parametrize("kind", ["tracking", "velocity"])
+def test_derivatives_against_central_differences(cost, kind):
+    delta = cost.delta_x if kind == "tracking" else cost.delta_qdot
+    value, gradient, curvature = (getattr(cost, kind + tail) for tail in ("", "_gradient", "_curvature"))
+    step = 1e-5 * delta
+    # Away from the kinks at 0 and at ±Δ; one component at a time, so that large ones do not drown small ones.
+    for x in delta * np.array([-3.0, -1.2, -0.7, -0.1, 0.2, 0.9, 1.1, 2.0, 10.0]):
+        up, down = [x + step], [x - step]
+        assert gradient([x])[0] == pytest.approx((value(up) - value(down)) / (2 * step), rel=1e-6)
+        assert curvature([x])[0] == pytest.approx(
+            (gradient(up)[0] - gradient(down)[0]) / (2 * step), rel=1e-6, abs=1e-6 / delta**2
+        )
+    together = delta * np.array([-3.0, 0.2, 1.1])
+    np.testing.assert_array_equal(gradient(together), [gradient([x])[0] for x in together])
+
+
+@pytest.mark.parametrize("cost", COSTS)
+def test_kinks(cost):
+    """Continuous at Δ, where the slope jumps from P inside to P outside; flat at rest."""
+    d = cost.delta_x
+    below, above = d * (1 - 1e-12), d * (1 + 1e-12)
+    assert cost.tracking([below]) == pytest.approx(cost.tracking([above]), rel=1e-10)
+    assert cost.tracking_gradient([below])[0] * d == pytest.approx(2, rel=1e-9)
+    assert cost.tracking_gradient([above])[0] * d == pytest.approx(cost.p_x, rel=1e-9)
+    np.testing.assert_array_equal(cost.velocity_gradient([0.0]), 0.0)
+
+
+def test_curvature_at_rest():
+    assert TrackingCost().velocity_curvature([0.0])[0] == 0.0  # the quartic
+    assert TrackingCost(p_in=2).velocity_curvature([0.0])[0] == pytest.approx(2 / 0.64)
+    assert TrackingCost(p_in=1.5).velocity_curvature([0.0])[0] == np.inf
+
+
+def test_batches_and_compiled_against_plain_python():
+    rng = np.random.default_rng(0)
+    errors = rng.normal(0, 2e-3, (4, 5, 6))
+    cost = TrackingCost()
+    values = cost.tracking(errors)
+    assert values.shape == (4, 5)
+    assert cost.tracking_gradient(errors).shape == errors.shape
+    for index in np.ndindex(4, 5):
+        assert values[index] == cost.tracking(errors[index])
+        assert values[index] == cost_kernels.tracking.py_func(cost.parameters, errors[index])
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"delta_x": 0.0}, r"delta_x: expected a finite number above 0, got 0\.0"),
+        ({"delta_x": -1e-3}, "delta_x: expected a finite number above 0"),
+        ({"delta_qdot": np.nan}, "delta_qdot: expected a finite number above 0, got nan"),
+        ({"p_x": 0.5}, r"p_x: expected a finite number of at least 1, got 0\.5"),
+        ({"p_out": 0}, "p_out: expected a finite number of at least 1"),
+        ({"p_in": np.inf}, "p_in: expected a finite number of at least 1, got inf"),
+        ({"p_in": "4"}, "p_in: expected a finite number of at least 1, got '4'"),
+        ({"p_in": True}, "p_in: expected a finite number of at least 1, got True"),
+    ],
+)
+def test_bad_parameters(change, message):
+    with pytest.raises(InvalidInputError, match=message):
+        TrackingCost(**change)
+
+
+@pytest.mark.parametrize("error", [np.nan, [np.inf, 0], "a", [], 1.0, [None]])
+def test_bad_errors(error):
+    with pytest.raises(InvalidInputError, match="error: expected"):
+        TrackingCost().tracking(error)

@@ -1,0 +1,216 @@
+"""Scenarios: data, checks, seeds, and the values that PAPERS prescribes."""
+
+from __future__ import annotations
+
+import pickle
+import threading
+
+import numpy as np
+import pytest
+
+import ikgym
+from ikgym import compilation, parallel, scenarios
+from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.scenarios import Disturbance, Scenario
+from ikgym.simulation import _uniform
+
+ALL = scenarios.names()
+
+
+def test_catalogue():
+    """Arm, model, task, Δt, steps and velocity limit of each."""
+    table = {
+        s.name: (s.arm.name, s.model.name, s.task.name, s.dt, s.steps, s.velocity_limit[0])
+        for s in map(scenarios.get, ALL)
+    }
+    varga, literal = ("varga7", "varga7", "skew", 1e-3), ("varga7_literal", "varga7_literal", "skew", 1e-3)
+    faitli = ("faitli3", "faitli3", "position", 1e-3, 6283, 50.0)
+    khan = ("khan8", "khan8_approximate", "matrix", 1e-3, 100_500, 50.0)
+    assert table == {
+        "varga7-fast": (*varga, 3000, 20.0),
+        "varga7-slow": (*varga, 3000, 20.0),
+        "varga7-literal-fast": (*literal, 3000, 20.0),
+        "varga7-literal-slow": (*literal, 3000, 20.0),
+        "varga7-random": (*varga, 1000, 20.0),
+        "varga7-random-long": (*varga, 3000, 20.0),
+        "faitli3-stretched": faitli,
+        "faitli3-regular": faitli,
+        "faitli3-shoulder": faitli,
+        "khan8-q1": khan,
+        "khan8-q7q8": khan,
+        "zhang3-helix": ("zhang3", "zhang3", "position", 1.0, 799, 10.0),
+        "zhang6-lspb": ("puma560", "puma560", "pose", 1e-3, 2000, 20.0),
+    }
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_nominal_is_the_model_on_the_nominal_joint_path(name):
+    scenario = scenarios.get(name).replace(steps=40)
+    nominal = scenario.nominal(seed=3, preview=5)
+    assert nominal.shape == (46, scenario.task.size)
+    path = scenario.nominal_joint_path(seed=3, preview=5)
+    if path is None:
+        assert scenario.trajectory.joint_bound() is None
+    else:
+        poses = scenario.task.coordinates(*scenario.model.forward(path))
+        np.testing.assert_array_equal(nominal, poses)
+        observation, _ = ikgym.RedundantIKEnv(scenario).reset(seed=3)
+        np.testing.assert_array_equal(observation["q"], path[0])
+
+
+def test_nominal_of_a_random_scenario_needs_a_seed():
+    with pytest.raises(InvalidInputError, match="a seed says which episode"):
+        scenarios.get("varga7-random").nominal()
+
+
+def test_the_literal_reading_is_another_arm():
+    fast, literal = (scenarios.get(name).nominal() for name in ("varga7-fast", "varga7-literal-fast"))
+    assert abs(fast - literal).max() > 0.1
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_pickling_keeps_everything(name):
+    scenario = scenarios.get(name)
+    copy = pickle.loads(pickle.dumps(scenario))
+    np.testing.assert_array_equal(copy.nominal(seed=1), scenario.nominal(seed=1))
+    assert not copy.velocity_limit.flags.writeable
+    assert not copy.arm.chain.offsets.flags.writeable
+
+
+def test_replace():
+    scenario = scenarios.get("varga7-fast")
+    assert scenario.replace(steps=500).steps == 500
+    assert scenario.steps == 3000
+    other = scenario.replace(arm=ikgym.arms.get("varga7_literal"))
+    assert other.model is other.arm
+    twin = scenarios.get("khan8-q1").replace(arm=ikgym.arms.get("khan8_approximate"))
+    assert twin.model.name == "khan8_approximate"
+    with pytest.raises(UnknownNameError, match=r"no field of Scenario 'step'\. Did you mean 'steps'\?"):
+        scenario.replace(step=3)
+
+
+def test_seed_ranges_are_disjoint_and_documented():
+    ranges = list(scenarios.SPLITS.values())
+    assert list(scenarios.SPLITS) == ["train", "validation", "test"]
+    for i, a in enumerate(ranges):
+        for b in ranges[i + 1 :]:
+            assert a.stop <= b.start or b.stop <= a.start
+    assert scenarios.seeds("test", 3) == (2_000_000, 2_000_001, 2_000_002)
+    with pytest.raises(UnknownNameError, match="Did you mean 'validation'"):
+        scenarios.seeds("validaton", 3)
+    with pytest.raises(InvalidInputError, match="at most 1000000 in split 'test'"):
+        scenarios.seeds("test", 1_000_001)
+    with pytest.raises(InvalidInputError, match="at least 1, got 0"):
+        scenarios.seeds("test", 0)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"dt": 0.0}, "dt: expected a finite number above 0"),
+        ({"dt": -1e-3}, "dt: expected a finite number above 0"),
+        ({"dt": np.nan}, "dt: expected a finite number above 0, got nan"),
+        ({"steps": 0}, "steps: expected a whole number of at least 1, got 0"),
+        ({"steps": -5}, "steps: expected a whole number of at least 1"),
+        ({"steps": 10.5}, "steps: expected a whole number"),
+        ({"velocity_limit": 0.0}, "velocity_limit: expected numbers above 0"),
+        ({"velocity_limit": [1.0, 2.0]}, r"velocity_limit: expected shape \(7,\), got \(2,\)"),
+        ({"start": np.zeros(6)}, r"start: expected shape \(7,\)"),
+        ({"initial_pose": np.zeros(7)}, r"initial_pose: expected shape \(6,\)"),
+        ({"iterations_per_point": ()}, "iterations_per_point: expected at least one number"),
+        ({"iterations_per_point": (3, 0)}, "iterations_per_point: expected a whole number of at least 1, got 0"),
+        ({"model": ikgym.arms.get("faitli3")}, "model of scenario 'varga7-fast': expected an Arm with 7 joints"),
+        ({"arm": "varga7"}, "arm of scenario 'varga7-fast': expected Arm, got 'varga7'"),
+        ({"task": "skew"}, "task of scenario 'varga7-fast': expected Task, got 'skew'"),
+        ({"cost": None}, "cost of scenario 'varga7-fast': expected TrackingCost, got None"),
+        ({"trajectory": ikgym.trajectories.Sinusoid([1.0, 2.0])}, "expected 7 joints, as arm 'varga7' has, got 2"),
+        (
+            {"trajectory": ikgym.trajectories.Helix([0, 0, 0], 1, 1, 1), "start": np.zeros(7)},
+            "task 'skew' needs orientations",
+        ),
+        ({"disturbance": Disturbance(bias=(1.0, 2.0))}, r"bias: expected shape \(7,\)"),
+    ],
+)
+def test_bad_scenarios(change, message):
+    with pytest.raises(InvalidInputError, match=message):
+        scenarios.get("varga7-fast").replace(**change)
+
+
+def test_a_cartesian_trajectory_needs_a_start():
+    with pytest.raises(InvalidInputError, match="a Cartesian trajectory needs a start"):
+        scenarios.get("zhang3-helix").replace(start=None)
+
+
+@pytest.mark.parametrize("noise", [-0.1, np.nan, (0.1, -0.1)])
+def test_bad_disturbances(noise):
+    with pytest.raises(InvalidInputError, match="noise: expected"):
+        Disturbance(noise=noise)
+
+
+def test_register_your_own(monkeypatch):
+    monkeypatch.setattr(scenarios._registry, "_makers", dict(scenarios._registry._makers))
+    monkeypatch.setattr(scenarios._registry, "_made", {})
+    scenarios.register("mine", lambda: scenarios.get("varga7-fast").replace(name="mine", steps=3))
+    assert isinstance(scenarios.get("mine"), Scenario)
+    assert ikgym.RedundantIKEnv("mine").scenario.steps == 3
+    with pytest.raises(InvalidInputError, match="scenario 'mine' is registered already"):
+        scenarios.register("mine", lambda: scenarios.get("varga7-slow"))
+
+
+def test_disturbance_moves_the_arm_as_said():
+    scenario = scenarios.get("varga7-fast").replace(steps=400, disturbance=Disturbance(bias=0.5, noise=0.25))
+    env = ikgym.RedundantIKEnv(scenario)
+    before = env.reset(seed=3)[0]["q"]
+    drifts = []
+    for _ in range(400):
+        observation = env.step(np.zeros(7, dtype=np.float32))[0]
+        drifts.append((observation["q"] - before) / scenario.dt)
+        before = observation["q"]
+        np.testing.assert_array_equal(observation["qdot"], 0.0)
+    drifts = np.array(drifts)
+    assert abs(drifts - 0.5).max() <= 0.25 + 1e-9
+    np.testing.assert_allclose(drifts.mean(axis=0), 0.5, atol=0.05)
+    np.testing.assert_allclose(drifts.std(axis=0), 0.25 / 3**0.5, rtol=0.2)
+    assert abs(np.corrcoef(drifts.T) - np.eye(7)).max() < 0.25
+
+
+def test_noise_is_uniform_and_uncorrelated():
+    key = np.uint64(12345)
+    values = np.array([_uniform(key, np.uint64(i)) for i in range(20_000)])
+    counts = np.histogram(values, bins=20, range=(-1, 1))[0]
+    assert abs(counts - 1000).max() < 5 * 1000**0.5
+    assert abs(np.corrcoef(values[:-1], values[1:])[0, 1]) < 0.03
+    assert _uniform(np.uint64(1), np.uint64(0)) != _uniform(np.uint64(2), np.uint64(0))
+
+
+def test_chunks_cover_all_rows_once(monkeypatch):
+    monkeypatch.setattr(parallel, "cores", lambda: 4)
+    for rows in (0, 1, 7, 100, 1001):
+        seen = np.zeros(rows, dtype=int)
+
+        def work(start, stop, seen=seen):
+            seen[start:stop] += 1
+
+        parallel.in_chunks(work, rows, grain=10)
+        assert (seen == 1).all()
+
+
+def test_an_error_in_a_chunk_is_not_lost(monkeypatch):
+    monkeypatch.setattr(parallel, "cores", lambda: 2)
+
+    def work(start, stop):
+        if start > 0:
+            raise RuntimeError("lost?")
+
+    with pytest.raises(RuntimeError, match="lost"):
+        parallel.in_chunks(work, 100, grain=10)
+
+
+def test_long_compilation_is_announced(caplog):
+    with compilation.announced("nothing much", patience=0.01):
+        threading.Event().wait(0.2)
+    assert "Compiling nothing much; this happens once" in caplog.text
+    caplog.clear()
+    with compilation.announced("nothing much", patience=10.0):
+        pass
+    assert caplog.text == ""
