@@ -28,19 +28,8 @@ def horizon_cost(chain, kind, cost, dt, q, nominal, qdot):  # type: ignore[no-un
     Returns:
         The cost.
     """
-    m, n = nominal.shape[1], q.shape[0]
-    rotation, position = np.empty((3, 3)), np.empty(3)
-    pose, error = np.empty(m), np.empty(6 if kind == task_kernels.POSE else m)
-    here = q.copy()
-    total = 0.0
-    for i in range(qdot.shape[0]):
-        for j in range(n):
-            here[j] += dt * qdot[i, j]  # eq. 5
-        forward(chain, here, rotation, position)
-        task_kernels.coordinates(kind, rotation, position, pose)
-        task_kernels.error(kind, nominal[i], pose, error)
-        total += cost_kernels.tracking(cost, error) + cost_kernels.velocity(cost, qdot[i])
-    return total
+    stages = np.empty(qdot.shape[0])
+    return _roll(chain, kind, cost, dt, q.copy(), nominal, qdot, 0, stages, _scratch(kind, nominal))
 
 
 @njit(cache=True, nogil=True)
@@ -61,23 +50,56 @@ def difference_gradient(chain, kind, cost, dt, q, nominal, qdot, delta, gradient
     Returns:
         The cost.
     """
-    here = horizon_cost(chain, kind, cost, dt, q, nominal, qdot)
-    for i in range(qdot.shape[0]):
-        for j in range(qdot.shape[1]):
+    steps, n = qdot.shape
+    scratch = _scratch(kind, nominal)
+    stages, shifted = np.empty(steps), np.empty(steps)
+    total = _roll(chain, kind, cost, dt, q.copy(), nominal, qdot, 0, stages, scratch)
+    start, here = q.copy(), np.empty(n)
+    before = 0.0
+    for i in range(steps):
+        for j in range(n):
             kept = qdot[i, j]
             qdot[i, j] = kept + delta
-            gradient[i, j] = (horizon_cost(chain, kind, cost, dt, q, nominal, qdot) - here) / delta
+            here[:] = start
+            # The stages before the i-th are as they were.
+            moved = before + _roll(chain, kind, cost, dt, here, nominal, qdot, i, shifted, scratch)
+            gradient[i, j] = (moved - total) / delta
             qdot[i, j] = kept
-    return here
+        for j in range(n):
+            start[j] += dt * qdot[i, j]
+        before += stages[i]
+    return total
+
+
+@njit(cache=True, nogil=True)
+def _roll(chain, kind, cost, dt, here, nominal, qdot, first, stages, scratch):  # type: ignore[no-untyped-def]
+    """Goes from ``here`` through the stages from ``first`` on, and sums their costs, which ``stages`` receives."""
+    rotation, position, pose, error = scratch
+    total = 0.0
+    for i in range(first, qdot.shape[0]):
+        for j in range(here.shape[0]):
+            here[j] += dt * qdot[i, j]  # eq. 5
+        forward(chain, here, rotation, position)
+        task_kernels.coordinates(kind, rotation, position, pose)
+        task_kernels.error(kind, nominal[i], pose, error)
+        stages[i] = cost_kernels.tracking(cost, error) + cost_kernels.velocity(cost, qdot[i])
+        total += stages[i]
+    return total
+
+
+@njit(cache=True, nogil=True)
+def _scratch(kind, nominal):  # type: ignore[no-untyped-def]
+    m = nominal.shape[1]
+    return np.empty((3, 3)), np.empty(3), np.empty(m), np.empty(6 if kind == task_kernels.POSE else m)
 
 
 @njit(cache=True, nogil=True)
 def analytic_gradient(chain, kind, cost, dt, q, nominal, qdot, gradient):  # type: ignore[no-untyped-def]
     """∂Φ/∂q̇ by the chain rule, and Φ; arguments as in :func:`difference_gradient`."""
-    m, n, steps = nominal.shape[1], q.shape[0], qdot.shape[0]
-    e = 6 if kind == task_kernels.POSE else m
-    rotation, position, geometric = np.empty((3, 3)), np.empty(3), np.empty((6, n))
-    pose, error, slope = np.empty(m), np.empty(e), np.empty(e)
+    steps, n = qdot.shape
+    rotation, position, pose, error = _scratch(kind, nominal)
+    e = error.shape[0]
+    slope, geometric = np.empty(e), np.empty((6, n))
     jacobian, error_jacobian = np.empty((e, n)), np.empty((e, n))
     pull = np.empty((steps, n))
     here = q.copy()

@@ -12,11 +12,9 @@ from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError, ResetNeededError
 from ikgym.scenarios import Preview, Scenario
 from ikgym.simulation import Outcome
-from ikgym.simulator import Simulator
+from ikgym.simulator import Observation, Simulator, observation
 from ikgym.spaces import action_space, observation_space
-from ikgym.validation import FloatArray, known_names
-
-Observation = dict[str, FloatArray]
+from ikgym.validation import known_names
 
 OBSERVED = ("q", "qdot", "pose", "nominal", "remaining")
 #: The keys of `info` after a step.
@@ -149,9 +147,9 @@ class RedundantIKEnv(gym.Env[Any, Any]):
         self._step = 0
         out = self._simulator.observe()
         if self._renderer is not None:
-            self._renderer.begin(self._simulator.nominal_positions(0))
+            self._renderer.begin(self._simulator.nominal_positions(0), self._steps * self._dt)
             self._draw_later(out)
-        return _observation(out), {}
+        return observation(out), {}
 
     def step(self, action: npt.NDArray[np.float32]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Applies joint velocities for one time step; the class says what comes back.
@@ -179,7 +177,7 @@ class RedundantIKEnv(gym.Env[Any, Any]):
         }
         if self._renderer is not None:
             self._draw_later(out)
-        return _observation(out), -(tracking + velocity), False, self._step == self._steps, info
+        return observation(out), -(tracking + velocity), False, self._step == self._steps, info
 
     def render(self) -> npt.NDArray[np.uint8] | None:
         """Draws the arm, the nominal and the realised path, and the error over time.
@@ -225,13 +223,3 @@ def resolve(scenario: str | Scenario) -> Scenario:
         UnknownNameError: There is no such scenario.
     """
     return scenario if isinstance(scenario, Scenario) else scenarios.get(scenario)
-
-
-def _observation(out: Outcome) -> Observation:
-    return {
-        "q": out.q[0],
-        "qdot": out.qdot[0],
-        "pose": out.pose[0],
-        "nominal": out.nominal[0],
-        "remaining": out.remaining[0],
-    }

@@ -45,7 +45,7 @@ def forward(chain, q, rotation, position):  # type: ignore[no-untyped-def]
         rotation: Receives the orientation of the tool. Shape (3, 3).
         position: Receives the tool point in the base frame in [m]. Shape (3,).
     """
-    _walk(chain, q, rotation, position, np.empty((0, 0)))
+    _walk(chain, q, rotation, position, rotation, False)
 
 
 @njit(cache=True, nogil=True)
@@ -60,7 +60,7 @@ def forward_and_jacobian(chain, q, rotation, position, jacobian):  # type: ignor
         jacobian: Receives the Jacobian at the tool point, in the base frame: rows 0-2 linear in [m/s], rows 3-5
             angular in [rad/s], per unit of joint velocity. Shape (6, n).
     """
-    _walk(chain, q, rotation, position, jacobian)
+    _walk(chain, q, rotation, position, jacobian, True)
     for i in range(q.shape[0]):
         if chain.prismatic[i]:
             continue
@@ -75,10 +75,9 @@ def forward_and_jacobian(chain, q, rotation, position, jacobian):  # type: ignor
 
 
 @njit(cache=True, nogil=True, inline="always")
-def _walk(chain, q, rotation, position, jacobian):  # type: ignore[no-untyped-def]
-    """Goes along the chain; where ``jacobian`` has columns, leaves each joint's axis and point in them."""
+def _walk(chain, q, rotation, position, jacobian, keep):  # type: ignore[no-untyped-def]
+    """Goes along the chain; if told to keep them, leaves each joint's axis and point in ``jacobian``."""
     offsets, axes, prismatic = chain.offsets, chain.axes, chain.prismatic
-    keep = jacobian.shape[1] > 0
     # The orientation so far is kept in nine scalars, which stay in registers; an array would not.
     r00, r01, r02 = 1.0, 0.0, 0.0
     r10, r11, r12 = 0.0, 1.0, 0.0

@@ -16,6 +16,9 @@ from ikgym.scenarios import Preview, Scenario
 from ikgym.simulation import Law, Outcome, State
 from ikgym.validation import FloatArray, float_array
 
+#: What a policy sees of an arm, see :func:`observation`.
+Observation = dict[str, FloatArray]
+
 # Rows worth a thread of their own: below, handing over costs more than it saves.
 GRAIN_STEP = 256
 GRAIN_RESET = 4
@@ -213,6 +216,17 @@ class Simulator:
         return np.array(raw, dtype=np.float64, order="C").reshape(self.rows, -1)
 
 
+def observation(out: Outcome) -> Observation:
+    """What a policy sees of the only arm: the observation of the environment, without a row axis."""
+    return {
+        "q": out.q[0],
+        "qdot": out.qdot[0],
+        "pose": out.pose[0],
+        "nominal": out.nominal[0],
+        "remaining": out.remaining[0],
+    }
+
+
 def offsets(preview: Preview) -> tuple[int, ...]:
     """The steps ahead that a preview shows.
 
@@ -227,8 +241,7 @@ def offsets(preview: Preview) -> tuple[int, ...]:
     if isinstance(preview, (tuple, list)):
         steps = [0, *preview]
         if len(steps) > 1 and all(
-            isinstance(b, (int, np.integer)) and not isinstance(b, bool) and b > a
-            for a, b in itertools.pairwise(steps)
+            isinstance(b, (int, np.integer)) and not isinstance(b, bool) and b > a for a, b in itertools.pairwise(steps)
         ):
             return tuple(int(p) for p in preview)
     raise InvalidInputError(

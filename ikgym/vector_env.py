@@ -12,11 +12,11 @@ from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
-from ikgym.env import OPTIONS, Observation, RedundantIKEnv, resolve
+from ikgym.env import OPTIONS, RedundantIKEnv, resolve
 from ikgym.exceptions import InvalidInputError, ResetNeededError, UnknownNameError
 from ikgym.scenarios import Preview, Scenario
 from ikgym.simulation import Outcome
-from ikgym.simulator import Simulator
+from ikgym.simulator import Observation, Simulator
 from ikgym.spaces import action_space, observation_space
 from ikgym.validation import FloatArray, known_names, whole_number
 

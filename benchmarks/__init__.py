@@ -1,0 +1,1 @@
+"""Speed, measured beside other environments and libraries in the same run: ``make bench``."""

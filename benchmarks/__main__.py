@@ -1,0 +1,58 @@
+"""Measures and prints everything: ``python -m benchmarks``."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+from benchmarks.environments import ROWS, single, vector
+from benchmarks.kernels import kinematics
+from benchmarks.policies import predict_times
+from benchmarks.timing import medians
+from ikgym.parallel import cores
+
+
+def main() -> None:
+    """Prints medians and ratios; all figures of one table are from interleaved rounds of one run."""
+    print(f"{cores()} cores, Python {sys.version.split()[0]}")
+    print(f"import ikgym, warm: {_import_time():.2f} s\n")
+
+    print("One step through gym.make, median")
+    times = medians(single())
+    _table({name: (f"{1e6 * t:8.2f} µs", _ratio(t, times["RedundantIK-v0, varga7-fast"])) for name, t in times.items()})
+
+    for rows in ROWS:
+        print(f"\nNative vector environment, {rows} arms, steps per second")
+        _table({name: (f"{rows / t / 1e6:8.2f} M", "") for name, t in medians(vector(rows)).items()})
+
+    print("\nForward kinematics and Jacobian, 7 joints, time per pose")
+    calls = kinematics()
+    poses = medians({name: call for name, (call, _) in calls.items()})
+    per_pose = {name: t / calls[name][1] for name, t in poses.items()}
+    fastest = per_pose["ikgym kernel, in a compiled loop"]
+    _table({name: (f"{1e6 * t:8.3f} µs", _ratio(t, fastest)) for name, t in per_pose.items()})
+
+    print("\nOne predict on varga7-fast: median, 99th percentile")
+    _table({name: (f"{1e6 * p50:8.1f} µs", f"{1e6 * p99:8.1f} µs") for name, (p50, p99) in predict_times().items()})
+
+
+def _ratio(time: float, reference: float) -> str:
+    return f"{time / reference:8.2f} x"
+
+
+def _table(rows: dict[str, tuple[str, str]]) -> None:
+    width = max(map(len, rows))
+    for name, cells in rows.items():
+        print(f"  {name:<{width}}  " + "  ".join(cells))
+
+
+def _import_time() -> float:
+    code = "import time; t = time.perf_counter(); import ikgym; print(time.perf_counter() - t)"
+    return min(
+        float(subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout)
+        for _ in range(3)
+    )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,37 @@
+"""Times of calls that are worth comparing: medians of interleaved rounds."""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import Callable, Mapping
+
+Call = Callable[[], object]
+
+
+def medians(calls: Mapping[str, Call], rounds: int = 15, seconds: float = 0.05) -> dict[str, float]:
+    """The median time of each call in [s].
+
+    Machines are noisy: what is compared takes turns, round by round, so that a slow spell hits all alike.
+
+    Args:
+        calls: What to time, by name. Each is called once before anything counts.
+        rounds: How often everything has its turn.
+        seconds: About how long a turn of one call lasts.
+    """
+    repeats = {}
+    for name, call in calls.items():
+        call()
+        repeats[name] = max(1, int(seconds / max(_time(call, 3), 1e-9)))
+    times: dict[str, list[float]] = {name: [] for name in calls}
+    for _ in range(rounds):
+        for name, call in calls.items():
+            times[name].append(_time(call, repeats[name]))
+    return {name: statistics.median(values) for name, values in times.items()}
+
+
+def _time(call: Call, repeats: int) -> float:
+    begin = time.perf_counter()
+    for _ in range(repeats):
+        call()
+    return (time.perf_counter() - begin) / repeats

@@ -1,0 +1,88 @@
+"""An error over time on a logarithmic axis."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
+
+from ikgym.rendering.style import MEDIUM, MIST, SMALL, stride, thinned
+from ikgym.validation import FloatArray
+
+SMALLEST, LARGEST = 1e-9, 1e99  # errors beyond are drawn as these, in [m] or [rad]
+
+
+class ErrorCurve:
+    """An error over time, on a logarithmic axis that grows by whole decades and never shrinks.
+
+    Args:
+        axes: Where to draw.
+        name: Of the error.
+        unit: Of the error.
+        color: Of the curve.
+        last: Whether these are the lowest axes, where the times are written.
+    """
+
+    def __init__(self, axes: Any, name: str, unit: str, color: str, *, last: bool) -> None:
+        self._axes, self._last = axes, last
+        (self.line,) = axes.plot([], [], color=color, lw=1.2, marker="o", ms=4.5, markevery=[-1], gid=name)
+        self.line.set_clip_on(False)  # the dot at its end may lie on the frame
+        axes.set_yscale("log")
+        axes.yaxis.set_major_locator(LogLocator(numticks=6))
+        axes.yaxis.set_minor_locator(NullLocator())
+        axes.xaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 2.5, 5, 10]))
+        axes.set_ylabel(f"{name} [{unit}]", size=MEDIUM)
+        axes.yaxis.set_label_coords(-0.16, 0.5)  # the same place, however wide the numbers
+        axes.grid(color=MIST, lw=0.6)
+        axes.spines[["top", "right"]].set_visible(False)
+        axes.tick_params(labelsize=SMALL)
+
+    def begin(self, duration: float) -> None:
+        """Begins an episode: its errors are unknown, and their axis without numbers.
+
+        Args:
+            duration: Of the episode, in [s].
+        """
+        self._decades = (math.inf, -math.inf)
+        self._axes.set(xlim=(0.0, duration), ylim=(1e-2, 1.0))
+        self._axes.tick_params(labelbottom=self._last, labelleft=False)
+
+    def show(self, time: FloatArray, error: FloatArray, steps: int) -> bool:
+        """Moves the curve on.
+
+        Args:
+            time: The times so far in [s]. Shape (k,).
+            error: The errors so far in [m] or [rad]. Shape (k,).
+            steps: Steps of the episode.
+
+        Returns:
+            Whether the axes changed.
+        """
+        known = self._decades
+        error = error.clip(SMALLEST, LARGEST)
+        # A start on the spot would open the axis downwards, and says nothing.
+        seen = error[1:] if error[0] == SMALLEST else error
+        if len(seen):
+            low = min(self._decades[0], math.floor(math.log10(seen.min())))
+            high = max(self._decades[1], math.ceil(math.log10(seen.max())))
+            # Two decades at least: downwards, where errors go, as far as there is anything to be seen.
+            low = max(min(low, high - 2), math.floor(math.log10(SMALLEST)))
+            high = max(high, low + 2)
+            if (low, high) != self._decades:
+                self._decades = low, high
+                self._axes.set_ylim(10.0**low, 10.0**high)
+                self._axes.tick_params(labelleft=True)
+            times, peaks = _peaks(time, error, stride(steps + 1))
+            self.line.set_data(times, np.maximum(peaks, 10.0**low))
+        else:
+            self.line.set_data([], [])
+        return known != self._decades
+
+
+def _peaks(time: FloatArray, error: FloatArray, step: int) -> tuple[FloatArray, FloatArray]:
+    """The largest error of each stretch, so that no peak is lost, and the last error as it is."""
+    starts = np.arange(0, len(time) - 1, step)
+    peaks = np.maximum.reduceat(error[:-1], starts) if len(starts) else error[:0]
+    return thinned(time, step), np.append(peaks, error[-1])

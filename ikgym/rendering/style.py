@@ -1,0 +1,24 @@
+"""What the parts of a picture share: colours, sizes of letters, and curves of no more points than can be seen."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ikgym.validation import FloatArray
+
+MOST_POINTS = 1000  # of a curve: more cannot be told apart in so few pixels
+
+# Okabe and Ito's colours, which the colour-blind can tell apart, and greys.
+BLUE, ORANGE, VERMILION, GREEN = "#0072B2", "#E69F00", "#D55E00", "#009E73"
+INK, STEEL, MIST, PALE = "#222222", "#808080", "#d9d9d9", "#f7f7f7"
+SMALL, MEDIUM, LARGE = 8.5, 9.5, 11.0  # letters, in [pt]
+
+
+def stride(points: int) -> int:
+    """How many points of a curve one is drawn for."""
+    return -(-points // MOST_POINTS)
+
+
+def thinned(points: FloatArray, step: int) -> FloatArray:
+    """Each step-th point, and the last."""
+    return np.concatenate([points[:-1:step], points[-1:]])

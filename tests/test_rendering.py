@@ -1,0 +1,394 @@
+import itertools
+import logging
+import subprocess
+import sys
+
+import gymnasium as gym
+import matplotlib as mpl
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from gymnasium.wrappers import RecordVideo
+
+import ikgym
+from ikgym import arms
+from ikgym.exceptions import InvalidInputError, ResetNeededError
+from ikgym.rendering import Renderer, renderer, scene, style
+from ikgym.rendering.renderer import HEIGHT, WIDTH
+
+STEPS = 8
+
+
+@pytest.fixture(autouse=True)
+def no_figure_left():
+    yield
+    assert plt.get_fignums() == []
+
+
+def short(name="varga7-fast", steps=STEPS):
+    return ikgym.scenarios.get(name).replace(steps=steps)
+
+
+def environment(name="varga7-fast", mode="rgb_array", steps=STEPS):
+    env = ikgym.RedundantIKEnv(short(name, steps), render_mode=mode)
+    env.reset(seed=0)
+    return env
+
+
+def move(env, fraction=0.5):
+    return env.step(np.full(env.action_space.shape, fraction, dtype=np.float32))
+
+
+def renderer_of(env):
+    return env.unwrapped._renderer
+
+
+def artist(env, name):
+    (found,) = renderer_of(env).figure.findobj(lambda a: a.get_gid() == name)
+    return found
+
+
+def blank(picture):
+    return np.count_nonzero(np.bincount(picture.ravel(), minlength=256)) < 20
+
+
+def count_paintings(monkeypatch):
+    painted = []
+    paint = scene.Scene.paint
+
+    def counted(self, *, anew):
+        painted.append(anew)
+        paint(self, anew=anew)
+
+    monkeypatch.setattr(scene.Scene, "paint", counted)
+    return painted
+
+
+@pytest.mark.parametrize("name", ikgym.scenarios.names())
+def test_every_scenario_gives_a_picture_of_the_same_even_size(name):
+    env = environment(name)
+    for _ in range(2):
+        picture = env.render()
+        assert picture.shape == (HEIGHT, WIDTH, 3)
+        assert picture.dtype == np.uint8
+        assert not blank(picture)
+        move(env)
+    assert HEIGHT % 2 == WIDTH % 2 == 0
+
+
+def test_a_picture_changes_with_the_arm_and_only_with_it():
+    env = environment()
+    pictures = [env.render()]
+    for _ in range(3):
+        move(env)
+        pictures.append(env.render())
+        np.testing.assert_array_equal(env.render(), pictures[-1])
+    for before, after in itertools.pairwise(pictures):
+        assert (before != after).any()
+
+
+def test_a_picture_is_the_callers_own():
+    env = environment()
+    first = env.render()
+    kept = first.copy()
+    move(env)
+    env.render()[:] = 0
+    np.testing.assert_array_equal(first, kept)
+    assert env.render().any()
+
+
+def test_restoring_the_background_gives_the_same_pixels_as_drawing_all_anew():
+    env = environment()
+    for _ in range(4):
+        move(env)
+        quick = env.render()
+    renderer_of(env)._scene._background = None
+    np.testing.assert_array_equal(env.render(), quick)
+
+
+def test_a_second_episode_looks_as_if_it_were_the_first():
+    env, fresh = environment("varga7-random"), environment("varga7-random")
+    for _ in range(4):
+        move(env, 1.0)
+        env.render()
+    for one in (env, fresh):
+        one.reset(seed=1)
+        move(one)
+    np.testing.assert_array_equal(env.render(), fresh.render())
+
+
+def test_the_axes_stay_during_an_episode():
+    env = environment()
+    limits = []
+    for _ in range(STEPS):
+        move(env, 1.0)
+        env.render()
+        space, *_ = renderer_of(env).figure.axes
+        limits.append((space.get_xlim(), space.get_ylim(), space.get_zlim()))
+    assert len(set(limits)) == 1
+
+
+def test_lengths_look_the_same_in_all_directions():
+    env = environment()
+    env.render()
+    space, *_ = renderer_of(env).figure.axes
+    sides = np.ptp([space.get_xlim(), space.get_ylim(), space.get_zlim()], axis=1)
+    aspect = space._box_aspect  # has no getter
+    np.testing.assert_allclose(sides / sides[0], aspect / aspect[0])
+
+
+@pytest.mark.parametrize("name", ["varga7-fast", "khan8-q1", "zhang3-helix", "zhang6-lspb"])
+def test_ticks_are_as_far_apart_on_all_axes_and_stay_away_from_the_ends(name):
+    env = environment(name)
+    env.render()
+    space, *_ = renderer_of(env).figure.axes
+    distances = []
+    for ticks, (low, high) in [
+        (space.get_xticks(), space.get_xlim()),
+        (space.get_yticks(), space.get_ylim()),
+        (space.get_zticks(), space.get_zlim()),
+    ]:
+        assert 2 <= len(ticks) <= 8
+        assert low + 0.05 * (high - low) < ticks[0] < ticks[-1] < high - 0.05 * (high - low)
+        distances.extend(np.diff(ticks))
+    np.testing.assert_allclose(distances, distances[0])
+
+
+def test_prismatic_joints_have_an_artist_of_their_own():
+    env = environment()
+    for _ in range(3):
+        observation, *_ = move(env)
+    env.render()
+    points = env.scenario.arm.joint_points(observation["q"])
+    slides = np.array(env.scenario.arm.prismatic)
+    drawn = np.transpose(artist(env, "prismatic joint").get_data_3d())
+    np.testing.assert_array_equal(drawn[:2], points[slides][0])
+    assert np.linalg.norm(drawn[1] - drawn[0]) > 0.01
+    assert np.isnan(drawn[2]).all()
+    turning = np.transpose(artist(env, "revolute joint").get_data_3d())
+    np.testing.assert_array_equal(turning, points[~slides, 1])
+    assert artist(env, "prismatic joint").get_marker() != artist(env, "revolute joint").get_marker()
+    # The link is interrupted where the joint slides.
+    links = np.transpose(artist(env, "links").get_data_3d())
+    assert np.isnan(links).all(axis=1).sum() == slides.sum()
+
+
+@pytest.mark.parametrize(("name", "shown"), [("varga7-fast", True), ("zhang6-lspb", False)])
+def test_the_legend_has_prismatic_joints_only_where_there_are_some(name, shown):
+    env = environment(name)
+    env.render()
+    (legend,) = renderer_of(env).figure.legends
+    assert ("prismatic joint" in [text.get_text() for text in legend.get_texts()]) == shown
+
+
+def test_tool_target_and_paths_are_where_they_should_be():
+    env = environment()
+    for _ in range(4):
+        observation, *_ = move(env)
+    env.render()
+    tool = env.scenario.arm.forward(observation["q"])[1]
+    nominal = env._simulator.nominal_positions(0)
+    np.testing.assert_allclose(np.ravel(artist(env, "tool").get_data_3d()), tool)
+    np.testing.assert_allclose(np.ravel(artist(env, "target").get_data_3d()), nominal[4])
+    np.testing.assert_allclose(np.transpose(artist(env, "nominal path").get_data_3d()), nominal)
+    realised = np.transpose(artist(env, "realised path").get_data_3d())
+    assert len(realised) == 5
+    np.testing.assert_allclose(realised[-1], tool)
+
+
+@pytest.mark.parametrize(("name", "panels"), [("varga7-fast", 2), ("zhang3-helix", 1)])
+def test_the_orientation_error_is_shown_where_the_task_has_one(name, panels):
+    env = environment(name)
+    info = move(env)[-1]
+    env.render()
+    _, *curves = renderer_of(env).figure.axes
+    labels = ["position error [m]", "orientation error [rad]"][:panels]
+    assert [axes.get_ylabel() for axes in curves] == labels
+    for label in labels:
+        kind = label.split(" [")[0]
+        time, error = artist(env, kind).get_data()
+        assert time[-1] == info["time"]
+        assert error[-1] == info[kind.replace(" ", "_")]
+    for axes in curves:
+        assert axes.get_xlim() == pytest.approx((0.0, STEPS * env.scenario.dt))
+
+
+def test_long_curves_are_thinned_and_keep_their_peaks():
+    arm, states = arms.get("zhang3"), 10_000
+    drawn = Renderer(arm, "rgb_array", title="long", has_orientation=False)
+    drawn.begin(np.ones((states, 3)), 0.001 * (states - 1))
+    for k in range(states):
+        drawn.add(np.full(3, 1e-4 * k), 5.0 if k == 1234 else 1e-3, np.nan, 0.001 * k)
+    drawn.draw()
+    (line,) = drawn.figure.findobj(lambda a: a.get_gid() == "position error")
+    assert len(line.get_xdata()) <= style.MOST_POINTS + 1
+    assert line.get_ydata().max() == 5.0
+    assert line.get_xdata()[-1] == pytest.approx(0.001 * (states - 1))
+
+
+@pytest.mark.parametrize("error", [0.0, 1e-300, 1e6, 1e300, np.inf])
+@pytest.mark.parametrize("q", [0.0, 1e6, -1e9])
+@pytest.mark.parametrize("name", ["varga7", "puma560"])
+def test_nothing_is_too_far_or_too_small_to_be_drawn(name, q, error):
+    arm = arms.get(name)
+    drawn = Renderer(arm, "rgb_array", title="$diverges_", has_orientation=True)
+    drawn.begin(np.linspace(0.0, 1.0, 3)[:, None] * np.ones(3), 2.0)
+    for k in range(3):
+        drawn.add(np.full(arm.joints, q * (k > 0)), error if k else 0.0, error, float(k))
+        picture = drawn.draw()
+    assert not blank(picture)
+
+
+def test_human_mode_without_windows_is_silent_and_says_so_once(caplog):
+    with caplog.at_level(logging.INFO, logger="ikgym"):
+        env = environment(mode="human")
+        for _ in range(STEPS):
+            move(env)
+        assert env.render() is None
+        env.reset()
+    (message,) = caplog.messages
+    assert "agg" in message.lower()
+    assert caplog.records[0].levelno == logging.INFO
+    env.close()
+
+
+def test_human_mode_passes_over_states_but_never_the_first_or_the_last(monkeypatch):
+    painted = count_paintings(monkeypatch)
+    now = [100.0]
+    monkeypatch.setattr(renderer.clock, "perf_counter", lambda: now[0])
+    env = environment(mode="human", steps=40)
+    assert len(painted) == 1
+    for _ in range(39):
+        now[0] += renderer.INTERVAL / 10.5
+        move(env)
+    assert len(painted) == 1 + 3  # after 11, 22 and 33 steps
+    move(env)
+    assert len(painted) == 5
+    env.reset()
+    assert len(painted) == 6
+
+
+def test_a_window_does_not_outrun_the_episode(monkeypatch):
+    monkeypatch.setattr(renderer.backend_registry, "resolve_backend", lambda name: (name, "pretended"))
+    monkeypatch.setattr(renderer.Figure, "show", lambda _: None)
+    painted, now = count_paintings(monkeypatch), [100.0]
+    monkeypatch.setattr(renderer.clock, "perf_counter", lambda: now[0])
+    monkeypatch.setattr(renderer.clock, "sleep", lambda seconds: now.append(now.pop() + seconds))
+    env = environment(mode="human", steps=100)
+    for _ in range(100):
+        move(env)  # takes no time at all
+    assert now[0] - 100.0 == pytest.approx(2 / 30, abs=1e-9)
+    assert len(painted) == 1 + 2 + 1  # at 0, 34, 68 and 100 ms
+    env.close()
+
+
+def test_a_window_is_drawn_on_until_it_is_closed(monkeypatch):
+    """The backend of the tests has no windows; that pyplot keeps the figure stands for one."""
+    monkeypatch.setattr(renderer.backend_registry, "resolve_backend", lambda name: (name, "pretended"))
+    monkeypatch.setattr(renderer.Figure, "show", lambda _: None)
+    monkeypatch.setattr(renderer, "INTERVAL", 0.0)
+    painted = count_paintings(monkeypatch)
+    env = environment(mode="human")
+    assert plt.get_fignums() == [renderer_of(env).figure.number]
+    move(env)
+    assert len(painted) == 2
+    plt.close(renderer_of(env).figure)  # what a click on the window's cross does
+    move(env)
+    env.reset()
+    assert len(painted) == 2
+    env.close()
+    env.reset()
+    assert len(painted) == 3
+    assert len(plt.get_fignums()) == 1
+    for _ in range(2):
+        env.close()
+        assert plt.get_fignums() == []
+
+
+def test_rgb_array_mode_draws_only_when_asked(monkeypatch):
+    painted = count_paintings(monkeypatch)
+    env = environment()
+    move(env)
+    assert painted == []
+    assert renderer_of(env).figure is None
+    env.render()
+    env.render()
+    assert painted == [True, False]
+
+
+def test_a_video_can_be_recorded(tmp_path):
+    pytest.importorskip("moviepy")
+    ffmpeg = pytest.importorskip("imageio_ffmpeg").get_ffmpeg_exe()
+    env = gym.make("RedundantIK-v0", scenario=short(), render_mode="rgb_array")
+    env = RecordVideo(env, str(tmp_path / "videos"), episode_trigger=lambda _: True, disable_logger=True)
+    env.reset()
+    for _ in range(STEPS):
+        *_, truncated, _ = move(env)
+    assert truncated
+    env.close()
+    (video,) = tmp_path.glob("videos/*.mp4")
+    decode = [ffmpeg, "-v", "error", "-i", str(video), "-f", "rawvideo", "-pix_fmt", "rgb24", "-"]
+    played = subprocess.run(decode, check=True, capture_output=True)
+    assert played.stderr == b""
+    frames = np.frombuffer(played.stdout, dtype=np.uint8).reshape(-1, HEIGHT, WIDTH, 3)
+    assert len(frames) == STEPS + 1
+    assert (frames[0] != frames[-1]).any()
+
+
+@pytest.mark.parametrize("mode", ["ansi", "", 3])
+def test_a_wrong_render_mode_is_an_error(mode):
+    with pytest.raises(InvalidInputError, match="rgb_array"):
+        ikgym.RedundantIKEnv(short(), render_mode=mode)
+
+
+@pytest.mark.parametrize("mode", ["human", "rgb_array"])
+def test_there_is_nothing_to_draw_before_a_reset(mode):
+    with pytest.raises(ResetNeededError, match="reset"):
+        ikgym.RedundantIKEnv(short(), render_mode=mode).render()
+
+
+def test_render_without_a_mode_warns():
+    env = environment(mode=None)
+    with pytest.warns(UserWarning, match="render_mode"):
+        assert env.render() is None
+
+
+def test_closing_twice_does_no_harm_and_a_new_episode_draws_again():
+    env = environment()
+    before = env.render()
+    for _ in range(2):
+        env.close()
+        assert renderer_of(env).figure is None
+    env.reset(seed=0)
+    np.testing.assert_array_equal(env.render(), before)
+
+
+@pytest.mark.parametrize("mode", [None, "rgb_array", "human"])
+def test_closing_before_the_first_picture_does_no_harm(mode):
+    ikgym.RedundantIKEnv(short(), render_mode=mode).close()
+
+
+def test_rgb_array_mode_leaves_matplotlib_as_it_was():
+    settings, backend, figures = dict(mpl.rcParams), mpl.get_backend(), plt.get_fignums()
+    env = environment()
+    env.render()
+    move(env)
+    env.render()
+    env.close()
+    assert dict(mpl.rcParams) == settings
+    assert mpl.get_backend() == backend
+    assert plt.get_fignums() == figures
+
+
+def test_rgb_array_mode_imports_no_pyplot_and_no_mode_no_matplotlib():
+    code = """
+import sys, ikgym
+env = ikgym.RedundantIKEnv("zhang3-helix")
+env.reset()
+assert "matplotlib" not in sys.modules
+env = ikgym.RedundantIKEnv("zhang3-helix", render_mode="rgb_array")
+env.reset()
+env.render()
+assert "matplotlib.pyplot" not in sys.modules
+"""
+    subprocess.run([sys.executable, "-c", code], check=True)
