@@ -43,10 +43,7 @@ def rodrigues(axis, angle):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def quaternion(rotation):  # type: ignore[no-untyped-def]
-    """The unit quaternion (w, x, y, z) with w >= 0 of a rotation, by Shepperd's choice of the largest part.
-
-    The choice keeps every division well away from 0/0, so that the quaternion is exact to rounding near 0 and
-    near π alike.
+    """The unit quaternion (w, x, y, z) with w >= 0 of a rotation.
 
     Args:
         rotation: Rotation matrix. Shape (3, 3).
@@ -54,27 +51,45 @@ def quaternion(rotation):  # type: ignore[no-untyped-def]
     Returns:
         Four numbers w, x, y, z.
     """
-    r00, r11, r22 = rotation[0, 0], rotation[1, 1], rotation[2, 2]
+    return _quaternion(
+        rotation[0, 0],
+        rotation[0, 1],
+        rotation[0, 2],
+        rotation[1, 0],
+        rotation[1, 1],
+        rotation[1, 2],
+        rotation[2, 0],
+        rotation[2, 1],
+        rotation[2, 2],
+    )
+
+
+@njit(cache=True, nogil=True)
+def _quaternion(r00, r01, r02, r10, r11, r12, r20, r21, r22):  # type: ignore[no-untyped-def]
+    """Shepperd's choice of the largest part.
+
+    It keeps every division well away from 0/0, so that the quaternion is exact to rounding near 0 and near π alike.
+    """
     trace = r00 + r11 + r22
     if trace >= r00 and trace >= r11 and trace >= r22:
         w = 1.0 + trace
-        x = rotation[2, 1] - rotation[1, 2]
-        y = rotation[0, 2] - rotation[2, 0]
-        z = rotation[1, 0] - rotation[0, 1]
+        x = r21 - r12
+        y = r02 - r20
+        z = r10 - r01
     elif r00 >= r11 and r00 >= r22:
-        w = rotation[2, 1] - rotation[1, 2]
+        w = r21 - r12
         x = 1.0 + r00 - r11 - r22
-        y = rotation[0, 1] + rotation[1, 0]
-        z = rotation[0, 2] + rotation[2, 0]
+        y = r01 + r10
+        z = r02 + r20
     elif r11 >= r22:
-        w = rotation[0, 2] - rotation[2, 0]
-        x = rotation[0, 1] + rotation[1, 0]
+        w = r02 - r20
+        x = r01 + r10
         y = 1.0 - r00 + r11 - r22
-        z = rotation[1, 2] + rotation[2, 1]
+        z = r12 + r21
     else:
-        w = rotation[1, 0] - rotation[0, 1]
-        x = rotation[0, 2] + rotation[2, 0]
-        y = rotation[1, 2] + rotation[2, 1]
+        w = r10 - r01
+        x = r02 + r20
+        y = r12 + r21
         z = 1.0 - r00 - r11 + r22
     scale = 1.0 / math.sqrt(w * w + x * x + y * y + z * z)
     if w < 0.0:
@@ -117,9 +132,20 @@ def geodesic_angle(first, second):  # type: ignore[no-untyped-def]
     Returns:
         Angle in [rad], between 0 and π.
     """
-    between = np.empty((3, 3))
-    for i in range(3):
-        for j in range(3):
-            between[i, j] = second[i, 0] * first[j, 0] + second[i, 1] * first[j, 1] + second[i, 2] * first[j, 2]
-    w, x, y, z = quaternion(between)
+    w, x, y, z = _quaternion(
+        _dot(second[0], first[0]),
+        _dot(second[0], first[1]),
+        _dot(second[0], first[2]),
+        _dot(second[1], first[0]),
+        _dot(second[1], first[1]),
+        _dot(second[1], first[2]),
+        _dot(second[2], first[0]),
+        _dot(second[2], first[1]),
+        _dot(second[2], first[2]),
+    )
     return 2.0 * math.atan2(math.sqrt(x * x + y * y + z * z), w)
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _dot(a, b):  # type: ignore[no-untyped-def]
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

@@ -122,10 +122,11 @@ def step(*arguments):  # type: ignore[no-untyped-def]
     """
     chain, law, cost, state, out = _assemble(arguments)
     actions, active, start, stop = arguments[34], arguments[35], arguments[36], arguments[37]
+    scratch = _scratch(law, out)
     for row in range(start, stop):
         if active[row]:
             _move_row(law, state, actions, out, row)
-            _observe_row(chain, law, cost, state, out, row)
+            _observe_row(chain, law, cost, state, out, row, scratch)
 
 
 @njit(cache=True, nogil=True)
@@ -133,10 +134,11 @@ def observe(*arguments):  # type: ignore[no-untyped-def]
     """Observes the active rows without moving them; the arguments are those of :func:`step`."""
     chain, law, cost, state, out = _assemble(arguments)
     active, start, stop = arguments[35], arguments[36], arguments[37]
+    scratch = _scratch(law, out)
     for row in range(start, stop):
         if active[row]:
             out.clipped[row] = False
-            _observe_row(chain, law, cost, state, out, row)
+            _observe_row(chain, law, cost, state, out, row, scratch)
 
 
 @njit(cache=True, nogil=True, inline="always")
@@ -172,8 +174,16 @@ def _move_row(law, state, actions, out, row):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _observe_row(chain, law, cost, state, out, row):  # type: ignore[no-untyped-def]
-    rotation, position = np.empty((3, 3)), np.empty(3)
+def _scratch(law, out):  # type: ignore[no-untyped-def]
+    """Arrays that the rows of a call use one after the other: to allocate them costs as much as the kinematics."""
+    m = out.pose.shape[1]
+    e = 6 if law.kind == task_kernels.POSE else m
+    return np.empty((3, 3)), np.empty(3), np.empty(m), np.empty(e)
+
+
+@njit(cache=True, nogil=True)
+def _observe_row(chain, law, cost, state, out, row, scratch):  # type: ignore[no-untyped-def]
+    rotation, position, nominal, error = scratch
     k = state.step[row]
     for j in range(state.q.shape[1]):
         out.q[row, j] = state.q[row, j]
@@ -197,18 +207,12 @@ def _observe_row(chain, law, cost, state, out, row):  # type: ignore[no-untyped-
     if law.kind == task_kernels.POSITION:
         out.orientation_error[row] = math.nan
     else:
-        nominal_rotation = np.empty((3, 3))
-        for i in range(3):
-            for j in range(3):
-                nominal_rotation[i, j] = frame[3 * i + j]
-        out.orientation_error[row] = geodesic_angle(rotation, nominal_rotation)
+        out.orientation_error[row] = geodesic_angle(rotation, frame[:9].reshape(3, 3))
 
     out.tracking_cost[row] = 0.0
     out.velocity_cost[row] = 0.0
     if law.counted[k]:
-        nominal = np.empty(pose.shape[0])
         task_kernels.frame_coordinates(law.kind, frame, nominal)
-        error = np.empty(6 if law.kind == task_kernels.POSE else pose.shape[0])
         task_kernels.error(law.kind, nominal, pose, error)
         out.tracking_cost[row] = cost_kernels.tracking(cost, error)
         out.velocity_cost[row] = cost_kernels.velocity(cost, out.qdot[row])
