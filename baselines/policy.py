@@ -81,6 +81,22 @@ class Solution(NamedTuple):
     iterations: npt.NDArray[np.int64]
 
 
+class Operations(NamedTuple):
+    """What one step has cost, counted in what is dear on a real arm.
+
+    Attributes:
+        forward_kinematics: Evaluations of the model's forward kinematics alone. Shape (B,).
+        jacobians: Evaluations of the model's Jacobian, with the forward kinematics that come with it. Shape (B,).
+        factorisations: Matrices factorised, decomposed or inverted. Shape (B,).
+        measurements: Poses measured. Shape (B,).
+    """
+
+    forward_kinematics: npt.NDArray[np.int64]
+    jacobians: npt.NDArray[np.int64]
+    factorisations: npt.NDArray[np.int64]
+    measurements: npt.NDArray[np.int64]
+
+
 class Report(NamedTuple):
     """What a solver says of its last step; read from the state by :meth:`SolverPolicy.report`."""
 
@@ -194,6 +210,22 @@ class SolverPolicy(abc.ABC):
     def report(state: Memory) -> Report:
         """Status and iterations of the call that returned a state."""
         return Report(state[0], state[1])
+
+    def operations(self, state: Memory) -> Operations:
+        """What the call that returned a state has cost; worked out when asked for, at no cost otherwise."""
+        counts = self.count(self.report(state).iterations)
+        return Operations(*(np.broadcast_to(np.asarray(c, dtype=np.int64), state[1].shape).copy() for c in counts))
+
+    @abc.abstractmethod
+    def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
+        """What a solve of so many iterations costs.
+
+        Args:
+            iterations: Iterations made. Shape (B,).
+
+        Returns:
+            The numbers of :class:`Operations`, in its order; each one number, or of shape (B,).
+        """
 
     def _batch(self, observation: Observation) -> tuple[Batch, bool]:
         try:

@@ -67,6 +67,10 @@ class ResolvedRate(SolverPolicy, abc.ABC):
         remembered = (batch.nominal[:, 0].copy(), np.ones(rows, dtype=np.bool_))
         return Solution(step / self.problem.dt, remembered, status, np.ones(rows, dtype=np.int64))
 
+    def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
+        """One Jacobian, one factorisation, one measurement."""
+        return 0, 1, 1, 1
+
     @abc.abstractmethod
     def invert(self, jacobian: FloatArray, shift: FloatArray) -> tuple[FloatArray, npt.NDArray[np.int64]]:
         """The joint shifts for task shifts.

@@ -6,6 +6,7 @@ import dataclasses
 from typing import ClassVar
 
 import numpy as np
+import numpy.typing as npt
 from numba import njit
 
 from baselines.horizon import analytic_gradient, difference_gradient
@@ -106,6 +107,14 @@ class RecedingHorizonGradient(SolverPolicy):
             iterations,
         )
         return Solution(plan[:, 0].copy(), (plan, alpha), status, iterations)
+
+    def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
+        """A gradient before each step and one for the last test, over the HL - 1 stages of the horizon."""
+        stages, joints, gradients = self.horizon - 1, self.problem.model.joints, iterations + 1
+        if self.gradient == "analytic":
+            return 0, gradients * stages, 0, 0
+        # A velocity of the i-th stage moves that stage and all behind it.
+        return gradients * (stages + joints * stages * (stages + 1) // 2), 0, 0, 0
 
 
 @njit(cache=True, nogil=True)

@@ -17,8 +17,10 @@ class Status(enum.IntEnum):
     ITERATION_LIMIT = 1
     #: The Jacobian had lost rank, and the directions lost were left out.
     RANK_DEFICIENT = 2
+    #: A vector was too long for the rotation that was to turn it; the arm was stopped for this step.
+    NOT_A_ROTATION = 3
     #: The iterates blew up, or are no numbers; the arm was stopped for this step and the memory cleared.
-    DIVERGED = 3
+    DIVERGED = 4
 
     @property
     def label(self) -> str:

@@ -96,6 +96,9 @@ def test_actions_are_in_the_box_and_deterministic_changes_nothing(name, on):
         report = policy.report(next_state)
         assert report.status[0] in set(Status)
         assert report.iterations[0] >= 0
+        operations = policy.operations(next_state)
+        assert all(count.shape == (1,) and count[0] >= 0 for count in operations)
+        assert policy.reference or sum(count[0] for count in operations) > 0
         state = next_state
 
 
@@ -213,6 +216,9 @@ class Broken(SolverPolicy):
         qdot = np.zeros_like(batch.q)
         qdot[1] = np.nan
         return Solution(qdot, (memory[0] + 1.0,), statuses(len(qdot)), np.ones(len(qdot), dtype=np.int64))
+
+    def count(self, iterations):
+        return 0, 0, 0, 0
 
 
 def test_no_nan_leaves_a_policy():
