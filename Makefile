@@ -3,6 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
+DEMO := moore_penrose dls rhc_gradient follow_nominal
 
 .PHONY: help setup demo test check format lint types layers bench clean
 
@@ -17,7 +18,7 @@ $(STAMP): pyproject.toml constraints.txt
 	@touch $@
 
 demo: $(STAMP) ## Evaluate the baselines on the default scenario: table and plots in results/demo
-	$(BIN)/python -m baselines.evaluate --scenarios varga7-fast --out results/demo
+	$(BIN)/python -m baselines.evaluate --scenarios varga7-fast --policies $(DEMO) --out results/demo --overwrite
 
 test: $(STAMP) ## Run the whole test suite
 	$(BIN)/python -m pytest

@@ -1,0 +1,298 @@
+"""The numbers that an episode is judged by, and how those of several episodes are put together."""
+
+from __future__ import annotations
+
+import collections
+import dataclasses
+import json
+import math
+import statistics
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, Self
+
+import numpy as np
+
+from baselines.rollout import Episode
+from baselines.status import Status
+from ikgym.exceptions import InvalidInputError
+from ikgym.scenarios import Scenario
+from ikgym.validation import FloatArray
+
+#: The columns that are measured with a clock, and so differ from run to run.
+TIME_COLUMNS = ("time_p50_us", "time_p99_us", "deadline_misses")
+
+
+@dataclasses.dataclass(frozen=True)
+class Row:
+    """The result of one episode.
+
+    Where a scenario holds its nominal points for several steps, costs and errors are those of the steps that
+    count, see :meth:`ikgym.Scenario.counted`; all else is over all steps.
+
+    Args:
+        scenario: Its name.
+        policy: Its name.
+        parameters: All parameters of the policy, but for the seed of a reference.
+        seed: The reset seed.
+        steps: Steps of the episode.
+        total_cost: Sum of −reward, added up step by step.
+        tracking_cost: The part Φ^X.
+        velocity_cost: The part Φ^U.
+        regret: total_cost / best known cost; None where that is not known.
+        position_error_max: Largest distance from the nominal position, in [m].
+        position_error_rms: Its root mean square over the steps, in [m].
+        orientation_error_max: Largest geodesic angle to the nominal orientation, in [rad]; None without one.
+        orientation_error_rms: Its root mean square over the steps, in [rad]; None without an orientation.
+        qdot_peak: Largest absolute joint velocity, in [rad/s] or [m/s].
+        qdot_rms: Root mean square over steps and joints, in [rad/s] or [m/s].
+        qdot_total_variation: Σ_k Σ_j |q̇_j(k+1) − q̇_j(k)|, in [rad/s] or [m/s].
+        time_p50_us: Median wall time of one call of the policy, in [µs].
+        time_p99_us: Its 99th percentile, in [µs].
+        deadline_misses: Calls that took longer than the scenario's Δt.
+        status: The worst status of the episode.
+        machine: What it ran on, see :func:`baselines.machine.describe`.
+        iterations: Mean iterations of the policy in one step.
+        status_counts: How many steps ended with which status.
+        preview: Steps ahead that the policy was shown.
+        fingerprint: Tells scenarios apart that share a name, see :func:`baselines.plan.fingerprint`.
+    """
+
+    scenario: str
+    policy: str
+    parameters: dict[str, Any]
+    seed: int
+    steps: int
+    total_cost: float
+    tracking_cost: float
+    velocity_cost: float
+    regret: float | None
+    position_error_max: float
+    position_error_rms: float
+    orientation_error_max: float | None
+    orientation_error_rms: float | None
+    qdot_peak: float
+    qdot_rms: float
+    qdot_total_variation: float
+    time_p50_us: float
+    time_p99_us: float
+    deadline_misses: int
+    status: str
+    machine: dict[str, Any]
+    iterations: float
+    status_counts: dict[str, int]
+    preview: int
+    fingerprint: str
+
+    @property
+    def key(self) -> tuple[str, str, str, int, int]:
+        """What says which episode of an evaluation this is."""
+        return key(self.scenario, self.policy, self.parameters, self.seed, self.steps)
+
+    def to_json(self) -> dict[str, Any]:
+        """The row as JSON has it: numbers that are not finite are null."""
+        values = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        return {name: _finite_or_none(value) for name, value in values.items()}
+
+    @classmethod
+    def from_json(cls, values: object) -> Self:
+        """The row that :meth:`to_json` gave.
+
+        Raises:
+            InvalidInputError: A key is missing, is one too many, or has a value of a wrong type.
+        """
+        if not isinstance(values, Mapping):
+            raise InvalidInputError(f"expected an object with the keys of a row, got {type(values).__name__}")
+        types = {field.name: str(field.type) for field in dataclasses.fields(cls)}
+        if missing := [name for name in types if name not in values]:
+            raise InvalidInputError(f"the key {missing[0]!r} is missing")
+        if unknown := [name for name in values if name not in types]:
+            raise InvalidInputError(f"there is a key {unknown[0]!r} that no row has")
+        return cls(**{name: _typed(name, types[name], values[name]) for name in types})
+
+
+def key(
+    scenario: str, policy: str, parameters: Mapping[str, Any], seed: int, steps: int
+) -> tuple[str, str, str, int, int]:
+    """What says which episode of an evaluation is meant; two are the same where their keys are."""
+    return scenario, policy, canonical(parameters), seed, steps
+
+
+def canonical(value: object) -> str:
+    """Equal JSON texts for equal values."""
+    return json.dumps(value, sort_keys=True, ensure_ascii=False)
+
+
+def jsonable(value: Any) -> Any:
+    """A parameter's value as JSON has it; what JSON does not know becomes text."""
+    if isinstance(value, (np.ndarray, np.generic)):
+        value = value.tolist()
+    if isinstance(value, (list, tuple)):
+        return [jsonable(item) for item in value]
+    if isinstance(value, Mapping):
+        return {str(name): jsonable(item) for name, item in value.items()}
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value)
+    return value if value is None or isinstance(value, (bool, int, float, str)) else repr(value)
+
+
+def measure(
+    scenario: Scenario,
+    policy: str,
+    parameters: Mapping[str, Any],
+    seed: int,
+    episode: Episode,
+    *,
+    machine: Mapping[str, Any],
+    preview: int,
+    fingerprint: str,
+) -> Row:
+    """The row of a recorded episode; for the arguments see :class:`Row`."""
+    counted = scenario.counted()[1:]
+    angles = episode.orientation_error[counted] if scenario.task.has_orientation else None
+    statuses = collections.Counter(episode.status.tolist())
+    return Row(
+        scenario=scenario.name,
+        policy=policy,
+        parameters=dict(parameters),
+        seed=seed,
+        steps=scenario.steps,
+        total_cost=_added_up(episode.tracking_cost + episode.velocity_cost),
+        tracking_cost=_added_up(episode.tracking_cost),
+        velocity_cost=_added_up(episode.velocity_cost),
+        regret=None,
+        position_error_max=float(episode.position_error[counted].max()),
+        position_error_rms=_rms(episode.position_error[counted]),
+        orientation_error_max=None if angles is None else float(angles.max()),
+        orientation_error_rms=None if angles is None else _rms(angles),
+        qdot_peak=float(np.abs(episode.qdot).max()),
+        qdot_rms=_rms(episode.qdot),
+        qdot_total_variation=float(np.abs(np.diff(episode.qdot, axis=0)).sum()),
+        time_p50_us=float(np.percentile(episode.time_ns, 50)) / 1e3,
+        time_p99_us=float(np.percentile(episode.time_ns, 99)) / 1e3,
+        deadline_misses=int((episode.time_ns > 1e9 * scenario.dt).sum()),
+        status=Status(max(statuses)).label,
+        machine=dict(machine),
+        iterations=float(episode.iterations.mean()),
+        status_counts={Status(status).label: count for status, count in sorted(statuses.items())},
+        preview=preview,
+        fingerprint=fingerprint,
+    )
+
+
+@dataclasses.dataclass(frozen=True)
+class Summary:
+    """The episodes of one policy in one scenario, put together.
+
+    Args:
+        scenario: Its name.
+        policy: Its name.
+        parameters: The policy's parameters.
+        steps: Steps of an episode.
+        episodes: How many there are.
+        total_cost: Geometric mean.
+        total_cost_median: Median.
+        total_cost_worst: The largest.
+        worst_seed: The reset seed of the episode with the largest cost.
+        tracking_cost: Geometric mean.
+        velocity_cost: Geometric mean.
+        regret: Geometric mean; None where one is not known.
+        position_error_max: The largest, in [m].
+        orientation_error_max: The largest, in [rad]; None without an orientation.
+        qdot_peak: The largest, in [rad/s] or [m/s].
+        time_p50_us: Median of the medians, in [µs].
+        time_p99_us: The largest, in [µs].
+        deadline_misses: Their sum.
+        status: The worst.
+    """
+
+    scenario: str
+    policy: str
+    parameters: dict[str, Any]
+    steps: int
+    episodes: int
+    total_cost: float
+    total_cost_median: float
+    total_cost_worst: float
+    worst_seed: int
+    tracking_cost: float
+    velocity_cost: float
+    regret: float | None
+    position_error_max: float
+    orientation_error_max: float | None
+    qdot_peak: float
+    time_p50_us: float
+    time_p99_us: float
+    deadline_misses: int
+    status: str
+
+
+def summarise(rows: Iterable[Row]) -> list[Summary]:
+    """One summary for each policy with its parameters in each scenario, in the order of their first rows."""
+    groups: dict[tuple[str, str, str, int], list[Row]] = {}
+    for row in rows:
+        groups.setdefault((row.scenario, row.policy, canonical(row.parameters), row.steps), []).append(row)
+    return [_summary(group) for group in groups.values()]
+
+
+def geometric_mean(values: Sequence[float]) -> float:
+    """Exp of the mean logarithm; 0 where a value is 0."""
+    if min(values) <= 0.0:
+        return 0.0
+    return values[0] if len(values) == 1 else math.exp(math.fsum(map(math.log, values)) / len(values))
+
+
+def _summary(rows: Sequence[Row]) -> Summary:
+    first, costs = rows[0], [row.total_cost for row in rows]
+    worst = max(rows, key=lambda row: row.total_cost)
+    regrets = [row.regret for row in rows if row.regret is not None]
+    angles = [row.orientation_error_max for row in rows if row.orientation_error_max is not None]
+    return Summary(
+        scenario=first.scenario,
+        policy=first.policy,
+        parameters=first.parameters,
+        steps=first.steps,
+        episodes=len(rows),
+        total_cost=geometric_mean(costs),
+        total_cost_median=statistics.median(costs),
+        total_cost_worst=worst.total_cost,
+        worst_seed=worst.seed,
+        tracking_cost=geometric_mean([row.tracking_cost for row in rows]),
+        velocity_cost=geometric_mean([row.velocity_cost for row in rows]),
+        regret=geometric_mean(regrets) if len(regrets) == len(rows) else None,
+        position_error_max=max(row.position_error_max for row in rows),
+        orientation_error_max=max(angles) if angles else None,
+        qdot_peak=max(row.qdot_peak for row in rows),
+        time_p50_us=statistics.median(row.time_p50_us for row in rows),
+        time_p99_us=max(row.time_p99_us for row in rows),
+        deadline_misses=sum(row.deadline_misses for row in rows),
+        status=max((row.status for row in rows), key=lambda status: Status[status.upper()]),
+    )
+
+
+def _added_up(costs: FloatArray) -> float:
+    # From left to right, as everybody adds up rewards; NumPy's sum() goes pairwise and differs in the last bits.
+    return float(np.cumsum(costs)[-1])
+
+
+def _rms(values: FloatArray) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+def _finite_or_none(value: Any) -> Any:
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _typed(name: str, kind: str, value: Any) -> Any:
+    """A value of JSON as the field's type, or words that say why not."""
+    number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    right = {
+        "str": isinstance(value, str),
+        "int": isinstance(value, int) and number,
+        "float": number or value is None,
+        "float | None": number or value is None,
+    }.get(kind, isinstance(value, dict))
+    if not right or (name == "status" and value.upper() not in Status.__members__):
+        raise InvalidInputError(f"the key {name!r} should have a value of type {kind}, got {value!r}")
+    if kind.startswith("float") and value is not None:
+        return float(value)
+    return math.nan if kind == "float" and value is None else value
