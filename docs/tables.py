@@ -1,0 +1,117 @@
+"""Writes the tables of the documentation from the registries: ``python -m docs.tables``.
+
+A test fails where a page does not hold what this writes.
+"""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+
+import baselines
+import ikgym
+from baselines.registry import get
+from baselines.status import Status
+
+PAGES = Path(__file__).parent
+
+
+def arms() -> list[tuple[str, ...]]:
+    """One line an arm."""
+    rows = [("arm", "joints", "of which slide", "tool at home [m]")]
+    for name in ikgym.arms.names():
+        arm = ikgym.arms.get(name)
+        home = ", ".join(f"{x:.4g}" for x in arm.forward(np.zeros(arm.joints))[1] + 0.0)
+        rows.append((f"`{name}`", str(arm.joints), str(sum(arm.prismatic)), f"({home})"))
+    return rows
+
+
+def tasks() -> list[tuple[str, ...]]:
+    """One line a task."""
+    return [("task", "coordinates", "components of the error", "orientation")] + [
+        (f"`{task.name}`", str(task.size), str(task.error_size), "yes" if task.has_orientation else "no")
+        for task in map(ikgym.tasks.get, ikgym.tasks.names())
+    ]
+
+
+def scenarios() -> list[tuple[str, ...]]:
+    """One line a scenario."""
+    rows = [("scenario", "arm", "solvers know", "task", "Δt [s]", "steps", "source")]
+    for s in map(ikgym.scenarios.get, ikgym.scenarios.names()):
+        model = "the arm" if s.model is s.arm else f"`{s.model.name}`"
+        rows.append(
+            (f"`{s.name}`", f"`{s.arm.name}`", model, f"`{s.task.name}`", f"{s.dt:g}", f"{s.steps:,}", s.source)
+        )
+    return rows
+
+
+def splits() -> list[tuple[str, ...]]:
+    """One line a split."""
+    rows = [("split", "seeds")]
+    for name, seeds in ikgym.scenarios.SPLITS.items():
+        rows.append((name, f"{seeds.start:,} … {seeds.stop - 1:,}"))
+    return rows
+
+
+def policies() -> list[tuple[str, ...]]:
+    """One line a policy."""
+    rows = [("policy", "what it does", "parameters and defaults")]
+    for name in baselines.names():
+        policy = get(name)
+        summary = " ".join((policy.__doc__ or "").split("\n\n")[0].split())
+        fields = policy.__dataclass_fields__
+        parameters = ", ".join(f"`{p} = {fields[p].default!r}`" for p in policy.parameter_names())
+        rows.append((f"`{name}`" + (" (reference)" if policy.reference else ""), summary, parameters))
+    return rows
+
+
+def statuses() -> list[tuple[str, ...]]:
+    """One line a status, from good to bad."""
+    source = inspect.getsource(Status)
+    rows = [("status", "meaning")]
+    for status in Status:
+        comment = re.search(rf"((?:    #: .*\n|    #  .*\n)+)    {status.name} =", source)
+        meaning = " ".join(line.strip(" #:") for line in comment[1].splitlines()) if comment else ""
+        rows.append((f"`{status.label}`", meaning))
+    return rows
+
+
+TABLES = {
+    "arms": arms,
+    "tasks": tasks,
+    "scenarios": scenarios,
+    "splits": splits,
+    "policies": policies,
+    "statuses": statuses,
+}
+
+
+def markdown(rows: Iterable[tuple[str, ...]]) -> str:
+    """A table, its first row the head."""
+    head, *body = rows
+    lines = ["| " + " | ".join(row) + " |" for row in (head, *body)]
+    return "\n".join([lines[0], "|---" * len(head) + "|", *lines[1:]])
+
+
+def filled(text: str) -> str:
+    """A page with its tables written anew."""
+    return re.sub(
+        r"(<!-- table: (\w+) -->\n).*?(<!-- end -->)",
+        lambda m: f"{m[1]}{markdown(TABLES[m[2]]())}\n{m[3]}",
+        text,
+        flags=re.DOTALL,
+    )
+
+
+def main() -> None:
+    """Writes the tables into the pages."""
+    for page in sorted(PAGES.glob("*.md")):
+        page.write_text(filled(page.read_text(encoding="utf-8")), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,23 @@
+"""Every example runs."""
+
+from __future__ import annotations
+
+import runpy
+from pathlib import Path
+
+import pytest
+
+EXAMPLES = sorted(Path(__file__).parents[1].glob("examples/[0-9]*.py"))
+
+
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
+def test_example(example, capsys, tmp_path):
+    arguments = {"04_video": (tmp_path / "video.mp4", 40)}.get(example.stem, ())
+    runpy.run_path(str(example))["main"](*arguments)
+    assert capsys.readouterr().out.strip()
+    if arguments:
+        assert arguments[0].stat().st_size > 1000
+
+
+def test_there_are_examples():
+    assert len(EXAMPLES) >= 4
