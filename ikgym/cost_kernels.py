@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from numba import njit
+from ikgym.jit import inlined, kernel
 
 
 class CostParameters(NamedTuple):
@@ -21,7 +21,7 @@ class CostParameters(NamedTuple):
 P_X_INSIDE = 2.0
 
 
-@njit(cache=True, nogil=True, inline="always")
+@inlined
 def _power(x, p):  # type: ignore[no-untyped-def]
     """The p-th power of x >= 0; whole exponents, the usual case, cost a few products instead of a call."""
     if p == 2.0:
@@ -37,13 +37,13 @@ def _power(x, p):  # type: ignore[no-untyped-def]
     return x**p
 
 
-@njit(cache=True, nogil=True, inline="always")
+@inlined
 def _value(x, delta, inside, outside):  # type: ignore[no-untyped-def]
     r = abs(x) / delta
     return _power(r, outside if r > 1.0 else inside)
 
 
-@njit(cache=True, nogil=True, inline="always")
+@inlined
 def _slope(x, delta, inside, outside):  # type: ignore[no-untyped-def]
     r = abs(x) / delta
     p = outside if r > 1.0 else inside
@@ -52,16 +52,16 @@ def _slope(x, delta, inside, outside):  # type: ignore[no-untyped-def]
     return slope if x > 0.0 else (-slope if x < 0.0 else 0.0)
 
 
-@njit(cache=True, nogil=True, inline="always")
+@inlined
 def _bend(x, delta, inside, outside):  # type: ignore[no-untyped-def]
     r = abs(x) / delta
     p = outside if r > 1.0 else inside
     if p == 1.0:
         return 0.0
-    return p * (p - 1.0) * _power(r, p - 2.0) / (delta * delta)
+    return p * (p - 1.0) * _power(r, p - 2.0) / delta / delta
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def tracking(cost, error):  # type: ignore[no-untyped-def]
     """Φ^X, the sum over the components of the tracking error. Shape of ``error`` (e,)."""
     total = 0.0
@@ -70,21 +70,21 @@ def tracking(cost, error):  # type: ignore[no-untyped-def]
     return total
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def tracking_gradient(cost, error, out):  # type: ignore[no-untyped-def]
     """∂Φ^X/∂error. Shapes (e,)."""
     for j in range(error.shape[0]):
         out[j] = _slope(error[j], cost.delta_x, P_X_INSIDE, cost.p_x)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def tracking_curvature(cost, error, out):  # type: ignore[no-untyped-def]
     """The diagonal of ∂²Φ^X/∂error². Shapes (e,)."""
     for j in range(error.shape[0]):
         out[j] = _bend(error[j], cost.delta_x, P_X_INSIDE, cost.p_x)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def velocity(cost, qdot):  # type: ignore[no-untyped-def]
     """Φ^U, the sum over all joints (the printed sum to 6 is a slip). Shape of ``qdot`` (n,)."""
     total = 0.0
@@ -93,14 +93,14 @@ def velocity(cost, qdot):  # type: ignore[no-untyped-def]
     return total
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def velocity_gradient(cost, qdot, out):  # type: ignore[no-untyped-def]
     """∂Φ^U/∂q̇. Shapes (n,)."""
     for j in range(qdot.shape[0]):
         out[j] = _slope(qdot[j], cost.delta_qdot, cost.p_in, cost.p_out)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def velocity_curvature(cost, qdot, out):  # type: ignore[no-untyped-def]
     """The diagonal of ∂²Φ^U/∂q̇². Shapes (n,)."""
     for j in range(qdot.shape[0]):

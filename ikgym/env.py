@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, ClassVar
 
 import gymnasium as gym
@@ -28,6 +29,9 @@ class NotApplicable(np.float64):
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, NotApplicable)
+
+    def __ne__(self, other: object) -> bool:
+        return not self == other
 
     __hash__ = np.float64.__hash__
 
@@ -98,7 +102,7 @@ class RedundantIKEnv(gym.Env[Any, Any]):
 
     Raises:
         UnknownNameError: There is no such scenario.
-        InvalidInputError: The preview or the render mode is none.
+        InvalidInputError: The preview or the render mode is not valid.
     """
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": ["human", "rgb_array"], "render_fps": 50}  # type: ignore[misc]
@@ -137,10 +141,9 @@ class RedundantIKEnv(gym.Env[Any, Any]):
 
         Raises:
             UnknownNameError: There is no such option.
-            InvalidInputError: The start has a wrong shape, is not finite or out of range.
+            InvalidInputError: The options are no dict, or the start has a wrong shape, is not finite or out of range.
         """
-        options = options or {}
-        known_names("option of reset", options, OPTIONS)
+        options = checked_options(options, OPTIONS)
         starts = self._simulator.checked_starts(options.get("q"))
         super().reset(seed=seed)
         self._simulator.reset(np.ones(1, dtype=np.bool_), [self.np_random], starts)
@@ -214,6 +217,21 @@ def _renderer(scenario: Scenario, mode: str) -> Any:
     from ikgym.rendering import Renderer
 
     return Renderer(scenario.arm, mode, title=scenario.name, has_orientation=scenario.task.has_orientation)
+
+
+def checked_options(options: dict[str, Any] | None, known: Sequence[str]) -> dict[str, Any]:
+    """The options of a reset.
+
+    Raises:
+        UnknownNameError: There is no such option.
+        InvalidInputError: They are no dict.
+    """
+    if options is None:
+        return {}
+    if not isinstance(options, dict):
+        raise InvalidInputError(f"options: expected None or a dict, got {options!r}.")
+    known_names("option of reset", options, known)
+    return options
 
 
 def resolve(scenario: str | Scenario) -> Scenario:

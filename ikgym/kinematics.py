@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
+from ikgym.jit import inlined, kernel
 from ikgym.rotations import rodrigues
 
 
@@ -35,7 +35,7 @@ class Chain(NamedTuple):
     tool_rotation: npt.NDArray[np.float64]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def forward(chain, q, rotation, position):  # type: ignore[no-untyped-def]
     """Forward kinematics of one configuration.
 
@@ -48,7 +48,7 @@ def forward(chain, q, rotation, position):  # type: ignore[no-untyped-def]
     _walk(chain, q, rotation, position, rotation, False)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def forward_and_jacobian(chain, q, rotation, position, jacobian):  # type: ignore[no-untyped-def]
     """Forward kinematics and geometric Jacobian of one configuration.
 
@@ -74,7 +74,7 @@ def forward_and_jacobian(chain, q, rotation, position, jacobian):  # type: ignor
         jacobian[2, i] = wx * y - wy * x
 
 
-@njit(cache=True, nogil=True, inline="always")
+@inlined
 def _walk(chain, q, rotation, position, jacobian, keep):  # type: ignore[no-untyped-def]
     """Goes along the chain; if told to keep them, leaves each joint's axis and point in ``jacobian``."""
     offsets, axes, prismatic = chain.offsets, chain.axes, chain.prismatic
@@ -139,21 +139,21 @@ def _walk(chain, q, rotation, position, jacobian, keep):  # type: ignore[no-unty
         rotation[2, j] = r20 * tx + r21 * ty + r22 * tz
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def forward_rows(chain, q, rotation, position):  # type: ignore[no-untyped-def]
     """:func:`forward` for N rows: ``q`` (N, n), ``rotation`` (N, 3, 3), ``position`` (N, 3)."""
     for row in range(q.shape[0]):
         forward(chain, q[row], rotation[row], position[row])
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def forward_and_jacobian_rows(chain, q, rotation, position, jacobian):  # type: ignore[no-untyped-def]
     """:func:`forward_and_jacobian` for N rows: as above, with ``jacobian`` (N, 6, n)."""
     for row in range(q.shape[0]):
         forward_and_jacobian(chain, q[row], rotation[row], position[row], jacobian[row])
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def joint_points(chain, q, points):  # type: ignore[no-untyped-def]
     """Where each joint begins and ends, for drawing.
 
@@ -176,13 +176,13 @@ def joint_points(chain, q, points):  # type: ignore[no-untyped-def]
 
 
 # Written out, since numba's matrix product needs SciPy.
-@njit(cache=True, nogil=True)
+@kernel
 def _shift(rotation, vector, length, point):  # type: ignore[no-untyped-def]
     for i in range(3):
         point[i] += length * (rotation[i, 0] * vector[0] + rotation[i, 1] * vector[1] + rotation[i, 2] * vector[2])
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _product(first, second):  # type: ignore[no-untyped-def]
     out = np.zeros((3, 3))
     for i in range(3):

@@ -9,10 +9,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from ikgym.jit import inlined, kernel
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def rodrigues(axis, angle):  # type: ignore[no-untyped-def]
     """The rotation about a unit axis (Varga 2021, eq. 8; Khan 2020, eq. 4.17).
 
@@ -41,7 +42,7 @@ def rodrigues(axis, angle):  # type: ignore[no-untyped-def]
     return out
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def quaternion(rotation):  # type: ignore[no-untyped-def]
     """The unit quaternion (w, x, y, z) with w >= 0 of a rotation.
 
@@ -64,7 +65,7 @@ def quaternion(rotation):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _quaternion(r00, r01, r02, r10, r11, r12, r20, r21, r22):  # type: ignore[no-untyped-def]
     """Shepperd's choice of the largest part.
 
@@ -97,7 +98,7 @@ def _quaternion(r00, r01, r02, r10, r11, r12, r20, r21, r22):  # type: ignore[no
     return scale * w, scale * x, scale * y, scale * z
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def rotation_vector(rotation):  # type: ignore[no-untyped-def]
     """The rotation vector (axis times angle) of a rotation, its angle between 0 and π.
 
@@ -121,7 +122,7 @@ def rotation_vector(rotation):  # type: ignore[no-untyped-def]
     return out
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def geodesic_angle(first, second):  # type: ignore[no-untyped-def]
     """The angle of the rotation that leads from one orientation to another.
 
@@ -146,6 +147,6 @@ def geodesic_angle(first, second):  # type: ignore[no-untyped-def]
     return 2.0 * math.atan2(math.sqrt(x * x + y * y + z * z), w)
 
 
-@njit(cache=True, nogil=True, inline="always")
+@inlined
 def _dot(a, b):  # type: ignore[no-untyped-def]
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

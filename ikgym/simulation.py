@@ -11,10 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
 from ikgym import cost_kernels, task_kernels
 from ikgym.cost_kernels import CostParameters
+from ikgym.jit import inlined, kernel
 from ikgym.kinematics import Chain, forward
 from ikgym.rotations import geodesic_angle
 
@@ -97,7 +97,7 @@ class Outcome(NamedTuple):
     clipped: Flags
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def first_not_finite(actions, active):  # type: ignore[no-untyped-def]
     """The first active row of ``actions`` (N, n) with a NaN or an infinity, or -1."""
     for row in range(actions.shape[0]):
@@ -108,7 +108,7 @@ def first_not_finite(actions, active):  # type: ignore[no-untyped-def]
     return -1
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def step(*arguments):  # type: ignore[no-untyped-def]
     """Moves the active rows from ``start`` to ``stop``, and observes them.
 
@@ -129,7 +129,7 @@ def step(*arguments):  # type: ignore[no-untyped-def]
             _observe_row(chain, law, cost, state, out, row, scratch)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def observe(*arguments):  # type: ignore[no-untyped-def]
     """Observes the active rows without moving them; the arguments are those of :func:`step`."""
     chain, law, cost, state, out = _assemble(arguments)
@@ -141,7 +141,7 @@ def observe(*arguments):  # type: ignore[no-untyped-def]
             _observe_row(chain, law, cost, state, out, row, scratch)
 
 
-@njit(cache=True, nogil=True, inline="always")
+@inlined
 def _assemble(arguments):  # type: ignore[no-untyped-def]
     return (
         Chain(*arguments[0:5]),
@@ -152,7 +152,7 @@ def _assemble(arguments):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _move_row(law, state, actions, out, row):  # type: ignore[no-untyped-def]
     n = actions.shape[1]
     k = state.step[row]
@@ -173,7 +173,7 @@ def _move_row(law, state, actions, out, row):  # type: ignore[no-untyped-def]
     out.clipped[row] = clipped
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _scratch(law, out):  # type: ignore[no-untyped-def]
     """Arrays that the rows of a call use one after the other: to allocate them costs as much as the kinematics."""
     m = out.pose.shape[1]
@@ -181,7 +181,7 @@ def _scratch(law, out):  # type: ignore[no-untyped-def]
     return np.empty((3, 3)), np.empty(3), np.empty(m), np.empty(e)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _observe_row(chain, law, cost, state, out, row, scratch):  # type: ignore[no-untyped-def]
     rotation, position, nominal, error = scratch
     k = state.step[row]
@@ -218,7 +218,7 @@ def _observe_row(chain, law, cost, state, out, row, scratch):  # type: ignore[no
         out.velocity_cost[row] = cost_kernels.velocity(cost, out.qdot[row])
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _uniform(key, counter):  # type: ignore[no-untyped-def]
     """The ``counter``-th number of a stream, uniform between -1 and 1 (SplitMix64).
 
@@ -231,7 +231,7 @@ def _uniform(key, counter):  # type: ignore[no-untyped-def]
     return 2.0 * (np.float64(z >> np.uint64(11)) * 2.0**-53) - 1.0
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def nominal_rows(kind, frames, out):  # type: ignore[no-untyped-def]
     """Task coordinates of frames: ``frames`` (k, 12 or 3), ``out`` (k, m)."""
     for row in range(frames.shape[0]):

@@ -23,6 +23,9 @@ Observation = dict[str, FloatArray]
 GRAIN_STEP = 256
 GRAIN_RESET = 4
 
+# A preview beyond would fill the memory before it served any policy.
+FARTHEST = 1_000_000
+
 
 class Simulator:
     """States of N arms that track the same scenario, and the compiled step between them.
@@ -34,7 +37,7 @@ class Simulator:
             those.
 
     Raises:
-        InvalidInputError: The preview is none.
+        InvalidInputError: The preview is not valid.
     """
 
     def __init__(self, scenario: Scenario, rows: int | None, preview: Preview) -> None:
@@ -72,6 +75,7 @@ class Simulator:
         # The kernels take tuples apart, see simulation.step: what never changes is taken apart once.
         self._constants = (*scenario.arm.chain, *self._law, *scenario.cost.parameters, *self._state)
         self._all = np.ones(rows, dtype=np.bool_)
+        self._own_start = np.zeros(rows, dtype=np.bool_)
         with announced("the simulation kernels"):
             simulation.first_not_finite(self._state.q, ~self._all)
             for kernel in (simulation.step, simulation.observe):
@@ -105,6 +109,7 @@ class Simulator:
         if noisy:
             for row in rows:
                 state.noise_key[row] = generators[row].integers(2**63, dtype=np.uint64)
+        self._own_start[active] = starts is None
         state.qdot[active] = 0.0
         state.step[active] = 0
 
@@ -144,7 +149,7 @@ class Simulator:
         active = self._all if active is None else active
         simulation.observe(*self._constants, *out, self._state.q, active, 0, self.rows)
         if self.scenario.initial_pose is not None:
-            out.pose[active & (self._state.step == 0)] = self.scenario.initial_pose
+            out.pose[active & self._own_start & (self._state.step == 0)] = self.scenario.initial_pose
         return out
 
     def step(self, actions: npt.ArrayLike, active: npt.NDArray[np.bool_] | None = None) -> Outcome:
@@ -208,7 +213,10 @@ class Simulator:
         )
 
     def _checked_actions(self, actions: npt.ArrayLike) -> FloatArray:
-        raw = np.asarray(actions)
+        try:
+            raw = np.asarray(actions)
+        except ValueError:  # lists of different lengths
+            raw = np.asarray(None)
         if raw.dtype.kind not in "fiub":
             raise InvalidInputError(f"action: expected numbers of shape {self._action_shape}, got {actions!r}.")
         if raw.shape != self._action_shape:
@@ -236,14 +244,18 @@ def offsets(preview: Preview) -> tuple[int, ...]:
     Raises:
         InvalidInputError: It is neither, or not rising, or below 1.
     """
-    if isinstance(preview, (int, np.integer)) and not isinstance(preview, bool) and preview >= 1:
-        return tuple(range(1, int(preview) + 1))
-    if isinstance(preview, (tuple, list)):
-        steps = [0, *preview]
-        if len(steps) > 1 and all(
-            isinstance(b, (int, np.integer)) and not isinstance(b, bool) and b > a for a, b in itertools.pairwise(steps)
-        ):
-            return tuple(int(p) for p in preview)
+    if isinstance(preview, (tuple, list)) and preview:
+        ahead = tuple(preview)
+        rising = all(map(_is_whole, ahead)) and all(a < b for a, b in itertools.pairwise(ahead))
+        if rising and ahead[0] >= 1 and ahead[-1] <= FARTHEST:
+            return tuple(int(step) for step in ahead)
+    elif _is_whole(preview) and 1 <= preview <= FARTHEST:  # type: ignore[operator]  # a whole number
+        return tuple(range(1, preview + 1))  # type: ignore[operator]
     raise InvalidInputError(
-        f"preview: expected a whole number of at least 1, or rising steps ahead such as (1, 10, 40), got {preview!r}."
+        "preview: expected a whole number of at least 1, or rising steps ahead such as (1, 10, 40), none above "
+        f"{FARTHEST}, got {preview!r}."
     )
+
+
+def _is_whole(value: object) -> bool:
+    return isinstance(value, (int, np.integer)) and not isinstance(value, bool)

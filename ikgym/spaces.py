@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from gymnasium import spaces
 
-from ikgym.scenarios import Scenario
-from ikgym.scenarios.scenario import Preview
+from ikgym.scenarios import Preview, Scenario
 from ikgym.simulator import offsets
 from ikgym.validation import FloatArray
 
@@ -30,7 +29,7 @@ def observation_space(scenario: Scenario, preview: Preview) -> spaces.Dict:
         Boxes of float64: q (n,), qdot (n,), pose (m,), nominal (p, m), remaining (1,).
 
     Raises:
-        InvalidInputError: The preview is none.
+        InvalidInputError: The preview is not valid.
     """
     ahead = offsets(preview)
     disturbance = np.abs(scenario.disturbance.bias) + np.abs(scenario.disturbance.noise)

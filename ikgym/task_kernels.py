@@ -9,14 +9,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from ikgym.jit import kernel
 from ikgym.rotations import rotation_vector
 
 POSITION, SKEW, MATRIX, POSE = 0, 1, 2, 3
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def coordinates(kind, rotation, position, out):  # type: ignore[no-untyped-def]
     """Task coordinates of a pose.
 
@@ -40,7 +40,7 @@ def coordinates(kind, rotation, position, out):  # type: ignore[no-untyped-def]
         out[m - 3 + i] = position[i]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def frame_coordinates(kind, frame, out):  # type: ignore[no-untyped-def]
     """:func:`coordinates` of a frame of shape (12,), or (3,) where there is no orientation."""
     m, width = out.shape[0], frame.shape[0]
@@ -55,7 +55,7 @@ def frame_coordinates(kind, frame, out):  # type: ignore[no-untyped-def]
         out[m - 3 + i] = frame[width - 3 + i]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def error(kind, nominal, coordinates, out):  # type: ignore[no-untyped-def]
     """What is missing from coordinates to their nominal values.
 
@@ -85,7 +85,7 @@ def error(kind, nominal, coordinates, out):  # type: ignore[no-untyped-def]
             out[i] = nominal[i] - coordinates[i]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def jacobian(kind, rotation, geometric, out):  # type: ignore[no-untyped-def]
     """Derivative of the task coordinates; for POSE that of -error where the error is 0.
 
@@ -123,7 +123,7 @@ def jacobian(kind, rotation, geometric, out):  # type: ignore[no-untyped-def]
             out[e - 3 + i, j] = geometric[i, j]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def error_jacobian(kind, error, jacobian, out):  # type: ignore[no-untyped-def]
     """Derivative of the error by the joint coordinates, exact for errors of any size.
 

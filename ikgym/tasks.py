@@ -69,9 +69,16 @@ class Task(Frozen):
         Raises:
             InvalidInputError: A shape is wrong, or a number not finite.
         """
-        nominal, coordinates = np.broadcast_arrays(
-            _array("nominal", nominal, (self.size,)), _array("coordinates", coordinates, (self.size,))
+        nominal, coordinates = (
+            _array("nominal", nominal, (self.size,)),
+            _array("coordinates", coordinates, (self.size,)),
         )
+        try:
+            nominal, coordinates = np.broadcast_arrays(nominal, coordinates)
+        except ValueError:
+            raise InvalidInputError(
+                f"coordinates: expected a shape that goes with {nominal.shape} of nominal, got {coordinates.shape}."
+            ) from None
         nominal, coordinates = np.ascontiguousarray(nominal), np.ascontiguousarray(coordinates)
         out = np.empty((*nominal.shape[:-1], self.error_size))
         for index in np.ndindex(nominal.shape[:-1]):

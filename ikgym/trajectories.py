@@ -15,7 +15,7 @@ import numpy as np
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 from ikgym.rotations import rodrigues, rotation_vector
-from ikgym.validation import FloatArray, Frozen, frozen_array, number, per_joint
+from ikgym.validation import FloatArray, Frozen, frozen_array, number, per_joint, rotation_matrix
 
 
 class Trajectory(Frozen, abc.ABC):
@@ -241,7 +241,7 @@ class StraightLine(Trajectory):
         blend: Time of each parabolic blend, in [s]; at most half of the duration.
 
     Raises:
-        InvalidInputError: A shape is wrong, a number not finite, or the blends do not fit.
+        InvalidInputError: A shape is wrong, a number not finite, a rotation none, or the blends do not fit.
     """
 
     start: FloatArray
@@ -251,7 +251,9 @@ class StraightLine(Trajectory):
 
     def __post_init__(self) -> None:
         for name in ("start", "end"):
-            object.__setattr__(self, name, frozen_array(name, getattr(self, name), (12,)))
+            frame = frozen_array(name, getattr(self, name), (12,))
+            rotation_matrix(f"rotation of {name}", frame[:9].reshape(3, 3))
+            object.__setattr__(self, name, frame)
         for name in ("duration", "blend"):
             object.__setattr__(self, name, number(name, getattr(self, name), above=0.0))
         if 2.0 * self.blend > self.duration:

@@ -14,6 +14,9 @@ from ikgym.exceptions import InvalidInputError, UnknownNameError
 
 FloatArray = npt.NDArray[np.float64]
 
+# What is this close to unit length, or to a rotation, was meant to be one, and is made one exactly.
+UNIT_TOLERANCE = 1e-6
+
 
 def float_array(name: str, value: npt.ArrayLike, shape: tuple[int | None, ...] | None = None) -> FloatArray:
     """A fresh, C-contiguous float64 copy of finite numbers.
@@ -59,7 +62,7 @@ def per_joint(name: str, value: npt.ArrayLike, n: int) -> FloatArray:
     """One number for all joints, or one a joint, as a read-only array of shape (n,).
 
     Raises:
-        InvalidInputError: There are as many numbers as neither, or one is not finite.
+        InvalidInputError: There is neither one number nor one a joint, or one is not finite.
     """
     array = frozen_array(name, value)
     return frozen_array(name, array, (n,)) if array.ndim else read_only(np.full(n, array))
@@ -74,7 +77,10 @@ def number(name: str, value: float, *, above: float | None = None, at_least: flo
     bound = f" above {above:g}" if above is not None else f" of at least {at_least:g}" if at_least is not None else ""
     if isinstance(value, bool) or not isinstance(value, (int, float, np.integer, np.floating)):
         raise InvalidInputError(f"{name}: expected a finite number{bound}, got {value!r}.")
-    out = float(value)
+    try:
+        out = float(value)
+    except OverflowError:  # a whole number beyond all floats
+        out = math.inf
     if (
         not math.isfinite(out)
         or (above is not None and not out > above)
@@ -93,6 +99,24 @@ def whole_number(name: str, value: int, *, at_least: int) -> int:
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < at_least:
         raise InvalidInputError(f"{name}: expected a whole number of at least {at_least}, got {value!r}.")
     return int(value)
+
+
+def rotation_matrix(name: str, value: npt.ArrayLike) -> FloatArray:
+    """A rotation matrix, made exactly orthogonal if it is within 1e-6 of one, and read-only.
+
+    Raises:
+        InvalidInputError: It is no orthogonal matrix with determinant 1.
+    """
+    matrix = float_array(name, value, (3, 3))
+    deviation = np.abs(matrix @ matrix.T - np.eye(3)).max()
+    if deviation > UNIT_TOLERANCE or np.linalg.det(matrix) < 0.0:
+        raise InvalidInputError(
+            f"{name}: expected a rotation matrix (orthogonal, determinant 1), got {matrix.tolist()}."
+        )
+    if deviation > 1e-14:
+        left, _, right = np.linalg.svd(matrix)
+        matrix = left @ right
+    return read_only(matrix)
 
 
 def known_names(kind: str, given: Iterable[str], available: Iterable[str]) -> None:

@@ -12,13 +12,13 @@ from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
-from ikgym.env import OPTIONS, RedundantIKEnv, resolve
+from ikgym.env import OPTIONS, RedundantIKEnv, checked_options, resolve
 from ikgym.exceptions import InvalidInputError, ResetNeededError, UnknownNameError
 from ikgym.scenarios import Preview, Scenario
 from ikgym.simulation import Outcome
 from ikgym.simulator import Observation, Simulator
 from ikgym.spaces import action_space, observation_space
-from ikgym.validation import FloatArray, known_names, whole_number
+from ikgym.validation import FloatArray, whole_number
 
 Flags = npt.NDArray[np.bool_]
 Infos = dict[str, Any]
@@ -52,7 +52,7 @@ class RedundantIKVectorEnv(gym.vector.VectorEnv[Observation, npt.NDArray[np.floa
 
     Raises:
         UnknownNameError: There is no such scenario or autoreset mode.
-        InvalidInputError: N, the preview or the render mode is none.
+        InvalidInputError: N, the preview or the render mode is not valid.
     """
 
     def __init__(
@@ -112,8 +112,7 @@ class RedundantIKVectorEnv(gym.vector.VectorEnv[Observation, npt.NDArray[np.floa
             InvalidInputError: Seeds, mask or starts are of a wrong shape or type. Nothing has changed then.
             ResetNeededError: The mask leaves out a row that has never been reset.
         """
-        options = options or {}
-        known_names("option of reset", options, (*OPTIONS, "reset_mask"))
+        options = checked_options(options, (*OPTIONS, "reset_mask"))
         seeds = self._checked_seeds(seed)
         mask = self._checked_mask(options.get("reset_mask"))
         if not (self._begun | mask).all():
@@ -194,6 +193,8 @@ class RedundantIKVectorEnv(gym.vector.VectorEnv[Observation, npt.NDArray[np.floa
         if isinstance(seed, (int, np.integer)):
             first = whole_number("seed", seed, at_least=0)
             return [first + row for row in range(self.num_envs)]
+        if not isinstance(seed, (list, tuple)):
+            raise InvalidInputError(f"seed: expected None, a whole number or a list of them, got {seed!r}.")
         seeds = [None if s is None else whole_number("seed", s, at_least=0) for s in seed]
         if len(seeds) != self.num_envs:
             raise InvalidInputError(f"seed: expected {self.num_envs} seeds, one a row, got {len(seeds)}.")

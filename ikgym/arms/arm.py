@@ -11,10 +11,7 @@ import numpy.typing as npt
 from ikgym import kinematics
 from ikgym.exceptions import InvalidInputError
 from ikgym.kinematics import Chain
-from ikgym.validation import FloatArray, Frozen, float_array, frozen_array, read_only
-
-# An axis this close to unit length was meant to be one, and is scaled to it exactly.
-UNIT_TOLERANCE = 1e-6
+from ikgym.validation import UNIT_TOLERANCE, FloatArray, Frozen, float_array, frozen_array, read_only, rotation_matrix
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -33,7 +30,8 @@ class Arm(Frozen):
             1e-6 is an error, within that it is scaled to unit length.
         prismatic: True where a joint slides, one entry a joint. All joints turn if it is left out.
         tool: Tool point in the last frame, in [m]. Shape (3,).
-        tool_rotation: Orientation of the tool in the last frame. Shape (3, 3).
+        tool_rotation: Orientation of the tool in the last frame, a rotation matrix to within 1e-6, which is made
+            exactly orthogonal. Shape (3, 3).
         lower: Lower limits of the joints in [rad] or [m], -inf where there is none. Shape (n,). The limits are
             data for solvers: nothing in the kinematics stops at them.
         upper: Upper limits of the joints in [rad] or [m], inf where there is none. Shape (n,).
@@ -66,15 +64,7 @@ class Arm(Frozen):
                 f"prismatic of arm {self.name!r}: expected {n} truth values, one a joint, got {self.prismatic!r}."
             )
         tool = frozen_array(f"tool of arm {self.name!r}", self.tool, (3,))
-        tool_rotation = frozen_array(f"tool_rotation of arm {self.name!r}", self.tool_rotation, (3, 3))
-        if (
-            np.abs(tool_rotation @ tool_rotation.T - np.eye(3)).max() > UNIT_TOLERANCE
-            or np.linalg.det(tool_rotation) < 0.0
-        ):
-            raise InvalidInputError(
-                f"tool_rotation of arm {self.name!r}: expected a rotation matrix (orthogonal, determinant 1), "
-                f"got {tool_rotation.tolist()}."
-            )
+        tool_rotation = rotation_matrix(f"tool_rotation of arm {self.name!r}", self.tool_rotation)
         lower = _limits(self.name, "lower", self.lower, n, -np.inf)
         upper = _limits(self.name, "upper", self.upper, n, np.inf)
         velocity_limit = _limits(self.name, "velocity_limit", self.velocity_limit, n, np.inf)

@@ -36,7 +36,10 @@ def get(name: str) -> Scenario:
     Raises:
         UnknownNameError: There is no such scenario; the message has the nearest name.
     """
-    return _registry.get(name)
+    scenario = _registry.get(name)
+    if not isinstance(scenario, Scenario):
+        raise InvalidInputError(f"Scenario {name!r}: its maker gave {scenario!r}, which is no Scenario.")
+    return scenario
 
 
 def names() -> tuple[str, ...]:

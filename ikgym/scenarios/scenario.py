@@ -44,9 +44,8 @@ class Disturbance(Frozen):
         for name in ("bias", "noise"):
             value = frozen_array(name, getattr(self, name))
             if value.ndim > 1 or (name == "noise" and (value < 0.0).any()):
-                raise InvalidInputError(
-                    f"{name}: expected a number of at least 0 or one a joint, got {value.tolist()}."
-                )
+                least = " of at least 0" if name == "noise" else ""
+                raise InvalidInputError(f"{name}: expected a number{least} or one a joint, got {value.tolist()}.")
             object.__setattr__(self, name, float(value) if value.ndim == 0 else tuple(value.tolist()))
 
 
@@ -107,12 +106,13 @@ class Scenario(Frozen):
                 raise InvalidInputError(
                     f"{field} of scenario {self.name!r}: expected {kind.__name__}, got {getattr(self, field)!r}."
                 )
+        if not isinstance(self.name, str):
+            raise InvalidInputError(f"name of a scenario: expected a text, got {self.name!r}.")
         n = self.arm.joints
         settle("model", self.arm if self.model is None else self.model)
         if not isinstance(self.model, Arm) or self.model.joints != n:
-            raise InvalidInputError(
-                f"model of scenario {self.name!r}: expected an Arm with {n} joints, got {self.model!r}."
-            )
+            got = f"{self.model.name!r} with {self.model.joints}" if isinstance(self.model, Arm) else repr(self.model)
+            raise InvalidInputError(f"model of scenario {self.name!r}: expected an Arm with {n} joints, got {got}.")
         self.trajectory.check(self.model)
         if self.task.has_orientation and not self.trajectory.has_orientation:
             raise InvalidInputError(
@@ -265,5 +265,10 @@ class Scenario(Frozen):
 
 
 def furthest(preview: Preview) -> int:
-    """How many steps a preview looks ahead."""
-    return int(preview) if isinstance(preview, (int, np.integer)) else max(preview, default=0)
+    """How many steps a preview looks ahead.
+
+    Raises:
+        InvalidInputError: It is no whole number of at least 0, nor a sequence of them.
+    """
+    steps: list[Any] = list(preview) if isinstance(preview, (tuple, list)) else [preview]
+    return max((whole_number("preview", step, at_least=0) for step in steps), default=0)

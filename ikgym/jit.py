@@ -1,0 +1,79 @@
+"""How kernels are compiled: cached on disk, without the interpreter lock, and never stale.
+
+numba looks at the file of a function alone to tell whether what it has on disk is still good. A kernel whose callee in
+another file has changed, or a constant from there, would go on running as it was. Here the stamp of a kernel is made
+of all that it may reach.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+import sys
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from numba import njit
+from numba.core.dispatcher import Dispatcher
+
+logger = logging.getLogger("ikgym")
+
+# Stamps of whole modules, by name.
+_stamps: dict[str, str] = {}
+
+
+def kernel(function: Any) -> Any:
+    """Compiles a function when it is first called; the machine code is kept on disk.
+
+    Args:
+        function: Takes and gives arrays, numbers and tuples of them.
+    """
+    return _cached(function)
+
+
+def inlined(function: Any) -> Any:
+    """Like :func:`kernel`, and copied into its callers, so that constant arguments are folded away."""
+    return _cached(function, inline="always")
+
+
+def _cached(function: Any, **options: Any) -> Any:
+    try:
+        compiled = njit(cache=True, nogil=True, **options)(function)
+    except RuntimeError:
+        # Neither the folder of the package nor the user's own can be written.
+        logger.info("No folder to keep machine code in: %s is compiled anew in each process.", function.__qualname__)
+        return njit(nogil=True, **options)(function)
+    # Not public, and absent where compilation is switched off: then numba's own stamp has to do.
+    file = getattr(getattr(compiled, "_cache", None), "_cache_file", None)
+    if hasattr(file, "_source_stamp"):
+        file._source_stamp = _stamp(function.__module__)  # type: ignore[union-attr]
+    return compiled
+
+
+def _stamp(module: str) -> str:
+    """A digest of a module's file, of the constants it has so far, and of the modules that its kernels come from."""
+    if module in _stamps:
+        return _stamps[module]
+    digest = hashlib.sha256(_source(module))
+    for name, value in sorted(vars(sys.modules[module]).items()):
+        if isinstance(value, (bool, int, float, str)) and not name.startswith("__"):
+            digest.update(f"{name}={value!r};".encode())
+        elif (origin := _origin(value)) and origin != module:
+            _stamps[origin] = _stamp(origin)  # imported, and so complete
+            digest.update(_stamps[origin].encode())
+    return digest.hexdigest()
+
+
+def _origin(value: object) -> str:
+    """The name of the module of ours that a kernel comes from, or that has kernels; nothing for all else."""
+    if isinstance(value, Dispatcher):
+        return str(value.py_func.__module__)
+    if isinstance(value, ModuleType) and any(isinstance(v, Dispatcher) for v in vars(value).values()):
+        return value.__name__
+    return ""
+
+
+def _source(module: str) -> bytes:
+    file = getattr(sys.modules.get(module), "__file__", None)
+    return Path(file).read_bytes() if file else b""

@@ -1,0 +1,83 @@
+"""Machine code on disk is never stale, and not needed."""
+
+from __future__ import annotations
+
+import logging
+import os
+import subprocess
+import sys
+
+import numba.core.dispatcher
+import pytest
+
+from ikgym.jit import kernel
+
+CALLEE = "from {jit}\nSCALE = {scale}\n@kernel\ndef scaled(x):\n    return SCALE * x\n"
+CALLER = (
+    "from {jit}\nfrom constants import SHIFT\nfrom callee import scaled\n"
+    "@kernel\ndef f(x):\n    return scaled(x) + SHIFT\n"
+)
+OURS = "ikgym.jit import kernel"
+NUMBAS = "numba import njit\nkernel = njit(cache=True)"
+
+
+def answer(folder, jit, scale, shift):
+    """What a fresh process works out."""
+    for name, text in {
+        "constants": f"SHIFT = {shift}\n",
+        "callee": CALLEE.format(jit=jit, scale=scale),
+        "caller": CALLER.format(jit=jit),
+    }.items():
+        file = folder / f"{name}.py"
+        if not file.exists() or file.read_text() != text:
+            file.write_text(text)
+    return float(
+        subprocess.run(
+            [sys.executable, "-c", "from caller import f; print(f(1.0))"],
+            cwd=folder,
+            env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1"},
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+    )
+
+
+def test_a_changed_callee_or_constant_is_noticed(tmp_path):
+    assert answer(tmp_path, OURS, scale=2.0, shift=0.0) == 2.0
+    assert list(tmp_path.glob("__pycache__/caller.f-*.nbc"))
+    assert answer(tmp_path, OURS, scale=3.0, shift=0.0) == 3.0
+    assert answer(tmp_path, OURS, scale=3.0, shift=10.0) == 13.0
+
+
+def test_numba_alone_would_not_notice(tmp_path):
+    """If this fails numba has learned it, and the stamp can go."""
+    assert answer(tmp_path, NUMBAS, scale=2.0, shift=0.0) == 2.0
+    assert answer(tmp_path, NUMBAS, scale=3.0, shift=10.0) == 2.0
+
+
+def test_without_a_folder_to_write_to(monkeypatch, caplog):
+    def no_locator(self, function):
+        raise RuntimeError("cannot cache function: no locator available")
+
+    monkeypatch.setattr(numba.core.dispatcher.FunctionCache, "__init__", no_locator)
+    with caplog.at_level(logging.INFO, logger="ikgym"):
+
+        @kernel
+        def double(x):
+            return 2 * x
+
+    assert double(4) == 8
+    assert "compiled anew in each process" in caplog.text
+
+
+@pytest.mark.parametrize("module", ["ikgym", "baselines"])
+def test_plain_python_still_works(module):
+    code = (
+        "import warnings; warnings.simplefilter('ignore')\n"
+        f"import {module}, ikgym, numpy as np\n"
+        "print(ikgym.arms.get('varga7').forward(np.zeros(7))[1][0])"
+    )
+    environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
+    out = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
+    assert out.stdout.strip() == "5.5"
