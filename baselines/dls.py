@@ -7,11 +7,11 @@ from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
 from baselines.linear_algebra import cholesky, cholesky_solve
 from baselines.policy import statuses
 from baselines.resolved_rate import ResolvedRate
+from ikgym.jit import kernel
 from ikgym.validation import FloatArray, number
 
 
@@ -46,7 +46,7 @@ class DampedLeastSquares(ResolvedRate):
         return out, statuses(len(out))
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def damped_rows(jacobian, shift, damping, out):  # type: ignore[no-untyped-def]
     """Δq = Jᵀ (J Jᵀ + λ I)⁻¹ Δx, row by row: shapes (B, e, n), (B, e), a number, (B, n)."""
     e, n = jacobian.shape[1], jacobian.shape[2]

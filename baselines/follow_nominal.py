@@ -11,7 +11,7 @@ import numpy.typing as npt
 from baselines.policy import Batch, Memory, Problem, Solution, SolverPolicy, statuses
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
-from ikgym.validation import FloatArray, whole_number
+from ikgym.validation import FloatArray, frozen_array, whole_number
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -36,6 +36,9 @@ class FollowNominal(SolverPolicy):
 
     name: ClassVar[str] = "follow_nominal"
     reference: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "path", frozen_array("path", self.path, (None, self.problem.model.joints)))
 
     @classmethod
     def for_scenario(cls, scenario: Scenario, **parameters: Any) -> Self:

@@ -7,10 +7,11 @@ from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
 from baselines.linear_algebra import orthogonal_columns
 from baselines.resolved_rate import ResolvedRate, status_of
+from ikgym.exceptions import InvalidInputError
+from ikgym.jit import kernel
 from ikgym.validation import FloatArray, number
 
 
@@ -25,7 +26,7 @@ class MoorePenrose(ResolvedRate):
     Args:
         problem: What the policy is told of the scenario.
         gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
-        rank_tolerance: Singular values below this share of the largest count as zero. At least 0.
+        rank_tolerance: Singular values below this share of the largest count as zero. At least 0, below 1.
 
     Raises:
         InvalidInputError: The gain or the tolerance is out of its range.
@@ -38,6 +39,8 @@ class MoorePenrose(ResolvedRate):
     def __post_init__(self) -> None:
         super().__post_init__()
         object.__setattr__(self, "rank_tolerance", number("rank_tolerance", self.rank_tolerance, at_least=0.0))
+        if self.rank_tolerance >= 1.0:
+            raise InvalidInputError(f"rank_tolerance: expected a number below 1, got {self.rank_tolerance:g}.")
 
     def invert(self, jacobian: FloatArray, shift: FloatArray) -> tuple[FloatArray, npt.NDArray[np.int64]]:
         """See :meth:`ResolvedRate.invert`."""
@@ -48,7 +51,7 @@ class MoorePenrose(ResolvedRate):
         return out, status_of(deficient)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def pseudoinverse_rows(jacobian, shift, tolerance, full_rank, out, deficient):  # type: ignore[no-untyped-def]
     """Δq = J⁺ Δx by singular values, row by row.
 

@@ -3,28 +3,34 @@
 from __future__ import annotations
 
 import abc
+import contextlib
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
 from baselines.status import Status
 from ikgym.arms import Arm
+from ikgym.compilation import announced
 from ikgym.cost import TrackingCost
 from ikgym.exceptions import InvalidInputError
+from ikgym.jit import kernel
 from ikgym.scenarios import Scenario
 from ikgym.tasks import Task
-from ikgym.validation import FloatArray
+from ikgym.validation import FloatArray, Frozen, frozen_array
 
 Observation = Mapping[str, npt.NDArray[np.floating[Any]]]
 Memory = tuple[npt.NDArray[Any], ...]
 
 
+#: Policies that have solved something in this process, and so are compiled.
+_compiled: set[type] = set()
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
-class Problem:
+class Problem(Frozen):
     """What a policy is told of a scenario: its model of the arm, which may differ from the arm that moves.
 
     Args:
@@ -40,6 +46,10 @@ class Problem:
     cost: TrackingCost
     dt: float
     velocity_limit: FloatArray
+
+    def __post_init__(self) -> None:
+        limit = frozen_array("velocity_limit", self.velocity_limit, (self.model.joints,))
+        object.__setattr__(self, "velocity_limit", limit)
 
     @classmethod
     def of(cls, scenario: Scenario) -> Self:
@@ -105,7 +115,7 @@ class Report(NamedTuple):
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class SolverPolicy(abc.ABC):
+class SolverPolicy(Frozen, abc.ABC):
     """Base of all solvers: turns `solve` on a batch into Stable-Baselines3's `predict`.
 
     A policy is a frozen dataclass: its fields behind ``problem`` are its parameters, and whatever changes from
@@ -178,7 +188,9 @@ class SolverPolicy(abc.ABC):
         """Actions for observations, single or batched.
 
         Args:
-            observation: As the environment gives it; single, or all arrays with a leading batch axis B.
+            observation: As the environment gives it; single, or all arrays with a leading batch axis B. Its
+                ``nominal`` must show the steps 1, 2, … ahead: an environment made with a tuple as its preview shows
+                others, which no solver can tell from these.
             state: What the last call returned; None at the first.
             episode_start: True where an episode begins, and the memory is to be cleared. Shape (B,).
             deterministic: Changes nothing; solvers do not draw at random.
@@ -195,7 +207,8 @@ class SolverPolicy(abc.ABC):
         batch, single = self._batch(observation)
         rows = len(batch.q)
         memory = self._recall(state, episode_start, rows)
-        solution = self.solve(batch, memory)
+        with _announced(type(self)):
+            solution = self.solve(batch, memory)
         action = solution.qdot / self.problem.velocity_limit
         status, kept = solution.status, solution.memory
         if not _finite(action):
@@ -204,6 +217,8 @@ class SolverPolicy(abc.ABC):
             status = np.where(lost, int(Status.DIVERGED), status)
             kept = _replace_rows(kept, self.memory(rows), lost)
         answer: npt.NDArray[np.float32] = np.clip(action, -1.0, 1.0).astype(np.float32)
+        if (excess := np.abs(action) > 1.0).any():
+            status = np.where(excess.any(axis=1), np.maximum(status, int(Status.SATURATED)), status)
         return answer[0] if single else answer, (status, solution.iterations, *kept)
 
     @staticmethod
@@ -229,7 +244,7 @@ class SolverPolicy(abc.ABC):
 
     def _batch(self, observation: Observation) -> tuple[Batch, bool]:
         try:
-            arrays = [np.ascontiguousarray(observation[key], dtype=np.float64) for key in Batch._fields]
+            arrays = [_as_floats(observation[key]) for key in Batch._fields]
         except (KeyError, IndexError, TypeError, ValueError) as e:
             keys = sorted(observation) if isinstance(observation, Mapping) else type(observation).__name__
             raise InvalidInputError(
@@ -247,7 +262,7 @@ class SolverPolicy(abc.ABC):
                 lead = () if single else (rows,)
                 got = array.shape[1:] if single else array.shape
                 raise InvalidInputError(f"observation[{key!r}]: expected shape {(*lead, *shape)}, got {got}.")
-        if not (_finite(batch.q) and _finite(batch.qdot) and _finite(batch.pose) and _finite(batch.nominal)):
+        if not all(map(_finite, batch)):
             raise InvalidInputError("observation: expected finite numbers, got NaN or infinity.")
         if batch.nominal.shape[1] < self.preview:
             raise InvalidInputError(
@@ -258,17 +273,24 @@ class SolverPolicy(abc.ABC):
 
     def _recall(self, state: Memory | None, episode_start: npt.ArrayLike | None, rows: int) -> Memory:
         fresh = self.memory(rows)
+        starting = np.zeros(rows, dtype=np.bool_)
+        if episode_start is not None:
+            given = np.asarray(episode_start)
+            if given.dtype.kind not in "biuf" or given.shape not in {(), (rows,)}:
+                raise InvalidInputError(f"episode_start: expected {rows} truth values, got {episode_start!r}.")
+            starting |= given.astype(np.bool_)
         if state is None:
             return fresh
-        kept = state[2:]
-        if len(kept) != len(fresh) or any(k.shape != f.shape for k, f in zip(kept, fresh, strict=True)):
+        kept = state[2:] if isinstance(state, tuple) else None
+        if (
+            kept is None
+            or not all(isinstance(array, np.ndarray) for array in state)
+            or [k.shape for k in kept] != [f.shape for f in fresh]
+        ):
             raise InvalidInputError(
-                f"state: expected what {self.name}.predict returned for a batch of {rows}, got arrays of shapes "
-                f"{[np.shape(k) for k in state]}."
+                f"state: expected what {self.name}.predict returned for a batch of {rows}, got "
+                f"{[np.shape(k) for k in state] if isinstance(state, tuple) else state!r}."
             )
-        if episode_start is None or not fresh:
-            return kept
-        starting = np.broadcast_to(np.asarray(episode_start, dtype=np.bool_), (rows,))
         return _replace_rows(kept, fresh, starting) if starting.any() else kept
 
 
@@ -281,7 +303,7 @@ def _replace_rows(memory: Memory, fresh: Memory, rows: npt.NDArray[np.bool_]) ->
     return tuple(np.where(rows.reshape(-1, *[1] * (k.ndim - 1)), f, k) for k, f in zip(memory, fresh, strict=True))
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _all_finite(values):  # type: ignore[no-untyped-def]
     for value in values:  # noqa: SIM110  # compiled, the loop is faster than a generator
         if not np.isfinite(value):
@@ -292,3 +314,26 @@ def _all_finite(values):  # type: ignore[no-untyped-def]
 def _finite(array: FloatArray) -> bool:
     """Whether all numbers are finite, without the temporary array that NumPy makes."""
     return bool(_all_finite(array.ravel()))
+
+
+def _as_floats(value: object) -> FloatArray:
+    """A C-contiguous float64 array; refuses what is no array of real numbers, such as strings."""
+    raw = np.asarray(value)
+    if raw.dtype.kind not in "fiub":
+        raise TypeError(f"no real numbers: {raw.dtype}")
+    return np.ascontiguousarray(raw, dtype=np.float64)
+
+
+@contextlib.contextmanager
+def _compiling(policy: type[SolverPolicy]) -> Iterator[None]:
+    with announced(f"the policy {policy.name}"):
+        yield
+    _compiled.add(policy)
+
+
+def _announced(policy: type[SolverPolicy]) -> contextlib.AbstractContextManager[None]:
+    """Tells the user if the first solve of a policy takes long, since it has to be compiled."""
+    return _READY if policy in _compiled else _compiling(policy)
+
+
+_READY = contextlib.nullcontext()

@@ -7,12 +7,12 @@ from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
 from baselines.horizon import analytic_gradient, difference_gradient
 from baselines.policy import Batch, Memory, Solution, SolverPolicy
 from baselines.status import Status
 from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.jit import kernel
 from ikgym.validation import number, whole_number
 
 GRADIENTS = ("finite_difference", "analytic")
@@ -117,7 +117,7 @@ class RecedingHorizonGradient(SolverPolicy):
         return gradients * (stages + joints * stages * (stages + 1) // 2), 0, 0, 0
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def descend_rows(  # type: ignore[no-untyped-def]
     chain,
     kind,

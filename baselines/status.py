@@ -17,10 +17,12 @@ class Status(enum.IntEnum):
     ITERATION_LIMIT = 1
     #: The Jacobian had lost rank, and the directions lost were left out.
     RANK_DEFICIENT = 2
+    #: More was asked for than the velocity limit allows; each joint was cut to its limit by itself.
+    SATURATED = 3
     #: A vector was too long for the rotation that was to turn it; the arm was stopped for this step.
-    NOT_A_ROTATION = 3
+    NOT_A_ROTATION = 4
     #: The iterates blew up, or are no numbers; the arm was stopped for this step and the memory cleared.
-    DIVERGED = 4
+    DIVERGED = 5
 
     @property
     def label(self) -> str:

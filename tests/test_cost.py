@@ -68,6 +68,7 @@ def test_kinks(cost):
 def test_curvature_at_rest():
     assert TrackingCost().velocity_curvature([0.0])[0] == 0.0  # the quartic
     assert TrackingCost(p_in=2).velocity_curvature([0.0])[0] == pytest.approx(2 / 0.64)
+    assert np.isfinite(TrackingCost(delta_x=1e-150).tracking_curvature([0.0])[0])
     assert TrackingCost(p_in=1.5).velocity_curvature([0.0])[0] == np.inf
 
 
@@ -93,6 +94,7 @@ def test_batches_and_compiled_against_plain_python():
         ({"p_out": 0}, "p_out: expected a finite number of at least 1"),
         ({"p_in": np.inf}, "p_in: expected a finite number of at least 1, got inf"),
         ({"p_in": "4"}, "p_in: expected a finite number of at least 1, got '4'"),
+        ({"delta_x": 10**400}, "delta_x: expected a finite number above 0, got inf"),
         ({"p_in": True}, "p_in: expected a finite number of at least 1, got True"),
     ],
 )

@@ -153,11 +153,22 @@ def test_zhang_helix_measures_zero_at_the_start_only():
     assert math.isnan(info["orientation_error"])
 
 
+def test_another_start_is_measured_as_it_is():
+    """The zero of the paper belongs to its own start."""
+    q = np.array([0.1, 0.2, 0.3])
+    env = make("zhang3-helix")
+    observation, _ = env.reset(options={"q": q})
+    np.testing.assert_array_equal(observation["pose"], env.unwrapped.scenario.arm.forward(q)[1])
+    observation, _ = env.reset()
+    np.testing.assert_array_equal(observation["pose"], 0.0)
+
+
 def test_not_applicable_equals_itself():
     a, b = NotApplicable("nan"), NotApplicable("nan")
     assert np.isnan(a)
     assert data_equivalence({"x": a}, {"x": b}, exact=True)
     assert a != np.float64(1.0)
+    assert not (a != b)  # noqa: SIM202  # the two operators are implemented apart
     assert np.zeros(1, dtype=type(a)).dtype == np.float64
 
 
@@ -284,6 +295,7 @@ def test_bounds_are_true_at_the_worst(name):
         (np.zeros((1, 7)), r"expected shape \(7,\), got \(1, 7\)"),
         (0.0, r"expected shape \(7,\), got \(\)"),
         (["a"] * 7, "expected numbers of shape"),
+        ([[1], [1, 2]], "expected numbers of shape"),
         ([None] * 7, "expected numbers of shape"),
         (np.zeros(7, dtype=complex), "expected numbers of shape"),
         (np.array([0, 0, np.nan, 0, 0, 0, 0]), "expected finite numbers.*nan.*state is as it was"),
@@ -339,6 +351,7 @@ def test_step_needs_an_episode():
         ({"q": [0, 0, np.nan, 0, 0, 0, 0]}, InvalidInputError, "finite"),
         ({"q": "home"}, InvalidInputError, "array of real numbers"),
         ({"q": np.full(7, 7.0)}, InvalidInputError, r"at most .*6\.2832"),
+        (["q"], InvalidInputError, r"options: expected None or a dict, got \['q'\]"),
         ({"Q": np.zeros(7)}, UnknownNameError, "option of reset 'Q'.*Available: q"),
     ],
 )
@@ -352,9 +365,11 @@ def test_bad_options_change_nothing(options, error, message):
     env.step(np.zeros(7, dtype=np.float32))
 
 
-@pytest.mark.parametrize("preview", [0, -1, True, 1.5, (), (0, 1), (3, 2), (2, 2), "2", (1, 2.5), None])
+@pytest.mark.parametrize(
+    "preview", [0, -1, True, 1.5, (), (0, 1), (3, 2), (2, 2), "2", (1, 2.5), None, 2**40, (1, 2**40)]
+)
 def test_bad_previews(preview):
-    with pytest.raises(InvalidInputError, match="preview: expected a whole number of at least 1, or rising"):
+    with pytest.raises(InvalidInputError, match=r"preview: expected a whole number of at least 1, or rising.* got"):
         ikgym.RedundantIKEnv(preview=preview)
 
 
@@ -363,6 +378,16 @@ def test_unknown_scenario_and_argument():
         make("varga7-fats")
     with pytest.raises(TypeError, match="scenaro"):
         gym.make("RedundantIK-v0", scenaro="varga7-fast")
+
+
+def test_bounds_hold_for_a_tool_that_is_a_rotation_only_nearly():
+    axes = [[0, 0, 1.0], [0, 1.0, 0]]
+    arm = ikgym.Arm("nearly", [[0, 0, 1.0]] * 2, axes, tool_rotation=np.eye(3) * (1 + 4e-7))
+    motion = ikgym.trajectories.Sinusoid([1.0, 1.0])
+    env = make(ikgym.Scenario("nearly", arm, ikgym.tasks.get("matrix"), motion, velocity_limit=1.0))
+    observation, _ = env.reset()
+    assert env.observation_space.contains(observation)
+    np.testing.assert_array_equal(arm.tool_rotation, np.eye(3))
 
 
 def test_unseeded_first_reset_works():

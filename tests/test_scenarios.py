@@ -63,6 +63,12 @@ def test_nominal_of_a_random_scenario_needs_a_seed():
         scenarios.get("varga7-random").nominal()
 
 
+@pytest.mark.parametrize("preview", [-1, 1.5, "a", (1, -2)])
+def test_bad_previews_of_a_nominal(preview):
+    with pytest.raises(InvalidInputError, match="preview: expected a whole number of at least 0"):
+        scenarios.get("varga7-fast").nominal(preview=preview)
+
+
 def test_the_literal_reading_is_another_arm():
     fast, literal = (scenarios.get(name).nominal() for name in ("varga7-fast", "varga7-literal-fast"))
     assert abs(fast - literal).max() > 0.1
@@ -119,7 +125,8 @@ def test_seed_ranges_are_disjoint_and_documented():
         ({"initial_pose": np.zeros(7)}, r"initial_pose: expected shape \(6,\)"),
         ({"iterations_per_point": ()}, "iterations_per_point: expected at least one number"),
         ({"iterations_per_point": (3, 0)}, "iterations_per_point: expected a whole number of at least 1, got 0"),
-        ({"model": ikgym.arms.get("faitli3")}, "model of scenario 'varga7-fast': expected an Arm with 7 joints"),
+        ({"model": ikgym.arms.get("faitli3")}, "expected an Arm with 7 joints, got 'faitli3' with 3"),
+        ({"name": None}, "name of a scenario: expected a text, got None"),
         ({"arm": "varga7"}, "arm of scenario 'varga7-fast': expected Arm, got 'varga7'"),
         ({"task": "skew"}, "task of scenario 'varga7-fast': expected Task, got 'skew'"),
         ({"cost": None}, "cost of scenario 'varga7-fast': expected TrackingCost, got None"),
@@ -141,6 +148,12 @@ def test_a_cartesian_trajectory_needs_a_start():
         scenarios.get("zhang3-helix").replace(start=None)
 
 
+def test_a_bias_may_be_negative_but_no_matrix():
+    assert Disturbance(bias=-0.5).bias == -0.5
+    with pytest.raises(InvalidInputError, match="bias: expected a number or one a joint"):
+        Disturbance(bias=[[1.0]])
+
+
 @pytest.mark.parametrize("noise", [-0.1, np.nan, (0.1, -0.1)])
 def test_bad_disturbances(noise):
     with pytest.raises(InvalidInputError, match="noise: expected"):
@@ -153,6 +166,9 @@ def test_register_your_own(monkeypatch):
     scenarios.register("mine", lambda: scenarios.get("varga7-fast").replace(name="mine", steps=3))
     assert isinstance(scenarios.get("mine"), Scenario)
     assert ikgym.RedundantIKEnv("mine").scenario.steps == 3
+    scenarios.register("nothing", lambda: 3)
+    with pytest.raises(InvalidInputError, match="'nothing': its maker gave 3, which is no Scenario"):
+        scenarios.get("nothing")
     with pytest.raises(InvalidInputError, match="scenario 'mine' is registered already"):
         scenarios.register("mine", lambda: scenarios.get("varga7-slow"))
 

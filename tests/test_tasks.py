@@ -94,6 +94,8 @@ def test_bad_input():
         task.coordinates(np.eye(3), np.zeros((2, 3)))
     with pytest.raises(InvalidInputError, match=r"nominal: expected shape \(\.\.\., 6\), got \(5,\)"):
         task.error(np.zeros(5), np.zeros(6))
+    with pytest.raises(InvalidInputError, match=r"coordinates: expected a shape that goes with \(4, 6\)"):
+        task.error(np.zeros((4, 6)), np.zeros((3, 6)))
     with pytest.raises(InvalidInputError, match="coordinates: expected finite numbers"):
         task.error(np.zeros(6), np.full(6, np.nan))
     with pytest.raises(InvalidInputError, match="jacobian: expected shape"):

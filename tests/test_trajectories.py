@@ -13,6 +13,7 @@ from ikgym.exceptions import InvalidInputError
 from ikgym.trajectories import Helix, RandomSinusoid, Sinusoid, StraightLine
 
 TIMES = np.linspace(0, 7, 57)
+HOME = np.array([*np.eye(3).ravel(), 0.0, 0.0, 0.0])
 VARGA = np.array([0.8, 1.0, 1.2, 1.4, 1.6, 1.8, 2.0])
 
 
@@ -145,8 +146,9 @@ def test_reach_bounds_the_positions(name):
         (lambda: RandomSinusoid([1.0], scale=(1.0, 0.2)), r"scale: expected a range \(low, high\), got \(1, 0.2\)"),
         (lambda: Helix([0, 0], 1, 1, 1), r"center: expected shape \(3,\)"),
         (lambda: Helix([0, 0, 0], 0, 1, 1), "radius: expected a finite number above 0"),
-        (lambda: StraightLine(np.zeros(12), np.zeros(12), 1.0, 0.6), "at most half of the duration of 1 s, got 0.6"),
-        (lambda: StraightLine(np.zeros(3), np.zeros(12), 1.0, 0.5), r"start: expected shape \(12,\)"),
+        (lambda: StraightLine(HOME, HOME, 1.0, 0.6), "at most half of the duration of 1 s, got 0.6"),
+        (lambda: StraightLine(np.zeros(3), HOME, 1.0, 0.5), r"start: expected shape \(12,\)"),
+        (lambda: StraightLine(HOME, np.zeros(12), 1.0, 0.5), "rotation of end: expected a rotation matrix"),
     ],
 )
 def test_bad_trajectories(make, message):

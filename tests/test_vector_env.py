@@ -195,6 +195,10 @@ def test_bad_arguments():
     envs = ikgym.RedundantIKVectorEnv(2)
     with pytest.raises(InvalidInputError, match="expected 2 seeds, one a row, got 3"):
         envs.reset(seed=[1, 2, 3])
+    with pytest.raises(InvalidInputError, match=r"seed: expected None, a whole number or a list of them, got 1\.5"):
+        envs.reset(seed=1.5)
+    with pytest.raises(InvalidInputError, match="options: expected None or a dict, got 3"):
+        envs.reset(options=3)
     with pytest.raises(UnknownNameError, match="Did you mean 'reset_mask'"):
         envs.reset(options={"resetmask": np.ones(2, dtype=bool)})
 

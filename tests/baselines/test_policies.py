@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import functools
+import time
 
 import gymnasium as gym
 import numpy as np
@@ -136,8 +138,8 @@ def test_policies_are_frozen_and_say_their_parameters(name):
     for parameter in policy.parameters:
         with pytest.raises(dataclasses.FrozenInstanceError):
             setattr(policy, parameter, 0)
-    copy = baselines.make(name, "varga7-fast", **policy.parameters)
-    assert copy.parameters == policy.parameters
+    again = baselines.make(name, "varga7-fast", **policy.parameters)
+    assert again.parameters == policy.parameters
 
 
 def test_unknown_names():
@@ -173,6 +175,9 @@ def good():
         (lambda o: o.update(pose=np.full(6, np.nan)), "expected finite numbers"),
         (lambda o: o.update(nominal=np.full((2, 6), np.inf)), "expected finite numbers"),
         (lambda o: o.update(q=["a"] * 7), "expected a dict of number arrays"),
+        (lambda o: o.update(q=np.array(["0.1"] * 7)), "expected a dict of number arrays"),
+        (lambda o: o.update(q=np.full(7, 0.1 + 5j)), "expected a dict of number arrays"),
+        (lambda o: o.update(remaining=np.array([np.nan])), "expected finite numbers"),
     ],
 )
 def test_bad_observations(spoil, message):
@@ -195,6 +200,58 @@ def test_a_state_of_another_batch_or_policy_is_refused():
         policy.predict(batch, state=state)
     with pytest.raises(InvalidInputError, match=r"state: expected what dls.predict returned"):
         baselines.make("dls", "varga7-fast").predict(good(), state=state)
+
+
+@pytest.mark.parametrize("start", [[True, False], [[True]], "a", [None]])
+@pytest.mark.parametrize("name", ["dls", "follow_nominal"])
+def test_bad_episode_starts(name, start):
+    policy = baselines.make(name, "varga7-fast")
+    _, state = policy.predict(good())
+    with pytest.raises(InvalidInputError, match="episode_start: expected 1 truth values"):
+        policy.predict(good(), state, start)
+
+
+@pytest.mark.parametrize("state", [3, "a", (None,) * 4, [np.zeros(1)] * 4, (np.zeros(1),) * 9])
+def test_bad_states(state):
+    with pytest.raises(InvalidInputError, match=r"state: expected what rhc_gradient.predict returned"):
+        baselines.make("rhc_gradient", "varga7-fast").predict(good(), state)
+
+
+def test_what_exceeds_the_velocity_limit_is_said():
+    """The environment sees the action cut already, so that the policy has to say so."""
+    scenario = ikgym.scenarios.get("varga7-fast").replace(velocity_limit=1e-3)
+    batch = {key: np.stack([value] * 2) for key, value in good().items()}
+    batch["nominal"][1] = batch["pose"][1]  # nothing to do in this row
+    action, state = baselines.make("dls", scenario).predict(batch)
+    assert baselines.SolverPolicy.report(state).status.tolist() == [Status.SATURATED, Status.CONVERGED]
+    assert abs(action[0]).max() == 1.0
+
+
+@pytest.mark.parametrize("name", baselines.names())
+def test_arrays_stay_read_only_in_copies(name):
+    for policy in (baselines.make(name, "varga7-fast"), copy.deepcopy(baselines.make(name, "varga7-fast"))):
+        arrays = [policy.problem.velocity_limit, policy.problem.model.offsets]
+        arrays += [value for value in vars(policy).values() if isinstance(value, np.ndarray)]
+        assert not any(array.flags.writeable for array in arrays)
+        assert policy.predict(good())[0].shape == (7,)
+
+
+def test_long_compilation_of_a_policy_is_announced(monkeypatch, caplog):
+    monkeypatch.setattr("baselines.policy._compiled", set())
+    monkeypatch.setattr(ikgym.compilation.announced.__wrapped__, "__defaults__", (0.01,))
+
+    class Slow(Broken):
+        name = "slow"
+
+        def solve(self, batch, memory):
+            time.sleep(0.1)
+            return Solution(np.zeros_like(batch.q), memory, statuses(1), np.zeros(1, dtype=np.int64))
+
+    policy = Slow(Problem.of(scenario("varga7-fast")))
+    policy.predict(good())
+    assert caplog.text.count("Compiling the policy slow") == 1
+    policy.predict(good())
+    assert caplog.text.count("Compiling") == 1
 
 
 def test_float32_observations_do():

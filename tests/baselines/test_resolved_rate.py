@@ -105,6 +105,7 @@ def test_tracks_a_regular_trajectory(name):
         ("dls", {"damping": np.nan}, "damping: expected a finite number above 0, got nan"),
         ("dls", {"gain": 0.0}, "gain: expected a finite number above 0"),
         ("moore_penrose", {"gain": 2.0}, "gain: expected a number above 0 and below 2, got 2"),
+        ("moore_penrose", {"rank_tolerance": 2.0}, "rank_tolerance: expected a number below 1, got 2"),
         ("moore_penrose", {"rank_tolerance": -1.0}, "rank_tolerance: expected a finite number of at least 0"),
     ],
 )
