@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
+from ikgym.jit import kernel
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def cholesky(matrix):  # type: ignore[no-untyped-def]
     """Cholesky factorisation in place: the lower triangle of ``matrix`` (m, m) becomes L with L Lᵀ = matrix.
 
@@ -34,7 +34,7 @@ def cholesky(matrix):  # type: ignore[no-untyped-def]
     return True
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def cholesky_solve(factor, rhs):  # type: ignore[no-untyped-def]
     """Solves L Lᵀ x = rhs in place; ``factor`` (m, m) from :func:`cholesky`, ``rhs`` (m,) becomes x."""
     m = rhs.shape[0]
@@ -48,7 +48,7 @@ def cholesky_solve(factor, rhs):  # type: ignore[no-untyped-def]
         rhs[i] /= factor[i, i]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def orthogonal_columns(columns, rotations):  # type: ignore[no-untyped-def]
     """Singular value decomposition in place, by one-sided Jacobi rotations (Hestenes).
 
@@ -64,6 +64,11 @@ def orthogonal_columns(columns, rotations):  # type: ignore[no-untyped-def]
     for i in range(c):
         for j in range(c):
             rotations[i, j] = 1.0 if i == j else 0.0
+    # A column that has shrunk to rounding errors has no direction of its own, and would be turned for ever.
+    vanished = 0.0
+    for i in range(r):
+        for j in range(c):
+            vanished += 1e-31 * columns[i, j] * columns[i, j]
     for _ in range(60):
         rotated = False
         for p in range(c - 1):
@@ -73,7 +78,7 @@ def orthogonal_columns(columns, rotations):  # type: ignore[no-untyped-def]
                     a += columns[i, p] * columns[i, p]
                     b += columns[i, q] * columns[i, q]
                     d += columns[i, p] * columns[i, q]
-                if abs(d) <= 1e-15 * math.sqrt(a * b):
+                if min(a, b) <= vanished or abs(d) <= 1e-15 * math.sqrt(a * b):
                     continue
                 rotated = True
                 tau = (b - a) / (2.0 * d)

@@ -55,6 +55,7 @@ class Row:
         status_counts: How many steps ended with which status.
         preview: Steps ahead that the policy was shown.
         fingerprint: Tells scenarios apart that share a name, see :func:`baselines.plan.fingerprint`.
+        operations: Mean numbers of operations in one step, see :class:`baselines.policy.Operations`.
     """
 
     scenario: str
@@ -82,6 +83,7 @@ class Row:
     status_counts: dict[str, int]
     preview: int
     fingerprint: str
+    operations: dict[str, float]
 
     @property
     def key(self) -> tuple[str, str, str, int, int]:
@@ -176,6 +178,7 @@ def measure(
         status_counts={Status(status).label: count for status, count in sorted(statuses.items())},
         preview=preview,
         fingerprint=fingerprint,
+        operations={name: float(count.mean()) for name, count in episode.operations._asdict().items()},
     )
 
 
@@ -203,6 +206,7 @@ class Summary:
         time_p99_us: The largest, in [µs].
         deadline_misses: Their sum.
         status: The worst.
+        operations: Means over the episodes.
     """
 
     scenario: str
@@ -224,6 +228,7 @@ class Summary:
     time_p99_us: float
     deadline_misses: int
     status: str
+    operations: dict[str, float]
 
 
 def summarise(rows: Iterable[Row]) -> list[Summary]:
@@ -266,6 +271,7 @@ def _summary(rows: Sequence[Row]) -> Summary:
         time_p99_us=max(row.time_p99_us for row in rows),
         deadline_misses=sum(row.deadline_misses for row in rows),
         status=max((row.status for row in rows), key=lambda status: Status[status.upper()]),
+        operations={name: statistics.fmean(row.operations[name] for row in rows) for name in first.operations},
     )
 
 

@@ -226,6 +226,15 @@ class SolverPolicy(Frozen, abc.ABC):
         """Status and iterations of the call that returned a state."""
         return Report(state[0], state[1])
 
+    def inside(self, state: Memory) -> dict[str, FloatArray]:
+        """What a solver can show of how it came to its answer, by name; read from the state that `predict` returned.
+
+        Returns:
+            Arrays with a leading axis of B; nothing for most solvers.
+        """
+        del state
+        return {}
+
     def operations(self, state: Memory) -> Operations:
         """What the call that returned a state has cost; worked out when asked for, at no cost otherwise."""
         counts = self.count(self.report(state).iterations)

@@ -4,18 +4,50 @@ from __future__ import annotations
 
 from typing import Any
 
+from baselines.abstract_rotation import AbstractRotation
+from baselines.broyden import Broyden
 from baselines.dls import DampedLeastSquares
+from baselines.fixed_point import FixedPoint
+from baselines.fixed_point_extended import FixedPointExtended
 from baselines.follow_nominal import FollowNominal
+from baselines.gram_schmidt import GramSchmidt
+from baselines.jacobian_transpose import JacobianTranspose
+from baselines.mfac import ModelFreeAdaptiveControl
+from baselines.mfapc import ModelFreeAdaptivePredictiveControl
 from baselines.moore_penrose import MoorePenrose
+from baselines.null_space import NullSpace
 from baselines.policy import SolverPolicy
 from baselines.rhc_gradient import RecedingHorizonGradient
+from baselines.rhc_lagrange import RecedingHorizonLagrange
+from baselines.smoothing import Smoothed
+from baselines.truncated_svd import TruncatedSVD
+from baselines.weighted_pseudoinverse import WeightedPseudoinverse
 from ikgym import scenarios
 from ikgym.exceptions import UnknownNameError
 from ikgym.scenarios import Scenario
 from ikgym.validation import known_names
 
 POLICIES: dict[str, type[SolverPolicy]] = {
-    policy.name: policy for policy in (MoorePenrose, DampedLeastSquares, RecedingHorizonGradient, FollowNominal)
+    policy.name: policy
+    for policy in (
+        MoorePenrose,
+        DampedLeastSquares,
+        JacobianTranspose,
+        WeightedPseudoinverse,
+        NullSpace,
+        TruncatedSVD,
+        GramSchmidt,
+        Broyden,
+        RecedingHorizonGradient,
+        RecedingHorizonLagrange,
+        Smoothed,
+        ModelFreeAdaptiveControl,
+        ModelFreeAdaptivePredictiveControl,
+        FixedPoint,
+        AbstractRotation,
+        FixedPointExtended,
+        FollowNominal,
+    )
 }
 
 
@@ -30,7 +62,7 @@ def get(name: str) -> type[SolverPolicy]:
     Raises:
         UnknownNameError: There is no such policy; the message has the nearest name.
     """
-    if name not in POLICIES:
+    if not isinstance(name, str) or name not in POLICIES:
         raise UnknownNameError("policy", name, POLICIES)
     return POLICIES[name]
 

@@ -56,12 +56,13 @@ def number(value: float | None, scale: float = 1.0) -> str:
     return f"{mantissa}e{int(exponent)}" if exponent else mantissa.removesuffix(".")
 
 
-def table(rows: Sequence[Row], skipped: Sequence[Skipped] = ()) -> str:
+def table(rows: Sequence[Row], skipped: Sequence[Skipped] = (), *, operations: bool = False) -> str:
     """The tables of all scenarios as plain text, at most 120 characters wide.
 
     Args:
         rows: The results.
         skipped: What was left out, to be said below.
+        operations: Whether to show what a step costs in kinematics, factorisations and measurements.
     """
     parts = []
     for scenario, summaries in by_scenario(rows).items():
@@ -69,6 +70,8 @@ def table(rows: Sequence[Row], skipped: Sequence[Skipped] = ()) -> str:
         parts.append(f"{heading(scenario, summaries)}\n{_plain(_columns(names), summaries)}")
         if spread := _spread(names, summaries):
             parts.append(f"total cost over the episodes of {scenario}\n{_plain(spread, summaries)}")
+        if operations:
+            parts.append(f"operations in one step of {scenario}, mean\n{_plain(_operations(names), summaries)}")
     notes = _notes(rows)
     notes += [f"skipped: {s.policy} in {s.scenario}: {s.reason}" for s in skipped]
     wrapped = (textwrap.fill(note, WIDTH, subsequent_indent="  ", break_on_hyphens=False) for note in notes)
@@ -98,6 +101,8 @@ def readme(
         out += [f"## {heading(scenario, summaries)}", "", *_markdown(_columns(names), summaries), ""]
         if spread := _spread(names, summaries):
             out += ["Total cost over the episodes:", "", *_markdown(spread, summaries), ""]
+        audit = _markdown(_operations(names), summaries)
+        out += ["<details>", "<summary>Operations in one step, mean</summary>", "", *audit, "", "</details>", ""]
         for group, files in (pictures or {}).get(scenario, {}).items():
             # Those of each policy are many: folded away, so that the tables stay together.
             folded = group != OVERVIEW
@@ -199,6 +204,21 @@ def _spread(names: Mapping[int, str], summaries: Sequence[Summary]) -> list[Colu
         Column("median", "", lambda s: number(s.total_cost_median)),
         Column("worst", "", lambda s: number(s.total_cost_worst)),
         Column("worst seed", "", lambda s: str(s.worst_seed)),
+    ]
+
+
+def _operations(names: Mapping[int, str]) -> list[Column]:
+    """The columns of the operation audit."""
+
+    def column(title: str, unit: str, name: str) -> Column:
+        return Column(title, unit, lambda s: number(s.operations[name]))
+
+    return [
+        _policy(names),
+        column("forward", "kinematics", "forward_kinematics"),
+        column("Jacobians", "", "jacobians"),
+        column("factorisations", "", "factorisations"),
+        column("poses", "measured", "measurements"),
     ]
 
 

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
 from baselines.policy import Batch, Memory, Solution, SolverPolicy
 from baselines.status import Status
 from ikgym import task_kernels
 from ikgym.exceptions import InvalidInputError
+from ikgym.jit import kernel
 from ikgym.kinematics import forward_and_jacobian
 from ikgym.validation import FloatArray, number
 
@@ -63,13 +63,23 @@ class ResolvedRate(SolverPolicy, abc.ABC):
             jacobian,
             shift,
         )
-        step, status = self.invert(jacobian, shift)
+        step, status = self.move(batch.q, jacobian, shift)
         remembered = (batch.nominal[:, 0].copy(), np.ones(rows, dtype=np.bool_))
         return Solution(step / self.problem.dt, remembered, status, np.ones(rows, dtype=np.int64))
 
     def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
         """One Jacobian, one factorisation, one measurement."""
         return 0, 1, 1, 1
+
+    @property
+    def full_rank(self) -> int:
+        """The rank that the task Jacobian has where nothing is lost: redundant coordinates add none."""
+        return min(self.problem.task.error_size, self.problem.model.joints, 6)
+
+    def move(self, q: FloatArray, jacobian: FloatArray, shift: FloatArray) -> tuple[FloatArray, npt.NDArray[np.int64]]:
+        """As :meth:`invert`, for those that want more than the task: they are told where the joints are, (B, n)."""
+        del q
+        return self.invert(jacobian, shift)
 
     @abc.abstractmethod
     def invert(self, jacobian: FloatArray, shift: FloatArray) -> tuple[FloatArray, npt.NDArray[np.int64]]:
@@ -84,7 +94,7 @@ class ResolvedRate(SolverPolicy, abc.ABC):
         """
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def linearise(chain, kind, gain, q, pose, target, present, jacobian, shift):  # type: ignore[no-untyped-def]
     """Task Jacobians and the task shifts asked for, row by row.
 
@@ -105,10 +115,16 @@ def linearise(chain, kind, gain, q, pose, target, present, jacobian, shift):  # 
     for row in range(q.shape[0]):
         forward_and_jacobian(chain, q[row], rotation, position, geometric)
         task_kernels.jacobian(kind, rotation, geometric, jacobian[row])
-        task_kernels.error(kind, target[row], present[row], shift[row])
-        task_kernels.error(kind, present[row], pose[row], error)
-        for i in range(error.shape[0]):
-            shift[row, i] += gain * error[i]
+        task_shift(kind, gain, pose[row], target[row], present[row], error, shift[row])
+
+
+@kernel
+def task_shift(kind, gain, pose, target, present, error, shift):  # type: ignore[no-untyped-def]
+    """Δx = (X^N(k+1) - X^N(k)) + gain (X^N(k) - x(k)) of one row; ``error`` (e,) receives the last difference."""
+    task_kernels.error(kind, target, present, shift)
+    task_kernels.error(kind, present, pose, error)
+    for i in range(error.shape[0]):
+        shift[i] += gain * error[i]
 
 
 def status_of(rank_deficient: npt.NDArray[Any]) -> npt.NDArray[np.int64]:

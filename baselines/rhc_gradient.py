@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
+from baselines.descent import GOES_ON, adapted, settle, stop_test
 from baselines.horizon import analytic_gradient, difference_gradient
 from baselines.policy import Batch, Memory, Solution, SolverPolicy
-from baselines.status import Status
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 from ikgym.jit import kernel
-from ikgym.validation import number, whole_number
+from ikgym.validation import FloatArray, number, whole_number
 
 GRADIENTS = ("finite_difference", "analytic")
-_CONVERGED, _LIMIT, _DIVERGED = int(Status.CONVERGED), int(Status.ITERATION_LIMIT), int(Status.DIVERGED)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -89,7 +88,7 @@ class RecedingHorizonGradient(SolverPolicy):
         plan, alpha = memory[0].copy(), memory[1].copy()
         rows = len(plan)
         status, iterations = np.empty(rows, dtype=np.int64), np.empty(rows, dtype=np.int64)
-        descend_rows(
+        self._descend()(
             problem.model.chain,
             problem.task.kind,
             problem.cost.parameters,
@@ -107,6 +106,14 @@ class RecedingHorizonGradient(SolverPolicy):
             iterations,
         )
         return Solution(plan[:, 0].copy(), (plan, alpha), status, iterations)
+
+    def _descend(self) -> Any:
+        """The kernel of the descent."""
+        return descend_rows
+
+    def inside(self, state: Memory) -> dict[str, FloatArray]:
+        """The step α that is kept for the next horizon, as ``alpha``, of shape (B,)."""
+        return {"alpha": state[3]}
 
     def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
         """A gradient before each step and one for the last test, over the HL - 1 stages of the horizon."""
@@ -137,12 +144,9 @@ def descend_rows(  # type: ignore[no-untyped-def]
 ):
     """Gradient descent row by row; ``plan`` (B, HL - 1, n) and ``alpha`` (B,) are changed in place."""
     gradient = np.empty(plan.shape[1:])
-    alpha_min, alpha_max, factor = rule
     for row in range(plan.shape[0]):
-        qdot = plan[row]
-        first_cost, last_norm = 0.0, 0.0
-        status[row] = _LIMIT
-        step = 0
+        qdot, step = plan[row], 0
+        first_value = last_norm = 0.0
         while True:
             if difference > 0.0:
                 value = difference_gradient(chain, kind, cost, dt, q[row], nominal[row], qdot, difference, gradient)
@@ -150,33 +154,15 @@ def descend_rows(  # type: ignore[no-untyped-def]
                 value = analytic_gradient(chain, kind, cost, dt, q[row], nominal[row], qdot, gradient)
             norm = np.sqrt(np.sum(gradient * gradient))
             if step == 0:
-                first_cost = value
-            if not (np.isfinite(value) and np.isfinite(norm)):
-                status[row] = _DIVERGED
+                first_value = value
+            status[row] = stop_test(value, norm, tolerance, step, most)
+            if status[row] != GOES_ON:
                 break
-            if norm <= tolerance:
-                status[row] = _CONVERGED
-                break
-            if step == most:
-                break
-            if step > 0:
-                if norm < last_norm:
-                    alpha[row] *= factor
-                elif norm > last_norm:
-                    alpha[row] /= factor
-                alpha[row] = min(max(alpha[row], alpha_min), alpha_max)
+            alpha[row] = adapted(alpha[row], norm, last_norm, rule)
             last_norm = norm
             for i in range(qdot.shape[0]):
                 for j in range(qdot.shape[1]):
                     qdot[i, j] -= alpha[row] * gradient[i, j]
             step += 1
         iterations[row] = step
-        # A gradient of 0 beyond all limits, at a cost that has risen, is no minimum: the differences have drowned.
-        if status[row] != _DIVERGED and value > first_cost:
-            for i in range(qdot.shape[0]):
-                for j in range(qdot.shape[1]):
-                    if abs(qdot[i, j]) > limit[j]:
-                        status[row] = _DIVERGED
-        if status[row] == _DIVERGED:
-            qdot[:] = 0.0
-            alpha[row] = alpha_min
+        settle(status, value, first_value, limit, rule, row, qdot, alpha)

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium.utils import seeding
 
-from baselines.policy import SolverPolicy
+from baselines.policy import Operations, SolverPolicy
 from ikgym.scenarios import Preview, Scenario
 from ikgym.simulator import Simulator, observation
 from ikgym.validation import FloatArray
@@ -35,6 +35,9 @@ class Episode:
         status: Values of :class:`baselines.Status`. Shape (steps,).
         iterations: Iterations of the policy. Shape (steps,).
         time_ns: Wall time of the call of `predict`, in [ns]. Shape (steps,).
+        operations: What the steps have cost, see :class:`baselines.policy.Operations`, its arrays of shape (steps,).
+        inside: What the policy showed of its inside, by name, see :meth:`SolverPolicy.inside`; each of shape
+            (steps, …).
     """
 
     q: FloatArray
@@ -47,6 +50,8 @@ class Episode:
     status: npt.NDArray[np.int64]
     iterations: npt.NDArray[np.int64]
     time_ns: npt.NDArray[np.int64]
+    operations: Operations
+    inside: dict[str, FloatArray]
 
 
 def rollout(
@@ -82,6 +87,8 @@ def rollout(
     tracking, velocity, position, orientation = np.empty((4, steps))
     status, iterations, time_ns = np.empty((3, steps), dtype=np.int64)
 
+    inside: dict[str, FloatArray] = {}
+
     seen = observation(simulator.observe())
     # Compilation, caches and first touch of memory belong to no step: one call on a copy, whose answer is dropped.
     policy.predict({key: value.copy() for key, value in seen.items()})
@@ -102,6 +109,8 @@ def rollout(
             tracking[k], velocity[k] = out.tracking_cost[0], out.velocity_cost[0]
             position[k], orientation[k] = out.position_error[0], out.orientation_error[0]
             status[k], iterations[k] = report.status[0], report.iterations[0]
+            for name, value in policy.inside(state).items():
+                inside.setdefault(name, np.empty((steps, *value.shape[1:])))[k] = value[0]
             if tick is not None and (k + 1) % TICK == 0:
                 tick(TICK)
     finally:
@@ -109,4 +118,7 @@ def rollout(
             gc.enable()
     if tick is not None:
         tick(steps % TICK)
-    return Episode(q, qdot, pose, tracking, velocity, position, orientation, status, iterations, time_ns)
+    operations = policy.operations((status, iterations))
+    return Episode(
+        q, qdot, pose, tracking, velocity, position, orientation, status, iterations, time_ns, operations, inside
+    )

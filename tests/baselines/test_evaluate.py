@@ -90,11 +90,9 @@ def test_all_stands_for_all():
     plan = make_plan("all", "all")
     assert {job.scenario.name for job in plan.jobs} == set(ikgym.scenarios.names())
     assert {job.policy for job in plan.jobs} | {s.policy for s in plan.skipped} == set(baselines.names())
-    assert {(s.scenario, s.policy) for s in plan.skipped} == {
-        ("zhang3-helix", "follow_nominal"),
-        ("zhang6-lspb", "follow_nominal"),
-    }
-    assert "Cartesian" in plan.skipped[0].reason
+    reasons = {(s.scenario, s.policy): s.reason for s in plan.skipped}
+    for scenario in ("zhang3-helix", "zhang6-lspb"):
+        assert "Cartesian" in reasons[scenario, "follow_nominal"]
 
 
 def test_what_is_given_twice_is_done_once():

@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 import baselines
 import ikgym
 from baselines.metrics import TIME_COLUMNS, Row, geometric_mean, jsonable, measure, summarise
+from baselines.policy import Operations
 from baselines.rollout import Episode, rollout
 from baselines.status import Status
 from ikgym.exceptions import InvalidInputError
@@ -40,7 +41,11 @@ def handmade(steps=4, **changes):
         "iterations": np.ones(steps, dtype=np.int64),
         "time_ns": np.full(steps, 1000, dtype=np.int64),
     }
-    return Episode(**{**arrays, **{k: np.asarray(v) for k, v in changes.items()}})
+    return Episode(
+        inside={},
+        operations=Operations(*np.ones((4, steps), dtype=np.int64)),
+        **{**arrays, **{k: np.asarray(v) for k, v in changes.items()}},
+    )
 
 
 def position_scenario(steps=4, **changes):
@@ -91,6 +96,8 @@ def test_the_warm_up_call_leaves_no_trace_in_the_episode():
     class Counting:
         preview = solver.preview
         report = staticmethod(solver.report)
+        inside = staticmethod(solver.inside)
+        operations = staticmethod(solver.operations)
 
         def predict(self, observation, state=None):
             calls.append(state)
