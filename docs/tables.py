@@ -5,6 +5,7 @@ A test fails where a page does not hold what this writes.
 
 from __future__ import annotations
 
+import dataclasses
 import inspect
 import re
 from collections.abc import Iterable
@@ -63,10 +64,22 @@ def policies() -> list[tuple[str, ...]]:
     for name in baselines.names():
         policy = get(name)
         summary = " ".join((policy.__doc__ or "").split("\n\n")[0].split())
-        fields = policy.__dataclass_fields__
-        parameters = ", ".join(f"`{p} = {fields[p].default!r}`" for p in policy.parameter_names())
+        summary = re.sub(r":class:`(\w+)`", lambda m: f"`{_policy_of(m[1])}`", summary)
+        parameters = ", ".join(_parameter(policy.__dataclass_fields__[p]) for p in policy.parameter_names())
         rows.append((f"`{name}`" + (" (reference)" if policy.reference else ""), summary, parameters))
     return rows
+
+
+def _policy_of(class_name: str) -> str:
+    return next((name for name in baselines.names() if get(name).__name__ == class_name), class_name)
+
+
+def _parameter(field: dataclasses.Field[object]) -> str:
+    """A parameter with its default; one without has None, and chooses for itself."""
+    default = field.default
+    if field.default_factory is not dataclasses.MISSING:
+        default = field.default_factory()
+    return f"`{field.name}`" if default is None else f"`{field.name} = {default!r}`"
 
 
 def statuses() -> list[tuple[str, ...]]:

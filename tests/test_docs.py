@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+import baselines
 import ikgym
 from baselines.evaluate import evaluate
 from docs.tables import PAGES, filled
@@ -99,3 +100,8 @@ def test_evaluation_snippet_runs(capsys):
     (snippet,) = re.findall(r"```python\n(.*?)```", (PAGES / "evaluation.md").read_text(encoding="utf-8"), re.DOTALL)
     exec(snippet, {})
     assert "('dls', 0.01, " in capsys.readouterr().out
+
+
+def test_changelog_names_every_policy():
+    text = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    assert all(f"`{name}`" in text for name in baselines.names())
