@@ -5,6 +5,7 @@ from __future__ import annotations
 import abc
 import contextlib
 import dataclasses
+import math
 from collections.abc import Iterator, Mapping
 from typing import Any, ClassVar, NamedTuple, Self
 
@@ -24,6 +25,8 @@ from ikgym.validation import FloatArray, Frozen, frozen_array
 Observation = Mapping[str, npt.NDArray[np.floating[Any]]]
 Memory = tuple[npt.NDArray[Any], ...]
 
+
+_SATURATED, _DIVERGED = int(Status.SATURATED), int(Status.DIVERGED)
 
 #: Policies that have solved something in this process, and so are compiled.
 _compiled: set[type] = set()
@@ -209,17 +212,11 @@ class SolverPolicy(Frozen, abc.ABC):
         memory = self._recall(state, episode_start, rows)
         with _announced(type(self)):
             solution = self.solve(batch, memory)
-        action = solution.qdot / self.problem.velocity_limit
-        status, kept = solution.status, solution.memory
-        if not _finite(action):
-            lost = np.logical_not(np.isfinite(action).all(axis=1, keepdims=True))[:, 0]
-            action[lost] = 0.0
-            status = np.where(lost, int(Status.DIVERGED), status)
-            kept = _replace_rows(kept, self.memory(rows), lost)
-        answer: npt.NDArray[np.float32] = np.clip(action, -1.0, 1.0).astype(np.float32)
-        if (excess := np.abs(action) > 1.0).any():
-            status = np.where(excess.any(axis=1), np.maximum(status, int(Status.SATURATED)), status)
-        return answer[0] if single else answer, (status, solution.iterations, *kept)
+        action, status = np.empty(batch.q.shape, dtype=np.float32), solution.status.copy()
+        lost = np.empty(rows, dtype=np.bool_)
+        _cut_rows(solution.qdot, self.problem.velocity_limit, action, status, lost)
+        kept = _replace_rows(solution.memory, self.memory(rows), lost) if lost.any() else solution.memory
+        return action[0] if single else action, (status, solution.iterations, *kept)
 
     @staticmethod
     def report(state: Memory) -> Report:
@@ -282,12 +279,9 @@ class SolverPolicy(Frozen, abc.ABC):
 
     def _recall(self, state: Memory | None, episode_start: npt.ArrayLike | None, rows: int) -> Memory:
         fresh = self.memory(rows)
-        starting = np.zeros(rows, dtype=np.bool_)
-        if episode_start is not None:
-            given = np.asarray(episode_start)
-            if given.dtype.kind not in "biuf" or given.shape not in {(), (rows,)}:
-                raise InvalidInputError(f"episode_start: expected {rows} truth values, got {episode_start!r}.")
-            starting |= given.astype(np.bool_)
+        starting = None if episode_start is None else np.asarray(episode_start)
+        if starting is not None and (starting.dtype.kind not in "biuf" or starting.shape not in {(), (rows,)}):
+            raise InvalidInputError(f"episode_start: expected {rows} truth values, got {episode_start!r}.")
         if state is None:
             return fresh
         kept = state[2:] if isinstance(state, tuple) else None
@@ -300,7 +294,9 @@ class SolverPolicy(Frozen, abc.ABC):
                 f"state: expected what {self.name}.predict returned for a batch of {rows}, got "
                 f"{[np.shape(k) for k in state] if isinstance(state, tuple) else state!r}."
             )
-        return _replace_rows(kept, fresh, starting) if starting.any() else kept
+        if starting is None or not starting.any():
+            return kept
+        return _replace_rows(kept, fresh, np.broadcast_to(starting.astype(np.bool_), (rows,)))
 
 
 def statuses(rows: int, status: Status = Status.CONVERGED) -> npt.NDArray[np.int64]:
@@ -310,6 +306,35 @@ def statuses(rows: int, status: Status = Status.CONVERGED) -> npt.NDArray[np.int
 
 def _replace_rows(memory: Memory, fresh: Memory, rows: npt.NDArray[np.bool_]) -> Memory:
     return tuple(np.where(rows.reshape(-1, *[1] * (k.ndim - 1)), f, k) for k, f in zip(memory, fresh, strict=True))
+
+
+@kernel
+def _cut_rows(qdot, limit, action, status, lost):  # type: ignore[no-untyped-def]
+    """Joint velocities as fractions of their limit, within the box, row by row.
+
+    Args:
+        qdot: In [rad/s] or [m/s]. Shape (B, n).
+        limit: In [rad/s] or [m/s]. Shape (n,).
+        action: Receives the actions; zeros where a number is not finite. Shape (B, n).
+        status: Raised to what the row deserves. Shape (B,).
+        lost: Receives whether a number of the row is not finite. Shape (B,).
+    """
+    for row in range(qdot.shape[0]):
+        lost[row], saturated = False, False
+        for j in range(qdot.shape[1]):
+            fraction = qdot[row, j] / limit[j]
+            if not np.isfinite(fraction):
+                lost[row] = True
+            elif abs(fraction) > 1.0:
+                saturated = True
+                fraction = math.copysign(1.0, fraction)
+            action[row, j] = fraction
+        if lost[row]:
+            status[row] = _DIVERGED
+            for j in range(qdot.shape[1]):
+                action[row, j] = 0.0
+        elif saturated:
+            status[row] = max(status[row], _SATURATED)
 
 
 @kernel
