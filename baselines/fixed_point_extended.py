@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any, ClassVar, Self
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
 from baselines.fixed_point import FixedPoint, jacobian_bound
-from baselines.policy import Batch, Problem
+from baselines.handed_path import HandedPath
+from baselines.policy import Batch
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 from ikgym.kinematics import Chain
-from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray, frozen_array, read_only, whole_number
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class FixedPointExtended(FixedPoint):
+class FixedPointExtended(HandedPath, FixedPoint):
     """:class:`FixedPoint` with x extended by the end point of a link, which brings q back to the nominal joint path.
 
     A reference, not a contender: where that end point should be follows from the nominal joint path, which no
@@ -52,21 +52,6 @@ class FixedPointExtended(FixedPoint):
     _points: FloatArray = dataclasses.field(init=False, repr=False)
 
     name: ClassVar[str] = "fixed_point_extended"
-    reference: ClassVar[bool] = True
-
-    @classmethod
-    def for_scenario(cls, scenario: Scenario, **parameters: Any) -> Self:
-        """See :meth:`SolverPolicy.for_scenario`; unlike most this policy is handed the joint path."""
-        seed = parameters.get("seed")
-        if seed is not None:
-            parameters["seed"] = whole_number("seed", seed, at_least=0)
-        path = scenario.nominal_joint_path(seed)
-        if path is None:
-            raise InvalidInputError(
-                f"fixed_point_extended needs a nominal joint path; scenario {scenario.name!r} is given in Cartesian "
-                "space."
-            )
-        return cls(Problem.of(scenario), path=path, **parameters)
 
     def __post_init__(self) -> None:
         if self.transformation != "transpose":
@@ -96,9 +81,7 @@ class FixedPointExtended(FixedPoint):
         return 2, 2 * iterations, 0, 0
 
     def _extension(self, batch: Batch) -> tuple[Chain, FloatArray]:
-        last = len(self._points) - 1
-        step = np.clip(last - batch.remaining[:, 0].astype(np.int64) + 1, 0, last)
-        return self._branch.chain, self._points[step]
+        return self._branch.chain, self._points[self.next_rows(batch)]
 
     def _jacobian_bound(self) -> float:
         return super()._jacobian_bound() + jacobian_bound(self._branch, 0.0)
