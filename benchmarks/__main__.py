@@ -7,7 +7,7 @@ import sys
 
 from benchmarks.environments import ROWS, single, vector
 from benchmarks.kernels import kinematics
-from benchmarks.policies import predict_times
+from benchmarks.policies import POLICIES, damped_iterations, predict_times
 from benchmarks.timing import medians
 from ikgym.parallel import cores
 
@@ -32,8 +32,15 @@ def main() -> None:
     fastest = per_pose["ikgym kernel, in a compiled loop"]
     _table({name: (f"{1e6 * t:8.3f} µs", _ratio(t, fastest)) for name, t in per_pose.items()})
 
-    print("\nOne predict on varga7-fast: median, 99th percentile")
-    _table({name: (f"{1e6 * p50:8.1f} µs", f"{1e6 * p99:8.1f} µs") for name, (p50, p99) in predict_times().items()})
+    for scenario in POLICIES:
+        print(f"\nOne predict on {scenario}: median, 99th percentile")
+        predicting = predict_times(scenario)
+        _table({name: (f"{1e6 * p50:8.1f} µs", f"{1e6 * p99:8.1f} µs") for name, (p50, p99) in predicting.items()})
+
+    print("\nOne iteration of damped least squares inside the kernel, 7 joints")
+    iterating = damped_iterations()
+    spent = medians({name: call for name, (call, _) in iterating.items()})
+    _table({name: (f"{1e6 * t / iterating[name][1]:8.3f} µs", "") for name, t in spent.items()})
 
 
 def _ratio(time: float, reference: float) -> str:

@@ -3,26 +3,75 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 
 import gymnasium as gym
 import numpy as np
+from numba import njit
 
 import baselines
+import ikgym
+from baselines.damped_step import damped_step
+from baselines.policy import Batch
 
 STEPS = 1000
-POLICIES: dict[str, tuple[str, dict[str, object]]] = {
-    "follow_nominal": ("follow_nominal", {}),
-    "moore_penrose": ("moore_penrose", {}),
-    "dls": ("dls", {}),
-    "rhc_gradient": ("rhc_gradient", {}),
-    "rhc_gradient, always 450 iterations": ("rhc_gradient", {"tolerance": 0.0}),
-    "rhc_gradient, analytic": ("rhc_gradient", {"gradient": "analytic"}),
+#: Policies by scenario and label.
+POLICIES: dict[str, dict[str, tuple[str, dict[str, object]]]] = {
+    "varga7-fast": {
+        "follow_nominal": ("follow_nominal", {}),
+        "moore_penrose": ("moore_penrose", {}),
+        "dls": ("dls", {}),
+        "rhc_gradient": ("rhc_gradient", {}),
+        "rhc_gradient, always 450 iterations": ("rhc_gradient", {"tolerance": 0.0}),
+        "rhc_gradient, analytic": ("rhc_gradient", {"gradient": "analytic"}),
+    },
+    "zhang6-lspb": {
+        "mfapc, n = 2, λ = 0": ("mfapc", {"horizon": 2, "rule": "constant", "damping": 0.0}),
+        "mfapc, n = 3, λ > 0, always 10 iterations": (
+            "mfapc",
+            {"horizon": 3, "rule": "constant", "damping": 1e-3, "iterations": 10, "tolerance": 0.0},
+        ),
+    },
 }
 
 
 def predict_times(scenario: str = "varga7-fast") -> dict[str, tuple[float, float]]:
     """Median and 99th percentile of the time of `predict` in [s], by policy."""
-    return {label: _episode(scenario, name, kwargs) for label, (name, kwargs) in POLICIES.items()}
+    return {label: _episode(scenario, name, kwargs) for label, (name, kwargs) in POLICIES[scenario].items()}
+
+
+def damped_iterations(rows: int = 100, iterations: int = 100) -> dict[str, tuple[Callable[[], object], int]]:
+    """Damped least squares with 7 joints and 6 components of the error, again and again inside the compiled kernel.
+
+    Args:
+        rows: Arms, each with its own target.
+        iterations: Most iterations made for each of them.
+
+    Returns:
+        Calls by name, with how many iterations each makes.
+    """
+    calls = {f"Jacobian, error of {task}, damped step": _iterating(task, rows, iterations) for task in ("skew", "pose")}
+    rng, rounds = np.random.default_rng(0), rows * iterations
+    scratch = rng.normal(size=(6, 7)), rng.normal(size=6), 1e-3, np.empty((6, 6)), np.empty(6), np.empty(7)
+    return {**calls, "damped step alone": (lambda: _steps(rounds, *scratch), rounds)}
+
+
+def _iterating(task: str, rows: int, iterations: int) -> tuple[Callable[[], object], int]:
+    scenario = ikgym.scenarios.get("varga7-fast").replace(task=ikgym.tasks.get(task))
+    policy = baselines.make("mfac", scenario, rule="constant", damping=1e-3, tolerance=0.0, iterations=iterations)
+    rng = np.random.default_rng(0)
+    q = rng.uniform(-1.0, 1.0, (rows, scenario.joints))
+    goal = q + rng.uniform(-0.3, 0.3, q.shape)
+    here, there = (scenario.task.coordinates(*scenario.model.forward(p)) for p in (q, goal))
+    batch = Batch(q, np.zeros_like(q), here, there[:, None], np.ones((rows, 1)))
+    memory = policy.memory(rows)
+    return lambda: policy.solve(batch, memory), int(policy.solve(batch, memory).iterations.sum())
+
+
+@njit
+def _steps(rounds, jacobian, error, damping, gram, x, out):  # type: ignore[no-untyped-def]
+    for _ in range(rounds):
+        damped_step(jacobian, error, damping, gram, x, out)
 
 
 def _episode(scenario: str, name: str, kwargs: dict[str, object]) -> tuple[float, float]:

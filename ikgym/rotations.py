@@ -52,7 +52,7 @@ def quaternion(rotation):  # type: ignore[no-untyped-def]
     Returns:
         Four numbers w, x, y, z.
     """
-    return _quaternion(
+    return quaternion_of(
         rotation[0, 0],
         rotation[0, 1],
         rotation[0, 2],
@@ -66,8 +66,8 @@ def quaternion(rotation):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _quaternion(r00, r01, r02, r10, r11, r12, r20, r21, r22):  # type: ignore[no-untyped-def]
-    """Shepperd's choice of the largest part.
+def quaternion_of(r00, r01, r02, r10, r11, r12, r20, r21, r22):  # type: ignore[no-untyped-def]
+    """:func:`quaternion` of a matrix given element by element, by Shepperd's choice of the largest part.
 
     It keeps every division well away from 0/0, so that the quaternion is exact to rounding near 0 and near π alike.
     """
@@ -113,13 +113,19 @@ def rotation_vector(rotation):  # type: ignore[no-untyped-def]
     """
     out = np.empty(3)
     w, x, y, z = quaternion(rotation)
-    sine = math.sqrt(x * x + y * y + z * z)
-    # At 0 the factor angle / sine tends to 2.
-    factor = 2.0 * math.atan2(sine, w) / sine if sine > 0.0 else 2.0
+    factor = vector_factor(w, x, y, z)
     out[0] = factor * x
     out[1] = factor * y
     out[2] = factor * z
     return out
+
+
+@kernel
+def vector_factor(w, x, y, z):  # type: ignore[no-untyped-def]
+    """By what the vector part of a unit quaternion with w >= 0 must be multiplied to be the rotation vector."""
+    sine = math.sqrt(x * x + y * y + z * z)
+    # At 0 the factor angle / sine tends to 2.
+    return 2.0 * math.atan2(sine, w) / sine if sine > 0.0 else 2.0
 
 
 @kernel
@@ -133,7 +139,7 @@ def geodesic_angle(first, second):  # type: ignore[no-untyped-def]
     Returns:
         Angle in [rad], between 0 and π.
     """
-    w, x, y, z = _quaternion(
+    w, x, y, z = quaternion_of(
         _dot(second[0], first[0]),
         _dot(second[0], first[1]),
         _dot(second[0], first[2]),

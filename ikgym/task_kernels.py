@@ -8,10 +8,8 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
-from ikgym.jit import kernel
-from ikgym.rotations import rotation_vector
+from ikgym.jit import inlined, kernel
+from ikgym.rotations import quaternion_of, vector_factor
 
 POSITION, SKEW, MATRIX, POSE = 0, 1, 2, 3
 
@@ -69,20 +67,31 @@ def error(kind, nominal, coordinates, out):  # type: ignore[no-untyped-def]
     if kind == POSE:
         for i in range(3):
             out[i] = nominal[9 + i] - coordinates[9 + i]
-        between = np.empty((3, 3))
-        for i in range(3):
-            for j in range(3):
-                between[i, j] = (
-                    nominal[3 * i] * coordinates[3 * j]
-                    + nominal[3 * i + 1] * coordinates[3 * j + 1]
-                    + nominal[3 * i + 2] * coordinates[3 * j + 2]
-                )
-        vector = rotation_vector(between)
-        for i in range(3):
-            out[3 + i] = vector[i]
+        # The quaternion of R* Rᵀ, without the matrix itself, which would have to be allocated.
+        w, x, y, z = quaternion_of(
+            _rows(nominal, 0, coordinates, 0),
+            _rows(nominal, 0, coordinates, 3),
+            _rows(nominal, 0, coordinates, 6),
+            _rows(nominal, 3, coordinates, 0),
+            _rows(nominal, 3, coordinates, 3),
+            _rows(nominal, 3, coordinates, 6),
+            _rows(nominal, 6, coordinates, 0),
+            _rows(nominal, 6, coordinates, 3),
+            _rows(nominal, 6, coordinates, 6),
+        )
+        factor = vector_factor(w, x, y, z)
+        out[3] = factor * x
+        out[4] = factor * y
+        out[5] = factor * z
     else:
         for i in range(out.shape[0]):
             out[i] = nominal[i] - coordinates[i]
+
+
+@inlined
+def _rows(a, i, b, j):  # type: ignore[no-untyped-def]
+    """The product of a row of one rotation and a row of another, where they begin in their frames."""
+    return a[i] * b[j] + a[i + 1] * b[j + 1] + a[i + 2] * b[j + 2]
 
 
 @kernel

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from benchmarks import environments, kernels, timing
+import baselines
+from benchmarks import environments, kernels, policies, timing
 
 
 def test_medians_are_of_what_was_called():
@@ -38,3 +39,15 @@ def test_both_kinematics_are_of_the_same_arm():
     for call, poses in kernels.kinematics().values():
         call()
         assert poses >= 1
+
+
+def test_policies_are_those_of_their_scenarios():
+    for scenario, labelled in policies.POLICIES.items():
+        for name, parameters in labelled.values():
+            assert baselines.make(name, scenario, **parameters).name == name
+
+
+def test_iterations_are_counted_as_made():
+    for call, iterations in policies.damped_iterations(rows=2, iterations=3).values():
+        call()
+        assert iterations == 6

@@ -17,6 +17,7 @@ from stable_baselines3.common.vec_env import DummyVecEnv
 import baselines
 import ikgym
 from baselines.policy import Problem, Solution, SolverPolicy, statuses
+from baselines.registry import get
 from baselines.status import Status
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 from tests.comparison import identical
@@ -121,6 +122,21 @@ def test_a_policy_is_told_the_model_and_never_the_arm(name, on):
     assert policy.problem.model is scenario(on).model
     values = [getattr(policy, f.name) for f in dataclasses.fields(policy) if f.name != "problem"]
     assert not any(isinstance(value, (ikgym.Arm, ikgym.Scenario, gym.Env)) for value in values)
+
+
+@pytest.mark.parametrize("name", [name for name in baselines.names() if not get(name).reference])
+@pytest.mark.parametrize("on", ["khan8-q1", "khan8-q7q8"])
+def test_the_exact_arm_changes_no_answer(name, on):
+    """Same observations, same model, another arm behind the scenario: a policy that saw it would answer otherwise."""
+    exact = scenario(on)
+    mirrored = exact.replace(arm=exact.arm.replace(name="other", offsets=-2.0 * exact.arm.offsets), model=exact.model)
+    policies = [baselines.make(name, which) for which in (exact, mirrored)]
+    assert policies[0].problem.model is policies[1].problem.model is exact.model
+    states = [None, None]
+    for observation in observations(on, policies[0].preview, 2):
+        answers = [p.predict(observation, state) for p, state in zip(policies, states, strict=True)]
+        assert identical(*answers)
+        states = [state for _, state in answers]
 
 
 @pytest.mark.parametrize("name", baselines.names())
