@@ -1,0 +1,100 @@
+"""Pictures of panels one above the other, which is what all figures of the papers are."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.figure import Figure
+
+from baselines.plots import style
+from ikgym.validation import FloatArray
+
+
+class Curve(NamedTuple):
+    """A line.
+
+    Attributes:
+        name: Stands in the legend; curves of the same name in a picture share colour and entry.
+        x: Abscissae. Shape (k,).
+        y: Ordinates. Shape (k,).
+        dashed: For what is nominal.
+        dots: For single points instead of a line.
+    """
+
+    name: str
+    x: FloatArray
+    y: FloatArray
+    dashed: bool = False
+    dots: bool = False
+
+
+class Panel(NamedTuple):
+    """Curves over one pair of axes.
+
+    Attributes:
+        ylabel: With the unit.
+        curves: What is drawn.
+        xlabel: With the unit; the lowest panel has one at least.
+        log: Whether the ordinate is logarithmic.
+        title: Stands above the panel.
+    """
+
+    ylabel: str
+    curves: Sequence[Curve]
+    xlabel: str = "time [s]"
+    log: bool = False
+    title: str = ""
+
+
+def picture(title: str, panels: Sequence[Panel], *, columns: int = 1, height: float = 2.1) -> Figure:
+    """Panels in rows, with one legend for all.
+
+    Args:
+        title: Stands above.
+        panels: From left to right, from top to bottom.
+        columns: Panels in a row.
+        height: Of a row, in [in].
+    """
+    rows = -(-len(panels) // columns)
+    drawn = style.figure(0.8 + height * rows)
+    grid = drawn.add_gridspec(rows, columns)
+    names: dict[str, int] = {}
+    handles: dict[str, Artist] = {}
+    for place, panel in enumerate(panels):
+        axes = drawn.add_subplot(grid[place // columns, place % columns])
+        if panel.log:
+            axes.set_yscale("log")
+            axes.tick_params(axis="y", which="minor", labelsize=style.SMALL)
+        for curve in panel.curves:
+            colour = style.looks(names.setdefault(curve.name, len(names)))["color"]
+            line = "" if curve.dots else (0, (4, 2)) if curve.dashed else "-"
+            (handle,) = axes.plot(
+                curve.x,
+                _drawable(curve.y, log=panel.log),
+                color=colour,
+                linestyle=line,
+                marker="." if curve.dots else "",
+                markersize=3.0,
+                lw=1.6 if curve.dashed else 1.2,
+            )
+            handles.setdefault(curve.name, handle)
+        last = place >= len(panels) - columns
+        style.dress(
+            axes,
+            ylabel=panel.ylabel,
+            xlabel=panel.xlabel if last or panel.xlabel != "time [s]" else "",
+            title=panel.title,
+            ticks=8 if columns == 1 else 5,
+        )
+        axes.margins(x=0.01)
+    style.legend(drawn, title, list(handles.values()), list(handles))
+    drawn.align_ylabels()
+    return drawn
+
+
+def _drawable(values: FloatArray, *, log: bool) -> FloatArray:
+    """What is not above 0 has no place on a logarithmic axis."""
+    return np.where(values > 0.0, values, np.nan) if log else values

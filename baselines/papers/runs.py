@@ -1,0 +1,59 @@
+"""Episodes that figures and claims share, each played once."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from threadpoolctl import threadpool_limits
+from tqdm import tqdm
+
+from baselines.metrics import canonical, jsonable
+from baselines.registry import make
+from baselines.rollout import Episode, rollout
+from ikgym import scenarios
+from ikgym.scenarios import Scenario
+
+
+class Runs:
+    """Plays episodes when they are asked for, and keeps them.
+
+    Args:
+        steps: Most steps of an episode, for trials; the scenarios' own if left out.
+        progress: Whether to show a bar on stderr while an episode is played.
+    """
+
+    def __init__(self, steps: int | None = None, *, progress: bool = False) -> None:
+        self.steps, self._progress = steps, progress
+        self._episodes: dict[tuple[str, str, str], Episode] = {}
+
+    def scenario(self, name: str) -> Scenario:
+        """A scenario, shortened if the run is a trial."""
+        whole = scenarios.get(name)
+        return whole if self.steps is None else whole.replace(steps=min(self.steps, whole.steps))
+
+    def play(self, scenario: str, policy: str, /, **parameters: Any) -> Episode:
+        """The episode of a policy in a fixed scenario, from seed 0.
+
+        Args:
+            scenario: The scenario's name.
+            policy: The policy's name.
+            **parameters: The policy's parameters.
+
+        Returns:
+            The recorded episode; the same object at every call.
+        """
+        key = scenario, policy, canonical(jsonable(parameters))
+        if key not in self._episodes:
+            what = self.scenario(scenario)
+            bar = tqdm(
+                total=what.steps,
+                desc=f"{scenario} · {policy}",
+                unit="step",
+                unit_scale=True,
+                leave=False,
+                disable=not self._progress,
+            )
+            # As in an evaluation: one thread, so that times are comparable.
+            with bar, threadpool_limits(limits=1):
+                self._episodes[key] = rollout(what, make(policy, what, **parameters), 0, tick=bar.update)
+        return self._episodes[key]

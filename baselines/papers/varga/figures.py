@@ -1,0 +1,167 @@
+"""Varga 2021: the figures."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+
+from baselines.papers.drawing import Curve, Panel, picture
+from baselines.papers.paper import Drawn, PaperFigure, rms
+from baselines.papers.runs import Runs
+from baselines.papers.varga.episodes import FAST, METHOD, PRINTED, SLOW, fast, fluctuation, slow, smooth
+from baselines.rollout import Episode
+from baselines.status import Status
+from ikgym.validation import FloatArray
+
+WINDOW = 150  # steps of a close-up
+
+
+def _times(runs: Runs, name: str) -> FloatArray:
+    scenario = runs.scenario(name)
+    return scenario.times(scenario.steps + 1)[1:]
+
+
+def _coordinates(title: str, runs: Runs, name: str, episode: Episode, columns: list[int], labels: list[str]) -> Drawn:
+    """Some task coordinates, nominal and realised, above their errors."""
+    scenario, time = runs.scenario(name), _times(runs, name)
+    nominal = scenario.nominal()[1:]
+    error = nominal - episode.pose
+    unit = "[m]" if columns[0] >= 3 else "[1]"
+    tracks, errors = [], []
+    for column, label in zip(columns, labels, strict=True):
+        tracks += [
+            Curve(f"{label} realised", time, episode.pose[:, column]),
+            Curve(f"{label} nominal", time, nominal[:, column], dashed=True),
+        ]
+        errors.append(Curve(f"{label} realised", time, error[:, column]))
+    figure = picture(title, [Panel(f"coordinates {unit}", tracks), Panel(f"tracking error {unit}", errors)], height=2.6)
+    angle = episode.orientation_error
+    return Drawn(
+        figure,
+        {
+            "largest_component_error": float(np.abs(error[:, columns]).max()),
+            "rms_component_error": rms(error[:, columns]),
+            "largest_position_error_m": float(episode.position_error.max()),
+            "largest_orientation_error_rad": float(angle.max()),
+        },
+    )
+
+
+def _cartesian(title: str, runs: Runs, name: str, episode: Episode) -> Drawn:
+    return _coordinates(title, runs, name, episode, [3, 4, 5], ["x", "y", "z"])
+
+
+def _orientation(title: str, runs: Runs, name: str, episode: Episode) -> Drawn:
+    labels = [f"$O^A_{{{i}}}$" for i in (12, 13, 23)]
+    return _coordinates(title, runs, name, episode, [0, 1, 2], labels)
+
+
+def _joints(title: str, runs: Runs, name: str, episode: Episode) -> Drawn:
+    scenario, time = runs.scenario(name), _times(runs, name)
+    path = scenario.nominal_joint_path()
+    nominal = episode.q if path is None else path[1:]
+    panels = [
+        Panel(
+            f"$q_{i + 1}$ [{'m' if slides else 'rad'}]",
+            [Curve("realised", time, episode.q[:, i]), Curve("nominal", time, nominal[:, i], dashed=True)],
+        )
+        for i, slides in enumerate(scenario.arm.prismatic)
+    ]
+    apart = np.abs(episode.q - nominal).max(axis=0)
+    return Drawn(picture(title, panels, columns=2, height=1.6), {"largest_separation_rad_or_m": apart.tolist()})
+
+
+def busiest(qdot: FloatArray) -> slice:
+    """The steps of a close-up: where the velocities fluctuate most."""
+    width = min(WINDOW, len(qdot) - 2)
+    bends = np.square(np.diff(qdot, 2, axis=0)).sum(axis=1)
+    start = int(sliding_window_view(bends, width).sum(axis=1).argmax())
+    return slice(start, start + width)
+
+
+def _velocities(title: str, runs: Runs, name: str, episode: Episode, part: slice) -> Drawn:
+    time = _times(runs, name)
+    names = [f"$\\dot q_{i + 1}$" + (" [m/s]" if s else "") for i, s in enumerate(runs.scenario(name).arm.prismatic)]
+    curves = [Curve(n, time, episode.qdot[:, i]) for i, n in enumerate(names)]
+    close = [Curve(c.name, time[part], c.y[part]) for c in curves]
+    label = "joint velocity\n[rad/s] or [m/s]"
+    return Drawn(
+        picture(title, [Panel(label, curves), Panel(label, close, title="where it fluctuates most")], height=2.5),
+        {
+            "peak": float(np.abs(episode.qdot).max()),
+            "rms": rms(episode.qdot),
+            "rms_of_second_differences": fluctuation(episode.qdot),
+            "close_up_s": [float(time[part][0]), float(time[part][-1])],
+        },
+    )
+
+
+def _effort(runs: Runs) -> Drawn:
+    time = _times(runs, FAST)
+    panels, numbers = [], {}
+    for label, episode in {
+        "α up to 1e-4": fast(runs),
+        "α up to 5e-4, as printed": runs.play(FAST, METHOD, **PRINTED),
+    }.items():
+        millis = 1e-6 * episode.time_ns.astype(np.float64)
+        panels.append(
+            (
+                Curve(label, time, millis, dots=True),
+                Curve(label, time, episode.iterations.astype(np.float64), dots=True),
+                Curve(label, time, episode.inside["alpha"], dots=True),
+            )
+        )
+        numbers[label] = {
+            "median_time_ms": float(np.median(millis)),
+            "p99_time_ms": float(np.percentile(millis, 99)),
+            "mean_iterations": float(episode.iterations.mean()),
+            "share_at_limit": float((episode.iterations == 450).mean()),
+            "share_diverged": float((episode.status == Status.DIVERGED).mean()),
+        }
+    times, steps, alphas = zip(*panels, strict=True)
+    return Drawn(
+        picture(
+            "Time of each control step, steps of the descent, and α",
+            [Panel("time [ms]", times, log=True), Panel("steps [1]", steps), Panel("α [1]", alphas, log=True)],
+        ),
+        numbers,
+    )
+
+
+FIGURES = (
+    PaperFigure(2, "Cartesian tracking, fast", lambda r: _cartesian("Cartesian tracking, fast", r, FAST, fast(r))),
+    PaperFigure(
+        3, "Orientation tracking, fast", lambda r: _orientation("Orientation tracking, fast", r, FAST, fast(r))
+    ),
+    PaperFigure(4, "Joint paths, fast", lambda r: _joints("Joint paths, fast", r, FAST, fast(r))),
+    PaperFigure(
+        5,
+        "Joint velocities, fast",
+        lambda r: _velocities("Joint velocities, fast", r, FAST, fast(r), busiest(fast(r).qdot)),
+    ),
+    PaperFigure(6, "Time, steps and α of the descent, fast", _effort),
+    PaperFigure(7, "Cartesian tracking, slow", lambda r: _cartesian("Cartesian tracking, slow", r, SLOW, slow(r))),
+    PaperFigure(
+        8, "Orientation tracking, slow", lambda r: _orientation("Orientation tracking, slow", r, SLOW, slow(r))
+    ),
+    PaperFigure(9, "Joint paths, slow", lambda r: _joints("Joint paths, slow", r, SLOW, slow(r))),
+    PaperFigure(
+        10,
+        "Joint velocities, slow",
+        lambda r: _velocities("Joint velocities, slow", r, SLOW, slow(r), busiest(slow(r).qdot)),
+    ),
+    PaperFigure(
+        11,
+        "Smoothed joint velocities, the same part as figure 5",
+        lambda r: _velocities("Smoothed joint velocities", r, FAST, smooth(r), busiest(fast(r).qdot)),
+    ),
+    PaperFigure(12, "Joint paths, smoothed", lambda r: _joints("Joint paths, smoothed", r, FAST, smooth(r))),
+    PaperFigure(
+        13, "Cartesian tracking, smoothed", lambda r: _cartesian("Cartesian tracking, smoothed", r, FAST, smooth(r))
+    ),
+    PaperFigure(
+        14,
+        "Orientation tracking, smoothed",
+        lambda r: _orientation("Orientation tracking, smoothed", r, FAST, smooth(r)),
+    ),
+)

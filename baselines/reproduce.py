@@ -1,0 +1,174 @@
+"""Regenerates the papers' experiments as figures and numbers, and the ledger of their claims.
+
+>>> from baselines.reproduce import reproduce
+>>> findings = reproduce(["zhang"])
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import pathlib
+import sys
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Annotated, Any
+
+import tyro
+
+from baselines.machine import describe
+from baselines.metrics import jsonable
+from baselines.papers import PAPERS, get
+from baselines.papers.ledger import ledger
+from baselines.papers.paper import Finding, Paper
+from baselines.papers.runs import Runs
+from baselines.plots.style import png
+from baselines.results import write
+from ikgym.exceptions import IkgymError, InvalidInputError
+from ikgym.validation import whole_number
+
+#: What the claims of each paper came to, by paper and claim.
+Findings = dict[str, dict[str, Finding]]
+
+
+def reproduce(
+    papers: Iterable[str] = tuple(PAPERS),
+    *,
+    figures: Iterable[int] | None = None,
+    out: pathlib.Path | str | None = None,
+    steps: int | None = None,
+    progress: bool = False,
+) -> Findings:
+    """Plays the experiments of papers, draws their figures and tests their claims.
+
+    Args:
+        papers: Names of papers.
+        figures: Numbers of the figures to draw; all if left out. Claims are tested if it is left out.
+        out: Where files go: ``PAPER/figure-NN.png``, ``PAPER/numbers.json`` and ``papers.md``; nowhere if left out.
+        steps: Most steps of an episode, for trials, whose findings mean nothing.
+        progress: Whether to show bars and the files written on stderr.
+
+    Returns:
+        The findings, by paper and claim.
+
+    Raises:
+        UnknownNameError: There is no such paper.
+        InvalidInputError: A paper has no such figure.
+        ResultsError: `out` cannot be written.
+    """
+    if steps is not None:
+        whole_number("steps", steps, at_least=1)
+    chosen = [get(name) for name in papers]
+    numbers = None if figures is None else set(figures)
+    _check_figures(chosen, numbers)
+    folder = None if out is None else pathlib.Path(out)
+    runs = Runs(steps, progress=progress)
+    findings: Findings = {}
+    for paper in chosen:
+        drawn = _draw(paper, runs, numbers, folder, progress=progress)
+        findings[paper.name] = {} if numbers is not None else {c.name: c.test(runs) for c in paper.claims}
+        if folder is not None:
+            _write_numbers(folder / paper.name / "numbers.json", drawn, findings[paper.name])
+    if folder is not None and numbers is None:
+        write(folder / "papers.md", ledger(chosen, findings).encode())
+    return findings
+
+
+def _check_figures(papers: Sequence[Paper], numbers: set[int] | None) -> None:
+    for paper in papers:
+        there = [figure.number for figure in paper.figures]
+        if missing := (numbers or set()) - set(there):
+            raise InvalidInputError(
+                f"figure: paper {paper.name!r} has no figure {min(missing)} to be drawn again; it has {there}."
+            )
+
+
+def _draw(
+    paper: Paper, runs: Runs, numbers: set[int] | None, folder: pathlib.Path | None, *, progress: bool
+) -> dict[str, Any]:
+    drawn = {}
+    for figure in paper.figures:
+        if numbers is not None and figure.number not in numbers:
+            continue
+        picture, values = figure.draw(runs)
+        drawn[f"figure {figure.number}"] = {"title": figure.title, **values}
+        if folder is not None:
+            file = folder / paper.name / f"figure-{figure.number:02d}.png"
+            write(file, png(picture))
+            if progress:
+                print(f"{file}: {figure.title}", file=sys.stderr)
+    return drawn
+
+
+def _write_numbers(file: pathlib.Path, drawn: Mapping[str, Any], findings: Mapping[str, Finding]) -> None:
+    content = {
+        "machine": describe(),
+        "figures": drawn,
+        "claims": {name: finding._asdict() for name, finding in findings.items()},
+    }
+    write(file, (json.dumps(jsonable(content), indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode())
+
+
+@dataclasses.dataclass(frozen=True)
+class Options:
+    """What the command line takes."""
+
+    paper: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME …")] = tuple(PAPERS)
+    """Papers: varga, faitli, khan, zhang."""
+    figure: Annotated[tuple[int, ...], tyro.conf.arg(metavar="N …")] = ()
+    """Figures to draw, by their numbers in the paper. All of them, and the claims, if left out."""
+    out: Annotated[pathlib.Path, tyro.conf.arg(metavar="DIR")] = pathlib.Path("results/papers")
+    """Folder for the files."""
+    ledger: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None
+    """Where the ledger of claims goes besides DIR/papers.md, for example docs/papers.md. Needs all papers."""
+    steps: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
+    """Most steps of an episode, for trials, whose findings mean nothing."""
+
+
+MANUAL = """\
+Regenerates the experiments of the papers: every figure drawn again from episodes played here, every claim tested.
+
+Examples:
+  python -m baselines.reproduce
+  python -m baselines.reproduce --paper khan --figure 3 4
+  python -m baselines.reproduce --ledger docs/papers.md
+
+Files in the folder of --out:
+  PAPER/figure-NN.png  a figure of the paper, with its number there
+  PAPER/numbers.json   the numbers behind the figures and the claims
+  papers.md            the ledger: claim by claim, how it was tested, what came out"""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """The command line.
+
+    Args:
+        arguments: What stands behind the command; taken from the process if left out.
+
+    Returns:
+        The exit code: 0, or 2 where something expected went wrong.
+    """
+    options = tyro.cli(Options, prog="python -m baselines.reproduce", description=MANUAL, args=arguments)
+    try:
+        if options.ledger is not None and (set(options.paper) != set(PAPERS) or options.figure or options.steps):
+            raise InvalidInputError("ledger: needs all papers, all figures and whole episodes.")
+        findings = reproduce(
+            options.paper,
+            figures=options.figure or None,
+            out=options.out,
+            steps=options.steps,
+            progress=True,
+        )
+        if options.ledger is not None:
+            write(options.ledger, ledger([get(name) for name in PAPERS], findings).encode())
+    except IkgymError as e:
+        print(f"error: {' '.join(str(e).split())}", file=sys.stderr)
+        return 2
+    for paper, of_paper in findings.items():
+        for name, finding in of_paper.items():
+            print(f"{paper:8} {finding.verdict:13} {name}: {finding.evidence}")
+    print(f"\nwritten to {options.out}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
