@@ -71,6 +71,11 @@ def test_readme_table_is_what_the_demo_prints():
         assert shown[row.policy]["status"] == row.status
 
 
+def test_readme_s_ratio_of_times_is_that_of_its_table():
+    assert "about ten times the computing time" in README
+    assert 5 < cells()["rhc_gradient"]["p50 [µs]"] / cells()["dls"]["p50 [µs]"] < 20
+
+
 @pytest.mark.parametrize("page", PROSE, ids=lambda page: page.name)
 def test_links_and_commands_exist(page):
     text = page.read_text(encoding="utf-8")

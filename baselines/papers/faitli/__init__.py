@@ -1,0 +1,25 @@
+"""Faitli and Tar 2018: inverse kinematics by a quasi-differential fixed-point transformation."""
+
+from __future__ import annotations
+
+from baselines.papers.faitli import method_claims, simulation_claims
+from baselines.papers.faitli.figures import FIGURES
+from baselines.papers.paper import Paper
+
+PAPER = Paper(
+    "faitli",
+    "Faitli, Tar 2018: quasi-differential fixed-point transformation",
+    FIGURES,
+    (*simulation_claims.CLAIMS, *method_claims.CLAIMS),
+    readings=(
+        "No trajectory is printed; figures are those of `faitli3-stretched`, which passes the stretched elbow six "
+        "times, and `faitli3-regular` and `faitli3-shoulder` are tested besides.",
+        "The iterations per grid point are not printed; 10 are made.",
+        "Eq. 1 is printed for f(q) - x, the text recommends x̃ = Jᵀ f(q); figures are drawn with Jᵀ.",
+        "Eq. 1 adds a vector of the Cartesian space to q, which fits with n = m only, and with Jᵀ always.",
+        "With F(ξ) = ξ/2 + D the fixed point is ξ* = 2D, and the step is q + (A/2) Jᵀ(f(q) - x): D cancels.",
+        "Figure 6 is drawn along the calculated and the nominal joint path, with the smallest singular value below, "
+        "since a real part can be zero where no eigenvalue is.",
+        "The end point of link 2 follows from the nominal joint path, as in the paper, which makes it in joint space.",
+    ),
+)
