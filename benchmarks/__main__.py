@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from collections.abc import Mapping
 
-from benchmarks.environments import ROWS, single, vector
+from benchmarks.environments import ROWS, single, vector, whole_episodes
 from benchmarks.kernels import kinematics
 from benchmarks.policies import POLICIES, damped_iterations, predict_times
 from benchmarks.timing import medians
@@ -22,8 +23,11 @@ def main() -> None:
     _table({name: (f"{1e6 * t:8.2f} µs", _ratio(t, times["RedundantIK-v0, varga7-fast"])) for name, t in times.items()})
 
     for rows in ROWS:
-        print(f"\nNative vector environment, {rows} arms, steps per second")
-        _table({name: (f"{rows / t / 1e6:8.2f} M", "") for name, t in medians(vector(rows)).items()})
+        print(f"\nNative vector environment, {rows} arms, steps per second between resets")
+        _table({name: (f"{rows / t / 1e6:8.2f} M",) for name, t in medians(vector(rows)).items()})
+
+    whole = whole_episodes(1024) / 1e6
+    print(f"\nWhole episodes of varga7-random, resets included, 1024 arms: {whole:.2f} M steps per second")
 
     print("\nForward kinematics and Jacobian, 7 joints, time per pose")
     calls = kinematics()
@@ -40,14 +44,14 @@ def main() -> None:
     print("\nOne iteration of damped least squares inside the kernel, 7 joints")
     iterating = damped_iterations()
     spent = medians({name: call for name, (call, _) in iterating.items()})
-    _table({name: (f"{1e6 * t / iterating[name][1]:8.3f} µs", "") for name, t in spent.items()})
+    _table({name: (f"{1e6 * t / iterating[name][1]:8.3f} µs",) for name, t in spent.items()})
 
 
 def _ratio(time: float, reference: float) -> str:
     return f"{time / reference:8.2f} x"
 
 
-def _table(rows: dict[str, tuple[str, str]]) -> None:
+def _table(rows: Mapping[str, tuple[str, ...]]) -> None:
     width = max(map(len, rows))
     for name, cells in rows.items():
         print(f"  {name:<{width}}  " + "  ".join(cells))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 import warnings
 from collections.abc import Callable
 from typing import Any
@@ -9,7 +10,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
-import ikgym  # noqa: F401  # registers the environment
+import ikgym
 
 ROWS = (64, 1024, 16384)
 
@@ -41,6 +42,24 @@ def single() -> dict[str, Callable[[], None]]:
     except (ImportError, gym.error.DependencyNotInstalled) as e:
         warnings.warn(f"Reacher-v5 is left out: {e}", stacklevel=2)
     return calls
+
+
+def whole_episodes(rows: int, scenario: str = "varga7-random") -> float:
+    """Steps per second of the native vector environment over a whole episode of each row, the resets included.
+
+    Args:
+        rows: How many arms.
+        scenario: A scenario's name.
+    """
+    envs = gym.make_vec("RedundantIK-v0", num_envs=rows, scenario=scenario, autoreset_mode="SameStep")
+    envs.reset(seed=0)
+    actions = np.zeros(envs.action_space.shape or (), dtype=np.float32)
+    envs.step(actions)
+    steps = ikgym.scenarios.get(scenario).steps
+    begin = time.perf_counter()
+    for _ in range(steps):
+        envs.step(actions)
+    return rows * steps / (time.perf_counter() - begin)
 
 
 def vector(rows: int) -> dict[str, Callable[[], object]]:
