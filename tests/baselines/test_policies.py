@@ -6,6 +6,7 @@ import copy
 import dataclasses
 import functools
 import time
+from collections.abc import Mapping
 
 import gymnasium as gym
 import numpy as np
@@ -20,6 +21,7 @@ from baselines.policy import Problem, Solution, SolverPolicy, statuses
 from baselines.registry import get
 from baselines.status import Status
 from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.simulator import Simulator
 from tests.comparison import identical
 
 STEPS = 6
@@ -120,8 +122,25 @@ def test_a_policy_is_told_the_model_and_never_the_arm(name, on):
         return
     assert {f.name for f in dataclasses.fields(Problem)} == {"model", "task", "cost", "dt", "velocity_limit"}
     assert policy.problem.model is scenario(on).model
-    values = [getattr(policy, f.name) for f in dataclasses.fields(policy) if f.name != "problem"]
-    assert not any(isinstance(value, (ikgym.Arm, ikgym.Scenario, gym.Env)) for value in values)
+    for thing in reachable(policy):
+        assert not isinstance(thing, (ikgym.Scenario, gym.Env, gym.vector.VectorEnv, Simulator))
+        assert not isinstance(thing, ikgym.Arm) or thing is scenario(on).model
+
+
+def reachable(thing, seen=None):
+    """All objects that an object holds, however deep."""
+    seen = {} if seen is None else seen
+    if id(thing) in seen or isinstance(thing, (str, bytes, type, np.ndarray)):
+        return seen.values()
+    seen[id(thing)] = thing
+    inside = list(getattr(thing, "__dict__", {}).values())
+    if isinstance(thing, Mapping):
+        inside += thing.values()
+    elif isinstance(thing, (tuple, list, set)):
+        inside += thing
+    for value in inside:
+        reachable(value, seen)
+    return seen.values()
 
 
 @pytest.mark.parametrize("name", [name for name in baselines.names() if not get(name).reference])
