@@ -113,7 +113,7 @@ def step(*arguments):  # type: ignore[no-untyped-def]
     """Moves the active rows from ``start`` to ``stop``, and observes them.
 
     The arguments are ``*Chain, *Law, *CostParameters, *State, *Outcome, actions, active, start, stop``: tuples are
-    taken apart by the caller, since handing over named tuples costs several times as much as the step itself.
+    taken apart by the caller, since numba takes them over one by one in less time than as named tuples.
 
     Args:
         *arguments: The arm; the law; the cost; the state, changed in place; the outcome, written in place; the

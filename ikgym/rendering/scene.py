@@ -1,7 +1,7 @@
 """The picture of an arm and its paths in space, with the error curves beside it.
 
 What stays (axes, grid, legend) is drawn once an episode and kept as pixels. A frame restores them and draws
-only what moves, which costs a few milliseconds instead of some thirty.
+only what moves.
 """
 
 from __future__ import annotations
