@@ -10,9 +10,10 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from baselines.linear_algebra import dot
 from baselines.policy import Batch, Memory, Solution, SolverPolicy
 from baselines.status import Status
-from baselines.turning import adaptive_deform, dot, plane, turn
+from baselines.turning import adaptive_deform, plane, turn
 from ikgym import task_kernels
 from ikgym.exceptions import InvalidInputError
 from ikgym.jit import kernel

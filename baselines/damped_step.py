@@ -1,6 +1,6 @@
 """Kernels: one damped step Δq = Jᵀ (J Jᵀ + λ I)⁻¹ e, in the small space (Zhang 2020, eq. 5 and 13).
 
-The matrix is factorised as L D Lᵀ, which needs no root and one division a row: at six rows that is half the time.
+The matrix is factorised as L D Lᵀ, which needs no root and one division a row.
 """
 
 from __future__ import annotations
@@ -118,15 +118,6 @@ def transposed_product(jacobian, vector, out):  # type: ignore[no-untyped-def]
         for a in range(e):
             total += jacobian[a, k] * vector[a]
         out[k] = total
-
-
-@kernel
-def square_of(vector):  # type: ignore[no-untyped-def]
-    """‖v‖²: shape (e,)."""
-    total = 0.0
-    for a in range(vector.shape[0]):
-        total += vector[a] * vector[a]
-    return total
 
 
 @kernel

@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
+from baselines.damped_step import damped_gram, transposed_product
 from baselines.linear_algebra import cholesky, cholesky_solve
 from baselines.policy import statuses
 from baselines.resolved_rate import ResolvedRate
@@ -49,24 +50,14 @@ class DampedLeastSquares(ResolvedRate):
 @kernel
 def damped_rows(jacobian, shift, damping, out):  # type: ignore[no-untyped-def]
     """Δq = Jᵀ (J Jᵀ + λ I)⁻¹ Δx, row by row: shapes (B, e, n), (B, e), a number, (B, n)."""
-    e, n = jacobian.shape[1], jacobian.shape[2]
+    e = jacobian.shape[1]
     gram, rhs = np.empty((e, e)), np.empty(e)
     for row in range(jacobian.shape[0]):
-        j = jacobian[row]
-        for a in range(e):
-            for b in range(a + 1):
-                total = damping if a == b else 0.0
-                for k in range(n):
-                    total += j[a, k] * j[b, k]
-                gram[a, b] = total
-            rhs[a] = shift[row, a]
+        damped_gram(jacobian[row], damping, gram)
         # Positive definite by the damping; if rounding says otherwise the damping is too small to count.
         if not cholesky(gram):
             out[row] = np.nan
             continue
+        rhs[:] = shift[row]
         cholesky_solve(gram, rhs)
-        for k in range(n):
-            total = 0.0
-            for a in range(e):
-                total += j[a, k] * rhs[a]
-            out[row, k] = total
+        transposed_product(jacobian[row], rhs, out[row])

@@ -10,9 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.contraction import Contraction, contraction, evaluate
+from baselines.linear_algebra import dot
 from baselines.policy import Batch, Memory, Solution, SolverPolicy
 from baselines.status import Status
-from baselines.turning import dot
 from ikgym import task_kernels
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError, UnknownNameError

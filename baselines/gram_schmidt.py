@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
+from baselines.linear_algebra import dot
 from baselines.resolved_rate import ResolvedRate, status_of
 from ikgym.exceptions import InvalidInputError
 from ikgym.jit import kernel
@@ -88,7 +89,7 @@ def orthonormal_rows(jacobian, shift, truncation, full_rank, out, deficient):  #
             pick, longest = 0, -1.0
             for a in range(e):
                 if free[a]:
-                    square = _dot(rest[a], rest[a])
+                    square = dot(rest[a], rest[a])
                     if square > longest:
                         pick, longest = a, square
             if rank == 0:
@@ -96,7 +97,7 @@ def orthonormal_rows(jacobian, shift, truncation, full_rank, out, deficient):  #
             # What rounding has left along the rows before: once more is enough.
             for b in range(rank):
                 _take_off(rest, wanted, pick, basis[b], given[b])
-            length = np.sqrt(_dot(rest[pick], rest[pick]))
+            length = np.sqrt(dot(rest[pick], rest[pick]))
             if length == 0.0 or longest < shortest:
                 break
             free[pick] = False
@@ -115,15 +116,7 @@ def orthonormal_rows(jacobian, shift, truncation, full_rank, out, deficient):  #
 @kernel
 def _take_off(rest, wanted, a, unit, given):  # type: ignore[no-untyped-def]
     """Takes the part along a unit vector off a row, and what that part makes off the row's demand."""
-    part = _dot(rest[a], unit)
+    part = dot(rest[a], unit)
     for k in range(unit.shape[0]):
         rest[a, k] -= part * unit[k]
     wanted[a] -= part * given
-
-
-@kernel
-def _dot(x, y):  # type: ignore[no-untyped-def]
-    total = 0.0
-    for k in range(x.shape[0]):
-        total += x[k] * y[k]
-    return total

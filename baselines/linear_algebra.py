@@ -7,7 +7,16 @@ from __future__ import annotations
 
 import math
 
-from ikgym.jit import kernel
+from ikgym.jit import inlined, kernel
+
+
+@inlined
+def dot(a, b):  # type: ignore[no-untyped-def]
+    """The scalar product; written out, since numba's own needs SciPy."""
+    total = 0.0
+    for i in range(a.shape[0]):
+        total += a[i] * b[i]
+    return total
 
 
 @kernel

@@ -9,8 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.damped import DampedIteration
-from baselines.damped_step import damped_step, ran_away, square_of
+from baselines.damped_step import damped_step, ran_away
 from baselines.damping_rules import condition_number, damping_next, damping_now
+from baselines.linear_algebra import dot
 from baselines.moore_penrose import pseudoinverse_rows
 from baselines.policy import Batch, Memory, Solution
 from baselines.status import Status
@@ -151,7 +152,7 @@ def iterate_rows(  # type: ignore[no-untyped-def]
             task_kernels.jacobian(kind, rotation, geometric, jacobian)
             task_kernels.coordinates(kind, rotation, position, coordinates)
             task_kernels.error(kind, target, measured if one_step else coordinates, error)
-            norm = np.sqrt(square_of(error))
+            norm = np.sqrt(dot(error, error))
             if i == 0:
                 first = norm
             if not np.isfinite(norm):

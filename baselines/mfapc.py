@@ -12,8 +12,9 @@ import numpy.typing as npt
 
 from baselines.block_tridiagonal import horizon_step
 from baselines.damped import DampedIteration
-from baselines.damped_step import ran_away, square_of
+from baselines.damped_step import ran_away
 from baselines.damping_rules import condition_number, damping_next, damping_now
+from baselines.linear_algebra import dot
 from baselines.mfac import RANK_TOLERANCE
 from baselines.moore_penrose import pseudoinverse_rows
 from baselines.policy import Batch, Memory, Solution
@@ -210,11 +211,11 @@ def iterate_horizon_rows(  # type: ignore[no-untyped-def]
             for j in range(horizon):
                 task_kernels.error(kind, nominal[row, j], pose[row] if one_step else present, residuals[j])
             # The rest of the predicted path: y(k+j)_(i) and J(k+j)_(i) (34), (35).
-            first_square = square_of(residuals[0])
+            first_square = dot(residuals[0], residuals[0])
             square = first_square
             for j in range(1, horizon):
                 if i == 0:
-                    square += square_of(residuals[j])
+                    square += dot(residuals[j], residuals[j])
                 else:
                     if predicted:
                         forward_and_jacobian(chain, path[j], rotation, position, geometric)
@@ -222,7 +223,7 @@ def iterate_horizon_rows(  # type: ignore[no-untyped-def]
                         forward(chain, path[j], rotation, position)
                     task_kernels.coordinates(kind, rotation, position, coordinates)
                     task_kernels.error(kind, nominal[row, j], coordinates, error)
-                    square += square_of(error)
+                    square += dot(error, error)
                 if predicted and i > 0:
                     task_kernels.jacobian(kind, rotation, geometric, jacobians[j])
                 else:

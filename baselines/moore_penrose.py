@@ -44,10 +44,9 @@ class MoorePenrose(ResolvedRate):
 
     def invert(self, jacobian: FloatArray, shift: FloatArray) -> tuple[FloatArray, npt.NDArray[np.int64]]:
         """See :meth:`ResolvedRate.invert`."""
-        rows, size, n = jacobian.shape
+        rows, _, n = jacobian.shape
         out, deficient = np.empty((rows, n)), np.empty(rows, dtype=np.bool_)
-        # The rank that a task with redundant coordinates can have is that of a rigid motion.
-        pseudoinverse_rows(jacobian, shift, self.rank_tolerance, min(size, n, 6), out, deficient)
+        pseudoinverse_rows(jacobian, shift, self.rank_tolerance, self.full_rank, out, deficient)
         return out, status_of(deficient)
 
 

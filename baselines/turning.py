@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import math
 
-from ikgym.jit import inlined, kernel
+from baselines.linear_algebra import dot
+from ikgym.jit import kernel
 
 # A unit vector this close to another one, or to its opposite, spans no plane with it: what is left is rounding.
 PARALLEL = 1e-15
@@ -112,15 +113,6 @@ def adaptive_deform(realized, deformed, desired, rule, extended, out):  # type: 
     for i in range(out.shape[0]):
         out[i] = largest * math.tanh(c[i] / largest)
     return angle
-
-
-@inlined
-def dot(a, b):  # type: ignore[no-untyped-def]
-    """The scalar product; written out, since numba's own needs SciPy."""
-    total = 0.0
-    for i in range(a.shape[0]):
-        total += a[i] * b[i]
-    return total
 
 
 @kernel

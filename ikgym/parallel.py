@@ -26,7 +26,9 @@ def in_chunks(work: Callable[[int, int], object], rows: int, grain: int) -> None
         rows: The number of rows.
         grain: Rows that are worth a thread; fewer are worked off in this one.
     """
-    chunks = min(cores(), rows // max(grain, 1))
+    # The cores are counted only where there is work for more than one: asking for them takes time, too.
+    chunks = rows // max(grain, 1)
+    chunks = min(chunks, cores()) if chunks > 1 else chunks
     if chunks <= 1:
         work(0, rows)
         return

@@ -179,10 +179,7 @@ class Simulator:
         def work(start: int, stop: int) -> None:
             simulation.step(*self._constants, *out, actions, active, start, stop)
 
-        if self.rows < 2 * GRAIN_STEP:
-            work(0, self.rows)
-        else:
-            in_chunks(work, self.rows, GRAIN_STEP)
+        in_chunks(work, self.rows, GRAIN_STEP)
         return out
 
     def nominal_positions(self, row: int) -> FloatArray:

@@ -23,9 +23,6 @@ from ikgym.validation import FloatArray, whole_number
 Flags = npt.NDArray[np.bool_]
 Infos = dict[str, Any]
 
-# A row that has begun no episode yet; it is stepped as little as one whose episode has ended.
-NO_EPISODE = -1
-
 
 class RedundantIKVectorEnv(gym.vector.VectorEnv[Observation, npt.NDArray[np.float32], npt.NDArray[Any]]):
     """N times :class:`ikgym.RedundantIKEnv`, stepped by one compiled kernel.
