@@ -12,10 +12,9 @@ import numpy.typing as npt
 from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError, ResetNeededError
 from ikgym.scenarios import Preview, Scenario
-from ikgym.simulation import Outcome
 from ikgym.simulator import Observation, Simulator, observation
 from ikgym.spaces import action_space, observation_space
-from ikgym.validation import known_names
+from ikgym.validation import FloatArray, known_names
 
 OBSERVED = ("q", "qdot", "pose", "nominal", "remaining")
 #: The keys of `info` after a step.
@@ -151,7 +150,7 @@ class RedundantIKEnv(gym.Env[Any, Any]):
         out = self._simulator.observe()
         if self._renderer is not None:
             self._renderer.begin(self._simulator.nominal_positions(0), self._steps * self._dt)
-            self._draw_later(out)
+            self._draw_later(out.q[0], float(out.position_error[0]), float(out.orientation_error[0]))
         return observation(out), {}
 
     def step(self, action: npt.NDArray[np.float32]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
@@ -167,20 +166,19 @@ class RedundantIKEnv(gym.Env[Any, Any]):
                 if self._step < 0
                 else f"The episode has ended after {self._steps} steps: call reset() first."
             )
-        out = self._simulator.step(action)
+        seen, (tracking, velocity, position, orientation, clipped) = self._simulator.step_one(action)
         self._step += 1
-        tracking, velocity = float(out.tracking_cost[0]), float(out.velocity_cost[0])
         info = {
             "tracking_cost": tracking,
             "velocity_cost": velocity,
-            "position_error": float(out.position_error[0]),
-            "orientation_error": float(out.orientation_error[0]) if self._has_orientation else NotApplicable("nan"),
-            "clipped": bool(out.clipped[0]),
+            "position_error": position,
+            "orientation_error": orientation if self._has_orientation else NotApplicable("nan"),
+            "clipped": clipped > 0.0,
             "time": self._step * self._dt,
         }
         if self._renderer is not None:
-            self._draw_later(out)
-        return observation(out), -(tracking + velocity), False, self._step == self._steps, info
+            self._draw_later(seen["q"], position, orientation)
+        return seen, -(tracking + velocity), False, self._step == self._steps, info
 
     def render(self) -> npt.NDArray[np.uint8] | None:
         """Draws the arm, the nominal and the realised path, and the error over time.
@@ -204,10 +202,8 @@ class RedundantIKEnv(gym.Env[Any, Any]):
         if self._renderer is not None:
             self._renderer.close()
 
-    def _draw_later(self, out: Outcome) -> None:
-        self._renderer.add(
-            out.q[0], float(out.position_error[0]), float(out.orientation_error[0]), self._step * self._dt
-        )
+    def _draw_later(self, q: FloatArray, position_error: float, orientation_error: float) -> None:
+        self._renderer.add(q, position_error, orientation_error, self._step * self._dt)
         if self.render_mode == "human":
             self._renderer.draw()
 

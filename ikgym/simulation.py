@@ -31,7 +31,8 @@ class Law(NamedTuple):
         dt: Δt in [s].
         velocity_limit: What an action of 1 means, in [rad/s] or [m/s]. Shape (n,).
         steps: Steps of an episode.
-        point: Which nominal point is the target after k steps. Shape (steps + furthest preview + 1,).
+        point: Where the nominal point that is the target after k steps is among the state's frames.
+            Shape (steps + furthest preview + 1,).
         counted: Whether costs count at the k-th step, that is whether it is the last of its point.
             Shape (steps + 1,).
         preview: How many steps ahead the nominal coordinates are shown. Shape (p,).
@@ -51,28 +52,34 @@ class Law(NamedTuple):
 
 
 class State(NamedTuple):
-    """Where the N arms are.
+    """Where the N arms are, and where they are told to go.
 
     Attributes:
+        actions: Joint velocities as fractions of the velocity limit, finite. Shape (N, n).
         q: Joint coordinates in [rad] or [m]. Shape (N, n).
         qdot: Joint velocities last applied, in [rad/s] or [m/s]. Shape (N, n).
         step: Steps made in the episode. Shape (N,).
-        frames: Nominal frames of the rows' episodes, see :mod:`ikgym.task_kernels`; shared where the first
-            length is 1. Shape (N or 1, points, 12 or 3).
+        frames: Nominal frames of the rows' episodes, or those that are near, see :mod:`ikgym.task_kernels`; shared
+            where the first length is 1. Shape (N or 1, points, 12 or 3).
         noise_key: Key of the row's random disturbance. Shape (N,).
+        scratch: What a call of the kernel works with: a frame, nominal task coordinates and their error, at its
+            first row. Shape (N, 12 + m + e).
     """
 
+    actions: Floats
     q: Floats
     qdot: Floats
     step: Integers
     frames: Floats
     noise_key: npt.NDArray[np.uint64]
+    scratch: Floats
 
 
 class Outcome(NamedTuple):
     """What the N arms show after a step: the observation, then what the step cost.
 
     Attributes:
+        numbers: All of it in one block, which the others are views of; see :func:`outcome`.
         q: Joint coordinates in [rad] or [m]. Shape (N, n).
         qdot: Joint velocities last applied, in [rad/s] or [m/s]. Shape (N, n).
         pose: Measured task coordinates. Shape (N, m).
@@ -82,9 +89,10 @@ class Outcome(NamedTuple):
         velocity_cost: Φ^U, 0 where the step does not count. Shape (N,).
         position_error: In [m]. Shape (N,).
         orientation_error: Geodesic angle in [rad], NaN where the task has no orientation. Shape (N,).
-        clipped: Whether the action left its box. Shape (N,).
+        clipped: 1 where the action left its box, 0 elsewhere. Shape (N,).
     """
 
+    numbers: Floats
     q: Floats
     qdot: Floats
     pose: Floats
@@ -94,7 +102,45 @@ class Outcome(NamedTuple):
     velocity_cost: Floats
     position_error: Floats
     orientation_error: Floats
-    clipped: Flags
+    clipped: Floats
+
+
+def outcome(numbers: Floats, rows: int, n: int, m: int, p: int) -> Outcome:
+    """The parts of an outcome that is one block of numbers, as each step fills a fresh one.
+
+    One block, since to allocate ten arrays and to hand them to a kernel takes longer than what the kernel does.
+
+    Args:
+        numbers: The block. Shape (N (2 n + m + p m + 6),).
+        rows: N.
+        n: Joints of the arm.
+        m: Task coordinates.
+        p: Steps ahead that are shown.
+
+    Returns:
+        Views of the block.
+    """
+    qdot = rows * n
+    pose = qdot + rows * n
+    nominal = pose + rows * m
+    remaining = nominal + rows * p * m
+    reward = remaining + rows
+    return Outcome(
+        numbers,
+        numbers[:qdot].reshape(rows, n),
+        numbers[qdot:pose].reshape(rows, n),
+        numbers[pose:nominal].reshape(rows, m),
+        numbers[nominal:remaining].reshape(rows, p, m),
+        numbers[remaining:reward].reshape(rows, 1),
+        numbers[reward : reward + rows],
+        numbers[reward + rows : reward + 2 * rows],
+        numbers[reward + 2 * rows : reward + 3 * rows],
+        numbers[reward + 3 * rows : reward + 4 * rows],
+        numbers[reward + 4 * rows :],
+    )
+
+
+_outcome = inlined(outcome)
 
 
 @kernel
@@ -109,113 +155,114 @@ def first_not_finite(actions, active):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def step(*arguments):  # type: ignore[no-untyped-def]
-    """Moves the active rows from ``start`` to ``stop``, and observes them.
+def step(  # type: ignore[no-untyped-def]
+    # Chain.
+    offsets,
+    axes,
+    prismatic,
+    tool,
+    tool_rotation,
+    # Law.
+    kind,
+    dt,
+    velocity_limit,
+    steps,
+    point,
+    counted,
+    preview,
+    bias,
+    noise,
+    # CostParameters.
+    delta_x,
+    p_x,
+    delta_qdot,
+    p_out,
+    p_in,
+    # State, changed in place.
+    actions,
+    q,
+    qdot,
+    made,
+    tables,
+    noise_key,
+    scratch,
+    # What is asked for.
+    numbers,
+    active,
+    moving,
+    start,
+    stop,
+):
+    """Moves rows, and observes them.
 
-    The arguments are ``*Chain, *Law, *CostParameters, *State, *Outcome, actions, active, start, stop``: tuples are
-    taken apart by the caller, since numba takes them over one by one in less time than as named tuples.
+    The arguments are the parts of :class:`Chain`, :class:`Law`, :class:`CostParameters` and :class:`State`; then the
+    block of an outcome (see :func:`outcome`), written in place; the rows that are meant, of shape (N,); whether they
+    move or are observed where they are; the first row, and the row after the last.
 
-    Args:
-        *arguments: The arm; the law; the cost; the state, changed in place; the outcome, written in place; the
-            actions as fractions of the velocity limit, finite, of shape (N, n); the rows to step, of shape (N,); the
-            first row, and the row after the last.
+    The tuples are taken apart by the caller: numba takes their parts over one by one in less time, and would count
+    references at each access to a part, which in the loop over rows takes longer than the kinematics.
     """
-    chain, law, cost, state, out = _assemble(arguments)
-    actions, active, start, stop = arguments[34], arguments[35], arguments[36], arguments[37]
-    scratch = _scratch(law, out)
+    chain = Chain(offsets, axes, prismatic, tool, tool_rotation)
+    cost = CostParameters(delta_x, p_x, delta_qdot, p_out, p_in)
+    rows, n = q.shape
+    p, width = preview.shape[0], tables.shape[2]
+    m = (numbers.shape[0] // rows - 2 * n - 6) // (p + 1)
+    out = _outcome(numbers, rows, n, m, p)
+    seen_q, seen_qdot, seen_pose, seen_nominal, remaining = out.q, out.qdot, out.pose, out.nominal, out.remaining
+    tracking_cost, velocity_cost, clipped = out.tracking_cost, out.velocity_cost, out.clipped
+    position_error, orientation_error = out.position_error, out.orientation_error
+    # Each call has the scratch of its first row to itself.
+    rotation, position = scratch[start, :9].reshape(3, 3), scratch[start, 9:12]
+    nominal, error = scratch[start, 12 : 12 + m], scratch[start, 12 + m :]
     for row in range(start, stop):
-        if active[row]:
-            _move_row(law, state, actions, out, row)
-            _observe_row(chain, law, cost, state, out, row, scratch)
+        if not active[row]:
+            continue
+        clipped[row] = 0.0
+        if moving:
+            for j in range(n):
+                action = actions[row, j]
+                if abs(action) > 1.0:
+                    clipped[row] = 1.0
+                    action = math.copysign(1.0, action)
+                velocity = action * velocity_limit[j]
+                qdot[row, j] = velocity
+                if bias[j] != 0.0:
+                    velocity += bias[j]
+                if noise[j] != 0.0:
+                    velocity += noise[j] * _uniform(noise_key[row], np.uint64(made[row] * n + j))
+                q[row, j] += dt * velocity  # Varga 2021, eq. 5
+            made[row] += 1
+        k = made[row]
+        for j in range(n):
+            seen_q[row, j] = q[row, j]
+            seen_qdot[row, j] = qdot[row, j]
+        forward(chain, q[row], rotation, position)
+        pose = seen_pose[row]
+        task_kernels.coordinates(kind, rotation, position, pose)
 
+        frames = tables[row if tables.shape[0] > 1 else 0]
+        for i in range(p):
+            task_kernels.frame_coordinates(kind, frames[point[k + preview[i]]], seen_nominal[row, i])
+        remaining[row, 0] = steps - k
 
-@kernel
-def observe(*arguments):  # type: ignore[no-untyped-def]
-    """Observes the active rows without moving them; the arguments are those of :func:`step`."""
-    chain, law, cost, state, out = _assemble(arguments)
-    active, start, stop = arguments[35], arguments[36], arguments[37]
-    scratch = _scratch(law, out)
-    for row in range(start, stop):
-        if active[row]:
-            out.clipped[row] = False
-            _observe_row(chain, law, cost, state, out, row, scratch)
+        frame = frames[point[k]]
+        square = 0.0
+        for i in range(3):
+            missing = frame[width - 3 + i] - position[i]
+            square += missing * missing
+        position_error[row] = math.sqrt(square)
+        if kind == task_kernels.POSITION:
+            orientation_error[row] = math.nan
+        else:
+            orientation_error[row] = geodesic_angle(rotation, frame[:9].reshape(3, 3))
 
-
-@inlined
-def _assemble(arguments):  # type: ignore[no-untyped-def]
-    return (
-        Chain(*arguments[0:5]),
-        Law(*arguments[5:14]),
-        CostParameters(*arguments[14:19]),
-        State(*arguments[19:24]),
-        Outcome(*arguments[24:34]),
-    )
-
-
-@kernel
-def _move_row(law, state, actions, out, row):  # type: ignore[no-untyped-def]
-    n = actions.shape[1]
-    k = state.step[row]
-    clipped = False
-    for j in range(n):
-        action = actions[row, j]
-        if abs(action) > 1.0:
-            clipped = True
-            action = math.copysign(1.0, action)
-        velocity = action * law.velocity_limit[j]
-        state.qdot[row, j] = velocity
-        if law.bias[j] != 0.0:
-            velocity += law.bias[j]
-        if law.noise[j] != 0.0:
-            velocity += law.noise[j] * _uniform(state.noise_key[row], np.uint64(k * n + j))
-        state.q[row, j] += law.dt * velocity  # Varga 2021, eq. 5
-    state.step[row] = k + 1
-    out.clipped[row] = clipped
-
-
-@kernel
-def _scratch(law, out):  # type: ignore[no-untyped-def]
-    """Arrays that the rows of a call use one after the other: to allocate them costs as much as the kinematics."""
-    m = out.pose.shape[1]
-    e = 6 if law.kind == task_kernels.POSE else m
-    return np.empty((3, 3)), np.empty(3), np.empty(m), np.empty(e)
-
-
-@kernel
-def _observe_row(chain, law, cost, state, out, row, scratch):  # type: ignore[no-untyped-def]
-    rotation, position, nominal, error = scratch
-    k = state.step[row]
-    for j in range(state.q.shape[1]):
-        out.q[row, j] = state.q[row, j]
-        out.qdot[row, j] = state.qdot[row, j]
-    forward(chain, out.q[row], rotation, position)
-    pose = out.pose[row]
-    task_kernels.coordinates(law.kind, rotation, position, pose)
-
-    frames = state.frames[row if state.frames.shape[0] > 1 else 0]
-    for p in range(law.preview.shape[0]):
-        task_kernels.frame_coordinates(law.kind, frames[law.point[k + law.preview[p]]], out.nominal[row, p])
-    out.remaining[row, 0] = law.steps - k
-
-    frame = frames[law.point[k]]
-    width = frame.shape[0]
-    square = 0.0
-    for i in range(3):
-        missing = frame[width - 3 + i] - position[i]
-        square += missing * missing
-    out.position_error[row] = math.sqrt(square)
-    if law.kind == task_kernels.POSITION:
-        out.orientation_error[row] = math.nan
-    else:
-        out.orientation_error[row] = geodesic_angle(rotation, frame[:9].reshape(3, 3))
-
-    out.tracking_cost[row] = 0.0
-    out.velocity_cost[row] = 0.0
-    if law.counted[k]:
-        task_kernels.frame_coordinates(law.kind, frame, nominal)
-        task_kernels.error(law.kind, nominal, pose, error)
-        out.tracking_cost[row] = cost_kernels.tracking(cost, error)
-        out.velocity_cost[row] = cost_kernels.velocity(cost, out.qdot[row])
+        tracking_cost[row] = 0.0
+        velocity_cost[row] = 0.0
+        if counted[k]:
+            task_kernels.frame_coordinates(kind, frame, nominal)
+            task_kernels.error(kind, nominal, pose, error)
+            tracking_cost[row] = cost_kernels.tracking(cost, error)
+            velocity_cost[row] = cost_kernels.velocity(cost, qdot[row])
 
 
 @kernel

@@ -13,7 +13,8 @@ from ikgym.compilation import announced
 from ikgym.exceptions import InvalidInputError
 from ikgym.parallel import in_chunks
 from ikgym.scenarios import Preview, Scenario
-from ikgym.simulation import Law, Outcome, State
+from ikgym.simulation import Law, Outcome, State, outcome
+from ikgym.trajectories import Trajectory
 from ikgym.validation import FloatArray, float_array
 
 #: What a policy sees of an arm, see :func:`observation`.
@@ -22,9 +23,14 @@ Observation = dict[str, FloatArray]
 # Rows worth a thread of their own: below, handing over costs more than it saves.
 GRAIN_STEP = 256
 GRAIN_RESET = 4
+# Rows whose nominal frames are computed at a time: their intermediate results stay small.
+PIECE = 64
 
 # A preview beyond would fill the memory before it served any policy.
 FARTHEST = 1_000_000
+
+# What the nominal frames of all rows may take, in bytes: of many long episodes only what is near is kept.
+MEMORY = 2**26
 
 
 class Simulator:
@@ -35,51 +41,68 @@ class Simulator:
         rows: N, or None for one arm whose actions have no row axis.
         preview: How many steps ahead the nominal coordinates are shown: an int p shows 1 … p, a sequence just
             those.
+        memory: What the nominal frames of all rows may take, in bytes. Those of random episodes that would take
+            more are computed block by block on the way; a block is never shorter than the preview looks ahead.
 
     Raises:
         InvalidInputError: The preview is not valid.
     """
 
-    def __init__(self, scenario: Scenario, rows: int | None, preview: Preview) -> None:
-        joints = scenario.joints
+    def __init__(self, scenario: Scenario, rows: int | None, preview: Preview, memory: int = MEMORY) -> None:
+        joints, size = scenario.joints, scenario.task.size
         self._action_shape = (joints,) if rows is None else (rows, joints)
         # One arm has no rows that do not step, whose outcome would have to be zero.
         self._new = np.empty if rows is None else np.zeros
         rows = 1 if rows is None else rows
         self.scenario, self.rows = scenario, rows
         self.preview = offsets(preview)
-        points = scenario.points(preview)
-        self._points = int(points[-1]) + 1
+        self._point = scenario.points(preview)
+        width = 12 if scenario.task.has_orientation else 3
+        points = int(self._point[-1]) + 1
+        tables = rows if scenario.random else 1
+        affordable = memory // (8 * width * rows) if scenario.random else points
+        # Rows know all of their points, or two blocks of them: the next one takes the place of the one before.
+        self._block = points if points <= affordable else min(points, max(affordable // 2, self.preview[-1]))
+        self._in_blocks = self._block < points
+        known = self._block * (2 if self._in_blocks else 1)
+        self._last_block = self._point[self.preview[-1] :] // self._block
+        self._blocks_known = np.zeros(tables, dtype=np.int64)
+        self._episodes: list[Trajectory] = [scenario.trajectory] * tables
         self._law = Law(
             kind=scenario.task.kind,
             dt=scenario.dt,
             velocity_limit=scenario.velocity_limit,
             steps=scenario.steps,
-            point=points,
+            point=self._point % known,
             counted=scenario.counted(),
             preview=np.array(self.preview, dtype=np.int64),
             bias=np.broadcast_to(scenario.disturbance.bias, joints).astype(np.float64),
             noise=np.broadcast_to(scenario.disturbance.noise, joints).astype(np.float64),
         )
-        tables = rows if scenario.random else 1
-        width = 12 if scenario.task.has_orientation else 3
         self._state = State(
+            actions=np.zeros((rows, joints)),
             q=np.zeros((rows, joints)),
             qdot=np.zeros((rows, joints)),
             step=np.zeros(rows, dtype=np.int64),
-            frames=np.zeros((tables, self._points, width)),
+            frames=np.zeros((tables, known, width)),
             noise_key=np.zeros(rows, dtype=np.uint64),
+            scratch=np.empty((rows, 12 + size + scenario.task.error_size)),
         )
         if not scenario.random:
-            self._state.frames[0] = scenario.frames(scenario.trajectory, self._points)
+            self._know(np.zeros(1, dtype=np.int64))
+        self._shape = (rows, joints, size, len(self.preview))
+        self._nominal_shape = (len(self.preview), size)
+        self._count = rows * (2 * joints + size + len(self.preview) * size + 6)
+        # Where the parts of the only arm are in the block.
+        parts = self._outcome(np.arange(self._count, dtype=np.float64))[1:6]
+        self._parts = [slice(int(part.flat[0]), int(part.flat[-1]) + 1) for part in parts]
         # The kernels take tuples apart, see simulation.step: what never changes is taken apart once.
         self._constants = (*scenario.arm.chain, *self._law, *scenario.cost.parameters, *self._state)
         self._all = np.ones(rows, dtype=np.bool_)
         self._own_start = np.zeros(rows, dtype=np.bool_)
         with announced("the simulation kernels"):
             simulation.first_not_finite(self._state.q, ~self._all)
-            for kernel in (simulation.step, simulation.observe):
-                kernel(*self._constants, *self._outcome(), self._state.q, ~self._all, 0, 0)
+            self._run(~self._all, self._new(self._count), moving=False)
 
     def reset(
         self,
@@ -95,23 +118,21 @@ class Simulator:
             starts: What :meth:`checked_starts` gave; the scenario's own starts if left out. Shape (N, n).
         """
         scenario, state = self.scenario, self._state
-        rows = np.flatnonzero(active).tolist()
-        episodes = [scenario.trajectory.sample(generators[row]) for row in rows]
+        rows = np.flatnonzero(active)
         noisy = bool(self._law.noise.any())
-
-        def prepare(first: int, stop: int) -> None:
-            for row, episode in zip(rows[first:stop], episodes[first:stop], strict=True):
-                if scenario.random:
-                    state.frames[row] = scenario.frames(episode, self._points)
-                state.q[row] = scenario.first_q(episode) if starts is None else starts[row]
-
-        in_chunks(prepare, len(rows), GRAIN_RESET if scenario.random else len(rows))
-        if noisy:
-            for row in rows:
+        for row in rows.tolist():
+            episode = scenario.trajectory.sample(generators[row])
+            if scenario.random:
+                self._episodes[row] = episode
+            state.q[row] = scenario.first_q(episode) if starts is None else starts[row]
+            if noisy:
                 state.noise_key[row] = generators[row].integers(2**63, dtype=np.uint64)
         self._own_start[active] = starts is None
         state.qdot[active] = 0.0
         state.step[active] = 0
+        if scenario.random:
+            self._blocks_known[active] = 0
+            self._look_ahead(rows, steps=0)
 
     def checked_starts(self, q: npt.ArrayLike | None) -> FloatArray | None:
         """Starts that a user asks for.
@@ -145,9 +166,9 @@ class Simulator:
             active: The rows to observe, all if left out. Shape (N,).
             out: Where to write; fresh arrays if left out, zero in the rows that are not observed.
         """
-        out = self._outcome() if out is None else out
+        out = self._outcome(self._new(self._count)) if out is None else out
         active = self._all if active is None else active
-        simulation.observe(*self._constants, *out, self._state.q, active, 0, self.rows)
+        self._run(active, out.numbers, moving=False)
         if self.scenario.initial_pose is not None:
             out.pose[active & self._own_start & (self._state.step == 0)] = self.scenario.initial_pose
         return out
@@ -166,26 +187,37 @@ class Simulator:
             InvalidInputError: The actions have a wrong shape or type, or one is not finite. Nothing has changed
                 then.
         """
-        actions = self._checked_actions(actions)
         active = self._all if active is None else active
-        bad = simulation.first_not_finite(actions, active)
-        if bad >= 0:
-            where = f" of row {bad}" if self.rows > 1 else ""
-            raise InvalidInputError(
-                f"action{where}: expected finite numbers, got {actions[bad].tolist()}. The state is as it was."
-            )
-        out = self._outcome()
-
-        def work(start: int, stop: int) -> None:
-            simulation.step(*self._constants, *out, actions, active, start, stop)
-
-        in_chunks(work, self.rows, GRAIN_STEP)
+        self._accept(actions, active)
+        out = self._outcome(self._new(self._count))
+        self._run(active, out.numbers, moving=True)
         return out
+
+    def step_one(self, action: npt.ArrayLike) -> tuple[Observation, list[float]]:
+        """:meth:`step` of the only arm, in less time.
+
+        Returns:
+            What a policy sees, without a row axis; tracking cost, velocity cost, position error, orientation error
+            and whether the action was clipped.
+        """
+        self._accept(action, self._all)
+        numbers = np.empty(self._count)
+        simulation.step(*self._constants, numbers, self._all, True, 0, 1)
+        q, qdot, pose, nominal, remaining = self._parts
+        seen = {
+            "q": numbers[q],
+            "qdot": numbers[qdot],
+            "pose": numbers[pose],
+            "nominal": numbers[nominal].reshape(self._nominal_shape),
+            "remaining": numbers[remaining],
+        }
+        return seen, numbers[-5:].tolist()
 
     def nominal_positions(self, row: int) -> FloatArray:
         """The nominal positions of a row's episode in [m], one a step. Shape (steps + 1, 3)."""
-        frames = self._state.frames[row if len(self._state.frames) > 1 else 0]
-        positions: FloatArray = frames[self._law.point[: self.scenario.steps + 1], -3:]
+        point = self._point[: self.scenario.steps + 1]
+        episode = self._episodes[row if self.scenario.random else 0]
+        positions: FloatArray = self.scenario.frames(episode, int(point[-1]) + 1)[point, -3:]
         return positions
 
     @property
@@ -193,23 +225,8 @@ class Simulator:
         """Steps made in each row's episode. Shape (N,)."""
         return self._state.step
 
-    def _outcome(self) -> Outcome:
-        rows, joints, size = self.rows, self.scenario.joints, self.scenario.task.size
-        new = self._new
-        return Outcome(
-            new((rows, joints)),
-            new((rows, joints)),
-            new((rows, size)),
-            new((rows, len(self.preview), size)),
-            new((rows, 1)),
-            new(rows),
-            new(rows),
-            new(rows),
-            new(rows),
-            new(rows, np.bool_),
-        )
-
-    def _checked_actions(self, actions: npt.ArrayLike) -> FloatArray:
+    def _accept(self, actions: npt.ArrayLike, active: npt.NDArray[np.bool_]) -> None:
+        """Takes actions over, if they are good, and prepares the active rows for their step."""
         try:
             raw = np.asarray(actions)
         except ValueError:  # lists of different lengths
@@ -218,7 +235,49 @@ class Simulator:
             raise InvalidInputError(f"action: expected numbers of shape {self._action_shape}, got {actions!r}.")
         if raw.shape != self._action_shape:
             raise InvalidInputError(f"action: expected shape {self._action_shape}, got {raw.shape}.")
-        return np.array(raw, dtype=np.float64, order="C").reshape(self.rows, -1)
+        accepted = self._state.actions
+        accepted[:] = raw
+        bad = simulation.first_not_finite(accepted, active)
+        if bad >= 0:
+            where = f" of row {bad}" if self.rows > 1 else ""
+            raise InvalidInputError(
+                f"action{where}: expected finite numbers, got {accepted[bad].tolist()}. The state is as it was."
+            )
+        if self._in_blocks:
+            self._look_ahead(np.flatnonzero(active), steps=1)
+
+    def _run(self, active: npt.NDArray[np.bool_], numbers: FloatArray, *, moving: bool) -> None:
+        in_chunks(
+            lambda start, stop: simulation.step(*self._constants, numbers, active, moving, start, stop),
+            self.rows,
+            GRAIN_STEP,
+        )
+
+    def _outcome(self, numbers: FloatArray) -> Outcome:
+        return outcome(numbers, *self._shape)
+
+    def _look_ahead(self, rows: npt.NDArray[np.int64], *, steps: int) -> None:
+        """Sees to it that the rows know all nominal frames that they need after some steps more."""
+        last = self._last_block[self._state.step[rows] + steps]
+        while len(late := rows[last >= self._blocks_known[rows]]):
+            self._know(late)
+
+    def _know(self, rows: npt.NDArray[np.int64]) -> None:
+        """Computes the next block of nominal frames of some rows."""
+        frames, block = self._state.frames, self._block
+        first = self._blocks_known[rows] * block
+        ahead = np.arange(block)
+
+        def work(start: int, stop: int) -> None:
+            for part in range(start, stop, PIECE):
+                some = slice(part, min(part + PIECE, stop))
+                points = first[some, None] + ahead
+                episodes = [self._episodes[row] for row in rows[some].tolist()]
+                computed = self.scenario.frames_of(episodes, points)
+                frames[rows[some, None], points % frames.shape[1]] = computed
+
+        in_chunks(work, len(rows), GRAIN_RESET)
+        self._blocks_known[rows] += 1
 
 
 def observation(out: Outcome) -> Observation:

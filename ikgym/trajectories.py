@@ -9,6 +9,7 @@ from __future__ import annotations
 import abc
 import dataclasses
 import typing
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -125,15 +126,11 @@ class Sinusoid(Trajectory):
 
     def joint_path(self, times: FloatArray) -> FloatArray:
         """See :meth:`Trajectory.joint_path`."""
-        wave = self.amplitude * np.sin(np.multiply.outer(times, self.frequency) + self.phase)
-        if self.sigmoid is not None:
-            wave = self.sigmoid * wave / (1.0 + np.abs(wave))
-        return wave + self.offset
+        return _sinusoid(times[:, None], self.amplitude, self.frequency, self.phase, self.offset, self.sigmoid)
 
     def frames(self, times: FloatArray, model: Arm) -> FloatArray:
         """See :meth:`Trajectory.frames`."""
-        rotations, positions = model.forward(self.joint_path(times))
-        return np.hstack([rotations.reshape(-1, 9), positions])
+        return _frames(self.joint_path(times), model)
 
     def joint_bound(self) -> FloatArray:
         """See :meth:`Trajectory.joint_bound`."""
@@ -285,3 +282,44 @@ class StraightLine(Trajectory):
         rotations = np.array([rodrigues(axis, s * angle) @ first for s in share])
         positions = self.start[9:] + share[:, None] * (self.end[9:] - self.start[9:])
         return np.hstack([rotations.reshape(-1, 9), positions])
+
+
+def frames_of(trajectories: Sequence[Trajectory], times: FloatArray, model: Arm) -> FloatArray:
+    """The nominal poses of several trajectories, each at times of its own.
+
+    Args:
+        trajectories: One a row.
+        times: Times in [s]. Shape (k, t).
+        model: The arm through whose kinematics a joint path is mapped.
+
+    Returns:
+        Bit for bit what :meth:`Trajectory.frames` gives row by row. Shape (k, t, 12) or (k, t, 3).
+    """
+    # What random scenarios draw by the thousands is computed at once.
+    if all(type(trajectory) is Sinusoid and trajectory.sigmoid is None for trajectory in trajectories):
+        sinusoids = typing.cast(Sequence[Sinusoid], trajectories)
+        motions = np.array([(s.amplitude, s.frequency, s.phase, s.offset) for s in sinusoids])
+        amplitude, frequency, phase, offset = motions.swapaxes(0, 1)[:, :, None]
+        return _frames(_sinusoid(times[..., None], amplitude, frequency, phase, offset, None), model)
+    return np.stack([t.frames(row, model) for t, row in zip(trajectories, times, strict=True)])
+
+
+def _sinusoid(
+    times: FloatArray,
+    amplitude: FloatArray,
+    frequency: FloatArray | float,
+    phase: FloatArray | float,
+    offset: FloatArray | float,
+    sigmoid: float | None,
+) -> FloatArray:
+    """Joint coordinates of one sinusoid or of many: all that is given broadcasts."""
+    wave: FloatArray = amplitude * np.sin(times * frequency + phase)
+    if sigmoid is not None:
+        wave = sigmoid * wave / (1.0 + np.abs(wave))
+    return wave + offset
+
+
+def _frames(path: FloatArray, model: Arm) -> FloatArray:
+    """The poses that an arm takes along joint coordinates of shape (..., n)."""
+    rotations, positions = model.forward(path)
+    return np.concatenate([rotations.reshape(*path.shape[:-1], 9), positions], axis=-1)

@@ -168,7 +168,7 @@ class RedundantIKVectorEnv(gym.vector.VectorEnv[Observation, npt.NDArray[np.floa
             "velocity_cost": out.velocity_cost,
             "position_error": out.position_error,
             "orientation_error": out.orientation_error,
-            "clipped": out.clipped,
+            "clipped": out.clipped > 0.0,
             "time": self._simulator.steps_made * self.scenario.dt,
         }
         infos: Infos = {}

@@ -10,7 +10,8 @@ from scipy.spatial.transform import Rotation
 
 import ikgym
 from ikgym.exceptions import InvalidInputError
-from ikgym.trajectories import Helix, RandomSinusoid, Sinusoid, StraightLine
+from ikgym.trajectories import Helix, RandomSinusoid, Sinusoid, StraightLine, frames_of
+from tests.comparison import identical
 
 TIMES = np.linspace(0, 7, 57)
 HOME = np.array([*np.eye(3).ravel(), 0.0, 0.0, 0.0])
@@ -160,3 +161,27 @@ def test_pickles():
     copy = pickle.loads(pickle.dumps(Sinusoid(VARGA, phase=0.3, sigmoid=0.2)))
     np.testing.assert_array_equal(copy.joint_path(TIMES), Sinusoid(VARGA, phase=0.3, sigmoid=0.2).joint_path(TIMES))
     assert not copy.amplitude.flags.writeable
+
+
+class Shaken(Sinusoid):
+    """Inherits all of it but the path."""
+
+    def joint_path(self, times):
+        return super().joint_path(times) + 0.1 * times[:, None]
+
+
+@pytest.mark.parametrize("kinds", ["drawn", "bent", "shaken", "mixed"])
+def test_frames_of_many_are_those_of_each(kinds):
+    arm = ikgym.arms.get("varga7")
+    rng = np.random.default_rng(2)
+    random = ikgym.scenarios.get("varga7-random").trajectory
+    drawn = [random.sample(rng).replace(offset=rng.uniform(-1, 1, 7)) for _ in range(5)]
+    bent = [sinusoid.replace(sigmoid=0.1 + 0.1 * i) for i, sinusoid in enumerate(drawn)]
+    shaken = [Shaken(s.amplitude, s.frequency, s.phase) for s in drawn]
+    line = ikgym.scenarios.get("zhang6-lspb").trajectory
+    mixed = [drawn[0], bent[1], line, shaken[2], drawn[3]]
+    trajectories = {"drawn": drawn, "bent": bent, "shaken": shaken, "mixed": mixed}[kinds]
+    times = rng.uniform(0.0, 9.0, (5, 13))
+    many = frames_of(trajectories, times, arm)
+    for frames, trajectory, row in zip(many, trajectories, times, strict=True):
+        assert identical(frames, trajectory.frames(row, arm))

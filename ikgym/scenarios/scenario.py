@@ -15,7 +15,7 @@ from ikgym.cost import TrackingCost
 from ikgym.exceptions import InvalidInputError
 from ikgym.simulation import nominal_rows
 from ikgym.tasks import Task
-from ikgym.trajectories import Trajectory
+from ikgym.trajectories import Trajectory, frames_of
 from ikgym.validation import FloatArray, Frozen, frozen_array, number, per_joint, whole_number
 
 # A start given by `options={"q": …}` may be this far from home in each joint, in [rad] or [m].
@@ -231,6 +231,19 @@ class Scenario(Frozen):
         """
         frames = trajectory.frames(self.times(points), self.model)
         return np.ascontiguousarray(frames if self.task.has_orientation else frames[:, -3:])
+
+    def frames_of(self, episodes: Sequence[Trajectory], points: npt.NDArray[np.int64]) -> FloatArray:
+        """The nominal frames of several episodes, each at points of its own; bit for bit those of :meth:`frames`.
+
+        Args:
+            episodes: What was drawn for the k episodes.
+            points: Numbers of points. Shape (k, p).
+
+        Returns:
+            Frames. Shape (k, p, 12), or (k, p, 3) where the task has no orientation.
+        """
+        frames = frames_of(episodes, points.astype(np.float64) * self.dt, self.model)
+        return frames if self.task.has_orientation else frames[..., -3:]
 
     def times(self, points: int) -> FloatArray:
         """When the trajectory is at its nominal points, in [s]. Shape (points,)."""

@@ -1,0 +1,144 @@
+"""The simulator: nominal frames in blocks, memory, copies, and arrays that share nothing."""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+import itertools
+import pickle
+import typing
+
+import numpy as np
+import pytest
+from gymnasium.utils import seeding
+
+import ikgym
+import ikgym.simulator as simulator_module
+from ikgym import parallel
+from ikgym.simulator import Simulator
+from ikgym.trajectories import Helix, RandomSinusoid, Trajectory
+from tests.comparison import identical
+
+ROWS = 9
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Wanderer(Trajectory):
+    """A user's own random trajectory: of another kind each time, and without orientation."""
+
+    random: typing.ClassVar[bool] = True
+    has_orientation: typing.ClassVar[bool] = False
+
+    def sample(self, rng):
+        return Helix(rng.uniform(-1, 1, 3), 1.0, 2.0, 0.1)
+
+    def frames(self, times, model):
+        raise NotImplementedError
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Bent(RandomSinusoid):
+    """Draws what needs each row computed by itself."""
+
+    def sample(self, rng):
+        return dataclasses.replace(super().sample(rng), sigmoid=float(rng.uniform(0.1, 0.4)), offset=0.3)
+
+
+def random_scenarios():
+    drawn = ikgym.scenarios.get("varga7-random").replace(steps=60)
+    wanderer = ikgym.scenarios.get("zhang3-helix").replace(trajectory=Wanderer(), initial_pose=None, steps=60)
+    return {
+        "sinusoids": drawn,
+        "held": drawn.replace(iterations_per_point=(3, 2)),
+        "bent": drawn.replace(trajectory=Bent(drawn.trajectory.amplitude)),
+        "wanderer": wanderer,
+        "noisy": drawn.replace(disturbance=ikgym.Disturbance(noise=0.3)),
+    }
+
+
+@pytest.mark.parametrize("preview", [1, 4, (2, 13), (1, 59), (1, 200)])
+@pytest.mark.parametrize("name", random_scenarios())
+def test_blocks_of_nominal_frames_are_the_whole_table_bit_for_bit(name, preview):
+    """Rows begin new episodes at different times, so that they stand in different blocks."""
+    scenario = random_scenarios()[name]
+    whole, in_blocks = Simulator(scenario, ROWS, preview), Simulator(scenario, ROWS, preview, memory=0)
+    points = int(scenario.points(preview)[-1]) + 1
+    ahead = in_blocks.preview[-1]
+    assert whole._state.frames.shape[1] == points
+    assert in_blocks._state.frames.shape[1] == (2 * ahead if ahead < points else points)
+    rng, generators = np.random.default_rng(4), [[np.random.default_rng(i) for i in range(ROWS)] for _ in range(2)]
+    active = np.ones(ROWS, dtype=bool)
+    for k in range(150):
+        if k > 0:
+            active = (whole.steps_made == scenario.steps) | (rng.random(ROWS) < 0.02)
+        for simulator, own in zip((whole, in_blocks), generators, strict=True):
+            simulator.reset(active, own)
+        assert identical(whole.observe().numbers, in_blocks.observe().numbers)
+        actions, stepping = rng.uniform(-0.1, 0.1, (ROWS, scenario.joints)), rng.random(ROWS) < 0.9
+        assert identical(whole.step(actions, stepping).numbers, in_blocks.step(actions, stepping).numbers)
+    for row in range(ROWS):
+        assert identical(whole.nominal_positions(row), in_blocks.nominal_positions(row))
+
+
+def test_blocks_show_the_episodes_nominals():
+    """Against the public scenario, which knows nothing of blocks."""
+    scenario = random_scenarios()["sinusoids"]
+    simulator = Simulator(scenario, 2, 3, memory=0)
+    simulator.reset(np.ones(2, dtype=bool), [seeding.np_random(seed)[0] for seed in (5, 6)])
+    for k in range(1, scenario.steps + 1):
+        shown = simulator.step(np.zeros((2, 7))).nominal
+        for row, seed in enumerate((5, 6)):
+            assert identical(shown[row], scenario.nominal(seed, 3)[k + 1 : k + 4])
+    for row, seed in enumerate((5, 6)):
+        assert identical(simulator.nominal_positions(row), scenario.nominal(seed)[:, -3:])
+
+
+def test_threads_do_not_disturb_each_other(monkeypatch):
+    """All rows of a step in several threads against the same in one."""
+    monkeypatch.setattr(parallel, "cores", lambda: 4)
+    rows, outcomes = 4000, {}
+    actions = np.random.default_rng(0).uniform(-1, 1, (5, rows, 7))
+    for grain in (1000, rows):
+        monkeypatch.setattr(simulator_module, "GRAIN_STEP", grain)
+        simulator = Simulator(ikgym.scenarios.get("varga7-random"), rows, 2)
+        simulator.reset(np.ones(rows, dtype=bool), [np.random.default_rng(i) for i in range(rows)])
+        outcomes[grain] = [simulator.step(a).numbers for a in actions]
+    assert identical(outcomes[1000], outcomes[rows])
+
+
+@pytest.mark.parametrize("name", ["varga7-fast", "varga7-random", "varga7-random-long"])
+def test_many_arms_take_little_memory(name):
+    """All arrays of a simulator of 16,384 arms, and one outcome."""
+    simulator = Simulator(ikgym.scenarios.get(name), 16_384, 2)
+    taken = sum(array.nbytes for array in (*simulator._state, *simulator._law) if isinstance(array, np.ndarray))
+    assert taken + simulator.observe().numbers.nbytes < 100e6
+
+
+@pytest.mark.parametrize("duplicate", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))])
+@pytest.mark.parametrize("make", [ikgym.RedundantIKEnv, lambda name: ikgym.RedundantIKVectorEnv(3, name)])
+def test_copies_go_on_by_themselves(make, duplicate):
+    """A copy whose kernel still saw the arrays of the first would step it instead."""
+    env, twin = make("varga7-random"), make("varga7-random")
+    actions = np.full(env.action_space.shape, 0.2, dtype=np.float32)
+    for e in (env, twin):
+        e.reset(seed=3)
+        e.step(actions)
+    copied = duplicate(env)
+    got = [copied.step(k * actions)[0]["q"] for k in (1, 2, 3)]
+    wanted = [twin.step(k * actions)[0]["q"] for k in (1, 2, 3)]
+    np.testing.assert_array_equal(got, wanted)
+    np.testing.assert_array_equal(env.step(actions)[0]["q"], wanted[0])
+
+
+@pytest.mark.parametrize("make", [ikgym.RedundantIKEnv, lambda name: ikgym.RedundantIKVectorEnv(3, name)])
+def test_what_goes_out_shares_no_memory(make):
+    env = make("varga7-random")
+    actions = np.full(env.action_space.shape, 0.2, dtype=np.float64)
+    seen = [*env.reset(seed=0)[0].values()]
+    for _ in range(2):
+        observation, _, _, _, info = env.step(actions)
+        seen += [*observation.values(), *(value for value in info.values() if isinstance(value, np.ndarray))]
+    inside = [array for array in (*env._simulator._state, *env._simulator._law) if isinstance(array, np.ndarray)]
+    for a, b in itertools.chain(itertools.combinations(seen, 2), itertools.product(seen, [*inside, actions])):
+        assert not np.shares_memory(a, b)
+    assert all(array.flags.c_contiguous and array.flags.writeable for array in seen)
