@@ -14,10 +14,11 @@ import shlex
 import sys
 import textwrap
 from collections.abc import Iterable, Sequence
-from typing import Annotated
+from typing import Annotated, Literal
 
 import tyro
 
+from baselines import frozen as frozen_sets
 from baselines import registry, report
 from baselines.machine import describe
 from baselines.metrics import Row
@@ -31,14 +32,16 @@ from ikgym.validation import whole_number
 
 
 def evaluate(
-    scenarios: str | Scenario | Iterable[str | Scenario],
+    scenarios: str | Scenario | Iterable[str | Scenario] = (),
     policies: PolicySpec | Iterable[PolicySpec] = ALL,
     *,
-    episodes: Annotated[int, tyro.conf.arg(metavar="N")] = 1,
-    split: Annotated[str, tyro.conf.arg(metavar="NAME")] = "test",
-    steps: Annotated[int | None, tyro.conf.arg(metavar="N")] = None,
-    preview: Annotated[int | None, tyro.conf.arg(metavar="P")] = None,
-    workers: Annotated[int, tyro.conf.arg(metavar="N")] = 1,
+    frozen: str | Iterable[str] = (),
+    episodes: int = 1,
+    split: str = "test",
+    steps: int | None = None,
+    preview: int | None = None,
+    timed: int | Literal["all"] = 1,
+    workers: int = 1,
     out: str | pathlib.Path | None = None,
     resume: bool = False,
     overwrite: bool = False,
@@ -47,18 +50,21 @@ def evaluate(
 ) -> list[Row]:
     """Plays all policies on all scenarios, and measures them.
 
-    Everything but the time columns is the same at every run, whatever the number of workers. A policy that does
-    not suit a scenario is left out there.
+    Episodes of one policy in one scenario are played together, but for those that are timed. Everything but the time
+    columns is the same at every run, however many are timed and whatever the number of workers. A policy that does not
+    suit a scenario is left out there.
 
     Args:
         scenarios: Scenarios or their names; ``"all"`` stands for all that are registered.
         policies: Names, names with parameters such as ``"dls:damping=1e-2"``, or pairs such as
             ``("dls", {"damping": 1e-2})``; ``"all"`` stands for all that are registered.
+        frozen: Names of frozen sets, see :mod:`baselines.frozen`, instead of scenarios, episodes, split and steps.
         episodes: Episodes of a random scenario: the first of the split. A scenario that is the same at every reset
             has one, with seed 0.
         split: Where the seeds of random scenarios come from, see :data:`ikgym.scenarios.SPLITS`.
         steps: Most steps of an episode, for trials; the scenarios' own if left out.
         preview: Steps ahead that policies are shown; what each asks for if left out.
+        timed: Episodes of each policy in each scenario that are played alone, with the clock; ``"all"`` for all.
         workers: Processes that play episodes; 1 means this one. More than one need a main module that may be
             imported, that is with ``if __name__ == "__main__":``.
         out: Where files go; nowhere if left out.
@@ -71,12 +77,15 @@ def evaluate(
         One row an episode, policy by policy within each scenario.
 
     Raises:
-        UnknownNameError: There is no such scenario, policy, parameter or split.
-        InvalidInputError: A value is out of range, or a policy refuses what it is shown.
+        UnknownNameError: There is no such scenario, policy, parameter, split or frozen set.
+        InvalidInputError: A value is out of range, a policy refuses what it is shown, or a frozen set has drifted or
+            is to be changed.
         ResultsError: `out` cannot be read or written, or is not to be gone on with.
         WorkerError: A worker process has died.
     """
-    plan = make_plan(scenarios, policies, episodes=episodes, split=split, steps=steps, preview=preview)
+    plan = make_plan(
+        scenarios, policies, frozen=frozen, episodes=episodes, split=split, steps=steps, preview=preview, timed=timed
+    )
     folder = None if out is None else pathlib.Path(out)
     return _carry_out(
         plan,
@@ -105,11 +114,11 @@ def _carry_out(
     results = None if out is None else Results(out, plan, describe(), resume=resume, overwrite=overwrite)
     left = [job for job in plan.jobs if results is None or not results.done(job)]
     rows = {} if results is None else {row.key: row for row in results.rows}
-    with contextlib.closing(run(left, workers=workers, progress=progress)) as outcomes:
-        for job, row, series in outcomes:
-            rows[job.key] = row
+    with contextlib.closing(run(left, workers=workers, progress=progress)) as batches:
+        for outcomes in batches:
+            rows.update({job.key: row for job, row, _ in outcomes})
             if results is not None:
-                results.add(job, row, series)
+                results.add(outcomes)
     if results is not None:
         _finish(results, plan, plots=plots, progress=progress, command=command)
     return [rows[job.key] for job in plan.jobs]
@@ -134,8 +143,10 @@ def _finish(results: Results, plan: Plan, *, plots: bool, progress: bool, comman
 class Options:
     """What the command line takes."""
 
-    scenarios: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME …")] = ("varga7-fast",)
-    """Names of scenarios, or: all."""
+    scenarios: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME …")] = ()
+    """Names of scenarios, or: all. If neither scenarios nor frozen sets are named: varga7-fast."""
+    frozen: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME …")] = ()
+    """Names of frozen sets, which say themselves what is played: instead of scenarios, episodes, split and steps."""
     policies: Annotated[tuple[str, ...], tyro.conf.arg(metavar="POLICY …")] = (ALL,)
     """Policies as NAME or NAME:PARAMETER=VALUE,PARAMETER=VALUE, or: all."""
     episodes: Annotated[int, tyro.conf.arg(metavar="N")] = 1
@@ -147,6 +158,9 @@ class Options:
     """Most steps of an episode, for trials. The scenario's own number if left out."""
     preview: Annotated[int | None, tyro.conf.arg(metavar="P")] = None
     """Steps ahead that policies are shown. What each policy asks for if left out."""
+    timed: Annotated[int | Literal["all"], tyro.conf.arg(metavar="N|all")] = 1
+    """Episodes of each policy in each scenario that are played alone, with the clock. The others are played together,
+    which is faster, and have no times."""
     out: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="DIR")] = None
     """Folder for the files. Nothing is written if left out."""
     resume: bool = False
@@ -170,6 +184,8 @@ Plays every policy on every scenario, and measures costs, errors, joint velociti
 
 {_listing("Scenarios", scenario_registry.names())}
 
+{_listing("Frozen sets", frozen_sets.names())}
+
 {_listing("Policies", policies)}
 
 Examples:
@@ -177,9 +193,10 @@ Examples:
   python -m baselines.evaluate --policies dls dls:damping=1e-2 rhc_gradient:alpha_max=5e-4,horizon=5
   python -m baselines.evaluate --scenarios varga7-random --episodes 20 --workers 4 --out results/random
   python -m baselines.evaluate --scenarios varga7-random --episodes 50 --out results/random --resume
+  python -m baselines.evaluate --frozen varga7-random --policies rhc_gradient --out results/frozen
 
 Files in the folder of --out, each replaced in one go, so that a run may be stopped at any time:
-  results.json  a list of rows, one an episode, written anew after each episode
+  results.json  a list of rows, one an episode, written anew after each batch
   results.csv   the same as a table
   README.md     tables, plots and conditions
   plots/        for each scenario: tracking and errors, joint velocities, joint paths, cost against time
@@ -188,16 +205,19 @@ Files in the folder of --out, each replaced in one go, so that a run may be stop
 Columns:
   scenario, policy, parameters, seed, steps      which episode it is
   total_cost = tracking_cost + velocity_cost     sum of -reward
-  regret                                         total_cost / best known cost, null where none is known
+  regret                                         total_cost / best known cost, null where there is none above 1e-9
   position_error_max, position_error_rms         distance from the nominal position in [m]
   orientation_error_max, orientation_error_rms   geodesic angle in [rad], null where the task has none
   qdot_peak, qdot_rms, qdot_total_variation      of the joint velocities, in [rad/s] or [m/s]
-  time_p50_us, time_p99_us                       wall time of one call of the policy in [µs]
-  deadline_misses                                calls longer than the time step of the scenario
+  time_first_us                                  wall time of the first call of the policy in [µs]
+  time_p50_us, time_p99_us                       that of the later calls, null where the episode was not timed
+  deadline_misses                                later calls that were longer than the time step of the scenario
   status                                         the worst of the episode
   machine                                        CPU, cores and versions
   iterations, status_counts                      mean iterations in one step, and how many steps ended how
-  preview, fingerprint                           steps ahead that were shown, and which scenario it was
+  preview                                        steps ahead that were shown
+  fingerprint                                    digest of the scenario and the version of the cost
+  frozen                                         digest of the frozen set, null where there is none
   operations                                     mean kinematics, Jacobians, factorisations, measurements in a step
 
 Costs and errors of scenarios that hold their nominal points are those of the last step of each point."""
@@ -225,12 +245,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     try:
         plan = make_plan(
-            options.scenarios,
+            options.scenarios or (() if options.frozen else ("varga7-fast",)),
             options.policies,
+            frozen=options.frozen,
             episodes=options.episodes,
             split=options.split,
             steps=options.steps,
             preview=options.preview,
+            timed=options.timed,
         )
         rows = _carry_out(
             plan,

@@ -19,7 +19,7 @@ from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray
 
 #: The columns that are measured with a clock, and so differ from run to run.
-TIME_COLUMNS = ("time_p50_us", "time_p99_us", "deadline_misses")
+TIME_COLUMNS = ("time_first_us", "time_p50_us", "time_p99_us", "deadline_misses")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Row:
         total_cost: Sum of −reward, added up step by step.
         tracking_cost: The part Φ^X.
         velocity_cost: The part Φ^U.
-        regret: total_cost / best known cost; None where that is not known.
+        regret: total_cost / best known cost, see :mod:`baselines.best_known`; None where there is none.
         position_error_max: Largest distance from the nominal position, in [m].
         position_error_rms: Its root mean square over the steps, in [m].
         orientation_error_max: Largest geodesic angle to the nominal orientation, in [rad]; None without one.
@@ -46,16 +46,20 @@ class Row:
         qdot_peak: Largest absolute joint velocity, in [rad/s] or [m/s].
         qdot_rms: Root mean square over steps and joints, in [rad/s] or [m/s].
         qdot_total_variation: Σ_k Σ_j |q̇_j(k+1) − q̇_j(k)|, in [rad/s] or [m/s].
-        time_p50_us: Median wall time of one call of the policy, in [µs].
+        time_p50_us: Median wall time of one call of the policy, in [µs], over all but the first, which often does more
+            than the others (and is taken only where there is no other). None, like all times, where the episode was
+            played together with others.
         time_p99_us: Its 99th percentile, in [µs].
-        deadline_misses: Calls that took longer than the scenario's Δt.
+        deadline_misses: Calls, but for the first, that took longer than the scenario's Δt.
         status: The worst status of the episode.
         machine: What it ran on, see :func:`baselines.machine.describe`.
         iterations: Mean iterations of the policy in one step.
         status_counts: How many steps ended with which status.
         preview: Steps ahead that the policy was shown.
-        fingerprint: Tells scenarios apart that share a name, see :func:`baselines.plan.fingerprint`.
+        fingerprint: Tells scenarios apart that share a name, see :func:`baselines.content.fingerprint`.
         operations: Mean numbers of operations in one step, see :class:`baselines.policy.Operations`.
+        time_first_us: Wall time of the first call of the policy, in [µs].
+        frozen: The digest of the frozen set that the episode belongs to, see :mod:`baselines.frozen`.
     """
 
     scenario: str
@@ -74,9 +78,9 @@ class Row:
     qdot_peak: float
     qdot_rms: float
     qdot_total_variation: float
-    time_p50_us: float
-    time_p99_us: float
-    deadline_misses: int
+    time_p50_us: float | None
+    time_p99_us: float | None
+    deadline_misses: int | None
     status: str
     machine: dict[str, Any]
     iterations: float
@@ -84,6 +88,8 @@ class Row:
     preview: int
     fingerprint: str
     operations: dict[str, float]
+    time_first_us: float | None
+    frozen: str | None
 
     @property
     def key(self) -> tuple[str, str, str, int, int]:
@@ -147,8 +153,12 @@ def measure(
     machine: Mapping[str, Any],
     preview: int,
     fingerprint: str,
+    frozen: str | None = None,
+    best_known: float | None = None,
 ) -> Row:
-    """The row of a recorded episode; for the arguments see :class:`Row`."""
+    """The row of a recorded episode; for the arguments see :class:`Row`, `best_known` is what the regret is against."""
+    total = _added_up(episode.tracking_cost + episode.velocity_cost)
+    timed, later = len(episode.time_ns) > 0, episode.time_ns[1:] if len(episode.time_ns) > 1 else episode.time_ns
     counted = scenario.counted()[1:]
     angles = episode.orientation_error[counted] if scenario.task.has_orientation else None
     statuses = collections.Counter(episode.status.tolist())
@@ -158,10 +168,10 @@ def measure(
         parameters=dict(parameters),
         seed=seed,
         steps=scenario.steps,
-        total_cost=_added_up(episode.tracking_cost + episode.velocity_cost),
+        total_cost=total,
         tracking_cost=_added_up(episode.tracking_cost),
         velocity_cost=_added_up(episode.velocity_cost),
-        regret=None,
+        regret=None if best_known is None else total / best_known,
         position_error_max=float(episode.position_error[counted].max()),
         position_error_rms=_rms(episode.position_error[counted]),
         orientation_error_max=None if angles is None else float(angles.max()),
@@ -169,9 +179,9 @@ def measure(
         qdot_peak=float(np.abs(episode.qdot).max()),
         qdot_rms=_rms(episode.qdot),
         qdot_total_variation=float(np.abs(np.diff(episode.qdot, axis=0)).sum()),
-        time_p50_us=float(np.percentile(episode.time_ns, 50)) / 1e3,
-        time_p99_us=float(np.percentile(episode.time_ns, 99)) / 1e3,
-        deadline_misses=int((episode.time_ns > 1e9 * scenario.dt).sum()),
+        time_p50_us=float(np.percentile(later, 50)) / 1e3 if timed else None,
+        time_p99_us=float(np.percentile(later, 99)) / 1e3 if timed else None,
+        deadline_misses=int((later > 1e9 * scenario.dt).sum()) if timed else None,
         status=Status(max(statuses)).label,
         machine=dict(machine),
         iterations=float(episode.iterations.mean()),
@@ -179,7 +189,35 @@ def measure(
         preview=preview,
         fingerprint=fingerprint,
         operations={name: float(count.mean()) for name, count in episode.operations._asdict().items()},
+        time_first_us=float(episode.time_ns[0]) / 1e3 if timed else None,
+        frozen=frozen,
     )
+
+
+@dataclasses.dataclass(frozen=True)
+class Spread:
+    """A number over several episodes.
+
+    Args:
+        mean: Its geometric mean.
+        median: Its median.
+        p90: Its 90th percentile.
+        worst: The largest.
+        worst_seed: The reset seed of the episode with the largest.
+    """
+
+    mean: float
+    median: float
+    p90: float
+    worst: float
+    worst_seed: int
+
+    @classmethod
+    def of(cls, values: Mapping[int, float]) -> Self:
+        """The spread of numbers by their reset seeds."""
+        numbers, seed = list(values.values()), max(values, key=lambda seed: values[seed])
+        p90 = float(np.percentile(numbers, 90))
+        return cls(geometric_mean(numbers), statistics.median(numbers), p90, values[seed], seed)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -192,21 +230,19 @@ class Summary:
         parameters: The policy's parameters.
         steps: Steps of an episode.
         episodes: How many there are.
-        total_cost: Geometric mean.
-        total_cost_median: Median.
-        total_cost_worst: The largest.
-        worst_seed: The reset seed of the episode with the largest cost.
+        total_cost: Over the episodes.
         tracking_cost: Geometric mean.
         velocity_cost: Geometric mean.
-        regret: Geometric mean; None where one is not known.
+        regret: Over the episodes; None where one is not known.
         position_error_max: The largest, in [m].
         orientation_error_max: The largest, in [rad]; None without an orientation.
         qdot_peak: The largest, in [rad/s] or [m/s].
-        time_p50_us: Median of the medians, in [µs].
+        time_p50_us: Median of the medians, in [µs]; None, like all times, where no episode was timed.
         time_p99_us: The largest, in [µs].
         deadline_misses: Their sum.
         status: The worst.
         operations: Means over the episodes.
+        time_first_us: The largest, in [µs].
     """
 
     scenario: str
@@ -214,27 +250,37 @@ class Summary:
     parameters: dict[str, Any]
     steps: int
     episodes: int
-    total_cost: float
-    total_cost_median: float
-    total_cost_worst: float
-    worst_seed: int
+    total_cost: Spread
     tracking_cost: float
     velocity_cost: float
-    regret: float | None
+    regret: Spread | None
     position_error_max: float
     orientation_error_max: float | None
     qdot_peak: float
-    time_p50_us: float
-    time_p99_us: float
-    deadline_misses: int
+    time_p50_us: float | None
+    time_p99_us: float | None
+    deadline_misses: int | None
     status: str
     operations: dict[str, float]
+    time_first_us: float | None
 
 
 def summarise(rows: Iterable[Row]) -> list[Summary]:
-    """One summary for each policy with its parameters in each scenario, in the order of their first rows."""
+    """One summary for each policy with its parameters in each scenario, in the order of their first rows.
+
+    Raises:
+        InvalidInputError: Rows cannot be compared: their scenarios share a name and no more, or they belong to
+            different sets.
+    """
     groups: dict[tuple[str, str, str, int], list[Row]] = {}
+    contents: dict[str, tuple[str, str | None]] = {}
     for row in rows:
+        content = row.fingerprint, row.frozen
+        if contents.setdefault(row.scenario, content) != content:
+            raise InvalidInputError(
+                f"The results of {row.scenario!r} cannot be put together: fingerprint and frozen set are "
+                f"{contents[row.scenario]} and {content}."
+            )
         groups.setdefault((row.scenario, row.policy, canonical(row.parameters), row.steps), []).append(row)
     return [_summary(group) for group in groups.values()]
 
@@ -247,31 +293,30 @@ def geometric_mean(values: Sequence[float]) -> float:
 
 
 def _summary(rows: Sequence[Row]) -> Summary:
-    first, costs = rows[0], [row.total_cost for row in rows]
-    worst = max(rows, key=lambda row: row.total_cost)
-    regrets = [row.regret for row in rows if row.regret is not None]
+    first = rows[0]
+    regrets = {row.seed: row.regret for row in rows if row.regret is not None}
     angles = [row.orientation_error_max for row in rows if row.orientation_error_max is not None]
+    medians = [row.time_p50_us for row in rows if row.time_p50_us is not None]
+    misses = [row.deadline_misses for row in rows if row.deadline_misses is not None]
     return Summary(
         scenario=first.scenario,
         policy=first.policy,
         parameters=first.parameters,
         steps=first.steps,
         episodes=len(rows),
-        total_cost=geometric_mean(costs),
-        total_cost_median=statistics.median(costs),
-        total_cost_worst=worst.total_cost,
-        worst_seed=worst.seed,
+        total_cost=Spread.of({row.seed: row.total_cost for row in rows}),
         tracking_cost=geometric_mean([row.tracking_cost for row in rows]),
         velocity_cost=geometric_mean([row.velocity_cost for row in rows]),
-        regret=geometric_mean(regrets) if len(regrets) == len(rows) else None,
+        regret=Spread.of(regrets) if len(regrets) == len(rows) else None,
         position_error_max=max(row.position_error_max for row in rows),
         orientation_error_max=max(angles) if angles else None,
         qdot_peak=max(row.qdot_peak for row in rows),
-        time_p50_us=statistics.median(row.time_p50_us for row in rows),
-        time_p99_us=max(row.time_p99_us for row in rows),
-        deadline_misses=sum(row.deadline_misses for row in rows),
+        time_p50_us=statistics.median(medians) if medians else None,
+        time_p99_us=max((row.time_p99_us for row in rows if row.time_p99_us is not None), default=None),
+        deadline_misses=sum(misses) if misses else None,
         status=max((row.status for row in rows), key=lambda status: Status[status.upper()]),
         operations={name: statistics.fmean(row.operations[name] for row in rows) for name in first.operations},
+        time_first_us=max((row.time_first_us for row in rows if row.time_first_us is not None), default=None),
     )
 
 
@@ -296,6 +341,8 @@ def _typed(name: str, kind: str, value: Any) -> Any:
         "int": isinstance(value, int) and number,
         "float": number or value is None,
         "float | None": number or value is None,
+        "int | None": value is None or (isinstance(value, int) and number),
+        "str | None": value is None or isinstance(value, str),
     }.get(kind, isinstance(value, dict))
     if not right or (name == "status" and value.upper() not in Status.__members__):
         raise InvalidInputError(f"the key {name!r} should have a value of type {kind}, got {value!r}")

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import ast
 import dataclasses
-import hashlib
-from collections.abc import Iterable, Mapping
-from typing import Any
+import sys
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any, Final, Literal
 
 import numpy as np
 
+from baselines import frozen as frozen_sets
 from baselines import metrics, registry
+from baselines.content import fingerprint
 from baselines.metrics import jsonable
 from baselines.policy import SolverPolicy
 from ikgym import scenarios as scenario_registry
@@ -22,7 +24,7 @@ from ikgym.validation import known_names, whole_number
 PolicySpec = str | tuple[str, Mapping[str, Any]]
 
 #: Stands for all scenarios, or all policies.
-ALL = "all"
+ALL: Final = "all"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -36,8 +38,10 @@ class Job:
         parameters: All of its parameters, as they stand in the row.
         seed: The reset seed.
         first: Whether it is the first episode of its policy in its scenario, whose course is kept for plots.
+        timed: Whether it is played alone, by single calls with the clock.
         preview: Steps ahead that the policy is shown.
         fingerprint: Of the scenario.
+        frozen: The digest of the frozen set that it belongs to, None where to none.
     """
 
     scenario: Scenario
@@ -46,8 +50,10 @@ class Job:
     parameters: Mapping[str, Any]
     seed: int
     first: bool
+    timed: bool
     preview: int
     fingerprint: str
+    frozen: str | None
 
     @property
     def key(self) -> tuple[str, str, str, int, int]:
@@ -80,35 +86,45 @@ def make_plan(
     scenarios: str | Scenario | Iterable[str | Scenario],
     policies: PolicySpec | Iterable[PolicySpec],
     *,
+    frozen: str | Iterable[str] = (),
     episodes: int = 1,
     split: str = "test",
     steps: int | None = None,
     preview: int | None = None,
+    timed: int | Literal["all"] = 1,
 ) -> Plan:
     """All episodes of an evaluation, policy by policy within each scenario.
 
     Args:
         scenarios: Scenarios or their names; ``"all"`` stands for all that are registered.
         policies: Names with or without parameters; ``"all"`` stands for all that are registered.
+        frozen: Names of frozen sets, instead of scenarios; they say themselves which episodes are played.
         episodes: Episodes of a random scenario. One that is the same at every reset has one, with seed 0.
         split: Where the seeds of random scenarios come from, see :data:`ikgym.scenarios.SPLITS`.
         steps: Most steps of an episode; the scenarios' own if left out.
         preview: Steps ahead that policies are shown; what each asks for if left out.
+        timed: Episodes of each policy in each scenario that are timed, ``"all"`` for all of them.
 
     Raises:
-        UnknownNameError: There is no such scenario, policy, parameter or split.
-        InvalidInputError: A value is out of range, two scenarios share a name, or no policy suits any scenario.
+        UnknownNameError: There is no such scenario, policy, parameter, split or frozen set.
+        InvalidInputError: A value is out of range, two scenarios share a name, no policy suits any scenario, or a
+            frozen set has drifted or is to be changed.
     """
+    listed, sets = _scenarios(scenarios, steps), (frozen,) if isinstance(frozen, str) else tuple(frozen)
+    if sets and (listed or (episodes, split, steps) != (1, "test", None)):
+        raise InvalidInputError(
+            f"A frozen set says itself what is played: with {', '.join(map(repr, sets))}, expected no scenarios, "
+            "episodes, split or steps."
+        )
     drawn = scenario_registry.seeds(split, episodes)
     if preview is not None:
         whole_number("preview", preview, at_least=1)
+    clocked = sys.maxsize if timed == ALL else whole_number("timed", timed, at_least=1)
     specs = _specs(policies)
     jobs: dict[tuple[str, str, str, int, int], Job] = {}
     skipped: list[Skipped] = []
-    for scenario in _scenarios(scenarios, steps):
+    for scenario, seeds, label in [*_frozen(sets), *_drawn(listed, drawn)]:
         digest = fingerprint(scenario)
-        # A scenario that is the same at every reset would only be played N times over.
-        seeds = drawn if scenario.random or np.any(scenario.disturbance.noise) else (0,)
         for name, given in specs:
             if reason := _unsuited(scenario, name, seeds[0]):
                 skipped.append(Skipped(scenario.name, name, reason))
@@ -117,9 +133,10 @@ def make_plan(
             hidden = _with_seed(scenario, name, {}, seeds[0]).keys() - given.keys()
             own = {k: jsonable(v) for k, v in policy.parameters.items() if k not in hidden}
             shown = policy.preview if preview is None else preview
-            for seed in seeds:
+            for number, seed in enumerate(seeds):
                 with_seed = _with_seed(scenario, name, given, seed)
-                job = Job(scenario, name, with_seed, own, seed, seed == seeds[0], shown, digest)
+                first, alone = number == 0, number < clocked
+                job = Job(scenario, name, with_seed, own, seed, first, alone, shown, digest, label)
                 jobs.setdefault(job.key, job)
     if not jobs:
         raise InvalidInputError(
@@ -154,28 +171,19 @@ def parse_policy(spec: PolicySpec) -> tuple[str, dict[str, Any]]:
     return name, parameters
 
 
-def fingerprint(scenario: Scenario) -> str:
-    """Twelve digits that differ where two scenarios would give different results.
-
-    Covers all that a scenario is made of but its name and its source.
-    """
-    parts = {
-        f.name: getattr(scenario, f.name) for f in dataclasses.fields(scenario) if f.name not in {"name", "source"}
-    }
-    return hashlib.sha256(metrics.canonical(_canonical(parts)).encode()).hexdigest()[:12]
+def _frozen(names: Iterable[str]) -> Iterator[tuple[Scenario, tuple[int, ...], str | None]]:
+    """The scenarios of frozen sets, their seeds and their digests."""
+    for frozen in map(frozen_sets.get, names):
+        yield frozen.scenario, frozen.seeds, frozen.digest
 
 
-def _canonical(value: Any) -> Any:
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        fields = {f.name: _canonical(getattr(value, f.name)) for f in dataclasses.fields(value) if f.init}
-        return [type(value).__qualname__, fields]
-    if isinstance(value, Mapping):
-        return {str(k): _canonical(v) for k, v in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_canonical(v) for v in value]
-    plain = jsonable(value)
-    # The default repr() holds an address, which differs from run to run.
-    return type(value).__qualname__ if isinstance(plain, str) and " at 0x" in plain else plain
+def _drawn(
+    scenarios: Iterable[Scenario], drawn: tuple[int, ...]
+) -> Iterator[tuple[Scenario, tuple[int, ...], str | None]]:
+    """Scenarios, the seeds that they are played with, and that they belong to no set."""
+    for scenario in scenarios:
+        # One that is the same at every reset would only be played N times over.
+        yield scenario, drawn if scenario.random or np.any(scenario.disturbance.noise) else (0,), None
 
 
 def _scenarios(given: str | Scenario | Iterable[str | Scenario], steps: int | None) -> list[Scenario]:

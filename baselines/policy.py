@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import abc
-import contextlib
 import dataclasses
+import functools
 import math
-from collections.abc import Iterator, Mapping
+import threading
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
@@ -18,6 +19,7 @@ from ikgym.compilation import announced
 from ikgym.cost import TrackingCost
 from ikgym.exceptions import InvalidInputError
 from ikgym.jit import kernel
+from ikgym.parallel import in_chunks
 from ikgym.scenarios import Scenario
 from ikgym.tasks import Task
 from ikgym.validation import FloatArray, Frozen, frozen_array
@@ -27,9 +29,14 @@ Memory = tuple[npt.NDArray[Any], ...]
 
 
 _SATURATED, _DIVERGED = int(Status.SATURATED), int(Status.DIVERGED)
+_FLOAT = np.dtype(np.float64)
 
 #: Policies that have solved something in this process, and so are compiled.
 _compiled: set[type] = set()
+
+#: Which threads work on a share of a batch. What they call in turn shares out no further: threads of one pool that
+#: wait for others of it wait forever.
+_sharing = threading.local()
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -134,6 +141,8 @@ class SolverPolicy(Frozen, abc.ABC):
     name: ClassVar[str]
     #: Whether the policy knows more than its observation: a reference, not a contender.
     reference: ClassVar[bool] = False
+    #: Rows that are worth a thread of their own: the fewer, the longer a row takes.
+    grain: ClassVar[int] = 256
 
     @classmethod
     def for_scenario(cls, scenario: Scenario, **parameters: Any) -> Self:
@@ -210,12 +219,11 @@ class SolverPolicy(Frozen, abc.ABC):
         batch, single = self._batch(observation)
         rows = len(batch.q)
         memory = self._recall(state, episode_start, rows)
-        with _announced(type(self)):
-            solution = self.solve(batch, memory)
+        solution = self._solve(batch, memory)
         action, status = np.empty(batch.q.shape, dtype=np.float32), solution.status.copy()
-        lost = np.empty(rows, dtype=np.bool_)
-        _cut_rows(solution.qdot, self.problem.velocity_limit, action, status, lost)
-        kept = _replace_rows(solution.memory, self.memory(rows), lost) if lost.any() else solution.memory
+        lost, kept = np.empty(rows, dtype=np.bool_), solution.memory
+        if _cut_rows(solution.qdot, self.problem.velocity_limit, action, status, lost):
+            kept = _replace_rows(kept, self.memory(rows), lost)
         return action[0] if single else action, (status, solution.iterations, *kept)
 
     @staticmethod
@@ -250,58 +258,93 @@ class SolverPolicy(Frozen, abc.ABC):
 
     def _batch(self, observation: Observation) -> tuple[Batch, bool]:
         try:
-            arrays = [_as_floats(observation[key]) for key in Batch._fields]
+            batch = Batch(*[_as_floats(observation[key]) for key in Batch._fields])
         except (KeyError, IndexError, TypeError, ValueError) as e:
             keys = sorted(observation) if isinstance(observation, Mapping) else type(observation).__name__
             raise InvalidInputError(
                 f"observation: expected a dict of number arrays with the keys {list(Batch._fields)}, got {keys} ({e})."
             ) from None
-        single = arrays[0].ndim == 1
+        single = batch.q.ndim == 1
         if single:
-            arrays = [a[None] for a in arrays]
-        batch = Batch(*arrays)
+            batch = Batch(*[a[None] for a in batch])
         rows, n, m = len(batch.q), self.problem.model.joints, self.problem.task.size
         ahead = batch.nominal.shape[1] if batch.nominal.ndim == 3 else self.preview
-        shapes = {"q": (n,), "qdot": (n,), "pose": (m,), "nominal": (ahead, m), "remaining": (1,)}
-        for (key, shape), array in zip(shapes.items(), batch, strict=True):
-            if array.shape != (rows, *shape):
-                lead = () if single else (rows,)
-                got = array.shape[1:] if single else array.shape
-                raise InvalidInputError(f"observation[{key!r}]: expected shape {(*lead, *shape)}, got {got}.")
-        if not all(map(_finite, batch)):
+        shapes = (rows, n), (rows, n), (rows, m), (rows, ahead, m), (rows, 1)
+        for key, shape, array in zip(Batch._fields, shapes, batch, strict=True):
+            if array.shape != shape:
+                begin = 1 if single else 0
+                raise InvalidInputError(
+                    f"observation[{key!r}]: expected shape {shape[begin:]}, got {array.shape[begin:]}."
+                )
+        if not _all_finite(*batch):
             raise InvalidInputError("observation: expected finite numbers, got NaN or infinity.")
-        if batch.nominal.shape[1] < self.preview:
+        if ahead < self.preview:
             raise InvalidInputError(
-                f"{self.name} needs to be shown {self.preview} steps ahead, the observation has "
-                f"{batch.nominal.shape[1]}: make the environment with preview={self.preview}."
+                f"{self.name} needs to be shown {self.preview} steps ahead, the observation has {ahead}: make the "
+                f"environment with preview={self.preview}."
             )
         return batch, single
 
     def _recall(self, state: Memory | None, episode_start: npt.ArrayLike | None, rows: int) -> Memory:
-        fresh = self.memory(rows)
         starting = None if episode_start is None else np.asarray(episode_start)
         if starting is not None and (starting.dtype.kind not in "biuf" or starting.shape not in {(), (rows,)}):
             raise InvalidInputError(f"episode_start: expected {rows} truth values, got {episode_start!r}.")
         if state is None:
-            return fresh
-        kept = state[2:] if isinstance(state, tuple) else None
+            return self.memory(rows)
         if (
-            kept is None
+            not isinstance(state, tuple)
             or not all(isinstance(array, np.ndarray) for array in state)
-            or [k.shape for k in kept] != [f.shape for f in fresh]
+            or [k.shape for k in state[2:]] != [(rows, *shape) for shape in self._remembered]
         ):
             raise InvalidInputError(
                 f"state: expected what {self.name}.predict returned for a batch of {rows}, got "
                 f"{[np.shape(k) for k in state] if isinstance(state, tuple) else state!r}."
             )
         if starting is None or not starting.any():
-            return kept
-        return _replace_rows(kept, fresh, np.broadcast_to(starting.astype(np.bool_), (rows,)))
+            return state[2:]
+        return _replace_rows(state[2:], self.memory(rows), np.broadcast_to(starting.astype(np.bool_), (rows,)))
+
+    @functools.cached_property
+    def _remembered(self) -> list[tuple[int, ...]]:
+        """The shapes of one row's memory."""
+        return [array.shape[1:] for array in self.memory(1)]
+
+    def _solve(self, batch: Batch, memory: Memory) -> Solution:
+        """The solution of all rows; where they are many, several threads share them out."""
+        policy, rows = type(self), len(batch.q)
+        if policy not in _compiled:  # the first solve has to compile
+            with announced(f"the policy {policy.name}"):
+                solution = self.solve(batch, memory)
+            _compiled.add(policy)
+            return solution
+        if rows < 2 * self.grain or getattr(_sharing, "now", False):
+            return self.solve(batch, memory)
+        parts: dict[int, Solution] = {}
+
+        def work(start: int, stop: int) -> None:
+            share = Batch(*[array[start:stop] for array in batch])
+            _sharing.now = True
+            try:
+                parts[start] = self.solve(share, tuple(array[start:stop] for array in memory))
+            finally:
+                _sharing.now = False
+
+        in_chunks(work, rows, self.grain)
+        return _joined([parts[start] for start in sorted(parts)])
 
 
 def statuses(rows: int, status: Status = Status.CONVERGED) -> npt.NDArray[np.int64]:
     """The same status for all rows. Shape (B,)."""
     return np.full(rows, int(status))
+
+
+def _joined(parts: Sequence[Solution]) -> Solution:
+    """The solutions of one batch's parts as one."""
+    if len(parts) == 1:
+        return parts[0]
+    qdots, memories, status, iterations = zip(*parts, strict=True)
+    memory = tuple(np.concatenate(arrays) for arrays in zip(*memories, strict=True))
+    return Solution(np.concatenate(qdots), memory, np.concatenate(status), np.concatenate(iterations))
 
 
 def _replace_rows(memory: Memory, fresh: Memory, rows: npt.NDArray[np.bool_]) -> Memory:
@@ -318,7 +361,11 @@ def _cut_rows(qdot, limit, action, status, lost):  # type: ignore[no-untyped-def
         action: Receives the actions; zeros where a number is not finite. Shape (B, n).
         status: Raised to what the row deserves. Shape (B,).
         lost: Receives whether a number of the row is not finite. Shape (B,).
+
+    Returns:
+        Whether any row is lost.
     """
+    any_lost = False
     for row in range(qdot.shape[0]):
         lost[row], saturated = False, False
         for j in range(qdot.shape[1]):
@@ -330,44 +377,30 @@ def _cut_rows(qdot, limit, action, status, lost):  # type: ignore[no-untyped-def
                 fraction = math.copysign(1.0, fraction)
             action[row, j] = fraction
         if lost[row]:
+            any_lost = True
             status[row] = _DIVERGED
             for j in range(qdot.shape[1]):
                 action[row, j] = 0.0
         elif saturated:
             status[row] = max(status[row], _SATURATED)
+    return any_lost
 
 
 @kernel
-def _all_finite(values):  # type: ignore[no-untyped-def]
-    for value in values:  # noqa: SIM110  # compiled, the loop is faster than a generator
-        if not np.isfinite(value):
-            return False
+def _all_finite(q, qdot, pose, nominal, remaining):  # type: ignore[no-untyped-def]
+    """Whether all numbers of a batch are finite, without the temporary arrays that NumPy makes."""
+    for array in (q.ravel(), qdot.ravel(), pose.ravel(), nominal.ravel(), remaining.ravel()):
+        for value in array:
+            if not np.isfinite(value):
+                return False
     return True
-
-
-def _finite(array: FloatArray) -> bool:
-    """Whether all numbers are finite, without the temporary array that NumPy makes."""
-    return bool(_all_finite(array.ravel()))
 
 
 def _as_floats(value: object) -> FloatArray:
     """A C-contiguous float64 array; refuses what is no array of real numbers, such as strings."""
+    if type(value) is np.ndarray and value.dtype is _FLOAT and value.flags.c_contiguous:
+        return value
     raw = np.asarray(value)
     if raw.dtype.kind not in "fiub":
         raise TypeError(f"no real numbers: {raw.dtype}")
     return np.ascontiguousarray(raw, dtype=np.float64)
-
-
-@contextlib.contextmanager
-def _compiling(policy: type[SolverPolicy]) -> Iterator[None]:
-    with announced(f"the policy {policy.name}"):
-        yield
-    _compiled.add(policy)
-
-
-def _announced(policy: type[SolverPolicy]) -> contextlib.AbstractContextManager[None]:
-    """Tells the user if the first solve of a policy takes long, since it has to be compiled."""
-    return _READY if policy in _compiled else _compiling(policy)
-
-
-_READY = contextlib.nullcontext()

@@ -12,7 +12,8 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 from urllib.parse import quote
 
-from baselines.metrics import Row, Summary, summarise
+from baselines import best_known
+from baselines.metrics import Row, Spread, Summary, summarise
 from baselines.plan import Skipped
 from baselines.registry import POLICIES
 
@@ -69,7 +70,7 @@ def table(rows: Sequence[Row], skipped: Sequence[Skipped] = (), *, operations: b
         names = labels(summaries)
         parts.append(f"{heading(scenario, summaries)}\n{_plain(_columns(names), summaries)}")
         if spread := _spread(names, summaries):
-            parts.append(f"total cost over the episodes of {scenario}\n{_plain(spread, summaries)}")
+            parts.append(f"{_judged_by(summaries)} over the episodes of {scenario}\n{_plain(spread, summaries)}")
         if operations:
             parts.append(f"operations in one step of {scenario}, mean\n{_plain(_operations(names), summaries)}")
     notes = _notes(rows)
@@ -100,7 +101,8 @@ def readme(
         names = labels(summaries)
         out += [f"## {heading(scenario, summaries)}", "", *_markdown(_columns(names), summaries), ""]
         if spread := _spread(names, summaries):
-            out += ["Total cost over the episodes:", "", *_markdown(spread, summaries), ""]
+            title = f"{_judged_by(summaries).capitalize()} over the episodes:"
+            out += [title, "", *_markdown(spread, summaries), ""]
         audit = _markdown(_operations(names), summaries)
         out += ["<details>", "<summary>Operations in one step, mean</summary>", "", *audit, "", "</details>", ""]
         for group, files in (pictures or {}).get(scenario, {}).items():
@@ -126,7 +128,9 @@ def readme(
     out += [f"- machine: {_escaped(_machine(machine))}" for machine in machines]
     if len(machines) > 1:
         out += ["- The rows were measured on different machines: their times cannot be compared."]
-    out += ["- One thread; garbage collection off; the policy's call alone is timed, after one call that is not."]
+    out += [
+        "- Times are those of single calls of the policy on one thread: garbage collection off, one call before that."
+    ]
     return "\n".join(out) + "\n"
 
 
@@ -179,31 +183,42 @@ def heading(scenario: str, summaries: Sequence[Summary]) -> str:
 def _columns(names: Mapping[int, str]) -> list[Column]:
     return [
         _policy(names),
-        Column("total", "cost", lambda s: number(s.total_cost)),
+        Column("total", "cost", lambda s: number(s.total_cost.mean)),
         Column("tracking", "cost", lambda s: number(s.tracking_cost)),
         Column("velocity", "cost", lambda s: number(s.velocity_cost)),
-        Column("regret", "", lambda s: number(s.regret)),
+        Column("regret", "", lambda s: number(None if s.regret is None else s.regret.mean)),
         Column("pos max", "[mm]", lambda s: number(s.position_error_max, 1e3)),
         Column("ori max", "[mrad]", lambda s: number(s.orientation_error_max, 1e3)),
         Column("q̇ peak", "", lambda s: number(s.qdot_peak)),
         Column("p50", "[µs]", lambda s: number(s.time_p50_us)),
         Column("p99", "[µs]", lambda s: number(s.time_p99_us)),
-        Column("misses", "", lambda s: str(s.deadline_misses)),
+        Column("misses", "", lambda s: NOTHING if s.deadline_misses is None else str(s.deadline_misses)),
         Column("status", "", lambda s: s.status, left=True),
     ]
+
+
+def _judged_by(summaries: Sequence[Summary]) -> str:
+    """What the table of several episodes shows: the regret, where it is known for all of them."""
+    return "total cost" if any(summary.regret is None for summary in summaries) else "regret"
 
 
 def _spread(names: Mapping[int, str], summaries: Sequence[Summary]) -> list[Column]:
     """The columns of the table of several episodes; none where there is one."""
     if all(summary.episodes == 1 for summary in summaries):
         return []
+    by_regret = _judged_by(summaries) == "regret"
+
+    def column(title: str, cell: Callable[[Spread], str]) -> Column:
+        return Column(title, "", lambda s: cell(s.regret if by_regret and s.regret else s.total_cost))
+
     return [
         _policy(names),
         Column("episodes", "", lambda s: str(s.episodes)),
-        Column("geometric mean", "", lambda s: number(s.total_cost)),
-        Column("median", "", lambda s: number(s.total_cost_median)),
-        Column("worst", "", lambda s: number(s.total_cost_worst)),
-        Column("worst seed", "", lambda s: str(s.worst_seed)),
+        column("geometric mean", lambda spread: number(spread.mean)),
+        column("median", lambda spread: number(spread.median)),
+        column("p90", lambda spread: number(spread.p90)),
+        column("worst", lambda spread: number(spread.worst)),
+        column("worst seed", lambda spread: str(spread.worst_seed)),
     ]
 
 
@@ -260,14 +275,30 @@ def _notes(rows: Sequence[Row]) -> list[str]:
     notes = []
     if any(is_reference(row.policy) for row in rows):
         notes.append(REFERENCE_NOTE)
-    notes.append("regret: total cost / best known cost, – where none is known; misses: calls longer than Δt")
+    notes.append(
+        "regret: total cost / best known cost, – where none is known; p50, p99: time of a call after the first; "
+        "misses: such calls longer than Δt"
+    )
     notes.append("pos, ori: position and orientation error; q̇ peak in rad/s, in m/s for joints that slide")
     if any(summary.episodes > 1 for summaries in by_scenario(rows).values() for summary in summaries):
         notes.append(
-            "several episodes: costs are geometric means, errors, q̇ peak, p99 and status the worst, p50 the median, "
-            "misses the sum"
+            "several episodes: costs and regret are geometric means, errors, q̇ peak, p99 and status the worst, p50 the "
+            "median, misses the sum; times are those of episodes that were played alone"
         )
-    return notes
+    return notes + _beaten(rows)
+
+
+def _beaten(rows: Sequence[Row]) -> list[str]:
+    """What has to be said where a policy is better than the best known."""
+    seeds: dict[tuple[str, str], list[int]] = {}
+    for row in rows:
+        if best_known.beaten(row):
+            seeds.setdefault((row.policy, row.scenario), []).append(row.seed)
+    return [
+        f"{policy} beats the best known cost of {scenario}, seed {', '.join(map(str, better))}: bring the record up to "
+        f"date with {best_known.UPDATE}"
+        for (policy, scenario), better in seeds.items()
+    ]
 
 
 def _machine(machine: Mapping[str, Any]) -> str:

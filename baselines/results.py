@@ -12,7 +12,7 @@ import pathlib
 import re
 import tempfile
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -34,8 +34,8 @@ class ResultsError(IkgymError):
 class Results:
     """The folder of an evaluation.
 
-    `results.json` holds all rows and is written anew after each episode; the courses of the first episodes lie in
-    `series/SCENARIO/POLICY-….npz`. Every file is replaced in one go, so that none is ever half written.
+    `results.json` holds all rows and is written anew after each batch of episodes; the courses of the first episodes
+    lie in `series/SCENARIO/POLICY-….npz`. Every file is replaced in one go, so that none is ever half written.
 
     Args:
         directory: The folder; made if it is not there.
@@ -86,25 +86,26 @@ class Results:
         return besides + [self._rows[key] for key in self._order if key in self._rows]
 
     def done(self, job: Job) -> bool:
-        """Whether an episode has been played, and its course kept where it is to be."""
-        return job.key in self._rows and not (job.first and not self.series_file(job).exists())
+        """Whether an episode has been played, timed if it is to be, and its course kept where it is to be."""
+        row = self._rows.get(job.key)
+        untimed = job.timed and (row is None or row.time_first_us is None)
+        return row is not None and not untimed and not (job.first and not self.series_file(job).exists())
 
-    def add(self, job: Job, row: Row, series: Mapping[str, npt.NDArray[Any]] | None) -> None:
-        """Keeps a result.
+    def add(self, outcomes: Iterable[tuple[Job, Row, Mapping[str, npt.NDArray[Any]] | None]]) -> None:
+        """Keeps results.
 
         Args:
-            job: What was done.
-            row: What came out.
-            series: The course of the episode, where it is kept.
+            outcomes: What was done, what came out, and the course of the episode where it is kept.
 
         Raises:
             ResultsError: The folder cannot be written.
         """
-        if series is not None:
-            file = io.BytesIO()
-            np.savez_compressed(file, allow_pickle=False, **series)
-            write(self.series_file(job), file.getvalue())
-        self._rows[row.key] = row
+        for job, row, series in outcomes:
+            if series is not None:
+                file = io.BytesIO()
+                np.savez_compressed(file, allow_pickle=False, **series)
+                write(self.series_file(job), file.getvalue())
+            self._rows[row.key] = row
         self.save()
 
     def save(self) -> None:
@@ -251,6 +252,8 @@ def _check_settings(file: pathlib.Path, rows: list[Row], plan: Plan, machine: Ma
             refuse(f"{row.scenario} with", f"{row.steps} steps", f"{job.scenario.steps}")
         if row.fingerprint != job.fingerprint:
             refuse(f"another scenario {row.scenario}: fingerprint", row.fingerprint, job.fingerprint)
+        if row.frozen != job.frozen:
+            refuse(f"{row.scenario} in the frozen set", row.frozen or "none", job.frozen or "none")
         preview = previews.get((row.scenario, row.policy, canonical(row.parameters)), row.preview)
         if row.preview != preview:
             refuse(f"{row.policy} in {row.scenario} with preview", row.preview, preview)

@@ -58,6 +58,7 @@ class RecedingHorizonGradient(SolverPolicy):
     difference: float = 1e-3
 
     name: ClassVar[str] = "rhc_gradient"
+    grain: ClassVar[int] = 1
 
     def __post_init__(self) -> None:
         whole_number("horizon", self.horizon, at_least=2)

@@ -1,23 +1,27 @@
-"""One episode of a policy: the loop that scores are published from, in float64, with the policy timed alone."""
+"""Episodes of a policy: the loop that scores are published from, in float64, one arm with the clock or many at once."""
 
 from __future__ import annotations
 
 import dataclasses
 import gc
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import numpy.typing as npt
 from gymnasium.utils import seeding
 
-from baselines.policy import Operations, SolverPolicy
+from baselines.policy import Batch, Operations, SolverPolicy
 from ikgym.scenarios import Preview, Scenario
-from ikgym.simulator import Simulator, observation
+from ikgym.simulation import Outcome
+from ikgym.simulator import Observation, Simulator, observation
 from ikgym.validation import FloatArray
 
 # Steps between two words to the progress bar.
 TICK = 100
+
+#: Called now and then, while no clock runs, with the number of steps made since the last call.
+Tick = Callable[[int], object]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -34,7 +38,7 @@ class Episode:
         orientation_error: Geodesic angle in [rad], NaN where the task has no orientation. Shape (steps,).
         status: Values of :class:`baselines.Status`. Shape (steps,).
         iterations: Iterations of the policy. Shape (steps,).
-        time_ns: Wall time of the call of `predict`, in [ns]. Shape (steps,).
+        time_ns: Wall time of the call of `predict`, in [ns]. Shape (steps,), or (0,) where the calls were not timed.
         operations: What the steps have cost, see :class:`baselines.policy.Operations`, its arrays of shape (steps,).
         inside: What the policy showed of its inside, by name, see :meth:`SolverPolicy.inside`; each of shape
             (steps, …).
@@ -60,9 +64,9 @@ def rollout(
     seed: int,
     *,
     preview: Preview | None = None,
-    tick: Callable[[int], object] | None = None,
+    tick: Tick | None = None,
 ) -> Episode:
-    """Plays one episode.
+    """Plays one episode by single calls of the policy, each of them timed.
 
     The same as `gym.make("RedundantIK-v0", scenario=…)` reset with the seed and stepped with the policy, bit for
     bit, without what Gymnasium's wrappers and Stable-Baselines3's float32 rewards would add.
@@ -72,7 +76,7 @@ def rollout(
         policy: Who tracks it.
         seed: The reset seed.
         preview: What the policy is shown; what it asks for if left out.
-        tick: Called now and then, while no clock runs, with the number of steps made since the last call.
+        tick: See :data:`Tick`.
 
     Returns:
         The recorded episode.
@@ -80,16 +84,55 @@ def rollout(
     Raises:
         InvalidInputError: The preview is none, or shorter than the policy needs.
     """
-    simulator = Simulator(scenario, None, policy.preview if preview is None else preview)
-    simulator.reset(np.ones(1, dtype=np.bool_), [seeding.np_random(seed)[0]])
-    steps, n, m = scenario.steps, scenario.joints, scenario.task.size
-    q, qdot, pose = np.empty((steps, n)), np.empty((steps, n)), np.empty((steps, m))
-    tracking, velocity, position, orientation = np.empty((4, steps))
-    status, iterations, time_ns = np.empty((3, steps), dtype=np.int64)
+    (episode,) = _play(scenario, policy, [seed], preview, tick, alone=True)
+    return episode
 
+
+def rollouts(
+    scenario: Scenario,
+    policy: SolverPolicy,
+    seeds: Sequence[int],
+    *,
+    preview: Preview | None = None,
+    tick: Tick | None = None,
+) -> list[Episode]:
+    """Plays several episodes in step, with one call of the policy for all of them.
+
+    Args:
+        scenario: What is to be tracked.
+        policy: Who tracks it.
+        seeds: The reset seeds.
+        preview: What the policy is shown; what it asks for if left out.
+        tick: See :data:`Tick`; the steps of all episodes count.
+
+    Returns:
+        For each seed what :func:`rollout` gives, bit for bit, but no times.
+
+    Raises:
+        InvalidInputError: The preview is none, or shorter than the policy needs.
+    """
+    return _play(scenario, policy, seeds, preview, tick, alone=False)
+
+
+def _play(
+    scenario: Scenario,
+    policy: SolverPolicy,
+    seeds: Sequence[int],
+    preview: Preview | None,
+    tick: Tick | None,
+    *,
+    alone: bool,
+) -> list[Episode]:
+    rows, steps, n, m = len(seeds), scenario.steps, scenario.joints, scenario.task.size
+    simulator = Simulator(scenario, None if alone else rows, policy.preview if preview is None else preview)
+    simulator.reset(np.ones(rows, dtype=np.bool_), [seeding.np_random(seed)[0] for seed in seeds])
+    q, qdot, pose = np.empty((rows, steps, n)), np.empty((rows, steps, n)), np.empty((rows, steps, m))
+    tracking, velocity, position, orientation = np.empty((4, rows, steps))
+    status, iterations = np.empty((2, rows, steps), dtype=np.int64)
+    time_ns = np.empty(steps if alone else 0, dtype=np.int64)
     inside: dict[str, FloatArray] = {}
 
-    seen = observation(simulator.observe())
+    seen = _seen(simulator.observe(), alone)
     # Compilation, caches and first touch of memory belong to no step: one call on a copy, whose answer is dropped.
     policy.predict({key: value.copy() for key, value in seen.items()})
 
@@ -101,24 +144,44 @@ def rollout(
         for k in range(steps):
             begin = clock()
             action, state = policy.predict(seen, state)
-            time_ns[k] = clock() - begin
+            end = clock()
+            if alone:
+                time_ns[k] = end - begin
             out = simulator.step(action)
-            seen = observation(out)
+            seen = _seen(out, alone)
             report = policy.report(state)
-            q[k], qdot[k], pose[k] = out.q[0], out.qdot[0], out.pose[0]
-            tracking[k], velocity[k] = out.tracking_cost[0], out.velocity_cost[0]
-            position[k], orientation[k] = out.position_error[0], out.orientation_error[0]
-            status[k], iterations[k] = report.status[0], report.iterations[0]
+            q[:, k], qdot[:, k], pose[:, k] = out.q, out.qdot, out.pose
+            tracking[:, k], velocity[:, k] = out.tracking_cost, out.velocity_cost
+            position[:, k], orientation[:, k] = out.position_error, out.orientation_error
+            status[:, k], iterations[:, k] = report.status, report.iterations
             for name, value in policy.inside(state).items():
-                inside.setdefault(name, np.empty((steps, *value.shape[1:])))[k] = value[0]
+                inside.setdefault(name, np.empty((rows, steps, *value.shape[1:])))[:, k] = value
             if tick is not None and (k + 1) % TICK == 0:
-                tick(TICK)
+                tick(TICK * rows)
     finally:
         if collecting:
             gc.enable()
     if tick is not None:
-        tick(steps % TICK)
-    operations = policy.operations((status, iterations))
-    return Episode(
-        q, qdot, pose, tracking, velocity, position, orientation, status, iterations, time_ns, operations, inside
-    )
+        tick(steps % TICK * rows)
+    return [
+        Episode(
+            q[row],
+            qdot[row],
+            pose[row],
+            tracking[row],
+            velocity[row],
+            position[row],
+            orientation[row],
+            status[row],
+            iterations[row],
+            time_ns,
+            policy.operations((status[row], iterations[row])),
+            {name: values[row] for name, values in inside.items()},
+        )
+        for row in range(rows)
+    ]
+
+
+def _seen(out: Outcome, alone: bool) -> Observation:
+    """What the policy sees: of the only arm, or with an axis of arms."""
+    return observation(out) if alone else {name: getattr(out, name) for name in Batch._fields}

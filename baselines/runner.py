@@ -1,11 +1,12 @@
-"""Plays the jobs of a plan, in this process or in others, one row at a time."""
+"""Plays the jobs of a plan, in this process or in others: those of one policy in one scenario together."""
 
 from __future__ import annotations
 
+import itertools
 import multiprocessing
 import signal
 import sys
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Generator, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from typing import Any
@@ -15,23 +16,28 @@ import numpy.typing as npt
 from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
+from baselines import best_known
 from baselines.machine import describe
-from baselines.metrics import Row, measure
+from baselines.metrics import Row, canonical, jsonable, measure
 from baselines.plan import Job
-from baselines.rollout import Episode, rollout
+from baselines.rollout import Episode, Tick, rollout, rollouts
 from ikgym.exceptions import IkgymError
 
 #: The course of an episode, as arrays by name.
 Series = dict[str, npt.NDArray[Any]]
-Outcome = tuple[Row, Series | None]
+#: A job, its row, and the course of the episode if the job is a first one.
+Outcome = tuple[Job, Row, Series | None]
+
+#: Most episodes that are played in step: their courses are in memory until all of them are done.
+MOST = 64
 
 
 class WorkerError(IkgymError):
     """A worker process has died."""
 
 
-def run(jobs: Sequence[Job], *, workers: int, progress: bool) -> Generator[tuple[Job, Row, Series | None], None, None]:
-    """Plays jobs, and hands out each result as soon as it is there.
+def run(jobs: Sequence[Job], *, workers: int, progress: bool) -> Generator[list[Outcome], None, None]:
+    """Plays jobs in batches, and hands out what came of each batch as soon as it is done.
 
     Args:
         jobs: What is to be done.
@@ -39,12 +45,13 @@ def run(jobs: Sequence[Job], *, workers: int, progress: bool) -> Generator[tuple
         progress: Whether to show a bar on stderr.
 
     Yields:
-        The job, its row, and the course of the episode if the job is a first one.
+        What came of the jobs of a batch.
 
     Raises:
         InvalidInputError: A policy refuses what it is shown.
         WorkerError: A worker process has died.
     """
+    parts, done = batches(jobs), 0
     with tqdm(
         total=sum(job.scenario.steps for job in jobs),
         disable=not progress or not jobs,
@@ -56,28 +63,62 @@ def run(jobs: Sequence[Job], *, workers: int, progress: bool) -> Generator[tuple
         mininterval=0.1 if sys.stderr.isatty() else 10.0,
     ) as bar:
 
-        def announce(job: Job, number: int) -> None:
-            bar.set_description(f"{job.scenario.name} · {job.policy} ({number}/{len(jobs)})", refresh=False)
+        def announce(batch: Sequence[Job]) -> None:
+            nonlocal done
+            done += len(batch)
+            job = batch[0]
+            bar.set_description(f"{job.scenario.name} · {job.policy} ({done}/{len(jobs)})", refresh=False)
 
-        if workers == 1 or len(jobs) < 2:
-            for number, job in enumerate(jobs, 1):
-                announce(job, number)
-                yield job, *play(job, bar.update)
+        if workers == 1 or len(parts) < 2:
+            for batch in parts:
+                announce(batch)
+                yield play(batch, bar.update)
         else:
-            for number, (job, outcome) in enumerate(_in_processes(jobs, workers), 1):
-                announce(job, number)
-                bar.update(job.scenario.steps)
-                yield job, *outcome
+            for batch, outcomes in _in_processes(parts, workers):
+                announce(batch)
+                bar.update(sum(job.scenario.steps for job in batch))
+                yield outcomes
 
 
-def play(job: Job, tick: Callable[[int], object] | None = None) -> Outcome:
-    """Plays one job; for `tick` see :func:`baselines.rollout.rollout`."""
-    policy = job.make()
+def batches(jobs: Iterable[Job]) -> list[list[Job]]:
+    """Jobs that are played together, in their order.
+
+    Those that are timed are played alone. So are those of a reference that is made for one episode and knows no other:
+    its jobs differ in what it is made with.
+    """
+    out: list[list[Job]] = []
+    for _, alike in itertools.groupby(jobs, _together):
+        left = list(alike)
+        size = 1 if left[0].timed else MOST
+        out += [left[first : first + size] for first in range(0, len(left), size)]
+    return out
+
+
+def _together(job: Job) -> tuple[object, ...]:
+    return job.scenario.name, job.policy, canonical(job.parameters), canonical(jsonable(job.given)), job.timed
+
+
+def play(batch: Sequence[Job], tick: Tick | None = None) -> list[Outcome]:
+    """Plays jobs of one policy in one scenario together; a timed one has to be alone.
+
+    Args:
+        batch: The jobs.
+        tick: See :data:`baselines.rollout.Tick`.
+    """
+    first = batch[0]
+    scenario, policy = first.scenario, first.make()
     # The matrices of one arm are too small to share out, and threads would blur the times. Environment variables
     # would be heeded only by libraries that are not loaded yet, and NumPy is.
     with threadpool_limits(limits=1):
-        episode = rollout(job.scenario, policy, job.seed, preview=job.preview, tick=tick)
-    row = measure(
+        if first.timed:
+            episodes = [rollout(scenario, policy, first.seed, preview=first.preview, tick=tick)]
+        else:
+            episodes = rollouts(scenario, policy, [job.seed for job in batch], preview=first.preview, tick=tick)
+    return [(job, _row(job, e), course(job, e) if job.first else None) for job, e in zip(batch, episodes, strict=True)]
+
+
+def _row(job: Job, episode: Episode) -> Row:
+    return measure(
         job.scenario,
         job.policy,
         job.parameters,
@@ -86,8 +127,9 @@ def play(job: Job, tick: Callable[[int], object] | None = None) -> Outcome:
         machine=describe(),
         preview=job.preview,
         fingerprint=job.fingerprint,
+        frozen=job.frozen,
+        best_known=best_known.cost(job.scenario, job.seed),
     )
-    return row, course(job, episode) if job.first else None
 
 
 def course(job: Job, episode: Episode) -> Series:
@@ -118,14 +160,14 @@ def course(job: Job, episode: Episode) -> Series:
     return series
 
 
-def _in_processes(jobs: Sequence[Job], workers: int) -> Iterator[tuple[Job, Outcome]]:
+def _in_processes(parts: Sequence[list[Job]], workers: int) -> Iterator[tuple[list[Job], list[Outcome]]]:
     # Spawned, not forked: a fork would inherit numba's and the BLAS's threads without their locks' owners.
     context = multiprocessing.get_context("spawn")
     others = set(multiprocessing.active_children())
-    executor = ProcessPoolExecutor(min(workers, len(jobs)), context, initializer=_die_quietly)
+    executor = ProcessPoolExecutor(min(workers, len(parts)), context, initializer=_die_quietly)
     finished = False
     try:
-        futures = {executor.submit(play, job): job for job in jobs}
+        futures = {executor.submit(play, batch): batch for batch in parts}
         for future in as_completed(futures):
             yield futures.pop(future), future.result()
         finished = True

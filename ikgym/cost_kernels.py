@@ -17,6 +17,10 @@ class CostParameters(NamedTuple):
     p_in: float
 
 
+#: Which costs these kernels calculate: raised by whoever changes a value that they give. Best known costs and frozen
+#: evaluation sets belong to one version, and are refused or set aside under another.
+COST_VERSION = 1
+
 # The exponent of small tracking errors is not a parameter: "the usual quadratic tracking rule".
 P_X_INSIDE = 2.0
 
@@ -38,22 +42,25 @@ def _power(x, p):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _value(x, delta, inside, outside):  # type: ignore[no-untyped-def]
+def value(x, delta, inside, outside):  # type: ignore[no-untyped-def]
+    """|x / Δ| to the power ``inside`` up to |x| = Δ and ``outside`` beyond: one component of a cost."""
     r = abs(x) / delta
     return _power(r, outside if r > 1.0 else inside)
 
 
 @inlined
-def _slope(x, delta, inside, outside):  # type: ignore[no-untyped-def]
+def slope(x, delta, inside, outside):  # type: ignore[no-untyped-def]
+    """Derivative of :func:`value` by x."""
     r = abs(x) / delta
     p = outside if r > 1.0 else inside
-    slope = p * _power(r, p - 1.0) / delta
+    steepness = p * _power(r, p - 1.0) / delta
     # At rest the cost is flat, also for p = 1, where any slope between -1/Δ and 1/Δ would do.
-    return slope if x > 0.0 else (-slope if x < 0.0 else 0.0)
+    return steepness if x > 0.0 else (-steepness if x < 0.0 else 0.0)
 
 
 @inlined
-def _bend(x, delta, inside, outside):  # type: ignore[no-untyped-def]
+def bend(x, delta, inside, outside):  # type: ignore[no-untyped-def]
+    """Second derivative of :func:`value` by x."""
     r = abs(x) / delta
     p = outside if r > 1.0 else inside
     if p == 1.0:
@@ -66,7 +73,7 @@ def tracking(cost, error):  # type: ignore[no-untyped-def]
     """Φ^X, the sum over the components of the tracking error. Shape of ``error`` (e,)."""
     total = 0.0
     for j in range(error.shape[0]):
-        total += _value(error[j], cost.delta_x, P_X_INSIDE, cost.p_x)
+        total += value(error[j], cost.delta_x, P_X_INSIDE, cost.p_x)
     return total
 
 
@@ -74,14 +81,14 @@ def tracking(cost, error):  # type: ignore[no-untyped-def]
 def tracking_gradient(cost, error, out):  # type: ignore[no-untyped-def]
     """∂Φ^X/∂error. Shapes (e,)."""
     for j in range(error.shape[0]):
-        out[j] = _slope(error[j], cost.delta_x, P_X_INSIDE, cost.p_x)
+        out[j] = slope(error[j], cost.delta_x, P_X_INSIDE, cost.p_x)
 
 
 @kernel
 def tracking_curvature(cost, error, out):  # type: ignore[no-untyped-def]
     """The diagonal of ∂²Φ^X/∂error². Shapes (e,)."""
     for j in range(error.shape[0]):
-        out[j] = _bend(error[j], cost.delta_x, P_X_INSIDE, cost.p_x)
+        out[j] = bend(error[j], cost.delta_x, P_X_INSIDE, cost.p_x)
 
 
 @kernel
@@ -89,7 +96,7 @@ def velocity(cost, qdot):  # type: ignore[no-untyped-def]
     """Φ^U, the sum over all joints (the printed sum to 6 is a slip). Shape of ``qdot`` (n,)."""
     total = 0.0
     for j in range(qdot.shape[0]):
-        total += _value(qdot[j], cost.delta_qdot, cost.p_in, cost.p_out)
+        total += value(qdot[j], cost.delta_qdot, cost.p_in, cost.p_out)
     return total
 
 
@@ -97,11 +104,11 @@ def velocity(cost, qdot):  # type: ignore[no-untyped-def]
 def velocity_gradient(cost, qdot, out):  # type: ignore[no-untyped-def]
     """∂Φ^U/∂q̇. Shapes (n,)."""
     for j in range(qdot.shape[0]):
-        out[j] = _slope(qdot[j], cost.delta_qdot, cost.p_in, cost.p_out)
+        out[j] = slope(qdot[j], cost.delta_qdot, cost.p_in, cost.p_out)
 
 
 @kernel
 def velocity_curvature(cost, qdot, out):  # type: ignore[no-untyped-def]
     """The diagonal of ∂²Φ^U/∂q̇². Shapes (n,)."""
     for j in range(qdot.shape[0]):
-        out[j] = _bend(qdot[j], cost.delta_qdot, cost.p_in, cost.p_out)
+        out[j] = bend(qdot[j], cost.delta_qdot, cost.p_in, cost.p_out)

@@ -59,12 +59,13 @@ def _figures(
     for row in rows:
         first.setdefault((row.policy, canonical(row.parameters)), row)
 
-    yield (
-        OVERVIEW,
-        "cost-time",
-        f"Total cost against the median time per step in {scenario}",
-        cost_time.draw(scenario, summaries, names, looks),
-    )
+    if any(summary.time_p50_us is not None for summary in summaries):
+        yield (
+            OVERVIEW,
+            "cost-time",
+            f"Total cost against the median time per step in {scenario}",
+            cost_time.draw(scenario, summaries, names, looks),
+        )
 
     # The seed says which episode is shown, where there are others.
     episode = scenario if rows[0].seed == 0 else f"{scenario}, seed {rows[0].seed}"

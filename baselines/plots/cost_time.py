@@ -37,7 +37,7 @@ def draw(
 
     Args:
         title: Stands above it.
-        summaries: The results of one scenario.
+        summaries: The results of one scenario; those without times have no place. At least one has some.
         names: What to call them, by their ids; a reference ends in a star.
         looks: Their colours, by their ids.
     """
@@ -46,8 +46,9 @@ def draw(
     axes.set_xscale("log")
     axes.set_yscale("log")
     points = []
-    for summary in summaries:
-        x, y = summary.time_p50_us, max(summary.total_cost, SMALLEST)
+    timed = [(summary, summary.time_p50_us) for summary in summaries if summary.time_p50_us is not None]
+    for summary, x in timed:
+        y = max(summary.total_cost.mean, SMALLEST)
         colour = looks[id(summary)]["color"]
         hollow = names[id(summary)].endswith("*")
         axes.plot(x, y, "D" if hollow else "o", ms=7, color=colour, mfc="white" if hollow else colour, mew=1.6)
@@ -74,7 +75,7 @@ def draw(
     _ticks(axes.xaxis)
     _ticks(axes.yaxis)
     axes.grid(which="minor", color=style.MIST, lw=0.25)
-    _label(drawn, points, [names[id(s)] for s in summaries], [looks[id(s)]["color"] for s in summaries])
+    _label(drawn, points, [names[id(s)] for s, _ in timed], [looks[id(s)]["color"] for s, _ in timed])
     return drawn
 
 

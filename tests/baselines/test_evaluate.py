@@ -12,13 +12,15 @@ import pytest
 import baselines
 import ikgym
 from baselines import evaluate as module
+from baselines import frozen
 from baselines import results as results_module
 from baselines.evaluate import evaluate, main
 from baselines.machine import describe
 from baselines.metrics import TIME_COLUMNS, Row
-from baselines.plan import fingerprint, make_plan, parse_policy
+from baselines.plan import make_plan, parse_policy
 from baselines.results import COLUMNS, Results, ResultsError, read_rows, write
-from baselines.runner import play
+from baselines.runner import MOST, batches, play
+from ikgym import cost_kernels
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 
 ROOT = pathlib.Path(__file__).parents[2]
@@ -133,20 +135,6 @@ def test_text_is_never_run():
     assert parameters == {"damping": "__import__('os').getcwd()"}
 
 
-def test_fingerprints_tell_scenarios_apart():
-    fast = ikgym.scenarios.get("varga7-fast")
-    prints = [
-        fingerprint(fast),
-        fingerprint(fast.replace(steps=10)),
-        fingerprint(fast.replace(cost=ikgym.TrackingCost(delta_x=2e-3))),
-        fingerprint(fast.replace(model=ikgym.arms.get("varga7_literal"))),
-        fingerprint(ikgym.scenarios.get("varga7-slow")),
-    ]
-    assert len(set(prints)) == len(prints)
-    assert fingerprint(fast.replace(name="other", source="elsewhere")) == prints[0]
-    assert fingerprint(pickle.loads(pickle.dumps(fast))) == prints[0]
-
-
 @pytest.mark.parametrize(
     ("scenarios", "policies", "options", "error", "message"),
     [
@@ -163,6 +151,8 @@ def test_fingerprints_tell_scenarios_apart():
         ("varga7-fast", "dls", {"steps": 0}, InvalidInputError, "steps: expected a whole number of at least 1, got 0"),
         ("varga7-fast", "dls", {"workers": 0}, InvalidInputError, "workers: expected a whole number of at least 1"),
         ("varga7-fast", "dls", {"preview": 0}, InvalidInputError, "preview: expected a whole number of at least 1"),
+        ("varga7-fast", "dls", {"timed": 0}, InvalidInputError, "timed: expected a whole number of at least 1, got 0"),
+        ("varga7-fast", "dls", {"timed": "every"}, InvalidInputError, "timed: expected a whole number of at least 1"),
         ("varga7-fast", "dls", {"split": "tset"}, UnknownNameError, "no split 'tset'. Did you mean 'test'"),
         ("varga7-fast", "rhc_gradient", {"preview": 1}, InvalidInputError, "needs to be shown 2 steps ahead"),
         ("zhang3-helix", "follow_nominal", {}, InvalidInputError, "Nothing to evaluate: follow_nominal in"),
@@ -180,19 +170,62 @@ def test_two_scenarios_of_one_name_are_refused():
         evaluate([fast, fast.replace(dt=2e-3)], "dls")
 
 
+# Batches
+
+
+def test_episodes_of_a_policy_in_a_scenario_are_played_together():
+    jobs = make_plan(["varga7-random", "varga7-fast"], ["dls", "dls:damping=1e-2"], episodes=MOST + 3, timed=2).jobs
+    parts = batches(jobs)
+    assert [job for part in parts for job in part] == list(jobs)
+    assert [len(part) for part in parts] == [1, 1, MOST, 1] * 2 + [1, 1]
+    assert [part[0].timed for part in parts] == [True, True, False, False] * 2 + [True, True]
+    for part in parts:
+        assert len({(job.scenario.name, job.policy, str(job.parameters)) for job in part}) == 1
+
+
+def test_a_reference_that_knows_one_episode_plays_it_alone():
+    jobs = make_plan("varga7-random", "follow_nominal", episodes=4).jobs
+    assert [len(part) for part in batches(jobs)] == [1] * 4
+
+
+@pytest.mark.parametrize(("timed", "expected"), [(1, 1), (2, 2), (9, 5), ("all", 5)])
+def test_so_many_episodes_are_timed(timed, expected):
+    rows = evaluate("varga7-random", "dls", episodes=5, steps=5, timed=timed)
+    assert [row.time_first_us is not None for row in rows] == [True] * expected + [False] * (5 - expected)
+
+
+def test_what_is_timed_changes_nothing_but_the_times():
+    policies = ["dls", "rhc_gradient", "smoothed", "fixed_point_extended"]
+    options = {"episodes": 4, "steps": STEPS}
+    together = evaluate("varga7-random", policies, **options)
+    assert timeless(together) == timeless(evaluate("varga7-random", policies, timed="all", **options))
+    assert len({row.total_cost for row in together}) == len(together)
+
+
+def test_episodes_that_are_to_be_timed_after_all_are_played_again(tmp_path):
+    options = {"episodes": 3, "steps": 5, "out": tmp_path, "plots": False}
+    rows = evaluate("varga7-random", "dls", **options)
+    again = evaluate("varga7-random", "dls", timed=2, resume=True, **options)
+    assert [row.time_first_us is not None for row in again] == [True, True, False]
+    assert again[0] == rows[0]
+    assert again[2] == rows[2]
+    assert timeless(again) == timeless(rows)
+
+
 # Workers
 
 
 def test_a_job_played_elsewhere_gives_the_same_row():
     (job,) = make_plan("varga7-fast", "dls", steps=STEPS).jobs
-    row, series = play(pickle.loads(pickle.dumps(job)))
-    assert timeless([row]) == timeless([play(job)[0]])
+    ((_, row, series),) = play([pickle.loads(pickle.dumps(job))])
+    assert timeless([row]) == timeless([play([job])[0][1]])
     assert set(series) >= {"time", "pose", "nominal", "q", "qdot", "nominal_q", "position_error", "sliding"}
 
 
 def test_workers_change_nothing_but_the_times(tmp_path):
-    assert timeless(run_all(tmp_path, workers=2)) == timeless(run_all())
-    assert timeless(read_rows(tmp_path / "results.json")) == timeless(run_all())
+    rows = run_all(episodes=4)
+    assert timeless(run_all(tmp_path, workers=2, episodes=4)) == timeless(rows)
+    assert timeless(read_rows(tmp_path / "results.json")) == timeless(rows)
 
 
 def test_an_error_in_a_worker_reaches_the_user():
@@ -265,27 +298,28 @@ def interrupted(monkeypatch, after):
     play_jobs = module.run
 
     def run(jobs, **options):
-        for number, outcome in enumerate(play_jobs(jobs, **options)):
+        for number, outcomes in enumerate(play_jobs(jobs, **options)):
             if number == after:
                 raise KeyboardInterrupt
-            yield outcome
+            yield outcomes
 
     monkeypatch.setattr(module, "run", run)
 
 
-@pytest.mark.parametrize("after", [0, 1, 3, 7])
-def test_an_interrupted_run_goes_on_to_the_same_results(tmp_path, monkeypatch, after):
+# One episode of each policy is timed. The others of dls and moore_penrose are one batch, those of the reference two.
+@pytest.mark.parametrize(("after", "finished"), [(0, 0), (1, 1), (2, 3), (4, 6), (8, 10)])
+def test_an_interrupted_run_goes_on_to_the_same_results(tmp_path, monkeypatch, after, finished):
     whole, parts = tmp_path / "whole", tmp_path / "parts"
-    rows = run_all(whole)
+    rows = run_all(whole, episodes=3)
     with monkeypatch.context() as patch:
         interrupted(patch, after)
         with pytest.raises(KeyboardInterrupt):
-            run_all(parts)
+            run_all(parts, episodes=3)
     kept = read_rows(parts / "results.json") if after else []
-    assert len(kept) == after
-    assert timeless(run_all(parts, resume=True)) == timeless(rows)
+    assert len(kept) == finished
+    assert timeless(run_all(parts, episodes=3, resume=True)) == timeless(rows)
     there = read_rows(parts / "results.json")
-    assert there[:after] == kept  # not played again: even the times are those of before
+    assert there[:finished] == kept  # not played again: even the times are those of before
     assert timeless(there) == timeless(read_rows(whole / "results.json"))
     for file in whole.glob("series/*/*.npz"):
         with np.load(file) as one, np.load(parts / file.relative_to(whole)) as other:
@@ -326,6 +360,7 @@ def test_resuming_adds_episodes_and_policies(tmp_path):
         ({}, {"steps": 6}, "varga7-random with 5 steps, this run has 6"),
         ({}, {"split": "validation"}, "varga7-random on the split test, this run has validation"),
         ({}, {"preview": 3}, "dls in varga7-random with preview 1, this run has 3"),
+        ({"frozen": "0123456789ab"}, {}, "varga7-random in the frozen set 0123456789ab, this run has none"),
     ],
 )
 def test_what_cannot_be_compared_is_not_gone_on_with(tmp_path, change, options, message):
@@ -394,7 +429,7 @@ def test_a_crash_while_writing_leaves_the_old_file(tmp_path, monkeypatch):
     assert file.read_bytes() == b"new"
 
 
-def test_results_are_on_disk_after_each_episode(tmp_path, monkeypatch):
+def test_results_are_on_disk_after_each_batch(tmp_path, monkeypatch):
     lengths = []
     add = Results.add
 
@@ -403,8 +438,8 @@ def test_results_are_on_disk_after_each_episode(tmp_path, monkeypatch):
         lengths.append(len(strict_json(tmp_path / "results.json")))
 
     monkeypatch.setattr(results_module.Results, "add", watched)
-    run_all(tmp_path)
-    assert lengths == list(range(1, 9))
+    run_all(tmp_path, episodes=4)
+    assert lengths == [1, 4, 5, 8, 9, 10, 11, 12, 13, 14]
 
 
 # The command line
@@ -416,6 +451,7 @@ def test_errors_are_one_line_and_exit_code_2(capsys, tmp_path):
         ["--scenarios", "varga7-fest"],
         ["--policies", "rhc_gradient", "--preview", "1"],
         ["--episodes", "0"],
+        ["--frozen", "varga7-random"],  # with --steps
         ["--out", str(tmp_path / "results.json" / "x")],
     ]
     (tmp_path / "results.json").write_text("[")
@@ -435,6 +471,22 @@ def test_ctrl_c_says_how_to_go_on(capsys, tmp_path, monkeypatch):
     assert main(arguments) == 130
     assert "go on with --resume" in capsys.readouterr().err
     assert len(read_rows(tmp_path / "results.json")) == 1
+
+
+def test_results_of_another_cost_are_not_gone_on_with(tmp_path, monkeypatch):
+    evaluate("varga7-random", "dls", steps=5, out=tmp_path, plots=False)
+    monkeypatch.setattr(cost_kernels, "COST_VERSION", 0)
+    with pytest.raises(ResultsError, match="another scenario varga7-random: fingerprint"):
+        evaluate("varga7-random", "dls", steps=5, out=tmp_path, resume=True, plots=False)
+
+
+def test_a_frozen_set_from_the_command_line(capsys, tmp_path):
+    assert main(["--frozen", "varga7-random", "--policies", "dls", "--no-plots", "--out", str(tmp_path)]) == 0
+    assert "varga7-random: 64 episodes of 1000 steps" in capsys.readouterr().out
+    rows = read_rows(tmp_path / "results.json")
+    assert {row.frozen for row in rows} == {frozen.SETS["varga7-random"].digest}
+    with pytest.raises(ResultsError, match=r"in the frozen set .*, this run has none"):
+        evaluate("varga7-random", "dls", episodes=64, out=tmp_path, resume=True, plots=False)
 
 
 def test_the_demo_may_be_run_twice(capsys, tmp_path):

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import baselines
 import ikgym
-from baselines.metrics import TIME_COLUMNS, Row, geometric_mean, jsonable, measure, summarise
+from baselines.metrics import TIME_COLUMNS, Row, Spread, geometric_mean, jsonable, measure, summarise
 from baselines.policy import Operations
 from baselines.rollout import Episode, rollout
 from baselines.status import Status
@@ -225,8 +225,9 @@ def test_numbers_of_a_handmade_episode():
     assert row.qdot_peak == 2.0
     assert row.qdot_rms == pytest.approx(math.sqrt(9.5 / 8))
     assert row.qdot_total_variation == pytest.approx(3.0 + 0.5 + 2.0)
-    assert row.time_p50_us == pytest.approx(2.5)
-    assert row.time_p99_us == pytest.approx(np.percentile(times, 99) / 1e3)
+    assert row.time_first_us == 1.0
+    assert row.time_p50_us == pytest.approx(3.0)
+    assert row.time_p99_us == pytest.approx(np.percentile(times[1:], 99) / 1e3)
     assert row.deadline_misses == 1
     assert row.status == "diverged"
     assert row.status_counts == {"converged": 2, "iteration_limit": 1, "diverged": 1}
@@ -249,8 +250,32 @@ def test_one_step_has_no_variation():
     assert row_of(position_scenario(1), handmade(1, qdot=[[1.0, 2.0]])).qdot_total_variation == 0.0
 
 
-def test_a_row_survives_json():
-    row = row_of(position_scenario(), handmade(), parameters={"damping": 1e-3, "rule": "a", "weights": [1, 2]})
+def test_the_first_call_is_stated_apart():
+    row = row_of(position_scenario(), handmade(time_ns=[5_000_000_000, 1_000, 3_000, 2_000]))  # Δt is 1 s
+    assert (row.time_first_us, row.time_p50_us, row.deadline_misses) == (5e6, 2.0, 0)
+    only = row_of(position_scenario(1), handmade(1, time_ns=[5_000]))
+    assert (only.time_first_us, only.time_p50_us, only.time_p99_us, only.deadline_misses) == (5.0, 5.0, 5.0, 0)
+
+
+def test_what_was_not_timed_has_no_times():
+    row = row_of(position_scenario(), handmade(time_ns=np.empty(0, dtype=np.int64)))
+    assert [getattr(row, name) for name in TIME_COLUMNS] == [None] * 4
+    assert Row.from_json(json.loads(json.dumps(row.to_json()))) == row
+    timed = dataclasses.replace(row_of(position_scenario(), handmade()), seed=1)
+    (both,) = summarise([row, timed])
+    assert [getattr(both, name) for name in TIME_COLUMNS] == [getattr(timed, name) for name in TIME_COLUMNS]
+    (neither,) = summarise([row])
+    assert [getattr(neither, name) for name in TIME_COLUMNS] == [None] * 4
+
+
+def test_regret_is_against_the_best_known_cost():
+    assert row_of(position_scenario(), handmade(tracking_cost=[1, 2, 3, 4]), best_known=4.0).regret == 2.5
+
+
+@pytest.mark.parametrize("frozen", [None, "0123456789ab"])
+def test_a_row_survives_json(frozen):
+    parameters = {"damping": 1e-3, "rule": "a", "weights": [1, 2]}
+    row = row_of(position_scenario(), handmade(), parameters=parameters, frozen=frozen)
     there = json.loads(json.dumps(row.to_json(), allow_nan=False))
     assert list(there) == [field.name for field in dataclasses.fields(Row)]
     assert Row.from_json(there) == row
@@ -273,6 +298,9 @@ def test_numbers_that_are_not_finite_become_null():
         ({"steps": 1.5}, "the key 'steps'"),
         ({"total_cost": "much"}, "the key 'total_cost' should have a value of type float"),
         ({"parameters": []}, "the key 'parameters'"),
+        ({"deadline_misses": 1.5}, "the key 'deadline_misses' should have a value of type int"),
+        ({"time_p50_us": "1"}, "the key 'time_p50_us'"),
+        ({"frozen": 3}, "the key 'frozen'"),
         ({"status": "splendid"}, "the key 'status'"),
         ({"colour": 1}, "there is a key 'colour' that no row has"),
     ],
@@ -328,15 +356,36 @@ def test_summaries():
     first, second = summarise([*rows, other])
     assert (first.policy, second.policy) == ("dls", "moore_penrose")
     assert first.episodes == 3
-    assert first.total_cost == pytest.approx(10.0)
-    assert first.total_cost_median == 10.0
-    assert first.total_cost_worst == 100.0
-    assert first.worst_seed == 2
+    assert first.total_cost.mean == pytest.approx(10.0)
+    assert first.total_cost.median == 10.0
+    assert first.total_cost.p90 == pytest.approx(82.0)
+    assert first.total_cost.worst == 100.0
+    assert first.total_cost.worst_seed == 2
     assert first.position_error_max == 0.3
     assert first.orientation_error_max is None
     assert (first.time_p50_us, first.time_p99_us, first.deadline_misses) == (6.0, 14.0, 6)
     assert first.status == "rank_deficient"
     assert first.regret is None
+
+
+def test_the_spread_of_regrets():
+    base = row_of(position_scenario(), handmade())
+    regrets = {3: 1.0, 4: 4.0, 5: 2.0}
+    rows = [dataclasses.replace(base, seed=s, regret=regret, total_cost=1.0 / regret) for s, regret in regrets.items()]
+    (summary,) = summarise(rows)
+    assert summary.regret == Spread(pytest.approx(2.0), 2.0, pytest.approx(3.6), 4.0, 4)
+    assert summary.total_cost.worst_seed == 3
+    (summary,) = summarise([*rows, dataclasses.replace(base, seed=6)])
+    assert summary.regret is None  # of one of them it is not known
+
+
+@pytest.mark.parametrize("change", [{"fingerprint": "g"}, {"frozen": "0123456789ab"}])
+def test_rows_of_different_content_are_not_put_together(change):
+    base = row_of(position_scenario(), handmade())
+    other = dataclasses.replace(base, policy="moore_penrose", **change)
+    with pytest.raises(InvalidInputError, match="results of 'zhang3-helix' cannot be put together"):
+        summarise([base, other])
+    assert len(summarise([base, dataclasses.replace(other, scenario="another")])) == 2
 
 
 def test_time_columns_are_columns():

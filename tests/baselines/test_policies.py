@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import dataclasses
 import functools
+import threading
 import time
 from collections.abc import Mapping
 
@@ -20,6 +21,7 @@ import ikgym
 from baselines.policy import Problem, Solution, SolverPolicy, statuses
 from baselines.registry import get
 from baselines.status import Status
+from ikgym import parallel
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 from ikgym.simulator import Simulator
 from tests.comparison import identical
@@ -87,6 +89,31 @@ def test_batch_equals_single_calls_and_memory_goes_by_rows(name, on):
             )
             assert identical(single, action[i])
             assert all(identical(a[0], b[i]) for a, b in zip(states[i], batched, strict=True))
+
+
+@contract
+def test_rows_that_are_shared_out_to_threads_are_the_same(monkeypatch, name, on):
+    policy = policy_for(name, on)
+    if policy is None:
+        return
+    threads, solve = set(), type(policy).solve
+
+    def watched(self, batch, memory):
+        threads.add(threading.get_ident())
+        return solve(self, batch, memory)
+
+    monkeypatch.setattr(type(policy), "solve", watched)
+    monkeypatch.setattr(parallel, "cores", lambda: 2)
+    whole, shared = None, None
+    for k, observation in enumerate(observations(on, policy.preview, 5)):
+        start = np.array([k == 0, k == 2, False, False, k == 1])
+        monkeypatch.setattr(type(policy), "grain", 100)
+        expected, whole = policy.predict(observation, whole, start)
+        monkeypatch.setattr(type(policy), "grain", 1)
+        action, shared = policy.predict(observation, shared, start)
+        assert identical(action, expected)
+        assert identical(shared, whole)
+    assert len(threads) > 1
 
 
 @contract

@@ -41,6 +41,8 @@ BASE = Row(
     preview=1,
     fingerprint="0",
     operations={"forward_kinematics": 0.0, "jacobians": 1.0, "factorisations": 1.0, "measurements": 1.0},
+    time_first_us=120.0,
+    frozen=None,
 )
 REFERENCE = dataclasses.replace(BASE, policy="follow_nominal", parameters={}, tracking_cost=0.0)
 DATE = datetime.datetime(2026, 1, 2, 3, 4, tzinfo=datetime.UTC)
@@ -111,8 +113,26 @@ def test_several_episodes_are_put_together():
     assert text.startswith("varga7-random: 3 episodes of 3000 steps")
     assert "total cost over the episodes of varga7-random" in text
     (line,) = (line for line in text.split("\n") if line.endswith("2000002"))
-    assert re.split(r"\s{2,}", line) == ["dls", "3", "2154", "1000", "1.000e6", "2000002"]
+    assert re.split(r"\s{2,}", line) == ["dls", "3", "2154", "1000", "8.002e5", "1.000e6", "2000002"]
     assert "geometric means" in text
+
+
+def test_several_episodes_are_judged_by_their_regret_where_it_is_known():
+    rows = [row(scenario="varga7-random", seed=seed, regret=regret) for seed, regret in ((7, 1.0), (8, 4.0), (9, 2.0))]
+    text = report.table(rows)
+    assert "regret over the episodes of varga7-random" in text
+    assert "total cost over" not in text
+    line = [line for line in text.split("\n") if line.startswith("dls")][-1]
+    assert re.split(r"\s{2,}", line) == ["dls", "3", "2.000", "2.000", "3.600", "4.000", "8"]
+    assert re.split(r"\s{2,}", text.split("\n")[4])[4] == "2.000"
+    assert "Regret over the episodes:" in report.readme(rows, command="c", date=DATE)
+    assert "total cost over" in report.table([*rows, row(scenario="varga7-random", seed=10)])
+
+
+def test_what_was_not_timed_shows_dashes():
+    untimed = dict.fromkeys(("time_first_us", "time_p50_us", "time_p99_us", "deadline_misses"))
+    line = report.table([row(**untimed)]).split("\n")[4]
+    assert re.split(r"\s{2,}", line)[8:11] == ["–", "–", "–"]
 
 
 def test_lines_fit_the_width():
@@ -309,6 +329,13 @@ def test_one_policy_and_a_cost_of_zero_can_be_drawn():
     summaries = summarise([row(total_cost=0.0)])
     figure = cost_time.draw("t", summaries, {id(summaries[0]): "dls *"}, {id(summaries[0]): style.looks(0)})
     assert style.png(figure) == style.png(figure)
+
+
+def test_what_has_no_time_has_no_place_against_it():
+    summaries = summarise([BASE, row(policy="moore_penrose", time_p50_us=None)])
+    names = {id(s): s.policy for s in summaries}
+    figure = cost_time.draw("t", summaries, names, {id(s): style.looks(i) for i, s in enumerate(summaries)})
+    assert [t.get_text() for t in figure.axes[0].texts] == ["dls"]
 
 
 def test_lines_can_be_told_apart():
