@@ -58,6 +58,26 @@ def cholesky_solve(factor, rhs):  # type: ignore[no-untyped-def]
 
 
 @kernel
+def inverse_of_factor(factor, out):  # type: ignore[no-untyped-def]
+    """(L Lᵀ)⁻¹, both triangles: ``factor`` (m, m) from :func:`cholesky` is destroyed; ``out`` (m, m)."""
+    m = factor.shape[0]
+    # L becomes its inverse, column by column from the right.
+    for j in range(m - 1, -1, -1):
+        factor[j, j] = 1.0 / factor[j, j]
+        for i in range(m - 1, j, -1):
+            total = 0.0
+            for k in range(j + 1, i + 1):
+                total += factor[i, k] * factor[k, j]
+            factor[i, j] = -total * factor[j, j]
+    for i in range(m):
+        for j in range(i + 1):
+            total = 0.0
+            for k in range(i, m):
+                total += factor[k, i] * factor[k, j]
+            out[i, j] = out[j, i] = total
+
+
+@kernel
 def orthogonal_columns(columns, rotations):  # type: ignore[no-untyped-def]
     """Singular value decomposition in place, by one-sided Jacobi rotations (Hestenes).
 

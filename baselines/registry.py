@@ -17,6 +17,8 @@ from baselines.mfapc import ModelFreeAdaptivePredictiveControl
 from baselines.moore_penrose import MoorePenrose
 from baselines.null_space import NullSpace
 from baselines.policy import SolverPolicy
+from baselines.rhc import RecedingHorizon
+from baselines.rhc_foresight import RecedingHorizonForesight
 from baselines.rhc_gradient import RecedingHorizonGradient
 from baselines.rhc_lagrange import RecedingHorizonLagrange
 from baselines.smoothing import Smoothed
@@ -40,6 +42,8 @@ POLICIES: dict[str, type[SolverPolicy]] = {
         Broyden,
         RecedingHorizonGradient,
         RecedingHorizonLagrange,
+        RecedingHorizon,
+        RecedingHorizonForesight,
         Smoothed,
         ModelFreeAdaptiveControl,
         ModelFreeAdaptivePredictiveControl,

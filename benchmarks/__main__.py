@@ -1,69 +1,77 @@
-"""Measures and prints everything: ``python -m benchmarks``."""
+"""Measures everything, prints the tables and writes them: ``python -m benchmarks --out DIR``."""
 
 from __future__ import annotations
 
+import dataclasses
+import datetime
+import pathlib
 import subprocess
 import sys
-from collections.abc import Mapping
 
-from benchmarks.environments import ROWS, single, vector, whole_episodes
-from benchmarks.kernels import kinematics
-from benchmarks.policies import POLICIES, damped_iterations, predict_times
-from benchmarks.timing import medians
-from ikgym.parallel import cores
+import tyro
 
+from benchmarks import environments, growth, horizons, kernels, policies, report
+from benchmarks.effort import FULL, QUICK, Effort
+from benchmarks.table import Column, Table
 
-def main() -> None:
-    """Prints medians and ratios; all figures of one table are from interleaved rounds of one run."""
-    print(f"{cores()} cores, Python {sys.version.split()[0]}")
-    print(f"import ikgym, warm: {_import_time():.2f} s\n")
-
-    print("One step through gym.make, median")
-    times = medians(single())
-    _table({name: (f"{1e6 * t:8.2f} µs", _ratio(t, times["RedundantIK-v0, varga7-fast"])) for name, t in times.items()})
-
-    for rows in ROWS:
-        print(f"\nNative vector environment, {rows} arms, steps per second between resets")
-        _table({name: (f"{rows / t / 1e6:8.2f} M",) for name, t in medians(vector(rows)).items()})
-
-    whole = whole_episodes(1024) / 1e6
-    print(f"\nWhole episodes of varga7-random, resets included, 1024 arms: {whole:.2f} M steps per second")
-
-    print("\nForward kinematics and Jacobian, 7 joints, time per pose")
-    calls = kinematics()
-    poses = medians({name: call for name, (call, _) in calls.items()})
-    per_pose = {name: t / calls[name][1] for name, t in poses.items()}
-    fastest = per_pose["ikgym kernel, in a compiled loop"]
-    _table({name: (f"{1e6 * t:8.3f} µs", _ratio(t, fastest)) for name, t in per_pose.items()})
-
-    for scenario in POLICIES:
-        print(f"\nOne predict on {scenario}: median, 99th percentile")
-        predicting = predict_times(scenario)
-        _table({name: (f"{1e6 * p50:8.1f} µs", f"{1e6 * p99:8.1f} µs") for name, (p50, p99) in predicting.items()})
-
-    print("\nOne iteration of damped least squares inside the kernel, 7 joints")
-    iterating = damped_iterations()
-    spent = medians({name: call for name, (call, _) in iterating.items()})
-    _table({name: (f"{1e6 * t / iterating[name][1]:8.3f} µs",) for name, t in spent.items()})
+SECTIONS = {
+    "start": lambda effort: [_import_table(effort)],
+    "environments": environments.tables,
+    "kinematics": kernels.tables,
+    "policies": policies.tables,
+    "horizons": horizons.tables,
+    "growth": growth.tables,
+}
 
 
-def _ratio(time: float, reference: float) -> str:
-    return f"{time / reference:8.2f} x"
+@dataclasses.dataclass(frozen=True)
+class Command:
+    """Measures speed beside other environments, libraries and solvers."""
+
+    out: pathlib.Path = pathlib.Path("results/bench")
+    """The folder that receives bench.json and README.md."""
+    quick: bool = False
+    """Everything once and small, to see that it runs."""
+    sections: tuple[str, ...] = tuple(SECTIONS)
+    """What to measure."""
 
 
-def _table(rows: Mapping[str, tuple[str, ...]]) -> None:
-    width = max(map(len, rows))
-    for name, cells in rows.items():
-        print(f"  {name:<{width}}  " + "  ".join(cells))
+def main(command: Command) -> list[Table]:
+    """Measures section after section, prints each table when it is done, and writes the report.
+
+    Raises:
+        SystemExit: There is no section of a name.
+    """
+    if unknown := set(command.sections) - set(SECTIONS):
+        raise SystemExit(f"sections: expected some of {', '.join(SECTIONS)}, got {', '.join(sorted(unknown))}.")
+    done: list[Table] = []
+    for section in command.sections:
+        for table in SECTIONS[section](QUICK if command.quick else FULL):
+            print(f"\n{table.text()}", flush=True)
+            done.append(table)
+    given = {
+        "command": " ".join(["python -m benchmarks", *sys.argv[1:]]),
+        "finished": f"{datetime.datetime.now(datetime.UTC):%Y-%m-%d %H:%M} UTC",
+        "quick": command.quick,
+    }
+    report.save(command.out, done, given | report.conditions())
+    return done
 
 
-def _import_time() -> float:
+def _import_table(effort: Effort) -> Table:
     code = "import time; t = time.perf_counter(); import ikgym; print(time.perf_counter() - t)"
-    return min(
+    seconds = min(
         float(subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout)
-        for _ in range(3)
+        for _ in range(3 if effort is FULL else 1)
+    )
+    return Table(
+        "import",
+        "Start",
+        "The import of ikgym, warm, best of three.",
+        (Column("s", "time", "s"),),
+        {"import ikgym": (seconds,)},
     )
 
 
 if __name__ == "__main__":
-    main()
+    main(tyro.cli(Command))

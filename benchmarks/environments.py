@@ -11,8 +11,19 @@ import gymnasium as gym
 import numpy as np
 
 import ikgym
+from benchmarks.effort import FULL, Effort
+from benchmarks.table import Column, Table
+from benchmarks.timing import medians
 
-ROWS = (64, 1024, 16384)
+Calls = dict[str, Callable[[], object]]
+OURS = "RedundantIK-v0, varga7-fast"
+#: Gymnasium steps its environments one by one: more of them would only take longer.
+MOST_IN_A_ROW = 1024
+
+
+def tables(effort: Effort = FULL) -> list[Table]:
+    """Steps of one environment, of N, and whole episodes with their resets."""
+    return [_single_table(effort), *(_vector_table(rows, effort) for rows in effort.rows), _whole_table(effort)]
 
 
 def stepper(env_id: str, **kwargs: Any) -> Callable[[], None]:
@@ -30,44 +41,106 @@ def stepper(env_id: str, **kwargs: Any) -> Callable[[], None]:
     return step
 
 
-def single() -> dict[str, Callable[[], None]]:
-    """Steps through `gym.make`, by name."""
-    calls = {
-        "RedundantIK-v0, varga7-fast": stepper("RedundantIK-v0", scenario="varga7-fast"),
+def single() -> tuple[Calls, tuple[str, ...]]:
+    """Steps through `gym.make` by name, and what is left out."""
+    calls: Calls = {
+        OURS: stepper("RedundantIK-v0", scenario="varga7-fast"),
         "RedundantIK-v0, varga7-random": stepper("RedundantIK-v0", scenario="varga7-random"),
         "Pendulum-v1": stepper("Pendulum-v1"),
     }
     try:
         calls["Reacher-v5"] = stepper("Reacher-v5")
     except (ImportError, gym.error.DependencyNotInstalled) as e:
-        warnings.warn(f"Reacher-v5 is left out: {e}", stacklevel=2)
-    return calls
+        return calls, (f"Reacher-v5: {e}",)
+    return calls, ()
 
 
-def whole_episodes(rows: int, scenario: str = "varga7-random") -> float:
+def vector(rows: int) -> tuple[Calls, tuple[str, ...]]:
+    """Steps of vector environments by name, each of all its rows, and what is left out."""
+    calls, skipped = {}, []
+    for scenario in ("varga7-fast", "varga7-random"):
+        calls[f"RedundantIK-v0 native, {scenario}"] = _stepping(
+            gym.make_vec("RedundantIK-v0", num_envs=rows, scenario=scenario)
+        )
+    if rows <= MOST_IN_A_ROW:
+        calls["Pendulum-v1, Gymnasium's SyncVectorEnv"] = _stepping(
+            gym.make_vec("Pendulum-v1", num_envs=rows, vectorization_mode="sync")
+        )
+    else:
+        skipped.append(f"SyncVectorEnv with more than {MOST_IN_A_ROW} environments")
+    try:
+        import envpool
+    except ImportError as e:
+        return calls, (*skipped, f"EnvPool: {e}")
+    # The 16,384 simulations of MuJoCo take ten seconds to make.
+    for name in ("Pendulum-v1", "Reacher-v5") if rows <= MOST_IN_A_ROW else ("Pendulum-v1",):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # its boxes are float64, and Gymnasium minds
+            calls[f"{name}, EnvPool"] = _stepping(envpool.make_gymnasium(name, num_envs=rows, seed=0), rows)
+    return calls, tuple(skipped)
+
+
+def whole_episodes(rows: int, scenario: str = "varga7-random", steps: int | None = None) -> float:
     """Steps per second of the native vector environment over a whole episode of each row, the resets included.
 
     Args:
         rows: How many arms.
         scenario: A scenario's name.
+        steps: Steps of an episode; the scenario's own if left out.
     """
-    envs = gym.make_vec("RedundantIK-v0", num_envs=rows, scenario=scenario, autoreset_mode="SameStep")
-    envs.reset(seed=0)
-    actions = np.zeros(envs.action_space.shape or (), dtype=np.float32)
-    envs.step(actions)
-    steps = ikgym.scenarios.get(scenario).steps
+    given = ikgym.scenarios.get(scenario)
+    given = given if steps is None else given.replace(steps=steps)
+    envs = gym.make_vec("RedundantIK-v0", num_envs=rows, scenario=given, autoreset_mode="SameStep")
+    step = _stepping(envs)
+    step()
     begin = time.perf_counter()
-    for _ in range(steps):
-        envs.step(actions)
-    return rows * steps / (time.perf_counter() - begin)
+    for _ in range(given.steps):
+        step()
+    return rows * given.steps / (time.perf_counter() - begin)
 
 
-def vector(rows: int) -> dict[str, Callable[[], object]]:
-    """Steps of vector environments, by name; each steps all its rows."""
-    calls: dict[str, Callable[[], object]] = {}
-    for scenario in ("varga7-fast", "varga7-random"):
-        envs = gym.make_vec("RedundantIK-v0", num_envs=rows, scenario=scenario)
-        envs.reset(seed=0)
-        actions = np.zeros(envs.action_space.shape or (), dtype=np.float32)
-        calls[f"RedundantIK-v0 native, {scenario}"] = lambda envs=envs, actions=actions: envs.step(actions)  # type: ignore[misc]
-    return calls
+def _stepping(envs: Any, rows: int | None = None) -> Callable[[], object]:
+    """A step with actions of 0, after a reset; ``rows`` where the action space is that of one row."""
+    envs.reset() if rows else envs.reset(seed=0)
+    actions = np.zeros((*((rows,) if rows else ()), *envs.action_space.shape), dtype=envs.action_space.dtype)
+    return lambda: envs.step(actions)
+
+
+def _single_table(effort: Effort) -> Table:
+    calls, skipped = single()
+    times = medians(calls, effort.rounds, effort.seconds)
+    return Table(
+        "environment_single",
+        "One step of one environment",
+        "Through `gym.make` with its usual wrappers, a fixed action, the resets of ended episodes included; medians.",
+        (Column("step_us", "step", "µs"), Column("ratio", "× varga7-fast")),
+        {name: (1e6 * t, t / times[OURS]) for name, t in times.items()},
+        skipped,
+    )
+
+
+def _vector_table(rows: int, effort: Effort) -> Table:
+    calls, skipped = vector(rows)
+    times = medians(calls, effort.rounds, effort.seconds)
+    reference = next(iter(times.values()))
+    return Table(
+        f"environment_vector_{rows}",
+        f"Steps of {rows:,} environments at once",
+        "Actions of 0, as many threads as the environment chooses, medians. Episodes begin anew where they end: after "
+        "3000 steps of RedundantIK-v0, 200 of Pendulum-v1, 50 of Reacher-v5.",
+        (Column("steps_per_us", "steps per second", "10⁶/s"), Column("ratio", "time × native, varga7-fast")),
+        {name: (1e-6 * rows / t, t / reference) for name, t in times.items()},
+        skipped,
+    )
+
+
+def _whole_table(effort: Effort) -> Table:
+    rows = min(effort.rows[-1], 1024)
+    steps = None if effort is FULL else effort.steps
+    return Table(
+        "environment_whole_episodes",
+        "Whole episodes, their resets included",
+        f"Scenario varga7-random, {rows:,} arms, one episode of each.",
+        (Column("steps_per_us", "steps per second", "10⁶/s"),),
+        {"RedundantIK-v0 native, varga7-random": (1e-6 * whole_episodes(rows, steps=steps),)},
+    )

@@ -9,9 +9,29 @@ import pinocchio as pin
 from numba import njit
 
 import ikgym
+from benchmarks.effort import FULL, Effort
+from benchmarks.table import Column, Table
+from benchmarks.timing import medians
 from ikgym.kinematics import forward_and_jacobian
 
 LOOP = 1000
+
+
+def tables(effort: Effort = FULL) -> list[Table]:
+    """Forward kinematics and Jacobian of 7 joints."""
+    calls = kinematics()
+    times = medians({name: call for name, (call, _) in calls.items()}, effort.rounds, effort.seconds)
+    per_pose = {name: t / calls[name][1] for name, t in times.items()}
+    fastest = next(iter(per_pose.values()))
+    return [
+        Table(
+            "kinematics",
+            "Forward kinematics and Jacobian, 7 joints",
+            "The arm varga7 at random configurations, one thread, medians.",
+            (Column("pose_us", "per pose", "µs"), Column("ratio", "× compiled loop")),
+            {name: (1e6 * t, t / fastest) for name, t in per_pose.items()},
+        )
+    ]
 
 
 @njit

@@ -13,8 +13,10 @@ import baselines
 import ikgym
 from baselines.damped_step import damped_step
 from baselines.policy import Batch
+from benchmarks.effort import FULL, Effort
+from benchmarks.table import Column, Table
+from benchmarks.timing import medians
 
-STEPS = 1000
 #: Policies by scenario and label.
 POLICIES: dict[str, dict[str, tuple[str, dict[str, object]]]] = {
     "varga7-fast": {
@@ -35,9 +37,14 @@ POLICIES: dict[str, dict[str, tuple[str, dict[str, object]]]] = {
 }
 
 
-def predict_times(scenario: str = "varga7-fast") -> dict[str, tuple[float, float]]:
+def tables(effort: Effort = FULL) -> list[Table]:
+    """Times of `predict` in its scenarios, and of the iteration that most solvers share."""
+    return [*(_predicting(scenario, effort) for scenario in POLICIES), _iterations(effort)]
+
+
+def predict_times(scenario: str = "varga7-fast", steps: int = FULL.steps) -> dict[str, tuple[float, float]]:
     """Median and 99th percentile of the time of `predict` in [s], by policy."""
-    return {label: _episode(scenario, name, kwargs) for label, (name, kwargs) in POLICIES[scenario].items()}
+    return {label: _episode(scenario, name, kwargs, steps) for label, (name, kwargs) in POLICIES[scenario].items()}
 
 
 def damped_iterations(rows: int = 100, iterations: int = 100) -> dict[str, tuple[Callable[[], object], int]]:
@@ -74,13 +81,35 @@ def _steps(rounds, jacobian, error, damping, gram, x, out):  # type: ignore[no-u
         damped_step(jacobian, error, damping, gram, x, out)
 
 
-def _episode(scenario: str, name: str, kwargs: dict[str, object]) -> tuple[float, float]:
+def _predicting(scenario: str, effort: Effort) -> Table:
+    return Table(
+        f"predict_{scenario}",
+        f"One predict in {scenario}",
+        f"One arm, the first {effort.steps} steps of an episode, one policy after the other.",
+        (Column("p50_us", "median", "µs"), Column("p99_us", "99th percentile", "µs")),
+        {name: (1e6 * a, 1e6 * b) for name, (a, b) in predict_times(scenario, effort.steps).items()},
+    )
+
+
+def _iterations(effort: Effort) -> Table:
+    calls = damped_iterations(iterations=100 if effort is FULL else effort.steps)
+    times = medians({name: call for name, (call, _) in calls.items()}, effort.rounds, effort.seconds)
+    return Table(
+        "damped_iteration",
+        "One iteration of damped least squares, 7 joints",
+        "Inside the compiled kernel, 100 arms on the way to random targets, medians.",
+        (Column("iteration_us", "per iteration", "µs"),),
+        {name: (1e6 * t / calls[name][1],) for name, t in times.items()},
+    )
+
+
+def _episode(scenario: str, name: str, kwargs: dict[str, object], steps: int) -> tuple[float, float]:
     policy = baselines.make(name, scenario, **kwargs)
     env = gym.make("RedundantIK-v0", scenario=scenario, preview=policy.preview)
     observation, _ = env.reset(seed=0)
     policy.predict(observation)
-    state, times = None, np.empty(STEPS)
-    for k in range(STEPS):
+    state, times = None, np.empty(steps)
+    for k in range(steps):
         begin = time.perf_counter()
         action, state = policy.predict(observation, state)
         times[k] = time.perf_counter() - begin

@@ -1,0 +1,142 @@
+"""The time grid of a joint path: knots ahead, and how much each of them counts."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from ikgym.jit import kernel
+
+Floats = npt.NDArray[np.float64]
+Integers = npt.NDArray[np.int64]
+
+
+class Grid(NamedTuple):
+    """K knots; the path is linear between two, and begins where the arm is.
+
+    Attributes:
+        at: Steps from now to each knot, at least 1 and rising. Shape (K,).
+        length: Steps of the block that ends in the knot. Shape (K,).
+        tracking: How many stage costs of tracking the knot stands for. Shape (K,).
+        velocity: How many stage costs of velocity the block stands for. Shape (K,).
+    """
+
+    at: Integers
+    length: Floats
+    tracking: Floats
+    velocity: Floats
+
+
+def offsets(steps: int, blocks: int | None) -> Integers:
+    """Steps from now to the knots of a horizon: two blocks of one step, then lengths that grow geometrically.
+
+    Args:
+        steps: Steps of the horizon.
+        blocks: K; None, or as many as there are steps, for a knot at each step.
+
+    Returns:
+        Whole numbers, rising by at least 1, the last one ``steps``. Shape (K,).
+    """
+    if blocks is None or blocks >= steps:
+        return np.arange(1, steps + 1)
+    if blocks <= 2:
+        return np.array([1, steps][:blocks]) if blocks == 2 else np.array([steps])
+    growing = np.arange(1, blocks - 1)
+    low, high = 1.0, float(steps)
+    for _ in range(200):
+        ratio = 0.5 * (low + high)
+        low, high = (ratio, high) if np.sum(ratio**growing) < steps - 2 else (low, ratio)
+    ends = 2.0 + np.cumsum(low**growing)
+    # Rounded, no block shorter than a step, and the last where the horizon ends.
+    out = np.concatenate([[1, 2], np.rint(ends).astype(np.int64)])
+    out = np.maximum(out, np.arange(1, blocks + 1))
+    return np.minimum(out, steps - blocks + np.arange(1, blocks + 1))
+
+
+@kernel
+def cut(at, steps, terminal, grid):  # type: ignore[no-untyped-def]
+    """The grid of the knots ``at``, cut so that none lies more than ``steps`` ahead.
+
+    A block of h steps is weighted by the trapezoidal rule: the tracking costs of its steps are (h - 1) / 2 times that
+    of the knot before and (h + 1) / 2 times that of the knot at its end, which is exact for blocks of one step. The
+    joint velocity is the same all along a block, so that its cost counts h times.
+
+    Args:
+        at: Steps from now to the knots of the whole horizon. Shape (K,).
+        steps: Steps ahead of the last knot at most; at least 1.
+        terminal: Factor of the tracking cost of the last knot.
+        grid: Receives the grid in its first elements.
+
+    Returns:
+        How many knots there are.
+    """
+    knots, before = 0, 0
+    for k in range(at.shape[0]):
+        here = min(at[k], steps)
+        length = here - before
+        grid.at[k] = here
+        grid.length[k] = length
+        grid.velocity[k] = length
+        grid.tracking[k] = 0.5 * (length + 1.0)
+        if k > 0:
+            grid.tracking[k - 1] += 0.5 * (length - 1.0)
+        before = here
+        knots = k + 1
+        if here == steps:
+            break
+    grid.tracking[knots - 1] *= terminal
+    return knots
+
+
+@kernel
+def first_knots(grid, knots):  # type: ignore[no-untyped-def]
+    """The first so many knots of a grid."""
+    return Grid(grid.at[:knots], grid.length[:knots], grid.tracking[:knots], grid.velocity[:knots])
+
+
+@kernel
+def empty_grid(knots):  # type: ignore[no-untyped-def]
+    """A grid to be filled by :func:`cut`."""
+    return Grid(np.empty(knots, np.int64), np.empty(knots), np.empty(knots), np.empty(knots))
+
+
+@kernel
+def slide(old, path, qdot, new, out):  # type: ignore[no-untyped-def]
+    """What is left of a path one step later, at the knots of a new grid; past its end it goes on as it ended.
+
+    Args:
+        old: The grid of the path.
+        path: Joint coordinates at its knots. Shape (K, n).
+        qdot: q̇ Δt of the step that has passed, for a path of a single knot. Shape (n,).
+        new: The grid asked for, counted from one step later.
+        out: Receives the joint coordinates. Shape (at least as many as there are knots, n).
+    """
+    last = old.at.shape[0] - 1
+    block = 0
+    for k in range(new.at.shape[0]):
+        time = new.at[k] + 1
+        while block < last and old.at[block] < time:
+            block += 1
+        share = (time - old.at[block]) / old.length[block]  # from the end of the block, so 0 at its knot
+        for j in range(path.shape[1]):
+            slope = path[block, j] - path[block - 1, j] if block > 0 else qdot[j] * old.length[0]
+            out[k, j] = path[block, j] + share * slope
+
+
+@kernel
+def slide_multipliers(old, multipliers, new):  # type: ignore[no-untyped-def]
+    """Multipliers one step later, in place: each knot takes over those of the old knot at its time or next after it.
+
+    Args:
+        old: The grid of the multipliers.
+        multipliers: Shape (at least as many as the knots of both, w).
+        new: The grid asked for, counted from one step later; with no more knots than the old one.
+    """
+    last, block = old.at.shape[0] - 1, 0
+    for k in range(new.at.shape[0]):
+        while block < last and old.at[block] < new.at[k] + 1:
+            block += 1
+        for i in range(multipliers.shape[1]):
+            multipliers[k, i] = multipliers[block, i]

@@ -1,0 +1,145 @@
+"""Solvers of the horizon problem behind one interface: policies of `baselines`, and those of others."""
+
+from __future__ import annotations
+
+import abc
+import importlib
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+import baselines
+from baselines.policy import Problem, SolverPolicy
+from baselines.rhc import RecedingHorizon
+from baselines.status import Status
+from benchmarks.rivals.numpy_horizon import Horizon, Plan, plan_cost
+from benchmarks.states import Observation
+from ikgym.scenarios import Scenario
+from ikgym.validation import FloatArray
+
+
+class Answer(NamedTuple):
+    """A plan and what it costs.
+
+    Attributes:
+        q: Joint coordinates at the knots, in [rad] or [m]. Shape (K, n).
+        cost: By :func:`benchmarks.rivals.numpy_horizon.plan_cost`, for all contenders alike.
+        iterations: Iterations made.
+        converged: Whether the contender says that it has found an optimum.
+    """
+
+    q: FloatArray
+    cost: float
+    iterations: int
+    converged: bool
+
+
+class Contender(abc.ABC):
+    """A solver of the horizon with HL grid points in one scenario."""
+
+    @abc.abstractmethod
+    def warmed(self, observations: Sequence[Observation]) -> tuple[Callable[[], Any], Callable[[Any], Answer]]:
+        """Solves all states but the last, each from the answer to the one before.
+
+        Returns:
+            The call that solves the last one, to be timed, and what makes an answer of its result.
+        """
+
+
+class PolicyContender(Contender):
+    """A policy: what is timed is its `predict`."""
+
+    def __init__(self, policy: SolverPolicy) -> None:
+        self.policy = policy
+
+    def warmed(self, observations: Sequence[Observation]) -> tuple[Callable[[], Any], Callable[[Any], Answer]]:
+        """See :meth:`Contender.warmed`."""
+        state = None
+        for observation in observations[:-1]:
+            _, state = self.policy.predict(observation, state)
+        last, problem = observations[-1], self.policy.problem
+
+        def answer(result: Any) -> Answer:
+            q = plan_of(self.policy, last, result[1])
+            cost = plan_cost(problem, Horizon(last["q"], last["nominal"][: len(q)]), q)
+            status, iterations = (int(array[0]) for array in self.policy.report(result[1]))
+            return Answer(q, cost, iterations, status in (Status.CONVERGED, Status.SATURATED))
+
+        return lambda: self.policy.predict(last, state), answer
+
+
+class RivalContender(Contender):
+    """Someone else's solver, which starts from its last plan, one step on."""
+
+    def __init__(self, rival: Any) -> None:
+        self.rival = rival
+
+    def warmed(self, observations: Sequence[Observation]) -> tuple[Callable[[], Any], Callable[[Any], Answer]]:
+        """See :meth:`Contender.warmed`."""
+        start = None
+        *before, last = (Horizon(o["q"], o["nominal"][: self.rival.knots]) for o in observations)
+        for horizon in before:
+            q = self.rival.solve(horizon, start).q
+            start = np.vstack([q[1:], q[-1:]])
+
+        def answer(plan: Plan) -> Answer:
+            return Answer(plan.q, plan.cost, plan.iterations, plan.converged)
+
+        return lambda: self.rival.solve(last, start), answer
+
+
+def plan_of(policy: SolverPolicy, observation: Observation, state: Any) -> FloatArray:
+    """The joint coordinates at the knots that a policy has in mind. Shape (K, n)."""
+    if isinstance(policy, RecedingHorizon):
+        return policy.plan(state)[0]
+    qdot: FloatArray = state[2][0]  # those of gradient descent are velocities
+    out: FloatArray = observation["q"] + policy.problem.dt * np.cumsum(qdot, axis=0)
+    return out
+
+
+def policies(scenario: Scenario, grid: int) -> dict[str, Contender]:
+    """The policies that plan over a horizon, by label."""
+    return {
+        label: PolicyContender(baselines.make(name, scenario, horizon=grid, **kwargs))
+        for label, (name, kwargs, most) in POLICIES.items()
+        if grid <= most
+    }
+
+
+def rivals(scenario: Scenario, grid: int) -> tuple[dict[str, Contender], tuple[str, ...]]:
+    """What others solve the same problem by, by label, and what is left out."""
+    out: dict[str, Contender] = {}
+    skipped = []
+    for label, (module, name, kwargs) in RIVALS.items():
+        try:
+            rival = getattr(importlib.import_module(f"benchmarks.rivals.{module}"), name)
+        except ImportError as e:
+            skipped.append(f'{label}: {e}; pip install "ikgym[rivals]"')
+        else:
+            out[label] = RivalContender(rival(Problem.of(scenario), grid - 1, **kwargs))
+    return out, tuple(skipped)
+
+
+def linear_quadratic(joints: int, knots: int) -> Callable[[], object] | None:
+    """One iteration of Crocoddyl without any kinematics; None where it is missing."""
+    try:
+        from benchmarks.rivals import crocoddyl_horizon
+    except ImportError:
+        return None
+    return crocoddyl_horizon.linear_quadratic(joints, knots)
+
+
+#: The exact solver, to which all times are compared.
+EXACT = "rhc"
+#: Label, name, parameters, and the longest horizon at which it does not take seconds.
+POLICIES: dict[str, tuple[str, dict[str, Any], int]] = {
+    EXACT: ("rhc", {}, 1000),
+    "rhc, one Newton step a call": ("rhc", {"iterations": 1}, 1000),
+    "rhc_gradient, analytic": ("rhc_gradient", {"gradient": "analytic", "tolerance": 0.0}, 1000),
+    "rhc_gradient, differences": ("rhc_gradient", {"tolerance": 0.0}, 30),
+}
+RIVALS: dict[str, tuple[str, str, dict[str, Any]]] = {
+    "CasADi, IPOPT": ("casadi_horizon", "CasadiHorizon", {}),
+    "Crocoddyl, FDDP": ("crocoddyl_horizon", "CrocoddylHorizon", {}),
+}

@@ -1,0 +1,59 @@
+"""The report of a run: what was measured, on what, as JSON and as a page."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import json
+import pathlib
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from baselines.machine import describe
+from baselines.results import write
+from benchmarks.table import Table
+
+#: Whose versions matter to a figure besides those of :func:`baselines.machine.describe`.
+LIBRARIES = ("gymnasium", "mujoco", "envpool", "pin", "casadi", "crocoddyl")
+
+
+def conditions() -> dict[str, Any]:
+    """The machine, and the versions of what is measured beside, None where it is missing."""
+    return {**describe(), **{name: _version(name) for name in LIBRARIES}}
+
+
+def save(directory: pathlib.Path, tables: Sequence[Table], given: Mapping[str, Any]) -> None:
+    """Writes `bench.json` and `README.md`.
+
+    Args:
+        directory: The folder; made if it is not there.
+        tables: What was measured.
+        given: Machine, versions, command and date.
+    """
+    directory.mkdir(parents=True, exist_ok=True)
+    document = {"conditions": dict(given), "tables": [table.as_json() for table in tables]}
+    write(
+        directory / "bench.json", (json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode()
+    )
+    write(directory / "README.md", page(tables, given).encode())
+
+
+def page(tables: Sequence[Table], given: Mapping[str, Any]) -> str:
+    """All tables in Markdown."""
+    listed = "\n".join(f"- {key}: {'not installed' if value is None else value}" for key, value in given.items())
+    return "\n\n".join(
+        [
+            "# Speed",
+            "All figures of one table are medians of interleaved rounds of one run, so that ratios hold on a noisy "
+            "machine; figures of different tables do not compare as well.",
+            *(table.markdown() for table in tables),
+            "## Conditions",
+            listed,
+        ]
+    ) + "\n"  # fmt: skip
+
+
+def _version(name: str) -> str | None:
+    try:
+        return importlib.metadata.version(name)
+    except importlib.metadata.PackageNotFoundError:
+        return None

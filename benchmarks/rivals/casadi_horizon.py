@@ -1,0 +1,125 @@
+"""The horizon problem for IPOPT, by way of CasADi: an independent optimiser of the very same cost."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from typing import Any
+
+import casadi
+import numpy as np
+
+from baselines.policy import Problem
+from benchmarks.rivals import casadi_kinematics
+from benchmarks.rivals.numpy_horizon import Horizon, Plan, plan_cost
+from ikgym.exceptions import InvalidInputError
+from ikgym.validation import FloatArray
+
+#: Below a tolerance of 1e-10 IPOPT often cannot tell that it has arrived, and goes on until its iterations are spent;
+#: scaled by the gradient it finds its way from a far start in a fraction of the iterations.
+OPTIONS: dict[str, Any] = {
+    "print_time": False,
+    "error_on_fail": False,
+    "ipopt.print_level": 0,
+    "ipopt.sb": "yes",
+    "ipopt.tol": 1e-10,
+    "ipopt.constr_viol_tol": 1e-12,
+    "ipopt.compl_inf_tol": 1e-10,
+    "ipopt.dual_inf_tol": 1e-8,
+    "ipopt.acceptable_iter": 0,
+    "ipopt.bound_relax_factor": 0.0,
+    "ipopt.nlp_scaling_method": "gradient-based",
+    "ipopt.mu_strategy": "adaptive",
+    "ipopt.max_iter": 1000,
+}
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class CasadiHorizon:
+    """The optimum of a horizon by an interior point method.
+
+    Φ^X has a kink where |r| = 1 with r = error / Δx: it is the larger of r² and |r|^P, so that a variable t above
+    r², r^P and -r^P makes the problem smooth without changing its optimum. Joint coordinates count from the start
+    in units of Δt, where all is of order 1.
+
+    Args:
+        problem: Arm, task, cost and Δt.
+        knots: K, the number of knots.
+        options: Of CasADi's `nlpsol`, over those of :data:`OPTIONS`.
+
+    Raises:
+        InvalidInputError: The cost has exponents that this form cannot express: P_X must be a whole number of at
+            least 2, P_in = P_out an even number.
+    """
+
+    problem: Problem
+    knots: int
+    options: dict[str, Any] = dataclasses.field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        cost = self.problem.cost
+        if cost.p_x < 2 or cost.p_x % 1:
+            raise InvalidInputError(f"p_x: expected a whole number of at least 2, got {cost.p_x:g}.")
+        if cost.p_in != cost.p_out or cost.p_in < 2 or cost.p_in % 2:
+            raise InvalidInputError(
+                f"p_in and p_out: expected the same even number, so that Φ^U is smooth, got {cost.p_in:g} and "
+                f"{cost.p_out:g}."
+            )
+
+    @functools.cached_property
+    def solver(self) -> Any:
+        """The compiled problem, made once: variables y, t; parameters q_0, the nominal coordinates, h, w."""
+        problem, knots = self.problem, self.knots
+        n, m, e = problem.model.joints, problem.task.size, problem.task.error_size
+        y, t = casadi.SX.sym("y", n, knots), casadi.SX.sym("t", e, knots)
+        start, nominal = casadi.SX.sym("q", n), casadi.SX.sym("nominal", m, knots)
+        h, w = casadi.SX.sym("h", knots), casadi.SX.sym("w", knots)
+        residual = self._residual
+        cost, power = casadi.SX(0), int(problem.cost.p_x)
+        above = []
+        for k in range(knots):
+            qdot = (y[:, k] - (y[:, k - 1] if k else 0.0)) / h[k]
+            cost += h[k] * casadi.sum1((qdot / problem.cost.delta_qdot) ** int(problem.cost.p_in))
+            cost += w[k] * casadi.sum1(t[:, k])
+            r = residual(start + problem.dt * y[:, k], nominal[:, k])
+            above.append(t[:, k] - r**2)
+            if power > 2:
+                above += [t[:, k] - r**power, t[:, k] + r**power] if power % 2 else [t[:, k] - r**power]
+        nlp = {
+            "x": casadi.vertcat(casadi.vec(y), casadi.vec(t)),
+            "p": casadi.vertcat(start, casadi.vec(nominal), h, w),
+            "f": cost,
+            "g": casadi.vertcat(*above),
+        }
+        return casadi.nlpsol("horizon", "ipopt", nlp, {**OPTIONS, **self.options})
+
+    @functools.cached_property
+    def _residual(self) -> Any:
+        """The error of one knot in units of Δx, as a function of q and the nominal coordinates."""
+        problem = self.problem
+        q, nominal = casadi.SX.sym("q", problem.model.joints), casadi.SX.sym("nominal", problem.task.size)
+        rotation, position = casadi_kinematics.forward(problem.model, q)
+        r = casadi_kinematics.error(problem.task.name, nominal, rotation, position) / problem.cost.delta_x
+        return casadi.Function("residual", [q, nominal], [r])
+
+    def solve(self, horizon: Horizon, start: FloatArray | None = None) -> Plan:
+        """The optimum from one state.
+
+        Args:
+            horizon: The state, of K knots.
+            start: Where to begin: joint coordinates at the knots; at rest if left out. Shape (K, n).
+        """
+        problem = self.problem
+        rest = np.tile(horizon.q, (self.knots, 1))
+        y = ((rest if start is None else start) - horizon.q) / problem.dt
+        r = np.array(self._residual.map(self.knots)(horizon.q[:, None] + problem.dt * y.T, horizon.nominal.T))
+        t = np.maximum(r**2, np.abs(r) ** problem.cost.p_x)
+        answer = self.solver(
+            x0=np.concatenate([y.ravel(), t.T.ravel()]),
+            p=np.concatenate([horizon.q, horizon.nominal.ravel(), horizon.lengths, horizon.tracking_weights]),
+            lbg=0.0,
+            ubg=np.inf,
+        )
+        stats = self.solver.stats()
+        q = horizon.q + problem.dt * np.array(answer["x"])[: y.size, 0].reshape(y.shape)
+        return Plan(q, plan_cost(problem, horizon, q), int(stats["iter_count"]), bool(stats["success"]))

@@ -1,0 +1,58 @@
+"""The arm, its task coordinates and their error once more, in symbols of CasADi."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi
+
+from ikgym.arms import Arm
+
+
+def forward(arm: Arm, q: Any) -> tuple[Any, Any]:
+    """Rotation (3, 3) and position (3,) in [m] of the tool at symbolic joint coordinates (Varga 2021, eq. 6)."""
+    rotation, position = casadi.SX.eye(3), casadi.SX.zeros(3)
+    for i in range(arm.joints):
+        offset, axis = casadi.DM(arm.offsets[i]), casadi.DM(arm.axes[i])
+        if arm.prismatic[i]:
+            position += rotation @ (offset + q[i] * axis)
+        else:
+            position += rotation @ offset
+            cross = casadi.skew(axis)
+            turn = casadi.DM.eye(3) + casadi.sin(q[i]) * cross + (1.0 - casadi.cos(q[i])) * (cross @ cross)
+            rotation = rotation @ turn  # eq. 8
+    return rotation @ casadi.DM(arm.tool_rotation), position + rotation @ casadi.DM(arm.tool)
+
+
+def error(task: str, nominal: Any, rotation: Any, position: Any) -> Any:
+    """What is missing from a pose to its nominal task coordinates.
+
+    Args:
+        task: The name of the task coordinates.
+        nominal: Nominal coordinates. Shape (m,).
+        rotation: Orientation. Shape (3, 3).
+        position: Position in [m]. Shape (3,).
+    """
+    if task == "position":
+        return nominal - position
+    if task == "skew":
+        skew = (rotation - rotation.T) / 2
+        return nominal - casadi.vertcat(skew[0, 1], skew[0, 2], skew[1, 2], position)
+    if task == "matrix":
+        return nominal - casadi.vertcat(casadi.vec(rotation.T), position)
+    return casadi.vertcat(nominal[9:] - position, _rotation_vector(casadi.reshape(nominal[:9], 3, 3).T @ rotation.T))
+
+
+def _rotation_vector(turn: Any) -> Any:
+    """Rotation vector in [rad], smooth for angles below π: by the quaternion, whose vector part is sin(θ/2) n."""
+    w = casadi.sqrt(1.0 + casadi.trace(turn)) / 2
+    v = _axial(turn) / (4 * w)
+    square = casadi.sumsqr(v)
+    # θ / sin(θ/2) is 0/0 at 0: a series there, and the square root kept away from 0 in the branch not taken.
+    sine = casadi.sqrt(casadi.fmax(square, 1e-4))
+    series = 2 + square * (1 / 3 + square * (3 / 20 + square * (5 / 56 + square * 35 / 576)))
+    return casadi.if_else(square < 1e-4, series, 2 * casadi.atan2(sine, w) / sine) * v
+
+
+def _axial(turn: Any) -> Any:
+    return casadi.vertcat(turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1])

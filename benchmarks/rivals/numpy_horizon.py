@@ -1,0 +1,121 @@
+"""The horizon problem in plain NumPy: the number by which all plans are compared, whoever made them.
+
+Over knots 1 … K behind a start q_0, with lengths h_k in steps and weights w_k, a plan q_1 … q_K costs
+``Σ_k h_k Φ^U((q_k - q_{k-1}) / (h_k Δt)) + w_k Φ^X(error(X^N_k, F(q_k)))``; the horizon of HL grid points of
+Varga 2021, section III, has K = HL - 1 and h = w = 1. Written anew from the papers, so that it can find a slip in
+ikgym's kernels.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from baselines.policy import Problem
+from ikgym.arms import Arm
+from ikgym.validation import FloatArray
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Horizon:
+    """One state of a receding horizon.
+
+    Args:
+        q: Joint coordinates at the start, in [rad] or [m]. Shape (n,).
+        nominal: Nominal task coordinates at the knots. Shape (K, m).
+        steps: Lengths h of the intervals that end at the knots, in time steps; all 1 if left out. Shape (K,).
+        weights: Weights w of the tracking costs; all 1 if left out. Shape (K,).
+    """
+
+    q: FloatArray
+    nominal: FloatArray
+    steps: FloatArray | None = None
+    weights: FloatArray | None = None
+
+    @property
+    def knots(self) -> int:
+        """K."""
+        return len(self.nominal)
+
+    @property
+    def lengths(self) -> FloatArray:
+        """h, with the default filled in. Shape (K,)."""
+        return np.ones(self.knots) if self.steps is None else np.asarray(self.steps, dtype=np.float64)
+
+    @property
+    def tracking_weights(self) -> FloatArray:
+        """w, with the default filled in. Shape (K,)."""
+        return np.ones(self.knots) if self.weights is None else np.asarray(self.weights, dtype=np.float64)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Plan:
+    """What a solver answers.
+
+    Args:
+        q: Joint coordinates at the knots, in [rad] or [m]. Shape (K, n).
+        cost: The cost of that plan by :func:`plan_cost`, whatever the solver believes.
+        iterations: Iterations made.
+        converged: Whether the solver says that it has found an optimum.
+    """
+
+    q: FloatArray
+    cost: float
+    iterations: int
+    converged: bool
+
+
+def plan_cost(problem: Problem, horizon: Horizon, q: FloatArray) -> float:
+    """The cost of a plan.
+
+    Args:
+        problem: Arm, task, cost and Δt.
+        horizon: Start, nominal coordinates, lengths and weights.
+        q: Joint coordinates at the knots, in [rad] or [m]. Shape (K, n).
+    """
+    cost, h = problem.cost, horizon.lengths
+    qdot = np.diff(np.vstack([horizon.q, q]), axis=0) / (h[:, None] * problem.dt)
+    errors = [
+        error(problem.task.name, x, coordinates(problem.task.name, *forward(problem.model, row)))
+        for x, row in zip(horizon.nominal, q, strict=True)
+    ]
+    velocity = _powers(qdot / cost.delta_qdot, cost.p_in, cost.p_out)
+    tracking = _powers(np.array(errors) / cost.delta_x, 2.0, cost.p_x)
+    return float(h @ velocity + horizon.tracking_weights @ tracking)
+
+
+def forward(arm: Arm, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Rotation (3, 3) and position (3,) in [m] of the tool: the product of Varga 2021, eq. 6 and 8."""
+    rotation, position = np.eye(3), np.zeros(3)
+    for offset, axis, prismatic, angle in zip(arm.offsets, arm.axes, arm.prismatic, q, strict=True):
+        position = position + rotation @ (offset + angle * axis if prismatic else offset)
+        if not prismatic:
+            cross = np.cross(np.eye(3), axis)
+            rotation = rotation @ (np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross)
+    return rotation @ arm.tool_rotation, position + rotation @ arm.tool
+
+
+def coordinates(task: str, rotation: FloatArray, position: FloatArray) -> FloatArray:
+    """Task coordinates of a pose. Shape (m,)."""
+    if task == "position":
+        return position
+    if task == "skew":
+        return np.concatenate([(0.5 * (rotation - rotation.T))[[0, 0, 1], [1, 2, 2]], position])
+    return np.concatenate([rotation.ravel(), position])
+
+
+def error(task: str, nominal: FloatArray, here: FloatArray) -> FloatArray:
+    """What is missing to the nominal coordinates. Shape (e,)."""
+    if task != "pose":
+        return nominal - here
+    turn = nominal[:9].reshape(3, 3) @ here[:9].reshape(3, 3).T
+    double_sine = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
+    length = float(np.linalg.norm(double_sine))
+    angle = np.arctan2(length, np.trace(turn) - 1.0)
+    return np.concatenate([nominal[9:] - here[9:], double_sine * (angle / length if length > 0.0 else 0.5)])
+
+
+def _powers(x: FloatArray, inside: float, outside: float) -> FloatArray:
+    r = np.abs(x)
+    return np.asarray(np.where(r > 1.0, r**outside, r**inside).sum(axis=-1))

@@ -1,0 +1,129 @@
+"""What is measured runs, and is what its name says; how fast it is found is nobody's test."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+
+import baselines
+import ikgym
+from baselines.policy import Problem
+from benchmarks import contenders, effort, environments, horizons, kernels, policies, states, timing
+from benchmarks.rivals.numpy_horizon import Horizon, plan_cost
+
+
+def test_medians_are_of_what_was_called():
+    counts = {"a": 0, "b": 0}
+
+    def count(name):
+        counts[name] += 1
+
+    times = timing.medians({name: lambda name=name: count(name) for name in counts}, rounds=3, seconds=1e-5)
+    assert set(times) == set(counts)
+    assert all(t > 0 for t in times.values())
+    assert all(n > 3 for n in counts.values())
+
+
+def test_a_turn_is_at_least_one_call():
+    made = []
+    timing.medians({"a": lambda: made.append(1)}, rounds=4, seconds=0.0)
+    assert len(made) == 1 + 1 + 4
+
+
+def test_environments_step():
+    for calls, skipped in (environments.single(), environments.vector(3)):
+        assert len(calls) >= 3
+        assert all(isinstance(why, str) for why in skipped)
+        for call in calls.values():
+            call()
+
+
+def test_many_environments_are_not_stepped_one_by_one(monkeypatch):
+    monkeypatch.setattr(environments, "MOST_IN_A_ROW", 2)
+    calls, skipped = environments.vector(3)
+    assert not any("SyncVectorEnv" in name for name in calls)
+    assert any("SyncVectorEnv" in why for why in skipped)
+
+
+def test_both_kinematics_are_of_the_same_arm():
+    import pinocchio as pin
+
+    arm = ikgym.arms.get("varga7")
+    model, frame = kernels.pinocchio_model(arm)
+    q = np.random.default_rng(0).uniform(-1, 1, 7)
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, q)
+    np.testing.assert_allclose(data.oMf[frame].translation, arm.forward(q)[1], atol=1e-12)
+    for call, poses in kernels.kinematics().values():
+        call()
+        assert poses >= 1
+
+
+def test_policies_are_those_of_their_scenarios():
+    for scenario, labelled in policies.POLICIES.items():
+        for name, parameters in labelled.values():
+            assert baselines.make(name, scenario, **parameters).name == name
+
+
+def test_iterations_are_counted_as_made():
+    for call, iterations in policies.damped_iterations(rows=2, iterations=3).values():
+        call()
+        assert iterations == 6
+
+
+def test_states_lead_to_one_another():
+    scenario = ikgym.scenarios.get("varga7-fast").replace(steps=30)
+    for seen in states.along(scenario, preview=4, count=2, lead=3):
+        assert len(seen) == 4
+        for before, after in itertools.pairwise(seen):
+            assert before["remaining"] - after["remaining"] == 1
+            np.testing.assert_allclose(before["q"] + scenario.dt * after["qdot"], after["q"], atol=1e-12)
+            np.testing.assert_array_equal(before["nominal"][1:], after["nominal"][:-1])
+
+
+def test_rows_are_each_on_their_own_way():
+    seen = states.rows_along(ikgym.scenarios.get("varga7-random"), preview=2, rows=3, lead=1)
+    assert len(seen) == 2
+    assert seen[0]["q"].shape == (3, 7)
+    assert len(np.unique(seen[-1]["q"][:, 0])) == 3
+
+
+@pytest.mark.parametrize("joints", [3, 14])
+def test_chains_have_as_many_joints_as_they_say(joints):
+    arm = states.chain(joints)
+    assert arm.joints == joints
+    assert arm.forward(np.zeros(joints))[1] == pytest.approx([0.1, 0.0, 0.3 * (joints + 1)])
+
+
+def test_costs_of_contenders_are_those_of_their_plans():
+    scenario = ikgym.scenarios.get("varga7-slow")
+    (seen,) = states.along(scenario, preview=4, count=1, lead=2)
+    others, _ = contenders.rivals(scenario, 5)
+    costs = {}
+    for label, contender in (contenders.policies(scenario, 5) | others).items():
+        call, answer = contender.warmed(seen)
+        found = answer(call())
+        assert found.q.shape == (4, 7)
+        horizon = Horizon(seen[-1]["q"], seen[-1]["nominal"])
+        assert found.cost == pytest.approx(plan_cost(Problem.of(scenario), horizon, found.q))
+        assert found.iterations >= 1
+        costs[label] = found.cost
+    # The rest of the contenders are what the optimum is compared with.
+    assert min(costs.values()) == pytest.approx(costs["CasADi, IPOPT"], rel=1e-4)
+    assert costs["rhc_gradient, analytic"] > costs["CasADi, IPOPT"]
+
+
+def test_what_is_not_installed_is_named(monkeypatch):
+    monkeypatch.setitem(contenders.RIVALS, "Somebody", ("no_such_module", "Nobody", {}))
+    found, skipped = contenders.rivals(ikgym.scenarios.get("varga7-slow"), 3)
+    assert "Somebody" not in found
+    assert any(why.startswith("Somebody") and "ikgym[rivals]" in why for why in skipped)
+
+
+def test_nobody_is_below_the_best():
+    for table in horizons.tables(effort.QUICK):
+        keys = [column.key for column in table.columns]
+        excesses = [row[keys.index("worst_excess")] for row in table.rows.values()]
+        assert min(value for value in excesses if value is not None) == 0.0
