@@ -10,13 +10,14 @@ import sys
 
 import tyro
 
-from benchmarks import environments, growth, horizons, kernels, policies, report
+from benchmarks import collection, environments, growth, horizons, kernels, policies, report
 from benchmarks.effort import FULL, QUICK, Effort
 from benchmarks.table import Column, Table
 
 SECTIONS = {
     "start": lambda effort: [_import_table(effort)],
     "environments": environments.tables,
+    "collection": collection.tables,
     "kinematics": kernels.tables,
     "policies": policies.tables,
     "horizons": horizons.tables,

@@ -92,7 +92,8 @@ class RivalContender(Contender):
 def plan_of(policy: SolverPolicy, observation: Observation, state: Any) -> FloatArray:
     """The joint coordinates at the knots that a policy has in mind. Shape (K, n)."""
     if isinstance(policy, RecedingHorizon):
-        return policy.plan(state)[0]
+        plan: FloatArray = policy.plan(state)[0]
+        return plan
     qdot: FloatArray = state[2][0]  # those of gradient descent are velocities
     out: FloatArray = observation["q"] + policy.problem.dt * np.cumsum(qdot, axis=0)
     return out

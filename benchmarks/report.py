@@ -13,7 +13,7 @@ from baselines.results import write
 from benchmarks.table import Table
 
 #: Whose versions matter to a figure besides those of :func:`baselines.machine.describe`.
-LIBRARIES = ("gymnasium", "mujoco", "envpool", "pin", "casadi", "crocoddyl")
+LIBRARIES = ("gymnasium", "mujoco", "envpool", "pin", "casadi", "crocoddyl", "stable-baselines3", "torch")
 
 
 def conditions() -> dict[str, Any]:

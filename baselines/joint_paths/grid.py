@@ -52,7 +52,8 @@ def offsets(steps: int, blocks: int | None) -> Integers:
     # Rounded, no block shorter than a step, and the last where the horizon ends.
     out = np.concatenate([[1, 2], np.rint(ends).astype(np.int64)])
     out = np.maximum(out, np.arange(1, blocks + 1))
-    return np.minimum(out, steps - blocks + np.arange(1, blocks + 1))
+    cut_off: Integers = np.minimum(out, steps - blocks + np.arange(1, blocks + 1))
+    return cut_off
 
 
 @kernel

@@ -1,0 +1,204 @@
+"""The native vector environment as a `VecEnv` of Stable-Baselines3: ``pip install "ikgym[train]"``."""
+
+from __future__ import annotations
+
+import time
+from copy import deepcopy
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import numpy.typing as npt
+from gymnasium.vector import AutoresetMode
+
+from ikgym.env import OPTIONS, REPORTED, checked_options
+from ikgym.exceptions import InvalidInputError, MissingDependencyError
+from ikgym.scenarios import Preview, Scenario
+from ikgym.simulator import Observation
+from ikgym.validation import FloatArray, float_array
+from ikgym.vector_env import Flags, RedundantIKVectorEnv
+
+try:
+    from stable_baselines3.common.monitor import Monitor
+    from stable_baselines3.common.vec_env import VecEnv
+    from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices
+except ImportError as error:
+    raise MissingDependencyError('ikgym.sb3 needs Stable-Baselines3: pip install "ikgym[train]"') from error
+
+StepReturn = tuple[Observation, npt.NDArray[np.float32], Flags, list[dict[str, Any]]]
+
+
+class RedundantIKVecEnv(VecEnv):
+    """N arms in one process, stepped by one compiled kernel, for Stable-Baselines3.
+
+    Observations, rewards (as float32), ends and the episodes drawn after them are bit-identical to those of
+    `DummyVecEnv` over N single environments, each in SB3's `Monitor`. Only the infos say less: that of a row is
+    empty but at the end of its episode, where it holds what the single environment's last one does, and
+
+    | key | meaning |
+    |---|---|
+    | `TimeLimit.truncated` | True: no episode ends in another way |
+    | `terminal_observation` | the last observation; the one returned is already the first of the next episode |
+    | `episode` | `r`, `l`, `t`: return, length in steps, time since the environment was made in [s], as of `Monitor` |
+
+    As `r` is the sum of the float64 rewards before any wrapper, `env_is_wrapped(Monitor)` is true.
+
+    >>> from stable_baselines3 import PPO
+    >>> model = PPO("MultiInputPolicy", RedundantIKVecEnv(64, "varga7-random", preview=(1, 10, 40)))
+
+    Args:
+        num_envs: N.
+        scenario: A scenario or the name of one, see `ikgym.scenarios.names()`.
+        preview: How many steps ahead the nominal coordinates are shown, or which ones.
+
+    Raises:
+        UnknownNameError: There is no such scenario.
+        InvalidInputError: N or the preview is not valid.
+    """
+
+    def __init__(self, num_envs: int = 1, scenario: str | Scenario = "varga7-fast", preview: Preview = 2) -> None:
+        self._envs = RedundantIKVectorEnv(num_envs, scenario, preview, AutoresetMode.SAME_STEP)
+        self.scenario = self._envs.scenario
+        self._rows = [_Row(self._envs, index) for index in range(num_envs)]
+        self._actions: npt.NDArray[Any] | None = None
+        self._returns = np.zeros(num_envs)
+        self._made = time.perf_counter()
+        super().__init__(num_envs, self._envs.single_observation_space, self._envs.single_action_space)
+
+    def reset(self) -> Observation:
+        """Begins episodes in all rows, with what `seed()` and `set_options()` have left for this reset.
+
+        Row i is seeded with seed + i; without a seed it goes on with its generator. An option ``{"q": …}`` of shape
+        (n,), in [rad] or [m], starts elsewhere.
+
+        Returns:
+            The first observations, each of shape (N, …).
+
+        Raises:
+            UnknownNameError: There is no such option.
+            InvalidInputError: Seeds or options are not valid, or some rows have a start and others do not. The
+                episodes go on then, and seeds and options stay as they are.
+        """
+        observation, _ = self._envs.reset(seed=self._seeds, options=self._checked_options())
+        self._reset_seeds()
+        self._reset_options()
+        self._actions = None
+        self._returns[:] = 0.0
+        return observation
+
+    def step_async(self, actions: npt.NDArray[Any]) -> None:
+        """Takes joint velocities, as fractions of the velocity limit, for the step to come. Shape (N, n)."""
+        self._actions = deepcopy(actions)
+
+    def step_wait(self) -> StepReturn:
+        """Steps all arms, and begins new episodes in the rows where one has ended.
+
+        Returns:
+            Observations, each of shape (N, …); rewards and ends of shape (N,); one info a row.
+
+        Raises:
+            ResetNeededError: There has been no reset.
+            InvalidInputError: There are no actions, or they are not finite or of a wrong shape. Nothing has changed
+                then.
+        """
+        actions, self._actions = self._actions, None
+        observation, rewards, _, ended, final = self._envs.step(actions)  # type: ignore[arg-type]  # None is refused
+        self._returns += rewards
+        infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        for row in np.flatnonzero(ended).tolist():
+            infos[row] = {
+                **{key: final["final_info"][key][row].item() for key in REPORTED},
+                "TimeLimit.truncated": True,
+                "terminal_observation": final["final_obs"][row],
+                "episode": self._summary(row),
+            }
+        self._returns[ended] = 0.0
+        return observation, rewards.astype(np.float32), ended, infos
+
+    def close(self) -> None:
+        """Nothing is open; there is no harm in closing."""
+        self._envs.close()
+
+    def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
+        """What rows say of themselves: `scenario`, spaces, `np_random`, … and what `set_attr` has given them.
+
+        Raises:
+            AttributeError: They have no such attribute.
+        """
+        return [getattr(self._rows[index], attr_name) for index in self._get_indices(indices)]
+
+    def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
+        """Gives rows an attribute that they did not have before; the arms heed none.
+
+        Raises:
+            AttributeError: It is one of those that all arms share, such as the scenario: make another environment.
+        """
+        for index in self._get_indices(indices):
+            setattr(self._rows[index], attr_name, value)
+
+    def env_method(
+        self, method_name: str, *method_args: Any, indices: VecEnvIndices = None, **method_kwargs: Any
+    ) -> list[Any]:
+        """Calls what `get_attr` finds; arms are not reset or stepped one by one.
+
+        Raises:
+            AttributeError: Rows have no such method.
+        """
+        return [method(*method_args, **method_kwargs) for method in self.get_attr(method_name, indices)]
+
+    def env_is_wrapped(self, wrapper_class: type[gym.Wrapper], indices: VecEnvIndices = None) -> list[bool]:
+        """Only `Monitor` is as good as there: SB3 asks whether it may trust ``info["episode"]``."""
+        return [wrapper_class is Monitor for _ in self._get_indices(indices)]
+
+    def _summary(self, row: int) -> dict[str, float]:
+        """What `Monitor` says of an episode, rounded as it does."""
+        return {
+            "r": round(self._returns[row].item(), 6),
+            "l": self.scenario.steps,
+            "t": round(time.perf_counter() - self._made, 6),
+        }
+
+    def _checked_options(self) -> dict[str, FloatArray]:
+        """The options of all rows as one."""
+        if len(self._options) != self.num_envs:
+            raise InvalidInputError(f"options: expected {self.num_envs}, one a row, got {len(self._options)}.")
+        starts = [checked_options(options, OPTIONS).get("q") for options in self._options]
+        given = [float_array("options['q']", q, (self.scenario.joints,)) for q in starts if q is not None]
+        if not given:
+            return {}
+        if len(given) < self.num_envs:
+            raise InvalidInputError(
+                f"options: expected a start 'q' for all rows or for none, got {len(given)} of {self.num_envs}."
+            )
+        return {"q": np.stack(given)}
+
+
+class _Row:
+    """One of the N arms, as SB3 asks for its attributes: those of a single environment, which all arms share."""
+
+    def __init__(self, envs: RedundantIKVectorEnv, index: int) -> None:
+        self._envs, self._index = envs, index
+
+    @property
+    def scenario(self) -> Scenario:
+        return self._envs.scenario
+
+    @property
+    def observation_space(self) -> gym.Space[Any]:
+        return self._envs.single_observation_space
+
+    @property
+    def action_space(self) -> gym.Space[Any]:
+        return self._envs.single_action_space
+
+    @property
+    def render_mode(self) -> None:
+        return None
+
+    @property
+    def np_random(self) -> np.random.Generator:
+        return self._envs.np_random[self._index]
+
+    @property
+    def np_random_seed(self) -> int:
+        return self._envs.np_random_seed[self._index]
