@@ -3,9 +3,9 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
-DEMO := moore_penrose dls rhc_gradient follow_nominal
+DEMO := all
 
-.PHONY: help setup demo test check format lint types layers bench clean
+.PHONY: help setup demo test check format lint types layers bench rivals clean
 
 help: ## Show this list
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /  make \1\t/' | expand -t 18
@@ -39,8 +39,11 @@ layers: $(STAMP) ## Check the imports between layers
 
 check: lint types layers test ## All that CI runs: lint, types, layers, tests
 
-bench: $(STAMP) ## Measure speed beside other environments and libraries
+bench: $(STAMP) ## Measure speed beside other environments, libraries and solvers: report in results/bench
 	$(BIN)/python -m benchmarks
+
+rivals: $(STAMP) ## Install the solvers and environments that bench compares with (1.2 GB)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable ".[rivals]"
 
 clean: ## Remove .venv, results and caches
 	rm -rf $(VENV) results .pytest_cache .mypy_cache .ruff_cache .import_linter_cache
