@@ -15,8 +15,8 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from baselines.content import episode_hash
+from baselines.files import ResultsError, write
 from baselines.metrics import Row
-from baselines.results import ResultsError, write
 from ikgym.scenarios import Scenario
 
 #: The records that come with the package.

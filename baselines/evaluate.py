@@ -20,10 +20,11 @@ import tyro
 
 from baselines import frozen as frozen_sets
 from baselines import registry, report
+from baselines.files import write
 from baselines.machine import describe
 from baselines.metrics import Row
 from baselines.plan import ALL, Plan, PolicySpec, make_plan
-from baselines.results import Results, write
+from baselines.results import Results
 from baselines.runner import run
 from ikgym import scenarios as scenario_registry
 from ikgym.exceptions import IkgymError

@@ -16,6 +16,7 @@ from baselines.mfac import ModelFreeAdaptiveControl
 from baselines.mfapc import ModelFreeAdaptivePredictiveControl
 from baselines.moore_penrose import MoorePenrose
 from baselines.null_space import NullSpace
+from baselines.oracle.policy import Oracle
 from baselines.policy import SolverPolicy
 from baselines.rhc import RecedingHorizon
 from baselines.rhc_foresight import RecedingHorizonForesight
@@ -51,6 +52,7 @@ POLICIES: dict[str, type[SolverPolicy]] = {
         AbstractRotation,
         FixedPointExtended,
         FollowNominal,
+        Oracle,
     )
 }
 

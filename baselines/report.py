@@ -26,7 +26,7 @@ NOTHING = "–"
 Pictures = Mapping[str, Sequence[tuple[str, pathlib.PurePath]]]
 #: The group of plots that show all policies.
 OVERVIEW = "overview"
-REFERENCE_NOTE = "* reference: knows the nominal joint path, which no observation shows"
+REFERENCE_NOTE = "* reference: knows what no observation shows"
 
 
 @dataclasses.dataclass(frozen=True)

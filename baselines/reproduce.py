@@ -15,6 +15,7 @@ from typing import Annotated, Any
 
 import tyro
 
+from baselines.files import write
 from baselines.machine import describe
 from baselines.metrics import jsonable
 from baselines.papers import PAPERS, get
@@ -22,7 +23,6 @@ from baselines.papers.ledger import ledger
 from baselines.papers.paper import Finding, Paper
 from baselines.papers.runs import Runs
 from baselines.plots.style import png
-from baselines.results import write
 from ikgym.exceptions import IkgymError, InvalidInputError
 from ikgym.validation import whole_number
 

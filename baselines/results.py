@@ -7,7 +7,6 @@ import dataclasses
 import hashlib
 import io
 import json
-import os
 import pathlib
 import re
 import tempfile
@@ -18,17 +17,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from baselines.files import ResultsError, write
 from baselines.metrics import Row, canonical
 from baselines.plan import Job, Plan
-from ikgym.exceptions import IkgymError, InvalidInputError
+from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import SPLITS
 
 #: The columns of results.csv, which are the keys of a row in results.json.
 COLUMNS = tuple(field.name for field in dataclasses.fields(Row))
-
-
-class ResultsError(IkgymError):
-    """A folder of results cannot be read, written or gone on with."""
 
 
 class Results:
@@ -201,29 +197,6 @@ def read_rows(file: pathlib.Path) -> list[Row]:
             raise ResultsError(f"{file} is damaged: row {number} is there twice. {advice}")
         rows[row.key] = row
     return list(rows.values())
-
-
-def write(file: pathlib.Path, content: bytes) -> None:
-    """Writes a file in one go: whoever reads it, and whatever happens meanwhile, finds it old or new, never half.
-
-    Raises:
-        ResultsError: It cannot be written.
-    """
-    # In the same folder, since only within one file system is renaming one step.
-    draft = file.with_name(f".{file.name}.{os.getpid()}.tmp")
-    try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        try:
-            with draft.open("wb") as stream:
-                stream.write(content)
-                stream.flush()
-                os.fsync(stream.fileno())
-            draft.replace(file)
-        except BaseException:
-            draft.unlink(missing_ok=True)
-            raise
-    except OSError as e:
-        raise ResultsError(f"Cannot write {file}: {e.strerror or e}.") from None
 
 
 def slug(name: str) -> str:

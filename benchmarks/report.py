@@ -8,8 +8,8 @@ import pathlib
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from baselines.files import write
 from baselines.machine import describe
-from baselines.results import write
 from benchmarks.table import Table
 
 #: Whose versions matter to a figure besides those of :func:`baselines.machine.describe`.

@@ -23,8 +23,11 @@ from ikgym.kinematics import Chain, forward, forward_and_jacobian
 
 # ρ of a kink, in units of its steepness over Δ: the larger, the fewer updates of λ and the harder for Newton.
 KINK_STIFFNESS = 100.0
-# ρ of a limit, in units of the curvature of the cost there.
-LIMIT_STIFFNESS = 10.0
+# ρ of a limit of the velocities, in units of the curvature of Φ^U there, and of one of the joints, in units of that of
+# Φ^X at rest. Tracking presses with the curvature that errors of many Δx have: with a lower ρ the multipliers do not
+# get there in time.
+VELOCITY_STIFFNESS = 300.0
+JOINT_STIFFNESS = 1e4
 # Velocities below this share of Δq̇ count as this share in the curvature of Φ^U, which vanishes at rest.
 REST = 1e-3
 
@@ -301,13 +304,13 @@ def _tracking(cost, error, multiplier):  # type: ignore[no-untyped-def]
 @inlined
 def _velocity_limit(rules, j, velocity, multiplier):  # type: ignore[no-untyped-def]
     limit, cost = rules.velocity_limit[j], rules.cost
-    stiffness = LIMIT_STIFFNESS * cost_kernels.bend(limit, cost.delta_qdot, cost.p_in, max(cost.p_out, 2.0))
+    stiffness = VELOCITY_STIFFNESS * cost_kernels.bend(limit, cost.delta_qdot, cost.p_in, max(cost.p_out, 2.0))
     return press(velocity, -limit, limit, multiplier, stiffness, math.inf)
 
 
 @inlined
 def _joint_limit(rules, j, q, multiplier):  # type: ignore[no-untyped-def]
-    stiffness = LIMIT_STIFFNESS * 2.0 / (rules.cost.delta_x * rules.cost.delta_x)
+    stiffness = JOINT_STIFFNESS * 2.0 / (rules.cost.delta_x * rules.cost.delta_x)
     return press(q, rules.lower[j], rules.upper[j], multiplier, stiffness, math.inf)
 
 

@@ -44,7 +44,7 @@ def offsets(steps: int, blocks: int | None) -> Integers:
     if blocks <= 2:
         return np.array([1, steps][:blocks]) if blocks == 2 else np.array([steps])
     growing = np.arange(1, blocks - 1)
-    low, high = 1.0, float(steps)
+    low, high = 1.0, float(steps) ** (1.0 / (blocks - 2))  # at which the last block alone is too long
     for _ in range(200):
         ratio = 0.5 * (low + high)
         low, high = (ratio, high) if np.sum(ratio**growing) < steps - 2 else (low, ratio)

@@ -102,7 +102,7 @@ def newton_step(blocks, knots, exact, damping, inverse, factor, step):  # type: 
 
 @kernel
 def minimise(  # type: ignore[no-untyped-def]
-    rules, grid, start, nominal, path, multipliers, exact, most, tolerance, damping, room
+    rules, grid, start, nominal, path, multipliers, exact, most, tolerance, room
 ):
     """Damped Newton steps from a path, until it is a minimum or they run out.
 
@@ -116,17 +116,17 @@ def minimise(  # type: ignore[no-untyped-def]
         exact: Whether to try the Hessian itself where it is positive definite; its Gauss–Newton part otherwise.
         most: Newton steps at most.
         tolerance: Relative precision of the cost.
-        damping: The damping to begin with, in units of (Δt / Δq̇)⁻².
         room: A :class:`Room`.
 
     Returns:
-        CONVERGED, RAN_OUT or STALLED; the steps made; the cost; the norm of the merit's gradient by q; the damping.
+        CONVERGED, RAN_OUT or STALLED; the steps made; the cost (where they ran out the merit, which is not above it);
+        the norm of the merit's gradient by q (where they ran out that before the last step).
     """
     knots, n = path.shape
     blocks, step, trial = room.blocks, room.step[:knots], room.trial[:knots]
     unit = 1.0 / (rules.dt * rules.cost.delta_qdot) ** 2
     value, true, gap = linearise(rules, grid, start, nominal, path, multipliers, True, exact, room.scratch, blocks)
-    made, outcome = 0, RAN_OUT
+    made, outcome, renewed, damping = 0, RAN_OUT, True, 0.0
     while True:
         curved = exact
         while not newton_step(blocks, knots, curved, damping * unit, room.inverse, room.factor, step):
@@ -147,9 +147,11 @@ def minimise(  # type: ignore[no-untyped-def]
         if promised + gap <= tolerance * true + NEGLIGIBLE and damping <= 1e-3:
             outcome = CONVERGED
             break
-        if promised <= SETTLED * min(gap, gap * gap):
-            # Near the bottom for these multipliers, which are not yet those of the minimum.
+        if not renewed and promised <= SETTLED * min(gap, gap * gap):
+            # Near the bottom for these multipliers, which are not yet those of the minimum. Renewed once more at the
+            # same path they would overshoot, and those of limits, which have no bound, would swing for ever.
             made += 1
+            renewed = True
             if made >= most:
                 break
             value, true, gap = linearise(
@@ -179,7 +181,7 @@ def minimise(  # type: ignore[no-untyped-def]
         for k in range(knots):
             for a in range(n):
                 path[k, a] = trial[k, a]
-        true = reached
+        true, renewed = reached, False
         if made == most:
             break
         if length == 1.0:
@@ -191,4 +193,4 @@ def minimise(  # type: ignore[no-untyped-def]
     for k in range(knots):
         for a in range(n):
             square += blocks.gradient[k, a] * blocks.gradient[k, a]
-    return outcome, made, true, np.sqrt(square), damping
+    return outcome, made, true, np.sqrt(square)

@@ -162,7 +162,7 @@ def plan_rows(  # type: ignore[no-untyped-def]  # noqa: D417  # the first argume
             for j in range(n):
                 desk.passed[j] = qdot_before[row, j] * dt
             _slide(old, paths[row], multipliers[row], grid, desk)
-        outcome, steps, value, _, _ = minimise(
+        outcome, steps, value, _ = minimise(
             rules,
             grid,
             q[row],
@@ -172,7 +172,6 @@ def plan_rows(  # type: ignore[no-untyped-def]  # noqa: D417  # the first argume
             settings.iterations < 0,
             STEPS_TO_THE_OPTIMUM if settings.iterations < 0 else budget,
             tolerance,
-            0.0,
             desk.room,
         )
         made += steps
@@ -195,8 +194,10 @@ def plan_rows(  # type: ignore[no-untyped-def]  # noqa: D417  # the first argume
             )
         calls[row] += 1
         for j in range(n):
+            # A limit that holds the plan is kept to the tolerance only.
             target = min(max(path[0, j], lower[j]), upper[j])
-            qdot[row, j] = (target - q[row, j]) / (dt * grid.length[0])
+            velocity = (target - q[row, j]) / (dt * grid.length[0])
+            qdot[row, j] = min(max(velocity, -velocity_limit[j]), velocity_limit[j])
         status[row] = _CONVERGED if outcome == CONVERGED else _LIMIT
         iterations[row] = made
 
@@ -225,8 +226,8 @@ def _first_plan(rules, settings, grid, start, nominal, path, held, desk):  # typ
         held[:] = 0.0
         if settings.starts == 1:
             return 0
-        _, steps, value, _, _ = minimise(
-            rules, grid, start, nominal, path, held, False, STEPS_OF_A_START, TOLERANCE_OF_A_START, 0.0, desk.room
+        _, steps, value, _ = minimise(
+            rules, grid, start, nominal, path, held, False, STEPS_OF_A_START, TOLERANCE_OF_A_START, desk.room
         )
         made += steps
         value = max(value, true_cost(rules, grid, start, nominal, path, desk.room.scratch))
@@ -272,7 +273,7 @@ def _challenge(  # type: ignore[no-untyped-def]
         )
     else:
         _slide(old, rival, rival_held, grid, desk)
-    _, steps, reached, _, _ = minimise(
+    _, steps, reached, _ = minimise(
         rules,
         grid,
         start,
@@ -282,7 +283,6 @@ def _challenge(  # type: ignore[no-untyped-def]
         False,
         settings.challenge_rate,
         settings.tolerance,
-        0.0,
         desk.room,
     )
     age[0] += settings.challenge_rate

@@ -9,10 +9,11 @@ from collections.abc import Iterator
 from matplotlib.figure import Figure
 from tqdm import tqdm
 
+from baselines.files import write
 from baselines.metrics import Row, Summary, canonical
 from baselines.plots import cost_time, joints, style, tracking
 from baselines.report import OVERVIEW, Pictures, by_scenario, is_reference, labels
-from baselines.results import Results, slug, write
+from baselines.results import Results, slug
 
 __all__ = ["draw"]
 

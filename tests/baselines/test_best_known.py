@@ -8,7 +8,7 @@ import ikgym
 from baselines import best_known, report
 from baselines.best_known import MARGIN, Record, beaten, cost, episode_hash, lookup, read, record
 from baselines.evaluate import evaluate
-from baselines.results import ResultsError
+from baselines.files import ResultsError
 from ikgym import cost_kernels
 
 NAME = "varga7-fast"

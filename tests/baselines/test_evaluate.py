@@ -15,10 +15,11 @@ from baselines import evaluate as module
 from baselines import frozen
 from baselines import results as results_module
 from baselines.evaluate import evaluate, main
+from baselines.files import ResultsError, write
 from baselines.machine import describe
 from baselines.metrics import TIME_COLUMNS, Row
 from baselines.plan import make_plan, parse_policy
-from baselines.results import COLUMNS, Results, ResultsError, read_rows, write
+from baselines.results import COLUMNS, Results, read_rows
 from baselines.runner import MOST, batches, play
 from ikgym import cost_kernels
 from ikgym.exceptions import InvalidInputError, UnknownNameError

@@ -9,10 +9,10 @@ from matplotlib.text import Annotation, Text
 
 from baselines import report
 from baselines.evaluate import evaluate
+from baselines.files import ResultsError
 from baselines.metrics import Row, summarise
 from baselines.plan import Skipped
 from baselines.plots import cost_time, joints, style, tracking
-from baselines.results import ResultsError
 
 BASE = Row(
     scenario="varga7-fast",
@@ -92,7 +92,7 @@ def test_table():
         "converged",
     ]
     assert lines[5].startswith("follow_nominal *")
-    assert "* reference: knows the nominal joint path" in text
+    assert "* reference: knows what no observation shows" in text
     assert "[mm]" in lines[2]
     assert "[mrad]" in lines[2]
     assert "episodes" not in text

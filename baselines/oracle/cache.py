@@ -1,0 +1,113 @@
+"""Optima on disk: what took minutes to find is looked up the next time."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import io
+import json
+import logging
+import os
+import pathlib
+import sys
+import zipfile
+from collections.abc import Callable
+
+import numpy as np
+
+from baselines.content import episode_hash
+from baselines.files import ResultsError, write
+from baselines.metrics import canonical
+from baselines.oracle.optimum import Optimum, Search, Start
+from baselines.oracle.search import VERSION, search
+from ikgym import scenarios
+from ikgym.scenarios import Scenario
+from ikgym.validation import whole_number
+
+logger = logging.getLogger("ikgym")
+
+#: The environment variable that says where optima are kept.
+VARIABLE = "IKGYM_CACHE"
+
+
+def solve(
+    scenario: str | Scenario,
+    seed: int = 0,
+    how: Search | None = None,
+    *,
+    cached: bool = True,
+    tick: Callable[[float], object] | None = None,
+) -> Optimum:
+    """The cheapest joint path of an episode that a search finds: the best known one, certified by nobody.
+
+    Args:
+        scenario: What is tracked, or its name.
+        seed: The reset seed.
+        how: How thoroughly is searched.
+        cached: Whether to look on disk first, and to keep there what was found.
+        tick: Called now and then with the share of the work done since the last call.
+
+    Returns:
+        The same, bit for bit, at every call.
+
+    Raises:
+        UnknownNameError: There is no such scenario.
+        InvalidInputError: The seed is no whole number of at least 0, or the scenario has random noise.
+    """
+    scenario = scenario if isinstance(scenario, Scenario) else scenarios.get(scenario)
+    seed, how = whole_number("seed", seed, at_least=0), how or Search()
+    file = file_of(scenario, seed, how)
+    known = _read(file) if cached else None
+    if known is not None:
+        # The name is not part of the content.
+        return known.replace(scenario=scenario.name)
+    optimum = search(scenario, seed, how, tick)
+    if cached:
+        try:
+            write(file, _packed(optimum))
+        except ResultsError as e:
+            logger.warning("The optimum is not kept: %s", e)
+    return optimum
+
+
+def folder() -> pathlib.Path:
+    """Where optima are kept: what the variable IKGYM_CACHE says, or the user's folder for such files."""
+    if given := os.environ.get(VARIABLE):
+        return pathlib.Path(given)
+    home = pathlib.Path.home()
+    if sys.platform == "win32":
+        base = pathlib.Path(os.environ.get("LOCALAPPDATA") or home / "AppData" / "Local")
+    elif sys.platform == "darwin":
+        base = home / "Library" / "Caches"
+    else:
+        base = pathlib.Path(os.environ.get("XDG_CACHE_HOME") or home / ".cache")
+    return base / "ikgym"
+
+
+def file_of(scenario: Scenario, seed: int, how: Search) -> pathlib.Path:
+    """The file of an optimum: named by the content of the episode, the search, and the version of its code."""
+    what = canonical([episode_hash(scenario, seed), dataclasses.asdict(how), VERSION])
+    return folder() / "oracle" / f"{hashlib.sha256(what.encode()).hexdigest()[:24]}.npz"
+
+
+def _packed(optimum: Optimum) -> bytes:
+    plain = {f.name: getattr(optimum, f.name) for f in dataclasses.fields(optimum)}
+    arrays = {name: plain.pop(name) for name in ("q", "qdot")}
+    plain["starts"] = [dataclasses.asdict(start) for start in optimum.starts]
+    stream = io.BytesIO()
+    np.savez(stream, allow_pickle=False, **arrays, rest=np.array(canonical(plain)))
+    return stream.getvalue()
+
+
+def _read(file: pathlib.Path) -> Optimum | None:
+    try:
+        # Read before it is opened as an archive: NumPy would leave the file of a damaged one open.
+        with np.load(io.BytesIO(file.read_bytes()), allow_pickle=False) as content:
+            rest = json.loads(str(content["rest"]))
+            rest["starts"] = tuple(Start(**start) for start in rest["starts"])
+            return Optimum(q=content["q"], qdot=content["qdot"], **rest)
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as e:
+        logger.warning("%s is damaged, and is made anew: %s", file, e)
+        return None

@@ -1,0 +1,140 @@
+"""The whole of an episode as one problem: a joint path through all steps that count."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Self
+
+import numpy as np
+from gymnasium.utils import seeding
+
+from baselines.joint_paths.cost import Rules
+from baselines.joint_paths.grid import Grid
+from ikgym.exceptions import InvalidInputError
+from ikgym.scenarios import Scenario
+from ikgym.simulator import Simulator
+from ikgym.validation import FloatArray, whole_number
+
+# Knots at the beginning that a coarse grid has, too: an arm that starts far off its trajectory gets there in a few.
+FIRST = 8
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Whole:
+    """An episode from its start to its end, as the kernels of :mod:`baselines.joint_paths` see it.
+
+    A knot stands at each step that counts. Where a nominal point is held for h > 1 steps the arm moves in h - 1 of
+    them, which cost nothing, and rests in the last, which counts.
+
+    Args:
+        scenario: What is tracked.
+        seed: The reset seed.
+        rules: The arm itself, not its model; no joint limits, since the environment has none; the velocity limit.
+        start: Joint coordinates at the start in [rad] or [m]. Shape (n,).
+        nominal: Nominal task coordinates after the steps 1, 2, … Shape (steps, m).
+        grid: K knots, one a step that counts.
+    """
+
+    scenario: Scenario
+    seed: int
+    rules: Rules
+    start: FloatArray
+    nominal: FloatArray
+    grid: Grid
+
+    @classmethod
+    def of(cls, scenario: Scenario, seed: int) -> Self:
+        """The episode that a reset with the seed begins.
+
+        Raises:
+            InvalidInputError: The seed is no whole number of at least 0, or the scenario has random noise, which
+                nobody knows beforehand.
+        """
+        whole_number("seed", seed, at_least=0)
+        n, bias = scenario.joints, np.broadcast_to(scenario.disturbance.bias, scenario.joints)
+        if np.any(scenario.disturbance.noise):
+            raise InvalidInputError(
+                f"The best cost of an episode is sought knowing all that happens in it; scenario {scenario.name!r} has "
+                f"a random disturbance: expected noise=0, got {scenario.disturbance.noise}."
+            )
+        limit = scenario.velocity_limit - np.abs(bias)
+        if (limit <= 0.0).any():
+            raise InvalidInputError(
+                f"bias of scenario {scenario.name!r}: expected less than the velocity limit, got {bias.tolist()}."
+            )
+        rules = Rules(
+            scenario.arm.chain,
+            scenario.task.kind,
+            scenario.cost.parameters,
+            scenario.dt,
+            np.full(n, -np.inf),
+            np.full(n, np.inf),
+            limit,
+        )
+        at = np.flatnonzero(scenario.counted())
+        held = np.diff(at, prepend=0)
+        grid = Grid(at, np.maximum(held - 1.0, 1.0), np.ones(len(at)), (held == 1).astype(np.float64))
+        trajectory = scenario.trajectory.sample(seeding.np_random(seed)[0])
+        start = np.array(scenario.first_q(trajectory), dtype=np.float64)
+        return cls(scenario, seed, rules, start, np.ascontiguousarray(scenario.nominal(seed)[1:]), grid)
+
+    @property
+    def knots(self) -> int:
+        """K."""
+        return len(self.grid.at)
+
+    def coarse(self, stride: int) -> Grid:
+        """A grid with the first knots, every ``stride``-th of the others, and the last.
+
+        The tracking costs between two knots follow the trapezoidal rule, as in :func:`baselines.joint_paths.grid.cut`.
+        """
+        last = self.knots - 1
+        first_ones = np.arange(min(FIRST, last))
+        ends = np.concatenate([first_ones, np.arange(len(first_ones) + stride - 1, last, stride), [last]])
+        first = np.append(0, ends[:-1] + 1)
+        counts = np.diff(ends, prepend=-1)
+        tracking = 0.5 * (counts + 1.0)
+        tracking[:-1] += 0.5 * (counts[1:] - 1.0)
+        length, velocity = (np.add.reduceat(values, first) for values in (self.grid.length, self.grid.velocity))
+        return Grid(self.grid.at[ends], length, tracking, velocity)
+
+    def refined(self, grid: Grid, path: FloatArray) -> FloatArray:
+        """A path through the knots of a coarse grid at all knots. Shape (K, n)."""
+        fine, knots = np.cumsum(self.grid.length), np.append(0.0, np.cumsum(grid.length))
+        q = np.vstack([self.start, path])
+        return np.stack([np.interp(fine, knots, column) for column in q.T], axis=1)
+
+    def commands(self, path: FloatArray) -> FloatArray:
+        """The joint velocities that lead along a path, in [rad/s] or [m/s].
+
+        Args:
+            path: Joint coordinates at the knots, in [rad] or [m]. Shape (K, n).
+
+        Returns:
+            One row a step. Shape (steps, n).
+        """
+        bias = np.broadcast_to(self.scenario.disturbance.bias, self.scenario.joints)
+        moves = np.diff(path, axis=0, prepend=self.start[None]) / self.scenario.dt
+        held = np.diff(self.grid.at, prepend=0)
+        # Where a point is held, the bias goes on while the arm rests.
+        qdot = (moves - held[:, None] * bias) / self.grid.length[:, None]
+        every = np.repeat(qdot, held, axis=0)
+        every[self.grid.at[held > 1] - 1] = 0.0
+        return every
+
+    def play(self, qdot: FloatArray) -> tuple[FloatArray, float]:
+        """What the environment makes of joint velocities.
+
+        Args:
+            qdot: In [rad/s] or [m/s]. Shape (steps, n).
+
+        Returns:
+            Joint coordinates after each step in [rad] or [m], of shape (steps, n), and the total cost.
+        """
+        simulator = Simulator(self.scenario, None, 1)
+        simulator.reset(np.ones(1, dtype=np.bool_), [seeding.np_random(self.seed)[0]])
+        q, costs = np.empty_like(qdot), np.empty(len(qdot))
+        for k, action in enumerate(qdot / self.scenario.velocity_limit):
+            out = simulator.step(action)
+            q[k], costs[k] = out.q[0], out.tracking_cost[0] + out.velocity_cost[0]
+        return q, float(np.sum(costs))

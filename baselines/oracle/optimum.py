@@ -1,0 +1,139 @@
+"""What a search is asked for, and what it answers."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from baselines.best_known import MARGIN, MEANINGLESS, Record
+from ikgym.validation import FloatArray, Frozen, read_only, whole_number
+
+#: What starts are called that were drawn, and paths that the local search has found.
+RANDOM, CLIMBED = "random start", "local search"
+
+
+@dataclasses.dataclass(frozen=True)
+class Search(Frozen):
+    """How thoroughly is searched.
+
+    Args:
+        starts: Random starts, on a coarse time grid.
+        chains: Paths that the local search goes on with, the best of all starts.
+        generations: How often these learn of each other's progress; 0 leaves the local search out.
+        rounds: Branches of each path in a generation.
+        polished: Paths that are polished at full resolution, besides those that are known there.
+        knots: Knots of the coarse grid.
+        seed: Of all draws. The same search gives the same path, whatever the number of threads.
+
+    Raises:
+        InvalidInputError: A number is out of its range.
+    """
+
+    starts: int = 400
+    chains: int = 8
+    generations: int = 4
+    rounds: int = 40
+    polished: int = 6
+    knots: int = 150
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for name, least in {
+            "starts": 0,
+            "chains": 1,
+            "generations": 0,
+            "rounds": 1,
+            "polished": 1,
+            "knots": 1,
+            "seed": 0,
+        }.items():
+            object.__setattr__(self, name, whole_number(name, getattr(self, name), at_least=least))
+
+
+@dataclasses.dataclass(frozen=True)
+class Start:
+    """What came of one start.
+
+    Args:
+        kind: Where the path came from, in words.
+        number: Of a random start.
+        coarse: Its cost on the coarse grid; None where it was not tried there.
+        cost: Its cost in the environment, polished at full resolution; None where it was not worth that.
+        gradient_norm: Norm of the cost's gradient there, by q / Δt, in [s/rad] or [s/m].
+        newton_steps: Newton steps at full resolution.
+    """
+
+    kind: str
+    number: int | None = None
+    coarse: float | None = None
+    cost: float | None = None
+    gradient_norm: float | None = None
+    newton_steps: int | None = None
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Optimum(Frozen):
+    """The cheapest joint path of an episode that was found: the best known one, certified by nobody.
+
+    Args:
+        scenario: The scenario's name.
+        seed: The reset seed.
+        q: Joint coordinates after each step, in [rad] or [m]. Shape (steps, n).
+        qdot: Joint velocities that lead there, within the velocity limit, in [rad/s] or [m/s]. Shape (steps, n).
+        cost: What the environment charges for them.
+        gradient_norm: Norm of the cost's gradient there, by q / Δt, in [s/rad] or [s/m].
+        starts: All starts.
+        seconds: CPU time that one path took at full resolution, in [s].
+        hash: Of the episode, see :func:`baselines.content.episode_hash`.
+    """
+
+    scenario: str
+    seed: int
+    q: FloatArray
+    qdot: FloatArray
+    cost: float
+    gradient_norm: float
+    starts: tuple[Start, ...]
+    seconds: float
+    hash: str
+
+    def __post_init__(self) -> None:
+        for name in ("q", "qdot"):
+            object.__setattr__(self, name, read_only(getattr(self, name).copy()))
+
+    @property
+    def found_by(self) -> str:
+        """What kinds of starts led there, to within a millionth of the cost."""
+        return "; ".join(dict.fromkeys(one.kind for one in self.starts if self._reached(one)))
+
+    @property
+    def spread(self) -> dict[str, float]:
+        """How far the starts came.
+
+        Returns:
+            ``starts`` on the coarse grid, and how many of them came ``within_1_percent`` of the best there without
+            local search, their ``median`` and ``worst`` cost; paths ``polished`` at full resolution, and how many of
+            them came ``polished_within_1e-6`` of the best.
+        """
+        coarse = [one.coarse for one in self.starts if one.coarse is not None]
+        first = [one.coarse for one in self.starts if one.coarse is not None and one.kind != CLIMBED]
+        out: dict[str, float] = {
+            "polished": sum(one.cost is not None for one in self.starts),
+            "polished_within_1e-6": sum(map(self._reached, self.starts)),
+        }
+        if first:
+            out |= {
+                "starts": len(first),
+                "within_1_percent": sum(cost <= 1.01 * min(coarse) for cost in first),
+                "median": float(np.median(first)),
+                "worst": max(first),
+            }
+        return out
+
+    def record(self) -> Record:
+        """As it stands among the best known costs."""
+        return Record(self.scenario, self.seed, self.cost, self.found_by, self.gradient_norm, self.spread, self.hash)
+
+    def _reached(self, start: Start) -> bool:
+        return start.cost is not None and start.cost <= max(self.cost * (1.0 + MARGIN), MEANINGLESS)

@@ -1,0 +1,82 @@
+"""The privileged reference: plays the cheapest joint path of the whole episode that is known."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from typing import Any, ClassVar, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from baselines.handed_path import HandedPath
+from baselines.oracle.cache import solve
+from baselines.oracle.optimum import Search
+from baselines.policy import Batch, Memory, Problem, Solution, statuses
+from ikgym.exceptions import InvalidInputError
+from ikgym.scenarios import Scenario
+from ikgym.validation import FloatArray, whole_number
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Oracle(HandedPath):
+    """Plays the optimum of its episode, see :func:`baselines.oracle.solve`.
+
+    A reference, not a contender: it knows the whole trajectory and the arm itself, solves the episode when it is first
+    asked (or looks the solution up on disk), and has no other start than the episode's own in mind. What it plays is
+    the best path that the search has found; nobody certifies that there is none better.
+
+    Args:
+        problem: What the policy is told of the scenario.
+        seed: Which episode of a random scenario to play.
+        starts: Random starts of the search.
+        generations: Generations of its local search, 0 to leave that out.
+        scenario: What is tracked.
+
+    Raises:
+        InvalidInputError: The scenario is random and there is no seed, it has random noise, or a number is out of
+            range.
+    """
+
+    seed: int | None = None
+    starts: int = Search.starts
+    generations: int = Search.generations
+    scenario: Scenario = dataclasses.field(kw_only=True)
+
+    name: ClassVar[str] = "oracle"
+
+    def __post_init__(self) -> None:
+        if self.seed is not None:
+            object.__setattr__(self, "seed", whole_number("seed", self.seed, at_least=0))
+        elif self.scenario.random:
+            raise InvalidInputError(f"Scenario {self.scenario.name!r} is random: a seed says which episode is meant.")
+        if np.any(self.scenario.disturbance.noise):
+            raise InvalidInputError(
+                f"{self.name} has to know all that happens; scenario {self.scenario.name!r} has a random disturbance."
+            )
+        for name in ("starts", "generations"):
+            object.__setattr__(self, name, whole_number(name, getattr(self, name), at_least=0))
+
+    @classmethod
+    def for_scenario(cls, scenario: Scenario, **parameters: Any) -> Self:
+        """See :meth:`SolverPolicy.for_scenario`; unlike others this policy is handed the scenario itself."""
+        return cls(Problem.of(scenario), scenario=scenario, **parameters)
+
+    @functools.cached_property
+    def path(self) -> FloatArray:  # type: ignore[override]  # a field elsewhere; here it is solved when first needed
+        """The optimum's joint coordinates, one row a step, in [rad] or [m]. Shape (steps + 1, n)."""
+        optimum = solve(self.scenario, self.seed or 0, Search(starts=self.starts, generations=self.generations))
+        # Nobody goes to row 0.
+        path = np.vstack([optimum.q[:1], optimum.q])
+        path.flags.writeable = False
+        return path
+
+    def solve(self, batch: Batch, memory: Memory) -> Solution:
+        """See :meth:`SolverPolicy.solve`."""
+        qdot = (self.path[self.next_rows(batch)] - batch.q) / self.problem.dt - self.scenario.disturbance.bias
+        rows = len(qdot)
+        return Solution(qdot, memory, statuses(rows), np.zeros(rows, dtype=np.int64))
+
+    def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
+        """Nothing: all was known before."""
+        return 0, 0, 0, 0

@@ -1,0 +1,195 @@
+"""The search for the cheapest joint path of a whole episode, from many starts."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from baselines.content import episode_hash
+from baselines.joint_paths.grid import Grid
+from baselines.oracle import climbing
+from baselines.oracle.episode import Whole
+from baselines.oracle.optimum import CLIMBED, RANDOM, Optimum, Search, Start
+from baselines.rhc import RecedingHorizon
+from baselines.rollout import rollouts
+from ikgym.parallel import in_chunks
+from ikgym.scenarios import Scenario
+from ikgym.validation import FloatArray
+
+#: Raised by whoever changes what the search finds: what was kept on disk before counts no more.
+VERSION = 2
+#: Receding horizons whose paths are starts, too.
+HORIZONS: tuple[Mapping[str, Any], ...] = (
+    {"horizon": 1001, "blocks": 48, "iterations": 1, "starts": 64, "challenge": 10, "stop_at_end": True},
+    {"horizon": 101, "blocks": 24, "iterations": 1, "starts": 64, "challenge": 10, "stop_at_end": True},
+)
+# Newton steps of a path at full resolution, and the relative precision that ends them before.
+MOST, TOLERANCE = 300, 1e-12
+# Costs closer than this share belong to the same path.
+APART = 1e-3
+# Random starts worth a thread.
+GRAIN = 4
+# Paths that others are blended with.
+PARTNERS = 32
+# Seeds of the generations of the local search lie this far apart.
+STRIDE = 1_000_003
+
+
+def search(scenario: Scenario, seed: int, how: Search, tick: Callable[[float], object] | None = None) -> Optimum:
+    """The cheapest joint path of an episode that the starts lead to.
+
+    Args:
+        scenario: What is tracked.
+        seed: The reset seed.
+        how: How thoroughly.
+        tick: Called now and then with the share of the work done since the last call.
+
+    Raises:
+        InvalidInputError: The seed is no whole number of at least 0, or the scenario has random noise.
+    """
+    whole = Whole.of(scenario, seed)
+    done = tick or (lambda share: None)
+    known = _known_paths(whole)
+    starts, paths = [Start(kind) for kind in known], dict(enumerate(known.values()))
+    done(0.1)
+    # Where no velocity costs, as with held points, each knot is a problem of its own: nothing to search for.
+    if whole.grid.velocity.any():
+        starts, found = _coarse_search(whole, how, known, done)
+        paths |= found
+    polished = np.stack(list(paths.values()))
+    _, gradients, made, spent = _settle(whole, whole.grid, polished, exact=True, most=MOST, tolerance=TOLERANCE)
+    played = [_played(whole, path) for path in polished]
+    for number, (_, _, cost), gradient, steps in zip(paths, played, gradients * scenario.dt, made, strict=True):
+        starts[number] = dataclasses.replace(
+            starts[number], cost=cost, gradient_norm=float(gradient), newton_steps=int(steps)
+        )
+    best = int(np.argmin([cost for _, _, cost in played]))
+    q, qdot, cost = played[best]
+    done(0.1)
+    return Optimum(
+        scenario=scenario.name,
+        seed=seed,
+        q=q,
+        qdot=qdot,
+        cost=cost,
+        gradient_norm=float(gradients[best]) * scenario.dt,
+        starts=tuple(starts),
+        seconds=spent / len(paths),
+        hash=episode_hash(scenario, seed),
+    )
+
+
+def _played(whole: Whole, path: FloatArray) -> tuple[FloatArray, FloatArray, float]:
+    """Joint coordinates and joint velocities of each step, and their cost in the environment."""
+    limit = whole.scenario.velocity_limit
+    qdot = np.clip(whole.commands(path), -limit, limit)
+    q, cost = whole.play(qdot)
+    return q, qdot, cost
+
+
+def _known_paths(whole: Whole) -> dict[str, FloatArray]:
+    """Paths at full resolution that need no search."""
+    scenario, seed, grid = whole.scenario, whole.seed, whole.grid
+    out = {}
+    nominal = scenario.nominal_joint_path(seed)
+    if nominal is not None:
+        out["nominal joint path"] = np.ascontiguousarray(nominal[grid.at])
+    rolled = np.empty((1, whole.knots, scenario.joints))
+    climbing.roll_outs(whole.rules, grid, whole.start, whole.nominal, 0, rolled, 0, 1)
+    out["roll-out"] = rolled[0]
+    if whole.knots == scenario.steps:
+        for given in HORIZONS:
+            horizon = max(min(int(given["horizon"]), scenario.steps + 1), 2)
+            fitting = {**given, "horizon": horizon, "blocks": min(int(given["blocks"]), horizon - 1)}
+            policy = RecedingHorizon.for_scenario(scenario, **fitting)
+            (episode,) = rollouts(scenario, policy, [seed])
+            out.setdefault(f"rhc, horizon {given['horizon']}", episode.q)
+    return out
+
+
+def _coarse_search(
+    whole: Whole, how: Search, known: Mapping[str, FloatArray], done: Callable[[float], object]
+) -> tuple[list[Start], dict[int, FloatArray]]:
+    """Starts and local search on a coarse grid.
+
+    Returns:
+        All starts, the known ones first; and by their numbers the best of the others at full resolution.
+    """
+    grid = whole.coarse(max(-(-whole.knots // how.knots), 1))
+    ends = np.searchsorted(whole.grid.at, grid.at)
+    paths = np.empty((len(known) + how.starts, len(grid.at), whole.scenario.joints))
+    for path, fine in zip(paths, known.values(), strict=False):
+        path[:] = fine[ends]
+    problem = whole.rules, grid, whole.start, whole.nominal
+    # Start 0 of the kernel does not drift, and is known already.
+    drawn = paths[len(known) - 1 :]
+    in_chunks(lambda first, last: climbing.roll_outs(*problem, how.seed, drawn, first + 1, last + 1), how.starts, GRAIN)
+    costs, *_ = _settle(whole, grid, paths, exact=False, most=climbing.STEPS, tolerance=climbing.PRECISION)
+    done(0.3)
+
+    chosen = _distinct(costs, PARTNERS)
+    partners, chains = paths[chosen], paths[chosen[: how.chains]]
+    reached = costs[chosen[: how.chains]]
+    for generation in range(1, how.generations + 1):
+        seed, pool = how.seed + generation * STRIDE, np.concatenate([chains, partners])
+
+        def work(first: int, last: int, seed: int = seed, pool: FloatArray = pool) -> None:
+            climbing.climb(*problem, seed, how.rounds, pool, chains, reached, first, last)
+
+        in_chunks(work, len(chains), 1)
+        done(0.5 / how.generations)
+    better = reached < costs[chosen[: how.chains]]
+    paths, costs = np.concatenate([paths, chains[better]]), np.concatenate([costs, reached[better]])
+
+    kinds = [*known, *[RANDOM] * how.starts, *[CLIMBED] * int(better.sum())]
+    starts = [
+        Start(kind, number - len(known) + 1 if kind == RANDOM else None, cost)
+        for number, (kind, cost) in enumerate(zip(kinds, costs.tolist(), strict=True))
+    ]
+    best = [number for number in _distinct(costs, how.polished) if number >= len(known)]
+    return starts, {number: whole.refined(grid, paths[number]) for number in best}
+
+
+def _settle(
+    whole: Whole, grid: Grid, paths: FloatArray, *, exact: bool, most: int, tolerance: float
+) -> tuple[FloatArray, FloatArray, FloatArray, float]:
+    """Improves paths in place: costs, norms of the gradient, Newton steps, all (S,), and the CPU time in [s]."""
+    costs, gradients, made = np.empty((3, len(paths)))
+    spent: list[float] = []
+
+    def work(first: int, last: int) -> None:
+        begin = time.thread_time()
+        climbing.settle(
+            whole.rules,
+            grid,
+            whole.start,
+            whole.nominal,
+            exact,
+            most,
+            tolerance,
+            paths,
+            costs,
+            gradients,
+            made,
+            first,
+            last,
+        )
+        spent.append(time.thread_time() - begin)
+
+    in_chunks(work, len(paths), 1)
+    return costs, gradients, made, sum(spent)
+
+
+def _distinct(costs: FloatArray, most: int) -> list[int]:
+    """The cheapest, one of each cost, from the best up."""
+    chosen: list[int] = []
+    for i in np.argsort(costs, kind="stable").tolist():
+        if not chosen or costs[i] > (1.0 + APART) * costs[chosen[-1]]:
+            chosen.append(i)
+        if len(chosen) == most:
+            break
+    return chosen

@@ -1,0 +1,510 @@
+"""The receding horizon against IPOPT and gradient descent, its limits, and what it does along episodes."""
+
+from __future__ import annotations
+
+import functools
+
+import casadi
+import gymnasium as gym
+import numpy as np
+import pytest
+
+import baselines
+import ikgym
+from baselines.policy import Problem
+from baselines.status import Status
+from benchmarks.rivals.casadi_horizon import OPTIONS, CasadiHorizon
+from benchmarks.rivals.numpy_horizon import Horizon, plan_cost
+from ikgym.exceptions import InvalidInputError
+from tests.comparison import identical
+
+VARGA = ["varga7-fast", "varga7-slow", "varga7-literal-fast", "varga7-literal-slow"]
+# The policy stops at 1e-7 of the cost, IPOPT at 1e-10 of its optimality; below costs of 1e-3 an absolute 1e-9 counts.
+RELATIVE, ABSOLUTE = 1e-6, 1e-9
+FAR = 10**6
+
+
+def observe(problem, q, nominal, qdot=None, remaining=FAR):
+    """A batch of observations from joint coordinates and what lies ahead."""
+    q = np.atleast_2d(q)
+    return {
+        "q": q,
+        "qdot": np.zeros_like(q) if qdot is None else np.atleast_2d(qdot),
+        "pose": problem.task.coordinates(*problem.model.forward(q)),
+        "nominal": np.reshape(nominal, (len(q), -1, problem.task.size)),
+        "remaining": np.full((len(q), 1), float(remaining)),
+    }
+
+
+def grid_horizon(policy, q, nominal, left=FAR):
+    """What the policy minimises, its weights by the trapezoidal rule written out."""
+    end = min(int(policy.offsets[-1]), left)
+    at = np.append(policy.offsets[policy.offsets < end], end)
+    weights, before = np.zeros(len(at)), 0
+    for k, here in enumerate(at):
+        share = (np.arange(before + 1, here + 1) - before) / (here - before)
+        weights[k] += share.sum()
+        if k > 0:
+            weights[k - 1] += (1.0 - share).sum()
+        before = here
+    weights[-1] *= policy.terminal_weight
+    return Horizon(q, nominal[at - 1], np.diff(at, prepend=0).astype(float), weights)
+
+
+def states_near(scenario, ahead, count, far, seed=0):
+    """States on the nominal joint path, or off it by up to so much, and what lies ahead of them."""
+    rng = np.random.default_rng(seed)
+    joints, nominal = scenario.nominal_joint_path(0), scenario.nominal(0, preview=ahead)
+    steps = rng.integers(scenario.steps, size=count)
+    away = rng.normal(size=(count, scenario.joints)) * far * 10.0 ** rng.uniform(-1.0, 0.0, (count, 1))
+    return joints[steps] + away, np.stack([nominal[k + 1 : k + 1 + ahead] for k in steps])
+
+
+def planned(policy, q, nominal, state=None, **more):
+    """Costs of the plans for a batch, by plain NumPy, and the state after them."""
+    _, state = policy.predict(observe(policy.problem, q, nominal, **more), state)
+    left = more.get("remaining", FAR)
+    horizons = [grid_horizon(policy, a, b, left) for a, b in zip(q, nominal, strict=True)]
+    plans = [plan[: h.knots] for plan, h in zip(policy.plan(state), horizons, strict=True)]
+    costs = [plan_cost(policy.problem, h, plan) for h, plan in zip(horizons, plans, strict=True)]
+    return np.array(costs), horizons, plans, state
+
+
+def compare(policy, solver, costs, horizons, plans):
+    """Never above IPOPT's minimum, and where IPOPT goes on from the plan there is nothing left to gain."""
+    for cost, horizon, plan in zip(costs, horizons, plans, strict=True):
+        for start in (None, plan):
+            best = solver.solve(horizon, start)
+            assert cost <= best.cost * (1.0 + RELATIVE) + ABSOLUTE, (horizon.q, start is None)
+
+
+def along_an_episode(policy, scenario, q, first, steps):
+    """Costs of the plans while the policy moves the arm from q, its memory kept."""
+    nominal, state, ahead = scenario.nominal(0, preview=policy.preview), None, policy.preview
+    qdot = np.zeros_like(q)
+    for k in range(first, first + steps):
+        view = nominal[k + 1 : k + 1 + ahead]
+        costs, horizons, plans, state = planned(policy, q[None], view[None], state, qdot=qdot)
+        yield costs, horizons, plans
+        qdot = (plans[0][0] - q) / policy.problem.dt
+        q = plans[0][0]
+
+
+def check_against_ipopt(name, horizon, count, **parameters):
+    scenario = ikgym.scenarios.get(name)
+    policy = baselines.make("rhc", scenario, horizon=horizon, **parameters)
+    solver = CasadiHorizon(policy.problem, len(policy.offsets))
+    for far, seed in ((0.0, 1), (1e-2, 2)):
+        q, nominal = states_near(scenario, policy.preview, count, far, seed)
+        costs, horizons, plans, state = planned(policy, q, nominal)
+        assert set(policy.report(state).status) == {Status.CONVERGED}
+        compare(policy, solver, costs, horizons, plans)
+    joints = scenario.nominal_joint_path(0)
+    for first in (0, 900):
+        steps = along_an_episode(policy, scenario, joints[first] + 2e-3, first, count // 2)
+        for costs, horizons, plans in steps:
+            compare(policy, solver, costs, horizons, plans)
+
+
+@pytest.mark.parametrize("name", VARGA)
+def test_plans_are_as_cheap_as_ipopts(name):
+    check_against_ipopt(name, 10, 4)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("horizon", [3, 10, 30])
+@pytest.mark.parametrize("name", VARGA)
+def test_plans_are_as_cheap_as_ipopts_at_many_states(name, horizon):
+    check_against_ipopt(name, horizon, 50 if horizon < 30 else 14)
+
+
+@pytest.mark.parametrize(
+    ("name", "horizon", "count"),
+    [("faitli3-stretched", 8, 4), ("zhang6-lspb", 6, 4), ("khan8-q1", 4, 2), ("faitli3-shoulder", 8, 4)],
+)
+def test_other_arms_and_tasks(name, horizon, count):
+    scenario = ikgym.scenarios.get(name)
+    policy = baselines.make("rhc", scenario, horizon=horizon)
+    solver = CasadiHorizon(policy.problem, horizon - 1)
+    nominal, rng = scenario.nominal(0, preview=horizon), np.random.default_rng(0)
+    start = scenario.nominal_joint_path(0)
+    q = np.tile(scenario.start, (count, 1)) if start is None else start[np.arange(count) * 200]
+    steps = np.zeros(count, int) if start is None else np.arange(count) * 200
+    q = q + rng.normal(size=q.shape) * 1e-3
+    ahead = np.stack([nominal[k + 1 : k + horizon] for k in steps])
+    costs, horizons, plans, state = planned(policy, q, ahead)
+    assert set(policy.report(state).status) <= {Status.CONVERGED, Status.SATURATED}
+    compare(policy, solver, costs, horizons, plans)
+
+
+@pytest.mark.parametrize(
+    "parameters",
+    [
+        {"horizon": 31, "blocks": 8},
+        {"horizon": 31, "blocks": 8, "terminal_weight": 20.0},
+        {"horizon": 9, "terminal_weight": 0.0},
+        {"horizon": 9, "terminal_weight": 5.0},
+        {"horizon": 8, "blocks": 1},
+        {"horizon": 101, "blocks": 12},
+    ],
+)
+def test_blocked_and_weighted_horizons(parameters):
+    scenario = ikgym.scenarios.get("varga7-fast")
+    policy = baselines.make("rhc", scenario, **parameters)
+    q, nominal = states_near(scenario, policy.preview, 3, 1e-2)
+    costs, horizons, plans, state = planned(policy, q, nominal)
+    assert set(policy.report(state).status) == {Status.CONVERGED}
+    compare(policy, CasadiHorizon(policy.problem, len(policy.offsets)), costs, horizons, plans)
+
+
+@pytest.mark.parametrize("blocks", [None, 6])
+@pytest.mark.parametrize("left", [1, 2, 3, 5])
+def test_the_horizon_ends_with_the_episode(left, blocks):
+    scenario = ikgym.scenarios.get("varga7-fast")
+    policy = baselines.make("rhc", scenario, horizon=15, stop_at_end=True, blocks=blocks)
+    q, nominal = states_near(scenario, 14, 3, 1e-2)
+    costs, horizons, plans, _ = planned(policy, q, nominal, remaining=left)
+    compare(policy, CasadiHorizon(policy.problem, horizons[0].knots), costs, horizons, plans)
+    # What lies behind the end changes nothing, and without the parameter it would.
+    moved = nominal.copy()
+    moved[:, left:] += 0.1
+    for ends in (True, False):
+        policy = baselines.make("rhc", scenario, horizon=15, stop_at_end=ends, blocks=blocks)
+        answers = [policy.predict(observe(policy.problem, q, x, remaining=left))[0] for x in (nominal, moved)]
+        assert identical(*answers) == ends
+
+
+def test_what_is_left_of_the_last_plan_is_optimal():
+    """Bellman: where the horizon ends with the episode, a step along the plan leaves nothing to be done."""
+    scenario = ikgym.scenarios.get("varga7-fast")
+    policy = baselines.make("rhc", scenario, horizon=15, stop_at_end=True, tolerance=1e-9)
+    q, nominal = states_near(scenario, 20, 5, 1e-2)
+    _, state = policy.predict(observe(policy.problem, q, nominal, remaining=16))
+    for passed, left in enumerate(range(15, 0, -1), start=1):
+        ahead = np.pad(nominal[:, passed:], ((0, 0), (0, 15), (0, 0)))  # zeros where nothing looks any more
+        view = observe(policy.problem, policy.plan(state)[:, 0], ahead, remaining=left)
+        _, state = policy.predict(view, state)
+        if left < 14:
+            assert policy.report(state).iterations.max() == 0
+
+
+@functools.cache
+def descended(name, horizon, count):
+    """Costs that long gradient descent with analytic derivatives reaches from rest."""
+    scenario = ikgym.scenarios.get(name)
+    q, nominal = states_near(scenario, horizon - 1, count, 1e-2, seed=5)
+    descent = baselines.make(
+        "rhc_gradient", scenario, horizon=horizon, gradient="analytic", tolerance=1e-3, iterations=20_000
+    )
+    _, state = descent.predict(observe(descent.problem, q, nominal))
+    plans = q[:, None] + scenario.dt * np.cumsum(state[2], axis=1)
+    return [plan_cost(descent.problem, Horizon(a, b), p) for a, b, p in zip(q, nominal, plans, strict=True)]
+
+
+@pytest.mark.parametrize("horizon", [3, 6])
+@pytest.mark.parametrize("name", VARGA)
+def test_never_above_gradient_descent(name, horizon):
+    scenario = ikgym.scenarios.get(name)
+    q, nominal = states_near(scenario, horizon - 1, 20, 1e-2, seed=5)
+    costs, *_ = planned(baselines.make("rhc", scenario, horizon=horizon), q, nominal)
+    assert (costs <= np.array(descended(name, horizon, 20)) * (1.0 + RELATIVE) + ABSOLUTE).all()
+
+
+class Bounded:
+    """IPOPT with the limits of joints and velocities: the rival's residual, one more row of constraints."""
+
+    def __init__(self, problem: Problem, knots: int) -> None:
+        self.problem, self.knots = problem, knots
+        self.residual = CasadiHorizon(problem, knots)._residual
+        n, m, e, cost = problem.model.joints, problem.task.size, problem.task.error_size, problem.cost
+        y, t = casadi.SX.sym("y", n, knots), casadi.SX.sym("t", e, knots)
+        start, nominal = casadi.SX.sym("q", n), casadi.SX.sym("nominal", m, knots)
+        total, above, speeds = casadi.SX(0), [], []
+        for k in range(knots):
+            speeds.append(y[:, k] - (y[:, k - 1] if k else 0.0))
+            total += casadi.sum1((speeds[-1] / cost.delta_qdot) ** 4) + casadi.sum1(t[:, k])
+            r = self.residual(start + problem.dt * y[:, k], nominal[:, k])
+            above += [t[:, k] - r**2, t[:, k] - r**3, t[:, k] + r**3]
+        nlp = {
+            "x": casadi.vertcat(casadi.vec(y), casadi.vec(t)),
+            "p": casadi.vertcat(start, casadi.vec(nominal)),
+            "f": total,
+            "g": casadi.vertcat(*above, *speeds),
+        }
+        self.solver = casadi.nlpsol("bounded", "ipopt", nlp, OPTIONS)
+
+    def solve(self, horizon: Horizon, start: np.ndarray) -> tuple[float, bool]:
+        problem, knots, q = self.problem, self.knots, horizon.q
+        y = (start - q) / problem.dt
+        r = np.array(self.residual.map(knots)(start.T, horizon.nominal.T))
+        limit, free = np.tile(problem.velocity_limit, knots), np.full(r.size, np.inf)
+        answer = self.solver(
+            x0=np.concatenate([y.ravel(), np.maximum(r**2, abs(r) ** 3).T.ravel()]),
+            p=np.concatenate([q, horizon.nominal.ravel()]),
+            lbg=np.concatenate([np.zeros(3 * r.size), -limit]),
+            ubg=np.concatenate([np.full(3 * r.size, np.inf), limit]),
+            lbx=np.concatenate([np.tile((problem.model.lower - q) / problem.dt, knots), -free]),
+            ubx=np.concatenate([np.tile((problem.model.upper - q) / problem.dt, knots), free]),
+        )
+        path = q + problem.dt * np.array(answer["x"])[: y.size, 0].reshape(y.shape)
+        return plan_cost(problem, horizon, path), bool(self.solver.stats()["success"])
+
+
+def limited(name, speed=20.0, share=0.0):
+    """A scenario with slow joints, or with joint limits inside the range of its nominal joint path."""
+    scenario = ikgym.scenarios.get(name).replace(velocity_limit=speed)
+    if share == 0.0:
+        return scenario
+    joints = scenario.nominal_joint_path(0)
+    lower, upper = np.add(np.quantile(joints, [share, 1.0 - share], axis=0), [[-1e-3], [1e-3]])
+    arm = scenario.arm.replace(lower=lower, upper=upper)
+    return scenario.replace(arm=arm, model=arm)
+
+
+@pytest.mark.parametrize(
+    ("scenario", "horizon", "far"),
+    [
+        (limited("varga7-fast", speed=5.0), 10, 1e-2),
+        (limited("varga7-fast", speed=20.0), 3, 1e-1),
+        (limited("varga7-slow", speed=1.0), 6, 5e-3),
+        (limited("varga7-fast", share=0.1), 6, 1e-2),
+    ],
+    ids=["slow joints", "far away", "slow trajectory", "joint limits"],
+)
+def test_limits_are_kept_and_agree_with_ipopt(scenario, horizon, far):
+    policy = baselines.make("rhc", scenario, horizon=horizon)
+    q, nominal = states_near(scenario, horizon - 1, 12, far, seed=3)
+    lower, upper = policy.problem.model.lower, policy.problem.model.upper
+    q = np.clip(q, lower, upper)
+    costs, horizons, plans, _ = planned(policy, q, nominal)
+    plans = np.array(plans)
+    speeds = np.diff(np.concatenate([q[:, None], plans], axis=1), axis=1) / scenario.dt / scenario.velocity_limit
+    assert abs(speeds).max() <= 1.0 + 1e-6
+    assert (plans >= lower - 1e-6).all()
+    assert (plans <= upper + 1e-6).all()
+    # Limits that nothing presses on would test nothing.
+    assert (abs(speeds) > 1.0 - 1e-6).any() or (np.minimum(plans - lower, upper - plans) < 1e-6).any()
+    solver, compared = Bounded(policy.problem, horizon - 1), 0
+    for cost, state, plan in zip(costs, horizons, plans, strict=True):
+        best, good = solver.solve(state, plan)
+        compared += good
+        assert cost == pytest.approx(best, rel=RELATIVE, abs=ABSOLUTE) or not good
+    assert compared >= 6
+
+
+@pytest.mark.parametrize("iterations", [None, 1])
+@pytest.mark.parametrize("share", [0.0, 0.1])
+def test_an_episode_stays_within_its_limits(iterations, share):
+    scenario = limited("varga7-fast", speed=4.0, share=share).replace(steps=150)
+    policy = baselines.make("rhc", scenario, horizon=8, iterations=iterations)
+    env = gym.make("RedundantIK-v0", scenario=scenario, preview=policy.preview)
+    observation, _ = env.reset()
+    state, lower, upper = None, scenario.arm.lower - 1e-6, scenario.arm.upper + 1e-6
+    inside = np.all((observation["q"] >= lower) & (observation["q"] <= upper))
+    pressed = False
+    for _ in range(150):
+        action, state = policy.predict(observation, state)
+        assert action in env.action_space
+        observation, *_ = env.step(action)
+        within = bool(np.all((observation["q"] >= lower) & (observation["q"] <= upper)))
+        assert within or not inside  # the nominal start may lie outside
+        inside = inside or within
+        pressed |= bool((abs(action) > 0.999).any())
+    assert inside
+    assert pressed or share > 0.0
+
+
+def test_a_single_newton_step_from_a_wrong_plan_stays_within_the_limits():
+    """The plan itself may not have come to its limits yet."""
+    scenario = limited("varga7-fast", share=0.1)
+    policy = baselines.make("rhc", scenario, horizon=8, iterations=1)
+    lower, upper = scenario.arm.lower, scenario.arm.upper
+    q, nominal = states_near(scenario, 7, 40, 1e-2, seed=4)
+    _, state = policy.predict(observe(policy.problem, q, nominal))
+    q, nominal = states_near(scenario, 7, 40, 1e-2, seed=6)
+    q = np.clip(q, lower, upper)
+    action, state = policy.predict(observe(policy.problem, q, nominal), state)
+    reached = q + scenario.dt * scenario.velocity_limit * action
+    first = policy.plan(state)[:, 0]
+    assert ((first > upper + 1e-6) | (first < lower - 1e-6)).any()  # otherwise there is nothing to see
+    assert (reached >= lower - 1e-6).all()
+    assert (reached <= upper + 1e-6).all()
+
+
+@functools.cache
+def episode(name, policy="rhc", steps=3000, **parameters):
+    """Total cost, Newton steps and statuses of an episode."""
+    scenario = ikgym.scenarios.get(name).replace(steps=steps)
+    policy = baselines.make(policy, scenario, **parameters)
+    env = gym.make("RedundantIK-v0", scenario=scenario, preview=policy.preview)
+    observation, _ = env.reset()
+    total, state, made, statuses = 0.0, None, [], set()
+    for _ in range(steps):
+        action, state = policy.predict(observation, state)
+        observation, reward, *_ = env.step(action)
+        total -= float(reward)
+        made.append(int(policy.report(state).iterations[0]))
+        statuses.add(int(policy.report(state).status[0]))
+    return total, made, statuses
+
+
+def test_one_newton_step_a_period_is_nearly_the_optimum():
+    converged, _, statuses = episode("varga7-fast", steps=800)
+    quick, made, _ = episode("varga7-fast", steps=800, iterations=1)
+    assert quick == pytest.approx(converged, rel=0.01)
+    assert statuses == {Status.CONVERGED}
+    assert set(made[1:]) == {1}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["varga7-fast", "varga7-slow"])
+def test_one_newton_step_a_period_is_nearly_the_optimum_for_a_whole_episode(name):
+    assert episode(name, iterations=1)[0] == pytest.approx(episode(name)[0], rel=0.01)
+
+
+def test_newton_steps_do_not_grow_with_the_horizon():
+    """Their number, cold and warm; a step itself is linear in the knots."""
+    scenario = ikgym.scenarios.get("varga7-fast")
+    most = []
+    for horizon in (11, 41, 161, 641):
+        policy = baselines.make("rhc", scenario, horizon=horizon)
+        q, nominal = states_near(scenario, policy.preview, 8, 1e-2, seed=2)
+        _, state = policy.predict(observe(policy.problem, q, nominal))
+        assert set(policy.report(state).status) == {Status.CONVERGED}
+        most.append(float(np.median(policy.report(state).iterations)))
+    assert max(most) <= 3.0 * most[0] + 10.0
+    assert np.mean(episode("varga7-fast", steps=800)[1]) < 15.0
+    policy = baselines.make("rhc", scenario, horizon=31)
+    longer = baselines.make("rhc", scenario, horizon=301)
+    one = np.ones(1, dtype=np.int64)
+    assert np.array_equal(np.multiply(policy.count(one)[:3], 10), longer.count(one)[:3])
+
+
+CHALLENGED = {"horizon": 40, "iterations": 1, "blocks": 12, "starts": 4, "challenge": 5}
+
+
+def pushed(policy):
+    """Observations of three arms near the nominal path, and which of them begin an episode."""
+    scenario, rng = ikgym.scenarios.get("varga7-fast"), np.random.default_rng(0)
+    joints, nominal = scenario.nominal_joint_path(0), scenario.nominal(0, preview=policy.preview)
+    for k in range(30):
+        q = joints[k] + rng.normal(size=(3, 7)) * 1e-3
+        ahead = np.stack([nominal[k + 1 : k + 1 + policy.preview]] * 3)
+        yield observe(policy.problem, q, ahead, remaining=60 - k), np.array([k == 0, k % 7 == 0, k == 11])
+
+
+@pytest.mark.parametrize("more", [{}, {"stop_at_end": True}, {"iterations": None}])
+def test_rows_of_a_batch_are_single_calls_with_challengers_and_starts(more):
+    policy = baselines.make("rhc", "varga7-fast", **{**CHALLENGED, **more})
+    states, batched = [None] * 3, None
+    for view, start in pushed(policy):
+        action, batched = policy.predict(view, batched, start)
+        assert np.isfinite(action).all()
+        for i in range(3):
+            row = {key: value[i] for key, value in view.items()}
+            single, states[i] = policy.predict(row, None if start[i] else states[i])
+            assert identical(single, action[i])
+            assert all(identical(a[0], b[i]) for a, b in zip(states[i], batched, strict=True))
+    assert (policy.report(batched).iterations > 1).all()  # challengers among them
+
+
+@pytest.mark.parametrize(("change", "same"), [({}, True), ({"seed": 1}, False)])
+def test_seeds(change, same):
+    base = {"horizon": 200, "blocks": 16, "starts": 6}
+    first, second = (episode("varga7-fast", "rhc_foresight", steps=60, **base, **c) for c in ({}, change))
+    episode.cache_clear()
+    assert (episode("varga7-fast", "rhc_foresight", steps=60, **base, **change) == second) is True
+    assert (first == second) == same
+
+
+def test_without_random_guesses_the_seed_changes_nothing():
+    assert episode("varga7-fast", steps=20, seed=0) == episode("varga7-fast", steps=20, seed=9)
+
+
+def test_a_new_episode_clears_the_memory():
+    scenario = ikgym.scenarios.get("varga7-fast")
+    policy = baselines.make("rhc", scenario, **CHALLENGED)
+    q, nominal = states_near(scenario, policy.preview, 2, 1e-2)
+    view, other = (observe(policy.problem, q + shift, nominal) for shift in (0.0, 0.05))
+    fresh, first = policy.predict(view)
+    _, used = policy.predict(other, policy.predict(other)[1])
+    again, second = policy.predict(view, used, np.array([True, False]))
+    assert identical(again[0], fresh[0])
+    assert all(identical(a[0], b[0]) for a, b in zip(first, second, strict=True))
+    assert not identical(second[2][1], first[2][1])
+
+
+@pytest.mark.parametrize("name", ["rhc", "rhc_foresight"])
+def test_the_last_steps_of_an_episode(name):
+    more = {"horizon": 20, "stop_at_end": True} if name == "rhc" else {}
+    total, made, statuses = episode("varga7-fast", name, steps=6, **more)
+    assert np.isfinite(total)
+    assert len(made) == 6
+    assert statuses <= {Status.CONVERGED, Status.ITERATION_LIMIT}
+
+
+@pytest.mark.parametrize("parameters", [{}, {"iterations": 1}, CHALLENGED])
+def test_disturbed_drives_do_no_harm(parameters):
+    disturbance = ikgym.scenarios.scenario.Disturbance(bias=0.5, noise=2.0)
+    scenario = ikgym.scenarios.get("varga7-fast").replace(steps=80, disturbance=disturbance)
+    policy = baselines.make("rhc", scenario, **parameters)
+    env = gym.make("RedundantIK-v0", scenario=scenario, preview=policy.preview)
+    observation, _ = env.reset(seed=0)
+    state = None
+    for _ in range(80):
+        action, state = policy.predict(observation, state)
+        observation, *_, info = env.step(action)
+        assert all(np.isfinite(array).all() for array in state)
+        assert info["position_error"] < 0.05
+
+
+def test_nothing_finite_gives_a_nan():
+    """From absurdly far away, with targets out of reach, and at the singular home."""
+    scenario = ikgym.scenarios.get("varga7-fast")
+    for parameters in ({"horizon": 6}, {"horizon": 6, "iterations": 1}, {**CHALLENGED, "horizon": 30}):
+        policy = baselines.make("rhc", scenario, **parameters)
+        nominal = np.tile(scenario.nominal(0)[0], (4, policy.preview, 1))
+        nominal[1, :, 3:] = 1e3
+        nominal[2, :, 3:] = 1e8
+        q = np.zeros((4, 7))
+        q[3] = 1e5
+        state = None
+        for _ in range(8):
+            action, state = policy.predict(observe(policy.problem, q, nominal), state)
+            assert np.isfinite(action).all()
+            assert abs(action).max() <= 1.0
+            assert set(policy.report(state).status) <= set(Status)
+
+
+def test_status_and_iterations_are_said():
+    scenario = ikgym.scenarios.get("varga7-fast")
+    q, nominal = states_near(scenario, 29, 1, 1e-2)
+    for parameters, wanted in (({}, Status.CONVERGED), ({"iterations": 1, "starts": 1}, Status.CONVERGED)):
+        policy = baselines.make("rhc", scenario, **parameters)
+        _, state = policy.predict(observe(policy.problem, q, nominal))
+        assert policy.report(state).status[0] == wanted  # the first plan of all is given its time
+    _, state = policy.predict(observe(policy.problem, q + 0.01, nominal), state)
+    assert policy.report(state).status[0] == Status.ITERATION_LIMIT
+    assert policy.report(state).iterations[0] == 1
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"horizon": 1}, "horizon: expected a whole number of at least 2, got 1"),
+        ({"iterations": 0}, "iterations: expected a whole number of at least 1, got 0"),
+        ({"blocks": 0}, "blocks: expected a whole number of at least 1, got 0"),
+        ({"blocks": 30}, "blocks: expected at most horizon - 1 = 29, a knot at each step, got 30"),
+        ({"terminal_weight": -1.0}, "terminal_weight: expected a finite number of at least 0"),
+        ({"terminal_weight": np.inf}, "terminal_weight: expected a finite number"),
+        ({"stop_at_end": 1}, "stop_at_end: expected True or False, got 1"),
+        ({"starts": 0}, "starts: expected a whole number of at least 1"),
+        ({"challenge": -1}, "challenge: expected a whole number of at least 0"),
+        ({"challenge_rate": 0}, "challenge_rate: expected a whole number of at least 1"),
+        ({"seed": -1}, "seed: expected a whole number of at least 0"),
+        ({"tolerance": 0.0}, "tolerance: expected a finite number above 0"),
+    ],
+)
+def test_bad_parameters(change, message):
+    with pytest.raises(InvalidInputError, match=message):
+        baselines.make("rhc", "varga7-fast", **change)
