@@ -85,6 +85,7 @@ def record(records: Iterable[Record], path: pathlib.Path = DATA) -> list[Record]
     Raises:
         ResultsError: The file is damaged or cannot be written, or a cost is no number of at least 0.
     """
+    _read.cache_clear()  # another process may have written since
     known, kept = dict(_read(path)), {}
     for new in records:
         if not (math.isfinite(new.cost) and new.cost >= 0.0):

@@ -296,7 +296,7 @@ def _beaten(rows: Sequence[Row]) -> list[str]:
             seeds.setdefault((row.policy, row.scenario), []).append(row.seed)
     return [
         f"{policy} beats the best known cost of {scenario}, seed {', '.join(map(str, better))}: bring the record up to "
-        f"date with {best_known.UPDATE}"
+        f"date with {best_known.UPDATE} --scenarios {scenario} --policies {policy}"
         for (policy, scenario), better in seeds.items()
     ]
 

@@ -12,7 +12,11 @@ from baselines.joint_paths.grid import offsets
 from baselines.joint_paths.receding import Settings, plan_rows
 from baselines.policy import Batch, Memory, Solution, SolverPolicy
 from ikgym.exceptions import InvalidInputError
+from ikgym.simulator import FARTHEST
 from ikgym.validation import FloatArray, number, whole_number
+
+# What the kernel's counters and random numbers can hold.
+MOST = 2**31 - 1
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -26,19 +30,20 @@ class RecedingHorizon(SolverPolicy):
 
     To convergence (``iterations=None``) the plan is a local minimum of the horizon's cost, found with the exact Hessian
     where that is positive definite; with a number of iterations it is so many Gauss–Newton steps away from the plan
-    before, which at 1 kHz is close (the real-time iteration). A long horizon has many local minima, and some are a
-    million times dearer than others: several ``starts`` and challengers are for that.
+    before, which at 1 kHz is close (the real-time iteration). A long horizon has many local minima, some
+    of them very dear: several ``starts`` and challengers are for that.
 
     The joint limits of the arm and the velocity limit of the scenario are constraints of the plan.
 
     Args:
         problem: What the policy is told of the scenario.
         horizon: HL, the number of grid points with the present one. At least 2; HL - 1 steps must be shown ahead.
-        iterations: Newton steps in one control period; None for as many as the optimum takes.
+        iterations: Newton steps in one control period, at least 30 in the first; None for as many as the optimum takes.
         blocks: Knots of the horizon; None for one at each of its HL - 1 steps. Fewer are spaced out: two blocks of one
             step, then lengths that grow geometrically. Within a block the joint velocity is constant, and its tracking
             cost follows the trapezoidal rule.
-        terminal_weight: Factor of the tracking cost at the last grid point; 1 is the paper's cost.
+        terminal_weight: Factor of the tracking cost at the last grid point, unless the episode ends before it; 1 is the
+            paper's cost.
         stop_at_end: Whether the horizon ends where the episode does, which ``remaining`` tells. Else it looks on, where
             costs count no more.
         starts: Guesses from which the first plan of an episode is chosen: damped least squares from knot to knot, and
@@ -73,7 +78,8 @@ class RecedingHorizon(SolverPolicy):
     _constants: tuple[Any, ...] = dataclasses.field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        whole_number("horizon", self.horizon, at_least=2)
+        if whole_number("horizon", self.horizon, at_least=2) > FARTHEST:
+            raise InvalidInputError(f"horizon: expected at most {FARTHEST}, got {self.horizon}.")
         if self.iterations is not None:
             whole_number("iterations", self.iterations, at_least=1)
         if self.blocks is not None and whole_number("blocks", self.blocks, at_least=1) >= self.horizon:
@@ -84,7 +90,8 @@ class RecedingHorizon(SolverPolicy):
             raise InvalidInputError(f"stop_at_end: expected True or False, got {self.stop_at_end!r}.")
         terminal_weight = number("terminal_weight", self.terminal_weight, at_least=0.0)
         for name, least in {"starts": 1, "challenge": 0, "challenge_rate": 1, "seed": 0}.items():
-            whole_number(name, getattr(self, name), at_least=least)
+            if whole_number(name, getattr(self, name), at_least=least) > MOST:
+                raise InvalidInputError(f"{name}: expected at most {MOST}, got {getattr(self, name)}.")
         tolerance = number("tolerance", self.tolerance, above=0.0)
         knots = offsets(self.horizon - 1, self.blocks)
         knots.flags.writeable = False
@@ -137,5 +144,6 @@ class RecedingHorizon(SolverPolicy):
 
     def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
         """Jacobians and a factorisation a knot in each Newton step, and forward kinematics for one length tried."""
-        each = iterations * len(self.offsets)
+        # Even a plan that is found to be optimal at once has been linearised.
+        each = (iterations + 1) * len(self.offsets)
         return each, each, each, 0

@@ -33,7 +33,7 @@ class Effort:
     solves: int = 7
     lead: int = 3
     grid: int = 30
-    growth: tuple[int, ...] = (10, 30, 100, 200, 400)
+    growth: tuple[int, ...] = (10, 20, 50, 100, 200, 400)
     joints: tuple[int, ...] = (3, 5, 7, 10, 14)
     batches: tuple[int, ...] = (1, 4, 16, 64, 256, 1024)
 

@@ -43,8 +43,8 @@ def page(tables: Sequence[Table], given: Mapping[str, Any]) -> str:
     return "\n\n".join(
         [
             "# Speed",
-            "All figures of one table are medians of interleaved rounds of one run, so that ratios hold on a noisy "
-            "machine; figures of different tables do not compare as well.",
+            "Figures of one table come from one run and, but where it says otherwise, are medians of interleaved "
+            "rounds, so that ratios hold on a noisy machine; those of different tables do not compare as well.",
             *(table.markdown() for table in tables),
             "## Conditions",
             listed,

@@ -1,4 +1,4 @@
-"""States along an episode, at which solvers are compared: the same for all, and independent of any of them."""
+"""States along an episode, at which solvers are compared: the same for all."""
 
 from __future__ import annotations
 
@@ -14,7 +14,10 @@ Observation = dict[str, FloatArray]
 
 
 def along(scenario: Scenario, preview: int, count: int, lead: int) -> list[list[Observation]]:
-    """States of an episode of damped least squares, evenly spread, each at the end of the steps that lead to it.
+    """States of an episode of a receding horizon, evenly spread, each at the end of the steps that lead to it.
+
+    The episode is one of `rhc` with as many steps ahead: where a horizon of that length leads, and not where another
+    policy does, is where its solver has to be fast.
 
     Args:
         scenario: What is tracked.
@@ -25,7 +28,7 @@ def along(scenario: Scenario, preview: int, count: int, lead: int) -> list[list[
     Returns:
         Per state the ``lead + 1`` observations up to it.
     """
-    policy = baselines.make("dls", scenario)
+    policy = baselines.make("rhc", scenario, horizon=preview + 1)
     env = gym.make("RedundantIK-v0", scenario=scenario, preview=preview)
     observation, _ = env.reset(seed=0)
     ends = np.linspace(0, scenario.steps, count + 2).astype(int)[1:-1]
@@ -39,7 +42,7 @@ def along(scenario: Scenario, preview: int, count: int, lead: int) -> list[list[
 
 def rows_along(scenario: Scenario, preview: int, rows: int, lead: int) -> list[Observation]:
     """The same for a batch of arms, each on its own way: the ``lead + 1`` observations behind the 50th step."""
-    policy = baselines.make("dls", scenario)
+    policy = baselines.make("rhc", scenario, horizon=preview + 1)
     envs = gym.make_vec("RedundantIK-v0", num_envs=rows, scenario=scenario, preview=preview)
     observation, _ = envs.reset(seed=0)
     out, state = [], None

@@ -55,7 +55,7 @@ class Rules(NamedTuple):
 
 
 class Scratch(NamedTuple):
-    """Arrays of one knot that are used again and again."""
+    """Arrays of one knot that are used again and again, and the factor of the limits' stiffness. Shape (1,)."""
 
     rotation: npt.NDArray[np.float64]
     position: npt.NDArray[np.float64]
@@ -66,6 +66,7 @@ class Scratch(NamedTuple):
     error_jacobian: npt.NDArray[np.float64]
     slope: npt.NDArray[np.float64]
     pull: npt.NDArray[np.float64]
+    firmness: npt.NDArray[np.float64]
 
 
 class Blocks(NamedTuple):
@@ -98,6 +99,7 @@ def scratch_for(kind, m, n):  # type: ignore[no-untyped-def]
         np.empty((e, n)),
         np.empty(e),
         np.empty((3, 3)),
+        np.ones(1),
     )
 
 
@@ -154,6 +156,7 @@ def merit(rules, grid, start, nominal, path, multipliers, scratch):  # type: ign
     rotation, position, pose, error = scratch.rotation, scratch.position, scratch.pose, scratch.error
     at, lengths, tracking, often = grid.at, grid.length, grid.tracking, grid.velocity
     limits, lower, upper = rules.velocity_limit, rules.lower, rules.upper
+    firmness = scratch.firmness[0]
     e, n = error.shape[0], path.shape[1]
     total = 0.0
     for k in range(path.shape[0]):
@@ -171,9 +174,9 @@ def merit(rules, grid, start, nominal, path, multipliers, scratch):  # type: ign
             if often[k] != 0.0:
                 total += often[k] * cost_kernels.value(velocity, cost.delta_qdot, cost.p_in, cost.p_out)
             if multipliers[k, e + j] != 0.0 or abs(velocity) > limits[j]:
-                total += _velocity_limit(rules, j, velocity, multipliers[k, e + j])[0]
+                total += _velocity_limit(rules, j, velocity, multipliers[k, e + j], firmness)[0]
             if multipliers[k, e + n + j] != 0.0 or path[k, j] < lower[j] or path[k, j] > upper[j]:
-                total += _joint_limit(rules, j, path[k, j], multipliers[k, e + n + j])[0]
+                total += _joint_limit(rules, j, path[k, j], multipliers[k, e + n + j], firmness)[0]
     return total
 
 
@@ -204,6 +207,7 @@ def linearise(rules, grid, start, nominal, path, multipliers, advance, exact, sc
     gradient, diagonal, second, coupling = blocks.gradient, blocks.diagonal, blocks.second, blocks.coupling
     jacobian, error_jacobian = scratch.jacobian, scratch.error_jacobian
     limits, lower, upper = rules.velocity_limit, rules.lower, rules.upper
+    firmness = scratch.firmness[0]
     e, n = error.shape[0], path.shape[1]
     total = true = gap = 0.0
     for k in range(path.shape[0]):
@@ -251,8 +255,8 @@ def linearise(rules, grid, start, nominal, path, multipliers, advance, exact, sc
                 bend = often[k] * cost_kernels.bend(felt, cost.delta_qdot, cost.p_in, cost.p_out)
             if multipliers[k, e + j] != 0.0 or abs(velocity) > limits[j]:
                 if advance:
-                    multipliers[k, e + j] = _velocity_limit(rules, j, velocity, multipliers[k, e + j])[1]
-                value, pressure, stiffness, share = _velocity_limit(rules, j, velocity, multipliers[k, e + j])
+                    multipliers[k, e + j] = _velocity_limit(rules, j, velocity, multipliers[k, e + j], firmness)[1]
+                value, pressure, stiffness, share = _velocity_limit(rules, j, velocity, multipliers[k, e + j], firmness)
                 total += value
                 gap += abs(share)
                 slope += pressure
@@ -267,8 +271,12 @@ def linearise(rules, grid, start, nominal, path, multipliers, advance, exact, sc
                 diagonal[k - 1, j, j] += bend
             if multipliers[k, e + n + j] != 0.0 or path[k, j] < lower[j] or path[k, j] > upper[j]:
                 if advance:
-                    multipliers[k, e + n + j] = _joint_limit(rules, j, path[k, j], multipliers[k, e + n + j])[1]
-                value, pressure, stiffness, share = _joint_limit(rules, j, path[k, j], multipliers[k, e + n + j])
+                    multipliers[k, e + n + j] = _joint_limit(rules, j, path[k, j], multipliers[k, e + n + j], firmness)[
+                        1
+                    ]
+                value, pressure, stiffness, share = _joint_limit(
+                    rules, j, path[k, j], multipliers[k, e + n + j], firmness
+                )
                 total += value
                 gap += abs(share)
                 gradient[k, j] += pressure
@@ -302,15 +310,17 @@ def _tracking(cost, error, multiplier):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _velocity_limit(rules, j, velocity, multiplier):  # type: ignore[no-untyped-def]
+def _velocity_limit(rules, j, velocity, multiplier, firmness):  # type: ignore[no-untyped-def]
     limit, cost = rules.velocity_limit[j], rules.cost
-    stiffness = VELOCITY_STIFFNESS * cost_kernels.bend(limit, cost.delta_qdot, cost.p_in, max(cost.p_out, 2.0))
+    stiffness = (
+        firmness * VELOCITY_STIFFNESS * cost_kernels.bend(limit, cost.delta_qdot, cost.p_in, max(cost.p_out, 2.0))
+    )
     return press(velocity, -limit, limit, multiplier, stiffness, math.inf)
 
 
 @inlined
-def _joint_limit(rules, j, q, multiplier):  # type: ignore[no-untyped-def]
-    stiffness = JOINT_STIFFNESS * 2.0 / (rules.cost.delta_x * rules.cost.delta_x)
+def _joint_limit(rules, j, q, multiplier, firmness):  # type: ignore[no-untyped-def]
+    stiffness = firmness * JOINT_STIFFNESS * 2.0 / (rules.cost.delta_x * rules.cost.delta_x)
     return press(q, rules.lower[j], rules.upper[j], multiplier, stiffness, math.inf)
 
 

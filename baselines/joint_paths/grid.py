@@ -67,7 +67,7 @@ def cut(at, steps, terminal, grid):  # type: ignore[no-untyped-def]
     Args:
         at: Steps from now to the knots of the whole horizon. Shape (K,).
         steps: Steps ahead of the last knot at most; at least 1.
-        terminal: Factor of the tracking cost of the last knot.
+        terminal: Factor of the tracking cost of the last knot, where the horizon is not cut.
         grid: Receives the grid in its first elements.
 
     Returns:
@@ -87,7 +87,8 @@ def cut(at, steps, terminal, grid):  # type: ignore[no-untyped-def]
         knots = k + 1
         if here == steps:
             break
-    grid.tracking[knots - 1] *= terminal
+    if grid.at[knots - 1] == at[-1]:
+        grid.tracking[knots - 1] *= terminal
     return knots
 
 

@@ -16,6 +16,8 @@ CONVERGED, RAN_OUT, STALLED = 0, 1, 2
 SUFFICIENT = 1e-4
 # The multipliers are brought up to date where Newton's method promises less than this share of what they leave open.
 SETTLED = 0.1
+# Limits become so much firmer where a renewal leaves more than this share of what the one before left open; at most.
+FIRMER, SLOW, FIRMEST = 10.0, 0.3, 1e6
 # Lengths of a step tried one after the other.
 SHORTENING = 0.3
 TRIALS = 6
@@ -125,6 +127,8 @@ def minimise(  # type: ignore[no-untyped-def]
     knots, n = path.shape
     blocks, step, trial = room.blocks, room.step[:knots], room.trial[:knots]
     unit = 1.0 / (rules.dt * rules.cost.delta_qdot) ** 2
+    firmness, left_open = room.scratch.firmness, np.inf
+    firmness[0] = 1.0
     value, true, gap = linearise(rules, grid, start, nominal, path, multipliers, True, exact, room.scratch, blocks)
     made, outcome, renewed, damping = 0, RAN_OUT, True, 0.0
     while True:
@@ -152,6 +156,9 @@ def minimise(  # type: ignore[no-untyped-def]
             # same path they would overshoot, and those of limits, which have no bound, would swing for ever.
             made += 1
             renewed = True
+            if gap > SLOW * left_open:
+                firmness[0] = min(FIRMER * firmness[0], FIRMEST)
+            left_open = gap
             if made >= most:
                 break
             value, true, gap = linearise(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +17,10 @@ from ikgym.cost_kernels import CostParameters
 from ikgym.jit import kernel
 from ikgym.kinematics import Chain
 
-_CONVERGED, _LIMIT = int(Status.CONVERGED), int(Status.ITERATION_LIMIT)
+_CONVERGED, _LIMIT, _SATURATED = int(Status.CONVERGED), int(Status.ITERATION_LIMIT), int(Status.SATURATED)
+
+# How exactly a plan keeps the velocity limit, as a share of it.
+KEPT = 1e-5
 
 # Newton steps of each of several first plans, of a single one, and of a plan that is to be brought to its optimum.
 STEPS_OF_A_START, STEPS_OF_THE_FIRST, STEPS_TO_THE_OPTIMUM = 30, 30, 300
@@ -148,13 +152,13 @@ def plan_rows(  # type: ignore[no-untyped-def]  # noqa: D417  # the first argume
     )
     new_grid, old_grid = empty_grid(knots), empty_grid(knots)
     for row in range(q.shape[0]):
-        left = max(int(remaining[row, 0]), 1) if stop_at_end else at[-1]
+        left = int(min(max(remaining[row, 0], 1.0), at[-1] + 1.0)) if stop_at_end else at[-1]
         grid = first_knots(new_grid, cut(at, left, terminal_weight, new_grid))
         here = grid.at.shape[0]
         path, held = paths[row, :here], multipliers[row, :here]
         if calls[row] == 0:
             made = _first_plan(rules, settings, grid, q[row], nominal[row], path, held, desk)
-            budget = STEPS_OF_THE_FIRST
+            budget = max(STEPS_OF_THE_FIRST, settings.iterations)
         else:
             made = 0
             budget = settings.iterations
@@ -193,12 +197,20 @@ def plan_rows(  # type: ignore[no-untyped-def]  # noqa: D417  # the first argume
                 desk,
             )
         calls[row] += 1
-        for j in range(n):
-            # A limit that holds the plan is kept to the tolerance only.
-            target = min(max(path[0, j], lower[j]), upper[j])
-            velocity = (target - q[row, j]) / (dt * grid.length[0])
-            qdot[row, j] = min(max(velocity, -velocity_limit[j]), velocity_limit[j])
         status[row] = _CONVERGED if outcome == CONVERGED else _LIMIT
+        for j in range(n):
+            # A limit that holds the plan is kept to the tolerance only; what is no number stays none.
+            target, limit = path[0, j], velocity_limit[j]
+            if target < lower[j]:
+                target = lower[j]
+            elif target > upper[j]:
+                target = upper[j]
+            velocity = (target - q[row, j]) / (dt * grid.length[0])
+            if abs(velocity) > limit:
+                if abs(velocity) > (1.0 + KEPT) * limit:
+                    status[row] = _SATURATED
+                velocity = math.copysign(limit, velocity)
+            qdot[row, j] = velocity
         iterations[row] = made
 
 

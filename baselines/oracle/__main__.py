@@ -12,16 +12,18 @@ import numpy as np
 import tyro
 from tqdm import tqdm
 
-from baselines import best_known
+from baselines import best_known, registry
 from baselines import frozen as frozen_sets
 from baselines.best_known import MARGIN, MEANINGLESS
 from baselines.oracle.cache import VARIABLE, solve
 from baselines.oracle.episode import Whole
 from baselines.oracle.optimum import Optimum, Search
+from baselines.plan import parse_policy
+from baselines.rollout import rollouts
 from ikgym import scenarios as scenario_registry
 from ikgym.exceptions import IkgymError, InvalidInputError
 from ikgym.scenarios import Scenario
-from ikgym.validation import whole_number
+from ikgym.validation import FloatArray, whole_number
 
 #: An episode: its scenario and its seed.
 Episode = tuple[Scenario, int]
@@ -37,6 +39,8 @@ class Options:
     """Names of frozen sets."""
     seeds: Annotated[tuple[int, ...], tyro.conf.arg(metavar="N …")] = ()
     """Reset seeds of the random scenarios among those named."""
+    policies: Annotated[tuple[str, ...], tyro.conf.arg(metavar="POLICY …")] = ()
+    """Policies whose paths are starts, too, as NAME or NAME:PARAMETER=VALUE,…: those that have beaten a record."""
     search: Annotated[Search, tyro.conf.arg(name="")] = dataclasses.field(default_factory=Search)
     """How thoroughly is searched."""
     cache: bool = True
@@ -44,8 +48,8 @@ class Options:
     update: bool = False
     """Write down what is better than the records, or of episodes that have none."""
     check: bool = False
-    """Hold the records against what is found anew; the exit code is 1 where one is missing, stale or off by more than
-    a millionth."""
+    """Hold the records against what the search finds, or has on disk, played again; the exit code is 1 where one is
+    missing, stale or off by more than a millionth."""
 
 
 def manual() -> str:
@@ -63,6 +67,7 @@ Examples:
   python -m baselines.oracle --scenarios varga7-fast
   python -m baselines.oracle --scenarios varga7-random --seeds 1000000 1000001 --starts 1000
   python -m baselines.oracle --update
+  python -m baselines.oracle --scenarios varga7-fast --policies rhc_foresight --update
   python -m baselines.oracle --frozen varga7-random --check
 
 Of each episode is printed: its cost; how many paths at full resolution came within a millionth of it; how many random
@@ -104,12 +109,15 @@ def episodes(scenarios: Sequence[str], frozen: Sequence[str], seeds: Sequence[in
     return out
 
 
-def optima(todo: Sequence[Episode], how: Search, *, cache: bool) -> Iterator[tuple[Scenario, Optimum]]:
+def optima(
+    todo: Sequence[Episode], how: Search, policies: Sequence[str] = (), *, cache: bool
+) -> Iterator[tuple[Scenario, Optimum]]:
     """Solves episodes one after the other, with a bar on stderr.
 
     Args:
         todo: The episodes.
         how: How thoroughly is searched.
+        policies: Whose paths are starts, too.
         cache: Whether to look on disk first, and to keep there what was found.
     """
     with tqdm(
@@ -122,10 +130,23 @@ def optima(todo: Sequence[Episode], how: Search, *, cache: bool) -> Iterator[tup
     ) as bar:
         for number, (scenario, seed) in enumerate(todo, start=1):
             bar.set_description(f"{scenario.name}, seed {seed} ({number}/{len(todo)})")
-            optimum = solve(scenario, seed, how, cached=cache, tick=bar.update)
+            paths = {spec: path(scenario, seed, spec) for spec in policies}
+            optimum = solve(scenario, seed, how, cached=cache, tick=bar.update, paths=paths)
             bar.update(number - bar.n)
             bar.clear()
             yield scenario, optimum
+
+
+def path(scenario: Scenario, seed: int, spec: str) -> FloatArray:
+    """The joint coordinates of an episode that a policy plays, in [rad] or [m]. Shape (steps, n).
+
+    Raises:
+        UnknownNameError: There is no such policy or parameter.
+        InvalidInputError: The text has another form, or the policy does not suit the scenario.
+    """
+    name, parameters = parse_policy(spec)
+    (episode,) = rollouts(scenario, registry.make(name, scenario, **parameters), [seed])
+    return episode.q
 
 
 def line(optimum: Optimum) -> str:
@@ -174,7 +195,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     kept, wrong = 0, 0
     try:
         todo = episodes(options.scenarios, options.frozen, options.seeds)
-        for scenario, optimum in optima(todo, options.search, cache=options.cache):
+        for scenario, optimum in optima(todo, options.search, options.policies, cache=options.cache):
             print(line(optimum), flush=True)
             if options.check and (reason := verdict(scenario, optimum)):
                 print(f"  {reason}", flush=True)

@@ -11,7 +11,7 @@ import os
 import pathlib
 import sys
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from baselines.oracle.optimum import Optimum, Search, Start
 from baselines.oracle.search import VERSION, search
 from ikgym import scenarios
 from ikgym.scenarios import Scenario
-from ikgym.validation import whole_number
+from ikgym.validation import FloatArray, whole_number
 
 logger = logging.getLogger("ikgym")
 
@@ -37,6 +37,7 @@ def solve(
     *,
     cached: bool = True,
     tick: Callable[[float], object] | None = None,
+    paths: Mapping[str, FloatArray] | None = None,
 ) -> Optimum:
     """The cheapest joint path of an episode that a search finds: the best known one, certified by nobody.
 
@@ -46,22 +47,25 @@ def solve(
         how: How thoroughly is searched.
         cached: Whether to look on disk first, and to keep there what was found.
         tick: Called now and then with the share of the work done since the last call.
+        paths: Joint coordinates after each step by name, further starts, with which the disk is left alone.
+            Shapes (steps, n).
 
     Returns:
         The same, bit for bit, at every call.
 
     Raises:
         UnknownNameError: There is no such scenario.
-        InvalidInputError: The seed is no whole number of at least 0, or the scenario has random noise.
+        InvalidInputError: The seed is no whole number of at least 0, or the scenario has a disturbance.
     """
     scenario = scenario if isinstance(scenario, Scenario) else scenarios.get(scenario)
     seed, how = whole_number("seed", seed, at_least=0), how or Search()
     file = file_of(scenario, seed, how)
+    cached = cached and not paths
     known = _read(file) if cached else None
     if known is not None:
         # The name is not part of the content.
         return known.replace(scenario=scenario.name)
-    optimum = search(scenario, seed, how, tick)
+    optimum = search(scenario, seed, how, tick, paths)
     if cached:
         try:
             write(file, _packed(optimum))

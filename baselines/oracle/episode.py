@@ -47,20 +47,14 @@ class Whole:
         """The episode that a reset with the seed begins.
 
         Raises:
-            InvalidInputError: The seed is no whole number of at least 0, or the scenario has random noise, which
-                nobody knows beforehand.
+            InvalidInputError: The seed is no whole number of at least 0, or the scenario has a disturbance.
         """
         whole_number("seed", seed, at_least=0)
-        n, bias = scenario.joints, np.broadcast_to(scenario.disturbance.bias, scenario.joints)
-        if np.any(scenario.disturbance.noise):
+        n, disturbance = scenario.joints, scenario.disturbance
+        if np.any(disturbance.noise) or np.any(disturbance.bias):
             raise InvalidInputError(
-                f"The best cost of an episode is sought knowing all that happens in it; scenario {scenario.name!r} has "
-                f"a random disturbance: expected noise=0, got {scenario.disturbance.noise}."
-            )
-        limit = scenario.velocity_limit - np.abs(bias)
-        if (limit <= 0.0).any():
-            raise InvalidInputError(
-                f"bias of scenario {scenario.name!r}: expected less than the velocity limit, got {bias.tolist()}."
+                "The best cost of an episode is that of a joint path, which knows of no disturbance; scenario "
+                f"{scenario.name!r}: expected noise=0 and bias=0, got {disturbance}."
             )
         rules = Rules(
             scenario.arm.chain,
@@ -69,7 +63,7 @@ class Whole:
             scenario.dt,
             np.full(n, -np.inf),
             np.full(n, np.inf),
-            limit,
+            scenario.velocity_limit,
         )
         at = np.flatnonzero(scenario.counted())
         held = np.diff(at, prepend=0)
@@ -113,11 +107,9 @@ class Whole:
         Returns:
             One row a step. Shape (steps, n).
         """
-        bias = np.broadcast_to(self.scenario.disturbance.bias, self.scenario.joints)
         moves = np.diff(path, axis=0, prepend=self.start[None]) / self.scenario.dt
         held = np.diff(self.grid.at, prepend=0)
-        # Where a point is held, the bias goes on while the arm rests.
-        qdot = (moves - held[:, None] * bias) / self.grid.length[:, None]
+        qdot = moves / self.grid.length[:, None]
         every = np.repeat(qdot, held, axis=0)
         every[self.grid.at[held > 1] - 1] = 0.0
         return every

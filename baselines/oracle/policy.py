@@ -73,7 +73,7 @@ class Oracle(HandedPath):
 
     def solve(self, batch: Batch, memory: Memory) -> Solution:
         """See :meth:`SolverPolicy.solve`."""
-        qdot = (self.path[self.next_rows(batch)] - batch.q) / self.problem.dt - self.scenario.disturbance.bias
+        qdot = (self.path[self.next_rows(batch)] - batch.q) / self.problem.dt
         rows = len(qdot)
         return Solution(qdot, memory, statuses(rows), np.zeros(rows, dtype=np.int64))
 

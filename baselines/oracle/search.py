@@ -39,7 +39,13 @@ PARTNERS = 32
 STRIDE = 1_000_003
 
 
-def search(scenario: Scenario, seed: int, how: Search, tick: Callable[[float], object] | None = None) -> Optimum:
+def search(
+    scenario: Scenario,
+    seed: int,
+    how: Search,
+    tick: Callable[[float], object] | None = None,
+    paths: Mapping[str, FloatArray] | None = None,
+) -> Optimum:
     """The cheapest joint path of an episode that the starts lead to.
 
     Args:
@@ -47,23 +53,25 @@ def search(scenario: Scenario, seed: int, how: Search, tick: Callable[[float], o
         seed: The reset seed.
         how: How thoroughly.
         tick: Called now and then with the share of the work done since the last call.
+        paths: Joint coordinates after each step by name, further starts. Shapes (steps, n).
 
     Raises:
-        InvalidInputError: The seed is no whole number of at least 0, or the scenario has random noise.
+        InvalidInputError: The seed is no whole number of at least 0, or the scenario has a disturbance.
     """
     whole = Whole.of(scenario, seed)
     done = tick or (lambda share: None)
     known = _known_paths(whole)
-    starts, paths = [Start(kind) for kind in known], dict(enumerate(known.values()))
+    known |= {name: np.ascontiguousarray(q[whole.grid.at - 1]) for name, q in (paths or {}).items()}
+    starts, fine = [Start(kind) for kind in known], dict(enumerate(known.values()))
     done(0.1)
     # Where no velocity costs, as with held points, each knot is a problem of its own: nothing to search for.
     if whole.grid.velocity.any():
         starts, found = _coarse_search(whole, how, known, done)
-        paths |= found
-    polished = np.stack(list(paths.values()))
+        fine |= found
+    polished = np.stack(list(fine.values()))
     _, gradients, made, spent = _settle(whole, whole.grid, polished, exact=True, most=MOST, tolerance=TOLERANCE)
     played = [_played(whole, path) for path in polished]
-    for number, (_, _, cost), gradient, steps in zip(paths, played, gradients * scenario.dt, made, strict=True):
+    for number, (_, _, cost), gradient, steps in zip(fine, played, gradients * scenario.dt, made, strict=True):
         starts[number] = dataclasses.replace(
             starts[number], cost=cost, gradient_norm=float(gradient), newton_steps=int(steps)
         )
@@ -78,7 +86,7 @@ def search(scenario: Scenario, seed: int, how: Search, tick: Callable[[float], o
         cost=cost,
         gradient_norm=float(gradients[best]) * scenario.dt,
         starts=tuple(starts),
-        seconds=spent / len(paths),
+        seconds=spent / len(fine),
         hash=episode_hash(scenario, seed),
     )
 

@@ -76,7 +76,10 @@ def measured(options: Options, command: str) -> Measurement:
     if options.out is None:
         if options.write is None:
             raise InvalidInputError("Expected --out, where the results go, or --write, the page to be drawn up again.")
-        return Measurement.load(options.write.with_suffix(".json"))
+        written = Measurement.load(options.write.with_suffix(".json"))
+        if changed := [one.name for one in written.sets if one.stale]:
+            raise InvalidInputError(f"{', '.join(changed)}: changed since it was measured; measure again with --out.")
+        return written
     usual = ("varga7-random", "varga7-fast") if options.quick else (*frozen.names(), *fixed())
     everyone = contenders(
         SHORT if options.quick else HORIZONS,

@@ -18,9 +18,10 @@ BLOCKS_A_DOUBLING = 3.5
 #: Seeds of a preset that draws at random.
 SEEDS = (0, 1, 2)
 
-OPTIMUM, REAL_TIME, BLOCKS = "rhc to the optimum", "rhc, one iteration", "rhc, one iteration and blocks"
+OPTIMUM, REAL_TIME = "rhc to the optimum", "rhc, one iteration"
+OPTIMUM_BLOCKS, BLOCKS = "rhc to the optimum, blocks", "rhc, one iteration and blocks"
 #: The ways to compute a receding horizon, from dear to cheap; each is measured at all horizons.
-FAMILIES = (OPTIMUM, REAL_TIME, BLOCKS)
+FAMILIES = (OPTIMUM, OPTIMUM_BLOCKS, REAL_TIME, BLOCKS)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -79,6 +80,7 @@ def family(spec: str) -> tuple[str, int] | None:
         return None
     kinds: Mapping[frozenset[str], str] = {
         frozenset(): OPTIMUM,
+        frozenset({"blocks"}): OPTIMUM_BLOCKS,
         frozenset({"iterations"}): REAL_TIME,
         frozenset({"iterations", "blocks"}): BLOCKS,
     }
@@ -92,8 +94,8 @@ def blocks(horizon: int) -> int | None:
 
 
 def _spec(family: str, horizon: int) -> str | None:
-    spec = f"{RecedingHorizon.name}:horizon={horizon}" + (",iterations=1" if family != OPTIMUM else "")
-    if family != BLOCKS:
+    spec = f"{RecedingHorizon.name}:horizon={horizon}" + (",iterations=1" if family in (REAL_TIME, BLOCKS) else "")
+    if family in (OPTIMUM, REAL_TIME):
         return spec
     return None if (knots := blocks(horizon)) is None else f"{spec},blocks={knots}"
 

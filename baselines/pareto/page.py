@@ -20,12 +20,12 @@ from ikgym import scenarios
 #: Where the plots lie, seen from the page.
 IMAGES = pathlib.PurePath("images")
 # Colours: of the families, of presets, and of all others.
-LINES, PRESET, OTHER = style.COLOURS[:3], style.COLOURS[3], style.STEEL
+LINES, PRESET, OTHER = style.COLOURS[:4], style.COLOURS[4], style.STEEL
 BEST = "●"
 
 INTRODUCTION = f"""\
 Every policy that a user can choose, by what it costs and how long a step takes it: all registered ones as they are,
-`rhc` by horizon, computed in three ways, and its presets with and without knowing where the episode ends. References,
+`rhc` by horizon, computed in four ways, and its presets with and without knowing where the episode ends. References,
 which know what no observation shows, are left out. Written by `python -m baselines.pareto`, see
 [conditions](#conditions); everything below is worked out from what was measured, which lies in
 [pareto.json](pareto.json).

@@ -12,7 +12,7 @@ from matplotlib.text import Annotation, Text
 
 import baselines
 from baselines import best_known, frozen, registry
-from baselines.best_known import Record, episode_hash
+from baselines.best_known import UPDATE, Record, episode_hash
 from baselines.evaluate import evaluate
 from baselines.files import ResultsError
 from baselines.metrics import Spread, summarise
@@ -23,6 +23,7 @@ from baselines.pareto.contenders import (
     FAMILIES,
     HORIZONS,
     OPTIMUM,
+    OPTIMUM_BLOCKS,
     REAL_TIME,
     SEEDS,
     Contender,
@@ -98,7 +99,8 @@ class TestContenders:
         assert HORIZONS == (3, 5, 10, 30, 100, 200, 400)
         for name in (OPTIMUM, REAL_TIME):
             assert [horizon for kind, horizon in members if kind == name] == list(HORIZONS)
-        assert [horizon for kind, horizon in members if kind == BLOCKS] == [30, 100, 200, 400]
+        for name in (OPTIMUM_BLOCKS, BLOCKS):
+            assert [horizon for kind, horizon in members if kind == name] == [30, 100, 200, 400]
 
     @pytest.mark.parametrize(
         ("spec", "expected"),
@@ -106,6 +108,7 @@ class TestContenders:
             ("rhc:horizon=30", (OPTIMUM, 30)),
             ("rhc:horizon=5,iterations=1", (REAL_TIME, 5)),
             ("rhc:horizon=400,iterations=1,blocks=30", (BLOCKS, 400)),
+            ("rhc:horizon=400,blocks=30", (OPTIMUM_BLOCKS, 400)),
             ("rhc:horizon=30,starts=4", None),
             ("rhc", None),
             ("rhc_foresight:horizon=30", None),
@@ -362,6 +365,13 @@ class TestTree:
             assert (DOCS / "images" / f"pareto-{one.name}.png").is_file()
         kinds = {family(p.spec)[0] for p in written.sets[0].points if family(p.spec)}
         assert kinds == set(FAMILIES)
+
+    def test_nobody_beats_a_record(self, written):
+        for one in written.sets:
+            known = one.best_known()
+            for point in one.points if known else ():
+                for i, cost in enumerate(point.cost):
+                    assert cost >= known[i % len(known)] * (1.0 - 2e-6), (one.name, point.spec, i, UPDATE)
 
     def test_it_is_lean(self):
         assert (DOCS / "pareto.json").stat().st_size < 200_000
