@@ -23,6 +23,7 @@ POLICIES: dict[str, dict[str, tuple[str, dict[str, object]]]] = {
         "follow_nominal": ("follow_nominal", {}),
         "moore_penrose": ("moore_penrose", {}),
         "dls": ("dls", {}),
+        "rhc, HL = 3": ("rhc", {"horizon": 3}),
         "rhc_gradient": ("rhc_gradient", {}),
         "rhc_gradient, always 450 iterations": ("rhc_gradient", {"tolerance": 0.0}),
         "rhc_gradient, analytic": ("rhc_gradient", {"gradient": "analytic"}),

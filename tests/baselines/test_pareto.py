@@ -257,7 +257,7 @@ class TestPage:
             ("60", "rhc:horizon=30,iterations=1"),
             ("120", "rhc_foresight:stop_at_end=True"),
         ]
-        assert "| 30 | 1.300 | 180 | 1.333 | 50 | – | – |" in text
+        assert "| 30 | 1.300 | 180 | – | – | 1.333 | 50 | – | – |" in text
         assert "- date: 2000-01-01" in lines
 
     def test_seeds_are_counted(self, measurement):
