@@ -21,7 +21,7 @@ demo: $(STAMP) ## Evaluate the baselines on the default scenario: table and plot
 	$(BIN)/python -m baselines.evaluate --scenarios varga7-fast --policies $(DEMO) --out results/demo --overwrite
 
 test: $(STAMP) ## Run the whole test suite
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n auto --dist worksteal
 
 format: $(STAMP) ## Format the code and sort its imports
 	$(BIN)/ruff format .

@@ -2,6 +2,7 @@
 
 import os
 
+import pytest
 from hypothesis import settings
 
 os.environ["MPLBACKEND"] = "Agg"
@@ -9,3 +10,9 @@ os.environ["MPLBACKEND"] = "Agg"
 # The first call of a kernel compiles it, so no deadline; the same examples everywhere, so no surprise in CI.
 settings.register_profile("ikgym", deadline=None, derandomize=True, database=None)
 settings.load_profile("ikgym")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def optima_of_our_own(tmp_path_factory):
+    """Tests neither read nor fill the user's folder of optima."""
+    os.environ["IKGYM_CACHE"] = str(tmp_path_factory.mktemp("optima"))
