@@ -1,0 +1,106 @@
+"""The whole orientation behind skew coordinates, told from how they came about."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from baselines.policy import Batch, Memory, Problem
+from ikgym import task_kernels, tasks
+from ikgym.exceptions import InvalidInputError
+from ikgym.jit import inlined, kernel
+from ikgym.kinematics import forward
+
+
+def whole(problem: Problem) -> Problem:
+    """The problem with whole poses instead of skew coordinates.
+
+    Raises:
+        InvalidInputError: Its task is not `skew`.
+    """
+    if problem.task.kind != task_kernels.SKEW:
+        raise InvalidInputError(f"expected the task 'skew', whose orientation is folded, got {problem.task.name!r}.")
+    return problem.replace(task=tasks.get("pose"))
+
+
+def memory(rows: int) -> Memory:
+    """What :func:`unfold` remembers: cos θ of the last two nominal orientations, (B, 2), and whether they are known.
+
+    Args:
+        rows: B.
+    """
+    return np.zeros((rows, 2)), np.zeros(rows, dtype=np.bool_)
+
+
+def unfold(problem: Problem, batch: Batch, kept: Memory) -> tuple[Batch, Memory]:
+    """Whole poses for skew coordinates.
+
+    The skew part of a rotation by θ about a is sin θ · a: it is the same for θ and π − θ, and stands still at 90°,
+    where its Jacobian is singular although the arm is not. A solver that knows nothing else may go on there or turn
+    back, and follows the right coordinates with the wrong orientation from there on. But a nominal motion has no
+    reason to turn back just at 90°. So the sign of cos θ, which is all that is missing, is followed from step to step:
+    of the two orientations that coordinates allow, the nominal one is that whose cos θ goes on as it did. At the start
+    it is taken to be that of the arm, which the joint coordinates tell.
+
+    Args:
+        problem: With the task `skew`.
+        batch: Observations, `nominal` at the steps 1, 2, … ahead. Shapes (B, …).
+        kept: What :func:`memory` or the last call gave.
+
+    Returns:
+        The observations as the task `pose` has them, and what is to be remembered.
+    """
+    rows, ahead = batch.nominal.shape[:2]
+    pose, nominal = np.empty((rows, 12)), np.empty((rows, ahead, 12))
+    last, known = kept
+    last = last.copy()
+    unfold_rows(problem.model.chain, batch.q, batch.pose, batch.nominal, known, last, pose, nominal)
+    return batch._replace(pose=pose, nominal=nominal), (last, np.ones(rows, dtype=np.bool_))
+
+
+@kernel
+def unfold_rows(chain, q, pose, nominal, known, last, whole_pose, whole_nominal):  # type: ignore[no-untyped-def]
+    """See :func:`unfold`, row by row.
+
+    Args:
+        chain: The model of the arm.
+        q: Joint coordinates in [rad] or [m]. Shape (B, n).
+        pose: Measured skew coordinates. Shape (B, 6).
+        nominal: Skew coordinates of the next points. Shape (B, p, 6).
+        known: Whether the last orientations are known. Shape (B,).
+        last: cos θ of X^N(k - 1) and X^N(k); becomes that of X^N(k) and X^N(k + 1). Shape (B, 2).
+        whole_pose: Receives the frames of the arm. Shape (B, 12).
+        whole_nominal: Receives those of the next points. Shape (B, p, 12).
+    """
+    rotation, position = np.empty((3, 3)), np.empty(3)
+    for row in range(q.shape[0]):
+        forward(chain, q[row], rotation, position)
+        cosine = unfold_one(pose[row], 0.5 * (rotation[0, 0] + rotation[1, 1] + rotation[2, 2] - 1.0), whole_pose[row])
+        before, now = (last[row, 0], last[row, 1]) if known[row] else (cosine, cosine)
+        for i in range(nominal.shape[1]):
+            following = unfold_one(nominal[row, i], 2.0 * now - before, whole_nominal[row, i])
+            before, now = now, following
+            if i == 0:
+                last[row, 0], last[row, 1] = before, now
+
+
+@inlined
+def unfold_one(coordinates, expected, frame):  # type: ignore[no-untyped-def]
+    """The frame of skew coordinates, the one of two whose cos θ has the sign of ``expected``: shapes (6,), (12,).
+
+    Returns:
+        Cos θ.
+    """
+    x, y, z = -coordinates[2], coordinates[1], -coordinates[0]  # sin θ · a
+    square = min(x * x + y * y + z * z, 1.0)
+    cosine = math.copysign(math.sqrt(1.0 - square), expected)
+    # (1 - cos θ) / sin² θ, the weight of what is symmetric, written so that small angles lose no digits. At 180° the
+    # coordinates vanish, and do not tell the axis.
+    weight = 1.0 / (1.0 + cosine) if cosine > 0.0 else (1.0 - cosine) / max(square, 1e-300)
+    frame[0], frame[1], frame[2] = cosine + weight * x * x, weight * x * y - z, weight * x * z + y
+    frame[3], frame[4], frame[5] = weight * x * y + z, cosine + weight * y * y, weight * y * z - x
+    frame[6], frame[7], frame[8] = weight * x * z - y, weight * y * z + x, cosine + weight * z * z
+    for i in range(3):
+        frame[9 + i] = coordinates[3 + i]
+    return cosine
