@@ -42,6 +42,7 @@ def evaluate(
     steps: int | None = None,
     preview: int | None = None,
     timed: int | Literal["all"] = 1,
+    trust: bool = False,
     workers: int = 1,
     out: str | pathlib.Path | None = None,
     resume: bool = False,
@@ -58,7 +59,8 @@ def evaluate(
     Args:
         scenarios: Scenarios or their names; ``"all"`` stands for all that are registered.
         policies: Names, names with parameters such as ``"dls:damping=1e-2"``, or pairs such as
-            ``("dls", {"damping": 1e-2})``; ``"all"`` stands for all that are registered.
+            ``("dls", {"damping": 1e-2})``; ``"agent:PATH"`` for an agent in a file; ``"all"`` stands for all that are
+            registered.
         frozen: Names of frozen sets, see :mod:`baselines.frozen`, instead of scenarios, episodes, split and steps.
         episodes: Episodes of a random scenario: the first of the split. A scenario that is the same at every reset
             has one, with seed 0.
@@ -66,6 +68,7 @@ def evaluate(
         steps: Most steps of an episode, for trials; the scenarios' own if left out.
         preview: Steps ahead that policies are shown; what each asks for if left out.
         timed: Episodes of each policy in each scenario that are played alone, with the clock; ``"all"`` for all.
+        trust: Whether files of agents may run code of their own, see :class:`baselines.agent.policy.Agent`.
         workers: Processes that play episodes; 1 means this one. More than one need a main module that may be
             imported, that is with ``if __name__ == "__main__":``.
         out: Where files go; nowhere if left out.
@@ -81,11 +84,20 @@ def evaluate(
         UnknownNameError: There is no such scenario, policy, parameter, split or frozen set.
         InvalidInputError: A value is out of range, a policy refuses what it is shown, or a frozen set has drifted or
             is to be changed.
-        ResultsError: `out` cannot be read or written, or is not to be gone on with.
+        ResultsError: `out` cannot be read or written, or is not to be gone on with; the file of an agent cannot be
+            used.
         WorkerError: A worker process has died.
     """
     plan = make_plan(
-        scenarios, policies, frozen=frozen, episodes=episodes, split=split, steps=steps, preview=preview, timed=timed
+        scenarios,
+        policies,
+        frozen=frozen,
+        episodes=episodes,
+        split=split,
+        steps=steps,
+        preview=preview,
+        timed=timed,
+        trust=trust,
     )
     folder = None if out is None else pathlib.Path(out)
     return _carry_out(
@@ -149,7 +161,7 @@ class Options:
     frozen: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME …")] = ()
     """Names of frozen sets, which say themselves what is played: instead of scenarios, episodes, split and steps."""
     policies: Annotated[tuple[str, ...], tyro.conf.arg(metavar="POLICY …")] = (ALL,)
-    """Policies as NAME or NAME:PARAMETER=VALUE,PARAMETER=VALUE, or: all."""
+    """Policies as NAME or NAME:PARAMETER=VALUE,PARAMETER=VALUE, or agent:PATH for an agent in a file, or: all."""
     episodes: Annotated[int, tyro.conf.arg(metavar="N")] = 1
     """Episodes of each random scenario: the first seeds of the split. Other scenarios are the same at every reset and
     have one episode, with seed 0."""
@@ -162,6 +174,8 @@ class Options:
     timed: Annotated[int | Literal["all"], tyro.conf.arg(metavar="N|all")] = 1
     """Episodes of each policy in each scenario that are played alone, with the clock. The others are played together,
     which is faster, and have no times."""
+    trust: bool = False
+    """Let .zip files of agents run the code in them, as Stable-Baselines3 does: only those whose maker you know."""
     out: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="DIR")] = None
     """Folder for the files. Nothing is written if left out."""
     resume: bool = False
@@ -187,7 +201,7 @@ Plays every policy on every scenario, and measures costs, errors, joint velociti
 
 {_listing("Frozen sets", frozen_sets.names())}
 
-{_listing("Policies", policies)}
+{_listing("Policies", (*policies, "agent:PATH (an agent in a file)"))}
 
 Examples:
   python -m baselines.evaluate
@@ -195,6 +209,7 @@ Examples:
   python -m baselines.evaluate --scenarios varga7-random --episodes 20 --workers 4 --out results/random
   python -m baselines.evaluate --scenarios varga7-random --episodes 50 --out results/random --resume
   python -m baselines.evaluate --frozen varga7-random --policies rhc_gradient --out results/frozen
+  python -m baselines.evaluate --scenarios varga7-random --policies agent:runs/mine.safetensors dls
 
 Files in the folder of --out, each replaced in one go, so that a run may be stopped at any time:
   results.json  a list of rows, one an episode, written anew after each batch
@@ -216,7 +231,7 @@ Columns:
   status                                         the worst of the episode
   machine                                        CPU, cores and versions
   iterations, status_counts                      mean iterations in one step, and how many steps ended how
-  preview                                        steps ahead that were shown
+  preview                                        steps ahead that were shown, the furthest of some
   fingerprint                                    digest of the scenario and the version of the cost
   frozen                                         digest of the frozen set, null where there is none
   operations                                     mean kinematics, Jacobians, factorisations, measurements in a step
@@ -254,6 +269,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             steps=options.steps,
             preview=options.preview,
             timed=options.timed,
+            trust=options.trust,
         )
         rows = _carry_out(
             plan,

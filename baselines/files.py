@@ -9,7 +9,7 @@ from ikgym.exceptions import IkgymError
 
 
 class ResultsError(IkgymError):
-    """A folder of results cannot be read, written or gone on with."""
+    """A folder of results, or the file of an agent, cannot be read, written or gone on with."""
 
 
 def write(file: pathlib.Path, content: bytes) -> None:

@@ -55,7 +55,7 @@ class Row:
         machine: What it ran on, see :func:`baselines.machine.describe`.
         iterations: Mean iterations of the policy in one step.
         status_counts: How many steps ended with which status.
-        preview: Steps ahead that the policy was shown.
+        preview: Steps ahead that the policy was shown; the furthest where it was shown some of them.
         fingerprint: Tells scenarios apart that share a name, see :func:`baselines.content.fingerprint`.
         operations: Mean numbers of operations in one step, see :class:`baselines.policy.Operations`.
         time_first_us: Wall time of the first call of the policy, in [µs].

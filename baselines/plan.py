@@ -13,11 +13,12 @@ import numpy as np
 from baselines import frozen as frozen_sets
 from baselines import metrics, registry
 from baselines.content import fingerprint
+from baselines.files import ResultsError
 from baselines.metrics import jsonable
 from baselines.policy import SolverPolicy
 from ikgym import scenarios as scenario_registry
 from ikgym.exceptions import InvalidInputError
-from ikgym.scenarios import Scenario
+from ikgym.scenarios import Preview, Scenario
 from ikgym.validation import known_names, whole_number
 
 #: A policy as text such as ``"dls:damping=1e-2"``, or its name and its parameters.
@@ -39,7 +40,7 @@ class Job:
         seed: The reset seed.
         first: Whether it is the first episode of its policy in its scenario, whose course is kept for plots.
         timed: Whether it is played alone, by single calls with the clock.
-        preview: Steps ahead that the policy is shown.
+        preview: Steps ahead that the policy is shown, or which ones.
         fingerprint: Of the scenario.
         frozen: The digest of the frozen set that it belongs to, None where to none.
     """
@@ -51,7 +52,7 @@ class Job:
     seed: int
     first: bool
     timed: bool
-    preview: int
+    preview: Preview
     fingerprint: str
     frozen: str | None
 
@@ -61,8 +62,16 @@ class Job:
         return metrics.key(self.scenario.name, self.policy, self.parameters, self.seed, self.scenario.steps)
 
     def make(self) -> SolverPolicy:
-        """The policy."""
-        return registry.make(self.policy, self.scenario, **self.given)
+        """The policy.
+
+        Raises:
+            ResultsError: It is no longer what it was when the job was planned: the file behind it has changed.
+        """
+        policy = registry.make(self.policy, self.scenario, **self.given)
+        now = {name: jsonable(policy.parameters[name]) for name in self.parameters}
+        if now != self.parameters:
+            raise ResultsError(f"{self.policy} has changed since the evaluation began: {self.parameters} is now {now}.")
+        return policy
 
 
 @dataclasses.dataclass(frozen=True)
@@ -92,6 +101,7 @@ def make_plan(
     steps: int | None = None,
     preview: int | None = None,
     timed: int | Literal["all"] = 1,
+    trust: bool = False,
 ) -> Plan:
     """All episodes of an evaluation, policy by policy within each scenario.
 
@@ -104,11 +114,13 @@ def make_plan(
         steps: Most steps of an episode; the scenarios' own if left out.
         preview: Steps ahead that policies are shown; what each asks for if left out.
         timed: Episodes of each policy in each scenario that are timed, ``"all"`` for all of them.
+        trust: Whether the files of all agents given are trusted, see :class:`baselines.agent.policy.Agent`.
 
     Raises:
         UnknownNameError: There is no such scenario, policy, parameter, split or frozen set.
         InvalidInputError: A value is out of range, two scenarios share a name, no policy suits any scenario, or a
             frozen set has drifted or is to be changed.
+        ResultsError: The file of an agent cannot be used.
     """
     listed, sets = _scenarios(scenarios, steps), (frozen,) if isinstance(frozen, str) else tuple(frozen)
     if sets and (listed or (episodes, split, steps) != (1, "test", None)):
@@ -120,13 +132,13 @@ def make_plan(
     if preview is not None:
         whole_number("preview", preview, at_least=1)
     clocked = sys.maxsize if timed == ALL else whole_number("timed", timed, at_least=1)
-    specs = _specs(policies)
+    specs = [(name, _trusting(name, given) if trust else given) for name, given in _specs(policies)]
     jobs: dict[tuple[str, str, str, int, int], Job] = {}
     skipped: list[Skipped] = []
     for scenario, seeds, label in [*_frozen(sets), *_drawn(listed, drawn)]:
         digest = fingerprint(scenario)
         for name, given in specs:
-            if reason := _unsuited(scenario, name, seeds[0]):
+            if reason := _unsuited(scenario, name, given, seeds[0]):
                 skipped.append(Skipped(scenario.name, name, reason))
                 continue
             policy = registry.make(name, scenario, **_with_seed(scenario, name, given, seeds[0]))
@@ -153,8 +165,8 @@ def parse_policy(spec: PolicySpec) -> tuple[str, dict[str, Any]]:
     """Name and parameters of a policy.
 
     Args:
-        spec: ``"name"``, ``"name:parameter=value,parameter=value"`` or a pair of both. Values are Python's
-            literals; anything else is taken for plain text.
+        spec: ``"name"``, ``"name:parameter=value,parameter=value"`` or a pair of both; ``"agent:PATH"``, too. Values
+            are Python's literals; anything else is taken for plain text.
 
     Raises:
         UnknownNameError: There is no such policy or parameter.
@@ -162,7 +174,12 @@ def parse_policy(spec: PolicySpec) -> tuple[str, dict[str, Any]]:
     """
     if isinstance(spec, str):
         name, _, text = spec.partition(":")
-        name, parameters = name.strip(), _parse_parameters(spec, text) if ":" in spec else {}
+        name = name.strip()
+        alone, known = registry.get(name).nameless, registry.get(name).parameter_names()
+        if alone is not None and text.strip() and text.partition("=")[0].strip() not in known:
+            parameters: dict[str, Any] = {alone: text.strip()}
+        else:
+            parameters = _parse_parameters(spec, text) if ":" in spec else {}
     elif isinstance(spec, tuple) and len(spec) == 2 and isinstance(spec[0], str) and isinstance(spec[1], Mapping):
         name, parameters = spec[0], dict(spec[1])
     else:
@@ -224,10 +241,16 @@ def _with_seed(scenario: Scenario, name: str, given: Mapping[str, Any], seed: in
     return dict(given)
 
 
-def _unsuited(scenario: Scenario, name: str, seed: int) -> str | None:
-    """Why a policy does not suit a scenario; a policy that is refused with parameters only is not unsuited."""
+def _trusting(name: str, given: Mapping[str, Any]) -> dict[str, Any]:
+    """The parameters, with the trust in its file for a policy that asks for it."""
+    return {"trust": True, **given} if "trust" in registry.get(name).parameter_names() else dict(given)
+
+
+def _unsuited(scenario: Scenario, name: str, given: Mapping[str, Any], seed: int) -> str | None:
+    """Why a policy does not suit a scenario; a policy that is refused with other parameters only is not unsuited."""
+    decisive = {key: given[key] for key in registry.get(name).decisive if key in given}
     try:
-        registry.make(name, scenario, **_with_seed(scenario, name, {}, seed))
+        registry.make(name, scenario, **_with_seed(scenario, name, decisive, seed))
     except InvalidInputError as e:
         return str(e)
     return None
@@ -243,7 +266,7 @@ def _parse_parameters(spec: str, text: str) -> dict[str, Any]:
             raise InvalidInputError(f"policy {spec!r}: parameter {name!r} is given twice.")
         try:
             out[name] = ast.literal_eval(value)
-        except (ValueError, SyntaxError, TypeError):
+        except (ValueError, SyntaxError, TypeError, RecursionError, MemoryError):
             out[name] = value
     return out
 

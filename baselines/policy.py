@@ -20,7 +20,8 @@ from ikgym.cost import TrackingCost
 from ikgym.exceptions import InvalidInputError
 from ikgym.jit import kernel
 from ikgym.parallel import in_chunks
-from ikgym.scenarios import Scenario
+from ikgym.scenarios import Preview, Scenario
+from ikgym.scenarios.scenario import furthest
 from ikgym.tasks import Task
 from ikgym.validation import FloatArray, Frozen, frozen_array
 
@@ -143,6 +144,12 @@ class SolverPolicy(Frozen, abc.ABC):
     reference: ClassVar[bool] = False
     #: Rows that are worth a thread of their own: the fewer, the longer a row takes.
     grain: ClassVar[int] = 256
+    #: Whether the policy is made from others.
+    composed: ClassVar[bool] = False
+    #: The parameter that stands alone behind the name, as in ``"agent:PATH"``; None where all of them have to be named.
+    nameless: ClassVar[str | None] = None
+    #: Parameters without which nobody can tell whether the policy suits a scenario.
+    decisive: ClassVar[tuple[str, ...]] = ()
 
     @classmethod
     def for_scenario(cls, scenario: Scenario, **parameters: Any) -> Self:
@@ -168,8 +175,8 @@ class SolverPolicy(Frozen, abc.ABC):
         return {name: getattr(self, name) for name in self.parameter_names()}
 
     @property
-    def preview(self) -> int:
-        """How many steps ahead the policy must be shown."""
+    def preview(self) -> Preview:
+        """How many steps ahead the policy must be shown, or a tuple of which ones."""
         return 1
 
     def memory(self, rows: int) -> Memory:
@@ -201,8 +208,8 @@ class SolverPolicy(Frozen, abc.ABC):
 
         Args:
             observation: As the environment gives it; single, or all arrays with a leading batch axis B. Its
-                ``nominal`` must show the steps 1, 2, … ahead: an environment made with a tuple as its preview shows
-                others, which no solver can tell from these.
+                ``nominal`` must show the steps 1, 2, … ahead, or just those of :attr:`preview` where that is a tuple:
+                an environment made with another tuple shows others, which no policy can tell from these.
             state: What the last call returned; None at the first.
             episode_start: True where an episode begins, and the memory is to be cleared. Shape (B,).
             deterministic: Changes nothing; solvers do not draw at random.
@@ -217,14 +224,25 @@ class SolverPolicy(Frozen, abc.ABC):
         """
         del deterministic
         batch, single = self._batch(observation)
-        rows = len(batch.q)
-        memory = self._recall(state, episode_start, rows)
-        solution = self._solve(batch, memory)
+        action, after = self.act(batch, self._recall(state, episode_start, len(batch.q)))
+        return action[0] if single else action, after
+
+    def act(self, batch: Batch, memory: Memory) -> tuple[npt.NDArray[np.float32], Memory]:
+        """What `predict` does with observations that are known to be good, as policies over other ones may know.
+
+        Args:
+            batch: The observations, with no more steps ahead than the policy asks for; C-contiguous.
+            memory: As :meth:`memory` or the last call gave it, without status and iterations.
+
+        Returns:
+            Actions, of shape (B, n), and the state for the next call of `predict`.
+        """
+        solution, rows = self._solve(batch, memory), len(batch.q)
         action, status = np.empty(batch.q.shape, dtype=np.float32), solution.status.copy()
         lost, kept = np.empty(rows, dtype=np.bool_), solution.memory
         if _cut_rows(solution.qdot, self.problem.velocity_limit, action, status, lost):
             kept = _replace_rows(kept, self.memory(rows), lost)
-        return action[0] if single else action, (status, solution.iterations, *kept)
+        return action, (status, solution.iterations, *kept)
 
     @staticmethod
     def report(state: Memory) -> Report:
@@ -268,7 +286,7 @@ class SolverPolicy(Frozen, abc.ABC):
         if single:
             batch = Batch(*[a[None] for a in batch])
         rows, n, m = len(batch.q), self.problem.model.joints, self.problem.task.size
-        ahead = batch.nominal.shape[1] if batch.nominal.ndim == 3 else self.preview
+        ahead = batch.nominal.shape[1] if batch.nominal.ndim == 3 else furthest(self.preview)
         shapes = (rows, n), (rows, n), (rows, m), (rows, ahead, m), (rows, 1)
         for key, shape, array in zip(Batch._fields, shapes, batch, strict=True):
             if array.shape != shape:
@@ -278,12 +296,26 @@ class SolverPolicy(Frozen, abc.ABC):
                 )
         if not _all_finite(*batch):
             raise InvalidInputError("observation: expected finite numbers, got NaN or infinity.")
-        if ahead < self.preview:
-            raise InvalidInputError(
-                f"{self.name} needs to be shown {self.preview} steps ahead, the observation has {ahead}: make the "
-                f"environment with preview={self.preview}."
-            )
-        return batch, single
+        needed = self._needed(batch.nominal)
+        return batch if needed is batch.nominal else batch._replace(nominal=needed), single
+
+    def _needed(self, nominal: FloatArray) -> FloatArray:
+        """The nominal coordinates that the policy asks for, of those that are shown. Shapes (B, any, m)."""
+        preview, ahead = self.preview, nominal.shape[1]
+        if isinstance(preview, int):
+            if ahead >= preview:
+                return nominal
+            wanted = f"{preview} steps"
+        else:
+            if ahead == len(preview):
+                return nominal
+            if ahead >= preview[-1]:
+                return nominal.take(np.array(preview) - 1, axis=1)
+            wanted = f"the steps {preview}"
+        raise InvalidInputError(
+            f"{self.name} needs to be shown {wanted} ahead, the observation has {ahead}: make the environment with "
+            f"preview={preview}."
+        )
 
     def _recall(self, state: Memory | None, episode_start: npt.ArrayLike | None, rows: int) -> Memory:
         starting = None if episode_start is None else np.asarray(episode_start)

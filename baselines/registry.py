@@ -5,6 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from baselines.abstract_rotation import AbstractRotation
+from baselines.agent.policy import Agent
+from baselines.agent.shipped import SHIPPED
 from baselines.broyden import Broyden
 from baselines.dls import DampedLeastSquares
 from baselines.fixed_point import FixedPoint
@@ -24,41 +26,46 @@ from baselines.rhc_gradient import RecedingHorizonGradient
 from baselines.rhc_lagrange import RecedingHorizonLagrange
 from baselines.smoothing import Smoothed
 from baselines.truncated_svd import TruncatedSVD
+from baselines.unfolded import Unfolded
 from baselines.weighted_pseudoinverse import WeightedPseudoinverse
 from ikgym import scenarios
 from ikgym.exceptions import UnknownNameError
 from ikgym.scenarios import Scenario
 from ikgym.validation import known_names
 
-POLICIES: dict[str, type[SolverPolicy]] = {
-    policy.name: policy
-    for policy in (
-        MoorePenrose,
-        DampedLeastSquares,
-        JacobianTranspose,
-        WeightedPseudoinverse,
-        NullSpace,
-        TruncatedSVD,
-        GramSchmidt,
-        Broyden,
-        RecedingHorizonGradient,
-        RecedingHorizonLagrange,
-        RecedingHorizon,
-        RecedingHorizonForesight,
-        Smoothed,
-        ModelFreeAdaptiveControl,
-        ModelFreeAdaptivePredictiveControl,
-        FixedPoint,
-        AbstractRotation,
-        FixedPointExtended,
-        FollowNominal,
-        Oracle,
-    )
-}
+_LISTED: tuple[type[SolverPolicy], ...] = (
+    MoorePenrose,
+    DampedLeastSquares,
+    JacobianTranspose,
+    WeightedPseudoinverse,
+    NullSpace,
+    TruncatedSVD,
+    GramSchmidt,
+    Broyden,
+    RecedingHorizonGradient,
+    RecedingHorizonLagrange,
+    RecedingHorizon,
+    RecedingHorizonForesight,
+    Smoothed,
+    Unfolded,
+    ModelFreeAdaptiveControl,
+    ModelFreeAdaptivePredictiveControl,
+    FixedPoint,
+    AbstractRotation,
+    *SHIPPED.values(),
+    FixedPointExtended,
+    FollowNominal,
+    Oracle,
+)
+
+POLICIES: dict[str, type[SolverPolicy]] = {policy.name: policy for policy in _LISTED}
+
+#: Those that are nothing by their name alone, and so are no part of "all policies".
+OTHERS: dict[str, type[SolverPolicy]] = {Agent.name: Agent}
 
 
 def names() -> tuple[str, ...]:
-    """The names of all policies."""
+    """The names of all policies that need no more than a scenario, agents that come with the package among them."""
     return tuple(POLICIES)
 
 
@@ -68,16 +75,17 @@ def get(name: str) -> type[SolverPolicy]:
     Raises:
         UnknownNameError: There is no such policy; the message has the nearest name.
     """
-    if not isinstance(name, str) or name not in POLICIES:
-        raise UnknownNameError("policy", name, POLICIES)
-    return POLICIES[name]
+    known = {**POLICIES, **OTHERS}
+    if not isinstance(name, str) or name not in known:
+        raise UnknownNameError("policy", name, known)
+    return known[name]
 
 
 def make(name: str, scenario: str | Scenario, **parameters: Any) -> SolverPolicy:
     """A policy for a scenario.
 
     Args:
-        name: One of :func:`names`.
+        name: One of :func:`names`, or ``"agent"`` with the `path` of its file.
         scenario: What is to be tracked, or its name. The policy is handed the scenario's model of the arm, not the
             arm itself.
         **parameters: The policy's own, see its class.

@@ -15,7 +15,7 @@ from urllib.parse import quote
 from baselines import best_known
 from baselines.metrics import Row, Spread, Summary, summarise
 from baselines.plan import Skipped
-from baselines.registry import POLICIES
+from baselines.registry import OTHERS, POLICIES
 
 #: Characters that a line of the printed tables may have.
 WIDTH = 120
@@ -308,9 +308,10 @@ def _machine(machine: Mapping[str, Any]) -> str:
 
 
 def _defaults(policy: str) -> dict[str, Any]:
-    if policy not in POLICIES:
+    known = {**POLICIES, **OTHERS}
+    if policy not in known:
         return {}
-    fields = dataclasses.fields(POLICIES[policy])
+    fields = dataclasses.fields(known[policy])
     # None often stands for a value that the policy works out itself.
     return {f.name: f.default for f in fields if f.default is not dataclasses.MISSING and f.default is not None}
 

@@ -22,6 +22,7 @@ from baselines.metrics import Row, canonical
 from baselines.plan import Job, Plan
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import SPLITS
+from ikgym.scenarios.scenario import furthest
 
 #: The columns of results.csv, which are the keys of a row in results.json.
 COLUMNS = tuple(field.name for field in dataclasses.fields(Row))
@@ -214,7 +215,7 @@ def _check_settings(file: pathlib.Path, rows: list[Row], plan: Plan, machine: Ma
         )
 
     jobs = {job.scenario.name: job for job in plan.jobs}
-    previews = {(job.scenario.name, job.policy, canonical(job.parameters)): job.preview for job in plan.jobs}
+    previews = {(job.scenario.name, job.policy, canonical(job.parameters)): furthest(job.preview) for job in plan.jobs}
     for row in rows:
         if row.machine.get("ikgym") != machine["ikgym"]:
             refuse("ikgym", row.machine.get("ikgym"), machine["ikgym"])

@@ -22,6 +22,7 @@ from baselines.metrics import Row, canonical, jsonable, measure
 from baselines.plan import Job
 from baselines.rollout import Episode, Tick, rollout, rollouts
 from ikgym.exceptions import IkgymError
+from ikgym.scenarios.scenario import furthest
 
 #: The course of an episode, as arrays by name.
 Series = dict[str, npt.NDArray[Any]]
@@ -125,7 +126,7 @@ def _row(job: Job, episode: Episode) -> Row:
         job.seed,
         episode,
         machine=describe(),
-        preview=job.preview,
+        preview=furthest(job.preview),
         fingerprint=job.fingerprint,
         frozen=job.frozen,
         best_known=best_known.cost(job.scenario, job.seed),

@@ -15,6 +15,7 @@ from ikgym import task_kernels
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 from ikgym.jit import kernel
 from ikgym.kinematics import forward
+from ikgym.scenarios import Preview
 from ikgym.validation import FloatArray, known_names, number
 
 FEEDBACKS = ("calculated", "measured")
@@ -60,6 +61,7 @@ class Smoothed(SolverPolicy):
     inner: SolverPolicy = dataclasses.field(init=False, repr=False)
 
     name: ClassVar[str] = "smoothed"
+    composed: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         kind = registry.get(self.policy)
@@ -80,7 +82,7 @@ class Smoothed(SolverPolicy):
             object.__setattr__(self, field, value)
 
     @property
-    def preview(self) -> int:
+    def preview(self) -> Preview:
         """That of the policy inside."""
         return self.inner.preview
 

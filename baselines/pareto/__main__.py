@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 import datetime
-import io
 import pathlib
 import shlex
 import sys
 from collections.abc import Sequence
 from typing import Annotated
 
-import PIL.Image
 import tyro
 
 from baselines import frozen
@@ -21,7 +19,7 @@ from baselines.pareto.contenders import HORIZONS, SEEDS, contenders
 from baselines.pareto.measure import fixed, measure
 from baselines.pareto.page import page, pictures
 from baselines.pareto.points import Measurement
-from baselines.plots.style import png
+from baselines.plots.style import small_png
 from ikgym.exceptions import IkgymError, InvalidInputError
 
 
@@ -110,15 +108,8 @@ def draw_up(measurement: Measurement, file: pathlib.Path) -> None:
     """
     measurement.save(file.with_suffix(".json"))
     for place, figure in pictures(measurement):
-        write(file.parent / place, _few_colours(png(figure)))
+        write(file.parent / place, small_png(figure))
     write(file, page(measurement).encode())
-
-
-def _few_colours(picture: bytes) -> bytes:
-    """A PNG with a palette, a third as large: there is one for each set in the tree."""
-    out = io.BytesIO()
-    PIL.Image.open(io.BytesIO(picture)).convert("RGB").quantize(256).save(out, format="png", optimize=True)
-    return out.getvalue()
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-import contextlib
-import dataclasses
 import pathlib
 from collections.abc import Iterable
 
-from baselines import frozen
-from baselines.machine import describe
+from baselines.contest import plan, play
 from baselines.pareto.contenders import Contender
 from baselines.pareto.points import Measured, Point
-from baselines.plan import Job, Plan, make_plan
-from baselines.results import Results, slug
-from baselines.runner import run
+from baselines.results import slug
 from ikgym import scenarios
 
 
@@ -53,39 +48,11 @@ def measure(
         WorkerError: A worker process has died.
     """
     plans = plan(name, contenders, episodes)
-    whole = Plan(tuple({job.key: job for jobs in plans.values() for job in jobs}.values()), ())
-    results = Results(out / slug(name), whole, describe(), resume=resume, overwrite=overwrite)
-    left = [job for job in whole.jobs if not results.done(job)]
-    for timed in (False, True):
-        part = [job for job in left if job.timed == timed]
-        with contextlib.closing(run(part, workers=1 if timed else workers, progress=progress)) as batches:
-            for outcomes in batches:
-                results.add(outcomes)
-    rows = {row.key: row for row in results.rows}
+    rows = play(plans, out / slug(name), workers=workers, resume=resume, overwrite=overwrite, progress=progress)
+    first = next(iter(plans.values()))
     return Measured(
         name=name,
-        fingerprint=whole.jobs[0].fingerprint,
-        seeds=tuple(dict.fromkeys(job.seed for job in whole.jobs)),
-        points=tuple(Point.of(spec, [rows[job.key] for job in jobs]) for spec, jobs in plans.items()),
+        fingerprint=first[0].fingerprint,
+        seeds=tuple(dict.fromkeys(job.seed for job in first)),
+        points=tuple(Point.of(spec, found) for spec, found in rows.items()),
     )
-
-
-def plan(name: str, contenders: Iterable[Contender], episodes: int | None = None) -> dict[str, list[Job]]:
-    """The episodes of each contender, seed by seed of the policy; without those that do not suit the scenario.
-
-    Args:
-        name: A frozen set, or a scenario.
-        contenders: Who plays.
-        episodes: The first so many of the set; all if left out.
-    """
-    sets, names = ((name,), ()) if name in frozen.names() else ((), (name,))
-    everyone = list(contenders)
-    unsuited = {s.policy for s in make_plan(names, [v for c in everyone for v in c.variants], frozen=sets).skipped}
-    out: dict[str, list[Job]] = {}
-    for contender in everyone:
-        variants = [variant for variant in contender.variants if variant[0] not in unsuited]
-        for variant in variants:
-            jobs = make_plan(names, [variant], frozen=sets, timed=contender.timed).jobs[:episodes]
-            # No course is kept: there are many contenders, and nobody draws them.
-            out.setdefault(contender.spec, []).extend(dataclasses.replace(job, first=False) for job in jobs)
-    return out

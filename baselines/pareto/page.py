@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import pathlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 from matplotlib.figure import Figure
 
+from baselines.markdown import table
 from baselines.metrics import Spread
 from baselines.pareto import picture
 from baselines.pareto.contenders import FAMILIES, family, presets
@@ -85,7 +86,7 @@ def _choice(one: Measured) -> list[str]:
         for spec in front(one, "time_p99_us")
     ]
     out = [f"On `{one.name}`, take the last line whose time (p99) you can spare; the {_quantity(one)} falls:", ""]
-    out += [*_markdown(head, lines, text=1), "", *_horizons(one), ""]
+    out += [*table(head, lines, text=(1,)), "", *_horizons(one), ""]
     return out + [text for name in presets() for text in _worth_of_the_end(one, name)]
 
 
@@ -113,7 +114,7 @@ def _horizons(one: Measured) -> list[str]:
             line += [number(spreads[point.spec].mean), _time(point.time_p50_us)] if point else [NOTHING, NOTHING]
         lines.append(line)
     head = ["horizon", *(text for name in FAMILIES for text in (f"{name}: {_quantity(one)}", "p50 [µs]"))]
-    return _markdown(head, lines)
+    return table(head, lines)
 
 
 def _section(one: Measured) -> list[str]:
@@ -136,10 +137,10 @@ def _section(one: Measured) -> list[str]:
                 str(point.timed),
             ]
         )
-    table = _markdown(head, lines, text=1)
+    rows = table(head, lines, text=(1,))
     if len(one.seeds) > 1:
-        return [*out, *table, ""]
-    return [*out, "<details>", f"<summary>All policies on {one.name}</summary>", "", *table, "", "</details>", ""]
+        return [*out, *rows, ""]
+    return [*out, "<details>", f"<summary>All policies on {one.name}</summary>", "", *rows, "", "</details>", ""]
 
 
 def _quantity(one: Measured) -> str:
@@ -160,12 +161,6 @@ def _values(one: Measured, point: Point, spread: Spread) -> list[str]:
 
 def _time(microseconds: float) -> str:
     return f"{microseconds:,.0f}"
-
-
-def _markdown(head: Sequence[str], lines: Sequence[Sequence[str]], *, text: int | None = None) -> list[str]:
-    """A table of numbers, but for one column, which is set to the left."""
-    rules = [":--" if column == text else "--:" for column in range(len(head))]
-    return [f"| {' | '.join(line)} |" for line in (head, rules, *lines)]
 
 
 def _file(one: Measured) -> pathlib.PurePath:

@@ -6,10 +6,11 @@ import dataclasses
 import json
 import pathlib
 import statistics
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Self
 
 from baselines import best_known
+from baselines.compact import DIGITS, one_line, rounded, with_list
 from baselines.content import fingerprint
 from baselines.files import ResultsError, write
 from baselines.metrics import Row, Spread
@@ -17,7 +18,6 @@ from ikgym import scenarios
 
 #: An arm that was farther from its nominal position than this has lost track, in [m].
 LOST = 0.05
-DIGITS = 7  # significant, of costs that are kept
 
 
 @dataclasses.dataclass(frozen=True)
@@ -51,12 +51,12 @@ class Point:
 
         return cls(
             spec=spec,
-            cost=tuple(_rounded(row.total_cost, DIGITS) for row in rows),
+            cost=tuple(rounded(row.total_cost, DIGITS) for row in rows),
             lost=sum(row.position_error_max > LOST for row in rows),
             timed=len(times("time_p50_us")),
-            time_p50_us=_rounded(statistics.median(times("time_p50_us"))),
-            time_p99_us=_rounded(max(times("time_p99_us"))),
-            time_first_us=_rounded(max(times("time_first_us"))),
+            time_p50_us=rounded(statistics.median(times("time_p50_us"))),
+            time_p99_us=rounded(max(times("time_p99_us"))),
+            time_first_us=rounded(max(times("time_first_us"))),
         )
 
 
@@ -123,8 +123,8 @@ class Measurement:
         sets = []
         for one in self.sets:
             about = {"name": one.name, "fingerprint": one.fingerprint, "seeds": one.seeds}
-            sets.append(_with_list(about, "points", [_json(dataclasses.asdict(point)) for point in one.points]))
-        write(file, (_with_list(head, "sets", sets) + "\n").encode())
+            sets.append(with_list(about, "points", [one_line(dataclasses.asdict(point)) for point in one.points]))
+        write(file, (with_list(head, "sets", sets) + "\n").encode())
 
     @classmethod
     def load(cls, file: pathlib.Path) -> Self:
@@ -163,16 +163,3 @@ def front(one: Measured, time: str = "time_p50_us") -> list[str]:
         if not out or means[point.spec] < means[out[-1]]:
             out.append(point.spec)
     return out
-
-
-def _rounded(value: float, digits: int = 4) -> float:
-    return float(f"{value:.{digits}g}")
-
-
-def _json(values: Mapping[str, Any]) -> str:
-    return json.dumps(values, ensure_ascii=False, allow_nan=False)
-
-
-def _with_list(values: Mapping[str, Any], name: str, items: Iterable[str]) -> str:
-    """The JSON of an object with one more member, a list with each item on lines of its own."""
-    return f'{_json(values)[:-1]}, "{name}": [\n' + ",\n".join(items) + "\n]}"

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from itertools import product
 from typing import Any
 
+import PIL.Image
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -40,6 +41,13 @@ def png(drawn: Figure) -> bytes:
     """The picture; always the same bytes for the same figure."""
     out = io.BytesIO()
     drawn.savefig(out, format="png", metadata={"Software": None})
+    return out.getvalue()
+
+
+def small_png(drawn: Figure) -> bytes:
+    """The picture with a palette, a third as large: for those that lie in the tree."""
+    out = io.BytesIO()
+    PIL.Image.open(io.BytesIO(png(drawn))).convert("RGB").quantize(256).save(out, format="png", optimize=True)
     return out.getvalue()
 
 

@@ -31,7 +31,11 @@ def assert_same(together, alone):
 @pytest.mark.parametrize("on", ["varga7-random", "zhang6-lspb"])
 def test_together_as_alone(name, on):
     scenario = ikgym.scenarios.get(on).replace(steps=STEPS, disturbance=ikgym.Disturbance(noise=0.1))
-    policy = baselines.make(name, scenario)
+    try:
+        policy = baselines.make(name, scenario)
+    except InvalidInputError:
+        assert get(name).composed  # agents suit arms of their size
+        return
     together = rollouts(scenario, policy, SEEDS)
     for seed, episode in zip(SEEDS, together, strict=True):
         assert_same(episode, rollout(scenario, policy, seed))

@@ -1,0 +1,192 @@
+"""The network of an agent: a multi-layer perceptron in float32, one kernel from features to answer."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.jit import kernel
+from ikgym.validation import Frozen
+
+Singles = npt.NDArray[np.float32]
+
+#: What may stand between the layers, by the number that the kernel knows it by.
+ACTIVATIONS = ("linear", "relu", "tanh", "silu", "elu")
+#: What brings the last layer into [-1, 1]: PPO and A2C cut it off, SAC, TD3 and DDPG bend it.
+SQUASHES = ("clip", "tanh")
+
+# Inputs that are added up in one sweep over the outputs: each sweep reads and writes all outputs.
+SWEEP = 8
+
+_RELU, _TANH, _SILU, _ELU = (ACTIVATIONS.index(name) for name in ("relu", "tanh", "silu", "elu"))
+_BEND = SQUASHES.index("tanh")
+_ONE = np.float32(1.0)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Network(Frozen):
+    """y ← activation(W y + b), layer by layer; the last layer has no activation and is squashed into [-1, 1].
+
+    Args:
+        weights: W of each layer. Shapes (outputs, inputs), those of a layer the outputs of the one before.
+        biases: b of each layer. Shapes (outputs,).
+        activation: One of :data:`ACTIVATIONS`, behind all layers but the last.
+        squash: One of :data:`SQUASHES`, behind the last layer.
+
+    Raises:
+        UnknownNameError: There is no such activation or squash.
+        InvalidInputError: There is no layer, layers do not fit together, or a number is not finite.
+    """
+
+    weights: tuple[Singles, ...]
+    biases: tuple[Singles, ...]
+    activation: str = "relu"
+    squash: str = "clip"
+
+    #: Inputs, widths of the hidden layers, and outputs.
+    sizes: tuple[int, ...] = dataclasses.field(init=False)
+    #: The arguments of the kernel that never change.
+    _constants: tuple[object, ...] = dataclasses.field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        if self.activation not in ACTIVATIONS:
+            raise UnknownNameError("activation", self.activation, ACTIVATIONS)
+        if self.squash not in SQUASHES:
+            raise UnknownNameError("squash", self.squash, SQUASHES)
+        weights, biases = _layers("weights", self.weights, 2), _layers("biases", self.biases, 1)
+        if not weights or len(weights) != len(biases):
+            raise InvalidInputError(
+                f"layers: expected at least one, each with weights and biases, got {len(weights)} and {len(biases)}."
+            )
+        sizes = (weights[0].shape[1], *(len(bias) for bias in biases))
+        for number, (matrix, shape) in enumerate(zip(weights, zip(sizes[1:], sizes, strict=False), strict=True)):
+            if matrix.shape != shape or 0 in shape:
+                raise InvalidInputError(f"weights of layer {number}: expected shape {shape}, got {matrix.shape}.")
+        packed = np.concatenate([matrix.T.ravel() for matrix in weights]), np.concatenate(biases), np.array(sizes)
+        for array in (*weights, *biases, *packed):
+            array.flags.writeable = False
+        constants = (*packed, ACTIVATIONS.index(self.activation), SQUASHES.index(self.squash))
+        fields = {"weights": weights, "biases": biases, "sizes": sizes, "_constants": constants}
+        for name, value in fields.items():
+            object.__setattr__(self, name, value)
+
+    @property
+    def inputs(self) -> int:
+        """The number of features."""
+        return self.sizes[0]
+
+    @property
+    def outputs(self) -> int:
+        """The number of answers."""
+        return self.sizes[-1]
+
+    def answer(self, features: Singles) -> Singles:
+        """What the network answers; a row of a batch is the single call, bit for bit.
+
+        Args:
+            features: Shape (B, inputs).
+
+        Returns:
+            Numbers in [-1, 1]; NaN where the sums overflow. Shape (B, outputs).
+
+        Raises:
+            InvalidInputError: The features have another shape or are not in float32.
+        """
+        if features.dtype != np.float32 or features.ndim != 2 or features.shape[1] != self.inputs:
+            raise InvalidInputError(
+                f"features: expected float32 of shape (any, {self.inputs}), got {features.dtype} {features.shape}."
+            )
+        out = np.empty((len(features), self.outputs), dtype=np.float32)
+        forward_rows(*self._constants, np.ascontiguousarray(features), out)
+        return out
+
+
+def _layers(name: str, arrays: Sequence[npt.ArrayLike], axes: int) -> tuple[Singles, ...]:
+    """Copies as float32."""
+    layers = tuple(np.array(array, dtype=np.float32, order="C") for array in arrays)
+    for number, layer in enumerate(layers):
+        if layer.ndim != axes:
+            raise InvalidInputError(f"{name} of layer {number}: expected {axes} axes, got shape {layer.shape}.")
+        if not np.isfinite(layer).all():
+            raise InvalidInputError(f"{name} of layer {number}: expected finite numbers, got NaN or infinity.")
+    return layers
+
+
+@kernel
+def forward_rows(weights, biases, sizes, activation, squash, features, out):  # type: ignore[no-untyped-def]
+    """The forward pass, row by row.
+
+    Sums run over the inputs outside and the outputs inside: that goes along the memory, and into vector instructions
+    without any sum being added up in another order. So a row gives the same whatever stands around it.
+
+    Args:
+        weights: Wᵀ of all layers, one after the other, flat.
+        biases: b of all layers, one after the other.
+        sizes: See :class:`Network`.
+        activation: Index in :data:`ACTIVATIONS`.
+        squash: Index in :data:`SQUASHES`.
+        features: Shape (B, inputs).
+        out: Receives the answers. Shape (B, outputs).
+    """
+    layers, widest = sizes.shape[0] - 1, sizes.max()
+    x, y = np.empty(widest, np.float32), np.empty(widest, np.float32)
+    for row in range(features.shape[0]):
+        x[: sizes[0]] = features[row]
+        begin, first = 0, 0
+        for layer in range(layers):
+            inputs, outputs = sizes[layer], sizes[layer + 1]
+            matrix = weights[begin : begin + inputs * outputs]
+            y[:outputs] = biases[first : first + outputs]
+            multiply_add(matrix, x[:inputs], y[:outputs])
+            if layer < layers - 1:
+                activate(activation, y[:outputs])
+            begin, first = begin + inputs * outputs, first + outputs
+            x, y = y, x
+        for j in range(out.shape[1]):
+            value = x[j]
+            if squash == _BEND:
+                value = np.float32(math.tanh(value))
+            elif value > _ONE:
+                value = _ONE
+            elif value < -_ONE:
+                value = -_ONE
+            out[row, j] = value
+
+
+@kernel
+def multiply_add(matrix, x, y):  # type: ignore[no-untyped-def]
+    """``y += W x`` with Wᵀ flat: shapes (inputs outputs,), (inputs,), (outputs,)."""
+    n, i = y.shape[0], 0
+    while i + SWEEP <= x.shape[0]:
+        w = matrix[i * n : (i + SWEEP) * n]
+        w0, w1, w2, w3 = w[:n], w[n : 2 * n], w[2 * n : 3 * n], w[3 * n : 4 * n]
+        w4, w5, w6, w7 = w[4 * n : 5 * n], w[5 * n : 6 * n], w[6 * n : 7 * n], w[7 * n :]
+        x0, x1, x2, x3, x4, x5, x6, x7 = x[i], x[i + 1], x[i + 2], x[i + 3], x[i + 4], x[i + 5], x[i + 6], x[i + 7]
+        for j in range(n):
+            low = (((y[j] + x0 * w0[j]) + x1 * w1[j]) + x2 * w2[j]) + x3 * w3[j]
+            y[j] = (((low + x4 * w4[j]) + x5 * w5[j]) + x6 * w6[j]) + x7 * w7[j]
+        i += SWEEP
+    for rest in range(i, x.shape[0]):
+        w = matrix[rest * n : (rest + 1) * n]
+        for j in range(n):
+            y[j] += x[rest] * w[j]
+
+
+@kernel
+def activate(activation, y):  # type: ignore[no-untyped-def]
+    """The activation, in place. Shape (outputs,)."""
+    for j in range(y.shape[0]):
+        value = y[j]
+        if activation == _RELU:
+            y[j] = max(value, np.float32(0.0))
+        elif activation == _TANH:
+            y[j] = math.tanh(value)
+        elif activation == _SILU:
+            y[j] = value / (_ONE + np.float32(math.exp(-value)))
+        elif activation == _ELU and value < 0.0:
+            y[j] = math.expm1(value)

@@ -1,0 +1,8 @@
+"""Trains agents: ``python train.py --help``."""
+
+import sys
+
+from training.command import main
+
+if __name__ == "__main__":
+    sys.exit(main())

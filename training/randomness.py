@@ -1,0 +1,75 @@
+"""All that is random in a run follows from its seed and the number of the segment, and from nothing before."""
+
+from __future__ import annotations
+
+import contextlib
+import random
+from collections.abc import Iterator
+
+import numpy as np
+import torch
+
+from ikgym import scenarios
+from ikgym.exceptions import InvalidInputError
+
+
+def sequence(seed: int, segment: int | None) -> np.random.SeedSequence:
+    """Where the randomness of a segment comes from.
+
+    Args:
+        seed: Of the run.
+        segment: Counted from 0; None for what is drawn before the first one, such as the first weights.
+    """
+    return np.random.SeedSequence(seed, spawn_key=(0 if segment is None else segment + 1,))
+
+
+def reseed(seed: int, segment: int | None) -> None:
+    """Seeds the generators of Python, NumPy and PyTorch that are shared by all.
+
+    Stable-Baselines3 draws noise, minibatches and samples from them.
+
+    Args:
+        seed: Of the run.
+        segment: As in :func:`sequence`.
+    """
+    for_python, for_numpy, for_torch = sequence(seed, segment).generate_state(3).tolist()
+    random.seed(for_python)
+    np.random.seed(for_numpy)  # noqa: NPY002  # what Stable-Baselines3 draws from
+    torch.manual_seed(for_torch)
+
+
+def episode_seed(seed: int, segment: int, rows: int) -> int:
+    """The reset seed of the first of some arms in a segment; those of the others follow it.
+
+    All of them are of the split for training, whatever is drawn.
+
+    Args:
+        seed: Of the run.
+        segment: Counted from 0.
+        rows: The number of arms.
+
+    Raises:
+        InvalidInputError: There are more arms than seeds.
+    """
+    split = scenarios.SPLITS["train"]
+    if rows > len(split):
+        raise InvalidInputError(f"envs: expected at most {len(split)}, got {rows}.")
+    generator = np.random.default_rng(sequence(seed, segment).spawn(1)[0])
+    return int(generator.integers(split.start, split.stop - rows, endpoint=True))
+
+
+@contextlib.contextmanager
+def settled() -> Iterator[None]:
+    """One thread of PyTorch, and only algorithms that give the same each time; as before at the end.
+
+    Networks this small are computed faster by one thread, and several seeds have a core each.
+    """
+    threads, strict = torch.get_num_threads(), torch.are_deterministic_algorithms_enabled()
+    warns = torch.is_deterministic_algorithms_warn_only_enabled()
+    torch.set_num_threads(1)
+    torch.use_deterministic_algorithms(True)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(threads)
+        torch.use_deterministic_algorithms(strict, warn_only=warns)
