@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import abc
 import dataclasses
+import functools
 import os
 import pathlib
 from collections.abc import Iterable
@@ -82,7 +83,7 @@ class LearnedPolicy(SolverPolicy, abc.ABC):
         """The steps ahead that are seen, or how many there are up to the furthest."""
         return self.outlook.furthest if self._unfolds else self.outlook.preview
 
-    @property
+    @functools.cached_property
     def outlook(self) -> Outlook:
         """What the agent and the policy under it see."""
         return Outlook.of(self.file.processing, self.base)
