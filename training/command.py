@@ -92,8 +92,8 @@ Each method has options of its own: {PROGRAM} METHOD --help
 Examples:
   python {PROGRAM} ppo --preset smoke --out runs/smoke
   python {PROGRAM} ppo --over dls:damping=1e-2 --reach 0.5 --seeds 0 1 2 3 4 --workers 2 --out runs/over-dls
-  python {PROGRAM} sac --preset sac-over-dls --out runs/sac
-  python {PROGRAM} ppo --init runs/over-dls/seed-0/model.zip --critic-warmup 2 --log-std-init -4 --out runs/finer
+  python {PROGRAM} imitate --preset residual --seeds 0 1 2 3 4 --workers 2 --out runs/residual
+  python {PROGRAM} ppo --preset finetune --init runs/apg/seed-0/model.zip --out runs/finer
   python {PROGRAM} ppo --preset smoke --out runs/smoke --resume
   python {PROGRAM} repeat runs/smoke/seed-0/run.json --out runs/again
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import pathlib
 from typing import Any
 
-from training.config import PPO, SAC, TD3, Config
+from training import methods
+from training.config import Config
 
 #: Options of a run on an arm of three joints, 20 steps an episode.
 TINY: dict[str, Any] = {
@@ -24,11 +26,22 @@ TINY: dict[str, Any] = {
 OVER: dict[str, Any] = {**TINY, "scenario": "varga7-random", "over": "mfac", "reach": 0.5}
 
 
+#: What else makes a run of a method short.
+FEW: dict[str, dict[str, Any]] = {
+    "ppo": {},
+    "sac": {"buffer": 200, "train_every": 5, "gradient_steps": 2},
+    "td3": {"buffer": 200, "train_every": 5, "gradient_steps": 2},
+    "imitate": {"expert": "dls", "gradient_steps": 3},
+    "apg": {"window": 8, "windows": 2},
+}
+
+
 def tiny(method: str, **changes: Any) -> Config:
     """A configuration that is trained within a second."""
-    kind = {"ppo": PPO, "sac": SAC, "td3": TD3}[method]
-    few = {} if method == "ppo" else {"buffer": 200, "train_every": 5, "gradient_steps": 2}
-    return kind(**{**TINY, **few, **changes})
+    kind = methods.get(method).config
+    known = {field.name for field in dataclasses.fields(kind)}
+    usual = {name: value for name, value in TINY.items() if name in known}
+    return kind(**{**usual, **FEW[method], **{name: value for name, value in changes.items() if name in known}})
 
 
 def about(folder: pathlib.Path) -> dict[str, Any]:
