@@ -140,6 +140,10 @@ class Reinforcement(Config):
     """Arms that are stepped together."""
     episodes: Annotated[int, tyro.conf.arg(metavar="N")] = 1
     """Episodes of each arm in one segment."""
+    cut: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
+    """Steps after which episodes are broken off at first, a divisor of theirs: an agent that knows nothing yet loses
+    its arm within tenths of a second, and learns nothing from what comes then. Over the first half of the segments
+    episodes grow to their full length. They have it from the beginning if left out."""
     learning_rate: Annotated[float, tyro.conf.arg(metavar="RATE")] = 3e-4
     """Of Adam, in the first segment."""
     learning_rate_end: Annotated[float, tyro.conf.arg(metavar="RATE")] = 3e-5
@@ -156,6 +160,8 @@ class Reinforcement(Config):
         known_names("reward", [self.reward], get_args(Reward))
         for name in ("envs", "episodes", "batch_size"):
             self._settle(name, whole_number(name, getattr(self, name), at_least=1))
+        if self.cut is not None:
+            self._settle("cut", whole_number("cut", self.cut, at_least=1))
         for name in ("learning_rate", "learning_rate_end"):
             self._settle(name, number(name, getattr(self, name), above=0.0))
         self._settle("gamma", share("gamma", self.gamma))

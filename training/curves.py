@@ -40,7 +40,7 @@ def curves(trainings: dict[str, pathlib.Path]) -> Figure:
     drawn = style.figure(4.2)
     axes = drawn.add_subplot()
     handles = []
-    for number, (name, folder) in enumerate(trainings.items()):
+    for number, folder in enumerate(trainings.values()):
         files = sorted(folder.glob("seed-*/run.json"))
         if not files:
             raise InvalidInputError(f"{folder}: expected runs, seed-*/run.json; there is none.")

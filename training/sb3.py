@@ -50,10 +50,10 @@ class SB3Trainer(abc.ABC):
         self.processing, self.segments = config.processing, config.segments
         self._config, self._seed = config, seed
         self._length, self._joints = config.episodes * scenario.steps, scenario.joints
-        # Values are then of the size of rewards: of sums a hundred times as large, the critics would take most of the
-        # gradient that is left after it has been clipped.
-        scale = max(1.0 - config.gamma, 1e-3)
-        self._env = ProcessedVecEnv(config.envs, scenario, config.processing, config.reward, scale)
+        self._scenario = scenario
+        self._cuts = _cuts(scenario.steps, config.cut)
+        self._env = self._new_env(self._cuts[0])
+        self._ends = config.envs * self._length // self._cuts[0]
         self.model: Any = self._make()
         if config.init is not None:
             begin_from(self.model, config)
@@ -71,6 +71,10 @@ class SB3Trainer(abc.ABC):
             number: Counted from 0.
         """
         model = self.model
+        cut = self._cuts[min(2 * len(self._cuts) * number // self.segments, len(self._cuts) - 1)]
+        if len(self._cuts) > 1:
+            self._env = self._new_env(cut)
+            model.set_env(self._env)
         self._env.seed(episode_seed(self._seed, number, self._env.num_envs))
         model._last_obs = None  # makes it reset the environment
         model.ep_info_buffer = None
@@ -79,7 +83,8 @@ class SB3Trainer(abc.ABC):
         with self._actor_at_rest() if number < self._config.critic_warmup else contextlib.nullcontext():
             self._learn(number)
         metrics = {name: float(value) for name, value in model.logger.name_to_value.items()}
-        costs = [-episode["r"] for episode in model.ep_info_buffer]
+        # Of those that are cut off, what a whole one would cost.
+        costs = [-episode["r"] * self._scenario.steps / episode["l"] for episode in model.ep_info_buffer]
         metrics["train/cost"] = float(np.exp(np.mean(np.log(np.maximum(costs, np.finfo(np.float64).tiny)))))
         return metrics
 
@@ -99,6 +104,13 @@ class SB3Trainer(abc.ABC):
             getattr(self.model, name).data.copy_(tensor)
         for name, count in state["counters"].items():
             setattr(self.model, name, count)
+
+    def _new_env(self, cut: int) -> ProcessedVecEnv:
+        config = self._config
+        # Values are then of the size of rewards: of sums a hundred times as large, the critics would take most of the
+        # gradient that is left after it has been clipped.
+        scale = max(1.0 - config.gamma, 1e-3)
+        return ProcessedVecEnv(config.envs, self._scenario, config.processing, config.reward, scale, cut)
 
     def _learn(self, number: int) -> None:
         del number
@@ -165,7 +177,7 @@ class PPOTrainer(SB3Trainer):
             clip_range=config.clip_range,
             target_kl=config.target_kl,
             ent_coef=config.entropy,
-            stats_window_size=config.envs * config.episodes,
+            stats_window_size=self._ends,
         )
 
     def _begun(self) -> None:
@@ -213,7 +225,7 @@ class OffPolicyTrainer(SB3Trainer):
             "gamma": config.gamma,
             "train_freq": (self._divides("train_every", config.train_every), "step"),
             "gradient_steps": config.gradient_steps,
-            "stats_window_size": config.envs * config.episodes,
+            "stats_window_size": self._ends,
         }
 
     def _actor(self) -> list[nn.Parameter]:
@@ -271,6 +283,15 @@ class TD3Trainer(OffPolicyTrainer):
             target_noise_clip=2.5 * config.target_noise,
             **self._parameters(),
         )
+
+
+def _cuts(steps: int, first: int | None) -> list[int]:
+    """Lengths of episodes that a segment is a multiple of, from the first one up to the whole."""
+    if first is None:
+        return [steps]
+    if steps % first:
+        raise InvalidInputError(f"cut: expected a divisor of the {steps} steps of an episode, got {first}.")
+    return [cut for cut in range(first, steps + 1) if steps % cut == 0]
 
 
 def _noise(joints: int, deviation: float, steps: int) -> ActionNoise:

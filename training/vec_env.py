@@ -12,7 +12,8 @@ from stable_baselines3.common.vec_env import VecEnvWrapper
 from baselines.agent.processing import LARGEST, Features, Processing
 from ikgym.sb3 import RedundantIKVecEnv
 from ikgym.scenarios import Scenario
-from ikgym.validation import known_names, number
+from ikgym.simulator import Observation
+from ikgym.validation import known_names, number, whole_number
 from ikgym.vector_env import Flags
 from training.view import View
 
@@ -57,20 +58,30 @@ class ProcessedVecEnv(VecEnvWrapper):
         processing: What the agent sees, and what its answers mean.
         reward: A name in :data:`REWARDS`.
         scale: What rewards are multiplied by, above 0.
+        cut: Steps after which an episode is broken off, which the agent does not foresee: it sees as many steps left
+            as there would be. Whole episodes if left out.
 
     Raises:
         UnknownNameError: There is no such reward, policy, or parameter of it.
-        InvalidInputError: N or the scale is not valid, or the policy cannot be under the agent.
+        InvalidInputError: N, the scale or the cut is not valid, or the policy cannot be under the agent.
     """  # noqa: E501  # a table
 
     def __init__(
-        self, num_envs: int, scenario: Scenario, processing: Processing, reward: str = "cost", scale: float = 1.0
+        self,
+        num_envs: int,
+        scenario: Scenario,
+        processing: Processing,
+        reward: str = "cost",
+        scale: float = 1.0,
+        cut: int | None = None,
     ) -> None:
         known_names("reward", [reward], REWARDS)
         self._view = View(processing, scenario)
         self._reward, self._scale = REWARDS[reward], np.float32(number("scale", scale, above=0.0))
+        steps = scenario.steps if cut is None else min(whole_number("cut", cut, at_least=1), scenario.steps)
+        self._hidden = scenario.steps - steps
         super().__init__(
-            RedundantIKVecEnv(num_envs, scenario, self._view.preview),
+            RedundantIKVecEnv(num_envs, scenario.replace(steps=steps), self._view.preview),
             observation_space=spaces.Box(-LARGEST, LARGEST, (self._view.size,), np.float32),
             action_space=spaces.Box(-1.0, 1.0, (scenario.joints,), np.float32),
         )
@@ -87,7 +98,7 @@ class ProcessedVecEnv(VecEnvWrapper):
             Shape (N, f).
         """
         observation: Any = self.venv.reset()
-        return self._view.see(observation, np.ones(self.num_envs, dtype=np.bool_))
+        return self._view.see(self._uncut(observation), np.ones(self.num_envs, dtype=np.bool_))
 
     def step_async(self, actions: npt.NDArray[Any]) -> None:
         """Takes answers for the step to come. Shape (N, n)."""
@@ -104,7 +115,11 @@ class ProcessedVecEnv(VecEnvWrapper):
         rows = np.flatnonzero(ended)
         if len(rows):
             last = [infos[row]["terminal_observation"] for row in rows]
-            final = self._view.glance({key: np.stack([o[key] for o in last]) for key in last[0]}, rows)
+            final = self._view.glance(self._uncut({key: np.stack([o[key] for o in last]) for key in last[0]}), rows)
             for row, features in zip(rows.tolist(), final, strict=True):
                 infos[row]["terminal_observation"] = features
-        return self._view.see(observation, ended), self._scale * self._reward(rewards), ended, infos
+        return self._view.see(self._uncut(observation), ended), self._scale * self._reward(rewards), ended, infos
+
+    def _uncut(self, observation: Observation) -> Observation:
+        """An observation, with the steps that would be left."""
+        return {**observation, "remaining": observation["remaining"] + self._hidden} if self._hidden else observation

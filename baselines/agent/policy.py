@@ -19,7 +19,6 @@ from baselines.agent.parts import AgentFile
 from baselines.agent.under import Outlook, policy_under, refuse_to_be_named
 from baselines.files import ResultsError
 from baselines.policy import Batch, Memory, Operations, Problem, Solution, SolverPolicy, statuses
-from ikgym import tasks
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 from ikgym.scenarios import Preview
 from ikgym.simulator import offsets as checked_offsets
@@ -142,10 +141,10 @@ class LearnedPolicy(SolverPolicy, abc.ABC):
         return self._counted((0, 0, 0, 1) if self.base is None else self.base.count(iterations))
 
     def _counted(self, counts: Iterable[Any]) -> Operations:
-        """With a Jacobian and a factorisation more where answers go through the null space."""
+        """With a Jacobian and a factorisation more where answers go through the null space, a pose where it unfolds."""
         forwards, jacobians, factorisations, measurements = map(np.asarray, counts)
-        more = int(self.file.processing.null_space is not None)
-        return Operations(forwards, jacobians + more, factorisations + more, measurements)
+        more, pose = int(self.file.processing.null_space is not None), int(self._unfolds)
+        return Operations(forwards + pose, jacobians + more, factorisations + more, measurements)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -207,10 +206,8 @@ class Agent(LearnedPolicy):
 
 def _told(file: AgentFile, problem: Problem) -> Problem:
     """The problem as the agent knows it."""
-    trained, whole = file.about.get("task"), tasks.get("pose")
-    if problem.task.name != "skew" or trained != {"size": whole.size, "error_size": whole.error_size}:
-        return problem
-    return unfolding.whole(problem)
+    trained = file.about.get("task", {}).get("name")
+    return unfolding.whole(problem) if (trained, problem.task.name) == ("pose", "skew") else problem
 
 
 def _check_size(file: AgentFile, problem: Problem) -> None:

@@ -51,6 +51,12 @@ GRIDS: Mapping[str, tuple[Stage, ...]] = {
     "gram_schmidt": (product(gain=GAINS, truncation=decades(-5, -1)), product(gain=FINE_GAINS)),
     "jacobian_transpose": (product(gain=GAINS + FINE_GAINS),),
     "dls": (product(gain=GAINS, damping=decades(-6, 0)), product(gain=FINE_GAINS)),
+    "unfolded:policy=rhc,options={'horizon': 3, 'iterations': 1}": (
+        [
+            {"options": {"horizon": 3, "iterations": 1, "terminal_weight": weight}}
+            for weight in (10.0, 30.0, 50.0, 70.0, 100.0, 150.0, 200.0, 300.0, 500.0, 1e3)
+        ],
+    ),
     "unfolded": (
         [{"options": options} for options in product(gain=(0.1, 0.15, 0.3, 0.6, 1.0), damping=decades(-3, -1))],
     ),
@@ -87,7 +93,6 @@ GRIDS: Mapping[str, tuple[Stage, ...]] = {
         + product(one_step=(True,)),
     ),
     "rhc_gradient": _DESCENT,
-    "rhc_lagrange": _DESCENT,
     "rhc:horizon=3": (
         product(terminal_weight=(0.0, 0.3, 3.0, 10.0, 30.0, 100.0, 300.0, 1e3, 1e4)),
         product(terminal_weight=(50.0, 70.0, 150.0, 200.0, 500.0, 700.0)),
@@ -96,13 +101,4 @@ GRIDS: Mapping[str, tuple[Stage, ...]] = {
         product(terminal_weight=(0.0, 0.3, 3.0, 10.0, 30.0, 100.0, 300.0, 1e3, 1e4)),
         product(terminal_weight=(50.0, 70.0, 150.0, 200.0, 500.0, 700.0)),
     ),
-    "fixed_point": (
-        product(a=(-0.01, -0.02, -0.05, -0.07, -0.1, -0.2, -0.5), iterations=(1, 3, 10, 30, 100, 300)),
-        product(family=("sigmoid",), slope=(0.3, 0.5, 0.8, 0.9), d=(0.1, 0.3, 1.0)),
-    ),
-    "abstract_rotation": (
-        product(lambda_a=decades(-3, 0), r_a=(100.0, 1e3, 1e4), counter_rotation=(True, False)),
-        product(q_pp_max=(1e2, 1e4, 1e5)),
-    ),
-    "smoothed": (product(relaxation=(100.0, 200.0, 500.0, 700.0, 1000.0, 1400.0, 1700.0, 1900.0)),),
 }

@@ -8,11 +8,12 @@ import pytest
 import baselines
 from baselines import unfolding
 from baselines.policy import Batch, Problem
-from baselines.rollout import rollouts
+from baselines.rollout import rollout, rollouts
 from baselines.unfolding import unfold_one
 from ikgym import scenarios, tasks
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 from ikgym.rotations import rodrigues
+from tests.baselines.agents import write_agent
 
 DLS = {"damping": 1e-2, "gain": 0.3}
 
@@ -75,6 +76,33 @@ def test_arms_that_turn_back_at_the_fold_go_on():
     folded = costs(scenario, baselines.make("dls", scenario, damping=1e-2), seeds)
     unfolded = costs(scenario, baselines.make("unfolded", scenario, options={"damping": 1e-2}), seeds)
     assert (folded > 30.0 * unfolded).all()
+
+
+@pytest.mark.parametrize(
+    ("over", "policy", "options"),
+    [
+        ("dls:damping=1e-2,gain=0.3", "dls", DLS),
+        # Sees further than the agent, and more of what lies between.
+        ("rhc:horizon=30,iterations=1", "rhc", {"horizon": 30, "iterations": 1}),
+    ],
+)
+def test_agents_that_know_whole_poses_play_skew_coordinates(tmp_path, over, policy, options):
+    scenario = scenarios.get("varga7-random").replace(steps=150)
+    file = write_agent(tmp_path / "a.safetensors", whole(scenario), over, zero=True, null_space=1e-2)
+    seeds = scenarios.seeds("train", 4)
+    agent = rollouts(scenario, baselines.make("agent", scenario, path=file), seeds)
+    alone = rollouts(scenario, baselines.make("unfolded", scenario, policy=policy, options=options), seeds)
+    for a, b in zip(agent, alone, strict=True):
+        np.testing.assert_array_equal(a.q, b.q)
+        np.testing.assert_array_equal(a.operations.forward_kinematics, b.operations.forward_kinematics)
+
+
+def test_batches_of_such_agents_are_single_calls(tmp_path):
+    scenario = scenarios.get("varga7-random").replace(steps=40)
+    file = write_agent(tmp_path / "a.safetensors", whole(scenario), "dls", null_space=1e-2)
+    policy, seeds = baselines.make("agent", scenario, path=file), scenarios.seeds("train", 3)
+    for seed, together in zip(seeds, rollouts(scenario, policy, seeds), strict=True):
+        np.testing.assert_array_equal(rollout(scenario, policy, seed).q, together.q)
 
 
 @pytest.mark.parametrize("name", ["khan8-q1", "faitli3-regular", "zhang6-lspb"])
