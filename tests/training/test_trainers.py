@@ -20,6 +20,7 @@ METHODS = ["ppo", "sac", "td3"]
 NOISY = [
     ("ppo", {}),
     ("ppo", {"noise_steps": 4, "rollout": 10, "episodes": 2, "target_kl": 0.5}),
+    ("ppo", {"cut": 5, "segments": 5}),
     ("sac", {"collect": 0}),
     ("sac", {"noise_steps": 4}),
     ("td3", {"buffer": 64}),
@@ -124,6 +125,21 @@ def test_all_episodes_are_played_to_their_end(method):
     assert len(trainer.model.ep_info_buffer) == 2 * 4
     assert trainer.steps == 2 * 4 * 20
     assert (trainer._env.venv._envs._simulator.steps_made == 0).all()
+
+
+def test_episodes_grow():
+    """Over the first half of the segments, through what divides a segment; costs are those of whole episodes."""
+    trainer = made(tiny("ppo", cut=5, segments=8, batch_size=80))
+    lengths, costs = [], []
+    for number in range(8):
+        costs.append(play(trainer, [number])[0]["train/cost"])
+        lengths.append({episode["l"] for episode in trainer.model.ep_info_buffer})
+        assert len(trainer.model.ep_info_buffer) == 4 * 20 / lengths[-1].copy().pop()
+    assert lengths == [{5}, {5}, {10}, {20}, {20}, {20}, {20}, {20}]
+    returns = [-episode["r"] for episode in trainer.model.ep_info_buffer]
+    assert costs[-1] == pytest.approx(np.exp(np.mean(np.log(returns))))
+    with pytest.raises(InvalidInputError, match="cut: expected a divisor of the 20 steps of an episode, got 7"):
+        made(tiny("ppo", cut=7))
 
 
 @pytest.mark.parametrize("method", METHODS)

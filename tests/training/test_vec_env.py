@@ -158,3 +158,25 @@ def test_bad_arguments():
 def test_answers_need_something_seen():
     with pytest.raises(ResetNeededError, match="call reset"):
         View(Processing(), scenario()).act(np.zeros((1, 7)))
+
+
+def test_cut_episodes_look_like_whole_ones():
+    """An agent is not told that they are broken off; the return is that of the steps that were played."""
+    whole, cut = (ProcessedVecEnv(N, scenario(steps=30), Processing(over="mfac"), cut=c) for c in (None, 5))
+    answers = np.random.default_rng(3).uniform(-1.0, 1.0, (6, N, 7)).astype(np.float32)
+    courses = []
+    for env in (whole, cut):
+        env.seed(4)
+        courses.append(played(env, answers))
+    for step, (wanted, got) in enumerate(zip(*courses, strict=True)):
+        if step < 5:
+            np.testing.assert_array_equal(got[0], wanted[0])
+        if step == 5:
+            for row, info in enumerate(got[2]):
+                np.testing.assert_array_equal(info["terminal_observation"], wanted[0][row])
+                assert info["TimeLimit.truncated"]
+                assert info["episode"]["l"] == 5
+            assert not np.array_equal(got[0], wanted[0])
+    assert ProcessedVecEnv(N, scenario(steps=30), Processing(), cut=99).get_attr("scenario")[0].steps == 30
+    with pytest.raises(InvalidInputError, match="cut"):
+        ProcessedVecEnv(N, scenario(), Processing(), cut=0)
