@@ -48,8 +48,9 @@ def policy_for(name, on):
     try:
         return baselines.make(name, scenario(on), **seed)
     except InvalidInputError:
-        # An agent suits the arms of its size.
-        if not (issubclass(get(name), ShippedAgent) or (name, on) in UNSUITED):
+        # An agent suits the arms of its size, and only skew coordinates can be unfolded.
+        folded = name != "unfolded" or scenario(on).task.name == "skew"
+        if folded and not (issubclass(get(name), ShippedAgent) or (name, on) in UNSUITED):
             assert name in HANDED_THE_PATH
             assert scenario(on).nominal_joint_path(1) is None
         return None
