@@ -8,8 +8,10 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from baselines import registry
+from baselines.agent.policy import LearnedPolicy
 from baselines.plan import parse_policy
 from baselines.rhc import RecedingHorizon
+from baselines.unfolded import Unfolded
 
 #: The horizons of the families.
 HORIZONS = (3, 5, 10, 30, 100, 200, 400)
@@ -50,13 +52,16 @@ def contenders(
 ) -> tuple[Contender, ...]:
     """All that are compared: references, which know what no observation shows, are nobody's choice and left out.
 
+    So are agents, and policies that are shown other coordinates than the scenario's: they are on the leaderboard.
+
     Args:
         horizons: Those of the families.
         seeds: Seeds of presets that draw at random.
         timed: Timed episodes of a preset, of each seed.
     """
     classes = {name: registry.get(name) for name in registry.names()}
-    plain = [Contender(n) for n, c in classes.items() if not (c.reference or issubclass(c, RecedingHorizon))]
+    elsewhere = (RecedingHorizon, LearnedPolicy, Unfolded)
+    plain = [Contender(n) for n, c in classes.items() if not (c.reference or issubclass(c, elsewhere))]
     families = [Contender(spec) for family in FAMILIES for h in horizons if (spec := _spec(family, h))]
     tuned = [
         Contender(f"{name}:stop_at_end={knows}", seeds if _draws(preset) else (), timed)
