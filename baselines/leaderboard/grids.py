@@ -34,10 +34,9 @@ RATIOS = (0.1, 0.2, 0.35, 0.5, 0.7, 0.85, 1.2, 1.4, 2.0)
 WEIGHTS = tuple(tuple(float(f"{ratio**j:.3g}") for j in range(_JOINTS)) for ratio in RATIOS)
 #: A heavily damped iteration that is given more makes all of them, in each period.
 _ITERATIONS = (1, 10)
-# Analytic gradients take a third of the time of finite differences, to the same end.
 _DESCENT: tuple[Stage, ...] = (
-    product(gradient=("analytic",), alpha_max=(1e-4, 2e-4, 3e-4), tolerance=(5.0, 20.0, 80.0)),
-    product(iterations=(150, 1500)),
+    product(alpha_max=(5e-5, 1e-4, 2e-4, 3e-4), tolerance=(4.0, 20.0, 80.0)),
+    product(iterations=(150, 1500)) + product(alpha_factor=(1.5,)),
 )
 
 #: The stages of each solver.
