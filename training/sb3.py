@@ -71,7 +71,7 @@ class SB3Trainer(abc.ABC):
             number: Counted from 0.
         """
         model = self.model
-        cut = self._cuts[min(len(self._cuts) * number // self.segments, len(self._cuts) - 1)]
+        cut = self._cuts[min(2 * len(self._cuts) * number // self.segments, len(self._cuts) - 1)]
         if len(self._cuts) > 1:
             self._env = self._new_env(cut)
             model.set_env(self._env)
