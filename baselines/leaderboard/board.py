@@ -156,7 +156,9 @@ class Section:
 
     @property
     def reference(self) -> FloatArray:
-        """What the costs are stated relative to: the best known ones, else those of the foresight's first seed.
+        """What the costs are stated relative to: the best known ones, else the lowest over the foresight's seeds.
+
+        One seed would not do: even that preset loses track now and then, and all others would seem to excel there.
 
         Raises:
             InvalidInputError: There is neither.
@@ -165,7 +167,8 @@ class Section:
             return np.array(known)
         for line in self.lines:
             if line.label == FORESIGHT:
-                return np.array(line.cost[0])
+                lowest: FloatArray = np.array(line.cost).min(axis=0)
+                return lowest
         raise InvalidInputError(f"{self.name} has no best known costs, and {FORESIGHT} was not played to stand in.")
 
     def regrets(self) -> dict[str, FloatArray]:

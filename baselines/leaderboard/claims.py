@@ -52,6 +52,11 @@ def sentences(section: Section) -> list[str]:
         return ["- No agent has been entered: the lines are those of solvers.", *_solvers(near, far, means)]
     best = learned[0]
     out = [f"- The best agent is {_name(best, means)}{_few(best)}; it loses track in {best.lost} of {best.runs} runs."]
+    if best.training and best.training.over:
+        out.append(
+            f"- It adds to `{best.training.over}` and sees {best.preview} steps ahead: what that solver reaches is no "
+            "merit of the training. Compare it with the same solver alone."
+        )
     alone = next((line for line in learned if line.kind == AGENT), None)
     if alone is None:
         out.append("- No agent stands alone, without a solver under it.")

@@ -19,7 +19,7 @@ from ikgym.exceptions import InvalidInputError
 
 #: How far the receding horizon of Varga 2021 looks ahead: HL = 3 grid points, of which one is the present.
 PAPER = 2
-#: The preset that draws at random, whose first seed is the reference where no best known cost is.
+#: The preset that draws at random, whose best seed is the reference where no best known cost is.
 FORESIGHT = "rhc_foresight"
 #: Receding horizons beside those that are registered: the paper's, exactly and in real time, and long ones with blocks.
 BLOCKED = ("rhc:horizon=100,iterations=1,blocks=23", "rhc:horizon=200,iterations=1,blocks=27")
@@ -91,6 +91,17 @@ class Entry:
 def label(name: str, settings: Mapping[str, Any]) -> str:
     """What to call a solver or an agent, so that one that was tuned differs from itself as it is."""
     return f"{name}, tuned" if settings else name
+
+
+def short(name: str) -> str:
+    """What to call a solver where there is little room: ``unfolded rhc:horizon=3`` for a policy made from another."""
+    if ":" not in name:
+        return name
+    outer, parameters = parse_policy(name)
+    inner, options = parameters.pop("policy", None), parameters.pop("options", {})
+    if inner is None or parameters:
+        return name
+    return f"{outer} {inner}" + (":" + ",".join(f"{key}={value}" for key, value in options.items()) if options else "")
 
 
 def solvers(tuned: Iterable[Tuned] = ()) -> tuple[Entry, ...]:

@@ -13,7 +13,7 @@ from baselines.leaderboard import pictures as drawing
 from baselines.leaderboard import places
 from baselines.leaderboard.board import AGENT, FAR, NEAR, REFERENCE, RESIDUAL, Board, Line, Section
 from baselines.leaderboard.claims import few, mean, quoted, sentences
-from baselines.leaderboard.entries import ENOUGH, FORESIGHT, PAPER
+from baselines.leaderboard.entries import ENOUGH, FORESIGHT, PAPER, label, short
 from baselines.leaderboard.statistics import interval
 from baselines.leaderboard.tuning import UPDATE, Tuning
 from baselines.markdown import table
@@ -173,7 +173,7 @@ def _generalisation(sections: Sequence[Section]) -> list[str]:
     out = ["## Generalisation", ""]
     out += [
         "Agents and some solvers on scenarios that no solver was tuned on. Where the best known costs are not known, "
-        f"costs are stated **relative to `{FORESIGHT}`**, to that of its first seed on the same episode, and not as "
+        f"costs are stated **relative to `{FORESIGHT}`**, to the lowest of its seeds on the same episode, and not as "
         "regrets: below 1 is better than that preset.",
         "",
     ]
@@ -271,4 +271,7 @@ def _time(microseconds: float | None) -> str:
 
 
 def _plain(line: Line) -> str:
-    return f"{line.label} ({few(line)})" if not line.benchmark else line.label
+    """A line's name in plots."""
+    if line.learned:
+        return line.name if line.benchmark else f"{line.name} ({few(line)})"
+    return label(short(line.name), line.settings)

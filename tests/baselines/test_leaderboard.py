@@ -164,6 +164,19 @@ class TestEntries:
         }
         assert {"rhc:horizon=3", "rhc:horizon=3,iterations=1", "rhc:horizon=200,iterations=1,blocks=27"} <= set(names)
 
+    @pytest.mark.parametrize(
+        ("name", "expected"),
+        [
+            ("dls", "dls"),
+            ("rhc:horizon=3", "rhc:horizon=3"),
+            ("unfolded", "unfolded"),
+            ("unfolded:policy=mfac", "unfolded mfac"),
+            ("unfolded:policy=rhc,options={'horizon': 3, 'iterations': 1}", "unfolded rhc:horizon=3,iterations=1"),
+        ],
+    )
+    def test_short_names(self, name, expected):
+        assert entries.short(name) == expected
+
     def test_tuned_is_another_line(self):
         better = solvers([Tuned("dls", {"gain": 0.5}, 2, 2.0, 1.0), Tuned("mfac", {}, 2, 1.0, 1.0)])
         assert [e.spec for e in better if e.name in ("dls", "mfac")] == ["dls", "mfac", "dls, tuned"]
@@ -305,8 +318,8 @@ class TestMeasure:
         found = measure("varga7-random-frequency", FEW[1:], out, episodes=1)
         assert found.best_known is None
         regrets = found.regrets()
-        assert regrets["rhc_foresight"][0].tolist() == [1.0]
-        assert regrets["dls"][0, 0] == found.lines[0].cost[0][0] / found.lines[2].cost[0][0]
+        assert regrets["rhc_foresight"].min() == 1.0 < regrets["rhc_foresight"].max()
+        assert regrets["dls"][0, 0] == found.lines[0].cost[0][0] / min(cost for (cost,) in found.lines[2].cost)
         assert found.lines[0].time_p50_us is None
         (row,) = evaluate(places.get("varga7-random-frequency"), "dls")
         assert found.lines[0].cost[0][0] == pytest.approx(row.total_cost, rel=1e-6)
@@ -377,6 +390,7 @@ class TestClaims:
         )
         text = "\n".join(sentences(section))
         assert "The best agent is residual (2.000); it loses track in 0 of 10 runs." in text
+        assert "It adds to `dls` and sees 240 steps ahead" in text
         assert "The best without a solver under it is PPO (3.000)." in text
         assert "below all 2 solvers" in text
         assert "its cost is 0.5000 (0.5000 to 0.5000) times that of the best of them, `dls` (4.000)." in text
