@@ -2,7 +2,7 @@
 
 import sys
 
-from training.command import main
+from baselines.training.command import main
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -7,7 +7,7 @@
 from __future__ import annotations
 
 from baselines.policy import SolverPolicy
-from baselines.registry import make, names
+from baselines.registry import get, make, names, register
 from baselines.status import Status
 
-__all__ = ["SolverPolicy", "Status", "make", "names"]
+__all__ = ["SolverPolicy", "Status", "get", "make", "names", "register"]

@@ -18,14 +18,16 @@ from typing import Annotated, Literal
 
 import tyro
 
-from baselines import frozen as frozen_sets
-from baselines import registry, report
+from baselines import registry
+from baselines.evaluation import report
+from baselines.evaluation import test_sets as known_sets
+from baselines.evaluation.machine import describe
+from baselines.evaluation.metrics import Row
+from baselines.evaluation.plan import ALL, Plan, make_plan
+from baselines.evaluation.results import Results
+from baselines.evaluation.runner import run
 from baselines.files import write
-from baselines.machine import describe
-from baselines.metrics import Row
-from baselines.plan import ALL, Plan, PolicySpec, make_plan
-from baselines.results import Results
-from baselines.runner import run
+from baselines.spec import PolicySpec
 from ikgym import scenarios as scenario_registry
 from ikgym.exceptions import IkgymError
 from ikgym.scenarios import Scenario
@@ -36,7 +38,7 @@ def evaluate(
     scenarios: str | Scenario | Iterable[str | Scenario] = (),
     policies: PolicySpec | Iterable[PolicySpec] = ALL,
     *,
-    frozen: str | Iterable[str] = (),
+    test_sets: str | Iterable[str] = (),
     episodes: int = 1,
     split: str = "test",
     steps: int | None = None,
@@ -61,14 +63,15 @@ def evaluate(
         policies: Names, names with parameters such as ``"dls:damping=1e-2"``, or pairs such as
             ``("dls", {"damping": 1e-2})``; ``"agent:PATH"`` for an agent in a file; ``"all"`` stands for all that are
             registered.
-        frozen: Names of frozen sets, see :mod:`baselines.frozen`, instead of scenarios, episodes, split and steps.
+        test_sets: Names of test sets, see :mod:`baselines.evaluation.test_sets`, instead of scenarios, episodes,
+            split and steps.
         episodes: Episodes of a random scenario: the first of the split. A scenario that is the same at every reset
             has one, with seed 0.
         split: Where the seeds of random scenarios come from, see :data:`ikgym.scenarios.SPLITS`.
         steps: Most steps of an episode, for trials; the scenarios' own if left out.
         preview: Steps ahead that policies are shown; what each asks for if left out.
         timed: Episodes of each policy in each scenario that are played alone, with the clock; ``"all"`` for all.
-        trust: Whether files of agents may run code of their own, see :class:`baselines.agent.policy.Agent`.
+        trust: Whether files of agents may run code of their own, see :class:`baselines.agents.policy.Agent`.
         workers: Processes that play episodes; 1 means this one. More than one need a main module that may be
             imported, that is with ``if __name__ == "__main__":``.
         out: Where files go; nowhere if left out.
@@ -81,8 +84,8 @@ def evaluate(
         One row an episode, policy by policy within each scenario.
 
     Raises:
-        UnknownNameError: There is no such scenario, policy, parameter, split or frozen set.
-        InvalidInputError: A value is out of range, a policy refuses what it is shown, or a frozen set has drifted or
+        UnknownNameError: There is no such scenario, policy, parameter, split or test set.
+        InvalidInputError: A value is out of range, a policy refuses what it is shown, or a test set has drifted or
             is to be changed.
         ResultsError: `out` cannot be read or written, or is not to be gone on with; the file of an agent cannot be
             used.
@@ -91,7 +94,7 @@ def evaluate(
     plan = make_plan(
         scenarios,
         policies,
-        frozen=frozen,
+        test_sets=test_sets,
         episodes=episodes,
         split=split,
         steps=steps,
@@ -142,7 +145,7 @@ def _finish(results: Results, plan: Plan, *, plots: bool, progress: bool, comman
     pictures = {}
     if plots:
         # matplotlib is slow to import, and most evaluations from Python draw nothing.
-        from baselines.plots import draw
+        from baselines.evaluation.plots import draw
 
         pictures = draw(results, progress=progress)
     results.save()
@@ -157,9 +160,9 @@ class Options:
     """What the command line takes."""
 
     scenarios: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME …")] = ()
-    """Names of scenarios, or: all. If neither scenarios nor frozen sets are named: varga7-fast."""
-    frozen: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME …")] = ()
-    """Names of frozen sets, which say themselves what is played: instead of scenarios, episodes, split and steps."""
+    """Names of scenarios, or: all. If neither scenarios nor test sets are named: varga7-fast."""
+    test_sets: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME …")] = ()
+    """Names of test sets, which say themselves what is played: instead of scenarios, episodes, split and steps."""
     policies: Annotated[tuple[str, ...], tyro.conf.arg(metavar="POLICY …")] = (ALL,)
     """Policies as NAME or NAME:PARAMETER=VALUE,PARAMETER=VALUE, or agent:PATH for an agent in a file, or: all."""
     episodes: Annotated[int, tyro.conf.arg(metavar="N")] = 1
@@ -199,7 +202,7 @@ Plays every policy on every scenario, and measures costs, errors, joint velociti
 
 {_listing("Scenarios", scenario_registry.names())}
 
-{_listing("Frozen sets", frozen_sets.names())}
+{_listing("Test sets", known_sets.names())}
 
 {_listing("Policies", (*policies, "agent:PATH (an agent in a file)"))}
 
@@ -208,7 +211,7 @@ Examples:
   python -m baselines.evaluate --policies dls dls:damping=1e-2 rhc_gradient:alpha_max=5e-4,horizon=5
   python -m baselines.evaluate --scenarios varga7-random --episodes 20 --workers 4 --out results/random
   python -m baselines.evaluate --scenarios varga7-random --episodes 50 --out results/random --resume
-  python -m baselines.evaluate --frozen varga7-random --policies rhc_gradient --out results/frozen
+  python -m baselines.evaluate --test-sets varga7-random --policies rhc_gradient --out results/test
   python -m baselines.evaluate --scenarios varga7-random --policies agent:runs/mine.safetensors dls
 
 Files in the folder of --out, each replaced in one go, so that a run may be stopped at any time:
@@ -221,7 +224,7 @@ Files in the folder of --out, each replaced in one go, so that a run may be stop
 Columns:
   scenario, policy, parameters, seed, steps      which episode it is
   total_cost = tracking_cost + velocity_cost     sum of -reward
-  regret                                         total_cost / best known cost, null where there is none above 1e-9
+  cost ratio                                         total_cost / best known cost, null where there is none above 1e-9
   position_error_max, position_error_rms         distance from the nominal position in [m]
   orientation_error_max, orientation_error_rms   geodesic angle in [rad], null where the task has none
   qdot_peak, qdot_rms, qdot_total_variation      of the joint velocities, in [rad/s] or [m/s]
@@ -233,7 +236,7 @@ Columns:
   iterations, status_counts                      mean iterations in one step, and how many steps ended how
   preview                                        steps ahead that were shown, the furthest of some
   fingerprint                                    digest of the scenario and the version of the cost
-  frozen                                         digest of the frozen set, null where there is none
+  test_set                                       digest of the test set, null where there is none
   operations                                     mean kinematics, Jacobians, factorisations, measurements in a step
 
 Costs and errors of scenarios that hold their nominal points are those of the last step of each point."""
@@ -261,9 +264,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     try:
         plan = make_plan(
-            options.scenarios or (() if options.frozen else ("varga7-fast",)),
+            options.scenarios or (() if options.test_sets else ("varga7-fast",)),
             options.policies,
-            frozen=options.frozen,
+            test_sets=options.test_sets,
             episodes=options.episodes,
             split=options.split,
             steps=options.steps,

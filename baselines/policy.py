@@ -249,7 +249,7 @@ class SolverPolicy(Frozen, abc.ABC):
         """Status and iterations of the call that returned a state."""
         return Report(state[0], state[1])
 
-    def inside(self, state: Memory) -> dict[str, FloatArray]:
+    def diagnostics(self, state: Memory) -> dict[str, FloatArray]:
         """What a solver can show of how it came to its answer, by name; read from the state that `predict` returned.
 
         Returns:

@@ -15,14 +15,14 @@ from typing import Annotated, Any
 
 import tyro
 
+from baselines.canonical import jsonable
+from baselines.evaluation.machine import describe
+from baselines.evaluation.plots.style import png
 from baselines.files import write
-from baselines.machine import describe
-from baselines.metrics import jsonable
 from baselines.papers import PAPERS, get
 from baselines.papers.ledger import ledger
 from baselines.papers.paper import Finding, Paper
 from baselines.papers.runs import Runs
-from baselines.plots.style import png
 from ikgym.exceptions import IkgymError, InvalidInputError
 from ikgym.validation import whole_number
 

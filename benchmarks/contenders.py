@@ -11,7 +11,7 @@ import numpy as np
 
 import baselines
 from baselines.policy import Problem, SolverPolicy
-from baselines.rhc import RecedingHorizon
+from baselines.solvers.receding_horizon.rhc import RecedingHorizon
 from baselines.status import Status
 from benchmarks.rivals.numpy_horizon import Horizon, Plan, plan_cost
 from benchmarks.states import Observation

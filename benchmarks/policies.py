@@ -11,8 +11,8 @@ from numba import njit
 
 import baselines
 import ikgym
-from baselines.damped_step import damped_step
 from baselines.policy import Batch
+from baselines.solvers.damped_step import damped_step
 from benchmarks.effort import FULL, Effort
 from benchmarks.table import Column, Table
 from benchmarks.timing import medians

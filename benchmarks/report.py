@@ -8,11 +8,11 @@ import pathlib
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from baselines.evaluation.machine import describe
 from baselines.files import write
-from baselines.machine import describe
 from benchmarks.table import Table
 
-#: Whose versions matter to a figure besides those of :func:`baselines.machine.describe`.
+#: Whose versions matter to a figure besides those of :func:`baselines.evaluation.machine.describe`.
 LIBRARIES = ("gymnasium", "mujoco", "envpool", "pin", "casadi", "crocoddyl", "stable-baselines3", "torch")
 
 

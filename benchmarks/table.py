@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from typing import Any
 
-from baselines.report import number
+from baselines.evaluation.report import number
 
 
 @dataclasses.dataclass(frozen=True)

@@ -15,9 +15,9 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from baselines.content import episode_hash
+from baselines.canonical import canonical
 from baselines.files import ResultsError, write
-from baselines.metrics import canonical
+from baselines.fingerprints import episode_hash
 from baselines.oracle.optimum import Optimum, Search, Start
 from baselines.oracle.search import VERSION, search
 from ikgym import scenarios

@@ -6,13 +6,16 @@ import dataclasses
 from typing import Self
 
 import numpy as np
+import numpy.typing as npt
 from gymnasium.utils import seeding
 
-from baselines.joint_paths.cost import Rules
-from baselines.joint_paths.grid import Grid
+from baselines.episode import added_up, play
+from baselines.policy import Batch, Memory, SolverPolicy
+from baselines.solvers.receding_horizon.newton.cost import Rules
+from baselines.solvers.receding_horizon.newton.grid import Grid
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
-from ikgym.simulator import Simulator
+from ikgym.simulation import Outcome
 from ikgym.validation import FloatArray, whole_number
 
 # Knots at the beginning that a coarse grid has, too: an arm that starts far off its trajectory gets there in a few.
@@ -21,7 +24,7 @@ FIRST = 8
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Whole:
-    """An episode from its start to its end, as the kernels of :mod:`baselines.joint_paths` see it.
+    """An episode from its start to its end, as the kernels of :mod:`baselines.solvers.receding_horizon.newton` see it.
 
     A knot stands at each step that counts. Where a nominal point is held for h > 1 steps the arm moves in h - 1 of
     them, which cost nothing, and rests in the last, which counts.
@@ -80,7 +83,7 @@ class Whole:
     def coarse(self, stride: int) -> Grid:
         """A grid with the first knots, every ``stride``-th of the others, and the last.
 
-        The tracking costs between two knots follow the trapezoidal rule, as in :func:`baselines.joint_paths.grid.cut`.
+        The tracking costs between two knots follow the trapezoidal rule, as in :func:`grid.cut`.
         """
         last = self.knots - 1
         first_ones = np.arange(min(FIRST, last))
@@ -123,10 +126,21 @@ class Whole:
         Returns:
             Joint coordinates after each step in [rad] or [m], of shape (steps, n), and the total cost.
         """
-        simulator = Simulator(self.scenario, None, 1)
-        simulator.reset(np.ones(1, dtype=np.bool_), [seeding.np_random(self.seed)[0]])
+        actions = iter(qdot / self.scenario.velocity_limit)
+        played = play(self.scenario, [self.seed], lambda _: next(actions), preview=1, single=True)
         q, costs = np.empty_like(qdot), np.empty(len(qdot))
-        for k, action in enumerate(qdot / self.scenario.velocity_limit):
-            out = simulator.step(action)
+        for k, out in enumerate(played):
             q[k], costs[k] = out.q[0], out.tracking_cost[0] + out.velocity_cost[0]
-        return q, float(np.sum(costs))
+        return q, float(added_up(costs))
+
+
+def path_of(policy: SolverPolicy, scenario: Scenario, seed: int) -> FloatArray:
+    """The joint coordinates of an episode that a policy plays, in [rad] or [m]. Shape (steps, n)."""
+    state: Memory | None = None
+
+    def act(out: Outcome) -> npt.NDArray[np.float32]:
+        nonlocal state
+        action, state = policy.predict({name: getattr(out, name) for name in Batch._fields}, state)
+        return action
+
+    return np.stack([out.q[0] for out in play(scenario, [seed], act, preview=policy.preview)])

@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 
-from baselines.best_known import MARGIN, MEANINGLESS, Record
+from baselines.oracle.best_known import MARGIN, MEANINGLESS, Record
 from ikgym.validation import FloatArray, Frozen, read_only, whole_number
 
 #: What starts are called that were drawn, and paths that the local search has found.
@@ -85,7 +85,7 @@ class Optimum(Frozen):
         gradient_norm: Norm of the cost's gradient there, by q / Δt, in [s/rad] or [s/m].
         starts: All starts.
         seconds: CPU time that one path took at full resolution, in [s].
-        hash: Of the episode, see :func:`baselines.content.episode_hash`.
+        hash: Of the episode, see :func:`baselines.fingerprints.episode_hash`.
     """
 
     scenario: str

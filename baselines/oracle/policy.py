@@ -9,10 +9,10 @@ from typing import Any, ClassVar, Self
 import numpy as np
 import numpy.typing as npt
 
-from baselines.handed_path import HandedPath
 from baselines.oracle.cache import solve
 from baselines.oracle.optimum import Search
 from baselines.policy import Batch, Memory, Problem, Solution, statuses
+from baselines.solvers.references.nominal_path import HandedPath
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray, whole_number

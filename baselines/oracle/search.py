@@ -9,13 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from baselines.content import episode_hash
-from baselines.joint_paths.grid import Grid
-from baselines.oracle import climbing
-from baselines.oracle.episode import Whole
+from baselines.fingerprints import episode_hash
+from baselines.oracle import local_search
+from baselines.oracle.episode import Whole, path_of
 from baselines.oracle.optimum import CLIMBED, RANDOM, Optimum, Search, Start
-from baselines.rhc import RecedingHorizon
-from baselines.rollout import rollouts
+from baselines.solvers.receding_horizon.newton.grid import Grid
+from baselines.solvers.receding_horizon.rhc import RecedingHorizon
 from ikgym.parallel import in_chunks
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray
@@ -107,15 +106,14 @@ def _known_paths(whole: Whole) -> dict[str, FloatArray]:
     if nominal is not None:
         out["nominal joint path"] = np.ascontiguousarray(nominal[grid.at])
     rolled = np.empty((1, whole.knots, scenario.joints))
-    climbing.roll_outs(whole.rules, grid, whole.start, whole.nominal, 0, rolled, 0, 1)
+    local_search.roll_outs(whole.rules, grid, whole.start, whole.nominal, 0, rolled, 0, 1)
     out["roll-out"] = rolled[0]
     if whole.knots == scenario.steps:
         for given in HORIZONS:
             horizon = max(min(int(given["horizon"]), scenario.steps + 1), 2)
             fitting = {**given, "horizon": horizon, "blocks": min(int(given["blocks"]), horizon - 1)}
             policy = RecedingHorizon.for_scenario(scenario, **fitting)
-            (episode,) = rollouts(scenario, policy, [seed])
-            out.setdefault(f"rhc, horizon {given['horizon']}", episode.q)
+            out.setdefault(f"rhc, horizon {given['horizon']}", path_of(policy, scenario, seed))
     return out
 
 
@@ -135,8 +133,10 @@ def _coarse_search(
     problem = whole.rules, grid, whole.start, whole.nominal
     # Start 0 of the kernel does not drift, and is known already.
     drawn = paths[len(known) - 1 :]
-    in_chunks(lambda first, last: climbing.roll_outs(*problem, how.seed, drawn, first + 1, last + 1), how.starts, GRAIN)
-    costs, *_ = _settle(whole, grid, paths, exact=False, most=climbing.STEPS, tolerance=climbing.PRECISION)
+    in_chunks(
+        lambda first, last: local_search.roll_outs(*problem, how.seed, drawn, first + 1, last + 1), how.starts, GRAIN
+    )
+    costs, *_ = _settle(whole, grid, paths, exact=False, most=local_search.STEPS, tolerance=local_search.PRECISION)
     done(0.3)
 
     chosen = _distinct(costs, PARTNERS)
@@ -146,7 +146,7 @@ def _coarse_search(
         seed, pool = how.seed + generation * STRIDE, np.concatenate([chains, partners])
 
         def work(first: int, last: int, seed: int = seed, pool: FloatArray = pool) -> None:
-            climbing.climb(*problem, seed, how.rounds, pool, chains, reached, first, last)
+            local_search.climb(*problem, seed, how.rounds, pool, chains, reached, first, last)
 
         in_chunks(work, len(chains), 1)
         done(0.5 / how.generations)
@@ -171,7 +171,7 @@ def _settle(
 
     def work(first: int, last: int) -> None:
         begin = time.thread_time()
-        climbing.settle(
+        local_search.settle(
             whole.rules,
             grid,
             whole.start,

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.figure import Figure
 
-from baselines.plots import style
+from baselines.evaluation.plots import style
 from ikgym.validation import FloatArray
 
 

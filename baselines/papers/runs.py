@@ -7,9 +7,9 @@ from typing import Any
 from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
-from baselines.metrics import canonical, jsonable
+from baselines.canonical import canonical, jsonable
+from baselines.evaluation.rollout import Episode, rollout
 from baselines.registry import make
-from baselines.rollout import Episode, rollout
 from ikgym import scenarios
 from ikgym.scenarios import Scenario
 

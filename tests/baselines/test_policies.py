@@ -18,7 +18,7 @@ from stable_baselines3.common.vec_env import DummyVecEnv
 
 import baselines
 import ikgym
-from baselines.agent.shipped import ShippedAgent
+from baselines.agents.shipped import ShippedAgent
 from baselines.policy import Problem, Solution, SolverPolicy, statuses
 from baselines.registry import get
 from baselines.status import Status
@@ -49,7 +49,7 @@ def policy_for(name, on):
         return baselines.make(name, scenario(on), **seed)
     except InvalidInputError:
         # An agent suits the arms of its size, and only skew coordinates can be unfolded.
-        folded = name != "unfolded" or scenario(on).task.name == "skew"
+        folded = name != "full_orientation" or scenario(on).task.name == "skew"
         if folded and not (issubclass(get(name), ShippedAgent) or (name, on) in UNSUITED):
             assert name in HANDED_THE_PATH
             assert scenario(on).nominal_joint_path(1) is None

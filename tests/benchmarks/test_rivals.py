@@ -8,8 +8,8 @@ from scipy.optimize import lsq_linear
 
 import baselines
 import ikgym
-from baselines.horizon import horizon_cost
 from baselines.policy import Problem
+from baselines.solvers.receding_horizon.horizon import horizon_cost
 from benchmarks.rivals.casadi_horizon import CasadiHorizon
 from benchmarks.rivals.numpy_horizon import Horizon, forward, plan_cost
 from ikgym import TrackingCost

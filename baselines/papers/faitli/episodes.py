@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from baselines.evaluation.rollout import Episode
 from baselines.papers.runs import Runs
-from baselines.rollout import Episode
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray

@@ -6,6 +6,7 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.ticker import MaxNLocator
 
+from baselines.evaluation.plots import style
 from baselines.papers.drawing import Curve, Panel, picture
 from baselines.papers.faitli.episodes import (
     STRETCHED,
@@ -19,7 +20,6 @@ from baselines.papers.faitli.episodes import (
 )
 from baselines.papers.paper import Drawn, PaperFigure, rms
 from baselines.papers.runs import Runs
-from baselines.plots import style
 
 LABELS = ("x", "y", "z")
 

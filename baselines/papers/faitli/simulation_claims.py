@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from baselines.evaluation.rollout import Episode
 from baselines.papers.faitli.episodes import (
     REGULAR,
     SHOULDER,
@@ -21,7 +22,6 @@ from baselines.papers.faitli.episodes import (
 )
 from baselines.papers.paper import Claim, Finding, rms, verdict
 from baselines.papers.runs import Runs
-from baselines.rollout import Episode
 from ikgym.validation import FloatArray
 
 

@@ -35,7 +35,7 @@ def _counter_rotation(runs: Runs) -> Finding:
         for n, v in numbers.items()
     ]
     turns = at_points(runs, Q7Q8)
-    median = float(np.nanmedian(turns.settled(turns.inside["angle_counter_rotation"])))
+    median = float(np.nanmedian(turns.settled(turns.diagnostics["angle_counter_rotation"])))
     return verdict(
         needed,
         f"root mean square of the errors after 1 s: {'; '.join(parts)}; "

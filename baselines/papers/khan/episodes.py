@@ -6,10 +6,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from baselines.evaluation.rollout import Episode, rollout
 from baselines.papers.paper import rms
 from baselines.papers.runs import Runs
 from baselines.registry import make
-from baselines.rollout import Episode, rollout
 from ikgym.rotations import rotation_vector
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray
@@ -31,7 +31,7 @@ class Points(NamedTuple):
         position_error: In [m]. Shape (k,).
         orientation_error: In [rad]. Shape (k,).
         q: Joint coordinates in [rad]. Shape (k, 8).
-        inside: Angles of both rotations in [rad], by name; each of shape (k,).
+        diagnostics: Angles of both rotations in [rad], by name; each of shape (k,).
     """
 
     time: FloatArray
@@ -40,7 +40,7 @@ class Points(NamedTuple):
     position_error: FloatArray
     orientation_error: FloatArray
     q: FloatArray
-    inside: dict[str, FloatArray]
+    diagnostics: dict[str, FloatArray]
 
     def settled(self, values: FloatArray) -> FloatArray:
         """Values from 1 s on, when the initial error is gone; all of them in a shorter trial."""
@@ -64,7 +64,7 @@ def points_of(scenario: Scenario, episode: Episode) -> Points:
         episode.position_error[last],
         episode.orientation_error[last],
         episode.q[last],
-        {name: values[last] for name, values in episode.inside.items()},
+        {name: values[last] for name, values in episode.diagnostics.items()},
     )
 
 

@@ -96,7 +96,7 @@ def _angles(title: str, points: Points) -> Drawn:
     panels, numbers = [], {}
     for name in ("counter_rotation", "abstract_rotation"):
         label = f"angle of the\n{name.replace('_rotation', ' rotation')} [rad]"
-        angle = points.inside[f"angle_{name}"]
+        angle = points.diagnostics[f"angle_{name}"]
         panels.append(Panel(label, [Curve("after each grid point", points.time, angle)], log=True))
         late = points.settled(angle)
         numbers[name] = {"median_rad": float(np.nanmedian(late)), "largest_rad": float(np.nanmax(angle))}

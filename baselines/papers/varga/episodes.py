@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from baselines.evaluation.rollout import Episode
 from baselines.papers.paper import roughness
 from baselines.papers.runs import Runs
-from baselines.rollout import Episode
 from ikgym.validation import FloatArray
 
 FAST, SLOW = "varga7-fast", "varga7-slow"

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
+from baselines.evaluation.rollout import Episode
 from baselines.papers.drawing import Curve, Panel, picture
 from baselines.papers.paper import Drawn, PaperFigure, rms
 from baselines.papers.runs import Runs
 from baselines.papers.varga.episodes import FAST, METHOD, PRINTED, SLOW, fast, fluctuation, slow, smooth
-from baselines.rollout import Episode
 from baselines.status import Status
 from ikgym.validation import FloatArray
 
@@ -108,7 +108,7 @@ def _effort(runs: Runs) -> Drawn:
             (
                 Curve(label, time, millis, dots=True),
                 Curve(label, time, episode.iterations.astype(np.float64), dots=True),
-                Curve(label, time, episode.inside["alpha"], dots=True),
+                Curve(label, time, episode.diagnostics["alpha"], dots=True),
             )
         )
         numbers[label] = {

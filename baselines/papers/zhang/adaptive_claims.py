@@ -6,19 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from baselines.damped import typical_link
+from baselines.evaluation.rollout import rollout
 from baselines.papers.paper import Claim, Finding, verdict
 from baselines.papers.runs import Runs
-from baselines.papers.zhang.episodes import (
-    HELIX,
-    constant,
-    jacobians_used,
-    listed,
-    predictive,
-    settled_from,
-)
+from baselines.papers.zhang.episodes import HELIX, constant, jacobians_used, listed, predictive, settled_from
 from baselines.registry import make
-from baselines.rollout import rollout
+from baselines.solvers.levenberg_marquardt.damped import typical_link
 from ikgym.trajectories import StraightLine
 from ikgym.validation import FloatArray
 

@@ -7,17 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from baselines.damped import typical_link
-from baselines.mfapc import EXAMPLE_1
 from baselines.papers.paper import Claim, Finding, verdict
 from baselines.papers.runs import Runs
-from baselines.papers.zhang.episodes import (
-    HELIX,
-    LINE,
-    listed,
-)
+from baselines.papers.zhang.episodes import HELIX, LINE, listed
 from baselines.policy import Batch
 from baselines.registry import make
+from baselines.solvers.levenberg_marquardt.damped import typical_link
+from baselines.solvers.levenberg_marquardt.mfapc import EXAMPLE_1
 from baselines.status import Status
 
 #: Sets of targets: the scenario whose arm it is, how far off they are in [rad], and the joint that is straight.

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from baselines.mfapc import EXAMPLE_1, EXAMPLE_2
+from baselines.evaluation.rollout import Episode
 from baselines.papers.runs import Runs
-from baselines.rollout import Episode
+from baselines.solvers.levenberg_marquardt.mfapc import EXAMPLE_1, EXAMPLE_2
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray
 
@@ -68,7 +68,7 @@ def jacobians_used(scenario: Scenario, episode: Episode) -> FloatArray:
 
 def lambdas_used(episode: Episode) -> FloatArray:
     """λ(1), λ(2), … of example 1, as the controller used them; what it kept is for the next sample. Shape (steps,)."""
-    return np.concatenate([[EXAMPLE_1["damping"]], episode.inside["lambda"][:-1]])
+    return np.concatenate([[EXAMPLE_1["damping"]], episode.diagnostics["lambda"][:-1]])
 
 
 def listed(values: Mapping[str, float], form: str = ".3g", unit: str = "") -> str:

@@ -7,18 +7,10 @@ import time
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from baselines.mfapc import EXAMPLE_2
 from baselines.papers.paper import Claim, Finding, verdict
 from baselines.papers.runs import Runs
-from baselines.papers.zhang.episodes import (
-    HELIX,
-    LINE,
-    constant,
-    iterative,
-    lambdas_used,
-    predictive,
-    settled_from,
-)
+from baselines.papers.zhang.episodes import HELIX, LINE, constant, iterative, lambdas_used, predictive, settled_from
+from baselines.solvers.levenberg_marquardt.mfapc import EXAMPLE_2
 from baselines.status import Status
 from ikgym.rotations import rodrigues, rotation_vector
 

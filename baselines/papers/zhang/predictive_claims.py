@@ -8,20 +8,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from baselines.evaluation.rollout import Episode
 from baselines.papers.paper import Claim, Finding, roughness, verdict
 from baselines.papers.runs import Runs
-from baselines.papers.zhang.episodes import (
-    HELIX,
-    adaptive,
-    constant,
-    jacobians_used,
-    listed,
-    predictive,
-    settled_from,
-)
+from baselines.papers.zhang.episodes import HELIX, adaptive, constant, jacobians_used, listed, predictive, settled_from
 from baselines.policy import Batch, Solution
 from baselines.registry import make
-from baselines.rollout import Episode
 from ikgym.validation import FloatArray
 
 

@@ -1,0 +1,282 @@
+"""The file of an agent: tensors, and one JSON text that says what they mean. Reading one runs nothing in it."""
+
+from __future__ import annotations
+
+import difflib
+import hashlib
+import itertools
+import json
+import pathlib
+import textwrap
+from collections.abc import Mapping
+from typing import Any, Final, NoReturn
+
+import numpy as np
+from safetensors import SafetensorError
+from safetensors.numpy import load, save
+
+import ikgym
+from baselines.agents.features import Processing
+from baselines.agents.network import Network, Singles
+from baselines.agents.parts import AgentFile
+from baselines.canonical import canonical
+from baselines.files import ResultsError, write
+from baselines.fingerprints import fingerprint
+from ikgym import cost_kernels
+from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.scenarios import Scenario
+
+#: The version of the format.
+FORMAT: Final = 1
+#: The key of the JSON text in the metadata of the file.
+KEY: Final = "ikgym"
+SUFFIX: Final = ".safetensors"
+
+# Files of agents are small; what is larger is none, and is not read. In bytes.
+MOST = 2**28
+MOST_HEADER = 2**20
+# Letters of a message: what is in a damaged file may be long.
+MOST_WORDS = 600
+
+# What is raised by descriptions that are JSON, and no more.
+_UNREADABLE = (InvalidInputError, UnknownNameError, KeyError, TypeError, ValueError, OverflowError)
+
+
+def save_agent(
+    file: pathlib.Path,
+    network: Network,
+    processing: Processing,
+    scenario: Scenario,
+    training: Mapping[str, Any] | None = None,
+) -> str:
+    """Writes an agent, in one go.
+
+    Args:
+        file: Where to; usually ``NAME.safetensors``.
+        network: Its network.
+        processing: What it sees, and what its answers mean.
+        scenario: What it was trained on.
+        training: How, in whatever JSON can say.
+
+    Returns:
+        Its hash, see :class:`AgentFile`.
+
+    Raises:
+        InvalidInputError: `training` is no JSON.
+        ResultsError: The file cannot be written.
+    """
+    tensors = _tensors(network)
+    about = {
+        **description(processing, scenario, training),
+        "network": {"sizes": list(network.sizes), "activation": network.activation, "squash": network.squash},
+    }
+    digest = _digest(tensors, about)
+    metadata = {KEY: json.dumps({**about, "hash": digest}, ensure_ascii=False, allow_nan=False)}
+    write(file, save(dict(tensors), metadata))
+    return digest
+
+
+def description(processing: Processing, scenario: Scenario, training: Mapping[str, Any] | None) -> dict[str, Any]:
+    """What files say of an agent besides its network, as JSON has it.
+
+    Raises:
+        InvalidInputError: `training` is no JSON.
+    """
+    about = {
+        "format": FORMAT,
+        "processing": processing.to_json(),
+        "scenario": {"name": scenario.name, "fingerprint": fingerprint(scenario)},
+        "joints": scenario.joints,
+        "task": {"name": scenario.task.name, "size": scenario.task.size, "error_size": scenario.task.error_size},
+        "training": dict(training or {}),
+        "ikgym": ikgym.__version__,
+        "cost_version": cost_kernels.COST_VERSION,
+    }
+    try:
+        same = json.loads(json.dumps(about, allow_nan=False))
+    except (TypeError, ValueError) as e:
+        raise InvalidInputError(f"training: expected what JSON can say, got {training!r} ({e}).") from None
+    return dict(same)
+
+
+def load_agent(file: pathlib.Path) -> AgentFile:
+    """Reads what :func:`save_agent` wrote. Whatever is in the file, none of it is executed.
+
+    Raises:
+        ResultsError: There is no such file, or it is damaged, changed, or of another version.
+    """
+    return parse_agent(str(file), read(file))
+
+
+def parse_agent(source: str, content: bytes) -> AgentFile:
+    """The agent in the content of a file.
+
+    Args:
+        source: What messages call the file.
+        content: All of its bytes.
+
+    Raises:
+        ResultsError: It is damaged, changed, or of another version.
+    """
+    about = parse_header(source, content)
+    try:
+        tensors = load(content)
+    except (SafetensorError, ValueError, TypeError, KeyError, OverflowError) as e:
+        refuse(source, f"is damaged: {e}")
+    claimed = about.pop("hash")
+    processing = check_described(source, about)
+    try:
+        network = _network(about["network"], tensors)
+    except _UNREADABLE as e:
+        refuse(source, f"is no agent that this version can read: {_said(e)}")
+    digest = _digest(_tensors(network), about)
+    if digest != claimed:
+        refuse(source, f"was changed after it was written: expected the hash {claimed}, got {digest}")
+    return AgentFile(source, network, processing, about, digest)
+
+
+def parse_header(source: str, content: bytes) -> dict[str, Any]:
+    """What a file says of its agent, taken at its word; the beginning of the file is enough.
+
+    Raises:
+        ResultsError: It is damaged, or of another version.
+    """
+    length = int.from_bytes(content[:8], "little")
+    if len(content) < 8 or length > min(len(content) - 8, MOST_HEADER):
+        refuse(
+            source,
+            f"is cut off, or no safetensors file: its header claims {length} bytes, expected at most {MOST_HEADER}, "
+            f"and {max(len(content) - 8, 0)} follow",
+        )
+    header = parse_json(source, content[8 : 8 + length])
+    metadata = header.get("__metadata__")
+    text = metadata.get(KEY) if isinstance(metadata, dict) else None
+    if not isinstance(text, str):
+        refuse(source, f"is no agent of ikgym: expected a text {KEY!r} in its metadata, got {_names(metadata)}")
+    about = parse_json(source, text.encode())
+    check_format(source, about)
+    if not isinstance(about.get("hash"), str):
+        refuse(source, f"is damaged: expected the key 'hash', got {_names(about)}")
+    return about
+
+
+def check_described(source: str, about: Mapping[str, Any]) -> Processing:
+    """The processing in what :func:`description` wrote, all of it being of the right type.
+
+    Raises:
+        ResultsError: Something is missing, or of another type.
+    """
+    try:
+        processing = Processing.from_json(dict(about["processing"]))
+        _check_types(about, processing)
+    except _UNREADABLE as e:
+        refuse(source, f"is no agent that this version can read: {_said(e)}")
+    return processing
+
+
+def check_format(source: str, about: Mapping[str, Any]) -> None:
+    """Refuses what another version has written."""
+    version = about.get("format")
+    if isinstance(version, bool) or version != FORMAT:
+        refuse(source, f"is of another version: expected format {FORMAT}, got {version!r}")
+
+
+def parse_json(source: str, text: bytes) -> dict[str, Any]:
+    """The object in a JSON text of unknown origin.
+
+    Raises:
+        ResultsError: It is none.
+    """
+    try:
+        value = json.loads(text.decode())
+    except (ValueError, RecursionError) as e:
+        refuse(source, f"is damaged: {e}")
+    if not isinstance(value, dict):
+        refuse(source, f"is damaged: expected a JSON object, got {type(value).__name__}")
+    return value
+
+
+def read(file: pathlib.Path) -> bytes:
+    """All bytes of a file that is not too large to be an agent's.
+
+    Raises:
+        ResultsError: There is no such file, the message has the nearest; it is too large, or cannot be read.
+    """
+    try:
+        if not file.is_file():
+            refuse(str(file), "is no file" if file.exists() else "does not exist", _near(file))
+        size = file.stat().st_size
+        if size > MOST:
+            refuse(str(file), f"is too large for an agent: expected at most {MOST} bytes, got {size}")
+        with file.open("rb") as stream:
+            return stream.read(MOST)
+    except (OSError, ValueError) as e:
+        refuse(str(file), f"cannot be read: {getattr(e, 'strerror', None) or e}")
+
+
+def refuse(source: str, why: str, hint: str = "") -> NoReturn:
+    """Raises the error of a file that cannot be used."""
+    raise ResultsError(f"Agent {source} {textwrap.shorten(why, MOST_WORDS, placeholder=' …')}.{hint}")
+
+
+def _near(file: pathlib.Path) -> str:
+    """The hint at what may have been meant."""
+    if not file.parent.is_dir():
+        return f" There is no folder {file.parent}."
+    names = sorted(other.name for other in file.parent.iterdir() if other.suffix in {SUFFIX, ".zip"})
+    nearest = difflib.get_close_matches(file.name, names, n=1, cutoff=0.5)
+    return f" Did you mean {str(file.with_name(nearest[0]))!r}?" if nearest else ""
+
+
+def _tensors(network: Network) -> list[tuple[str, Singles]]:
+    """The tensors of a network by name, layer by layer."""
+    out = []
+    for number, (weights, bias) in enumerate(zip(network.weights, network.biases, strict=True)):
+        out += [(f"layers.{number}.weight", weights), (f"layers.{number}.bias", bias)]
+    return out
+
+
+def _network(about: Mapping[str, Any], tensors: Mapping[str, Any]) -> Network:
+    sizes = [int(size) for size in about["sizes"]]
+    expected: dict[str, tuple[int, ...]] = {}
+    for number, (inputs, outputs) in enumerate(itertools.pairwise(sizes)):
+        expected[f"layers.{number}.weight"] = (outputs, inputs)
+        expected[f"layers.{number}.bias"] = (outputs,)
+    got = {name: tensor.shape for name, tensor in tensors.items()}
+    if got != expected or any(tensor.dtype != np.float32 for tensor in tensors.values()):
+        kinds = {name: f"{tensor.dtype} {tensor.shape}" for name, tensor in tensors.items()}
+        raise InvalidInputError(f"expected float32 tensors of the shapes {expected}, got {kinds}")
+    layers = range(len(sizes) - 1)
+    return Network(
+        tuple(tensors[f"layers.{number}.weight"] for number in layers),
+        tuple(tensors[f"layers.{number}.bias"] for number in layers),
+        about["activation"],
+        about["squash"],
+    )
+
+
+def _check_types(about: Mapping[str, Any], processing: Processing) -> None:
+    """Insists on the types of what others rely on."""
+    texts = about["scenario"]["name"], about["scenario"]["fingerprint"], about["task"]["name"], about["ikgym"]
+    numbers = about["joints"], about["task"]["size"], about["task"]["error_size"], about["cost_version"]
+    over = processing.over is None or isinstance(processing.over, str)
+    if not (all(isinstance(text, str) for text in texts) and all(type(value) is int for value in numbers) and over):
+        raise InvalidInputError(f"expected names as texts and sizes as whole numbers, got {texts} and {numbers}")
+    if not isinstance(about["training"], dict):
+        raise InvalidInputError(f"training: expected an object, got {about['training']!r}")
+
+
+def _digest(tensors: list[tuple[str, Singles]], about: Mapping[str, Any]) -> str:
+    digest = hashlib.sha256(canonical(about).encode())
+    for name, tensor in tensors:
+        digest.update(f"{name}{tensor.shape}".encode())
+        digest.update(tensor.astype("<f4", copy=False).tobytes())
+    return digest.hexdigest()
+
+
+def _names(value: object) -> str:
+    return f"the keys {sorted(value)}" if isinstance(value, dict) else repr(value)
+
+
+def _said(error: Exception) -> str:
+    return f"the key {error} is missing" if isinstance(error, KeyError) else str(error)

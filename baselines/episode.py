@@ -1,0 +1,52 @@
+"""The loop that steps episodes, and the sum of their costs: one of each, for evaluation, training and oracle alike."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from gymnasium.utils import seeding
+
+from ikgym.scenarios import Preview, Scenario
+from ikgym.simulation import Outcome
+from ikgym.simulator import Simulator
+from ikgym.validation import FloatArray
+
+#: From what the arms show to the actions that move them, of shape (B, n), or (n,) for a single arm.
+Act = Callable[[Outcome], npt.NDArray[Any]]
+
+
+def play(
+    scenario: Scenario, seeds: Sequence[int], act: Act, *, preview: Preview, single: bool = False
+) -> Iterator[Outcome]:
+    """Plays episodes in step, from their resets to their ends.
+
+    Args:
+        scenario: What is to be tracked.
+        seeds: The reset seeds, one an arm.
+        act: Called before each step with what all arms show.
+        preview: Steps ahead that the nominal coordinates are shown.
+        single: Whether there is one arm, whose actions have no row axis.
+
+    Yields:
+        What came of each step, as arrays with an axis of arms; it stays as it is when the next step is made.
+
+    Raises:
+        InvalidInputError: The preview is not valid.
+    """
+    rows = len(seeds)
+    simulator = Simulator(scenario, None if single else rows, preview)
+    simulator.reset(np.ones(rows, dtype=np.bool_), [seeding.np_random(seed)[0] for seed in seeds])
+    out = simulator.observe()
+    for _ in range(scenario.steps):
+        out = simulator.step(act(out))
+        yield out
+
+
+def added_up(costs: FloatArray) -> FloatArray:
+    """Sums over the steps, the last axis, from left to right: as everybody adds up rewards, bit for bit."""
+    # NumPy's sum() goes pairwise and differs in the last bits.
+    total: FloatArray = np.cumsum(costs, axis=-1)[..., -1]
+    return total

@@ -1,0 +1,1 @@
+"""Evaluation: test sets, episodes, metrics, results, tables, plots and pages."""

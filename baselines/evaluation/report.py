@@ -1,0 +1,332 @@
+"""Results in words: the table on the terminal, and the README of a folder of results."""
+
+from __future__ import annotations
+
+import collections
+import dataclasses
+import datetime
+import math
+import pathlib
+import textwrap
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+from urllib.parse import quote
+
+from baselines import registry
+from baselines.evaluation.metrics import Row, Spread, Summary, summarise
+from baselines.evaluation.plan import Skipped
+from baselines.oracle import best_known
+from ikgym.exceptions import IkgymError
+
+#: Characters that a line of the printed tables may have.
+WIDTH = 120
+# Of a name that stands in its line; longer ones stand above it.
+LONGEST = 20
+NOTHING = "–"
+#: The plots of a scenario: captions and files, relative to the folder, by the group they are shown in.
+Pictures = Mapping[str, Sequence[tuple[str, pathlib.PurePath]]]
+#: The group of plots that show all policies.
+OVERVIEW = "overview"
+REFERENCE_NOTE = "* reference: knows what no observation shows"
+
+
+@dataclasses.dataclass(frozen=True)
+class Column:
+    """A column of a table.
+
+    Args:
+        title: Its head.
+        unit: Stands below the head, empty for pure numbers.
+        cell: The text of a summary's cell.
+        left: Whether it is set to the left.
+    """
+
+    title: str
+    unit: str
+    cell: Callable[[Summary], str]
+    left: bool = False
+
+
+def number(value: float | None, scale: float = 1.0) -> str:
+    """A number with four significant digits: ``1234``, ``0.01235``, ``1.235e7``; a dash for none."""
+    if value is None or math.isnan(value):
+        return NOTHING
+    if value == 0.0:
+        return "0"
+    digits = f"{value * scale:#.4g}"
+    mantissa, _, exponent = digits.partition("e")
+    return f"{mantissa}e{int(exponent)}" if exponent else mantissa.removesuffix(".")
+
+
+def table(rows: Sequence[Row], skipped: Sequence[Skipped] = (), *, operations: bool = False) -> str:
+    """The tables of all scenarios as plain text, at most 120 characters wide.
+
+    Args:
+        rows: The results.
+        skipped: What was left out, to be said below.
+        operations: Whether to show what a step costs in kinematics, factorisations and measurements.
+    """
+    parts = []
+    for scenario, summaries in by_scenario(rows).items():
+        names = labels(summaries)
+        parts.append(f"{heading(scenario, summaries)}\n{_plain(_columns(names), summaries)}")
+        if spread := _spread(names, summaries):
+            parts.append(f"{_judged_by(summaries)} over the episodes of {scenario}\n{_plain(spread, summaries)}")
+        if operations:
+            parts.append(f"operations in one step of {scenario}, mean\n{_plain(_operations(names), summaries)}")
+    notes = _notes(rows)
+    notes += [f"skipped: {s.policy} in {s.scenario}: {s.reason}" for s in skipped]
+    wrapped = (textwrap.fill(note, WIDTH, subsequent_indent="  ", break_on_hyphens=False) for note in notes)
+    return "\n\n".join([*parts, "\n".join(wrapped)]).rstrip()
+
+
+def readme(
+    rows: Sequence[Row],
+    skipped: Sequence[Skipped] = (),
+    *,
+    command: str,
+    date: datetime.datetime,
+    pictures: Mapping[str, Pictures] | None = None,
+) -> str:
+    """The README of a folder of results, in Markdown.
+
+    Args:
+        rows: The results.
+        skipped: What was left out.
+        command: What made them.
+        date: When.
+        pictures: The plots of each scenario.
+    """
+    out = ["# Results", ""]
+    for scenario, summaries in by_scenario(rows).items():
+        names = labels(summaries)
+        out += [f"## {heading(scenario, summaries)}", "", *_markdown(_columns(names), summaries), ""]
+        if spread := _spread(names, summaries):
+            title = f"{_judged_by(summaries).capitalize()} over the episodes:"
+            out += [title, "", *_markdown(spread, summaries), ""]
+        audit = _markdown(_operations(names), summaries)
+        out += ["<details>", "<summary>Operations in one step, mean</summary>", "", *audit, "", "</details>", ""]
+        for group, files in (pictures or {}).get(scenario, {}).items():
+            # Those of each policy are many: folded away, so that the tables stay together.
+            folded = group != OVERVIEW
+            out += ["<details>", f"<summary>{group}</summary>", ""] if folded else []
+            for caption, file in files:
+                out += [f"![{_escaped(caption)}]({quote(file.as_posix())})", "", f"*{_escaped(caption)}.*", ""]
+            out += ["</details>", ""] if folded else []
+    out += ["## Notes", "", *(f"- {_escaped(note)}" for note in _notes(rows)), ""]
+    if skipped:
+        out += ["Skipped, since the policy does not suit the scenario:", ""]
+        out += [f"- {s.policy} in {s.scenario}: {_escaped(s.reason)}" for s in skipped] + [""]
+    out += ["## Parameters", "", "| scenario | policy | parameters |", "|---|---|---|"]
+    for scenario, summaries in by_scenario(rows).items():
+        names = labels(summaries)
+        for summary in summaries:
+            values = ", ".join(f"`{name}={value}`" for name, value in summary.parameters.items()) or NOTHING
+            values = values.replace("|", "\\|")  # in code nothing else has a meaning
+            out.append(f"| {_escaped(scenario)} | {_escaped(names[id(summary)])} | {values} |")
+    out += ["", "## Conditions", "", f"- command: `{command}`", f"- finished: {date:%Y-%m-%d %H:%M} UTC"]
+    machines = list({tuple(row.machine.items()): row.machine for row in rows}.values())
+    out += [f"- machine: {_escaped(_machine(machine))}" for machine in machines]
+    if len(machines) > 1:
+        out += ["- The rows were measured on different machines: their times cannot be compared."]
+    out += [
+        "- Times are those of single calls of the policy on one thread: garbage collection off, one call before that."
+    ]
+    return "\n".join(out) + "\n"
+
+
+def by_scenario(rows: Sequence[Row]) -> dict[str, list[Summary]]:
+    """Summaries of each scenario, in the order of the rows."""
+    out: dict[str, list[Summary]] = {}
+    for summary in summarise(rows):
+        out.setdefault(summary.scenario, []).append(summary)
+    return out
+
+
+def labels(summaries: Sequence[Summary]) -> dict[int, str]:
+    """What to call each summary's policy among those of one scenario, by the summary's id.
+
+    The name, and the parameters that are not at their defaults; where that leaves two of one name alike, all
+    parameters that differ between them.
+    """
+
+    def told(summary: Summary, variants: Sequence[Mapping[str, Any]]) -> str:
+        defaults = _defaults(summary.policy)
+        parts = [
+            f"{name}={_short(value)}"
+            for name, value in summary.parameters.items()
+            if any(variant.get(name) != value for variant in variants) or defaults.get(name, value) != value
+        ]
+        return summary.policy + (f":{','.join(parts)}" if parts else "")
+
+    short = {id(summary): told(summary, ()) for summary in summaries}
+    taken = collections.Counter(short.values())
+    return {
+        id(s): told(s, [o.parameters for o in summaries if short[id(o)] == short[id(s)]])
+        if taken[short[id(s)]] > 1
+        else short[id(s)]
+        for s in summaries
+    }
+
+
+def is_reference(policy: str) -> bool:
+    """Whether a policy knows more than its observation."""
+    return policy in registry.names() and registry.get(policy).reference
+
+
+def heading(scenario: str, summaries: Sequence[Summary]) -> str:
+    """Scenario, steps and episodes in words."""
+    episodes = sorted({summary.episodes for summary in summaries})
+    many = "" if episodes == [1] else f"{'–'.join(map(str, (episodes[0], episodes[-1])[: len(episodes)]))} episodes of "
+    return f"{scenario}: {many}{summaries[0].steps} steps"
+
+
+def _columns(names: Mapping[int, str]) -> list[Column]:
+    return [
+        _policy(names),
+        Column("total", "cost", lambda s: number(s.total_cost.mean)),
+        Column("tracking", "cost", lambda s: number(s.tracking_cost)),
+        Column("velocity", "cost", lambda s: number(s.velocity_cost)),
+        Column("cost ratio", "", lambda s: number(None if s.cost_ratio is None else s.cost_ratio.mean)),
+        Column("pos max", "[mm]", lambda s: number(s.position_error_max, 1e3)),
+        Column("ori max", "[mrad]", lambda s: number(s.orientation_error_max, 1e3)),
+        Column("q̇ peak", "", lambda s: number(s.qdot_peak)),
+        Column("p50", "[µs]", lambda s: number(s.time_p50_us)),
+        Column("p99", "[µs]", lambda s: number(s.time_p99_us)),
+        Column("misses", "", lambda s: NOTHING if s.deadline_misses is None else str(s.deadline_misses)),
+        Column("status", "", lambda s: s.status, left=True),
+    ]
+
+
+def _judged_by(summaries: Sequence[Summary]) -> str:
+    """What the table of several episodes shows: the cost ratio, where it is known for all of them."""
+    return "total cost" if any(summary.cost_ratio is None for summary in summaries) else "cost ratio"
+
+
+def _spread(names: Mapping[int, str], summaries: Sequence[Summary]) -> list[Column]:
+    """The columns of the table of several episodes; none where there is one."""
+    if all(summary.episodes == 1 for summary in summaries):
+        return []
+    by_cost_ratio = _judged_by(summaries) == "cost ratio"
+
+    def column(title: str, cell: Callable[[Spread], str]) -> Column:
+        return Column(title, "", lambda s: cell(s.cost_ratio if by_cost_ratio and s.cost_ratio else s.total_cost))
+
+    return [
+        _policy(names),
+        Column("episodes", "", lambda s: str(s.episodes)),
+        column("geometric mean", lambda spread: number(spread.mean)),
+        column("median", lambda spread: number(spread.median)),
+        column("p90", lambda spread: number(spread.p90)),
+        column("worst", lambda spread: number(spread.worst)),
+        column("worst seed", lambda spread: str(spread.worst_seed)),
+    ]
+
+
+def _operations(names: Mapping[int, str]) -> list[Column]:
+    """The columns of the operation audit."""
+
+    def column(title: str, unit: str, name: str) -> Column:
+        return Column(title, unit, lambda s: number(s.operations[name]))
+
+    return [
+        _policy(names),
+        column("forward", "kinematics", "forward_kinematics"),
+        column("Jacobians", "", "jacobians"),
+        column("factorisations", "", "factorisations"),
+        column("poses", "measured", "measurements"),
+    ]
+
+
+def _policy(names: Mapping[int, str]) -> Column:
+    def cell(summary: Summary) -> str:
+        return names[id(summary)] + (" *" if is_reference(summary.policy) else "")
+
+    return Column("policy", "", cell, left=True)
+
+
+def _plain(columns: Sequence[Column], summaries: Sequence[Summary]) -> str:
+    heads = [[column.title for column in columns], [column.unit for column in columns]]
+    cells = heads[: 1 + any(heads[1])] + [[column.cell(summary) for column in columns] for summary in summaries]
+    widths = [max(_width(line[i]) for line in cells) for i in range(len(columns))]
+    widths[0] = max(_width(line[0]) for line in cells if _width(line[0]) <= LONGEST)
+    gap = "  " if sum(widths) + 2 * (len(columns) - 1) <= WIDTH else " "
+    lines = []
+    for line in cells:
+        padded = [
+            text + " " * (width - _width(text)) if column.left else " " * (width - _width(text)) + text
+            for text, width, column in zip(line, widths, columns, strict=True)
+        ]
+        if _width(line[0]) > LONGEST:  # a name with many parameters gets a line of its own
+            lines.append(line[0])
+            padded[0] = " " * widths[0]
+        lines.append(gap.join(padded).rstrip())
+    rule = "-" * (sum(widths) + len(gap) * (len(columns) - 1))
+    return "\n".join([*lines[: len(cells) - len(summaries)], rule, *lines[len(cells) - len(summaries) :]])
+
+
+def _markdown(columns: Sequence[Column], summaries: Sequence[Summary]) -> list[str]:
+    heads = [f"{column.title} {column.unit}".strip() for column in columns]
+    rules = [":--" if column.left else "--:" for column in columns]
+    cells = [[_escaped(column.cell(summary)) for column in columns] for summary in summaries]
+    return [f"| {' | '.join(line)} |" for line in (heads, rules, *cells)]
+
+
+def _notes(rows: Sequence[Row]) -> list[str]:
+    notes = []
+    if any(is_reference(row.policy) for row in rows):
+        notes.append(REFERENCE_NOTE)
+    notes.append(
+        "cost ratio: total cost / best known cost, – where none is known; p50, p99: time of a call after the first; "
+        "misses: such calls longer than Δt"
+    )
+    notes.append("pos, ori: position and orientation error; q̇ peak in rad/s, in m/s for joints that slide")
+    if any(summary.episodes > 1 for summaries in by_scenario(rows).values() for summary in summaries):
+        notes.append(
+            "several episodes: costs and cost ratio are geometric means, errors, q̇ peak, p99 and status the worst, p50 "
+            "the median, misses the sum; times are those of episodes that were played alone"
+        )
+    return notes + _beaten(rows)
+
+
+def _beaten(rows: Sequence[Row]) -> list[str]:
+    """What has to be said where a policy is better than the best known."""
+    seeds: dict[tuple[str, str], list[int]] = {}
+    for row in rows:
+        if best_known.beaten(row):
+            seeds.setdefault((row.policy, row.scenario), []).append(row.seed)
+    return [
+        f"{policy} beats the best known cost of {scenario}, seed {', '.join(map(str, better))}: bring the record up to "
+        f"date with {best_known.UPDATE} --scenarios {scenario} --policies {policy}"
+        for (policy, scenario), better in seeds.items()
+    ]
+
+
+def _machine(machine: Mapping[str, Any]) -> str:
+    words = dict(machine)
+    cpu, cores = words.pop("cpu", "unknown CPU"), words.pop("cores", "?")
+    return f"{cpu}, {cores} cores, " + ", ".join(f"{name} {value}" for name, value in words.items())
+
+
+def _defaults(policy: str) -> dict[str, Any]:
+    try:
+        fields = dataclasses.fields(registry.get(policy))
+    except IkgymError:  # of a policy that is not known here
+        return {}
+    # None often stands for a value that the policy works out itself.
+    return {f.name: f.default for f in fields if f.default is not dataclasses.MISSING and f.default is not None}
+
+
+def _short(value: Any) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value).replace(" ", "")
+
+
+def _width(text: str) -> int:
+    """Columns that a text takes on a terminal: the dot of q̇ has none of its own."""
+    return len(text) - text.count("\u0307")
+
+
+def _escaped(text: str) -> str:
+    for sign in "|*":
+        text = text.replace(sign, f"\\{sign}")
+    return text

@@ -1,0 +1,192 @@
+"""Episodes of a policy: the loop that scores are published from, in float64, one arm with the clock or many at once."""
+
+from __future__ import annotations
+
+import dataclasses
+import gc
+import time
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from baselines.episode import play
+from baselines.policy import Batch, Memory, Operations, SolverPolicy
+from ikgym.scenarios import Preview, Scenario
+from ikgym.simulation import Outcome
+from ikgym.simulator import Observation, observation
+from ikgym.validation import FloatArray
+
+# Steps between two words to the progress bar.
+TICK = 100
+
+#: Called now and then, while no clock runs, with the number of steps made since the last call.
+Tick = Callable[[int], object]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Episode:
+    """All that happened in an episode; row k is what came of the k-th step, counted from 0.
+
+    Args:
+        q: Joint coordinates after the step, in [rad] or [m]. Shape (steps, n).
+        qdot: Joint velocities applied, in [rad/s] or [m/s]. Shape (steps, n).
+        pose: Task coordinates after the step. Shape (steps, m).
+        tracking_cost: Φ^X, 0 where the step does not count. Shape (steps,).
+        velocity_cost: Φ^U, 0 where the step does not count. Shape (steps,).
+        position_error: In [m]. Shape (steps,).
+        orientation_error: Geodesic angle in [rad], NaN where the task has no orientation. Shape (steps,).
+        status: Values of :class:`baselines.Status`. Shape (steps,).
+        iterations: Iterations of the policy. Shape (steps,).
+        time_ns: Wall time of the call of `predict`, in [ns]. Shape (steps,), or (0,) where the calls were not timed.
+        operations: What the steps have cost, see :class:`baselines.policy.Operations`, its arrays of shape (steps,).
+        diagnostics: What the policy showed of how it came to its action, by name, see
+            :meth:`SolverPolicy.diagnostics`; each of shape (steps, …).
+    """
+
+    q: FloatArray
+    qdot: FloatArray
+    pose: FloatArray
+    tracking_cost: FloatArray
+    velocity_cost: FloatArray
+    position_error: FloatArray
+    orientation_error: FloatArray
+    status: npt.NDArray[np.int64]
+    iterations: npt.NDArray[np.int64]
+    time_ns: npt.NDArray[np.int64]
+    operations: Operations
+    diagnostics: dict[str, FloatArray]
+
+
+def rollout(
+    scenario: Scenario,
+    policy: SolverPolicy,
+    seed: int,
+    *,
+    preview: Preview | None = None,
+    tick: Tick | None = None,
+) -> Episode:
+    """Plays one episode by single calls of the policy, each of them timed.
+
+    The same as `gym.make("RedundantIK-v0", scenario=…)` reset with the seed and stepped with the policy, bit for
+    bit, without what Gymnasium's wrappers and Stable-Baselines3's float32 rewards would add.
+
+    Args:
+        scenario: What is to be tracked.
+        policy: Who tracks it.
+        seed: The reset seed.
+        preview: What the policy is shown; what it asks for if left out.
+        tick: See :data:`Tick`.
+
+    Returns:
+        The recorded episode.
+
+    Raises:
+        InvalidInputError: The preview is none, or shorter than the policy needs.
+    """
+    (episode,) = _play(scenario, policy, [seed], preview, tick, alone=True)
+    return episode
+
+
+def rollouts(
+    scenario: Scenario,
+    policy: SolverPolicy,
+    seeds: Sequence[int],
+    *,
+    preview: Preview | None = None,
+    tick: Tick | None = None,
+) -> list[Episode]:
+    """Plays several episodes in step, with one call of the policy for all of them.
+
+    Args:
+        scenario: What is to be tracked.
+        policy: Who tracks it.
+        seeds: The reset seeds.
+        preview: What the policy is shown; what it asks for if left out.
+        tick: See :data:`Tick`; the steps of all episodes count.
+
+    Returns:
+        For each seed what :func:`rollout` gives, bit for bit, but no times.
+
+    Raises:
+        InvalidInputError: The preview is none, or shorter than the policy needs.
+    """
+    return _play(scenario, policy, seeds, preview, tick, alone=False)
+
+
+def _play(
+    scenario: Scenario,
+    policy: SolverPolicy,
+    seeds: Sequence[int],
+    preview: Preview | None,
+    tick: Tick | None,
+    *,
+    alone: bool,
+) -> list[Episode]:
+    rows, steps, n, m = len(seeds), scenario.steps, scenario.joints, scenario.task.size
+    shown = policy.preview if preview is None else preview
+    q, qdot, pose = np.empty((rows, steps, n)), np.empty((rows, steps, n)), np.empty((rows, steps, m))
+    tracking, velocity, position, orientation = np.empty((4, rows, steps))
+    status, iterations = np.empty((2, rows, steps), dtype=np.int64)
+    time_ns = np.empty(steps if alone else 0, dtype=np.int64)
+    diagnostics: dict[str, FloatArray] = {}
+
+    clock = time.perf_counter_ns
+    state: Memory | None = None
+    made = 0
+
+    def act(out: Outcome) -> npt.NDArray[np.float32]:
+        nonlocal state
+        seen = _seen(out, alone)
+        if made == 0:
+            # Compilation, caches and first touch of memory belong to no step: one call on a copy, its answer dropped.
+            policy.predict({key: value.copy() for key, value in seen.items()})
+        begin = clock()
+        action, state = policy.predict(seen, state)
+        end = clock()
+        if alone:
+            time_ns[made] = end - begin
+        return action
+
+    collecting = gc.isenabled()
+    gc.disable()
+    try:
+        for k, out in enumerate(play(scenario, seeds, act, preview=shown, single=alone)):
+            assert state is not None
+            report = policy.report(state)
+            q[:, k], qdot[:, k], pose[:, k] = out.q, out.qdot, out.pose
+            tracking[:, k], velocity[:, k] = out.tracking_cost, out.velocity_cost
+            position[:, k], orientation[:, k] = out.position_error, out.orientation_error
+            status[:, k], iterations[:, k] = report.status, report.iterations
+            for name, value in policy.diagnostics(state).items():
+                diagnostics.setdefault(name, np.empty((rows, steps, *value.shape[1:])))[:, k] = value
+            if tick is not None and (k + 1) % TICK == 0:
+                tick(TICK * rows)
+            made = k + 1
+    finally:
+        if collecting:
+            gc.enable()
+    if tick is not None:
+        tick(steps % TICK * rows)
+    return [
+        Episode(
+            q[row],
+            qdot[row],
+            pose[row],
+            tracking[row],
+            velocity[row],
+            position[row],
+            orientation[row],
+            status[row],
+            iterations[row],
+            time_ns,
+            policy.operations((status[row], iterations[row])),
+            {name: values[row] for name, values in diagnostics.items()},
+        )
+        for row in range(rows)
+    ]
+
+
+def _seen(out: Outcome, alone: bool) -> Observation:
+    """What the policy sees: of the only arm, or with an axis of arms."""
+    return observation(out) if alone else {name: getattr(out, name) for name in Batch._fields}

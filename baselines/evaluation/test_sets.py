@@ -1,0 +1,74 @@
+"""Evaluation sets that stay as they are, so that results of different days can be compared.
+
+A set is a scenario and its seeds. The digest of both, and of the version of the cost, is written down here: a set that
+has drifted is refused, and results of different sets are never put together.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+from baselines.fingerprints import set_hash
+from ikgym import scenarios
+from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.scenarios import Scenario
+
+
+@dataclasses.dataclass(frozen=True)
+class TestSet:
+    """Episodes that are never changed; other episodes are another set.
+
+    Args:
+        name: Of the set, and of its scenario, which is played to its end.
+        episodes: How many: the first seeds of the split.
+        digest: What :func:`baselines.fingerprints.set_hash` gave when the set was made.
+        split: Where the seeds come from, see :data:`ikgym.scenarios.SPLITS`.
+    """
+
+    name: str
+    episodes: int
+    digest: str
+    split: str = "test"
+
+    @property
+    def scenario(self) -> Scenario:
+        """What is played."""
+        return scenarios.get(self.name)
+
+    @property
+    def seeds(self) -> tuple[int, ...]:
+        """The reset seeds."""
+        return scenarios.seeds(self.split, self.episodes)
+
+
+#: All test sets.
+SETS = {
+    one.name: one
+    for one in (
+        TestSet("varga7-random", episodes=64, digest="f18d6765c034"),
+        TestSet("varga7-random-long", episodes=16, digest="f6956633fa43"),
+    )
+}
+
+
+def names() -> tuple[str, ...]:
+    """The names of all test sets."""
+    return tuple(SETS)
+
+
+def get(name: str) -> TestSet:
+    """The test set of a name.
+
+    Raises:
+        UnknownNameError: There is no such set.
+        InvalidInputError: Its scenario, its seeds or the cost are no longer what they were.
+    """
+    if name not in SETS:
+        raise UnknownNameError("test set", name, SETS)
+    found = SETS[name]
+    if (now := set_hash(found.scenario, found.seeds)) != found.digest:
+        raise InvalidInputError(
+            f"The test set {name!r} has drifted: its digest is {now}, expected {found.digest}. Its scenario, its "
+            "seeds or the cost have changed; what is meant to differ needs a new set with a name of its own."
+        )
+    return found

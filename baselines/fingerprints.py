@@ -1,0 +1,64 @@
+"""What results belong to: digests of scenarios, of single episodes, and of sets of them."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+
+from baselines.canonical import canonical, jsonable
+from ikgym import cost_kernels
+from ikgym.scenarios import Scenario
+
+#: Numbers in arrays, mostly of the order of 1, count up to here.
+DECIMALS = 12
+
+
+def fingerprint(scenario: Scenario) -> str:
+    """Twelve digits that differ where two scenarios would give different results.
+
+    Covers all that a scenario is made of but its name and its source, and the version of the cost,
+    :data:`ikgym.cost_kernels.COST_VERSION`.
+    """
+    parts = {
+        f.name: getattr(scenario, f.name) for f in dataclasses.fields(scenario) if f.name not in {"name", "source"}
+    }
+    return _digest(cost_kernels.COST_VERSION, _canonical(parts))
+
+
+def episode_hash(scenario: Scenario | str, seed: int) -> str:
+    """Twelve digits that stand for one episode: its scenario, the version of the cost, and its seed.
+
+    Args:
+        scenario: The scenario, or its fingerprint.
+        seed: The reset seed.
+    """
+    return set_hash(scenario, (seed,))
+
+
+def set_hash(scenario: Scenario | str, seeds: Iterable[int]) -> str:
+    """Twelve digits that stand for several episodes, like :func:`episode_hash`."""
+    return _digest(scenario if isinstance(scenario, str) else fingerprint(scenario), list(seeds))
+
+
+def _digest(*parts: Any) -> str:
+    return hashlib.sha256(canonical(parts).encode()).hexdigest()[:12]
+
+
+def _canonical(value: Any) -> Any:
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        fields = {f.name: _canonical(getattr(value, f.name)) for f in dataclasses.fields(value) if f.init}
+        return [type(value).__qualname__, fields]
+    if isinstance(value, Mapping):
+        return {str(k): _canonical(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_canonical(v) for v in value]
+    if isinstance(value, np.ndarray) and value.dtype.kind == "f":
+        # Numbers that were calculated, such as turned axes, differ between processors in the last bits.
+        value = np.round(value, DECIMALS) + 0.0
+    plain = jsonable(value)
+    # The default repr() holds an address, which differs from run to run.
+    return type(value).__qualname__ if isinstance(plain, str) and " at 0x" in plain else plain

@@ -1,0 +1,216 @@
+"""The best known costs, from the command line: ``python -m baselines.optimum --help``."""
+
+from __future__ import annotations
+
+import dataclasses
+import sys
+import textwrap
+from collections.abc import Iterator, Sequence
+from typing import Annotated
+
+import numpy as np
+import tyro
+from tqdm import tqdm
+
+from baselines import registry
+from baselines.evaluation import test_sets as known_sets
+from baselines.oracle import best_known
+from baselines.oracle.best_known import MARGIN, MEANINGLESS
+from baselines.oracle.cache import VARIABLE, solve
+from baselines.oracle.episode import Whole, path_of
+from baselines.oracle.optimum import Optimum, Search
+from baselines.spec import parse_policy
+from ikgym import scenarios as scenario_registry
+from ikgym.exceptions import IkgymError, InvalidInputError
+from ikgym.scenarios import Scenario
+from ikgym.validation import FloatArray, whole_number
+
+#: An episode: its scenario and its seed.
+Episode = tuple[Scenario, int]
+
+
+@dataclasses.dataclass(frozen=True)
+class Options:
+    """What the command line takes."""
+
+    scenarios: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME …")] = ()
+    """Names of scenarios. If neither scenarios nor test sets are named: all fixed scenarios and all test sets."""
+    test_sets: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME …")] = ()
+    """Names of test sets."""
+    seeds: Annotated[tuple[int, ...], tyro.conf.arg(metavar="N …")] = ()
+    """Reset seeds of the random scenarios among those named."""
+    policies: Annotated[tuple[str, ...], tyro.conf.arg(metavar="POLICY …")] = ()
+    """Policies whose paths are starts, too, as NAME or NAME:PARAMETER=VALUE,…: those that have beaten a record."""
+    search: Annotated[Search, tyro.conf.arg(name="")] = dataclasses.field(default_factory=Search)
+    """How thoroughly is searched."""
+    cache: bool = True
+    """Look on disk first, and keep there what was found."""
+    update: bool = False
+    """Write down what is better than the records, or of episodes that have none."""
+    check: bool = False
+    """Hold the records against what the search finds, or has on disk, played again; the exit code is 1 where one is
+    missing, stale or off by more than a millionth."""
+
+
+def manual() -> str:
+    """The text of ``--help`` above the options."""
+    names = ", ".join(scenario_registry.names())
+    return f"""\
+Finds the cheapest joint paths of whole episodes that are known, from many starts, and keeps their costs as records:
+cost ratio = cost / best known cost. Nobody certifies that there is no cheaper path.
+
+{textwrap.fill(f"Scenarios: {names}.", 100, subsequent_indent="  ", break_on_hyphens=False)}
+
+Test sets: {", ".join(known_sets.names())}.
+
+Examples:
+  python -m baselines.optimum --scenarios varga7-fast
+  python -m baselines.optimum --scenarios varga7-random --seeds 1000000 1000001 --starts 1000
+  python -m baselines.optimum --update
+  python -m baselines.optimum --scenarios varga7-fast --policies rhc_foresight --update
+  python -m baselines.optimum --test-sets varga7-random --check
+
+Of each episode is printed: its cost; how many paths at full resolution came within a millionth of it; how many random
+starts came within 1 % of the best before the local search, their median and their worst cost; the norm of the gradient
+in [s/rad] or [s/m]; the CPU time of one path at full resolution; and what led there.
+
+Optima are kept in the user's folder for such files, or where the environment variable {VARIABLE} says. What was
+found before Ctrl-C is kept."""
+
+
+def episodes(scenarios: Sequence[str], test_sets: Sequence[str], seeds: Sequence[int]) -> list[Episode]:
+    """What is to be solved.
+
+    Args:
+        scenarios: Names of scenarios.
+        test_sets: Names of test sets. Where neither these nor scenarios are named, all fixed scenarios and all sets.
+        seeds: Reset seeds of the random scenarios.
+
+    Raises:
+        UnknownNameError: There is no such scenario or test set.
+        InvalidInputError: Seeds are missing, or there is nothing that they belong to; a test set has drifted.
+    """
+    named = [scenario_registry.get(name) for name in scenarios]
+    drawn = any(scenario.random for scenario in named)
+    if bool(seeds) != drawn:
+        raise InvalidInputError(
+            "seeds: expected some for the random scenarios, got none."
+            if drawn
+            else "seeds: expected none, since no random scenario is named."
+        )
+    for seed in seeds:
+        whole_number("seeds", seed, at_least=0)
+    if not (scenarios or test_sets):
+        every = map(scenario_registry.get, scenario_registry.names())
+        named, test_sets = [scenario for scenario in every if not scenario.random], known_sets.names()
+    out = [(scenario, seed) for scenario in named for seed in (seeds if scenario.random else (0,))]
+    for one in map(known_sets.get, test_sets):
+        out += [(one.scenario, seed) for seed in one.seeds]
+    return out
+
+
+def optima(
+    todo: Sequence[Episode], how: Search, policies: Sequence[str] = (), *, cache: bool
+) -> Iterator[tuple[Scenario, Optimum]]:
+    """Solves episodes one after the other, with a bar on stderr.
+
+    Args:
+        todo: The episodes.
+        how: How thoroughly is searched.
+        policies: Whose paths are starts, too.
+        cache: Whether to look on disk first, and to keep there what was found.
+    """
+    with tqdm(
+        total=len(todo),
+        file=sys.stderr,
+        unit="episode",
+        dynamic_ncols=True,
+        bar_format="{desc}{percentage:3.0f}% |{bar}| {elapsed}<{remaining}",
+        mininterval=0.1 if sys.stderr.isatty() else 10.0,
+    ) as bar:
+        for number, (scenario, seed) in enumerate(todo, start=1):
+            bar.set_description(f"{scenario.name}, seed {seed} ({number}/{len(todo)})")
+            paths = {spec: path(scenario, seed, spec) for spec in policies}
+            optimum = solve(scenario, seed, how, cached=cache, tick=bar.update, paths=paths)
+            bar.update(number - bar.n)
+            bar.clear()
+            yield scenario, optimum
+
+
+def path(scenario: Scenario, seed: int, spec: str) -> FloatArray:
+    """The joint coordinates of an episode that a policy plays, in [rad] or [m]. Shape (steps, n).
+
+    Raises:
+        UnknownNameError: There is no such policy or parameter.
+        InvalidInputError: The text has another form, or the policy does not suit the scenario.
+    """
+    name, parameters = parse_policy(spec)
+    return path_of(registry.make(name, scenario, **parameters), scenario, seed)
+
+
+def line(optimum: Optimum) -> str:
+    """What is printed of an episode."""
+    spread = optimum.spread
+    parts = [
+        f"{optimum.scenario}, seed {optimum.seed}: {optimum.cost:.10g} by {optimum.found_by}",
+        f"gradient {optimum.gradient_norm:.1e}",
+        f"{spread['polished_within_1e-6']:.0f} of {spread['polished']:.0f} paths within 1e-6",
+    ]
+    if "starts" in spread:
+        parts.append(
+            f"{spread['within_1_percent']:.0f} of {spread['starts']:.0f} starts within 1 % "
+            f"(median {spread['median']:.4g}, worst {spread['worst']:.4g})"
+        )
+    return "; ".join([*parts, f"{optimum.seconds:.2f} s a path"])
+
+
+def verdict(scenario: Scenario, optimum: Optimum) -> str | None:
+    """What is wrong with the record of an episode, by the cost of an optimum played anew; None where nothing is."""
+    known = best_known.lookup(scenario, optimum.seed)
+    if known is None:
+        return "no record of this content"
+    _, cost = Whole.of(scenario, optimum.seed).play(optimum.qdot)
+    if max(known.cost, cost) <= MEANINGLESS:
+        return None
+    ratio = np.inf if known.cost == 0.0 else cost / known.cost
+    if ratio < 1.0 - MARGIN:
+        return f"the record, {known.cost:.10g}, is too high: {ratio:.7f} of it was found"
+    if ratio > 1.0 + MARGIN:
+        return f"the record, {known.cost:.10g}, was not reached: {ratio:.7f} of it was found"
+    return None
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """The command line.
+
+    Args:
+        arguments: What stands behind the command; taken from the process if left out.
+
+    Returns:
+        The exit code: 0, 1 where a record does not stand the check, 2 where something expected went wrong, 130 after
+        Ctrl-C.
+    """
+    options = tyro.cli(Options, prog="python -m baselines.optimum", description=manual(), args=arguments)
+    kept, wrong = 0, 0
+    try:
+        todo = episodes(options.scenarios, options.test_sets, options.seeds)
+        for scenario, optimum in optima(todo, options.search, options.policies, cache=options.cache):
+            print(line(optimum), flush=True)
+            if options.check and (reason := verdict(scenario, optimum)):
+                print(f"  {reason}", flush=True)
+                wrong += 1
+            if options.update:
+                kept += len(best_known.record([optimum.record()]))
+    except IkgymError as e:
+        print(f"error: {' '.join(str(e).split())}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("\nStopped; what was found is kept.", file=sys.stderr)
+        return 130
+    if options.update:
+        print(f"{kept} of {len(todo)} records are new or better: {best_known.DATA.name}")
+    return 1 if wrong else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,142 @@
+"""The best known costs of single episodes, and what they are for: cost ratio = cost / best known cost.
+
+They lie in `baselines/data/best_known.json`, one record a line. A record belongs to the content of its episode, see
+:func:`baselines.fingerprints.episode_hash`: where scenario, steps or cost have changed since it is none.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import json
+import math
+import pathlib
+from collections.abc import Iterable, Mapping
+from typing import Any, Protocol
+
+from baselines.files import ResultsError, write
+from baselines.fingerprints import episode_hash
+from ikgym.scenarios import Scenario
+
+#: The records that come with the package.
+DATA = pathlib.Path(__file__).parents[1] / "data" / "best_known.json"
+#: What brings them up to date.
+UPDATE = "python -m baselines.optimum --update"
+#: A best known cost up to here is rounding: an arm that may move where costs do not count can come to zero, and no
+#: ratio to that means anything.
+MEANINGLESS = 1e-9
+#: By what share a cost must lie below the record to beat it; less may be rounding.
+MARGIN = 1e-6
+
+
+@dataclasses.dataclass(frozen=True)
+class Record:
+    """The best known cost of an episode.
+
+    Args:
+        scenario: Its name.
+        seed: The reset seed.
+        cost: The lowest total cost that was found.
+        found_by: What found it, in words.
+        gradient_norm: Norm of the cost's gradient there, in [s/rad] or [s/m].
+        spread: What several starts came to, by name, such as the number of them and the worst.
+        hash: Of the episode, see :func:`baselines.fingerprints.episode_hash`.
+    """
+
+    scenario: str
+    seed: int
+    cost: float
+    found_by: str
+    gradient_norm: float
+    spread: Mapping[str, float]
+    hash: str
+
+
+class Scored(Protocol):
+    """What says which episode was played, and what it cost: a :class:`baselines.evaluation.metrics.Row`."""
+
+    @property
+    def scenario(self) -> str: ...  # noqa: D102
+    @property
+    def seed(self) -> int: ...  # noqa: D102
+    @property
+    def fingerprint(self) -> str: ...  # noqa: D102
+    @property
+    def total_cost(self) -> float: ...  # noqa: D102
+
+
+def lookup(scenario: Scenario, seed: int) -> Record | None:
+    """The record of an episode; None where there is none, or it is of another content than the episode now has."""
+    return _lookup(scenario.name, seed, scenario)
+
+
+def cost(scenario: Scenario, seed: int) -> float | None:
+    """The best known cost that a cost ratio is stated against; None where there is none, or none above 1e-9."""
+    known = lookup(scenario, seed)
+    return None if known is None or known.cost <= MEANINGLESS else known.cost
+
+
+def beaten(row: Scored) -> Record | None:
+    """The record that a row's cost lies below, by more than rounding; None where it does not."""
+    known = _lookup(row.scenario, row.seed, row.fingerprint)
+    if known is None or known.cost <= MEANINGLESS or not row.total_cost < known.cost * (1.0 - MARGIN):
+        return None
+    return known
+
+
+def record(records: Iterable[Record], path: pathlib.Path = DATA) -> list[Record]:
+    """Keeps records that are better than those that are there, or of another content.
+
+    Args:
+        records: What was found.
+        path: The file; it is replaced in one go, and stays as it is if nothing is better.
+
+    Returns:
+        The records that were kept.
+
+    Raises:
+        ResultsError: The file is damaged or cannot be written, or a cost is no number of at least 0.
+    """
+    _read.cache_clear()  # another process may have written since
+    known, kept = dict(_read(path)), {}
+    for new in records:
+        if not (math.isfinite(new.cost) and new.cost >= 0.0):
+            raise ResultsError(f"{new.scenario}, seed {new.seed}: expected a cost of at least 0, got {new.cost}.")
+        key = new.scenario, new.seed
+        old = known.get(key)
+        if old is None or old.hash != new.hash or new.cost < old.cost:
+            known[key] = kept[key] = new
+    if kept:
+        lines = [json.dumps(_plain(known[key]), ensure_ascii=False, allow_nan=False) for key in sorted(known)]
+        write(path, ("[\n" + ",\n".join(lines) + "\n]\n").encode())
+        _read.cache_clear()
+    return list(kept.values())
+
+
+def read(path: pathlib.Path = DATA) -> list[Record]:
+    """All records of a file, by scenario and seed; none where there is no file.
+
+    Raises:
+        ResultsError: It is damaged.
+    """
+    return list(_read(path).values())
+
+
+def _lookup(name: str, seed: int, content: Scenario | str) -> Record | None:
+    known = _read(DATA).get((name, seed))
+    return known if known is not None and known.hash == episode_hash(content, seed) else None
+
+
+@functools.cache
+def _read(path: pathlib.Path) -> dict[tuple[str, int], Record]:
+    try:
+        records = [Record(**values) for values in json.loads(path.read_text(encoding="utf-8"))]
+    except FileNotFoundError:
+        return {}
+    except (OSError, ValueError, TypeError) as e:
+        raise ResultsError(f"{path} is damaged: {e}. Mend it, or find the costs anew with: {UPDATE}") from None
+    return {(one.scenario, one.seed): one for one in records}
+
+
+def _plain(one: Record) -> dict[str, Any]:
+    return {**vars(one), "spread": dict(sorted(one.spread.items()))}

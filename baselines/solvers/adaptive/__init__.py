@@ -1,0 +1,1 @@
+"""Policies that correct their model or their reference on the way."""

@@ -1,0 +1,1 @@
+"""Fixed-point transformations and abstract rotations (Faitli 2018, Khan 2020)."""

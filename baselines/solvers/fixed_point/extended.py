@@ -1,0 +1,87 @@
+"""The fixed-point transformation with one more point of the arm prescribed (Faitli and Tar 2018, conclusion)."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import ClassVar
+
+import numpy as np
+import numpy.typing as npt
+
+from baselines.policy import Batch
+from baselines.solvers.fixed_point.fixed_point import FixedPoint, jacobian_bound
+from baselines.solvers.references.nominal_path import HandedPath
+from ikgym.arms import Arm
+from ikgym.exceptions import InvalidInputError
+from ikgym.kinematics import Chain
+from ikgym.validation import FloatArray, frozen_array, read_only, whole_number
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class FixedPointExtended(HandedPath, FixedPoint):
+    """:class:`FixedPoint` with x extended by the end point of a link, which brings q back to the nominal joint path.
+
+    A reference, not a contender: where that end point should be follows from the nominal joint path, which no
+    observation shows (a tool position leaves the elbow up to four places). The paper has it, since it makes its
+    trajectories in joint space. h becomes Jᵀ (f(q) - x) + J_ℓᵀ (p_ℓ(q) - p_ℓᴺ), with both points of the model.
+
+    Args:
+        problem: What the policy is told of the scenario.
+        transformation: ``"transpose"``; nothing else fits a longer x.
+        family: See :class:`FixedPoint`, like all up to the tolerance.
+        slope: The factor in F.
+        a: A; if left out it heeds the longer Jacobian.
+        d: D.
+        iterations: Iterations in one step.
+        tolerance: Norm of both errors together after the last up to which the status is ``converged``.
+        seed: Which episode of a random scenario is played.
+        link: ℓ, whose end point, the place of joint ℓ + 1, x is extended by. From 1 to n - 1; of use where that point
+            moves, unlike the end of link 2 of ``varga7``.
+        path: The nominal joint coordinates, one row a step, in [rad] or [m]. Shape (steps + 1, n).
+
+    Raises:
+        InvalidInputError: A parameter is out of its range, or the scenario has no joint path, or is random and there
+            is no seed.
+        UnknownNameError: There is no such transformation or family.
+    """
+
+    seed: int | None = None
+    link: int = 2
+    path: FloatArray = dataclasses.field(kw_only=True)
+    _branch: Arm = dataclasses.field(init=False, repr=False)
+    _points: FloatArray = dataclasses.field(init=False, repr=False)
+
+    name: ClassVar[str] = "fixed_point_extended"
+
+    def __post_init__(self) -> None:
+        if self.transformation != "transpose":
+            raise InvalidInputError(
+                f"transformation: a longer x needs the transposed Jacobian, expected 'transpose', got "
+                f"{self.transformation!r}."
+            )
+        model = self.problem.model
+        link = whole_number("link", self.link, at_least=1)
+        if link >= model.joints:
+            raise InvalidInputError(f"link: expected at most {model.joints - 1} for arm {model.name!r}, got {link}.")
+        branch = Arm(
+            f"{model.name} up to link {link}",
+            model.offsets[:link],
+            model.axes[:link],
+            model.prismatic[:link],
+            tool=model.offsets[link],
+        )
+        path = frozen_array("path", self.path, (None, model.joints))
+        object.__setattr__(self, "path", path)
+        object.__setattr__(self, "_branch", branch)
+        object.__setattr__(self, "_points", read_only(branch.forward(path[:, :link])[1]))
+        super().__post_init__()
+
+    def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
+        """Everything twice: for the tool, and for the link."""
+        return 2, 2 * iterations, 0, 0
+
+    def _extension(self, batch: Batch) -> tuple[Chain, FloatArray]:
+        return self._branch.chain, self._points[self.next_rows(batch)]
+
+    def _jacobian_bound(self) -> float:
+        return super()._jacobian_bound() + jacobian_bound(self._branch, 0.0)

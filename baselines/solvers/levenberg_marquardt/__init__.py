@@ -1,0 +1,1 @@
+"""Levenberg–Marquardt as model-free adaptive control, and predictive (Zhang 2020)."""

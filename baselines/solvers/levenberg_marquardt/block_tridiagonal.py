@@ -1,0 +1,57 @@
+"""Kernels: the damped least squares of a whole horizon, in time linear in its length (Zhang 2020, eq. 27 and 36).
+
+With Ψ̄ = L D, L the block lower triangle of identities and D = blockdiag(J_1 … J_n), the printed
+
+    ΔQ = (Ψ̄ᵀ Ψ̄ + λ I)⁻¹ Ψ̄ᵀ r    becomes    ΔQ = Dᵀ (D Dᵀ + λ M)⁻¹ d,    d_j = r_j - r_(j-1),  r_0 = 0,
+
+where M = L⁻¹ L⁻ᵀ is block tridiagonal: -I beside the diagonal, and I, 2I, … 2I on it. At λ = 0 the blocks come
+apart, which is the shortcut (38).
+"""
+
+from __future__ import annotations
+
+from baselines.solvers.damped_step import damped_gram, factorise, scaled_inverse, solve, transposed_product
+from ikgym.jit import kernel
+
+
+@kernel
+def horizon_step(jacobians, differences, damping, gram, gains, x, out):  # type: ignore[no-untyped-def]
+    """ΔQ = Dᵀ (D Dᵀ + λ M)⁻¹ d, by blocks from the end of the horizon to its beginning and back.
+
+    With S_n = J_n J_nᵀ + 2λ I and the gain K_j = λ S_j⁻¹, the elimination is a Riccati recursion:
+    S_j = J_j J_jᵀ + λ M_jj - λ K_(j+1), and x_j = S_j⁻¹ b_j + K_j x_(j-1).
+
+    Args:
+        jacobians: J_1 … J_n. Shape (n, e, joints).
+        differences: d. Shape (n, e).
+        damping: λ, at least 0.
+        gram: Scratch. Shape (e, e).
+        gains: Scratch. Shape (n, e, e).
+        x: Scratch. Shape (n, e).
+        out: Receives ΔQ. Shape (n, joints).
+
+    Returns:
+        False where a Jacobian has lost rank and λ is too small to count; ``out`` is of no use then.
+    """
+    n, e = x.shape
+    for j in range(n - 1, -1, -1):
+        damped_gram(jacobians[j], damping if j == 0 else 2.0 * damping, gram)
+        for a in range(e):
+            x[j, a] = differences[j, a]
+        if damping > 0.0 and j + 1 < n:
+            for a in range(e):
+                x[j, a] += damping * x[j + 1, a]
+                for b in range(a + 1):
+                    gram[a, b] -= damping * gains[j + 1, a, b]
+        if not factorise(gram):
+            return False
+        solve(gram, x[j])
+        if damping > 0.0 and j > 0:
+            scaled_inverse(gram, damping, gains[j])
+    for j in range(n):
+        if damping > 0.0 and j > 0:
+            for a in range(e):
+                for b in range(e):
+                    x[j, a] += gains[j, a, b] * x[j - 1, b]
+        transposed_product(jacobians[j], x[j], out[j])
+    return True

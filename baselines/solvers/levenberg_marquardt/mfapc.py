@@ -1,0 +1,276 @@
+"""Model-free adaptive predictive control: damped least squares over a horizon (Zhang 2020, sections IV and V)."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any, ClassVar
+
+import numpy as np
+import numpy.typing as npt
+
+from baselines.policy import Batch, Memory, Solution
+from baselines.solvers.damped_step import ran_away
+from baselines.solvers.levenberg_marquardt.block_tridiagonal import horizon_step
+from baselines.solvers.levenberg_marquardt.damped import DampedIteration
+from baselines.solvers.levenberg_marquardt.damping_rules import condition_number, damping_next, damping_now
+from baselines.solvers.levenberg_marquardt.mfac import RANK_TOLERANCE
+from baselines.solvers.linear_algebra import dot
+from baselines.solvers.resolved_rate.moore_penrose import pseudoinverse_rows
+from baselines.status import Status
+from ikgym import task_kernels
+from ikgym.exceptions import UnknownNameError
+from ikgym.jit import kernel
+from ikgym.kinematics import forward, forward_and_jacobian
+from ikgym.validation import whole_number
+
+_CONVERGED, _LIMIT = int(Status.CONVERGED), int(Status.ITERATION_LIMIT)
+_DEFICIENT, _DIVERGED = int(Status.RANK_DEFICIENT), int(Status.DIVERGED)
+
+JACOBIANS = ("predicted", "constant")
+STOPS = ("horizon", "first_point")
+
+#: The controller of example 1, for the scenario ``zhang3-helix``: (27), (28) and (44).
+EXAMPLE_1: Mapping[str, Any] = MappingProxyType(
+    {
+        "horizon": 5,
+        "one_step": True,
+        "jacobians": "constant",
+        "rule": "threshold",
+        "damping": 2.0,
+        "growth": 1.1,
+        "decay": 1.02,
+        "threshold": 10.0,
+        "carry": True,
+    }
+)
+#: The solver of example 2, for the scenario ``zhang6-lspb``: (55)-(59).
+EXAMPLE_2: Mapping[str, Any] = MappingProxyType({"horizon": 2, "iterations": 10, "rule": "constant", "damping": 0.0})
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class ModelFreeAdaptivePredictiveControl(DampedIteration):
+    """Goes towards the next n nominal points at once, by damped least squares of the joint shifts between them.
+
+    At each iteration all residuals are taken from the present iterate, r_j = e(y*(k+j), F(q_(i-1))), and
+    ``ΔQ = (Ψ̄ᵀ Ψ̄ + λ I)⁻¹ Ψ̄ᵀ r`` (36) is solved block by block, see
+    :mod:`levenberg_marquardt.block_tridiagonal`; only the first
+    shift is kept (57). The Jacobians belong to the iterate itself or, from the second iteration on, to the
+    path that ΔQ predicts (56); the paper says of the first only that it begins at q(k). With n = 1 this is
+    :class:`mfac.ModelFreeAdaptiveControl`, and so is the first shift at λ = 0 (38) for any n.
+
+    The test (40) asks that the whole predicted path meet its points. At λ = 0 the points behind the first are met
+    but to the second order of the motion per period, and with λ > 0 the first shift vanishes where the points ahead
+    pull as hard as the first one holds, beside the point: on a moving trajectory the printed δ is out of reach and
+    the status ``iteration_limit``. ``stop="first_point"`` asks it of the point that the arm is sent to only.
+
+    Statuses are those of :class:`baselines.solvers.levenberg_marquardt.mfac.ModelFreeAdaptiveControl`.
+
+    Args:
+        problem: What the policy is told of the scenario.
+        rule: The rule for λ; it and the ten numbers behind it are those of :class:`DampedIteration`. Its error is
+            the norm of (40), its condition number the largest over the horizon (37).
+        tolerance: δ, norm of the error at which the iteration stops, in the units of the task, [m] and [rad].
+        iterations: N_up, most iterations of one period.
+        one_step: Whether to apply the controller (27), (28) once to the measured pose; δ and N_up do not matter then,
+            and the status is ``converged`` where J has full rank.
+        horizon: n, the points that must be shown ahead.
+        jacobians: ``"predicted"`` over the horizon, or ``"constant"``. One step knows no prediction yet.
+        stop: Whose error is tested: that of the ``"horizon"`` (40), or of the ``"first_point"`` (16).
+
+    Raises:
+        InvalidInputError: A number is out of its range, or does not belong to the rule.
+        UnknownNameError: There is no such rule, choice of Jacobians or stop.
+    """
+
+    rule: str = "condition"
+    iterations: int = 10
+    horizon: int = 2
+    jacobians: str = "predicted"
+    stop: str = "horizon"
+
+    name: ClassVar[str] = "mfapc"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        whole_number("horizon", self.horizon, at_least=1)
+        for kind, value, available in (("jacobians", self.jacobians, JACOBIANS), ("stop", self.stop, STOPS)):
+            if value not in available:
+                raise UnknownNameError(f"choice of {kind}", value, available)
+
+    @property
+    def preview(self) -> int:
+        """The n points that lie ahead."""
+        return self.horizon
+
+    def solve(self, batch: Batch, memory: Memory) -> Solution:
+        """See :meth:`SolverPolicy.solve`."""
+        problem = self.problem
+        damping, error, factorised = self._start(memory)
+        rows = len(batch.q)
+        q, status, iterations = batch.q.copy(), np.empty(rows, dtype=np.int64), np.empty(rows, dtype=np.int64)
+        iterate_horizon_rows(
+            problem.model.chain,
+            problem.task.kind,
+            problem.task.error_size,
+            self.rank,
+            self.law,
+            problem.dt * problem.velocity_limit,
+            batch.q,
+            batch.pose,
+            batch.nominal,
+            self.horizon,
+            self.jacobians == "predicted",
+            self.stop == "horizon",
+            self.tolerance,
+            self.iterations,
+            self.one_step,
+            q,
+            damping,
+            error,
+            factorised,
+            status,
+            iterations,
+        )
+        return Solution((q - batch.q) / problem.dt, (damping, error, factorised), status, iterations)
+
+    def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
+        """One Jacobian at the start, where all n are the same, then n poses and 1 or n Jacobians an iteration."""
+        if self.one_step:
+            return 0, 1, self.horizon, 1
+        if self.jacobians == "predicted":
+            return 0, 1 + self.horizon * iterations, self.horizon * iterations, 0
+        return (self.horizon - 1) * iterations, 1 + iterations, self.horizon * iterations, 0
+
+
+@kernel
+def iterate_horizon_rows(  # type: ignore[no-untyped-def]
+    chain,
+    kind,
+    size,
+    rank,
+    law,
+    longest,
+    start,
+    pose,
+    nominal,
+    horizon,
+    predicted,
+    whole_horizon,
+    tolerance,
+    most,
+    one_step,
+    q,
+    damping,
+    error_before,
+    factorised,
+    status,
+    iterations,
+):
+    """The iteration (34)-(41) row by row; see :func:`mfac.iterate_rows` for what is not here.
+
+    Args:
+        chain: The model of the arm.
+        kind: The kind of task coordinates.
+        size: Components of the error, e.
+        rank: The rank that J has where nothing is lost.
+        law: The damping law.
+        longest: Way of each joint in one period at the velocity limit. Shape (n,).
+        start: q(k-1). Shape (B, n).
+        pose: Measured task coordinates. Shape (B, m).
+        nominal: Nominal task coordinates ahead. Shape (B, at least the horizon, m).
+        horizon: n of the paper.
+        predicted: Whether the Jacobians follow the predicted path (56).
+        whole_horizon: Whether (40) is tested, else the first point only.
+        tolerance: δ.
+        most: N_up.
+        one_step: Whether to apply (27), (28) once to the measured pose instead.
+        q: Receives q(k); holds ``start`` before. Shape (B, n).
+        damping: λ, goes on. Shape (B,).
+        error_before: Norm of the error before, goes on. Shape (B,).
+        factorised: Receives the matrices factorised. Shape (B,).
+        status: Receives values of :class:`Status`. Shape (B,).
+        iterations: Receives the iterations made. Shape (B,).
+    """
+    n, m = start.shape[1], pose.shape[1]
+    rotation, position, geometric = np.empty((3, 3)), np.empty(3), np.empty((6, n))
+    coordinates, present = np.empty(m), np.empty(m)
+    path, jacobians = np.empty((horizon, n)), np.empty((horizon, size, n))
+    residuals, differences, error = np.empty((horizon, size)), np.empty((horizon, size)), np.empty(size)
+    gram, gains, x = np.empty((size, size)), np.empty((horizon, size, size)), np.empty((horizon, size))
+    steps, lost = np.empty((horizon, n)), np.empty(horizon, dtype=np.bool_)
+    columns, rotations = np.empty((max(n, size), min(n, size))), np.empty((min(n, size), min(n, size)))
+    for row in range(start.shape[0]):
+        here = q[row]
+        status[row], i, first = _LIMIT, 0, 0.0
+        while True:
+            # y(k)_(i), J(k)_(i) and the residuals of all points from there (55).
+            forward_and_jacobian(chain, here, rotation, position, geometric)
+            task_kernels.jacobian(kind, rotation, geometric, jacobians[0])
+            task_kernels.coordinates(kind, rotation, position, present)
+            for j in range(horizon):
+                task_kernels.error(kind, nominal[row, j], pose[row] if one_step else present, residuals[j])
+            # The rest of the predicted path: y(k+j)_(i) and J(k+j)_(i) (34), (35).
+            first_square = dot(residuals[0], residuals[0])
+            square = first_square
+            for j in range(1, horizon):
+                if i == 0:
+                    square += dot(residuals[j], residuals[j])
+                else:
+                    if predicted:
+                        forward_and_jacobian(chain, path[j], rotation, position, geometric)
+                    else:
+                        forward(chain, path[j], rotation, position)
+                    task_kernels.coordinates(kind, rotation, position, coordinates)
+                    task_kernels.error(kind, nominal[row, j], coordinates, error)
+                    square += dot(error, error)
+                if predicted and i > 0:
+                    task_kernels.jacobian(kind, rotation, geometric, jacobians[j])
+                else:
+                    jacobians[j] = jacobians[0]
+            norm = np.sqrt(square)
+            if i == 0:
+                first = first_square
+            if not np.isfinite(norm):
+                status[row] = _DIVERGED
+                break
+            if (norm if whole_horizon else np.sqrt(first_square)) <= tolerance and not one_step:  # (40)
+                status[row] = _CONVERGED
+                break
+            if i == most:
+                break
+            condition = 1.0
+            if law.condition_bounds.shape[0] > 0:
+                for j in range(horizon if predicted and i > 0 else 1):
+                    condition = max(condition, condition_number(jacobians[j], rank, columns, rotations))
+                    factorised[row] += 1
+            damping[row] = damping_now(law, norm, condition, damping[row])  # (37)
+            for j in range(horizon):
+                for a in range(size):
+                    differences[j, a] = residuals[j, a] - (residuals[j - 1, a] if j > 0 else 0.0)
+            factorised[row] += horizon
+            if not horizon_step(jacobians, differences, damping[row], gram, gains, x, steps):  # (36)
+                pseudoinverse_rows(jacobians, differences, RANK_TOLERANCE, rank, steps, lost)  # (38)
+                factorised[row] += horizon
+                if lost.any():
+                    status[row] = _DEFICIENT
+            damping[row] = damping_next(law, damping[row], norm, error_before[row])  # (44)
+            error_before[row] = norm
+            for k in range(n):
+                shifted = here[k]
+                for j in range(horizon):
+                    shifted += steps[j, k]
+                    path[j, k] = shifted  # (56)
+                here[k] = path[0, k]  # (57), (41)
+            i += 1
+            if one_step:
+                if status[row] == _LIMIT:
+                    status[row] = _CONVERGED
+                break
+        iterations[row] = i
+        if not one_step and status[row] != _CONVERGED and first_square > first and ran_away(here, start[row], longest):
+            status[row] = _DIVERGED
+        if status[row] == _DIVERGED:
+            here[:] = start[row]
+            damping[row], error_before[row] = law.damping, np.inf

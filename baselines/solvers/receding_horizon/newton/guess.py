@@ -1,0 +1,98 @@
+"""Kernels: first guesses of a joint path, by damped least squares from knot to knot."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from baselines.solvers.damped_step import damped_step
+from baselines.solvers.linear_algebra import dot
+from ikgym import task_kernels
+from ikgym.jit import inlined, kernel
+from ikgym.kinematics import forward_and_jacobian
+
+# Damped steps that bring the arm from one knot to the next.
+CORRECTIONS = 2
+# λ of a guess that does not draw, and the range of those that do; drifts in [rad/s] or [m/s].
+DAMPING = 1e-3
+DAMPINGS = (0.03, 1.0)
+DRIFTS = (1.0, 10.0)
+# Random numbers that belong to one guess.
+STREAM = 256
+
+
+@kernel
+def roll_out(rules, grid, start, nominal, first, drift, damping, path, scratch, gram, x):  # type: ignore[no-untyped-def]
+    """Goes from knot to knot by damped least squares, drifting in the null space of the task.
+
+    Args:
+        rules: A :class:`baselines.solvers.receding_horizon.newton.cost.Rules`.
+        grid: The grid, of K knots.
+        start: Joint coordinates now. Shape (n,).
+        nominal: Nominal task coordinates ahead. Shape (at least grid.at[-1], m).
+        first: The first knot to be set; those before stay as they are.
+        drift: Joint velocities of which the part that does not move the task is added, in [rad/s] or [m/s].
+            Shape (n,).
+        damping: λ of the damped least squares.
+        path: Receives the joint coordinates at the knots. Shape (K, n).
+        scratch: A :class:`baselines.solvers.receding_horizon.newton.cost.Scratch`.
+        gram: Scratch. Shape (e, e).
+        x: Scratch. Shape (e,).
+    """
+    n, e = path.shape[1], x.shape[0]
+    move = np.empty(n)
+    for k in range(first, path.shape[0]):
+        here = path[k]
+        for j in range(n):
+            here[j] = path[k - 1, j] if k > 0 else start[j]
+        for correction in range(CORRECTIONS):
+            forward_and_jacobian(rules.chain, here, scratch.rotation, scratch.position, scratch.geometric)
+            task_kernels.coordinates(rules.kind, scratch.rotation, scratch.position, scratch.pose)
+            task_kernels.error(rules.kind, nominal[grid.at[k] - 1], scratch.pose, scratch.error)
+            task_kernels.jacobian(rules.kind, scratch.rotation, scratch.geometric, scratch.jacobian)
+            if correction == 0:
+                # What the drift would do to the task is taken out of the error, and so out of the step.
+                span = grid.length[k] * rules.dt
+                for i in range(e):
+                    scratch.error[i] -= span * dot(scratch.jacobian[i], drift)
+            if not damped_step(scratch.jacobian, scratch.error, damping, gram, x, move):
+                break
+            for j in range(n):
+                moved = here[j] + move[j] + (span * drift[j] if correction == 0 else 0.0)
+                here[j] = min(max(moved, rules.lower[j]), rules.upper[j])
+
+
+@inlined
+def uniform(key, counter):  # type: ignore[no-untyped-def]
+    """A number between 0 and 1 for a key and a counter (SplitMix64); no state, so that rows stay independent."""
+    z = np.uint64(key) * np.uint64(0xD1342543DE82EF95) + (np.uint64(counter) + np.uint64(1)) * np.uint64(
+        0x9E3779B97F4A7C15
+    )
+    z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    z = z ^ (z >> np.uint64(31))
+    return np.float64(z >> np.uint64(11)) * 2.0**-53
+
+
+@kernel
+def draw(seed, counter, drift):  # type: ignore[no-untyped-def]
+    """Draws the ``counter``-th guess of a seed: a drift, which ``drift`` (n,) receives; returns its damping."""
+    n = drift.shape[0]
+    square = 0.0
+    for j in range(n):
+        # A sum of four is near enough to normal, so that no direction is preferred.
+        total = -2.0
+        for i in range(4):
+            total += uniform(seed, STREAM * counter + 3 + 4 * j + i)
+        drift[j] = total
+        square += total * total
+    size = _between(DRIFTS, uniform(seed, STREAM * counter + 1)) / math.sqrt(square)
+    for j in range(n):
+        drift[j] *= size
+    return _between(DAMPINGS, uniform(seed, STREAM * counter + 2))
+
+
+@inlined
+def _between(bounds, share):  # type: ignore[no-untyped-def]
+    return bounds[0] * (bounds[1] / bounds[0]) ** share

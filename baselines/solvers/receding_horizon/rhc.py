@@ -1,0 +1,149 @@
+"""Receding horizon, minimised to its optimum by Newton's method."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any, ClassVar
+
+import numpy as np
+import numpy.typing as npt
+
+from baselines.policy import Batch, Memory, Solution, SolverPolicy
+from baselines.solvers.receding_horizon.newton.grid import offsets
+from baselines.solvers.receding_horizon.newton.receding import Settings, plan_rows
+from ikgym.exceptions import InvalidInputError
+from ikgym.simulator import FARTHEST
+from ikgym.validation import FloatArray, number, whole_number
+
+# What the kernel's counters and random numbers can hold.
+MOST = 2**31 - 1
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class RecedingHorizon(SolverPolicy):
+    """Minimises the cost of Varga 2021 over a horizon of any length; the first joint velocity is applied.
+
+    The unknowns are the joint coordinates at the knots of the horizon. In them the Hessian is block-tridiagonal, so
+    that a damped Newton step costs time linear in the number of knots. The kinks of the cost, on which minima often
+    lie, and the limits are held by multipliers, see :mod:`newton.multipliers`. The plan of one period, slid
+    by one step, is the start of the next.
+
+    To convergence (``iterations=None``) the plan is a local minimum of the horizon's cost, found with the exact Hessian
+    where that is positive definite; with a number of iterations it is so many Gauss–Newton steps away from the plan
+    before, which at 1 kHz is close (the real-time iteration). A long horizon has many local minima, some
+    of them very dear: several ``starts`` and challengers are for that.
+
+    The joint limits of the arm and the velocity limit of the scenario are constraints of the plan.
+
+    Args:
+        problem: What the policy is told of the scenario.
+        horizon: HL, the number of grid points with the present one. At least 2; HL - 1 steps must be shown ahead.
+        iterations: Newton steps in one control period, at least 30 in the first; None for as many as the optimum takes.
+        blocks: Knots of the horizon; None for one at each of its HL - 1 steps. Fewer are spaced out: two blocks of one
+            step, then lengths that grow geometrically. Within a block the joint velocity is constant, and its tracking
+            cost follows the trapezoidal rule.
+        terminal_weight: Factor of the tracking cost at the last grid point, unless the episode ends before it; 1 is the
+            paper's cost.
+        stop_at_end: Whether the horizon ends where the episode does, which ``remaining`` tells. Else it looks on, where
+            costs count no more.
+        starts: Guesses from which the first plan of an episode is chosen: damped least squares from knot to knot, and
+            with more than one the others with a random drift in the null space and random damping.
+        challenge: Newton steps of a challenger: a second plan, which branches off at a random knot into a random guess,
+            and takes over when it is cheaper after its last step. 0 for none.
+        challenge_rate: Newton steps of the challenger in one control period.
+        seed: Of the random guesses, which are the same in all episodes.
+        tolerance: Relative precision of the horizon's cost at which it counts as minimal.
+
+    Raises:
+        InvalidInputError: A parameter is out of its range.
+    """
+
+    horizon: int = 30
+    iterations: int | None = None
+    blocks: int | None = None
+    terminal_weight: float = 1.0
+    stop_at_end: bool = False
+    starts: int = 1
+    challenge: int = 0
+    challenge_rate: int = 1
+    seed: int = 0
+    tolerance: float = 1e-7
+
+    name: ClassVar[str] = "rhc"
+    grain: ClassVar[int] = 1
+
+    #: Steps from now to the knots. Shape (K,).
+    offsets: npt.NDArray[np.int64] = dataclasses.field(init=False, repr=False)
+    #: The arguments of the kernel that never change.
+    _constants: tuple[Any, ...] = dataclasses.field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        if whole_number("horizon", self.horizon, at_least=2) > FARTHEST:
+            raise InvalidInputError(f"horizon: expected at most {FARTHEST}, got {self.horizon}.")
+        if self.iterations is not None:
+            whole_number("iterations", self.iterations, at_least=1)
+        if self.blocks is not None and whole_number("blocks", self.blocks, at_least=1) >= self.horizon:
+            raise InvalidInputError(
+                f"blocks: expected at most horizon - 1 = {self.horizon - 1}, a knot at each step, got {self.blocks}."
+            )
+        if not isinstance(self.stop_at_end, (bool, np.bool_)):
+            raise InvalidInputError(f"stop_at_end: expected True or False, got {self.stop_at_end!r}.")
+        terminal_weight = number("terminal_weight", self.terminal_weight, at_least=0.0)
+        for name, least in {"starts": 1, "challenge": 0, "challenge_rate": 1, "seed": 0}.items():
+            if whole_number(name, getattr(self, name), at_least=least) > MOST:
+                raise InvalidInputError(f"{name}: expected at most {MOST}, got {getattr(self, name)}.")
+        tolerance = number("tolerance", self.tolerance, above=0.0)
+        knots = offsets(self.horizon - 1, self.blocks)
+        knots.flags.writeable = False
+        object.__setattr__(self, "offsets", knots)
+        problem, model = self.problem, self.problem.model
+        settings = Settings(
+            knots,
+            terminal_weight,
+            bool(self.stop_at_end),
+            -1 if self.iterations is None else self.iterations,
+            tolerance,
+            self.starts,
+            self.challenge,
+            self.challenge_rate,
+            self.seed,
+        )
+        rules = (problem.task.kind, *problem.cost.parameters, problem.dt, model.lower, model.upper)
+        object.__setattr__(self, "_constants", (*model.chain, *rules, problem.velocity_limit, *settings))
+
+    @property
+    def preview(self) -> int:
+        """Grid points 2 … HL lie ahead."""
+        return self.horizon - 1
+
+    def memory(self, rows: int) -> Memory:
+        """Plan and multipliers, of shapes (B, K, n) and (B, K, e + 2 n); those of the challenger; and two counters."""
+        knots, n = len(self.offsets), self.problem.model.joints
+        wide, rival = self.problem.task.error_size + 2 * n, knots if self.challenge else 0
+        plans = (np.zeros((rows, k, width)) for k in (knots, rival) for width in (n, wide))
+        return (*plans, np.zeros(rows, dtype=np.int64), np.zeros(rows, dtype=np.int64))
+
+    def solve(self, batch: Batch, memory: Memory) -> Solution:
+        """See :meth:`SolverPolicy.solve`."""
+        changed = tuple(array.copy() for array in memory)
+        qdot = np.empty_like(batch.q)
+        status, iterations = np.empty((2, len(qdot)), dtype=np.int64)
+        observed = (batch.q, batch.qdot, batch.nominal, batch.remaining)
+        plan_rows(*self._constants, *observed, *changed, qdot, status, iterations)
+        return Solution(qdot, changed, status, iterations)
+
+    def plan(self, state: Memory) -> FloatArray:
+        """The plan behind a state that `predict` returned: joint coordinates at the knots :attr:`offsets` ahead.
+
+        Where the horizon was cut at the episode's end the knots behind it are of no use.
+
+        Returns:
+            Joint coordinates in [rad] or [m]. Shape (B, K, n).
+        """
+        return state[2].copy()
+
+    def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
+        """Jacobians and a factorisation a knot in each Newton step, and forward kinematics for one length tried."""
+        # Even a plan that is found to be optimal at once has been linearised.
+        each = (iterations + 1) * len(self.offsets)
+        return each, each, each, 0

@@ -1,0 +1,1 @@
+"""Resolved rate: the desired task velocity answered by one linear step."""

@@ -1,0 +1,63 @@
+"""Damped least squares: resolved rate with the deformation of Levenberg and Marquardt."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import ClassVar
+
+import numpy as np
+import numpy.typing as npt
+
+from baselines.policy import statuses
+from baselines.solvers.damped_step import damped_gram, transposed_product
+from baselines.solvers.linear_algebra import cholesky, cholesky_solve
+from baselines.solvers.resolved_rate.base import ResolvedRate
+from ikgym.jit import kernel
+from ikgym.validation import FloatArray, number
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class DampedLeastSquares(ResolvedRate):
+    """Minimises ‖Δx − J Δq‖² + λ ‖Δq‖²: Δq = Jᵀ (J Jᵀ + λ I)⁻¹ Δx (Khan 2020, section 2; Zhang 2020, eq. 9).
+
+    Near a singularity the joint velocities stay bounded, at the price of a tracking error; away from one the error
+    is about λ / σ² of the shift, with σ the singular values of J.
+
+    Args:
+        problem: What the policy is told of the scenario.
+        gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
+        damping: λ, added to J Jᵀ as it is, not squared. In the square of the Jacobian's units, [m²] and [1]. Above 0.
+
+    Raises:
+        InvalidInputError: The gain or the damping is out of its range.
+    """
+
+    damping: float = 1e-3
+
+    name: ClassVar[str] = "dls"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "damping", number("damping", self.damping, above=0.0))
+
+    def invert(self, jacobian: FloatArray, shift: FloatArray) -> tuple[FloatArray, npt.NDArray[np.int64]]:
+        """See :meth:`ResolvedRate.invert`."""
+        out = np.empty((len(jacobian), jacobian.shape[2]))
+        damped_rows(jacobian, shift, self.damping, out)
+        return out, statuses(len(out))
+
+
+@kernel
+def damped_rows(jacobian, shift, damping, out):  # type: ignore[no-untyped-def]
+    """Δq = Jᵀ (J Jᵀ + λ I)⁻¹ Δx, row by row: shapes (B, e, n), (B, e), a number, (B, n)."""
+    e = jacobian.shape[1]
+    gram, rhs = np.empty((e, e)), np.empty(e)
+    for row in range(jacobian.shape[0]):
+        damped_gram(jacobian[row], damping, gram)
+        # Positive definite by the damping; if rounding says otherwise the damping is too small to count.
+        if not cholesky(gram):
+            out[row] = np.nan
+            continue
+        rhs[:] = shift[row]
+        cholesky_solve(gram, rhs)
+        transposed_product(jacobian[row], rhs, out[row])

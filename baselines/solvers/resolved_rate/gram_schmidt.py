@@ -1,0 +1,122 @@
+"""Resolved rate by orthonormalising the rows of the Jacobian: a reconstruction."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import ClassVar
+
+import numpy as np
+import numpy.typing as npt
+
+from baselines.solvers.linear_algebra import dot
+from baselines.solvers.resolved_rate.base import ResolvedRate, status_of
+from ikgym.exceptions import InvalidInputError
+from ikgym.jit import kernel
+from ikgym.validation import FloatArray, number
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class GramSchmidt(ResolvedRate):
+    """A solution without a cost function, by Gram–Schmidt orthonormalisation: a RECONSTRUCTION.
+
+    Khan 2020 (section 2, its reference 44) names a method that evades the minimisation of any cost function by the
+    Gram–Schmidt algorithm. The original text is not at hand; what follows is this project's reading of that sentence.
+
+    The rows of J are orthonormalised one after another, the longest remainder first. A row a with the remainder
+    ρ u (u of unit length) asks for Δx_a; what the rows before it have given is taken off, and the rest,
+    divided by ρ, is given along u. So Δq lies in the span of the rows and makes Δx: without truncation and with
+    full rank it is the Moore–Penrose solution, although no sum of squares was minimised. (Orthonormalised columns
+    would make Δx too, but with joints that stand still.)
+
+    Rows whose remainder is too short are left out: their coordinates are not tracked, those kept are tracked
+    exactly, unlike with the pseudoinverse, which spreads what cannot be made over all coordinates. The status then
+    says ``rank_deficient``, and joint velocities jump where a row leaves or comes back. A task with redundant
+    coordinates has at most six rows kept; which ones may change from step to step.
+
+    Args:
+        problem: What the policy is told of the scenario.
+        gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
+        truncation: Rows whose remainder is shorter than this share of the longest row are left out. At least 0 and
+            below 1. Rows of positions and of orientations are compared as they are, in [m] and [1].
+
+    Raises:
+        InvalidInputError: The gain or the truncation is out of its range.
+    """
+
+    truncation: float = 1e-3
+
+    name: ClassVar[str] = "gram_schmidt"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "truncation", number("truncation", self.truncation, at_least=0.0))
+        if self.truncation >= 1.0:
+            raise InvalidInputError(
+                f"truncation: expected a number of at least 0 and below 1, got {self.truncation:g}."
+            )
+
+    def invert(self, jacobian: FloatArray, shift: FloatArray) -> tuple[FloatArray, npt.NDArray[np.int64]]:
+        """See :meth:`ResolvedRate.invert`."""
+        rows, _, n = jacobian.shape
+        out, deficient = np.empty((rows, n)), np.empty(rows, dtype=np.bool_)
+        orthonormal_rows(jacobian, shift, self.truncation, self.full_rank, out, deficient)
+        return out, status_of(deficient)
+
+
+@kernel
+def orthonormal_rows(jacobian, shift, truncation, full_rank, out, deficient):  # type: ignore[no-untyped-def]
+    """Δq along the orthonormalised rows of J, row by row of the batch.
+
+    Args:
+        jacobian: J. Shape (B, e, n).
+        shift: Δx. Shape (B, e).
+        truncation: Remainders below this share of the longest row are left out.
+        full_rank: The rank that J has where nothing is lost.
+        out: Receives Δq. Shape (B, n).
+        deficient: Receives whether a row was left out. Shape (B,).
+    """
+    e, n = jacobian.shape[1], jacobian.shape[2]
+    basis, given = np.empty((full_rank, n)), np.empty(full_rank)
+    rest, wanted, free = np.empty((e, n)), np.empty(e), np.empty(e, dtype=np.bool_)
+    for row in range(jacobian.shape[0]):
+        rest[:] = jacobian[row]
+        wanted[:] = shift[row]
+        free[:] = True
+        out[row] = 0.0
+        shortest = 0.0
+        rank = 0
+        while rank < full_rank:
+            pick, longest = 0, -1.0
+            for a in range(e):
+                if free[a]:
+                    square = dot(rest[a], rest[a])
+                    if square > longest:
+                        pick, longest = a, square
+            if rank == 0:
+                shortest = truncation * truncation * longest
+            # What rounding has left along the rows before: once more is enough.
+            for b in range(rank):
+                _take_off(rest, wanted, pick, basis[b], given[b])
+            length = np.sqrt(dot(rest[pick], rest[pick]))
+            if length == 0.0 or longest < shortest:
+                break
+            free[pick] = False
+            for k in range(n):
+                basis[rank, k] = rest[pick, k] / length
+            given[rank] = wanted[pick] / length
+            for k in range(n):
+                out[row, k] += given[rank] * basis[rank, k]
+            for a in range(e):
+                if free[a]:
+                    _take_off(rest, wanted, a, basis[rank], given[rank])
+            rank += 1
+        deficient[row] = rank < full_rank
+
+
+@kernel
+def _take_off(rest, wanted, a, unit, given):  # type: ignore[no-untyped-def]
+    """Takes the part along a unit vector off a row, and what that part makes off the row's demand."""
+    part = dot(rest[a], unit)
+    for k in range(unit.shape[0]):
+        rest[a, k] -= part * unit[k]
+    wanted[a] -= part * given

@@ -1,0 +1,82 @@
+"""Resolved rate by the transposed Jacobian: no matrix is inverted."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import ClassVar
+
+import numpy as np
+import numpy.typing as npt
+
+from baselines.solvers.resolved_rate.base import ResolvedRate, status_of
+from ikgym.jit import kernel
+from ikgym.validation import FloatArray, number
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class JacobianTranspose(ResolvedRate):
+    """Goes down the gradient of ½ ‖Δx − J Δq‖²: Δq = α Jᵀ Δx, with the α that goes furthest down.
+
+    The direction is that of Wolovich and Elliott 1984 and of Balestrino, De Maria and Sciavicco 1984; the step
+    α = ΔxᵀJJᵀΔx / ‖JJᵀΔx‖² is the one that Buss 2004 prints. In one step an arm makes all of Δx only where J has
+    equal singular values; elsewhere it lags behind, the more so the more they differ, and what is missing comes
+    back through the measured error.
+
+    Joint velocities are not bounded: where Δx lies along a direction that is nearly lost, with a singular value σ,
+    the step is Δx / σ like that of the pseudoinverse. Where JᵀΔx is 0 the arm stands still; the status then says
+    ``rank_deficient``, unless the task has more coordinates than the arm can move at once, where JᵀΔx is 0 at the
+    best fit too.
+
+    Args:
+        problem: What the policy is told of the scenario.
+        gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
+        rank_tolerance: ‖JᵀΔx‖ below this share of ‖J‖ ‖Δx‖ (Frobenius) counts as zero. At least 0.
+
+    Raises:
+        InvalidInputError: The gain or the tolerance is out of its range.
+    """
+
+    rank_tolerance: float = 1e-12
+
+    name: ClassVar[str] = "jacobian_transpose"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "rank_tolerance", number("rank_tolerance", self.rank_tolerance, at_least=0.0))
+
+    def invert(self, jacobian: FloatArray, shift: FloatArray) -> tuple[FloatArray, npt.NDArray[np.int64]]:
+        """See :meth:`ResolvedRate.invert`."""
+        rows, size, n = jacobian.shape
+        out, stuck = np.empty((rows, n)), np.empty(rows, dtype=np.bool_)
+        transpose_rows(jacobian, shift, self.rank_tolerance, out, stuck)
+        return out, status_of(stuck & (size == self.full_rank))
+
+    def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
+        """One Jacobian and one measurement; nothing is factorised."""
+        return 0, 1, 0, 1
+
+
+@kernel
+def transpose_rows(jacobian, shift, tolerance, out, stuck):  # type: ignore[no-untyped-def]
+    """Δq = α Jᵀ Δx row by row, and whether Jᵀ Δx is 0: shapes (B, e, n), (B, e), a number, (B, n), (B,)."""
+    e, n = jacobian.shape[1], jacobian.shape[2]
+    for row in range(jacobian.shape[0]):
+        j, dx, dq = jacobian[row], shift[row], out[row]
+        pull = size = wanted = length = 0.0
+        for k in range(n):
+            dq[k] = 0.0
+            for a in range(e):
+                dq[k] += j[a, k] * dx[a]
+                size += j[a, k] * j[a, k]
+            pull += dq[k] * dq[k]
+        for a in range(e):
+            wanted += dx[a] * dx[a]
+            made = 0.0
+            for k in range(n):
+                made += j[a, k] * dq[k]
+            length += made * made
+        none = pull <= tolerance * tolerance * size * wanted or length == 0.0
+        stuck[row] = none and wanted > 0.0
+        alpha = 0.0 if none else pull / length
+        for k in range(n):
+            dq[k] *= alpha

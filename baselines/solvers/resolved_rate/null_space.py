@@ -1,0 +1,196 @@
+"""Resolved rate with a second aim in the null space of the task."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import ClassVar
+
+import numpy as np
+import numpy.typing as npt
+
+from baselines.policy import statuses
+from baselines.solvers.linear_algebra import cholesky, cholesky_solve
+from baselines.solvers.resolved_rate.dls import damped_rows
+from baselines.solvers.resolved_rate.moore_penrose import MoorePenrose
+from ikgym.arms import Arm
+from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.jit import kernel
+from ikgym.kinematics import forward_and_jacobian
+from ikgym.validation import FloatArray, number, per_joint, read_only
+
+OBJECTIVES = ("posture", "joint_centring", "manipulability")
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class NullSpace(MoorePenrose):
+    """Goes on with a second aim wherever the task leaves it free: q̇ = J⁺ ẋ + (I − J⁺ J) z (Liégeois 1977).
+
+    Varga 2021 (section I, its references 10 to 12) and Khan 2020 name the method. The second aim is a joint
+    velocity z, of which only the part is used that moves no task coordinate:
+
+    - ``posture``: z = K (q_posture − q).
+    - ``joint_centring``: z = K (r_min / r)² (q_middle − q), joint by joint, with the ranges r between the limits
+      and the smallest of them r_min; that is Liégeois's gradient, scaled so that K is the pull on the joint with
+      the smallest range. Joints without two finite limits are left alone.
+    - ``manipulability``: z = K ∂(w / ℓᵏ)/∂q, Yoshikawa's w = √det(J Jᵀ) of the geometric Jacobian (of its linear
+      rows where the task has no orientation), made free of units with the arm's reach ℓ in [m], without the strokes
+      of sliding joints; k = 3 for the three linear rows. The gradient is exact. In a singular pose, where w has a
+      kink, z is 0.
+
+    The first part is Moore–Penrose, or damped least squares if there is a damping. J⁺ in the second part is never
+    damped, or the task would be disturbed. An arm without redundancy is moved by the second aim in singular poses
+    only, where a direction is free for once.
+
+    Args:
+        problem: What the policy is told of the scenario.
+        gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
+        rank_tolerance: Singular values below this share of the largest count as zero. At least 0.
+        objective: One of ``posture``, ``joint_centring`` and ``manipulability``.
+        secondary_gain: K in [1/s], at least 0 and below 2/Δt; for the manipulability in [rad²/s] or [m²/s].
+        posture: q_posture in [rad] or [m]; one number, or one a joint. It counts for ``posture`` only.
+        damping: λ of the first part, as in :class:`DampedLeastSquares`; 0 stands for Moore–Penrose.
+
+    Raises:
+        InvalidInputError: A number is out of its range, or the joints are to be centred and none of them has
+            limits.
+        UnknownNameError: There is no such objective.
+    """
+
+    objective: str = "posture"
+    secondary_gain: float = 1.0
+    posture: float | Sequence[float] = 0.0
+    damping: float = 1e-3
+    _target: FloatArray = dataclasses.field(init=False, repr=False)
+    _pull: FloatArray = dataclasses.field(init=False, repr=False)
+
+    name: ClassVar[str] = "null_space"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.objective not in OBJECTIVES:
+            raise UnknownNameError("objective", self.objective, OBJECTIVES)
+        model = self.problem.model
+        gain = number("secondary_gain", self.secondary_gain, at_least=0.0)
+        if gain * self.problem.dt >= 2.0:
+            raise InvalidInputError(
+                f"secondary_gain: expected a number below 2/Δt = {2.0 / self.problem.dt:g}, got {gain:g}."
+            )
+        posture = per_joint("posture", self.posture, model.joints)
+        centring = self.objective == "joint_centring"
+        target, pull = _centre(model) if centring else (posture, np.ones(model.joints))
+        for field, value in {
+            "secondary_gain": gain,
+            "posture": float(posture[0]) if np.ndim(self.posture) == 0 else tuple(posture.tolist()),
+            "damping": number("damping", self.damping, at_least=0.0),
+            "_target": read_only(target),
+            "_pull": read_only(pull),
+        }.items():
+            object.__setattr__(self, field, value)
+
+    def move(self, q: FloatArray, jacobian: FloatArray, shift: FloatArray) -> tuple[FloatArray, npt.NDArray[np.int64]]:
+        """See :meth:`ResolvedRate.move`."""
+        aim = self.problem.dt * self.secondary_gain * self.slope(q)
+        disturbance = np.empty_like(shift)
+        task_rows(jacobian, aim, disturbance)
+        if self.damping == 0.0:
+            # J⁺ Δx + (I - J⁺ J) Δt z with one pseudoinverse.
+            step, status = self.invert(jacobian, shift - disturbance)
+            return step + aim, status
+        first = np.empty_like(aim)
+        damped_rows(jacobian, shift, self.damping, first)
+        taken_off, _ = self.invert(jacobian, disturbance)
+        return first + (aim - taken_off), statuses(len(aim))
+
+    def slope(self, q: FloatArray) -> FloatArray:
+        """The second aim z / K, at joint coordinates in [rad] or [m]. Shapes (B, n)."""
+        if self.objective != "manipulability":
+            return self._pull * (self._target - q)
+        model, lines = self.problem.model, 6 if self.problem.task.has_orientation else 3
+        out = np.empty_like(q)
+        manipulability_rows(model.chain, q, lines, out)
+        return out / model.reach(np.zeros(model.joints)) ** 3
+
+    def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
+        """A pseudoinverse; a damped system, and the geometric Jacobian with its own factorisation, where used."""
+        manipulability, damped = self.objective == "manipulability", self.damping > 0.0
+        return 0, 1 + manipulability, 1 + manipulability + damped, 1
+
+
+def _centre(model: Arm) -> tuple[FloatArray, FloatArray]:
+    """The middles between the limits and how strongly to go there, 0 for joints without limits; shapes (n,)."""
+    lower, upper = np.asarray(model.lower), np.asarray(model.upper)
+    limited = np.isfinite(lower) & np.isfinite(upper)
+    if not limited.any():
+        raise InvalidInputError(
+            f"objective 'joint_centring': expected an arm with joint limits, {model.name!r} has none; "
+            "objective 'posture' goes to joint coordinates of your choice."
+        )
+    target, pull = np.zeros(model.joints), np.zeros(model.joints)
+    span = upper[limited] - lower[limited]
+    target[limited] = 0.5 * (lower[limited] + upper[limited])
+    pull[limited] = (span.min() / span) ** 2
+    return target, pull
+
+
+@kernel
+def task_rows(jacobian, velocity, out):  # type: ignore[no-untyped-def]
+    """J q̇ row by row: shapes (B, e, n), (B, n), (B, e)."""
+    for row in range(jacobian.shape[0]):
+        for a in range(jacobian.shape[1]):
+            total = 0.0
+            for k in range(jacobian.shape[2]):
+                total += jacobian[row, a, k] * velocity[row, k]
+            out[row, a] = total
+
+
+@kernel
+def manipulability_rows(chain, q, lines, out):  # type: ignore[no-untyped-def]
+    """∂w/∂q row by row, w = √det(J Jᵀ) of the first ``lines`` (3 or 6) rows of the geometric Jacobian.
+
+    ∂w/∂q_i = w tr(∂J/∂q_i J⁺), and the columns of J turn with the joints before them and are led by those behind:
+    ∂J_j/∂q_i is (ω_i × v_j, ω_i × ω_j) for i ≤ j, and (ω_j × v_i, 0) for i > j.
+
+    Args:
+        chain: The model of the arm.
+        q: Joint coordinates. Shape (B, n).
+        lines: Number of rows.
+        out: Receives the gradients; 0 where J has no full rank. Shape (B, n).
+    """
+    n = q.shape[1]
+    rotation, position, jacobian = np.empty((3, 3)), np.empty(3), np.empty((6, n))
+    gram, dual, column, turned = np.empty((lines, lines)), np.empty((n, lines)), np.empty(lines), np.empty(6)
+    for row in range(q.shape[0]):
+        out[row] = 0.0
+        forward_and_jacobian(chain, q[row], rotation, position, jacobian)
+        for a in range(lines):
+            for b in range(a + 1):
+                gram[a, b] = 0.0
+                for k in range(n):
+                    gram[a, b] += jacobian[a, k] * jacobian[b, k]
+        if not cholesky(gram):
+            continue
+        w = 1.0
+        for a in range(lines):
+            w *= gram[a, a]
+        for j in range(n):
+            column[:] = jacobian[:lines, j]
+            cholesky_solve(gram, column)
+            dual[j] = column  # a row of J⁺
+        for i in range(n):
+            for j in range(n):
+                turned[3:] = 0.0
+                if i <= j:
+                    _cross(jacobian[3:, i], jacobian[:3, j], turned[:3])
+                    _cross(jacobian[3:, i], jacobian[3:, j], turned[3:])
+                else:
+                    _cross(jacobian[3:, j], jacobian[:3, i], turned[:3])
+                for a in range(lines):
+                    out[row, i] += w * turned[a] * dual[j, a]
+
+
+@kernel
+def _cross(x, y, out):  # type: ignore[no-untyped-def]
+    out[0] = x[1] * y[2] - x[2] * y[1]
+    out[1] = x[2] * y[0] - x[0] * y[2]
+    out[2] = x[0] * y[1] - x[1] * y[0]

@@ -1,0 +1,51 @@
+"""Resolved rate by the truncated singular value decomposition."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import ClassVar
+
+import numpy as np
+import numpy.typing as npt
+
+from baselines.solvers.resolved_rate.base import ResolvedRate, status_of
+from baselines.solvers.resolved_rate.moore_penrose import pseudoinverse_rows
+from ikgym.exceptions import InvalidInputError
+from ikgym.validation import FloatArray, number
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class TruncatedSVD(ResolvedRate):
+    """The pseudoinverse without the small singular values: Δq = Σ v uᵀ Δx / σ over the large σ (Khan 2020, section 2).
+
+    The joint shift is at most ‖Δx‖ / (threshold σ_max). Within the directions that are kept nothing is distorted,
+    unlike with damping; those left out are not tracked at all until their singular value has grown again, when the
+    error piled up is taken back at once: the joint velocity jumps. Wherever one is left out the status says
+    ``rank_deficient``.
+
+    Args:
+        problem: What the policy is told of the scenario.
+        gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
+        threshold: Singular values of the task Jacobian below this share of the largest are left out. Between 0
+            and 1.
+
+    Raises:
+        InvalidInputError: The gain or the threshold is out of its range.
+    """
+
+    threshold: float = 3e-3
+
+    name: ClassVar[str] = "truncated_svd"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "threshold", number("threshold", self.threshold, at_least=0.0))
+        if self.threshold >= 1.0:
+            raise InvalidInputError(f"threshold: expected a number of at least 0 and below 1, got {self.threshold:g}.")
+
+    def invert(self, jacobian: FloatArray, shift: FloatArray) -> tuple[FloatArray, npt.NDArray[np.int64]]:
+        """See :meth:`ResolvedRate.invert`."""
+        rows, _, n = jacobian.shape
+        out, deficient = np.empty((rows, n)), np.empty(rows, dtype=np.bool_)
+        pseudoinverse_rows(jacobian, shift, self.threshold, self.full_rank, out, deficient)
+        return out, status_of(deficient)

@@ -1,0 +1,68 @@
+"""Policies as text: ``"dls"``, ``"dls:damping=1e-2"``, ``"agent:PATH"``."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Mapping
+from typing import Any
+
+from baselines import registry
+from ikgym.exceptions import InvalidInputError
+from ikgym.validation import known_names
+
+#: A policy as text such as ``"dls:damping=1e-2"``, or its name and its parameters.
+PolicySpec = str | tuple[str, Mapping[str, Any]]
+
+
+def parse_policy(spec: PolicySpec) -> tuple[str, dict[str, Any]]:
+    """Name and parameters of a policy.
+
+    Args:
+        spec: ``"name"``, ``"name:parameter=value,parameter=value"`` or a pair of both; ``"agent:PATH"``, too. Values
+            are Python's literals; anything else is taken for plain text.
+
+    Raises:
+        UnknownNameError: There is no such policy or parameter.
+        InvalidInputError: The text has another form, or names a parameter twice.
+    """
+    if isinstance(spec, str):
+        name, _, text = spec.partition(":")
+        name = name.strip()
+        alone, known = registry.get(name).nameless, registry.get(name).parameter_names()
+        if alone is not None and text.strip() and text.partition("=")[0].strip() not in known:
+            parameters: dict[str, Any] = {alone: text.strip()}
+        else:
+            parameters = _parse_parameters(spec, text) if ":" in spec else {}
+    elif isinstance(spec, tuple) and len(spec) == 2 and isinstance(spec[0], str) and isinstance(spec[1], Mapping):
+        name, parameters = spec[0], dict(spec[1])
+    else:
+        raise InvalidInputError(f"policy: expected 'name:parameter=value' or (name, parameters), got {spec!r}.")
+    known_names(f"parameter of {name}", parameters, registry.get(name).parameter_names())
+    return name, parameters
+
+
+def _parse_parameters(spec: str, text: str) -> dict[str, Any]:
+    out: dict[str, Any] = {}
+    for part in _split(text):
+        name, equals, value = (piece.strip() for piece in part.partition("="))
+        if not (name and equals and value):
+            raise InvalidInputError(f"policy {spec!r}: expected name:parameter=value,…, got {part.strip()!r}.")
+        if name in out:
+            raise InvalidInputError(f"policy {spec!r}: parameter {name!r} is given twice.")
+        try:
+            out[name] = ast.literal_eval(value)
+        except (ValueError, SyntaxError, TypeError, RecursionError, MemoryError):
+            out[name] = value
+    return out
+
+
+def _split(text: str) -> list[str]:
+    """Parts between commas that stand in no bracket."""
+    parts, depth = [""], 0
+    for letter in text:
+        depth += (letter in "([{") - (letter in ")]}")
+        if letter == "," and depth == 0:
+            parts.append("")
+        else:
+            parts[-1] += letter
+    return parts

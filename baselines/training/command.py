@@ -1,0 +1,260 @@
+"""The command line of `train.py`."""
+
+from __future__ import annotations
+
+import dataclasses
+import pathlib
+import shlex
+import sys
+import textwrap
+from collections.abc import Iterable, Sequence
+from typing import Annotated, Any, Generic, TypeVar, Union
+
+import tyro
+
+from baselines import registry
+from baselines.training import methods, presets
+from baselines.training.config.common import SHAPE, Config
+from baselines.training.errors import TrainingError
+from baselines.training.seeds import Job, Outcome, train_seeds
+from ikgym import scenarios
+from ikgym.exceptions import IkgymError
+from ikgym.validation import whole_number
+
+PROGRAM = "train.py"
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Options:
+    """Where to, and how: nothing of this changes what comes of a seed."""
+
+    out: Annotated[pathlib.Path, tyro.conf.arg(metavar="DIR")]
+    """Folder for the files; the run with seed N has the folder seed-N in it."""
+    seeds: Annotated[tuple[int, ...], tyro.conf.arg(metavar="N …")] = (0,)
+    """One run each."""
+    workers: Annotated[int, tyro.conf.arg(metavar="N")] = 1
+    """Processes that train at the same time, one seed each."""
+    preset: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
+    """Options of a preset, or of a file that ends in .toml; those on the command line go first."""
+    resume: bool = False
+    """Go on with the runs in the folder, to the same end as if they had never been stopped."""
+    overwrite: bool = False
+    """Throw away the runs in the folder."""
+    checkpoint_every: Annotated[float, tyro.conf.arg(metavar="SECONDS")] = 15.0
+    """Shortest time between two checkpoints; there are none within a segment."""
+    progress: bool = True
+    """Show a progress bar."""
+
+
+C = TypeVar("C", bound=Config)
+
+
+@dataclasses.dataclass(frozen=True)
+class Command(Generic[C]):
+    """A method with its configuration."""
+
+    config: Annotated[C, tyro.conf.arg(name="")]
+    options: Annotated[Options, tyro.conf.arg(name="")]
+
+
+@dataclasses.dataclass(frozen=True)
+class Repeat:
+    """Repeats a run from its run.json, and compares the final weights; exit code 1 where they differ."""
+
+    run: Annotated[tyro.conf.Positional[pathlib.Path], tyro.conf.arg(metavar="RUN_JSON")]
+    """The run.json of a run."""
+    out: Annotated[pathlib.Path, tyro.conf.arg(metavar="DIR")]
+    """Folder for the files."""
+    resume: bool = False
+    """Go on with the repetition in the folder."""
+    overwrite: bool = False
+    """Throw away the run in the folder."""
+    checkpoint_every: Annotated[float, tyro.conf.arg(metavar="SECONDS")] = 15.0
+    """Shortest time between two checkpoints."""
+    progress: bool = True
+    """Show a progress bar."""
+
+
+def manual() -> str:
+    """The text of ``--help`` above the options."""
+    return f"""\
+Trains agents: networks that answer an observation with joint velocities, alone or as a correction of another policy.
+Each method has options of its own: {PROGRAM} METHOD --help
+
+{_listing("Methods", methods.METHODS)}
+
+{_listing("Presets", presets.names())}
+
+{_listing("Scenarios", scenarios.names())}
+
+{_listing("Policies for --over", (name for name in registry.names() if not registry.get(name).reference))}
+
+Examples:
+  python {PROGRAM} ppo --preset smoke --out runs/smoke
+  python {PROGRAM} ppo --over dls:damping=1e-2 --reach 0.5 --seeds 0 1 2 3 4 --workers 2 --out runs/over-dls
+  python {PROGRAM} imitate --preset residual --seeds 0 1 2 3 4 --workers 2 --out runs/residual
+  python {PROGRAM} ppo --preset finetune --init runs/apg/seed-0/model.zip --out runs/finer
+  python {PROGRAM} ppo --preset smoke --out runs/smoke --resume
+  python {PROGRAM} repeat runs/smoke/seed-0/run.json --out runs/again
+
+Files in the folder of a run, each replaced in one go, so that it may be stopped or killed at any time:
+  run.json           all that is needed to repeat it, its validation, what it has cost, the hash of its final weights
+  history.json       a row a segment
+  tensorboard/       the same, for: tensorboard --logdir DIR
+  checkpoint.pt      where it stands, for --resume
+  model.zip          at the end, the kept model, for Stable-Baselines3 and for --init
+  agent.safetensors  at the end, the same agent, for: python -m baselines.evaluate --policies agent:FILE
+
+Agents are trained on the seeds of the split "train" and judged on those of "validation"; those of "test" are not
+touched. Where there is a reference, the cost ratio is the geometric mean of the costs over those of rhc_foresight."""
+
+
+def _listing(title: str, names: Iterable[str]) -> str:
+    return textwrap.fill(f"{title}: {', '.join(names)}.", 100, subsequent_indent="  ", break_on_hyphens=False)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """The command line.
+
+    Args:
+        arguments: What stands behind the command; taken from the process if left out.
+
+    Returns:
+        The exit code: 0; 1 where a repetition came to other weights; 2 where something expected went wrong, be it in
+        one seed of several; 130 after Ctrl-C.
+    """
+    arguments = sys.argv[1:] if arguments is None else list(arguments)
+    out: pathlib.Path | None = None
+    try:
+        command, given = parse(arguments)
+        if isinstance(command, Repeat):
+            out = command.out
+            return _repeat(command)
+        out = command.options.out
+        return _train(command, given, shlex.join(["python", PROGRAM, *arguments]))
+    except IkgymError as e:
+        print(f"error: {' '.join(str(e).split())}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        kept = "" if out is None else f" What was done up to the last checkpoint is in {out}; go on with --resume."
+        print(f"\nStopped.{kept}", file=sys.stderr)
+        return 130
+
+
+def parse(arguments: Sequence[str]) -> tuple[Command[Any] | Repeat, frozenset[str]]:
+    """What a command line asks for.
+
+    Returns:
+        The command, and the names of the options in :data:`common.SHAPE` that it gives, be it by a preset.
+
+    Raises:
+        UnknownNameError: There is no such preset, or the method has no option that the preset gives.
+        InvalidInputError: A value is refused.
+    """
+    chosen = next((argument for argument in arguments if argument in methods.METHODS), None)
+    preset = _value_of("--preset", arguments)
+    given = {name for name in SHAPE if _value_of(f"--{name.replace('_', '-')}", arguments) is not None}
+    kinds: list[Any] = []
+    for name, method in methods.METHODS.items():
+        config, of_preset = presets.configure(method.config, preset if name == chosen else None)
+        default: Any = Command(config, Options(out=tyro.MISSING))
+        summary = (method.config.__doc__ or "").strip()
+        generic: Any = Command
+        kinds.append(
+            Annotated[generic[method.config], tyro.conf.subcommand(name, default=default, description=summary)]
+        )
+        given |= of_preset
+    kinds.append(Annotated[Repeat, tyro.conf.subcommand("repeat")])
+    any_of_them: Any = Union[tuple(kinds)]  # noqa: UP007  # made at run time
+    command: Command[Any] | Repeat = tyro.cli(
+        any_of_them,
+        prog=f"python {PROGRAM}",
+        description=manual(),
+        args=arguments,
+    )
+    return command, frozenset(given)
+
+
+def _value_of(option: str, arguments: Sequence[str]) -> str | None:
+    """The value of an option that is needed before the others can be read."""
+    for argument, following in zip(arguments, [*arguments[1:], ""], strict=True):
+        name, equals, value = argument.partition("=")
+        if name.replace("_", "-") == option:
+            return value if equals else following
+    return None
+
+
+def _train(command: Command[Any], given: frozenset[str], text: str) -> int:
+    # PyTorch takes seconds to load, and --help needs none.
+    from baselines.training.trainers.initial import settle
+
+    options = command.options
+    seeds = tuple(dict.fromkeys(whole_number("seeds", seed, at_least=0) for seed in options.seeds))
+    if not seeds:
+        raise TrainingError("seeds: expected at least one.")
+    job = Job(
+        settle(command.config, given),
+        options.out,
+        resume=options.resume,
+        overwrite=options.overwrite,
+        checkpoint_every=options.checkpoint_every,
+        command=text,
+    )
+    workers = whole_number("workers", options.workers, at_least=1)
+    outcomes = train_seeds(job, seeds, workers=workers, progress=options.progress)
+    print(table(outcomes))
+    for outcome in outcomes:
+        if outcome.error:
+            print(f"error: seed {outcome.seed}: {outcome.error}", file=sys.stderr)
+    print(f"\nwritten to {options.out}")
+    return 2 if any(outcome.error for outcome in outcomes) else 0
+
+
+def _repeat(command: Repeat) -> int:
+    from baselines.training.folder import read_run
+
+    about = read_run(command.run)
+    wanted = about.get("weights_sha256")
+    if not wanted:
+        raise TrainingError(f"{command.run} is of a run that has not ended: finish it with --resume.")
+    config = methods.get(about["method"]).config.from_json(about["config"])
+    job = Job(
+        config,
+        command.out,
+        resume=command.resume,
+        overwrite=command.overwrite,
+        checkpoint_every=command.checkpoint_every,
+        command=shlex.join(["python", PROGRAM, "repeat", str(command.run)]),
+    )
+    (outcome,) = train_seeds(job, [about["seed"]], workers=1, progress=command.progress)
+    if outcome.error:
+        raise TrainingError(outcome.error)
+    if outcome.weights_sha256 == wanted:
+        print(f"The same final weights, bit for bit: {wanted}")
+        return 0
+    print(f"Other final weights: expected {wanted}, got {outcome.weights_sha256}.")
+    for line in _reasons(about, read_run(job.folder(about["seed"]) / "run.json")):
+        print(line)
+    return 1
+
+
+def _reasons(there: dict[str, Any], here: dict[str, Any]) -> Iterable[str]:
+    """What may have led to other weights."""
+    for part in ("scenario", "init", "versions", "machine"):
+        if there.get(part) != here.get(part):
+            yield f"  {part}: {there.get(part)} there, {here.get(part)} here"
+
+
+def table(outcomes: Sequence[Outcome]) -> str:
+    """Seeds and their scores, as text."""
+    lines = [f"{'seed':>4}  {'cost ratio':>8}  {'cost':>10}  {'worst':>8}  {'lost':>6}"]
+    for outcome in outcomes:
+        if outcome.score is None:
+            lines.append(f"{outcome.seed:>4}  failed")
+            continue
+        score = outcome.score
+        cost_ratio = "–" if score.cost_ratio is None else f"{score.cost_ratio:.4f}"
+        lines.append(
+            f"{outcome.seed:>4}  {cost_ratio:>8}  {score.cost:>10.5g}  {score.worst:>8.4g}  {score.lost:>6.1%}"
+        )
+    return "\n".join(lines)

@@ -1,0 +1,90 @@
+"""Training curves as a plot: ``python -m baselines.training.curves NAME=DIR … --write FILE``."""
+
+from __future__ import annotations
+
+import dataclasses
+import pathlib
+import sys
+from collections.abc import Sequence
+from typing import Annotated
+
+import tyro
+from matplotlib.figure import Figure
+
+from baselines.evaluation.plots import style
+from baselines.files import write
+from baselines.training.folder import read_run
+from ikgym.exceptions import IkgymError, InvalidInputError
+
+
+@dataclasses.dataclass(frozen=True)
+class Options:
+    """What the command line takes."""
+
+    runs: tyro.conf.Positional[Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=DIR")]]
+    """Trainings: what to call each, and the folder of its seeds."""
+    write: Annotated[pathlib.Path, tyro.conf.arg(metavar="FILE")]
+    """The picture, a PNG."""
+
+
+def curves(trainings: dict[str, pathlib.Path]) -> Figure:
+    """Validation cost ratio over core-minutes, a line a seed.
+
+    Args:
+        trainings: The folders of seeds by name.
+
+    Raises:
+        TrainingError: A `run.json` cannot be read.
+        InvalidInputError: A folder has no runs.
+    """
+    drawn = style.figure(4.2)
+    axes = drawn.add_subplot()
+    handles = []
+    for number, folder in enumerate(trainings.values()):
+        files = sorted(folder.glob("seed-*/run.json"))
+        if not files:
+            raise InvalidInputError(f"{folder}: expected runs, seed-*/run.json; there is none.")
+        for file in files:
+            scores = [score for score in read_run(file)["validation"] if score["cost_ratio"] is not None]
+            minutes, cost_ratios = [s["core_minutes"] for s in scores], [s["cost_ratio"] for s in scores]
+            (line,) = axes.plot(minutes, cost_ratios, lw=1.0, marker="o", ms=2.5, **style.looks(number))
+        handles.append(line)
+    axes.set_yscale("log")
+    style.dress(axes, ylabel="validation cost ratio", xlabel="core-minutes of training")
+    style.legend(drawn, "Training: a line a seed", handles, list(trainings))
+    return drawn
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """The command line.
+
+    Args:
+        arguments: What stands behind the command; taken from the process if left out.
+
+    Returns:
+        The exit code: 0, or 2 where something expected went wrong.
+    """
+    options = tyro.cli(
+        Options,
+        prog="python -m baselines.training.curves",
+        description="Draws how agents got better: the geometric mean of their costs on validation episodes over those "
+        "of rhc_foresight.",
+        args=arguments,
+    )
+    try:
+        trainings = {}
+        for text in options.runs:
+            name, equals, folder = text.partition("=")
+            if not (name and equals and folder):
+                raise InvalidInputError(f"expected NAME=DIR, got {text!r}.")
+            trainings[name] = pathlib.Path(folder)
+        write(options.write, style.small_png(curves(trainings)))
+    except IkgymError as e:
+        print(f"error: {' '.join(str(e).split())}", file=sys.stderr)
+        return 2
+    print(f"written to {options.write}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,1 @@
+"""The environment as agents see it in training."""

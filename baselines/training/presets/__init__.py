@@ -1,0 +1,62 @@
+"""Presets: options of a method in a TOML file, by the names that they have in its configuration.
+
+A file may name its ``method``; one that does not is for all methods that have its options.
+"""
+
+from __future__ import annotations
+
+import pathlib
+import tomllib
+from typing import Any
+
+from baselines.training.config.common import Config
+from ikgym.exceptions import InvalidInputError, UnknownNameError
+
+FOLDER = pathlib.Path(__file__).parent
+
+
+def names() -> tuple[str, ...]:
+    """The presets that come with the training."""
+    return tuple(sorted(file.stem for file in FOLDER.glob("*.toml")))
+
+
+def read(preset: str) -> dict[str, Any]:
+    """The options of a preset.
+
+    Args:
+        preset: One of :func:`names`, or the path of a file that ends in ``.toml``.
+
+    Raises:
+        UnknownNameError: There is no such preset; the message has the nearest name.
+        InvalidInputError: The file cannot be read, or is no TOML.
+    """
+    file = pathlib.Path(preset) if preset.endswith(".toml") else FOLDER / f"{preset}.toml"
+    if file.parent == FOLDER and preset not in names():
+        raise UnknownNameError("preset", preset, names())
+    try:
+        return tomllib.loads(file.read_text(encoding="utf-8"))
+    except OSError as e:
+        raise InvalidInputError(f"Cannot read the preset {file}: {e.strerror}.") from None
+    except ValueError as e:
+        raise InvalidInputError(f"The preset {file} is no TOML: {e}.") from None
+
+
+def configure(kind: type[Config], preset: str | None) -> tuple[Config, frozenset[str]]:
+    """A method's configuration from a preset.
+
+    Args:
+        kind: The class of the configuration.
+        preset: As in :func:`read`; None for the defaults.
+
+    Returns:
+        The configuration, and the names of the options that the preset gives.
+
+    Raises:
+        UnknownNameError: There is no such preset, or the method has no option that it gives.
+        InvalidInputError: The preset is for another method, or a value is refused.
+    """
+    options = {} if preset is None else read(preset)
+    method = options.pop("method", kind.method)
+    if method != kind.method:
+        raise InvalidInputError(f"The preset {preset} is for {method}, not for {kind.method}.")
+    return kind.from_json(options), frozenset(options)

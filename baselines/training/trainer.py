@@ -1,0 +1,53 @@
+"""What a method of training has to offer, so that a run of it can be evaluated, taken up again and repeated."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+from stable_baselines3.common.base_class import BaseAlgorithm
+
+from baselines.agents.features import Processing
+
+#: What a trainer says of a segment, by name.
+Metrics = dict[str, float]
+
+
+class Trainer(Protocol):
+    """A run in the making.
+
+    Before it is made and before each segment, :func:`randomness.reseed` has seeded the generators of Python,
+    NumPy and PyTorch; what else is random comes from :func:`randomness.sequence`. A segment depends on
+    nothing but :meth:`state` and its number: then a run that was killed at any moment, and is taken up from any
+    earlier state, ends with the very weights of one that was not.
+
+    Attributes:
+        model: An ordinary model of Stable-Baselines3; its observations are the features of `processing`.
+        processing: What the agent sees, and what its answers mean.
+        segments: The number of segments.
+        steps: Steps that arms have been moved by so far, those of all arms together.
+    """
+
+    model: BaseAlgorithm
+    processing: Processing
+    segments: int
+
+    @property
+    def steps(self) -> int:
+        """Steps that arms have been moved by so far."""
+
+    def segment(self, number: int) -> Metrics:
+        """Trains for one segment.
+
+        Args:
+            number: Counted from 0.
+        """
+
+    def state(self) -> dict[str, Any]:
+        """All that the segments to come depend on: tensors, numbers, texts, and lists and dicts of them."""
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Goes on from a state.
+
+        Args:
+            state: What :meth:`state` gave, in this process or another.
+        """

@@ -1,0 +1,142 @@
+"""Models of Stable-Baselines3, and what is the same in all kinds of them: a network whose answers are squashed."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from typing import Any, Literal
+
+import numpy as np
+import torch
+from stable_baselines3 import PPO, SAC, TD3
+from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.logger import Logger
+from torch import nn
+
+from baselines.agents.features import Features
+from baselines.training.config.common import Activation, Algorithm
+from baselines.training.environment.vec_env import ProcessedVecEnv
+
+ACTIVATIONS: dict[Activation, type[nn.Module]] = {
+    "silu": nn.SiLU,
+    "relu": nn.ReLU,
+    "tanh": nn.Tanh,
+    "elu": nn.ELU,
+}
+ALGORITHMS: dict[Algorithm, type[BaseAlgorithm]] = {"ppo": PPO, "sac": SAC, "td3": TD3}
+
+#: The last layer's first weights are made this much smaller: an agent begins near the policy under it, or near rest.
+QUIET = 0.01
+
+#: How answers are kept within ±1.
+Squash = Literal["clip", "tanh"]
+
+
+def new_model(
+    algorithm: Algorithm,
+    env: ProcessedVecEnv,
+    hidden: Sequence[int],
+    activation: Activation,
+    log_std_init: float = -2.0,
+    noise_steps: int = 1,
+    **parameters: Any,
+) -> BaseAlgorithm:
+    """An untrained model, whose first answers are almost 0.
+
+    Its first weights are drawn from the generator of PyTorch that all share.
+
+    Args:
+        algorithm: Its kind.
+        env: What it is trained in.
+        hidden: Neurons of the hidden layers, of actor and critics alike.
+        activation: Of the hidden layers.
+        log_std_init: Logarithm of the standard deviation of its answers, before tanh where there is one; TD3 has none.
+        noise_steps: Steps after which noise is drawn anew; noise is a function of what is seen where they are more
+            than 1 (gSDE). Not for TD3.
+        **parameters: Of the class of Stable-Baselines3.
+    """
+    critic = "vf" if algorithm == "ppo" else "qf"
+    policy: dict[str, Any] = {
+        "net_arch": {"pi": list(hidden), critic: list(hidden)},
+        "activation_fn": ACTIVATIONS[activation],
+    }
+    if algorithm != "td3":
+        policy["log_std_init"] = log_std_init
+    if noise_steps > 1:
+        parameters |= {"use_sde": True, "sde_sample_freq": noise_steps}
+        if algorithm == "sac":
+            policy["clip_mean"] = 0.0  # or there would be more to the actor than layers
+    kind = ALGORITHMS[algorithm]
+    model: Any = kind("MlpPolicy", env, policy_kwargs=policy, device="cpu", **parameters)
+    model.set_logger(Logger(None, []))
+    with torch.no_grad():
+        last: Any = mean_network(model)[-1]
+        if algorithm != "ppo":  # whose policy sees to it by itself
+            last.weight.mul_(QUIET)
+            last.bias.zero_()
+        if algorithm == "sac" and noise_steps == 1:
+            model.policy.actor.log_std.weight.mul_(QUIET)
+            model.policy.actor.log_std.bias.fill_(log_std_init)
+        if algorithm == "td3":
+            model.policy.actor_target.load_state_dict(model.policy.actor.state_dict())
+    made: BaseAlgorithm = model
+    return made
+
+
+def algorithm_of(model: BaseAlgorithm) -> Algorithm:
+    """The kind of a model.
+
+    Raises:
+        TypeError: It is of no kind that is known here.
+    """
+    for name, kind in ALGORITHMS.items():
+        if isinstance(model, kind):
+            return name
+    raise TypeError(f"expected one of {', '.join(ALGORITHMS)}, got {type(model).__name__}")
+
+
+def squash_of(algorithm: Algorithm) -> Squash:
+    """How a kind of models keeps its answers within ±1."""
+    return "clip" if algorithm == "ppo" else "tanh"
+
+
+def mean_network(model: BaseAlgorithm) -> nn.Sequential:
+    """From features to the mean of the answers, before they are squashed; it shares the model's weights.
+
+    Returns:
+        Linear layers with activations in between, the last one without.
+    """
+    algorithm = algorithm_of(model)
+    policy: Any = model.policy
+    if algorithm == "ppo":
+        return nn.Sequential(*policy.mlp_extractor.policy_net, policy.action_net)
+    if algorithm == "sac":
+        return nn.Sequential(*policy.actor.latent_pi, policy.actor.mu)
+    return nn.Sequential(*list(policy.actor.mu)[:-1])  # without the tanh
+
+
+def answers(model: BaseAlgorithm, features: Features) -> Features:
+    """The deterministic answers of a model.
+
+    Args:
+        model: Of any kind.
+        features: Shape (N, f).
+
+    Returns:
+        Within ±1. Shape (N, n).
+    """
+    with torch.no_grad():
+        mean = mean_network(model)(torch.from_numpy(features))
+        squashed = mean.clamp(-1.0, 1.0) if squash_of(algorithm_of(model)) == "clip" else mean.tanh()
+    out: Features = squashed.numpy()
+    return out
+
+
+def weights_hash(model: BaseAlgorithm) -> str:
+    """SHA-256 of all weights of a model's policy, critics included."""
+    digest = hashlib.sha256()
+    for name, tensor in sorted(model.policy.state_dict().items()):
+        array = np.ascontiguousarray(tensor.detach().cpu().numpy())
+        digest.update(f"{name} {array.dtype} {array.shape} ".encode())
+        digest.update(array.tobytes())
+    return digest.hexdigest()

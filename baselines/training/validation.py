@@ -1,0 +1,206 @@
+"""How good an agent is on episodes that it was not trained on, and that no published score is about.
+
+``python -m baselines.training.validation --update`` computes the costs anew that the agents' ones are divided by.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import json
+import math
+import pathlib
+import sys
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import tyro
+
+from baselines import registry
+from baselines.agents.features import Features, Processing
+from baselines.episode import added_up
+from baselines.episode import play as play_episodes
+from baselines.evaluation.metrics import geometric_mean
+from baselines.evaluation.rollout import rollouts
+from baselines.files import write
+from baselines.fingerprints import fingerprint
+from baselines.policy import Batch
+from baselines.training.environment.view import View
+from ikgym import scenarios, tasks
+from ikgym.scenarios import Scenario
+from ikgym.simulation import Outcome
+from ikgym.validation import FloatArray
+
+#: Where the reference costs are kept, those of which policy, and of which scenario, tasks, and how many episodes.
+FILE = pathlib.Path(__file__).with_name("validation_reference.json")
+POLICY, SCENARIO, TASKS, EPISODES = "rhc_foresight", "varga7-random", ("skew", "pose"), 64
+#: Digits of a cost that are kept.
+DIGITS = 7
+
+#: An arm that was further from its path than this, in [m], was lost.
+LOST = 0.05
+
+#: From features of shape (N, f) to answers of shape (N, n).
+Answers = Callable[[Features], npt.NDArray[np.float32]]
+
+
+@dataclasses.dataclass(frozen=True)
+class Score:
+    """How an agent did on the validation split.
+
+    Args:
+        episodes: How many were played.
+        cost: Geometric mean of their costs.
+        cost_ratio: Geometric mean of their costs over those of the reference; None where there is none.
+        worst: Largest of these ratios; of the costs where there is no reference.
+        lost: Share of the episodes in which the arm was more than 50 mm away from its path at some time.
+    """
+
+    episodes: int
+    cost: float
+    cost_ratio: float | None
+    worst: float
+    lost: float
+
+    def to_json(self) -> dict[str, Any]:
+        """The fields by name."""
+        return dataclasses.asdict(self)
+
+
+def validation_seeds(scenario: Scenario, episodes: int) -> tuple[int, ...]:
+    """The first seeds of the validation split; one where the scenario knows no chance."""
+    chance = scenario.random or bool(np.any(scenario.disturbance.noise))
+    return scenarios.seeds("validation", episodes if chance else 1)
+
+
+def validate(answers: Answers, processing: Processing, scenario: Scenario, episodes: int) -> Score:
+    """Plays episodes of the validation split with an agent.
+
+    Args:
+        answers: The agent's, without chance.
+        processing: What the agent sees, and what its answers mean.
+        scenario: What is to be tracked.
+        episodes: How many; a scenario without chance has one.
+    """
+    seeds = validation_seeds(scenario, episodes)
+    costs, errors = play(answers, processing, scenario, seeds)
+    reference = reference_costs(fingerprint(scenario), seeds)
+    ratios = costs if reference is None else costs / reference
+    return Score(
+        episodes=len(seeds),
+        cost=geometric_mean(costs.tolist()),
+        cost_ratio=None if reference is None else geometric_mean(ratios.tolist()),
+        worst=float(ratios.max()),
+        lost=float((errors > LOST).mean()),
+    )
+
+
+def play(
+    answers: Answers, processing: Processing, scenario: Scenario, seeds: Sequence[int]
+) -> tuple[FloatArray, FloatArray]:
+    """Plays episodes in step, as :func:`baselines.evaluation.rollout.rollouts` does.
+
+    Args:
+        answers: The agent's, without chance.
+        processing: What the agent sees, and what its answers mean.
+        scenario: What is to be tracked.
+        seeds: The reset seeds.
+
+    Returns:
+        Costs of the episodes, and the largest position errors in [m]. Shapes (N,).
+    """
+    view, rows = View(processing, scenario), len(seeds)
+    starting = np.ones(rows, dtype=np.bool_)
+
+    def act(out: Outcome) -> npt.NDArray[Any]:
+        features = view.see({name: getattr(out, name) for name in Batch._fields}, starting)
+        starting[:] = False
+        return view.act(answers(features))
+
+    costs, errors = np.empty((rows, scenario.steps)), np.zeros(rows)
+    for k, out in enumerate(play_episodes(scenario, seeds, act, preview=view.preview)):
+        costs[:, k] = out.tracking_cost + out.velocity_cost
+        errors = np.maximum(errors, out.position_error)
+    return added_up(costs), errors
+
+
+def reference_costs(digest: str, seeds: Sequence[int]) -> FloatArray | None:
+    """The costs of the reference policy on some episodes, None where they are not known.
+
+    Args:
+        digest: The fingerprint of the scenario.
+        seeds: The reset seeds. Shape of what is returned: (N,).
+    """
+    known: dict[int, float] = {}
+    for record in _records():
+        if record["fingerprint"] == digest:
+            known.update(zip(record["seeds"], record["costs"], strict=True))
+    return np.array([known[seed] for seed in seeds]) if known.keys() >= set(seeds) else None
+
+
+@functools.cache
+def _records() -> list[dict[str, Any]]:
+    content: list[dict[str, Any]] = json.loads(FILE.read_text(encoding="utf-8"))
+    return content
+
+
+def update() -> None:
+    """Computes the costs of the reference anew, and writes them down."""
+    records, seeds = [], scenarios.seeds("validation", EPISODES)
+    for task in TASKS:
+        scenario = scenarios.get(SCENARIO).replace(task=tasks.get(task))
+        episodes = rollouts(scenario, registry.make(POLICY, scenario), seeds)
+        costs = [float(np.sum(e.tracking_cost + e.velocity_cost)) for e in episodes]
+        records.append(record_of(scenario, seeds, costs))
+    write(FILE, (json.dumps(records, indent=1) + "\n").encode())
+
+
+def record_of(scenario: Scenario, seeds: Sequence[int], costs: Sequence[float]) -> dict[str, Any]:
+    """The costs of the reference, as they are written down."""
+    return {
+        "scenario": scenario.name,
+        "task": scenario.task.name,
+        "fingerprint": fingerprint(scenario),
+        "policy": POLICY,
+        "seeds": list(seeds),
+        "costs": [float(f"{cost:.{DIGITS}g}") for cost in costs],
+    }
+
+
+@dataclasses.dataclass(frozen=True)
+class Options:
+    """What the command line takes."""
+
+    update: bool = False
+    """Compute the costs anew, which takes some minutes, and write them down."""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """The command line: prints the mean costs of the reference, or computes them anew.
+
+    Args:
+        arguments: What stands behind the command; taken from the process if left out.
+
+    Returns:
+        The exit code, 0.
+    """
+    options = tyro.cli(
+        Options,
+        prog="python -m baselines.training.validation",
+        description=f"Prints the mean cost of {POLICY} on the first {EPISODES} validation episodes of {SCENARIO}: the "
+        "costs of agents in training are divided by those of it.",
+        args=arguments,
+    )
+    if options.update:
+        update()
+        _records.cache_clear()
+    for record in _records():
+        mean, where = math.exp(float(np.mean(np.log(record["costs"])))), f"{record['scenario']} ({record['task']})"
+        print(f"{record['policy']} on {where}: geometric mean of {len(record['costs'])} costs {mean:.6g}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

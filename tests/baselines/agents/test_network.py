@@ -1,0 +1,129 @@
+"""Networks of agents: the forward pass, and what is refused."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+import time
+
+import numpy as np
+import pytest
+
+from baselines.agents.network import ACTIVATIONS, SQUASHES, Network
+from ikgym.exceptions import InvalidInputError, UnknownNameError
+from tests.baselines.random_agents import network
+from tests.comparison import identical
+
+FORMULAS = {
+    "linear": lambda x: x,
+    "relu": lambda x: np.maximum(x, 0.0),
+    "tanh": np.tanh,
+    "silu": lambda x: x / (1.0 + np.exp(-x)),
+    "elu": lambda x: np.where(x > 0.0, x, np.expm1(np.minimum(x, 0.0))),
+}
+SIZES = [(5, 3), (1, 1), (7, 8, 2), (76, 33, 31, 7), (17, 256, 6)]
+
+
+def written_out(net, features):
+    """The answers in float64, as NumPy has them."""
+    x = features.astype(np.float64)
+    for weights, biases in zip(net.weights[:-1], net.biases[:-1], strict=True):
+        x = FORMULAS[net.activation](x @ weights.T.astype(np.float64) + biases)
+    x = x @ net.weights[-1].T.astype(np.float64) + net.biases[-1]
+    return np.tanh(x) if net.squash == "tanh" else np.clip(x, -1.0, 1.0)
+
+
+def features(rows, size, seed=1):
+    return np.random.default_rng(seed).normal(0.0, 3.0, (rows, size)).astype(np.float32)
+
+
+@pytest.mark.parametrize("sizes", SIZES, ids=str)
+@pytest.mark.parametrize("squash", SQUASHES)
+@pytest.mark.parametrize("activation", ACTIVATIONS)
+def test_answers_are_those_of_the_formula(activation, squash, sizes):
+    net = network(sizes, activation, squash)
+    x = features(50, sizes[0])
+    answers = net.answer(x)
+    assert answers.dtype == np.float32
+    np.testing.assert_allclose(answers, written_out(net, x), atol=1e-5)
+    assert np.abs(answers).max() <= 1.0
+    assert np.ptp(answers) > 0.5
+
+
+@pytest.mark.parametrize("activation", ACTIVATIONS)
+def test_rows_are_single_calls(activation):
+    net = network((76, 64, 33, 7), activation)
+    x = features(70, 76)
+    whole = net.answer(x)
+    for rows in (1, 2, 5):
+        parts = [net.answer(x[i : i + rows]) for i in range(0, len(x), rows)]
+        assert identical(np.concatenate(parts), whole)
+    assert identical(net.answer(x[::-1]), whole[::-1].copy())
+
+
+def test_extreme_numbers():
+    for activation in ACTIVATIONS:
+        net = network((4, 8, 2), activation)
+        assert np.abs(net.answer(np.full((1, 4), 1e30, dtype=np.float32))).max() <= 1.0
+        assert np.isfinite(net.answer(np.full((1, 4), -1e30, dtype=np.float32))).all()
+
+
+def test_a_sum_that_overflows_is_no_answer():
+    net = Network((np.array([[3e38, 3e38], [3e38, -3e38]]), np.ones((1, 2))), (np.zeros(2), np.zeros(1)), "linear")
+    assert np.isnan(net.answer(np.array([[-3e38, 3e38]], dtype=np.float32))).all()
+
+
+def test_a_call_takes_less_than_50_us():
+    for sizes in ((76, 256, 256, 256, 7), (76, 384, 384, 7)):
+        net, x, times = network(sizes), features(1, 76), []
+        for _ in range(300):
+            begin = time.perf_counter()
+            net.answer(x)
+            times.append(time.perf_counter() - begin)
+        # The best: the others tell of what else the machine does.
+        assert min(times) < 50e-6
+
+
+def test_networks_are_frozen_copies():
+    weights, biases = [np.ones((2, 3))], [np.zeros(2)]
+    net = Network(tuple(weights), tuple(biases))
+    before = net.answer(np.ones((1, 3), dtype=np.float32))
+    weights[0][:] = 7.0
+    for other in (net, copy.deepcopy(net), pickle.loads(pickle.dumps(net))):
+        assert identical(other.answer(np.ones((1, 3), dtype=np.float32)), before)
+        arrays = [*other.weights, *other.biases, *(a for a in other._constants if isinstance(a, np.ndarray))]
+        assert not any(array.flags.writeable for array in arrays)
+    assert net.sizes == (3, 2)
+    assert (net.inputs, net.outputs) == (3, 2)
+
+
+@pytest.mark.parametrize(
+    ("weights", "biases", "message"),
+    [
+        ((), (), "layers: expected at least one"),
+        ((np.ones((2, 3)),), (), "got 1 and 0"),
+        ((np.ones((2, 3)),), (np.ones(3),), r"weights of layer 0: expected shape \(3, 3\), got \(2, 3\)"),
+        ((np.ones((2, 3)), np.ones((1, 3))), (np.ones(2), np.ones(1)), r"layer 1: expected shape \(1, 2\)"),
+        ((np.ones(3),), (np.ones(3),), "weights of layer 0: expected 2 axes"),
+        ((np.ones((2, 3)),), (np.ones((2, 1)),), "biases of layer 0: expected 1 axes"),
+        ((np.full((2, 3), np.nan),), (np.ones(2),), "weights of layer 0: expected finite"),
+        ((np.ones((2, 3)),), (np.array([1.0, np.inf]),), "biases of layer 0: expected finite"),
+        ((np.ones((0, 3)),), (np.ones(0),), "weights of layer 0: expected shape"),
+    ],
+)
+def test_what_is_no_network(weights, biases, message):
+    with pytest.raises(InvalidInputError, match=message):
+        Network(weights, biases)
+
+
+def test_unknown_names():
+    with pytest.raises(UnknownNameError, match=r"no activation 'relo'\. Did you mean 'relu'"):
+        network((2, 2), "relo")
+    with pytest.raises(UnknownNameError, match="no squash 'cut'"):
+        network((2, 2), "relu", "cut")
+
+
+@pytest.mark.parametrize("x", [np.ones((1, 2)), np.ones((1, 3), dtype=np.float32), np.ones(2, dtype=np.float32)])
+def test_features_of_another_shape_or_type(x):
+    with pytest.raises(InvalidInputError, match=r"features: expected float32 of shape \(any, 2\), got"):
+        network((2, 2)).answer(x)

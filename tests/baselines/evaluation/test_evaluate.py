@@ -1,0 +1,524 @@
+import csv
+import dataclasses
+import json
+import pathlib
+import pickle
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import baselines
+import ikgym
+from baselines import evaluate as module
+from baselines.evaluate import evaluate, main
+from baselines.evaluation import results as results_module
+from baselines.evaluation import test_sets
+from baselines.evaluation.machine import describe
+from baselines.evaluation.metrics import TIME_COLUMNS, Row
+from baselines.evaluation.plan import make_plan
+from baselines.evaluation.results import COLUMNS, Results, read_rows
+from baselines.evaluation.runner import MOST, batches, play
+from baselines.files import ResultsError, write
+from baselines.spec import parse_policy
+from ikgym import cost_kernels
+from ikgym.exceptions import InvalidInputError, UnknownNameError
+
+ROOT = pathlib.Path(__file__).parents[3]
+STEPS = 15
+
+
+def timeless(rows):
+    return [dataclasses.replace(row, **dict.fromkeys(TIME_COLUMNS, 0)) for row in rows]
+
+
+def strict_json(file):
+    def refuse(constant):
+        raise AssertionError(f"{constant} is no JSON")
+
+    return json.loads(file.read_text(encoding="utf-8"), parse_constant=refuse)
+
+
+def run_all(out=None, **changes):
+    options = {"episodes": 2, "steps": STEPS, "plots": False, "out": out, **changes}
+    return evaluate(["varga7-random", "zhang3-helix"], ["dls", "moore_penrose", "follow_nominal"], **options)
+
+
+# What is evaluated
+
+
+def test_order_and_seeds_of_the_rows():
+    rows = run_all()
+    assert [(row.scenario, row.policy, row.seed) for row in rows] == [
+        ("varga7-random", "dls", 2_000_000),
+        ("varga7-random", "dls", 2_000_001),
+        ("varga7-random", "moore_penrose", 2_000_000),
+        ("varga7-random", "moore_penrose", 2_000_001),
+        ("varga7-random", "follow_nominal", 2_000_000),
+        ("varga7-random", "follow_nominal", 2_000_001),
+        ("zhang3-helix", "dls", 0),
+        ("zhang3-helix", "moore_penrose", 0),
+    ]
+    assert all(row.steps == STEPS and row.preview == 1 for row in rows)
+    assert rows[0].parameters == baselines.make("dls", "varga7-random").parameters
+    assert rows[0].machine == describe()
+    assert set(rows[0].machine) == {"cpu", "cores", "system", "python", "numpy", "numba", "ikgym"}
+
+
+def test_two_runs_agree_in_all_but_the_times():
+    assert timeless(run_all()) == timeless(run_all())
+
+
+def test_a_reference_plays_the_episode_that_it_is_given():
+    rows = evaluate("varga7-random", "follow_nominal", episodes=2, steps=STEPS)
+    assert all(row.position_error_max < 1e-8 for row in rows)
+    assert rows[0].total_cost != rows[1].total_cost
+    assert all("seed" not in row.parameters for row in rows)
+
+
+def test_seeds_come_from_the_split():
+    rows = evaluate("varga7-random", "dls", episodes=2, split="train", steps=5)
+    assert [row.seed for row in rows] == [0, 1]
+
+
+def test_a_scenario_that_is_always_the_same_has_one_episode_unless_there_is_noise():
+    assert [job.seed for job in make_plan("varga7-fast", "dls", episodes=5).jobs] == [0]
+    noisy = ikgym.scenarios.get("varga7-fast").replace(disturbance=ikgym.Disturbance(noise=0.1))
+    plan = make_plan(noisy, "dls", episodes=2)
+    assert [job.seed for job in plan.jobs] == [2_000_000, 2_000_001]
+    assert [job.first for job in plan.jobs] == [True, False]
+
+
+def test_all_stands_for_all():
+    plan = make_plan("all", "all")
+    assert {job.scenario.name for job in plan.jobs} == set(ikgym.scenarios.names())
+    assert {job.policy for job in plan.jobs} | {s.policy for s in plan.skipped} == set(baselines.names())
+    reasons = {(s.scenario, s.policy): s.reason for s in plan.skipped}
+    for scenario in ("zhang3-helix", "zhang6-lspb"):
+        assert "Cartesian" in reasons[scenario, "follow_nominal"]
+
+
+def test_what_is_given_twice_is_done_once():
+    plan = make_plan(["varga7-fast", "varga7-fast"], ["dls", "dls:damping=1e-3", "all"])
+    assert [job.policy for job in plan.jobs].count("dls") == 1
+
+
+def test_steps_shorten_and_never_lengthen():
+    plan = make_plan(["varga7-fast", "zhang3-helix"], "dls", steps=1000)
+    assert [job.scenario.steps for job in plan.jobs] == [1000, 799]
+
+
+def test_policies_are_shown_what_they_ask_for():
+    plan = make_plan("varga7-fast", ["dls", "rhc_gradient:horizon=5"])
+    assert [job.preview for job in plan.jobs] == [1, 4]
+    assert evaluate("varga7-fast", "rhc_gradient:horizon=5,iterations=2", steps=3)[0].preview == 4
+    assert evaluate("varga7-fast", "dls", steps=3, preview=7)[0].preview == 7
+
+
+@pytest.mark.parametrize(
+    ("spec", "expected"),
+    [
+        ("dls", ("dls", {})),
+        ("dls:damping=1e-2", ("dls", {"damping": 1e-2})),
+        (" dls : damping = 1e-2 , gain = 0.5 ", ("dls", {"damping": 1e-2, "gain": 0.5})),
+        ("rhc_gradient:gradient=analytic,horizon=5", ("rhc_gradient", {"gradient": "analytic", "horizon": 5})),
+        ("rhc_gradient:gradient='analytic'", ("rhc_gradient", {"gradient": "analytic"})),
+        ("dls:damping=(1, [2, 3]),gain=1", ("dls", {"damping": (1, [2, 3]), "gain": 1})),
+        (("dls", {"damping": 2.0}), ("dls", {"damping": 2.0})),
+    ],
+)
+def test_policies_are_parsed(spec, expected):
+    assert parse_policy(spec) == expected
+
+
+def test_text_is_never_run():
+    _, parameters = parse_policy("dls:damping=__import__('os').getcwd()")
+    assert parameters == {"damping": "__import__('os').getcwd()"}
+
+
+@pytest.mark.parametrize(
+    ("scenarios", "policies", "options", "error", "message"),
+    [
+        ("varga7-fest", "dls", {}, UnknownNameError, "no scenario 'varga7-fest'. Did you mean 'varga7-fast'"),
+        ("varga7-fast", "dsl", {}, UnknownNameError, "no policy 'dsl'. Did you mean 'dls'"),
+        ("varga7-fast", "dls:dampin=1", {}, UnknownNameError, "no parameter of dls 'dampin'. Did you mean 'damping'"),
+        ("varga7-fast", "dls:damping", {}, InvalidInputError, "expected name:parameter=value,…, got 'damping'"),
+        ("varga7-fast", "dls:", {}, InvalidInputError, "expected name:parameter=value,…, got ''"),
+        ("varga7-fast", "dls:damping=1,damping=2", {}, InvalidInputError, "parameter 'damping' is given twice"),
+        ("varga7-fast", "dls:damping=-1", {}, InvalidInputError, "damping: expected a finite number above 0"),
+        ("varga7-fast", "dls:damping=much", {}, InvalidInputError, "above 0, got 'much'"),
+        ("varga7-fast", [("dls", 3)], {}, InvalidInputError, "expected 'name:parameter=value' or"),
+        ("varga7-fast", "dls", {"episodes": 0}, InvalidInputError, "episodes: expected a whole number of at least 1"),
+        ("varga7-fast", "dls", {"steps": 0}, InvalidInputError, "steps: expected a whole number of at least 1, got 0"),
+        ("varga7-fast", "dls", {"workers": 0}, InvalidInputError, "workers: expected a whole number of at least 1"),
+        ("varga7-fast", "dls", {"preview": 0}, InvalidInputError, "preview: expected a whole number of at least 1"),
+        ("varga7-fast", "dls", {"timed": 0}, InvalidInputError, "timed: expected a whole number of at least 1, got 0"),
+        ("varga7-fast", "dls", {"timed": "every"}, InvalidInputError, "timed: expected a whole number of at least 1"),
+        ("varga7-fast", "dls", {"split": "tset"}, UnknownNameError, "no split 'tset'. Did you mean 'test'"),
+        ("varga7-fast", "rhc_gradient", {"preview": 1}, InvalidInputError, "needs to be shown 2 steps ahead"),
+        ("zhang3-helix", "follow_nominal", {}, InvalidInputError, "Nothing to evaluate: follow_nominal in"),
+        ([], "dls", {}, InvalidInputError, "Nothing to evaluate"),
+    ],
+)  # fmt: skip
+def test_bad_input_is_refused(scenarios, policies, options, error, message):
+    with pytest.raises(error, match=message):
+        evaluate(scenarios, policies, **options)
+
+
+def test_two_scenarios_of_one_name_are_refused():
+    fast = ikgym.scenarios.get("varga7-fast")
+    with pytest.raises(InvalidInputError, match="Two different scenarios are called 'varga7-fast'"):
+        evaluate([fast, fast.replace(dt=2e-3)], "dls")
+
+
+# Batches
+
+
+def test_episodes_of_a_policy_in_a_scenario_are_played_together():
+    jobs = make_plan(["varga7-random", "varga7-fast"], ["dls", "dls:damping=1e-2"], episodes=MOST + 3, timed=2).jobs
+    parts = batches(jobs)
+    assert [job for part in parts for job in part] == list(jobs)
+    assert [len(part) for part in parts] == [1, 1, MOST, 1] * 2 + [1, 1]
+    assert [part[0].timed for part in parts] == [True, True, False, False] * 2 + [True, True]
+    for part in parts:
+        assert len({(job.scenario.name, job.policy, str(job.parameters)) for job in part}) == 1
+
+
+def test_a_reference_that_knows_one_episode_plays_it_alone():
+    jobs = make_plan("varga7-random", "follow_nominal", episodes=4).jobs
+    assert [len(part) for part in batches(jobs)] == [1] * 4
+
+
+@pytest.mark.parametrize(("timed", "expected"), [(1, 1), (2, 2), (9, 5), ("all", 5)])
+def test_so_many_episodes_are_timed(timed, expected):
+    rows = evaluate("varga7-random", "dls", episodes=5, steps=5, timed=timed)
+    assert [row.time_first_us is not None for row in rows] == [True] * expected + [False] * (5 - expected)
+
+
+def test_what_is_timed_changes_nothing_but_the_times():
+    policies = ["dls", "rhc_gradient", "smoothed", "fixed_point_extended"]
+    options = {"episodes": 4, "steps": STEPS}
+    together = evaluate("varga7-random", policies, **options)
+    assert timeless(together) == timeless(evaluate("varga7-random", policies, timed="all", **options))
+    assert len({row.total_cost for row in together}) == len(together)
+
+
+def test_episodes_that_are_to_be_timed_after_all_are_played_again(tmp_path):
+    options = {"episodes": 3, "steps": 5, "out": tmp_path, "plots": False}
+    rows = evaluate("varga7-random", "dls", **options)
+    again = evaluate("varga7-random", "dls", timed=2, resume=True, **options)
+    assert [row.time_first_us is not None for row in again] == [True, True, False]
+    assert again[0] == rows[0]
+    assert again[2] == rows[2]
+    assert timeless(again) == timeless(rows)
+
+
+# Workers
+
+
+def test_a_job_played_elsewhere_gives_the_same_row():
+    (job,) = make_plan("varga7-fast", "dls", steps=STEPS).jobs
+    ((_, row, series),) = play([pickle.loads(pickle.dumps(job))])
+    assert timeless([row]) == timeless([play([job])[0][1]])
+    assert set(series) >= {"time", "pose", "nominal", "q", "qdot", "nominal_q", "position_error", "sliding"}
+
+
+def test_workers_change_nothing_but_the_times(tmp_path):
+    rows = run_all(episodes=4)
+    assert timeless(run_all(tmp_path, workers=2, episodes=4)) == timeless(rows)
+    assert timeless(read_rows(tmp_path / "results.json")) == timeless(rows)
+
+
+def test_an_error_in_a_worker_reaches_the_user():
+    with pytest.raises(InvalidInputError, match="needs to be shown 2 steps ahead"):
+        evaluate(["varga7-fast", "varga7-slow"], "rhc_gradient", preview=1, workers=2)
+
+
+# Files
+
+
+def test_files(tmp_path):
+    rows = run_all(tmp_path)
+    content = strict_json(tmp_path / "results.json")
+    assert [Row.from_json(values) for values in content] == rows == read_rows(tmp_path / "results.json")
+    assert content[0]["cost_ratio"] is None
+    assert content[-1]["orientation_error_max"] is None
+    with (tmp_path / "results.csv").open(encoding="utf-8", newline="") as file:
+        table = list(csv.DictReader(file))
+    assert tuple(table[0]) == COLUMNS
+    assert COLUMNS[:20] == (
+        "scenario", "policy", "parameters", "seed", "steps", "total_cost", "tracking_cost", "velocity_cost",
+        "cost_ratio",
+        "position_error_max", "position_error_rms", "orientation_error_max", "orientation_error_rms", "qdot_peak",
+        "qdot_rms", "qdot_total_variation", "time_p50_us", "time_p99_us", "deadline_misses", "status",
+    )  # fmt: skip
+    for cells, row in zip(table, rows, strict=True):
+        assert float(cells["total_cost"]) == row.total_cost
+        assert json.loads(cells["parameters"]) == row.parameters
+        assert json.loads(cells["machine"]) == row.machine
+        assert cells["cost_ratio"] == ""
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["README.md", "results.csv", "results.json", "series"]
+    assert len(list(tmp_path.glob("series/varga7-random/*.npz"))) == 3
+    assert len(list(tmp_path.glob("series/zhang3-helix/*.npz"))) == 2
+
+
+def test_series_are_the_course_of_the_first_episode_at_the_steps_that_count(tmp_path):
+    held = ikgym.scenarios.get("khan8-q7q8")
+    (row,) = evaluate(held, "dls", steps=620, out=tmp_path, plots=False)
+    plan = make_plan(held, "dls", steps=620)
+    series = Results(tmp_path, plan, describe(), resume=True).series(row)
+    counted = np.flatnonzero(plan.jobs[0].scenario.counted())
+    assert len(counted) == 12
+    np.testing.assert_allclose(series["time"], counted * held.dt)
+    assert series["position_error"].max() == row.position_error_max
+    assert series["pose"].shape == series["nominal"].shape == (12, 12)
+    assert series["q"].shape == series["nominal_q"].shape == (12, 8)
+
+
+def test_results_are_never_overwritten_in_silence(tmp_path):
+    run_all(tmp_path)
+    before = (tmp_path / "results.json").read_bytes()
+    with pytest.raises(ResultsError, match=r"results\.json is there already: go on with it by --resume"):
+        run_all(tmp_path)
+    assert (tmp_path / "results.json").read_bytes() == before
+    with pytest.raises(ResultsError, match="choose one"):
+        run_all(tmp_path, resume=True, overwrite=True)
+
+
+def test_overwriting_removes_what_an_evaluation_wrote_and_nothing_else(tmp_path):
+    run_all(tmp_path)
+    (tmp_path / "notes.txt").write_text("mine")
+    (tmp_path / "series" / "notes.txt").write_text("mine")
+    rows = evaluate("zhang3-helix", "dls", steps=5, out=tmp_path, overwrite=True, plots=False)
+    assert read_rows(tmp_path / "results.json") == rows
+    assert not list(tmp_path.glob("series/varga7-random/*.npz"))
+    assert (tmp_path / "notes.txt").exists()
+    assert (tmp_path / "series" / "notes.txt").exists()
+
+
+def interrupted(monkeypatch, after):
+    play_jobs = module.run
+
+    def run(jobs, **options):
+        for number, outcomes in enumerate(play_jobs(jobs, **options)):
+            if number == after:
+                raise KeyboardInterrupt
+            yield outcomes
+
+    monkeypatch.setattr(module, "run", run)
+
+
+# One episode of each policy is timed. The others of dls and moore_penrose are one batch, those of the reference two.
+@pytest.mark.parametrize(("after", "finished"), [(0, 0), (1, 1), (2, 3), (4, 6), (8, 10)])
+def test_an_interrupted_run_goes_on_to_the_same_results(tmp_path, monkeypatch, after, finished):
+    whole, parts = tmp_path / "whole", tmp_path / "parts"
+    rows = run_all(whole, episodes=3)
+    with monkeypatch.context() as patch:
+        interrupted(patch, after)
+        with pytest.raises(KeyboardInterrupt):
+            run_all(parts, episodes=3)
+    kept = read_rows(parts / "results.json") if after else []
+    assert len(kept) == finished
+    assert timeless(run_all(parts, episodes=3, resume=True)) == timeless(rows)
+    there = read_rows(parts / "results.json")
+    assert there[:finished] == kept  # not played again: even the times are those of before
+    assert timeless(there) == timeless(read_rows(whole / "results.json"))
+    for file in whole.glob("series/*/*.npz"):
+        with np.load(file) as one, np.load(parts / file.relative_to(whole)) as other:
+            assert set(one) == set(other)
+            assert all((one[name] == other[name]).all() for name in one)
+
+
+def test_resuming_a_finished_run_plays_nothing(tmp_path, monkeypatch):
+    rows = run_all(tmp_path)
+    interrupted(monkeypatch, 0)
+    assert run_all(tmp_path, resume=True) == rows
+
+
+def test_a_course_that_is_missing_is_played_again(tmp_path):
+    rows = run_all(tmp_path)
+    (file,) = tmp_path.glob("series/zhang3-helix/dls-*.npz")
+    file.unlink()
+    assert timeless(run_all(tmp_path, resume=True)) == timeless(rows)
+    assert file.exists()
+
+
+def test_resuming_adds_episodes_and_policies(tmp_path):
+    evaluate("varga7-random", "dls", steps=5, out=tmp_path, plots=False)
+    rows = evaluate("varga7-random", "dls", episodes=2, steps=5, out=tmp_path, resume=True, plots=False)
+    assert [row.seed for row in rows] == [2_000_000, 2_000_001]
+    rows = evaluate("varga7-random", "moore_penrose", steps=5, out=tmp_path, resume=True, plots=False)
+    assert [row.policy for row in rows] == ["moore_penrose"]
+    there = read_rows(tmp_path / "results.json")
+    assert [row.policy for row in there] == ["dls", "dls", "moore_penrose"]
+    assert "moore_penrose" in (tmp_path / "README.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("change", "options", "message"),
+    [
+        ({"machine": {"ikgym": "0.0.1"}}, {}, r"results of ikgym 0\.0\.1, this run has"),
+        ({"fingerprint": "000000000000"}, {}, "another scenario varga7-random: fingerprint 000000000000"),
+        ({}, {"steps": 6}, "varga7-random with 5 steps, this run has 6"),
+        ({}, {"split": "validation"}, "varga7-random on the split test, this run has validation"),
+        ({}, {"preview": 3}, "dls in varga7-random with preview 1, this run has 3"),
+        ({"test_set": "0123456789ab"}, {}, "varga7-random in the test set 0123456789ab, this run has none"),
+    ],
+)
+def test_what_cannot_be_compared_is_not_gone_on_with(tmp_path, change, options, message):
+    evaluate("varga7-random", "dls", steps=5, out=tmp_path, plots=False)
+    file = tmp_path / "results.json"
+    file.write_text(json.dumps([{**row, **change} for row in strict_json(file)]), encoding="utf-8")
+    before = file.read_bytes()
+    with pytest.raises(ResultsError, match=message):
+        evaluate("varga7-random", "dls", **{"steps": 5, **options}, out=tmp_path, resume=True, plots=False)
+    assert file.read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("", "is damaged: Expecting value"),
+        ('[{"scenario": "varga7-', "is damaged: Unterminated string"),
+        ("{}", "is damaged: expected a list of rows, got dict"),
+        ("[3]", "is damaged: in row 0 expected an object with the keys of a row, got int"),
+        ('[{"scenario": "a"}]', "is damaged: in row 0 the key 'policy' is missing"),
+        ("[NaN]", "is damaged: NaN is no JSON"),
+        ("\udcff", "is damaged"),
+    ],
+)
+def test_damaged_results_are_named_and_kept(tmp_path, content, message):
+    file = tmp_path / "results.json"
+    file.write_bytes(content.encode("utf-8", "surrogateescape"))
+    with pytest.raises(ResultsError, match=message) as caught:
+        run_all(tmp_path, resume=True)
+    assert str(file) in str(caught.value)
+    assert file.read_bytes() == content.encode("utf-8", "surrogateescape")
+
+
+def test_a_row_that_is_there_twice_is_damage(tmp_path):
+    run_all(tmp_path)
+    file = tmp_path / "results.json"
+    content = strict_json(file)
+    file.write_text(json.dumps([*content, content[0]]), encoding="utf-8")
+    with pytest.raises(ResultsError, match="row 8 is there twice"):
+        read_rows(file)
+
+
+@pytest.mark.parametrize("out", ["file", "file/below"])
+def test_a_folder_that_cannot_be_written_is_refused_before_any_work(tmp_path, monkeypatch, out):
+    (tmp_path / "file").write_text("mine")
+    interrupted(monkeypatch, 0)
+    with pytest.raises(ResultsError, match="Cannot write into"):
+        run_all(tmp_path / out)
+
+
+def test_a_crash_while_writing_leaves_the_old_file(tmp_path, monkeypatch):
+    file = tmp_path / "results.json"
+    write(file, b"old")
+
+    def full(_):
+        raise OSError(28, "No space left on device")
+
+    for name in ("os.fsync", "pathlib.Path.replace"):
+        with monkeypatch.context() as patch:
+            patch.setattr(name, full if name == "os.fsync" else lambda *_: full(None))
+            with pytest.raises(ResultsError, match="No space left on device"):
+                write(file, b"new")
+        assert file.read_bytes() == b"old"
+        assert [p.name for p in tmp_path.iterdir()] == ["results.json"]
+    write(file, b"new")
+    assert file.read_bytes() == b"new"
+
+
+def test_results_are_on_disk_after_each_batch(tmp_path, monkeypatch):
+    lengths = []
+    add = Results.add
+
+    def watched(self, *arguments):
+        add(self, *arguments)
+        lengths.append(len(strict_json(tmp_path / "results.json")))
+
+    monkeypatch.setattr(results_module.Results, "add", watched)
+    run_all(tmp_path, episodes=4)
+    assert lengths == [1, 4, 5, 8, 9, 10, 11, 12, 13, 14]
+
+
+# The command line
+
+
+def test_errors_are_one_line_and_exit_code_2(capsys, tmp_path):
+    cases = [
+        ["--policies", "dsl"],
+        ["--scenarios", "varga7-fest"],
+        ["--policies", "rhc_gradient", "--preview", "1"],
+        ["--episodes", "0"],
+        ["--test-sets", "varga7-random"],  # with --steps
+        ["--out", str(tmp_path / "results.json" / "x")],
+    ]
+    (tmp_path / "results.json").write_text("[")
+    cases.append(["--out", str(tmp_path), "--resume"])
+    for arguments in cases:
+        assert main([*arguments, "--steps", "5"]) == 2
+        printed = capsys.readouterr()
+        lines = [line for line in printed.err.split("\n") if "error:" in line]
+        assert len(lines) == 1
+        assert "Traceback" not in printed.err
+        assert printed.out == ""
+
+
+def test_ctrl_c_says_how_to_go_on(capsys, tmp_path, monkeypatch):
+    interrupted(monkeypatch, 1)
+    arguments = ["--policies", "dls", "moore_penrose", "--steps", "5", "--no-plots", "--out", str(tmp_path)]
+    assert main(arguments) == 130
+    assert "go on with --resume" in capsys.readouterr().err
+    assert len(read_rows(tmp_path / "results.json")) == 1
+
+
+def test_results_of_another_cost_are_not_gone_on_with(tmp_path, monkeypatch):
+    evaluate("varga7-random", "dls", steps=5, out=tmp_path, plots=False)
+    monkeypatch.setattr(cost_kernels, "COST_VERSION", 0)
+    with pytest.raises(ResultsError, match="another scenario varga7-random: fingerprint"):
+        evaluate("varga7-random", "dls", steps=5, out=tmp_path, resume=True, plots=False)
+
+
+def test_a_frozen_set_from_the_command_line(capsys, tmp_path):
+    assert main(["--test-sets", "varga7-random", "--policies", "dls", "--no-plots", "--out", str(tmp_path)]) == 0
+    assert "varga7-random: 64 episodes of 1000 steps" in capsys.readouterr().out
+    rows = read_rows(tmp_path / "results.json")
+    assert {row.test_set for row in rows} == {test_sets.SETS["varga7-random"].digest}
+    with pytest.raises(ResultsError, match=r"in the test set .*, this run has none"):
+        evaluate("varga7-random", "dls", episodes=64, out=tmp_path, resume=True, plots=False)
+
+
+def test_the_demo_may_be_run_twice(capsys, tmp_path):
+    arguments = ["--policies", "dls", "--steps", "5", "--no-plots", "--out", str(tmp_path), "--overwrite"]
+    assert main(arguments) == 0
+    assert main(arguments) == 0
+    assert "varga7-fast: 5 steps" in capsys.readouterr().out
+
+
+def command(*arguments):
+    return subprocess.run(
+        [sys.executable, "-W", "error", "-m", "baselines.evaluate", *arguments],
+        cwd=ROOT, capture_output=True, text=True, timeout=120, check=False,
+    )  # fmt: skip
+
+
+def test_help_is_a_manual():
+    done = command("--help")
+    assert done.returncode == 0
+    for word in ("Examples:", "results.json", "total_cost", "[rad]", "[µs]", "--resume", "--overwrite", "varga7-fast"):
+        assert word in done.stdout
+    for column in COLUMNS:
+        assert column in done.stdout
+
+
+def test_a_small_run_from_the_command_line(tmp_path):
+    done = command("--policies", "dls", "dls:damping=1e-2", "--steps", "20", "--out", str(tmp_path), "--no-plots")
+    assert done.returncode == 0, done.stderr
+    assert "dls:damping=0.01" in done.stdout
+    assert f"written to {tmp_path}" in done.stdout
+    assert "varga7-fast · dls (2/2)" in done.stderr
+    assert len(strict_json(tmp_path / "results.json")) == 2

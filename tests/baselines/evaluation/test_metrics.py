@@ -1,0 +1,396 @@
+import dataclasses
+import json
+import math
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+import baselines
+import ikgym
+from baselines.canonical import jsonable
+from baselines.evaluation.metrics import TIME_COLUMNS, Row, Spread, geometric_mean, measure, summarise
+from baselines.evaluation.rollout import Episode, rollout
+from baselines.policy import Operations
+from baselines.status import Status
+from ikgym.exceptions import InvalidInputError
+
+MACHINE = {"cpu": "a", "ikgym": "0"}
+
+
+def scenario(name="varga7-fast", **changes):
+    return ikgym.scenarios.get(name).replace(**changes)
+
+
+def row_of(which, episode, **changes):
+    fields = {"policy": "dls", "parameters": {}, "seed": 0, "machine": MACHINE, "preview": 1, "fingerprint": "f"}
+    fields.update(changes)
+    return measure(which, fields.pop("policy"), fields.pop("parameters"), fields.pop("seed"), episode, **fields)
+
+
+def handmade(steps=4, **changes):
+    arrays = {
+        "q": np.zeros((steps, 2)),
+        "qdot": np.zeros((steps, 2)),
+        "pose": np.zeros((steps, 3)),
+        "tracking_cost": np.zeros(steps),
+        "velocity_cost": np.zeros(steps),
+        "position_error": np.zeros(steps),
+        "orientation_error": np.full(steps, np.nan),
+        "status": np.zeros(steps, dtype=np.int64),
+        "iterations": np.ones(steps, dtype=np.int64),
+        "time_ns": np.full(steps, 1000, dtype=np.int64),
+    }
+    return Episode(
+        inside={},
+        operations=Operations(*np.ones((4, steps), dtype=np.int64)),
+        **{**arrays, **{k: np.asarray(v) for k, v in changes.items()}},
+    )
+
+
+def position_scenario(steps=4, **changes):
+    return scenario("zhang3-helix", steps=steps, **changes)
+
+
+@pytest.mark.parametrize(
+    ("name", "steps", "seed", "policy"),
+    [
+        ("varga7-fast", 120, 0, "dls"),
+        ("varga7-fast", 40, 0, "rhc_gradient"),
+        ("varga7-random", 60, 2_000_001, "moore_penrose"),
+        ("zhang3-helix", 60, 0, "dls"),
+        ("khan8-q7q8", 150, 0, "dls"),
+    ],
+)
+def test_total_cost_is_the_sum_of_the_rewards_of_gymnasium_bit_for_bit(name, steps, seed, policy):
+    which = scenario(name, steps=steps)
+    solver = baselines.make(policy, which)
+    env = gym.make("RedundantIK-v0", scenario=which, preview=solver.preview)
+    observation, _ = env.reset(seed=seed)
+    total, state, ended = 0.0, None, False
+    while not ended:
+        action, state = solver.predict(observation, state)
+        observation, reward, _, ended, _ = env.step(action)
+        total -= float(reward)
+    assert row_of(which, rollout(which, solver, seed)).total_cost == total
+
+
+def test_noise_is_drawn_as_in_the_environment():
+    which = scenario(steps=50, disturbance=ikgym.Disturbance(noise=0.5))
+    solver = baselines.make("dls", which)
+    env = gym.make("RedundantIK-v0", scenario=which, preview=1)
+    observation, _ = env.reset(seed=7)
+    state = None
+    for _ in range(50):
+        action, state = solver.predict(observation, state)
+        observation, *_ = env.step(action)
+    assert_array_equal(rollout(which, solver, 7).q[-1], observation["q"])
+    assert (rollout(which, solver, 8).q[-1] != observation["q"]).any()
+
+
+def test_the_warm_up_call_leaves_no_trace_in_the_episode():
+    which = scenario(steps=20)
+    solver = baselines.make("rhc_gradient", which)
+    calls = []
+
+    class Counting:
+        preview = solver.preview
+        report = staticmethod(solver.report)
+        inside = staticmethod(solver.diagnostics)
+        operations = staticmethod(solver.operations)
+
+        def predict(self, observation, state=None):
+            calls.append(state)
+            answer = solver.predict(observation, state)
+            if len(calls) == 1:
+                observation["q"][:] = observation["nominal"][:] = 99.0  # what is warmed up with is a copy
+            return answer
+
+    episode = rollout(which, Counting(), 0)
+    assert len(calls) == 21
+    assert calls[0] is None
+    assert calls[1] is None
+    assert all(state is not None for state in calls[2:])
+    assert_array_equal(episode.qdot, rollout(which, solver, 0).qdot)
+
+
+def test_garbage_collection_is_as_before_even_after_an_error():
+    import gc
+
+    which = scenario(steps=5)
+
+    class Failing:
+        preview = 1
+        calls = 0
+
+        def predict(self, observation, state=None):
+            self.calls += 1
+            if self.calls > 1:
+                assert not gc.isenabled()
+                raise InvalidInputError("no")
+            return np.zeros(7, dtype=np.float32), ()
+
+    assert gc.isenabled()
+    with pytest.raises(InvalidInputError, match="no"):
+        rollout(which, Failing(), 0)
+    assert gc.isenabled()
+
+
+@pytest.mark.parametrize("steps", [1, 99, 100, 250])
+def test_ticks_add_up_to_the_steps(steps):
+    which = scenario(steps=steps)
+    ticks = []
+    rollout(which, baselines.make("dls", which), 0, tick=ticks.append)
+    assert sum(ticks) == steps
+
+
+def test_metrics_equal_a_plain_numpy_computation():
+    which = scenario(steps=80)
+    solver = baselines.make("dls", which)
+    episode = rollout(which, solver, 0)
+    row = row_of(which, episode)
+    # From the joint velocities alone, with the public objects and eq. 5.
+    nominal, path = which.nominal(), which.nominal_joint_path()
+    q = path[0] + np.cumsum(which.dt * episode.qdot, axis=0)
+    rotation, position = which.arm.forward(q)
+    pose = which.task.coordinates(rotation, position)
+    nominal_rotation, nominal_position = which.model.forward(path[1:])
+    distance = np.linalg.norm(nominal_position - position, axis=1)
+    trace = np.einsum("kij,kij->k", nominal_rotation, rotation)
+    angle = np.arccos(np.clip((trace - 1) / 2, -1, 1))
+    tracking = which.cost.tracking(which.task.error(nominal[1:], pose)).sum()
+    velocity = which.cost.velocity(episode.qdot).sum()
+
+    assert_allclose(episode.q, q, rtol=0, atol=1e-13)
+    assert_allclose(row.tracking_cost, tracking, rtol=1e-9)
+    assert_allclose(row.velocity_cost, velocity, rtol=1e-12)
+    assert_allclose(row.total_cost, tracking + velocity, rtol=1e-9)
+    assert_allclose(row.position_error_max, distance.max(), rtol=1e-9)
+    assert_allclose(row.position_error_rms, math.sqrt((distance**2).mean()), rtol=1e-9)
+    assert_allclose(row.orientation_error_max, angle.max(), rtol=1e-5)
+    assert_allclose(row.orientation_error_rms, math.sqrt((angle**2).mean()), rtol=1e-5)
+    assert row.qdot_peak == np.abs(episode.qdot).max()
+    assert_allclose(row.qdot_rms, math.sqrt((episode.qdot**2).sum() / (80 * 7)), rtol=1e-12)
+    differences = sum(np.abs(b - a).sum() for a, b in zip(episode.qdot, episode.qdot[1:], strict=False))
+    assert_allclose(row.qdot_total_variation, differences, rtol=1e-12)
+    assert (row.scenario, row.policy, row.seed, row.steps) == ("varga7-fast", "dls", 0, 80)
+    assert row.cost_ratio is None
+
+
+def test_held_points_count_at_their_last_step_only():
+    which = scenario("faitli3-regular", iterations_per_point=(2,), steps=6)
+    episode = rollout(which, baselines.make("dls", which, gain=0.5), 0)
+    row = row_of(which, episode)
+    # Steps 1 and 2 hold point 1, steps 3 and 4 point 2, steps 5 and 6 point 3.
+    path = which.trajectory.joint_path(np.array([1, 2, 3]) * which.dt)
+    start = which.trajectory.joint_path(np.zeros(1))[0]
+    q = start + np.cumsum(which.dt * episode.qdot, axis=0)
+    gap = which.model.forward(path)[1] - which.arm.forward(q)[1][[1, 3, 5]]
+    tracking = sum(which.cost.tracking(g) for g in gap)
+    velocity = sum(which.cost.velocity(episode.qdot[k]) for k in (1, 3, 5))
+    distance = np.linalg.norm(gap, axis=1)
+
+    assert_allclose(row.tracking_cost, tracking, rtol=1e-9)
+    assert_allclose(row.velocity_cost, velocity, rtol=1e-12)
+    assert_allclose(row.position_error_max, distance.max(), rtol=1e-9)
+    assert_allclose(row.position_error_rms, math.sqrt((distance**2).mean()), rtol=1e-9)
+    assert row.position_error_max < episode.position_error.max()  # the steps between are worse
+    # Of the joint velocities all steps count.
+    assert row.qdot_peak == np.abs(episode.qdot).max()
+    assert_allclose(row.qdot_rms, np.sqrt((episode.qdot**2).mean()), rtol=1e-12)
+
+
+def test_a_task_without_orientation_has_no_error_of_it():
+    row = row_of(position_scenario(), handmade())
+    assert row.orientation_error_max is None
+    assert row.orientation_error_rms is None
+
+
+def test_numbers_of_a_handmade_episode():
+    qdot = [[1.0, 0.0], [-2.0, 0.0], [-2.0, 0.5], [0.0, 0.5]]
+    times = [1_000, 2_000, 3_000, 1_000_000_001]
+    status = [Status.CONVERGED, Status.DIVERGED, Status.CONVERGED, Status.ITERATION_LIMIT]
+    row = row_of(
+        position_scenario(),  # Δt is 1 s
+        handmade(
+            qdot=qdot,
+            time_ns=times,
+            status=status,
+            iterations=[1, 2, 3, 6],
+            position_error=[0.0, 3.0, 4.0, 0.0],
+            tracking_cost=[1.0, 2.0, 3.0, 4.0],
+            velocity_cost=[0.5, 0.5, 0.5, 0.5],
+        ),
+    )
+    assert row.qdot_peak == 2.0
+    assert row.qdot_rms == pytest.approx(math.sqrt(9.5 / 8))
+    assert row.qdot_total_variation == pytest.approx(3.0 + 0.5 + 2.0)
+    assert row.time_first_us == 1.0
+    assert row.time_p50_us == pytest.approx(3.0)
+    assert row.time_p99_us == pytest.approx(np.percentile(times[1:], 99) / 1e3)
+    assert row.deadline_misses == 1
+    assert row.status == "diverged"
+    assert row.status_counts == {"converged": 2, "iteration_limit": 1, "diverged": 1}
+    assert row.iterations == 3.0
+    assert row.position_error_max == 4.0
+    assert row.position_error_rms == pytest.approx(2.5)
+    assert (row.total_cost, row.tracking_cost, row.velocity_cost) == (12.0, 10.0, 2.0)
+
+
+def test_costs_are_added_up_from_left_to_right():
+    costs = np.random.default_rng(0).uniform(0, 1e6, 1000) ** 2
+    total = 0.0
+    for cost in costs:
+        total += cost
+    row = row_of(position_scenario(1000), handmade(1000, tracking_cost=costs))
+    assert row.total_cost == total
+
+
+def test_one_step_has_no_variation():
+    assert row_of(position_scenario(1), handmade(1, qdot=[[1.0, 2.0]])).qdot_total_variation == 0.0
+
+
+def test_the_first_call_is_stated_apart():
+    row = row_of(position_scenario(), handmade(time_ns=[5_000_000_000, 1_000, 3_000, 2_000]))  # Δt is 1 s
+    assert (row.time_first_us, row.time_p50_us, row.deadline_misses) == (5e6, 2.0, 0)
+    only = row_of(position_scenario(1), handmade(1, time_ns=[5_000]))
+    assert (only.time_first_us, only.time_p50_us, only.time_p99_us, only.deadline_misses) == (5.0, 5.0, 5.0, 0)
+
+
+def test_what_was_not_timed_has_no_times():
+    row = row_of(position_scenario(), handmade(time_ns=np.empty(0, dtype=np.int64)))
+    assert [getattr(row, name) for name in TIME_COLUMNS] == [None] * 4
+    assert Row.from_json(json.loads(json.dumps(row.to_json()))) == row
+    timed = dataclasses.replace(row_of(position_scenario(), handmade()), seed=1)
+    (both,) = summarise([row, timed])
+    assert [getattr(both, name) for name in TIME_COLUMNS] == [getattr(timed, name) for name in TIME_COLUMNS]
+    (neither,) = summarise([row])
+    assert [getattr(neither, name) for name in TIME_COLUMNS] == [None] * 4
+
+
+def test_cost_ratio_is_against_the_best_known_cost():
+    assert row_of(position_scenario(), handmade(tracking_cost=[1, 2, 3, 4]), best_known=4.0).cost_ratio == 2.5
+
+
+@pytest.mark.parametrize("test_set", [None, "0123456789ab"])
+def test_a_row_survives_json(test_set):
+    parameters = {"damping": 1e-3, "rule": "a", "weights": [1, 2]}
+    row = row_of(position_scenario(), handmade(), parameters=parameters, test_set=test_set)
+    there = json.loads(json.dumps(row.to_json(), allow_nan=False))
+    assert list(there) == [field.name for field in dataclasses.fields(Row)]
+    assert Row.from_json(there) == row
+    assert Row.from_json(there).key == row.key
+
+
+def test_numbers_that_are_not_finite_become_null():
+    row = dataclasses.replace(row_of(position_scenario(), handmade()), total_cost=math.inf, qdot_rms=math.nan)
+    there = row.to_json()
+    assert there["total_cost"] is None
+    assert there["qdot_rms"] is None
+    assert math.isnan(Row.from_json(there).total_cost)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"seed": "0"}, "the key 'seed' should have a value of type int, got '0'"),
+        ({"seed": True}, "the key 'seed'"),
+        ({"steps": 1.5}, "the key 'steps'"),
+        ({"total_cost": "much"}, "the key 'total_cost' should have a value of type float"),
+        ({"parameters": []}, "the key 'parameters'"),
+        ({"deadline_misses": 1.5}, "the key 'deadline_misses' should have a value of type int"),
+        ({"time_p50_us": "1"}, "the key 'time_p50_us'"),
+        ({"test_set": 3}, "the key 'test_set'"),
+        ({"status": "splendid"}, "the key 'status'"),
+        ({"colour": 1}, "there is a key 'colour' that no row has"),
+    ],
+)
+def test_rows_of_a_wrong_form_are_refused(change, message):
+    there = {**row_of(position_scenario(), handmade()).to_json(), **change}
+    with pytest.raises(InvalidInputError, match=message):
+        Row.from_json(there)
+
+
+def test_a_row_that_lacks_a_key_or_is_none_is_refused():
+    there = row_of(position_scenario(), handmade()).to_json()
+    del there["qdot_peak"]
+    with pytest.raises(InvalidInputError, match="the key 'qdot_peak' is missing"):
+        Row.from_json(there)
+    with pytest.raises(InvalidInputError, match="expected an object with the keys of a row, got list"):
+        Row.from_json([])
+
+
+def test_parameters_become_plain_json():
+    given = {"a": np.float64(1.5), "b": np.arange(2), "c": (1, (2,)), "d": None, "e": math.inf}
+    assert jsonable(given) == {"a": 1.5, "b": [0, 1], "c": [1, [2]], "d": None, "e": "inf"}
+    json.dumps(jsonable(given), allow_nan=False)
+
+
+def test_geometric_mean():
+    assert geometric_mean([1e-3, 1e3]) == pytest.approx(1.0)
+    assert geometric_mean([7.3]) == 7.3
+    assert geometric_mean([0.0, 1e3]) == 0.0
+
+
+def test_summaries():
+    base = row_of(position_scenario(), handmade())
+    rows = [
+        dataclasses.replace(
+            base,
+            seed=seed,
+            total_cost=cost,
+            tracking_cost=cost,
+            position_error_max=error,
+            time_p50_us=time,
+            time_p99_us=2 * time,
+            deadline_misses=seed,
+            status=status,
+        )
+        for seed, cost, error, time, status in (
+            (1, 1.0, 0.3, 5.0, "converged"),
+            (2, 100.0, 0.1, 7.0, "rank_deficient"),
+            (3, 10.0, 0.2, 6.0, "iteration_limit"),
+        )
+    ]
+    other = dataclasses.replace(base, policy="moore_penrose")
+    first, second = summarise([*rows, other])
+    assert (first.policy, second.policy) == ("dls", "moore_penrose")
+    assert first.episodes == 3
+    assert first.total_cost.mean == pytest.approx(10.0)
+    assert first.total_cost.median == 10.0
+    assert first.total_cost.p90 == pytest.approx(82.0)
+    assert first.total_cost.worst == 100.0
+    assert first.total_cost.worst_seed == 2
+    assert first.position_error_max == 0.3
+    assert first.orientation_error_max is None
+    assert (first.time_p50_us, first.time_p99_us, first.deadline_misses) == (6.0, 14.0, 6)
+    assert first.status == "rank_deficient"
+    assert first.cost_ratio is None
+
+
+def test_the_spread_of_cost_ratios():
+    base = row_of(position_scenario(), handmade())
+    cost_ratios = {3: 1.0, 4: 4.0, 5: 2.0}
+    rows = [
+        dataclasses.replace(base, seed=s, cost_ratio=cost_ratio, total_cost=1.0 / cost_ratio)
+        for s, cost_ratio in cost_ratios.items()
+    ]
+    (summary,) = summarise(rows)
+    assert summary.cost_ratio == Spread(pytest.approx(2.0), 2.0, pytest.approx(3.6), 4.0, 4)
+    assert summary.total_cost.worst_seed == 3
+    (summary,) = summarise([*rows, dataclasses.replace(base, seed=6)])
+    assert summary.cost_ratio is None  # of one of them it is not known
+
+
+@pytest.mark.parametrize("change", [{"fingerprint": "g"}, {"test_set": "0123456789ab"}])
+def test_rows_of_different_content_are_not_put_together(change):
+    base = row_of(position_scenario(), handmade())
+    other = dataclasses.replace(base, policy="moore_penrose", **change)
+    with pytest.raises(InvalidInputError, match="results of 'zhang3-helix' cannot be put together"):
+        summarise([base, other])
+    assert len(summarise([base, dataclasses.replace(other, scenario="another")])) == 2
+
+
+def test_time_columns_are_columns():
+    assert set(TIME_COLUMNS) <= {field.name for field in dataclasses.fields(Row)}

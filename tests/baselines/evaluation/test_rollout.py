@@ -1,0 +1,97 @@
+"""Episodes that are played together are those that are played alone."""
+
+from __future__ import annotations
+
+import pytest
+
+import baselines
+import ikgym
+from baselines.evaluation.rollout import rollout, rollouts
+from baselines.registry import get
+from baselines.status import Status
+from ikgym.exceptions import InvalidInputError
+from tests.comparison import identical
+
+SEEDS = [2_000_000, 2_000_001, 5]
+STEPS = 25
+
+
+def fields(episode):
+    return {name: value for name, value in vars(episode).items() if name != "time_ns"}
+
+
+def assert_same(together, alone):
+    assert len(alone.time_ns) == len(alone.q)
+    assert len(together.time_ns) == 0
+    for name, value in fields(together).items():
+        assert identical(value, fields(alone)[name]), name
+
+
+@pytest.mark.parametrize("name", [name for name in baselines.names() if not get(name).reference])
+@pytest.mark.parametrize("on", ["varga7-random", "zhang6-lspb"])
+def test_together_as_alone(name, on):
+    scenario = ikgym.scenarios.get(on).replace(steps=STEPS, disturbance=ikgym.Disturbance(noise=0.1))
+    try:
+        policy = baselines.make(name, scenario)
+    except InvalidInputError:
+        assert get(name).composed  # agents suit arms of their size
+        return
+    together = rollouts(scenario, policy, SEEDS)
+    for seed, episode in zip(SEEDS, together, strict=True):
+        assert_same(episode, rollout(scenario, policy, seed))
+    assert (together[0].q != together[1].q).any()
+
+
+def test_a_reference_with_one_arm():
+    scenario = ikgym.scenarios.get("varga7-random").replace(steps=STEPS)
+    policy = baselines.make("follow_nominal", scenario, seed=7)
+    (episode,) = rollouts(scenario, policy, [7])
+    assert_same(episode, rollout(scenario, policy, 7))
+
+
+def test_points_that_are_held_and_a_longer_preview():
+    scenario = ikgym.scenarios.get("khan8-q7q8").replace(steps=70, disturbance=ikgym.Disturbance(noise=0.1))
+    policy = baselines.make("rhc_gradient", scenario)
+    for seed, episode in zip(SEEDS, rollouts(scenario, policy, SEEDS, preview=5), strict=True):
+        assert_same(episode, rollout(scenario, policy, seed, preview=5))
+
+
+def test_one_call_of_the_policy_a_step():
+    scenario = ikgym.scenarios.get("varga7-random").replace(steps=STEPS)
+    solver, shapes = baselines.make("dls", scenario), []
+
+    class Watched:
+        preview = solver.preview
+        report = staticmethod(solver.report)
+        inside = staticmethod(solver.diagnostics)
+        operations = staticmethod(solver.operations)
+
+        def predict(self, observation, state=None):
+            shapes.append(observation["q"].shape)
+            return solver.predict(observation, state)
+
+    rollouts(scenario, Watched(), SEEDS)
+    assert shapes == [(3, 7)] * (STEPS + 1)
+
+
+@pytest.mark.parametrize("steps", [1, 99, 250])
+def test_ticks_add_up_to_the_steps_of_all(steps):
+    scenario = ikgym.scenarios.get("varga7-random").replace(steps=steps)
+    ticks = []
+    rollouts(scenario, baselines.make("dls", scenario), SEEDS, tick=ticks.append)
+    assert sum(ticks) == 3 * steps
+
+
+def test_a_row_that_is_lost_does_not_touch_the_others():
+    scenario = ikgym.scenarios.get("varga7-random").replace(steps=STEPS)
+    wild = baselines.make("rhc_gradient", scenario, alpha_max=5e-2, alpha_min=1e-3)
+    together = rollouts(scenario, wild, SEEDS)
+    assert any(Status.DIVERGED in episode.status for episode in together)
+    for seed, episode in zip(SEEDS, together, strict=True):
+        assert_same(episode, rollout(scenario, wild, seed))
+
+
+def test_a_preview_that_is_none_is_refused():
+    scenario = ikgym.scenarios.get("varga7-random")
+    with pytest.raises(InvalidInputError, match="preview"):
+        rollouts(scenario, baselines.make("dls", scenario), SEEDS, preview=0)

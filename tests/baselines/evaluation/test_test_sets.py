@@ -1,0 +1,88 @@
+import pytest
+from numpy.testing import assert_allclose
+
+from baselines.evaluate import evaluate
+from baselines.evaluation import test_sets
+from baselines.evaluation.plan import make_plan
+from baselines.fingerprints import set_hash
+from ikgym import cost_kernels, scenarios
+from ikgym.exceptions import InvalidInputError, UnknownNameError
+
+
+@pytest.mark.parametrize("name", test_sets.names())
+def test_the_sets_are_what_they_were(name):
+    one = test_sets.SETS[name]
+    assert set_hash(one.scenario, one.seeds) == one.digest, "what is meant to differ needs a new set"
+    assert test_sets.get(name) is one
+
+
+def test_the_sets_are_the_published_ones():
+    assert {name: (one.episodes, one.split, one.scenario.steps) for name, one in test_sets.SETS.items()} == {
+        "varga7-random": (64, "test", 1000),
+        "varga7-random-long": (16, "test", 3000),
+    }
+
+
+@pytest.mark.parametrize(
+    ("name", "seed", "last"),
+    [
+        ("varga7-random", 2_000_000, (0.331915028534, 0.437288000971, 0.46396646241, -0.218935014377)),
+        ("varga7-random", 2_000_063, (0.409194226944, -0.488632498827, 0.058888695021, -0.4727872721)),
+        ("varga7-random-long", 2_000_000, (-0.331498392441, -0.187385693911, -0.554270485681, 0.227408558174)),
+        ("varga7-random-long", 2_000_015, (-0.320635318762, 0.603603897137, 0.978702510455, -0.630827291228)),
+    ],
+)
+def test_seeds_draw_what_they_drew(name, seed, last):
+    assert seed in test_sets.SETS[name].seeds
+    assert_allclose(scenarios.get(name).nominal_joint_path(seed)[-1, :4], last, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("drift", ["scenario", "cost", "seeds"])
+def test_a_set_that_has_drifted_is_refused(monkeypatch, drift):
+    if drift == "scenario":
+        changed = scenarios.get("varga7-random").replace(dt=2e-3)
+        monkeypatch.setattr(scenarios, "get", lambda name: changed)
+    elif drift == "cost":
+        monkeypatch.setattr(cost_kernels, "COST_VERSION", 0)
+    else:
+        monkeypatch.setitem(scenarios.SPLITS, "test", range(2_000_001, 3_000_000))
+    with pytest.raises(InvalidInputError, match="'varga7-random' has drifted"):
+        evaluate(test_sets="varga7-random", policies="dls")
+
+
+def test_a_frozen_set_is_played_as_it_is():
+    jobs = make_plan((), "dls", test_sets="varga7-random").jobs
+    assert [job.seed for job in jobs] == list(range(2_000_000, 2_000_064))
+    assert {(job.scenario.name, job.scenario.steps, job.test_set) for job in jobs} == {
+        ("varga7-random", 1000, test_sets.SETS["varga7-random"].digest)
+    }
+    both = make_plan((), ["dls", "follow_nominal"], test_sets=test_sets.names()).jobs
+    assert len(both) == 2 * (64 + 16)
+    assert all(job.test_set is None for job in make_plan("varga7-random", "dls").jobs)
+
+
+def test_a_frozen_set_from_python():
+    rows = evaluate(test_sets="varga7-random-long", policies="dls")
+    assert len(rows) == 16
+    assert {row.test_set for row in rows} == {test_sets.SETS["varga7-random-long"].digest}
+    assert {row.steps for row in rows} == {3000}
+
+
+@pytest.mark.parametrize(
+    ("scenario", "options"),
+    [
+        ("varga7-fast", {}),
+        (scenarios.get("varga7-random"), {}),
+        ((), {"episodes": 2}),
+        ((), {"steps": 5}),
+        ((), {"split": "train"}),
+    ],
+)
+def test_a_frozen_set_is_not_changed(scenario, options):
+    with pytest.raises(InvalidInputError, match="A test set says itself what is played"):
+        make_plan(scenario, "dls", test_sets="varga7-random", **options)
+
+
+def test_unknown_sets():
+    with pytest.raises(UnknownNameError, match=r"no test set 'varga7-randm'\. Did you mean 'varga7-random'"):
+        evaluate(test_sets="varga7-randm", policies="dls")

@@ -1,0 +1,183 @@
+import dataclasses
+import json
+import math
+
+import pytest
+
+import baselines
+import ikgym
+from baselines.evaluate import evaluate
+from baselines.evaluation import report
+from baselines.files import ResultsError
+from baselines.oracle import best_known
+from baselines.oracle.best_known import MARGIN, Record, beaten, cost, episode_hash, lookup, read, record
+from ikgym import cost_kernels
+
+NAME = "varga7-fast"
+
+
+def short(steps=20):
+    return ikgym.scenarios.get(NAME).replace(steps=steps)
+
+
+def one(scenario, value, seed=0, **changes):
+    return Record(
+        **{
+            "scenario": scenario.name,
+            "seed": seed,
+            "cost": value,
+            "found_by": "a test",
+            "gradient_norm": 1e-9,
+            "spread": {"starts": 3, "worst": 2.0 * value},
+            "hash": episode_hash(scenario, seed),
+            **changes,
+        }
+    )
+
+
+@pytest.fixture
+def file(tmp_path, monkeypatch):
+    path = tmp_path / "data" / "best.json"
+    monkeypatch.setattr(best_known, "DATA", path)
+    return path
+
+
+def test_the_data_of_the_package_are_in_order():
+    there = read()
+    assert [(r.scenario, r.seed) for r in there] == sorted({(r.scenario, r.seed) for r in there})
+    for known in there:
+        scenario = ikgym.scenarios.get(known.scenario)
+        assert lookup(scenario, known.seed) == known, "the episode has changed since: find its cost anew"
+        assert known.cost >= 0.0
+        assert known.found_by
+    assert best_known.DATA.read_text(encoding="utf-8") == text_of(there)
+
+
+def text_of(records):
+    lines = [json.dumps(dataclasses.asdict(r), ensure_ascii=False) for r in records]
+    return "[\n" + ",\n".join(lines) + ("\n]\n" if lines else "]\n")
+
+
+def test_a_record_comes_back_and_belongs_to_its_content(file, monkeypatch):
+    known = one(short(), 10.0)
+    assert lookup(short(), 0) is None
+    assert record([known], file) == [known]
+    assert lookup(short(), 0) == known
+    assert cost(short(), 0) == 10.0
+    assert lookup(short(), 1) is None
+    assert lookup(short(21), 0) is None
+    assert lookup(short().replace(name="other"), 0) is None
+    monkeypatch.setattr(cost_kernels, "COST_VERSION", 0)
+    assert lookup(short(), 0) is None
+
+
+def test_the_better_is_kept(file):
+    record([one(short(), 10.0)], file)
+    before = file.read_bytes()
+    assert record([one(short(), 10.0, found_by="another"), one(short(), 11.0)], file) == []
+    assert file.read_bytes() == before
+    (better,) = record([one(short(), 9.0), one(short(), 9.5)], file)
+    assert better.cost == lookup(short(), 0).cost == 9.0
+    # Of another content is another episode, whatever its cost.
+    assert record([one(short(21), 50.0)], file)
+    assert lookup(short(21), 0).cost == 50.0
+    assert len(read(file)) == 1
+
+
+def test_the_file_is_sorted_and_a_new_record_changes_one_line(file):
+    slow = ikgym.scenarios.get("varga7-slow")
+    record([one(slow, 3.0), one(short(), 2.0, seed=10), one(short(), 1.0, seed=9)], file)
+    before = file.read_text(encoding="utf-8").splitlines()
+    assert [(r.scenario, r.seed) for r in read(file)] == [(NAME, 9), (NAME, 10), ("varga7-slow", 0)]
+    record([one(short(), 1.5, seed=10, spread={"worst": 1.0, "starts": 2})], file)
+    after = file.read_text(encoding="utf-8").splitlines()
+    assert [a == b for a, b in zip(before, after, strict=True)] == [True, True, False, True, True]
+    assert not list(file.parent.glob("*.tmp"))
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -1.0])
+def test_bad_costs_are_refused_and_nothing_is_written(file, value):
+    with pytest.raises(ResultsError, match="expected a cost of at least 0"):
+        record([one(short(), 1.0), one(short(), value, seed=1)], file)
+    assert not file.exists()
+
+
+@pytest.mark.parametrize("content", ["{", "[3]", '[{"scenario": "a"}]'])
+def test_damaged_data_are_named(file, content):
+    file.parent.mkdir()
+    file.write_text(content, encoding="utf-8")
+    with pytest.raises(ResultsError, match=r"best\.json is damaged"):
+        read(file)
+
+
+def test_cost_ratio_is_the_cost_over_the_best_known(file):
+    (plain,) = evaluate(short(), "dls")
+    assert plain.cost_ratio is None
+    record([one(short(), plain.total_cost / 4.0)], file)
+    (row,) = evaluate(short(), "dls")
+    assert row.cost_ratio == pytest.approx(4.0)
+    assert evaluate(short(21), "dls")[0].cost_ratio is None
+
+
+@pytest.mark.parametrize("value", [0.0, 1e-9])
+def test_no_ratio_to_nothing(file, value):
+    record([one(short(), value)], file)
+    assert cost(short(), 0) is None
+    (row,) = evaluate(short(), "dls")
+    assert row.cost_ratio is None
+    assert beaten(dataclasses.replace(row, total_cost=0.0)) is None
+
+
+def test_a_record_is_beaten_by_more_than_rounding(file):
+    (row,) = evaluate(short(), "dls")
+    assert beaten(row) is None
+    known = one(short(), row.total_cost)
+    record([known], file)
+    for share, expected in ((1.0, None), (1.0 - 0.9 * MARGIN, None), (1.0 - 1.1 * MARGIN, known), (2.0, None)):
+        assert beaten(dataclasses.replace(row, total_cost=share * row.total_cost)) == expected
+    assert beaten(dataclasses.replace(row, total_cost=math.nan)) is None
+    assert beaten(dataclasses.replace(row, total_cost=0.1, seed=1)) is None
+    assert beaten(dataclasses.replace(row, total_cost=0.1, fingerprint="0" * 12)) is None
+
+
+def test_who_beats_a_record_is_told_the_command(file):
+    (row,) = evaluate(short(), "dls")
+    assert "beats" not in report.table([row])
+    record([one(short(), 2.0 * row.total_cost)], file)
+    text = " ".join(report.table([row]).split())
+    assert "dls beats the best known cost of varga7-fast, seed 0" in text
+    assert best_known.UPDATE in text
+
+
+# No policy beats a record: whoever finds a better path writes it down.
+
+QUICK = ["dls", "moore_penrose", "null_space", "fixed_point", "follow_nominal", "rhc_gradient"]
+
+
+def recorded():
+    """Fixed scenarios with a best known cost that a cost ratio can be stated against."""
+    return [s for s in map(ikgym.scenarios.get, ikgym.scenarios.names()) if not s.random and best_known.cost(s, 0)]
+
+
+def nobody_beats(scenarios, policies):
+    rows = evaluate(scenarios, policies) if scenarios else []
+    better = [(row.scenario, row.policy, row.total_cost) for row in rows if beaten(row)]
+    assert not better, f"write them down with: {best_known.UPDATE}"
+
+
+def test_no_quick_policy_beats_a_record_on_a_short_scenario():
+    nobody_beats([s for s in recorded() if s.name in {"varga7-fast", "zhang6-lspb"}], QUICK)
+
+
+@pytest.mark.slow
+def test_no_policy_beats_a_record():
+    # but for the oracle, which is what the records come from
+    nobody_beats(recorded(), [name for name in baselines.names() if name != "oracle"])
+
+
+def test_a_record_that_is_too_high_does_not_go_unnoticed(file):
+    (row,) = evaluate(NAME, "dls")
+    record([one(ikgym.scenarios.get(NAME), 1.001 * row.total_cost)], file)
+    assert [s.name for s in recorded()] == [NAME]
+    with pytest.raises(AssertionError, match="write them down"):
+        nobody_beats(recorded(), ["dls"])

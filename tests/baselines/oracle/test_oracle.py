@@ -1,0 +1,527 @@
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import baselines
+import ikgym
+from baselines import optimum as optimum_command
+from baselines.evaluate import evaluate
+from baselines.evaluation import test_sets
+from baselines.evaluation.rollout import rollout
+from baselines.fingerprints import episode_hash
+from baselines.oracle import Optimum, Search, Start, best_known, cache, local_search, solve
+from baselines.oracle.episode import Whole
+from baselines.oracle.optimum import CLIMBED, RANDOM
+from baselines.policy import Problem
+from ikgym import parallel
+from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.scenarios import Disturbance
+from tests.comparison import identical
+
+QUICK = Search(starts=12, chains=2, generations=1, rounds=4, polished=2, knots=20)
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch):
+    monkeypatch.setenv(cache.VARIABLE, str(tmp_path / "cache"))
+    return tmp_path / "cache" / "oracle"
+
+
+def short(name="varga7-fast", steps=30, **changes):
+    return ikgym.scenarios.get(name).replace(steps=steps, **changes)
+
+
+CASES = {
+    "fixed": (short(), 0),
+    "random": (short("varga7-random"), 1_000_003),
+    "off the path": (short(start=np.full(7, 0.01)), 0),
+    "held": (short("khan8-q7q8", 130), 0),
+    "held at times": (short(iterations_per_point=(3, 1, 1, 2, 1)), 0),
+    "ends while a point is held": (short(steps=8, iterations_per_point=3), 0),
+    "another measured start": (short("zhang3-helix"), 0),
+    "position": (short("faitli3-regular"), 0),
+    "pose": (short("zhang6-lspb"), 0),
+    "narrow limits": (short(velocity_limit=np.full(7, 5.0)), 0),
+    "one step": (short(steps=1), 0),
+}
+cases = pytest.mark.parametrize(("scenario", "seed"), CASES.values(), ids=CASES)
+
+
+def rolled(scenario, seed, name="oracle", **parameters):
+    given = {"seed": seed} if scenario.random and baselines.registry.get(name).reference else {}
+    episode = rollout(scenario, baselines.make(name, scenario, **given, **parameters), seed)
+    return episode, float(np.sum(episode.tracking_cost + episode.velocity_cost))
+
+
+@cases
+def test_the_cost_is_what_the_environment_charges_for_the_velocities(scenario, seed):
+    optimum = solve(scenario, seed, QUICK)
+    assert optimum.q.shape == optimum.qdot.shape == (scenario.steps, scenario.joints)
+    assert (np.abs(optimum.qdot) <= scenario.velocity_limit).all()
+    # Written down anew: the arm goes where it is told, and the steps that count cost.
+    trajectory = scenario.trajectory.sample(np.random.default_rng(0)) if not scenario.random else None
+    start = scenario.first_q(trajectory) if trajectory else scenario.nominal_joint_path(seed)[0]
+    q = start + scenario.dt * np.cumsum(optimum.qdot, axis=0)
+    assert_allclose(optimum.q, q, rtol=0, atol=1e-12)
+    pose = scenario.task.coordinates(*scenario.arm.forward(optimum.q))
+    stage = scenario.cost.tracking(scenario.task.error(scenario.nominal(seed)[1:], pose))
+    stage += scenario.cost.velocity(optimum.qdot)
+    assert optimum.cost == pytest.approx(float(np.sum(stage[scenario.counted()[1:]])), rel=1e-12, abs=1e-20)
+
+
+@cases
+def test_the_policy_plays_the_optimum(scenario, seed):
+    optimum = solve(scenario, seed, Search(starts=0, generations=0))
+    episode, cost = rolled(scenario, seed, starts=0, generations=0)
+    # What float32 actions leave.
+    assert cost == pytest.approx(optimum.cost, rel=1e-5, abs=1e-9)
+    assert_allclose(episode.q, optimum.q, rtol=0, atol=1e-5 * scenario.dt / 1e-3)
+
+
+@cases
+def test_nothing_that_was_tried_is_cheaper(scenario, seed):
+    optimum = solve(scenario, seed, QUICK)
+    assert optimum.cost == min(one.cost for one in optimum.starts if one.cost is not None)
+    names = ["dls"] if scenario.nominal_joint_path(seed) is None else ["dls", "follow_nominal"]
+    for name in names:
+        assert optimum.cost <= rolled(scenario, seed, name)[1] * (1.0 + 1e-9) + 1e-9
+
+
+@cases
+def test_commands_lead_along_a_path(scenario, seed):
+    whole = Whole.of(scenario, seed)
+    steps = np.random.default_rng(0).uniform(-1.0, 1.0, (whole.knots, scenario.joints))
+    path = whole.start + scenario.dt * np.cumsum(steps * whole.grid.length[:, None], axis=0)
+    qdot = whole.commands(path)
+    q, _ = whole.play(qdot)
+    assert_allclose(q[whole.grid.at - 1], path, rtol=0, atol=1e-12)
+    held = np.diff(whole.grid.at, prepend=0) > 1
+    assert not qdot[whole.grid.at[held] - 1].any()
+
+
+@cases
+def test_the_gradient_vanishes(scenario, seed):
+    optimum = solve(scenario, seed, QUICK)
+    assert optimum.gradient_norm <= 1e-7 * max(optimum.cost, 1.0)
+
+
+def test_moving_along_the_path_anywhere_costs_more():
+    scenario, seed = CASES["random"]
+    optimum = solve(scenario, seed, QUICK)
+    whole, rng = Whole.of(scenario, seed), np.random.default_rng(0)
+    for size in (1e-3, 1e-5):
+        for _ in range(20):
+            q = optimum.q + size * scenario.dt * rng.standard_normal(optimum.q.shape)
+            assert whole.play(whole.commands(q))[1] > optimum.cost
+
+
+@pytest.mark.parametrize("name", ["varga7-random", "khan8-q1"])
+def test_the_same_whatever_the_number_of_threads(monkeypatch, name):
+    scenario = short(name, 65)
+    results = []
+    for cores in (1, 2, 5):
+        monkeypatch.setattr(parallel, "cores", lambda cores=cores: cores)
+        optimum = solve(scenario, 3, QUICK, cached=False)
+        results.append((optimum.q, optimum.qdot, optimum.cost, *(dataclasses.astuple(one) for one in optimum.starts)))
+    assert identical(results[0][:3], results[1][:3])
+    assert identical(results[0][:3], results[2][:3])
+    assert results[0][3:] == results[1][3:] == results[2][3:]
+    if name == "varga7-random":
+        other = solve(scenario, 3, QUICK.replace(seed=1), cached=False)
+        assert [one.coarse for one in other.starts] != [one.coarse for one in optimum.starts]
+
+
+def test_kinds_of_starts():
+    optimum = solve(short("varga7-random", 60), 7, QUICK)
+    kinds = [one.kind for one in optimum.starts]
+    known = ["nominal joint path", "roll-out", "rhc, horizon 1001", "rhc, horizon 101"]
+    assert kinds[: 4 + QUICK.starts] == known + [RANDOM] * QUICK.starts
+    assert set(kinds[4 + QUICK.starts :]) <= {CLIMBED}
+    assert [one.number for one in optimum.starts[4 : 4 + QUICK.starts]] == list(range(1, QUICK.starts + 1))
+    assert all(one.cost is not None for one in optimum.starts[:4])
+    assert set(optimum.found_by.split("; ")) <= {*known, RANDOM, CLIMBED}
+    json.dumps(dataclasses.asdict(optimum.record()))
+    assert [one.kind for one in solve("zhang3-helix", 0, Search(starts=0, generations=0)).starts] == known[1:]
+
+
+def test_what_is_said_of_the_starts():
+    starts = (
+        Start("nominal joint path", None, 100.0, 10.0 * (1.0 + 1e-7)),
+        Start(RANDOM, 1, 10.2, 10.0),
+        Start(RANDOM, 2, 10.06, 10.0 * (1.0 + 1e-5)),
+        Start(RANDOM, 3, 900.0),
+        Start(CLIMBED, None, 10.05, 10.0),
+    )
+    optimum = solve(short(steps=2), 0, QUICK).replace(cost=10.0, starts=starts)
+    assert optimum.found_by == "nominal joint path; random start; local search"
+    assert optimum.spread == {
+        "starts": 4,
+        "within_1_percent": 1,
+        "median": (100.0 + 10.2) / 2.0,
+        "worst": 900.0,
+        "polished": 4,
+        "polished_within_1e-6": 3,
+    }
+    assert optimum.record().spread == optimum.spread
+    # Where nothing costs, all that is left is rounding.
+    free = optimum.replace(cost=1e-16, starts=(Start("nominal joint path", cost=1e-16), Start("roll-out", cost=1e-12)))
+    assert free.found_by == "nominal joint path; roll-out"
+    assert free.spread == {"polished": 2, "polished_within_1e-6": 2}
+
+
+@pytest.fixture(scope="module")
+def dear():
+    """Two paths of which the first is a hundred times too dear, their costs, and what they are paths of."""
+    whole = Whole.of(ikgym.scenarios.get("varga7-random"), 1_000_011)
+    problem = whole.rules, whole.coarse(25), whole.start, whole.nominal
+    paths = np.empty((2, len(problem[1].at), 7))
+    local_search.roll_outs(*problem, 0, paths, 0, 2)
+    costs, gradients, made = np.empty((3, 2))
+    local_search.settle(*problem, False, 50, 1e-4, paths, costs, gradients, made, 0, 2)
+    return problem, paths, costs
+
+
+def test_a_path_gets_never_worse(dear):
+    problem, before, _ = dear
+    paths, last = before.copy(), np.full(2, np.inf)
+    for _ in range(60):
+        costs, gradients, made = np.empty((3, 2))
+        local_search.settle(*problem, True, 1, 1e-12, paths, costs, gradients, made, 0, 2)
+        assert (costs <= last).all()
+        last = costs
+
+
+def climbed(dear, rounds, *chunks):
+    problem, before, costs_before = dear
+    paths, costs = before.copy(), costs_before.copy()
+    for first, last in chunks:
+        local_search.climb(*problem, 0, rounds, before, paths, costs, first, last)
+    return paths, costs
+
+
+def test_the_local_search_finds_what_a_start_does_not(dear):
+    _, before, costs_before = dear
+    paths, costs = climbed(dear, 40, (0, 1))
+    assert costs[0] < 0.1 * costs_before[0]
+    assert costs[1] == costs_before[1]
+    assert identical(paths[1], before[1])
+
+
+def test_the_local_search_of_a_path_depends_on_its_number_alone(dear):
+    _, before, _ = dear
+    together = climbed(dear, 20, (0, 2))
+    assert not identical(together[0][1], before[1])
+    assert identical(together, climbed(dear, 20, (1, 2), (0, 1)))
+
+
+class TestGrid:
+    @pytest.mark.parametrize("steps", [1, 2, 8, 9, 10, 11, 37])
+    @pytest.mark.parametrize("stride", [1, 2, 5, 50])
+    def test_a_coarse_grid_counts_all_steps(self, steps, stride):
+        for held in (1, (2, 1, 1, 3, 1)):
+            whole = Whole.of(short(steps=steps, iterations_per_point=held), 0)
+            grid = whole.coarse(stride)
+            assert grid.at[-1] == steps
+            assert (np.diff(grid.at) > 0).all()
+            for part, total in zip(grid[1:], whole.grid[1:], strict=True):
+                assert part.sum() == pytest.approx(total.sum())
+            if stride == 1:
+                assert all(identical(a, b) for a, b in zip(grid, whole.grid, strict=True))
+
+    def test_the_first_knots_stay(self):
+        whole = Whole.of(short(), 0)
+        assert whole.coarse(10).at.tolist() == [1, 2, 3, 4, 5, 6, 7, 8, 18, 28, 30]
+        assert whole.coarse(10).length.tolist() == [1] * 8 + [10, 10, 2]
+        assert whole.coarse(10).tracking.tolist() == [1] * 7 + [5.5, 10, 6, 1.5]
+
+    def test_a_straight_path_stays_straight(self):
+        whole = Whole.of(short(iterations_per_point=(2, 1, 1, 3, 1), start=np.zeros(7)), 0)
+        grid = whole.coarse(7)
+        fine = np.cumsum(whole.grid.length)[:, None] * np.linspace(0.1, 0.7, 7)
+        path = fine[np.searchsorted(whole.grid.at, grid.at)]
+        assert_allclose(whole.refined(grid, path), fine, rtol=0, atol=1e-12)
+
+    def test_held_points_are_free_of_charge(self):
+        scenario = short("khan8-q7q8", 130)
+        whole = Whole.of(scenario, 0)
+        assert whole.grid.at.tolist() == [60, 120, 130]
+        assert whole.grid.length.tolist() == [59, 59, 9]
+        assert not whole.grid.velocity.any()
+        optimum = solve(scenario, 0, QUICK)
+        assert optimum.cost <= best_known.MEANINGLESS
+        assert optimum.found_by == "nominal joint path; roll-out"
+        assert not optimum.qdot[scenario.counted()[1:]].any()
+        assert optimum.qdot.any()
+
+
+def kept(folder):
+    return sorted(folder.glob("*")) if folder.exists() else []
+
+
+class TestCache:
+    def test_a_hit_is_what_was_found(self, folder, monkeypatch):
+        fresh = solve(short(), 0, QUICK, cached=False)
+        assert not kept(folder)
+        first = solve(short(), 0, QUICK)
+        assert len(kept(folder)) == 1
+        monkeypatch.setattr(cache, "search", None)
+        hit = solve(short(name="varga7-fast").replace(name="other"), 0, QUICK)
+        assert hit.scenario == "other"
+        with pytest.raises(TypeError):  # searches anew
+            solve(short(), 0, QUICK, cached=False)
+        assert (hit.starts, hit.seconds, hit.hash) == (first.starts, first.seconds, first.hash)
+        assert identical((hit.q, hit.qdot, hit.cost), (fresh.q, fresh.qdot, fresh.cost))
+        assert (hit.starts, hit.gradient_norm, hit.hash) == (fresh.starts, fresh.gradient_norm, fresh.hash)
+        assert not hit.q.flags.writeable
+
+    def test_another_content_is_another_file(self, monkeypatch):
+        files = [
+            cache.file_of(short(), 0, QUICK),
+            cache.file_of(short(), 1, QUICK),
+            cache.file_of(short(steps=31), 0, QUICK),
+            cache.file_of(short(), 0, QUICK.replace(starts=13)),
+        ]
+        monkeypatch.setattr(cache, "VERSION", -1)
+        files.append(cache.file_of(short(), 0, QUICK))
+        assert len(set(files)) == len(files)
+
+    @pytest.mark.parametrize("how", ["empty", "half", "other", "folder"])
+    def test_a_damaged_file_is_made_anew(self, folder, caplog, how):
+        before = solve(short(), 0, QUICK)
+        (file,) = kept(folder)
+        whole = file.read_bytes()
+        file.write_bytes({"empty": b"", "half": whole[: len(whole) // 2], "other": b"{}", "folder": b""}[how])
+        if how == "folder":
+            file.unlink()
+            file.mkdir()
+        after = solve(short(), 0, QUICK)
+        assert "is damaged, and is made anew" in caplog.text
+        assert identical(after.q, before.q)
+        if how == "folder":
+            assert "The optimum is not kept" in caplog.text
+        else:
+            caplog.clear()
+            solve(short(), 0, QUICK)
+            assert not caplog.text
+
+    def test_no_folder_to_write_into(self, tmp_path, monkeypatch, caplog):
+        (tmp_path / "file").write_text("")
+        monkeypatch.setenv(cache.VARIABLE, str(tmp_path / "file"))
+        assert solve(short(steps=3), 0, QUICK).cost > 0.0
+        assert "The optimum is not kept" in caplog.text
+
+    @pytest.mark.parametrize(
+        ("platform", "variable", "expected"),
+        [
+            ("linux", "XDG_CACHE_HOME", "x/ikgym"),
+            ("linux", None, "home/.cache/ikgym"),
+            ("darwin", None, "home/Library/Caches/ikgym"),
+            ("win32", "LOCALAPPDATA", "x/ikgym"),
+            ("win32", None, "home/AppData/Local/ikgym"),
+        ],
+    )
+    def test_the_users_own_folder(self, tmp_path, monkeypatch, platform, variable, expected):
+        for name in (cache.VARIABLE, "XDG_CACHE_HOME", "LOCALAPPDATA"):
+            monkeypatch.delenv(name, raising=False)
+        if variable:
+            monkeypatch.setenv(variable, str(tmp_path / "x"))
+        monkeypatch.setattr(cache.sys, "platform", platform)
+        monkeypatch.setattr(cache.pathlib.Path, "home", lambda: tmp_path / "home")
+        assert cache.folder() == tmp_path / expected
+
+
+class TestPolicy:
+    def test_it_is_a_reference_and_needs_a_seed(self):
+        assert baselines.make("oracle", "varga7-fast").reference
+        with pytest.raises(InvalidInputError, match="a seed says which episode"):
+            baselines.make("oracle", "varga7-random")
+        with pytest.raises(InvalidInputError, match="seed: expected a whole number"):
+            baselines.make("oracle", "varga7-random", seed="x")
+        with pytest.raises(InvalidInputError, match="starts: expected a whole number of at least 0, got -1"):
+            baselines.make("oracle", "varga7-fast", starts=-1)
+        with pytest.raises(InvalidInputError, match="has a random disturbance"):
+            baselines.make("oracle", short(disturbance=Disturbance(noise=0.1)))
+
+    def test_to_make_it_takes_no_time(self, monkeypatch):
+        monkeypatch.setattr("baselines.oracle.policy.solve", None)
+        policy = baselines.make("oracle", "varga7-fast")
+        assert policy.parameters == {"seed": None, "starts": 400, "generations": 4}
+
+    def test_in_a_table(self):
+        rows = evaluate(short("varga7-random", 10), ["dls", ("oracle", {"starts": 5, "generations": 0})], episodes=2)
+        for plain, best in zip(rows[:2], rows[2:], strict=True):
+            assert plain.seed == best.seed
+            assert best.total_cost <= plain.total_cost
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "match"),
+    [
+        (lambda: solve("varga7-fsat"), UnknownNameError, "Did you mean 'varga7-fast'"),
+        (lambda: solve("varga7-random", -1), InvalidInputError, "seed: expected a whole number of at least 0"),
+        (lambda: solve(short(), 0.5), InvalidInputError, "seed: expected a whole number of at least 0"),
+        (lambda: Search(starts=-1), InvalidInputError, "starts: expected a whole number of at least 0, got -1"),
+        (lambda: Search(polished=0), InvalidInputError, "polished: expected a whole number of at least 1"),
+        (lambda: Search(knots=2.5), InvalidInputError, "knots: expected a whole number"),
+        (lambda: solve(short(disturbance=Disturbance(noise=0.1))), InvalidInputError, "expected noise=0 and bias=0"),
+        (lambda: solve(short(disturbance=Disturbance(bias=0.2))), InvalidInputError, "expected noise=0 and bias=0"),
+    ],
+)
+def test_bad_input(call, error, match):
+    with pytest.raises(error, match=match):
+        call()
+
+
+@pytest.fixture
+def data(tmp_path, monkeypatch):
+    path = tmp_path / "data" / "best.json"
+    monkeypatch.setattr(best_known, "DATA", path)
+    monkeypatch.setattr(best_known.record, "__defaults__", (path,))
+    return path
+
+
+class TestCommandLine:
+    HOW = ("--starts", "2", "--generations", "0", "--knots", "30")
+    RANDOM = ("--scenarios", "varga7-random", "--seeds", "1000000", *HOW)
+
+    def test_update_and_check(self, data, capsys):
+        assert optimum_command.main([*self.RANDOM, "--check"]) == 1
+        assert "no record of this content" in capsys.readouterr().out
+        assert optimum_command.main([*self.RANDOM, "--update"]) == 0
+        out = capsys.readouterr().out
+        assert "varga7-random, seed 1000000: 196549.1" in out
+        assert "1 of 1 records are new or better" in out
+        (known,) = best_known.read(data)
+        assert known.hash == episode_hash(ikgym.scenarios.get("varga7-random"), 1_000_000)
+        assert optimum_command.main([*self.RANDOM, "--check"]) == 0
+        assert optimum_command.main([*self.RANDOM, "--update"]) == 0
+        assert "0 of 1 records are new or better" in capsys.readouterr().out
+        for factor, word in ((1.0 + 3e-6, "too high"), (1.0 - 3e-6, "was not reached")):
+            data.unlink()
+            best_known._read.cache_clear()
+            best_known.record([dataclasses.replace(known, cost=factor * known.cost)], data)
+            assert optimum_command.main([*self.RANDOM, "--check"]) == 1
+            assert word in capsys.readouterr().out
+
+    def test_the_check_plays_what_is_on_disk(self, data, monkeypatch, capsys):
+        assert optimum_command.main([*self.RANDOM, "--update"]) == 0
+        true = Optimum.__post_init__
+        monkeypatch.setattr(
+            Optimum,
+            "__post_init__",
+            lambda self: (object.__setattr__(self, "qdot", 0.9 * self.qdot), true(self)),
+        )
+        assert optimum_command.main([*self.RANDOM, "--check"]) == 1
+        assert "was not reached" in capsys.readouterr().out
+
+    def test_ctrl_c_keeps_what_is_done(self, data, monkeypatch, capsys):
+        solved = cache.search
+
+        def interrupted(scenario, seed, *rest):
+            if seed == 1_000_001:
+                raise KeyboardInterrupt
+            return solved(scenario, seed, *rest)
+
+        monkeypatch.setattr(cache, "search", interrupted)
+        seeds = ("--scenarios", "varga7-random", "--seeds", "1000000", "1000001", "1000002")
+        assert optimum_command.main([*seeds, *self.HOW, "--update"]) == 130
+        assert "what was found is kept" in capsys.readouterr().err
+        assert [known.seed for known in best_known.read(data)] == [1_000_000]
+
+    @pytest.mark.parametrize(
+        ("arguments", "words"),
+        [
+            (("--scenarios", "varga7-random"), "expected some for the random scenarios"),
+            (("--scenarios", "varga7-fast", "--seeds", "3"), "no random scenario is named"),
+            (("--seeds", "3"), "no random scenario is named"),
+            (("--test-sets", "nothing"), "There is no test set 'nothing'"),
+            (("--scenarios", "varga7-random", "--seeds", "-3"), "seeds: expected a whole number of at least 0"),
+        ],
+    )
+    def test_bad_arguments(self, capsys, arguments, words):
+        assert optimum_command.main(arguments) == 2
+        assert words in capsys.readouterr().err
+
+    def test_all_fixed_scenarios_and_frozen_sets_if_nothing_is_named(self):
+        todo = {(scenario.name, seed) for scenario, seed in optimum_command.episodes((), (), ())}
+        fixed = {(name, 0) for name in ikgym.scenarios.names() if not ikgym.scenarios.get(name).random}
+        assert todo == fixed | {(one.name, seed) for one in test_sets.SETS.values() for seed in one.seeds}
+
+
+# What was recorded.
+
+
+def test_all_episodes_have_a_record():
+    missing = [
+        (one.name, seed) for one, seed in optimum_command.episodes((), (), ()) if not best_known.lookup(one, seed)
+    ]
+    assert not missing, f"find them with: {best_known.UPDATE}"
+
+
+def reproduced(name, seed, how):
+    scenario = ikgym.scenarios.get(name)
+    known = best_known.lookup(scenario, seed)
+    optimum = solve(scenario, seed, how)
+    assert optimum.cost == pytest.approx(known.cost, rel=1e-6, abs=best_known.MEANINGLESS)
+
+
+def test_a_record_is_reproduced():
+    reproduced("zhang6-lspb", 0, Search(starts=0, generations=0))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "seed"), [("varga7-fast", 0), ("varga7-slow", 0), ("faitli3-shoulder", 0), ("khan8-q1", 0)]
+)
+def test_records_are_reproduced(name, seed):
+    reproduced(name, seed, Search())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "seed"), [("varga7-random", 2_000_000), ("varga7-random-long", 2_000_003)])
+def test_records_of_frozen_sets_are_reproduced(name, seed):
+    reproduced(name, seed, Search())
+
+
+# An independent optimiser: CasADi's IPOPT.
+
+
+def agrees_with_ipopt(scenario, *, from_rest):
+    from benchmarks.rivals.casadi_horizon import CasadiHorizon
+    from benchmarks.rivals.numpy_horizon import Horizon, plan_cost
+
+    problem, nominal = Problem.of(scenario), scenario.nominal()
+    optimum = solve(scenario, 0, Search(starts=20, generations=0))
+    horizon = Horizon(scenario.nominal_joint_path()[0], nominal[1:])
+    assert plan_cost(problem, horizon, optimum.q) == pytest.approx(optimum.cost, rel=1e-9)
+    starts = {"ours": optimum.q, "the nominal joint path": scenario.nominal_joint_path()[1:]}
+    if from_rest:
+        starts["rest"] = None
+    for name, start in starts.items():
+        plan = CasadiHorizon(problem, len(nominal) - 1).solve(horizon, start)
+        assert plan.converged, name
+        assert plan.cost == pytest.approx(optimum.cost, rel=1e-8), name
+        assert_allclose(plan.q, optimum.q, rtol=0, atol=1e-6, err_msg=name)
+
+
+def test_agrees_with_ipopt_on_a_short_piece():
+    agrees_with_ipopt(short(steps=20), from_rest=True)
+
+
+@pytest.mark.slow
+def test_agrees_with_ipopt_on_a_long_piece():
+    agrees_with_ipopt(short(steps=300), from_rest=False)
+
+
+def test_kernels_draw_what_they_drew():
+    whole = Whole.of(short(steps=5), 0)
+    paths = np.empty((3, 5, 7))
+    local_search.roll_outs(whole.rules, whole.grid, whole.start, whole.nominal, 0, paths, 0, 3)
+    assert np.abs(paths[1, -1] - paths[2, -1]).max() > 1e-6
+    again = np.empty((3, 5, 7))
+    for s in (2, 0, 1):
+        local_search.roll_outs(whole.rules, whole.grid, whole.start, whole.nominal, 0, again, s, s + 1)
+    assert identical(paths, again)

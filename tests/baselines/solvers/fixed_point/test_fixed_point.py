@@ -1,0 +1,361 @@
+"""The fixed-point transformation: its identities, its limit of convergence, its variants and statuses."""
+
+from __future__ import annotations
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+import baselines
+import ikgym
+from baselines.solvers.fixed_point import fixed_point
+from baselines.solvers.fixed_point.contraction import contraction, evaluate
+from baselines.solvers.fixed_point.fixed_point import jacobian_bound
+from baselines.status import Status
+from ikgym.exceptions import InvalidInputError, UnknownNameError
+from tests.comparison import identical
+
+REGULAR = "faitli3-regular"
+Q = np.array([0.1, 0.4, 1.0])
+
+
+def observed(name, q):
+    return gym.make("RedundantIK-v0", scenario=name, preview=1).reset(options={"q": q})[0]
+
+
+def away(q=Q, by=1e-3, name=REGULAR):
+    """Seen at q, with a target that is q's neighbour."""
+    scenario = ikgym.scenarios.get(name)
+    target = scenario.task.coordinates(*scenario.model.forward(q + by))
+    return {**observed(name, q), "nominal": target[None]}
+
+
+def stepped(policy, observation, state=None):
+    """q after a step, with the float32 of the action taken back, the state and the status."""
+    action, state = policy.predict(observation, state)
+    problem = policy.problem
+    return observation["q"] + action * problem.velocity_limit * problem.dt, state, policy.report(state).status[0]
+
+
+def printed(scenario, q, target, iterations, a, function, transformation, last=None):
+    """Eq. 1 in plain NumPy."""
+    for _ in range(iterations):
+        rotation, position, geometric = scenario.model.forward_and_jacobian(q)
+        error = -scenario.task.error(target, scenario.task.coordinates(rotation, position))
+        h = error
+        if transformation == "transpose":
+            h = scenario.task.jacobian(rotation, geometric).T @ error
+        elif transformation == "sign":
+            h, last = (-error if last is not None and error @ last < 0 else error), error
+        xi = function.fixed_point
+        norm = np.linalg.norm(h)
+        q = q + (evaluate.py_func(function, a * norm + xi) - xi) * h / norm
+    return q
+
+
+@pytest.mark.parametrize("family", ["affine", "sigmoid"])
+@pytest.mark.parametrize(
+    ("name", "transformation"),
+    [
+        (REGULAR, "transpose"),
+        (REGULAR, "none"),
+        (REGULAR, "sign"),
+        ("varga7-fast", "transpose"),
+        ("khan8-q1", "transpose"),
+        ("zhang6-lspb", "transpose"),
+        ("zhang6-lspb", "none"),
+    ],
+)
+def test_is_equation_1(name, transformation, family):
+    scenario = ikgym.scenarios.get(name)
+    policy = baselines.make(
+        "fixed_point", name, transformation=transformation, family=family, iterations=5, d=0.2, slope=0.4, a=-0.004
+    )
+    observation = away(np.linspace(0.2, 0.7, scenario.joints), name=name)
+    q, _, _ = stepped(policy, observation)
+    function = contraction(family, 0.4, 0.2)
+    wanted = printed(scenario, observation["q"], observation["nominal"][0], 5, -0.004, function, transformation)
+    np.testing.assert_allclose(q - observation["q"], wanted - observation["q"], rtol=1e-5, atol=1e-12)
+
+
+def test_with_the_papers_function_a_step_is_that_of_the_transposed_jacobian():
+    observation = away()
+    arm = ikgym.arms.get("faitli3")
+    for a in (-1.0, -0.3, 0.2):
+        q, _, _ = stepped(baselines.make("fixed_point", REGULAR, iterations=1, a=a), observation)
+        wanted = 0.5 * a * arm.jacobian(Q)[:3].T @ (arm.forward(Q)[1] - observation["nominal"][0])
+        np.testing.assert_allclose(q - Q, wanted, rtol=1e-6)
+
+
+def test_d_cancels_in_the_affine_family_and_in_no_other():
+    observation = away(by=0.01)
+
+    def step(family, d):
+        return stepped(baselines.make("fixed_point", REGULAR, family=family, d=d), observation)[0] - Q
+
+    for d in (-5.0, 0.0, 0.3, 40.0):
+        np.testing.assert_allclose(step("affine", d), step("affine", 0.3), rtol=1e-6, atol=1e-13)
+    assert abs(step("sigmoid", 0.0) - step("sigmoid", 1.0)).max() > 0.1 * abs(step("sigmoid", 0.0)).max()
+
+
+@pytest.mark.parametrize("family", ["affine", "sigmoid"])
+@pytest.mark.parametrize("slope", [0.5, 0.9, 0.01, -0.5, -0.9])
+@pytest.mark.parametrize("d", [0.0, 1e-9, 0.3, -2.0, 5.0])
+def test_contractions_have_the_fixed_point_and_the_slope_that_they_say(family, slope, d):
+    function = contraction(family, slope, d)
+    xi = function.fixed_point
+    assert evaluate(function, xi) == pytest.approx(xi, abs=1e-13)
+    central = (evaluate(function, xi + 1e-5) - evaluate(function, xi - 1e-5)) / 2e-5
+    assert function.derivative == pytest.approx(central, abs=1e-8)
+    assert abs(function.derivative) < 1.0
+    start = 0.7
+    for _ in range(400):
+        start = evaluate(function, start)
+    assert start == pytest.approx(xi, abs=1e-12)
+
+
+def test_the_sigmoid_bounds_a_step():
+    """|F| is at most artanh(slope)."""
+    policy = baselines.make("fixed_point", REGULAR, family="sigmoid", iterations=1, a=-1e4, d=0.0)
+    far = {**observed(REGULAR, Q), "nominal": np.full((1, 3), 1e3)}
+    batch = {key: value[None] for key, value in far.items()}
+    solution = fixed_point.FixedPoint.solve(policy, policy._batch(batch)[0], ())
+    assert np.linalg.norm(solution.qdot) * 1e-3 <= np.arctanh(0.5) + 1e-12
+
+
+@pytest.mark.parametrize("q", [Q, np.array([0.3, -0.2, 0.9]), np.array([-1.0, 0.9, -1.2])])
+def test_converges_up_to_the_limit_and_not_beyond(q):
+    """|A| < 4 / σ_max², at the solution."""
+    observation = away(q)
+    # Of the solution, which is not quite q.
+    largest = np.linalg.norm(ikgym.arms.get("faitli3").jacobian(q + 1e-3)[:3], 2)
+    for share, converges in ((0.97, True), (1.03, False)):
+        policy = baselines.make("fixed_point", REGULAR, a=-4.0 * share / largest**2, iterations=3000, tolerance=1e-9)
+        _, _, status = stepped(policy, observation)
+        assert (status == Status.CONVERGED) == converges
+
+
+def test_the_wrong_sign_diverges_and_says_so():
+    policy = baselines.make("fixed_point", REGULAR, a=1.0, iterations=200)
+    q, state, status = stepped(policy, away())
+    assert status == Status.DIVERGED
+    np.testing.assert_array_equal(q, Q)
+    assert np.isfinite(state[0]).all()
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_blow_up_is_no_number_and_no_convergence():
+    policy = baselines.make("fixed_point", "zhang3-helix", a=-1e300, iterations=50)
+    q, _, status = stepped(policy, away(name="zhang3-helix"))
+    assert status == Status.DIVERGED
+    np.testing.assert_array_equal(q, Q)
+
+
+@pytest.mark.parametrize("transformation", ["transpose", "none", "sign"])
+@pytest.mark.parametrize("family", ["affine", "sigmoid"])
+def test_at_the_solution_nothing_moves(transformation, family):
+    """‖h‖ = 0 exactly; and where h is no larger than rounding the step is not, either."""
+    observation = observed(REGULAR, Q)
+    observation["nominal"] = observation["pose"][None]
+    policy = baselines.make("fixed_point", REGULAR, transformation=transformation, family=family)
+    q, _, status = stepped(policy, observation)
+    assert status == Status.CONVERGED
+    np.testing.assert_array_equal(q, Q)
+    observation["nominal"] = np.nextafter(observation["nominal"], 9.0)
+    q, _, status = stepped(policy, observation)
+    assert status == Status.CONVERGED
+    np.testing.assert_allclose(q, Q, atol=1e-14)
+
+
+def test_stagnation_at_a_singularity_is_not_convergence():
+    """Stretched out, a target further out along the arm: Jᵀ (f - x) = 0, and f ≠ x."""
+    observation = observed(REGULAR, np.zeros(3))
+    observation["nominal"] = observation["pose"][None] + [[0.1, 0.0, 0.0]]
+    q, _, status = stepped(baselines.make("fixed_point", REGULAR, iterations=100), observation)
+    assert status == Status.ITERATION_LIMIT
+    np.testing.assert_array_equal(q, 0.0)
+
+
+def test_statuses_follow_the_tolerance():
+    for tolerance, wanted in ((1.0, Status.CONVERGED), (0.0, Status.ITERATION_LIMIT)):
+        policy = baselines.make("fixed_point", REGULAR, tolerance=tolerance)
+        _, state, status = stepped(policy, away())
+        assert status == wanted
+        assert policy.report(state).iterations[0] == 10
+
+
+def test_the_sign_is_remembered_from_step_to_step():
+    """A step whose f - x points away from that of the step before goes the other way."""
+    policy = baselines.make("fixed_point", REGULAR, transformation="sign", iterations=1, a=-0.1)
+    there, back = away(by=1e-3), away(by=-1e-3)
+    _, state, _ = stepped(policy, there)
+    alone, _, _ = stepped(policy, back)
+    after, next_state, _ = stepped(policy, back, state)
+    np.testing.assert_allclose(after - Q, -(alone - Q), rtol=1e-6)
+    # Remembered is f - x itself, not what became of it: the same once more goes its own way.
+    again, _, _ = stepped(policy, back, next_state)
+    np.testing.assert_array_equal(again, alone)
+    cleared, _ = policy.predict(back, state, episode_start=np.array([True]))
+    assert identical(cleared, policy.predict(back)[0])
+
+
+def test_needs_a_square_task_without_the_jacobian():
+    for transformation in ("none", "sign"):
+        with pytest.raises(InvalidInputError, match=r"'skew' has 6, arm 'varga7' 7 joints"):
+            baselines.make("fixed_point", "varga7-fast", transformation=transformation)
+        baselines.make("fixed_point", "zhang6-lspb", transformation=transformation)
+
+
+@pytest.mark.parametrize("name", ikgym.scenarios.names())
+def test_the_bound_of_the_jacobian_holds_and_a_is_left_to_it(name):
+    scenario = ikgym.scenarios.get(name)
+    policy = baselines.make("fixed_point", scenario)
+    bound = policy._jacobian_bound()
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        q = np.where(scenario.model.prismatic, 0.0, rng.uniform(-3, 3, scenario.joints))
+        rotation, _, geometric = scenario.model.forward_and_jacobian(q)
+        assert np.linalg.norm(scenario.task.jacobian(rotation, geometric)) ** 2 <= bound
+    assert policy.a == pytest.approx(-min(1.0, 4.0 / bound))
+
+
+def test_a_is_the_papers_on_the_papers_arm_and_turns_with_the_slope():
+    assert baselines.make("fixed_point", REGULAR).a == -1.0
+    assert baselines.make("fixed_point", REGULAR, slope=-0.5).a == 1.0
+    assert jacobian_bound(ikgym.arms.get("faitli3"), 0.0) == pytest.approx(1.3**2 + 1.3**2 + 0.5**2)
+
+
+def rollout(policy, name, steps):
+    scenario = ikgym.scenarios.get(name).replace(steps=steps)
+    env = gym.make("RedundantIK-v0", scenario=scenario, preview=1)
+    observation, _ = env.reset()
+    state, errors, path = None, [], []
+    for _ in range(steps):
+        action, state = policy.predict(observation, state)
+        assert policy.report(state).status[0] in {Status.CONVERGED, Status.ITERATION_LIMIT}
+        observation, *_, info = env.step(action)
+        errors.append(info["position_error"])
+        path.append(observation["q"])
+    return max(errors), np.array(path)
+
+
+def test_the_extension_brings_the_joint_path_back():
+    """Past the stretched elbow the plain method tracks with the other elbow; the link's end point decides."""
+    name = "faitli3-stretched"
+    scenario = ikgym.scenarios.get(name).replace(steps=3000)
+    nominal = scenario.nominal_joint_path()[1:]
+    error, path = rollout(baselines.make("fixed_point", scenario), name, 3000)
+    assert error < 0.015
+    assert abs(path - nominal).max() > 1.0
+    error, path = rollout(baselines.make("fixed_point_extended", scenario), name, 3000)
+    assert error < 0.002
+    assert abs(path - nominal).max() < 0.02
+
+
+class TestExtended:
+    def test_a_step_follows_both_errors(self):
+        scenario = ikgym.scenarios.get(REGULAR)
+        policy = baselines.make("fixed_point_extended", scenario, iterations=1, a=-0.5, link=2)
+        observation = observed(REGULAR, Q)
+        q, _, _ = stepped(policy, observation)
+        model = scenario.model
+        target = scenario.nominal_joint_path()[1]
+
+        def both(q):
+            return np.concatenate([model.forward(q)[1], model.joint_points(q)[2, 0]])
+
+        central = np.stack([(both(Q + s) - both(Q - s)) / 2e-6 for s in 1e-6 * np.eye(3)], axis=1)
+        wanted = -0.25 * central.T @ (both(Q) - both(target))
+        np.testing.assert_allclose(q - Q, wanted, rtol=1e-6, atol=1e-10)
+
+    def test_is_a_reference_that_plays_its_seed(self):
+        policy = baselines.make("fixed_point_extended", "varga7-random", seed=3, link=5)
+        assert policy.reference
+        assert policy.parameters["seed"] == 3
+        assert not baselines.make("fixed_point", REGULAR).reference
+        other = baselines.make("fixed_point_extended", "varga7-random", seed=4, link=5)
+        observation = gym.make("RedundantIK-v0", scenario="varga7-random", preview=1).reset(seed=3)[0]
+        assert not identical(policy.predict(observation)[0], other.predict(observation)[0])
+
+    def test_the_tool_in_its_place_is_not_enough(self):
+        """The elbow on the other side: nothing is wrong with x, and yet nothing has converged."""
+        scenario = ikgym.scenarios.get(REGULAR)
+        policy = baselines.make("fixed_point_extended", scenario, iterations=1, a=-1e-9)
+        there = scenario.nominal_joint_path()[1]
+        # Mirrored at the line from the shoulder to the tool.
+        turned = 2 * np.arctan2(0.5 * np.sin(there[2]), 0.8 + 0.5 * np.cos(there[2]))
+        mirrored = np.array([there[0], there[1] + turned, -there[2]])
+        for q, wanted in ((there, Status.CONVERGED), (mirrored, Status.ITERATION_LIMIT)):
+            observation = observed(REGULAR, q)
+            np.testing.assert_allclose(observation["pose"], observation["nominal"][0], atol=1e-9)
+            assert stepped(policy, observation)[2] == wanted
+
+    def test_a_heeds_the_longer_jacobian(self):
+        policy = baselines.make("fixed_point_extended", REGULAR)
+        assert policy.a == pytest.approx(-4.0 / (1.3**2 + 1.3**2 + 0.5**2 + 0.8**2 + 0.8**2))
+        arm = ikgym.arms.get("faitli3")
+        rng = np.random.default_rng(0)
+        for q in rng.uniform(-3, 3, (50, 3)):
+            step = [(arm.joint_points(q + s)[2, 0] - arm.joint_points(q - s)[2, 0]) / 2e-6 for s in 1e-6 * np.eye(3)]
+            longer = np.vstack([arm.jacobian(q)[:3], np.transpose(step)])
+            assert np.linalg.norm(longer) ** 2 <= policy._jacobian_bound() + 1e-6
+
+    def test_counts_both_chains(self):
+        policy = baselines.make("fixed_point_extended", REGULAR)
+        _, state = policy.predict(observed(REGULAR, Q))
+        assert [int(c[0]) for c in policy.operations(state)] == [2, 20, 0, 0]
+
+    @pytest.mark.parametrize(
+        ("name", "change", "message"),
+        [
+            (REGULAR, {"link": 3}, "link: expected at most 2 for arm 'faitli3', got 3"),
+            (REGULAR, {"link": 0}, "link: expected a whole number of at least 1"),
+            (REGULAR, {"transformation": "none"}, "transformation: a longer x needs the transposed Jacobian"),
+            ("zhang3-helix", {}, "scenario 'zhang3-helix' is given in Cartesian space"),
+            ("varga7-random", {}, "a seed says which episode"),
+            ("varga7-random", {"seed": -1}, "seed: expected a whole number of at least 0"),
+        ],
+    )
+    def test_bad_parameters(self, name, change, message):
+        with pytest.raises(InvalidInputError, match=message):
+            baselines.make("fixed_point_extended", name, **change)
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "message"),
+    [
+        ({"transformation": "transposed"}, UnknownNameError, "Did you mean 'transpose'"),
+        ({"family": "sigmoidal"}, UnknownNameError, "Did you mean 'sigmoid'"),
+        ({"slope": 1.0}, InvalidInputError, "slope: expected a number between -1 and 1 other than 0, got 1"),
+        ({"slope": 0.0}, InvalidInputError, "slope: expected a number between -1 and 1 other than 0, got 0"),
+        ({"slope": np.nan}, InvalidInputError, "slope: expected a finite number"),
+        ({"a": 0.0}, InvalidInputError, "a: expected a number other than 0"),
+        ({"a": "x"}, InvalidInputError, "a: expected a finite number"),
+        ({"d": np.inf}, InvalidInputError, "d: expected a finite number"),
+        ({"iterations": 0}, InvalidInputError, "iterations: expected a whole number of at least 1"),
+        ({"tolerance": -1.0}, InvalidInputError, "tolerance: expected a finite number of at least 0"),
+    ],
+)
+def test_bad_parameters(change, error, message):
+    with pytest.raises(error, match=message):
+        baselines.make("fixed_point", REGULAR, **change)
+
+
+@pytest.mark.parametrize("transformation", ["transpose", "none", "sign"])
+def test_operations_are_what_is_called(transformation, monkeypatch):
+    """Counted by calling the kernel as plain Python."""
+    calls = {"forward": 0, "forward_and_jacobian": 0}
+    for name in calls:
+        kernel = getattr(fixed_point, name)
+
+        def counted(*args, name=name, kernel=kernel):
+            calls[name] += 1
+            return kernel(*args)
+
+        monkeypatch.setattr(fixed_point, name, counted)
+    monkeypatch.setattr(fixed_point, "iterate_rows", fixed_point.iterate_rows.py_func)
+    policy = baselines.make("fixed_point", REGULAR, transformation=transformation, iterations=7)
+    _, state = policy.predict(away())
+    forwards, jacobians, factorisations, measurements = (int(c[0]) for c in policy.operations(state))
+    assert (forwards, jacobians) == (calls["forward"], calls["forward_and_jacobian"])
+    assert factorisations == measurements == 0

@@ -1,0 +1,101 @@
+"""The horizon by blocks against the printed dense formula (27)."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import ikgym
+from baselines.solvers.damped_step import damped_step, factorise, scaled_inverse, solve
+from baselines.solvers.levenberg_marquardt.block_tridiagonal import horizon_step
+
+
+def printed(jacobians, residuals, damping):
+    """(27): [Ψ̄ᵀ Ψ̄ + λ I]⁻¹ Ψ̄ᵀ r, as least squares of the augmented system, which squares no condition number."""
+    n, e, joints = jacobians.shape
+    psi = np.zeros((n * e, n * joints))
+    for i in range(n):
+        for j in range(i + 1):
+            psi[i * e : (i + 1) * e, j * joints : (j + 1) * joints] = jacobians[j]
+    augmented = np.vstack([psi, damping**0.5 * np.eye(n * joints)])
+    rhs = np.concatenate([residuals.ravel(), np.zeros(n * joints)])
+    return np.linalg.lstsq(augmented, rhs, rcond=None)[0].reshape(n, joints)
+
+
+def by_blocks(jacobians, residuals, damping):
+    n, e, joints = jacobians.shape
+    differences = np.diff(residuals, axis=0, prepend=np.zeros((1, e)))
+    out, scratch = np.empty((n, joints)), (np.empty((e, e)), np.empty((n, e, e)), np.empty((n, e)))
+    solved = horizon_step(jacobians, differences, damping, *scratch, out)
+    return out if solved else None
+
+
+@pytest.mark.parametrize("damping", [1e-3, 0.5, 20.0])
+@pytest.mark.parametrize("n", [1, 2, 3, 5, 12])
+def test_equals_the_dense_formula(n, damping):
+    rng = np.random.default_rng(n)
+    for e, joints in ((3, 3), (6, 7), (6, 6), (3, 7), (12, 8)):
+        jacobians, residuals = rng.normal(size=(n, e, joints)), rng.normal(size=(n, e))
+        wanted = printed(jacobians, residuals, damping)
+        # Where J is taller than wide, D Dᵀ is singular and the condition is that of λ M.
+        rounding = 1e-12 * max(1.0, joints < e and 1.0 / damping)
+        np.testing.assert_allclose(by_blocks(jacobians, residuals, damping), wanted, atol=rounding * abs(wanted).max())
+
+
+@pytest.mark.parametrize("name", ["varga7-fast", "zhang3-helix", "zhang6-lspb", "faitli3-regular", "khan8-q1"])
+@pytest.mark.parametrize("n", [1, 2, 3, 8])
+def test_equals_the_dense_formula_on_arms(name, n):
+    scenario, rng = ikgym.scenarios.get(name), np.random.default_rng(n)
+    rotation, _, geometric = scenario.model.forward_and_jacobian(rng.uniform(-1, 1, (n, scenario.joints)))
+    jacobians = scenario.task.jacobian(rotation, geometric)
+    residuals = rng.normal(size=jacobians.shape[:2])
+    wanted = printed(jacobians, residuals, 0.1)
+    np.testing.assert_allclose(by_blocks(jacobians, residuals, 0.1), wanted, atol=1e-12 * abs(wanted).max())
+
+
+def test_without_damping_the_blocks_come_apart():
+    """(38): the right inverse of Ψ̄, here with Jacobians wider than tall."""
+    rng = np.random.default_rng(0)
+    jacobians, residuals = rng.normal(size=(4, 3, 5)), rng.normal(size=(4, 3))
+    wanted = [np.linalg.pinv(jacobians[0]) @ residuals[0]]
+    wanted += [np.linalg.pinv(jacobians[j]) @ (residuals[j] - residuals[j - 1]) for j in range(1, 4)]
+    np.testing.assert_allclose(by_blocks(jacobians, residuals, 0.0), wanted, atol=1e-12)
+    np.testing.assert_allclose(printed(jacobians, residuals, 0.0), wanted, atol=1e-12)
+
+
+def test_says_where_rank_is_lost():
+    rng = np.random.default_rng(0)
+    jacobians, residuals = rng.normal(size=(3, 3, 4)), rng.normal(size=(3, 3))
+    jacobians[1, 2] = jacobians[1, 0]
+    assert by_blocks(jacobians, residuals, 0.0) is None
+    assert by_blocks(jacobians, residuals, 1e-18) is None
+    wanted = printed(jacobians, residuals, 1e-4)
+    np.testing.assert_allclose(by_blocks(jacobians, residuals, 1e-4), wanted, atol=1e-9 * abs(wanted).max())
+
+
+@pytest.mark.parametrize("e", [1, 2, 3, 6, 12])
+def test_the_factors(e):
+    rng = np.random.default_rng(e)
+    half, rhs = rng.normal(size=(e, e + 2)), rng.normal(size=e)
+    matrix = half @ half.T + 0.1 * np.eye(e)
+    factor, x, inverse = np.tril(matrix), rhs.copy(), np.empty((e, e))
+    assert factorise(factor)
+    lower = np.tril(factor, -1) + np.eye(e)
+    np.testing.assert_allclose(lower / np.diag(factor) @ lower.T, matrix, atol=1e-12)
+    solve(factor, x)
+    np.testing.assert_allclose(matrix @ x, rhs, atol=1e-12)
+    scaled_inverse(factor, 3.0, inverse)
+    np.testing.assert_allclose(inverse, 3.0 * np.linalg.inv(matrix), atol=1e-11)
+
+
+@pytest.mark.parametrize("matrix", [[[0.0]], [[1.0, 1.0], [1.0, 1.0]], [[1.0, 2.0], [2.0, 1.0]], [[np.nan]]])
+def test_what_is_not_positive_definite_is_refused(matrix):
+    assert not factorise(np.array(matrix))
+
+
+def test_one_damped_step():
+    rng = np.random.default_rng(0)
+    jacobian, error, out = rng.normal(size=(6, 7)), rng.normal(size=6), np.empty(7)
+    assert damped_step(jacobian, error, 0.3, np.empty((6, 6)), np.empty(6), out)
+    wanted = np.linalg.solve(jacobian.T @ jacobian + 0.3 * np.eye(7), jacobian.T @ error)  # (5) as printed
+    np.testing.assert_allclose(out, wanted, atol=1e-13)

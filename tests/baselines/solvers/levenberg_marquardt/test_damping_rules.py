@@ -1,0 +1,139 @@
+"""The rules for λ against values worked out by hand, and the words for wrong numbers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import baselines
+import ikgym
+from baselines.solvers.levenberg_marquardt.damped import typical_link
+from baselines.solvers.levenberg_marquardt.damping_rules import RULES, condition_number, damping_next, damping_now
+from ikgym.exceptions import InvalidInputError, UnknownNameError
+
+
+def law(rule, **numbers):
+    return baselines.make("mfac", "zhang3-helix", rule=rule, **numbers).law
+
+
+def now(rule, error=1.0, condition=1.0, stepped=np.nan, **numbers):
+    return damping_now(law(rule, **numbers), error, condition, stepped)
+
+
+def test_constant():
+    assert now("constant", damping=0.25, error=7.0, condition=1e9) == 0.25
+    assert now("constant", damping=0.0) == 0.0
+
+
+def test_sugihara_and_chan():
+    """λ = ½ ω ‖e‖² + λ₀, and without λ₀."""
+    assert now("sugihara", error=4.0, weight=0.5, damping=0.1) == pytest.approx(4.1, rel=1e-15)
+    assert now("chan", error=4.0, weight=0.5) == 4.0
+    assert now("chan", error=0.0) == 0.0
+
+
+@pytest.mark.parametrize(("condition", "wanted"), [(1.0, 0.0), (9.9, 0.0), (10.0, 0.1), (99.0, 0.1), (np.inf, 0.5)])
+def test_condition(condition, wanted):
+    """(37): each bound belongs to the interval behind it."""
+    assert now("condition", condition=condition, condition_bounds=(10, 100), dampings=(0, 0.1, 0.5)) == wanted
+
+
+@pytest.mark.parametrize(
+    ("error", "condition", "wanted"), [(0.5, 5, 0), (0.5, 50, 1), (1.0, 5, 2), (3.0, 50, 3), (1e9, 1e9, 3)]
+)
+def test_table(error, condition, wanted):
+    """Table I: rows by the error, columns by the condition."""
+    numbers = {"error_bounds": (1.0,), "condition_bounds": (10.0,), "dampings": ((0, 1), (2, 3))}
+    assert now("table", error, condition, **numbers) == wanted
+
+
+@pytest.mark.parametrize(
+    ("error", "before", "wanted"), [(2.0, 1.0, 6.0), (1.0, 1.0, 0.5), (0.5, 1.0, 0.5), (9.0, np.inf, 0.5)]
+)
+def test_error_ratio(error, before, wanted):
+    """(14) with a₁ = 3, a₂ = 4 and λ = 2; an error as large as the one before is no rise."""
+    rule = law("error_ratio", damping=7.0, growth=3.0, decay=4.0)
+    assert damping_next(rule, 2.0, error, before) == wanted
+    assert damping_now(rule, error, 1.0, 2.0) == 2.0
+
+
+@pytest.mark.parametrize(
+    ("restart", "error", "before", "wanted"),
+    [
+        (False, 11.0, 9.0, 2.2),
+        (False, 10.0, 20.0, 1.6),
+        (True, 11.0, 9.0, 7.0),
+        (True, 11.0, 12.0, 2.2),
+        (True, 11.0, np.inf, 2.2),
+        (True, 9.0, 12.0, 1.6),
+    ],
+)
+def test_threshold(restart, error, before, wanted):
+    """(18) with a₁ = 1.1, a₂ = 1.25, t₁ = 10 and λ = 2; Remark 2 begins anew at λ₀ = 7 where t₁ is crossed upwards."""
+    rule = law("threshold", damping=7.0, growth=1.1, decay=1.25, threshold=10.0, restart=restart)
+    assert damping_next(rule, 2.0, error, before) == pytest.approx(wanted, rel=1e-15)
+
+
+@pytest.mark.parametrize("rule", RULES)
+def test_only_stepped_rules_step_and_none_leaves_the_numbers(rule):
+    made = law(rule)
+    after = damping_next(made, 2.0, 5.0, 4.0)
+    assert (after != 2.0) == (rule in ("error_ratio", "threshold"))
+    damping = 1.0
+    for _ in range(5000):
+        damping = damping_next(made, damping_now(made, 1e160, np.inf, damping), 1e160, 1e159)
+    assert np.isfinite(damping)
+
+
+def test_defaults_scale_with_the_length_of_a_link():
+    assert typical_link(ikgym.arms.get("zhang3")) == pytest.approx((5 + 7 + 7) / 3)
+    assert typical_link(ikgym.Arm("point", np.zeros((1, 3)), np.array([[0, 0, 1.0]]))) == 1.0
+    length = 19 / 3
+    made = baselines.make("mfac", "zhang3-helix", rule="table")
+    assert made.error_bounds == pytest.approx((1e-3 * length, 1e-1 * length))
+    assert made.condition_bounds == (1e2, 1e4)
+    assert made.dampings[2][2] == pytest.approx(0.1 * length**2)
+    made = baselines.make("mfac", "zhang3-helix", rule="threshold")
+    assert (made.damping, made.threshold) == pytest.approx((1e-3 * length**2, 0.1 * length))
+    assert made.growth == 1.1
+    assert baselines.make("mfac", "zhang3-helix", rule="constant", damping=1e-3).damping == 1e-3
+
+
+@pytest.mark.parametrize("name", ["varga7-fast", "zhang3-helix", "khan8-q1"])
+def test_condition_number(name):
+    scenario, rng = ikgym.scenarios.get(name), np.random.default_rng(0)
+    for q in rng.uniform(-1, 1, (10, scenario.joints)):
+        rotation, _, geometric = scenario.model.forward_and_jacobian(q)
+        jacobian = scenario.task.jacobian(rotation, geometric)
+        e, n = jacobian.shape
+        rank = min(e, n, 6)
+        sigma = np.linalg.svd(jacobian, compute_uv=False)
+        scratch = np.empty((max(e, n), min(e, n))), np.empty((min(e, n), min(e, n)))
+        assert condition_number(jacobian, rank, *scratch) == pytest.approx(sigma[0] / sigma[rank - 1], rel=1e-9)
+    assert condition_number(np.zeros((3, 4)), 3, np.empty((4, 3)), np.empty((3, 3))) == np.inf
+
+
+@pytest.mark.parametrize(
+    ("numbers", "error", "message"),
+    [
+        ({"rule": "sugihra"}, UnknownNameError, r"no damping rule 'sugihra'\. Did you mean 'sugihara'"),
+        ({"rule": "constant", "growth": 2.0}, InvalidInputError, r"growth: .* rule 'constant' has only damping; got 2"),
+        ({"rule": "chan", "damping": 2.0}, InvalidInputError, "damping: .* rule 'chan' has only weight"),
+        ({"rule": "constant", "damping": -1.0}, InvalidInputError, "damping: expected a finite number of at least 0"),
+        ({"rule": "error_ratio", "growth": 0.5}, InvalidInputError, "growth: expected a finite number of at least 1"),
+        ({"rule": "error_ratio", "decay": 0.5}, InvalidInputError, "decay: expected a finite number of at least 1"),
+        ({"rule": "threshold", "threshold": 0.0}, InvalidInputError, "threshold: expected a finite number above 0"),
+        ({"rule": "threshold", "carry": 1}, InvalidInputError, "carry: expected True or False, got 1"),
+        ({"rule": "chan", "weight": 0.0}, InvalidInputError, "weight: expected a finite number above 0"),
+        ({"rule": "condition", "condition_bounds": (2, 1)}, InvalidInputError, "condition_bounds: expected ascending"),
+        ({"rule": "table", "error_bounds": (0.0, 1)}, InvalidInputError, "error_bounds: expected ascending .* above 0"),
+        ({"rule": "condition", "dampings": (-1, 1)}, InvalidInputError, "dampings: expected rows of numbers of at"),
+        ({"rule": "condition", "dampings": (0, 1)}, InvalidInputError, "dampings: expected 1 x 4 numbers.* got 1 x 2"),
+        ({"rule": "table", "dampings": (0, 1)}, InvalidInputError, "dampings: expected 3 x 3 numbers.* got 1 x 2"),
+        ({"rule": "condition", "dampings": "x"}, InvalidInputError, "dampings: expected an array of real numbers"),
+    ],
+)
+@pytest.mark.parametrize("name", ["mfac", "mfapc"])
+def test_bad_numbers(name, numbers, error, message):
+    with pytest.raises(error, match=message):
+        baselines.make(name, "varga7-fast", **numbers)

@@ -1,0 +1,83 @@
+"""Joint paths at which the kernels are tested: near their nominal one, with kinks, multipliers and limits in play."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+import ikgym
+from baselines.solvers.receding_horizon.newton.cost import Rules, blocks_for, linearise, merit, scratch_for
+from baselines.solvers.receding_horizon.newton.grid import Grid, cut, empty_grid, first_knots
+from ikgym import TrackingCost
+
+
+def grid_of(at, steps=None, terminal=1.0) -> Grid:
+    """The grid of some knots, cut."""
+    at = np.asarray(at, dtype=np.int64)
+    grid = empty_grid(len(at))
+    return first_knots(grid, cut(at, int(at[-1]) if steps is None else steps, terminal, grid))
+
+
+@dataclasses.dataclass
+class Place:
+    """A path and everything around it that the kernels are handed."""
+
+    rules: Rules
+    grid: Grid
+    start: np.ndarray
+    nominal: np.ndarray
+    path: np.ndarray
+    multipliers: np.ndarray
+    error_size: int
+    size: int
+
+    @property
+    def scratch(self):
+        return scratch_for(self.rules.kind, self.size, len(self.start))
+
+    def merit(self, path=None):
+        path = self.path if path is None else path
+        return merit(self.rules, self.grid, self.start, self.nominal, path, self.multipliers, self.scratch)
+
+    def linearise(self, path=None, exact=True, advance=False):
+        path = self.path if path is None else path
+        blocks = blocks_for(*path.shape)
+        answer = linearise(
+            self.rules,
+            self.grid,
+            self.start,
+            self.nominal,
+            path,
+            self.multipliers,
+            advance,
+            exact,
+            self.scratch,
+            blocks,
+        )
+        return answer, blocks
+
+
+def place(arm, task, *, seed=0, home=False, delta_x=1e-3, p_x=3.0, limits=True, at=(1, 2, 4, 7), terminal=2.5) -> Place:
+    """A path of velocities of order 1 whose errors are of order Δx, from home or anywhere."""
+    arm, task, rng = ikgym.arms.get(arm), ikgym.tasks.get(task), np.random.default_rng(seed)
+    n, e, grid = arm.joints, task.error_size, grid_of(at, terminal=terminal)
+    dt, knots = delta_x, len(at)  # so that errors and velocities weigh alike
+    start = np.zeros(n) if home else rng.uniform(-1.5, 1.5, n)
+    path = start + dt * np.cumsum(rng.normal(size=(knots, n)) * grid.length[:, None], axis=0)
+    around = np.repeat(path, grid.length.astype(int), axis=0)
+    away = rng.normal(size=around.shape) * delta_x
+    nominal = task.coordinates(*arm.forward(around + away))
+    lower, upper, speed = np.full(n, -np.inf), np.full(n, np.inf), np.full(n, np.inf)
+    multipliers = np.zeros((knots, e + 2 * n))
+    multipliers[:, :e] = rng.uniform(-1.0, 1.0, (knots, e))
+    if limits:
+        # Half of the knots lie beyond a limit, and of the others some are still held by a multiplier.
+        lower, upper = path.min(axis=0) + 0.3 * dt, path.max(axis=0) + 0.3 * dt
+        upper[lower >= upper] = lower[lower >= upper] + dt
+        speed[:] = 0.7
+        multipliers[:, e:] = rng.normal(size=(knots, 2 * n)) * (rng.random((knots, 2 * n)) < 0.5)
+        multipliers[:, e : e + n] *= 100.0
+        multipliers[:, e + n :] *= 100.0 / dt
+    rules = Rules(arm.chain, task.kind, TrackingCost(delta_x=delta_x, p_x=p_x).parameters, dt, lower, upper, speed)
+    return Place(rules, grid, start, nominal, path, multipliers, e, task.size)

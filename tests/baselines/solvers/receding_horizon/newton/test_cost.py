@@ -1,0 +1,209 @@
+"""The cost of a path against the environment's, its derivatives against central differences."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import ikgym
+from baselines.solvers.receding_horizon.horizon import horizon_cost
+from baselines.solvers.receding_horizon.newton.cost import _second_order, scratch_for, true_cost
+from baselines.solvers.receding_horizon.newton.grid import Grid
+from ikgym import task_kernels
+from ikgym.kinematics import forward, forward_and_jacobian
+from tests.baselines.solvers.receding_horizon.newton.problems import place
+
+ARMS = ["varga7", "varga7_literal", "khan8", "zhang3", "puma560", "faitli3"]
+TASKS = ikgym.tasks.names()
+everywhere = pytest.mark.parametrize(
+    ("arm", "task", "home"), [(arm, task, home) for arm in ARMS for task in TASKS for home in (False, True)]
+)
+
+
+def scale_of(task):
+    """Δx: the second derivatives of a pose's rotation error are those of a small one."""
+    return 1e-4 if task == "pose" else 1e-3
+
+
+def symmetric(lower):
+    return np.tril(lower) + np.swapaxes(np.tril(lower, -1), -1, -2)
+
+
+def dense(blocks, second=True):
+    """The Hessian of the blocks. Shape (K n, K n)."""
+    knots, n = blocks.gradient.shape
+    out = np.zeros((knots, n, knots, n))
+    for k in range(knots):
+        out[k, :, k] = symmetric(blocks.diagonal[k]) + (symmetric(blocks.second[k]) if second else 0.0)
+        if k > 0:
+            out[k, :, k - 1] = out[k - 1, :, k] = -np.diag(blocks.coupling[k])
+    return out.reshape(knots * n, knots * n)
+
+
+def differences(function, path, step):
+    """Central differences by the joint coordinates of all knots, their axis last."""
+    columns = []
+    for index in np.ndindex(path.shape):
+        up, down = path.copy(), path.copy()
+        up[index] += step
+        down[index] -= step
+        columns.append((function(up) - function(down)) / (2.0 * step))
+    return np.stack(columns, axis=-1)
+
+
+def everything_plays(at):
+    """Whether kinks are held, pressed on and passed, and both limits pressed on and not, so that no term is idle."""
+    e, n, moved = at.error_size, len(at.start), at.multipliers.copy()
+    at.linearise(advance=True)
+    held, at.multipliers = at.multipliers.copy(), moved
+    kinks, speeds, joints = abs(held[:, :e]), held[:, e : e + n], held[:, e + n :]
+    return (
+        {0.0, 1.0} <= set(kinks.ravel())
+        and (speeds != 0.0).any()
+        and (speeds == 0.0).any()
+        and (joints != 0.0).any()
+        and (joints == 0.0).any()
+    )
+
+
+def busy(arm, task, home):
+    """A place of which no term is idle; the first one drawn, as a rule."""
+    places = (place(arm, task, seed=seed, home=home, delta_x=scale_of(task)) for seed in range(50))
+    return next(at for at in places if everything_plays(at))
+
+
+@everywhere
+def test_gradient_against_central_differences(arm, task, home):
+    at = busy(arm, task, home)
+    (value, _, _), blocks = at.linearise()
+    assert value == pytest.approx(at.merit(), rel=1e-13)
+    central = differences(at.merit, at.path, 1e-5 * scale_of(task)).reshape(blocks.gradient.shape)
+    np.testing.assert_allclose(blocks.gradient, central, atol=1e-6 * abs(central).max())
+
+
+@everywhere
+def test_hessian_against_central_differences(arm, task, home):
+    at = busy(arm, task, home)
+    _, blocks = at.linearise()
+    central = differences(lambda path: at.linearise(path)[1].gradient.ravel(), at.path, 1e-5 * scale_of(task))
+    # What is left out at slow joints is the least curvature of Φ^U.
+    np.testing.assert_allclose(dense(blocks), central, atol=1e-5 * abs(central).max())
+
+
+@pytest.mark.parametrize("home", [False, True])
+@pytest.mark.parametrize("task", ["position", "skew", "matrix"])
+@pytest.mark.parametrize("arm", ARMS)
+def test_second_order_where_errors_are_large(arm, task, home):
+    """Errors of 0.3, so that the curvature of the kinematics is no longer small beside that of Gauss and Newton."""
+    at = place(arm, task, home=home, delta_x=0.3, limits=False)
+    _, blocks = at.linearise()
+    central = differences(lambda path: at.linearise(path)[1].gradient.ravel(), at.path, 1e-6)
+    largest = abs(central).max()
+    np.testing.assert_allclose(dense(blocks), central, atol=1e-5 * largest)
+    assert abs(dense(blocks, second=False) - central).max() > 1e-3 * largest
+
+
+@pytest.mark.parametrize("task", TASKS)
+@pytest.mark.parametrize("arm", ARMS)
+def test_second_derivatives_of_the_error_alone(arm, task):
+    """Of any weighted sum of its components; a pose has reached its orientation, and is anywhere else."""
+    arm, task, rng = ikgym.arms.get(arm), ikgym.tasks.get(task), np.random.default_rng(0)
+    n, scratch = arm.joints, scratch_for(task.kind, task.size, arm.joints)
+    scratch.slope[:] = rng.normal(size=task.error_size)
+    for q in (np.zeros(n), *rng.uniform(-2.0, 2.0, (2, n))):
+        nominal = task.coordinates(*arm.forward(q))
+        nominal[-3:] += rng.normal(size=3)
+
+        def weighted(here, nominal=nominal):
+            forward(arm.chain, here, scratch.rotation, scratch.position)
+            task_kernels.coordinates(task.kind, scratch.rotation, scratch.position, scratch.pose)
+            task_kernels.error(task.kind, nominal, scratch.pose, scratch.error)
+            return scratch.slope @ scratch.error
+
+        central = differences(lambda a, q=q: differences(weighted, a, 1e-3), q, 1e-3)
+        out = np.empty((n, n))
+        forward_and_jacobian(arm.chain, q, scratch.rotation, scratch.position, scratch.geometric)
+        _second_order(task.kind, scratch, out)
+        np.testing.assert_allclose(symmetric(out), central, atol=2e-5 * max(abs(central).max(), 1.0))
+
+
+@pytest.mark.parametrize("p_x", [1.5, 2.0, 3.5])
+def test_other_exponents(p_x):
+    """With P_X up to 2 there is nothing to hold: a kink inwards, or none."""
+    at = place("varga7", "skew", p_x=p_x)
+    _, blocks = at.linearise()
+    central = differences(at.merit, at.path, 1e-8).reshape(blocks.gradient.shape)
+    np.testing.assert_allclose(blocks.gradient, central, atol=1e-6 * abs(central).max())
+    held = at.multipliers.copy()
+    at.linearise(advance=True)
+    assert p_x > 2.0 or not at.multipliers[:, : at.error_size].any()
+    assert held[:, : at.error_size].any()
+
+
+def test_a_knot_whose_tracking_does_not_count():
+    at = place("varga7", "skew", terminal=0.0)
+    assert at.grid.tracking[-1] == 0.0
+    _, blocks = at.linearise()
+    central = differences(lambda path: at.linearise(path)[1].gradient.ravel(), at.path, 1e-9)
+    np.testing.assert_allclose(dense(blocks), central, atol=2e-6 * abs(central).max())
+    before = at.merit()
+    at.nominal[at.grid.at[-1] - 1] += 1.0
+    assert at.merit() == before
+
+
+@pytest.mark.parametrize("task", TASKS)
+@pytest.mark.parametrize("arm", ikgym.arms.names())
+def test_true_cost_is_that_of_the_horizon(arm, task):
+    at = place(arm, task, at=range(1, 7), terminal=1.0, limits=False)
+    qdot = np.diff(np.vstack([at.start, at.path]), axis=0) / at.rules.dt
+    rules = at.rules
+    kernels = horizon_cost(rules.chain, rules.kind, rules.cost, rules.dt, at.start, at.nominal, qdot)
+    mine = true_cost(rules, at.grid, at.start, at.nominal, at.path, at.scratch)
+    assert mine == pytest.approx(kernels, rel=1e-10)  # q is the sum of Δt q̇ but for rounding
+    assert at.linearise()[0][1] == pytest.approx(mine, rel=1e-13)
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_true_cost_is_the_weighted_sum_over_knots_and_blocks(task):
+    at = place("varga7", task, limits=False)
+    cost, grid, start = at.rules.cost, at.grid, at.start
+    total = 0.0
+    for k, here in enumerate(at.path):
+        alone = Grid(np.ones(1, np.int64), np.ones(1), np.ones(1), np.ones(1))
+        velocity = (here - start) / (grid.length[k] * at.rules.dt)
+        # A single knot one step from the one before costs Φ^X + Φ^U; standing still, Φ^X alone.
+        nominal = at.nominal[grid.at[k] - 1 : grid.at[k]]
+        tracking = true_cost(at.rules, alone, here, nominal, here[None], at.scratch)
+        total += grid.tracking[k] * tracking + grid.velocity[k] * float(np.sum((velocity / cost.delta_qdot) ** 4))
+        start = here
+    assert true_cost(at.rules, grid, at.start, at.nominal, at.path, at.scratch) == pytest.approx(total, rel=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_merit_never_exceeds_the_cost_and_says_what_it_lacks(seed):
+    """Without limits it is a lower bound, whatever the multipliers, and reaches the cost as they are brought up."""
+    at = place("varga7", "skew", seed=seed, limits=False)
+    for _ in range(4):
+        (value, true, gap), _ = at.linearise()
+        assert value <= true
+        assert gap >= 0.0
+        at.linearise(advance=True)
+    # Off a kink the multipliers end at 0 or at its steepness.
+    (value, true, gap), _ = at.linearise()
+    assert value == pytest.approx(true, rel=1e-12)
+    assert gap == 0.0
+    assert set(abs(at.multipliers[:, : at.error_size]).ravel()) <= {0.0, 1.0}
+
+
+def test_limits_enter_the_gap():
+    at = place("varga7", "skew")
+    at.linearise(advance=True)
+    e = at.error_size
+    assert at.linearise()[0][2] > 0.0
+    at.multipliers[:, e:] = 0.0
+    for limit in (at.rules.velocity_limit, at.rules.upper):
+        limit[:] = np.inf
+    at.rules.lower[:] = -np.inf
+    for _ in range(3):
+        at.linearise(advance=True)
+    assert at.linearise()[0][2] == 0.0

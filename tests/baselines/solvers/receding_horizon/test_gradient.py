@@ -1,0 +1,189 @@
+"""Varga's method against the paper written down once more in plain NumPy, and its statuses."""
+
+from __future__ import annotations
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+import baselines
+import ikgym
+from baselines.solvers.receding_horizon import horizon as horizon_module
+from baselines.solvers.receding_horizon.horizon import analytic_gradient, difference_gradient, horizon_cost
+from baselines.status import Status
+from ikgym.exceptions import InvalidInputError, UnknownNameError
+
+
+def phi(scenario, q, nominal, qdot):
+    """Φ of the paper, section III, by the public parts of ikgym."""
+    total = 0.0
+    for velocity, target in zip(qdot, nominal, strict=True):
+        q = q + scenario.dt * velocity
+        error = scenario.task.error(target, scenario.task.coordinates(*scenario.model.forward(q)))
+        total += scenario.cost.tracking(error) + scenario.cost.velocity(velocity)
+    return total
+
+
+def printed(scenario, q, nominal, qdot, alpha, alpha_max, steps):
+    """The descent of section IV."""
+    qdot, last, made = qdot.copy(), None, 0
+    while True:
+        here = phi(scenario, q, nominal, qdot)
+        gradient = np.empty_like(qdot)
+        for index in np.ndindex(qdot.shape):
+            shifted = qdot.copy()
+            shifted[index] += 1e-3
+            gradient[index] = (phi(scenario, q, nominal, shifted) - here) / 1e-3
+        norm = np.linalg.norm(gradient)
+        if norm <= 20 or made == steps:
+            return qdot, alpha, made
+        if last is not None:
+            alpha = alpha * 1.2 if norm < last else alpha / 1.2 if norm > last else alpha
+            alpha = min(max(alpha, 1e-8), alpha_max)
+        last, made = norm, made + 1
+        qdot = qdot - alpha * gradient
+
+
+@pytest.mark.parametrize("name", ["varga7-fast", "varga7-literal-slow", "zhang6-lspb"])
+def test_follows_the_printed_descent(name):
+    scenario = ikgym.scenarios.get(name).replace(steps=12)
+    policy = baselines.make("rhc_gradient", scenario, iterations=8)
+    env = gym.make("RedundantIK-v0", scenario=scenario, preview=2)
+    observation, _ = env.reset()
+    state, plan, alpha = None, np.zeros((2, scenario.joints)), 1e-8
+    for _ in range(12):
+        plan, alpha, made = printed(scenario, observation["q"], observation["nominal"], plan, alpha, 1e-4, 8)
+        action, state = policy.predict(observation, state)
+        np.testing.assert_allclose(action * scenario.velocity_limit, plan[0], rtol=1e-5, atol=1e-6)
+        np.testing.assert_allclose(state[2][0], plan, rtol=1e-6, atol=1e-9)
+        assert state[3][0] == pytest.approx(alpha, rel=1e-12)
+        assert policy.report(state).iterations[0] == made
+        observation, *_ = env.step(action)
+
+
+@pytest.mark.parametrize("name", ikgym.scenarios.names())
+@pytest.mark.parametrize("steps", [1, 2, 5])
+def test_gradients_against_central_differences(name, steps):
+    scenario = ikgym.scenarios.get(name)
+    model, rng = scenario.model, np.random.default_rng(steps)
+    q = rng.uniform(-1, 1, scenario.joints)
+    nominal = scenario.task.coordinates(*model.forward(q + rng.uniform(-5e-3, 5e-3, (steps, scenario.joints))))
+    qdot = rng.uniform(-2, 2, (steps, scenario.joints))
+    common = (model.chain, scenario.task.kind, scenario.cost.parameters, scenario.dt, q, nominal)
+    analytic, forward = np.empty_like(qdot), np.empty_like(qdot)
+    value = analytic_gradient(*common, qdot, analytic)
+    assert value == horizon_cost(*common, qdot) == difference_gradient(*common, qdot, 1e-7, forward)
+    assert value == pytest.approx(phi(scenario, q, nominal, qdot), rel=1e-9)
+    central = np.empty_like(qdot)
+    for index in np.ndindex(qdot.shape):
+        up, down = qdot.copy(), qdot.copy()
+        up[index] += 1e-4
+        down[index] -= 1e-4
+        central[index] = (horizon_cost(*common, up) - horizon_cost(*common, down)) / 2e-4
+    scale = max(abs(central).max(), 1.0)
+    np.testing.assert_allclose(analytic, central, atol=1e-5 * scale)
+    np.testing.assert_allclose(forward, central, atol=1e-3 * scale)
+
+
+def rollout(policy, scenario, steps):
+    env = gym.make("RedundantIK-v0", scenario=scenario, preview=policy.preview)
+    observation, _ = env.reset()
+    state, status, errors = None, [], []
+    for _ in range(steps):
+        action, state = policy.predict(observation, state)
+        assert np.isfinite(action).all()
+        status.append(int(policy.report(state).status[0]))
+        observation, *_, info = env.step(action)
+        errors.append(info["position_error"])
+    return status, errors
+
+
+def test_diverges_as_printed_and_says_so():
+    """alpha_max = 5e-4 blows up on the fast trajectory; the row goes on, and nothing claims to have converged."""
+    policy = baselines.make("rhc_gradient", "varga7-fast", alpha_max=5e-4)
+    status, _ = rollout(policy, "varga7-fast", 1500)
+    assert Status.DIVERGED in status
+
+
+def test_the_default_step_does_not_diverge():
+    status, errors = rollout(baselines.make("rhc_gradient", "varga7-fast"), "varga7-fast", 1500)
+    assert Status.DIVERGED not in status
+    assert max(errors) < 0.1
+
+
+@pytest.mark.parametrize("gradient", ["finite_difference", "analytic"])
+def test_a_blow_up_is_not_taken_for_convergence(gradient):
+    """One huge step leads where finite differences of the cost are exactly 0."""
+    policy = baselines.make(
+        "rhc_gradient", "varga7-fast", alpha_min=1.0, alpha_max=1.0, iterations=3, gradient=gradient
+    )
+    env = gym.make("RedundantIK-v0")
+    env.reset()
+    observation = env.step(np.full(7, 0.01, dtype=np.float32))[0]
+    action, state = policy.predict(observation)
+    assert policy.report(state).status[0] == Status.DIVERGED
+    np.testing.assert_array_equal(action, 0.0)
+    np.testing.assert_array_equal(state[2], 0.0)
+
+
+def test_statuses():
+    env = gym.make("RedundantIK-v0")
+    observation, _ = env.reset()
+    for kwargs, wanted in [
+        ({"tolerance": 1e12}, Status.CONVERGED),
+        ({"tolerance": 0.0, "iterations": 5}, Status.ITERATION_LIMIT),
+    ]:
+        policy = baselines.make("rhc_gradient", "varga7-fast", **kwargs)
+        _, state = policy.predict(observation)
+        assert policy.report(state).status[0] == wanted
+
+
+def test_preview_is_what_the_horizon_needs():
+    assert baselines.make("rhc_gradient", "varga7-fast").preview == 2
+    assert baselines.make("rhc_gradient", "varga7-fast", horizon=10).preview == 9
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "message"),
+    [
+        ({"horizon": 1}, InvalidInputError, "horizon: expected a whole number of at least 2, got 1"),
+        ({"iterations": 0}, InvalidInputError, "iterations: expected a whole number of at least 1"),
+        ({"tolerance": -1}, InvalidInputError, "tolerance: expected a finite number of at least 0"),
+        ({"alpha_min": 0}, InvalidInputError, "alpha_min: expected a finite number above 0"),
+        ({"alpha_max": 1e-9}, InvalidInputError, "alpha_max: expected at least alpha_min = 1e-08, got 1e-09"),
+        ({"alpha_factor": 0.5}, InvalidInputError, "alpha_factor: expected a finite number of at least 1"),
+        ({"difference": 0}, InvalidInputError, "difference: expected a finite number above 0"),
+        ({"gradient": "analytc"}, UnknownNameError, "Did you mean 'analytic'"),
+    ],
+)
+def test_bad_parameters(change, error, message):
+    with pytest.raises(error, match=message):
+        baselines.make("rhc_gradient", "varga7-fast", **change)
+
+
+@pytest.mark.parametrize(("gradient", "horizon"), [("finite_difference", 3), ("finite_difference", 5), ("analytic", 3)])
+def test_operations_are_what_is_called(gradient, horizon, monkeypatch):
+    """Counted by calling the kernels as plain Python."""
+    policy = baselines.make("rhc_gradient", "varga7-fast", gradient=gradient, horizon=horizon)
+    calls = {"forward": 0, "forward_and_jacobian": 0}
+    for name in calls:
+        kernel = getattr(horizon_module, name)
+
+        def counted(*args, name=name, kernel=kernel):
+            calls[name] += 1
+            return kernel(*args)
+
+        monkeypatch.setattr(horizon_module, name, counted)
+    for name in ("_roll", "_scratch"):
+        monkeypatch.setattr(horizon_module, name, getattr(horizon_module, name).py_func)
+    scenario = ikgym.scenarios.get("varga7-fast")
+    common = (scenario.model.chain, 1, scenario.cost.parameters, 1e-3, np.zeros(7), scenario.nominal()[1:horizon])
+    qdot, out = np.zeros((horizon - 1, 7)), np.empty((horizon - 1, 7))
+    if gradient == "analytic":
+        analytic_gradient.py_func(*common, qdot, out)
+    else:
+        difference_gradient.py_func(*common, qdot, 1e-3, out)
+    forwards, jacobians, factorisations, measurements = policy.count(np.array([0]))
+    assert np.all(forwards == calls["forward"])
+    assert np.all(jacobians == calls["forward_and_jacobian"])
+    assert factorisations == measurements == 0

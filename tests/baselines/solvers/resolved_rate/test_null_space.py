@@ -1,0 +1,162 @@
+"""The null space term: no task velocity, and the way to each of the three aims."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import baselines
+import ikgym
+from baselines.policy import Problem
+from ikgym.exceptions import InvalidInputError, UnknownNameError
+from tests.baselines.solvers.resolved_rate.test_base import jacobians
+
+AIMS = [{"objective": "posture", "posture": 0.7}, {"objective": "manipulability"}]
+
+
+def with_limits(scenario):
+    n = scenario.joints
+    arm = dataclasses.replace(scenario.arm, lower=np.linspace(-1, -3, n), upper=np.linspace(2, 4, n))
+    return scenario.replace(arm=arm, model=arm)
+
+
+@pytest.mark.parametrize("damping", [0.0, 1e-3])
+@pytest.mark.parametrize("aim", [*AIMS, {"objective": "joint_centring"}], ids=lambda aim: aim["objective"])
+@pytest.mark.parametrize("name", ikgym.scenarios.names())
+def test_changes_no_task_velocity(name, aim, damping):
+    scenario = with_limits(ikgym.scenarios.get(name))
+    gain = 1.0 / scenario.dt
+    policy = baselines.make("null_space", scenario, secondary_gain=gain, damping=damping, **aim)
+    without = baselines.make("null_space", scenario, secondary_gain=0.0, damping=damping, **aim)
+    q = np.random.default_rng(0).uniform(-2, 2, (20, scenario.joints))
+    rotation, _, geometric = scenario.model.forward_and_jacobian(q)
+    jacobian = scenario.task.jacobian(rotation, geometric)
+    shift = np.random.default_rng(1).normal(size=jacobian.shape[:2]) * 1e-3
+    step, status = policy.move(q, jacobian, shift)
+    plain, same = without.move(q, jacobian, shift)
+    assert status.tolist() == same.tolist()
+    aims = scenario.dt * gain * policy.slope(q)
+    largest = np.linalg.norm(jacobian, 2, axis=(1, 2))
+    for j, a, b, z, sigma in zip(jacobian, step, plain, aims, largest, strict=True):
+        size = np.linalg.norm(z) + np.linalg.norm(b)
+        np.testing.assert_allclose(j @ (a - b), 0.0, atol=1e-13 * sigma * size)
+        # And what is added is the part of z in the null space.
+        wanted = z - np.linalg.pinv(j, rcond=1e-12) @ (j @ z)
+        np.testing.assert_allclose(a - b, wanted, atol=1e-10 * size)
+    if name == "varga7-fast":
+        assert np.linalg.norm(step - plain, axis=1).min() > 1e-6
+
+
+def test_first_part_is_moore_penrose_or_dls():
+    scenario = ikgym.scenarios.get("varga7-fast")
+    jacobian, shift = jacobians(scenario)
+    q = np.zeros((len(jacobian), 7))
+    for other, damping in (("moore_penrose", 0.0), ("dls", 0.02)):
+        mine, _ = baselines.make("null_space", scenario, damping=damping, secondary_gain=0.0).move(q, jacobian, shift)
+        given = {"damping": damping} if damping else {}
+        theirs, _ = baselines.make(other, scenario, **given).invert(jacobian, shift)
+        np.testing.assert_array_equal(mine, theirs)
+
+
+def manipulability(model, q, lines):
+    jacobian = model.jacobian(q)[:lines]
+    return np.sqrt(max(np.linalg.det(jacobian @ jacobian.T), 0.0))
+
+
+@pytest.mark.parametrize("lines", [3, 6])
+@pytest.mark.parametrize("name", ["varga7-fast", "khan8-q1", "zhang6-lspb", "faitli3-regular"])
+def test_manipulability_gradient_against_central_differences(name, lines):
+    scenario = ikgym.scenarios.get(name)
+    if scenario.joints < lines:
+        return
+    model = scenario.model
+    problem = dataclasses.replace(Problem.of(scenario), task=ikgym.tasks.get("pose" if lines == 6 else "position"))
+    policy = baselines.registry.get("null_space")(problem, objective="manipulability")
+    q = np.random.default_rng(lines).uniform(-1.5, 1.5, (10, scenario.joints))
+    slope = policy.slope(q) * model.reach(np.zeros(scenario.joints)) ** 3
+    for x, gradient in zip(q, slope, strict=True):
+        if manipulability(model, x, lines) < 1e-3:
+            continue
+        unit = 1e-5 * np.eye(scenario.joints)
+        central = [(manipulability(model, x + d, lines) - manipulability(model, x - d, lines)) / 2e-5 for d in unit]
+        np.testing.assert_allclose(gradient, central, rtol=1e-5, atol=1e-6)
+
+
+def test_no_pull_where_the_manipulability_has_a_kink():
+    policy = baselines.make("null_space", "varga7-fast", objective="manipulability")
+    assert np.isfinite(policy.slope(np.zeros((1, 7)))).all()
+
+
+@pytest.mark.parametrize("objective", ["posture", "joint_centring", "manipulability"])
+def test_gets_nearer_to_its_aim_while_the_task_stands_still(objective):
+    scenario = with_limits(ikgym.scenarios.get("varga7-fast"))
+    policy = baselines.make("null_space", scenario, objective=objective, posture=0.5, secondary_gain=20.0, damping=0.0)
+    here = np.array([0.3, -0.6, 0.4, 0.8, -0.5, 0.7, 0.2])
+    middle = 0.5 * (scenario.model.lower + scenario.model.upper)
+    weights = (np.min(scenario.model.upper - scenario.model.lower) / (scenario.model.upper - scenario.model.lower)) ** 2
+    merit = {
+        "posture": lambda q: -np.sum((q - 0.5) ** 2),
+        "joint_centring": lambda q: -np.sum(weights * (q - middle) ** 2),
+        "manipulability": lambda q: manipulability(scenario.model, q, 6),
+    }[objective]
+    target = scenario.task.coordinates(*scenario.model.forward(here))
+    q, state, merits = here.copy(), None, []
+    for _ in range(200):
+        observation = {
+            "q": q,
+            "qdot": np.zeros(7),
+            "pose": scenario.task.coordinates(*scenario.model.forward(q)),
+            "nominal": target[None],
+            "remaining": np.ones(1),
+        }
+        action, state = policy.predict(observation, state)
+        q = q + scenario.dt * action * scenario.velocity_limit
+        merits.append(merit(q))
+    assert (np.diff(merits) > -1e-9).all()
+    assert merits[-1] > merits[0]
+    reached = scenario.task.coordinates(*scenario.model.forward(q))
+    np.testing.assert_allclose(reached, target, atol=1e-4)
+
+
+def test_centring_leaves_joints_without_limits_alone():
+    scenario = ikgym.scenarios.get("varga7-fast")
+    lower, upper = np.full(7, -np.inf), np.full(7, np.inf)
+    lower[[1, 4]], upper[[1, 4]], upper[2] = [-1.0, 0.0], [3.0, 2.0], 1.0
+    arm = dataclasses.replace(scenario.arm, lower=lower, upper=upper)
+    policy = baselines.make("null_space", scenario.replace(arm=arm, model=arm), objective="joint_centring")
+    np.testing.assert_allclose(policy.slope(np.full((1, 7), 0.5))[0], [0, 0.5 * 0.25, 0, 0, 0.5, 0, 0])
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "message"),
+    [
+        ({"objective": "posure"}, UnknownNameError, r"no objective 'posure'\. Did you mean 'posture'\?"),
+        ({"objective": "joint_centring"}, InvalidInputError, "expected an arm with joint limits, 'varga7' has none"),
+        ({"secondary_gain": -1.0}, InvalidInputError, "secondary_gain: expected a finite number of at least 0"),
+        (
+            {"secondary_gain": 2000.0},
+            InvalidInputError,
+            "secondary_gain: expected a number below 2/Δt = 2000, got 2000",
+        ),
+        ({"posture": (1.0, 2.0)}, InvalidInputError, r"posture: expected shape \(7,\), got \(2,\)"),
+        ({"damping": -1e-3}, InvalidInputError, "damping: expected a finite number of at least 0"),
+    ],
+)
+def test_bad_parameters(change, error, message):
+    with pytest.raises(error, match=message):
+        baselines.make("null_space", "varga7-fast", **change)
+
+
+@pytest.mark.parametrize(
+    ("change", "counts"),
+    [
+        ({"damping": 0.0}, (0, 1, 1, 1)),
+        ({}, (0, 1, 2, 1)),
+        ({"objective": "manipulability"}, (0, 2, 3, 1)),
+        ({"objective": "manipulability", "damping": 0.0}, (0, 2, 2, 1)),
+    ],
+)
+def test_operations(change, counts):
+    assert baselines.make("null_space", "varga7-fast", **change).count(np.ones(1)) == counts

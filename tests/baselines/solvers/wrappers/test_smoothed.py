@@ -1,0 +1,238 @@
+"""Second-order smoothing: the filter, what the policy inside sees, and what is refused."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+import baselines
+import ikgym
+from baselines.evaluation.rollout import rollout
+from baselines.status import Status
+from ikgym.exceptions import InvalidInputError, UnknownNameError
+
+STEPS = 200
+
+
+def short(name="varga7-fast", steps=STEPS, **changes):
+    return ikgym.scenarios.get(name).replace(steps=steps, **changes)
+
+
+def smoothed(scenario, **parameters):
+    return baselines.make("smoothed", scenario, **parameters)
+
+
+def printed(path, dt, lambda_):
+    """Eq. 16 (with its dot) and 17 over a whole calculated path, afterwards."""
+    q, qdot, out = path[0].copy(), np.zeros_like(path[0]), []
+    for g in path:
+        out.append(qdot)
+        bend = lambda_**2 * (g - q) - 2 * lambda_ * qdot
+        q, qdot = q + dt * qdot, qdot + dt * bend
+    return np.array(out)
+
+
+@pytest.mark.parametrize("policy", ["rhc_gradient", "dls", "mfac"])
+@pytest.mark.parametrize("lambda_", [300.0, 30.0, 1500.0])
+def test_is_the_papers_filter_on_the_path_of_the_policy_alone(policy, lambda_):
+    """The policy inside runs as if alone, and what the arm is sent is the smoothed path, as computed afterwards."""
+    scenario = short()
+    alone = rollout(scenario, baselines.make(policy, scenario), 0)
+    episode = rollout(scenario, smoothed(scenario, policy=policy, relaxation=lambda_), 0)
+    np.testing.assert_array_equal(episode.iterations, alone.iterations)
+    path = np.vstack([scenario.nominal_joint_path()[0], alone.q])[:STEPS]
+    wanted = printed(path, scenario.dt, lambda_)
+    # The arm is sent float32 fractions of 20 rad/s.
+    np.testing.assert_allclose(episode.qdot, wanted, atol=2e-5 * max(1.0, lambda_ / 300))
+
+
+def test_the_calculated_path_is_that_of_the_policy_alone_bit_for_bit():
+    scenario = short()
+    alone = rollout(scenario, baselines.make("rhc_gradient", scenario), 0)
+    policy = smoothed(scenario)
+    env = gym.make("RedundantIK-v0", scenario=scenario, preview=policy.preview)
+    observation, _ = env.reset()
+    state = None
+    for k in range(STEPS):
+        action, state = policy.predict(observation, state)
+        observation, *_ = env.step(action)
+        np.testing.assert_array_equal(state[3][0], alone.q[k])
+
+
+def test_smooths_and_lags():
+    """What figures 11, 13 and 14 of the paper say."""
+    scenario = short("varga7-slow", 600)
+    alone, episode = (rollout(scenario, baselines.make(n, scenario), 0) for n in ("rhc_gradient", "smoothed"))
+    rough, smooth = (np.abs(np.diff(e.qdot[50:], n=2, axis=0)).sum() for e in (alone, episode))
+    assert smooth < 0.2 * rough
+    assert episode.position_error.max() > 5 * alone.position_error.max()
+
+
+def test_a_constant_velocity_is_followed_2_over_lambda_late():
+    scenario = short("faitli3-regular", 400)
+    ramp = ikgym.trajectories.Sinusoid(np.full(3, 1e4), 1e-4, offset=np.array([0.1, 0.4, 1.0]))
+    scenario = scenario.replace(trajectory=ramp)
+    episode = rollout(scenario, smoothed(scenario, policy="moore_penrose", relaxation=100.0), 0)
+    nominal = scenario.nominal_joint_path()[1:]
+    lag = (nominal - episode.q)[-1]
+    # One step more than 2/Λ: the velocity sent was known a step ago.
+    np.testing.assert_allclose(lag, 2.0 / 100.0 * 1.0, rtol=0.06)
+
+
+@pytest.mark.parametrize("feedback", ["calculated", "measured"])
+def test_what_the_policy_inside_sees(feedback, monkeypatch):
+    scenario = short("khan8-q1")
+    policy = smoothed(scenario, policy="dls", options={"gain": 0.1}, feedback=feedback)
+    seen = []
+    predict = type(policy.inner).predict
+
+    def listening(self, observation, *args, **kwargs):
+        if self is policy.inner:
+            seen.append({key: value.copy() for key, value in observation.items()})
+        return predict(self, observation, *args, **kwargs)
+
+    monkeypatch.setattr(type(policy.inner), "predict", listening)
+    env = gym.make("RedundantIK-v0", scenario=scenario, preview=1)
+    observation, _ = env.reset()
+    state = None
+    for _ in range(5):
+        action, state = policy.predict(observation, state)
+        shown = seen[-1]
+        np.testing.assert_array_equal(shown["nominal"][0], observation["nominal"])
+        if feedback == "measured":
+            for key in ("q", "qdot", "pose"):
+                np.testing.assert_array_equal(shown[key][0], observation[key])
+        else:
+            wanted = scenario.task.coordinates(*scenario.model.forward(shown["q"][0]))
+            np.testing.assert_allclose(shown["pose"][0], wanted, atol=1e-12)
+        observation, *_ = env.step(action)
+    if feedback == "calculated":
+        assert np.abs(seen[-1]["q"][0] - observation["q"]).max() > 1e-4
+        np.testing.assert_allclose(seen[-1]["q"] - seen[-2]["q"], scenario.dt * seen[-1]["qdot"], atol=1e-12)
+
+
+def test_measured_feedback_corrects_what_the_calculated_path_cannot_know():
+    scenario = short("faitli3-regular", 1500, disturbance=ikgym.scenarios.Disturbance(bias=0.3))
+    errors = {}
+    for feedback in ("calculated", "measured"):
+        policy = smoothed(scenario, policy="dls", options={"gain": 0.1, "damping": 1e-6}, feedback=feedback)
+        errors[feedback] = rollout(scenario, policy, 0).position_error[-500:].max()
+    assert errors["measured"] < 0.5 * errors["calculated"]
+
+
+@pytest.mark.parametrize(("gain", "stable"), [(0.3, True), (0.4, False)])
+def test_the_bound_for_measured_feedback(gain, stable):
+    """(z - 1)(z - 1 + a)² = -a² g with a = 0.3: stable below 0.35."""
+    roots = 1.0 + np.roots([1.0, 0.6, 0.09, 0.09 * gain])
+    assert (np.abs(roots).max() < 1.0) == stable
+    here = np.array([0.1, 0.4, 1.0])
+    still = ikgym.trajectories.Sinusoid(np.zeros(3), offset=here)
+    scenario = short("faitli3-regular", 3000, trajectory=still, start=here + 1e-6)
+    policy = smoothed(scenario, policy="moore_penrose", options={"gain": gain}, feedback="measured")
+    errors = rollout(scenario, policy, 0).position_error
+    assert (errors[-100:].max() < errors[:100].max()) == stable
+
+
+def test_euler_is_stable_up_to_its_bound():
+    here = np.array([0.1, 0.4, 1.0])
+    still = ikgym.trajectories.Sinusoid(np.zeros(3), offset=here)
+    scenario = short("faitli3-regular", 400, trajectory=still, start=here + 1e-4)
+    errors = rollout(scenario, smoothed(scenario, policy="moore_penrose", relaxation=1900.0), 0).position_error
+    assert errors[:20].max() > 1e-4
+    assert errors[-100:].max() < 1e-7
+    with pytest.raises(InvalidInputError, match="explicit Euler is stable below 2/Δt = 2000, got 2000"):
+        smoothed(scenario, relaxation=2000.0)
+    with pytest.raises(InvalidInputError, match="stable below 2/Δt = 2, got 300"):
+        smoothed("zhang3-helix")
+    assert smoothed("zhang3-helix", relaxation=0.3, policy="dls").preview == 1
+
+
+def test_a_saturated_velocity_is_remembered_as_it_was_sent():
+    """Otherwise the filter would take the arm for faster than it is, and swing far beyond."""
+    scenario = short("varga7-fast", 600, velocity_limit=np.full(7, 2.0))
+    policy = smoothed(scenario, policy="moore_penrose", relaxation=1500.0)
+    episode = rollout(scenario, policy, 0)
+    assert Status.SATURATED in episode.status
+    path = [scenario.nominal_joint_path()[0]]
+    env = gym.make("RedundantIK-v0", scenario=scenario, preview=1)
+    observation, _ = env.reset()
+    state, sent = None, np.zeros(7)
+    for _ in range(100):
+        action, state = policy.predict(observation, state)
+        bend = 1500.0**2 * (path[-1] - observation["q"]) - 2 * 1500.0 * sent
+        np.testing.assert_allclose(action * 2.0, np.clip(sent, -2, 2), atol=1e-6)
+        sent = np.clip(sent + scenario.dt * bend, -2.0, 2.0)
+        path.append(state[3][0])
+        observation, *_ = env.step(action)
+
+
+def test_status_and_cost_are_those_of_the_policy_inside():
+    scenario = short()
+    observation, _ = gym.make("RedundantIK-v0", preview=4).reset()
+    for feedback, forwards in (("calculated", 1), ("measured", 0)):
+        policy = smoothed(scenario, policy="moore_penrose", feedback=feedback)
+        _, state = policy.predict(observation)
+        assert policy.report(state).status[0] == Status.RANK_DEFICIENT
+        assert [int(c[0]) for c in policy.operations(state)] == [forwards, 1, 1, 1 - forwards]
+        assert [int(c) for c in policy.count(np.array(1))] == [forwards, 1, 1, 1 - forwards]
+    inner = baselines.make("mfac", scenario)
+    policy = smoothed(scenario, policy="mfac")
+    _, state = policy.predict(observation)
+    _, alone = inner.predict(observation)
+    assert policy.operations(state).factorisations[0] == inner.operations(alone).factorisations[0]
+
+
+def test_shows_what_the_policy_inside_shows():
+    scenario = short()
+    alone, episode = (rollout(scenario, baselines.make(n, scenario), 0) for n in ("rhc_gradient", "smoothed"))
+    assert alone.diagnostics.keys() == episode.diagnostics.keys()
+    for name, values in alone.diagnostics.items():
+        np.testing.assert_array_equal(episode.diagnostics[name], values)
+
+
+def test_options_reach_the_policy_inside():
+    policy = smoothed("varga7-fast", options={"horizon": 6})
+    assert policy.inner.horizon == 6
+    assert policy.preview == 5
+    assert policy.options == policy.inner.parameters
+    twice = smoothed("varga7-fast", policy="smoothed", options={"policy": "dls"})
+    assert twice.inner.inner.name == "dls"
+    changed = policy.replace(policy="dls", options={"damping": 0.5})
+    assert changed.inner.damping == 0.5
+
+
+def test_options_are_copied():
+    options = {"damping": 0.5}
+    policy = smoothed("varga7-fast", policy="dls", options=options)
+    options["damping"] = 1.0
+    assert policy.options["damping"] == 0.5
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "message"),
+    [
+        ({"policy": "rhc_gradent"}, UnknownNameError, "Did you mean 'rhc_gradient'"),
+        ({"policy": "follow_nominal"}, InvalidInputError, "got the reference 'follow_nominal'"),
+        ({"options": {"horizn": 4}}, UnknownNameError, "no parameter of rhc_gradient 'horizn'"),
+        ({"options": {"horizon": 1}}, InvalidInputError, "horizon: expected"),
+        ({"options": 5}, InvalidInputError, "options: expected the parameters of rhc_gradient by name, got 5"),
+        ({"relaxation": 0.0}, InvalidInputError, "relaxation: expected a finite number above 0"),
+        ({"feedback": "mesured"}, UnknownNameError, "Did you mean 'measured'"),
+    ],
+)
+def test_bad_parameters(change, error, message):
+    with pytest.raises(error, match=message):
+        smoothed("varga7-fast", **change)
+
+
+def test_a_disturbed_arm_is_smoothed_from_where_it_is():
+    """The filter starts from the measured q, so that what drives add does not pile up."""
+    scenario = short(steps=1000)
+    disturbed = dataclasses.replace(scenario, disturbance=ikgym.scenarios.Disturbance(bias=0.1))
+    episodes = [rollout(s, smoothed(s, policy="dls"), 0) for s in (scenario, disturbed)]
+    apart = np.abs(episodes[0].q - episodes[1].q)
+    # A constant velocity b from outside leaves 2 b / Λ, and not b t.
+    np.testing.assert_allclose(apart[-200:], 2 * 0.1 / 300, rtol=0.02)

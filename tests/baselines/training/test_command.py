@@ -1,0 +1,208 @@
+"""The command line: presets, exit codes, several seeds, repetition."""
+
+from __future__ import annotations
+
+import json
+import pathlib
+import subprocess
+import sys
+
+import pytest
+
+from baselines.training import command, methods, seeds
+from baselines.training.command import main, parse
+from baselines.training.config.common import PPO
+from baselines.training.errors import TrainingError
+from baselines.training.seeds import Job, train_seeds
+from tests.baselines.training.small import about, timeless, tiny
+
+ROOT = pathlib.Path(__file__).parents[3]
+TINY = [
+    "--scenario", "faitli3-regular", "--steps", "20", "--hidden", "8", "--offsets", "1", "2", "10",
+    "--segments", "2", "--envs", "4", "--batch-size", "20", "--validation-episodes", "1", "--no-progress",
+]  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def several(tmp_path_factory):
+    """Three seeds in two processes."""
+    folder = tmp_path_factory.mktemp("several")
+    code = main(["ppo", *TINY, "--seeds", "0", "1", "5", "--workers", "2", "--out", str(folder)])
+    return folder, code
+
+
+def test_several_seeds(several, tmp_path, capsys):
+    """Each in its folder, and the same as if it were alone."""
+    folder, code = several
+    assert code == 0
+    assert sorted(path.name for path in folder.iterdir()) == ["seed-0", "seed-1", "seed-5"]
+    assert len({about(folder / f"seed-{seed}")["weights_sha256"] for seed in (0, 1, 5)}) == 3
+    assert main(["ppo", *TINY, "--seeds", "5", "--out", str(tmp_path)]) == 0
+    assert about(tmp_path / "seed-5")["weights_sha256"] == about(folder / "seed-5")["weights_sha256"]
+    assert timeless(tmp_path / "seed-5") == timeless(folder / "seed-5")
+    printed = capsys.readouterr().out.splitlines()
+    assert printed[0].split() == ["seed", "cost ratio", "cost", "worst", "lost"]
+    assert printed[1].split()[:2] == ["5", "–"]
+
+
+def test_a_failing_seed_takes_no_other_with_it(several, tmp_path, capfd):
+    for seed in (0, 1):
+        (tmp_path / f"seed-{seed}").mkdir()
+    (tmp_path / "seed-0" / "run.json").write_text("{")
+    code = main(["ppo", *TINY, "--seeds", "0", "1", "--workers", "2", "--resume", "--out", str(tmp_path)])
+    assert code == 2
+    assert about(tmp_path / "seed-1")["weights_sha256"] == about(several[0] / "seed-1")["weights_sha256"]
+    printed = capfd.readouterr()
+    assert "   0  failed" in printed.out
+    assert "error: seed 0: " in printed.err
+    assert "run.json is damaged" in printed.err
+
+
+def test_repeat(several, tmp_path, capsys):
+    run = several[0] / "seed-1" / "run.json"
+    arguments = ["--no-progress", "--out"]
+    assert main(["repeat", str(run), *arguments, str(tmp_path / "again")]) == 0
+    assert "The same final weights, bit for bit" in capsys.readouterr().out
+    assert timeless(tmp_path / "again" / "seed-1") == timeless(run.parent)
+
+    content = about(run.parent)
+    changed = {**content, "seed": 2, "machine": {"cpu": "another"}}
+    (tmp_path / "run.json").write_text(json.dumps(changed))
+    assert main(["repeat", str(tmp_path / "run.json"), *arguments, str(tmp_path / "other")]) == 1
+    printed = capsys.readouterr().out
+    assert f"Other final weights: expected {content['weights_sha256']}, got " in printed
+    assert "  machine: {'cpu': 'another'} there, " in printed
+
+    del content["weights_sha256"]
+    (tmp_path / "run.json").write_text(json.dumps(content))
+    assert main(["repeat", str(tmp_path / "run.json"), *arguments, str(tmp_path / "third")]) == 2
+    assert "has not ended" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["ppo", "--preset", "smok"], "There is no preset 'smok'. Did you mean 'smoke'?"),
+        (["ppo", *TINY, "--over", "dlss"], "There is no policy 'dlss'. Did you mean 'dls'?"),
+        (["ppo", *TINY, "--over", "oracle"], "got the reference 'oracle'"),
+        (["ppo", *TINY, "--over", "dls:dampin=1"], "There is no parameter of dls 'dampin'. Did you mean 'damping'?"),
+        (["ppo", *TINY, "--scenario", "varga"], "There is no scenario 'varga'"),
+        (["ppo", *TINY, "--workers", "0"], "workers: expected a whole number of at least 1, got 0"),
+        (["ppo", *TINY, "--seeds", "-1"], "seeds: expected a whole number of at least 0, got -1"),
+        (["ppo", *TINY, "--rollout", "7"], "rollout: expected a divisor"),
+        (["ppo", *TINY, "--init", "nowhere.zip"], "nowhere.zip does not exist"),
+        (["repeat", "nowhere.json"], "Cannot read nowhere.json"),
+    ],
+)
+def test_errors_have_words_and_exit_code_2(arguments, message, tmp_path, capsys):
+    assert main([*arguments, "--out", str(tmp_path)]) == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert error.startswith("error: ")
+    assert len(error.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    "arguments", [["ppo", "--epoch", "3"], ["pp"], ["sac", "--epochs", "3"], ["ppo", "--gamma", "no"]]
+)
+def test_unknown_options_are_errors(arguments, tmp_path, capsys):
+    with pytest.raises(SystemExit) as ended:
+        main([*arguments, "--out", str(tmp_path)])
+    assert ended.value.code == 2
+    assert arguments[1 if len(arguments) > 1 else 0] in capsys.readouterr().err
+
+
+def test_values_out_of_range_on_the_command_line(tmp_path, capsys):
+    try:
+        code = main(["ppo", "--gamma", "2", "--out", str(tmp_path)])
+    except SystemExit as ended:
+        code = ended.code
+    assert code == 2
+    assert "gamma" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("arguments", [[], *([name] for name in methods.METHODS), ["repeat"]])
+def test_help(arguments, capsys):
+    with pytest.raises(SystemExit) as ended:
+        main([*arguments, "--help"])
+    assert ended.value.code == 0
+    text = capsys.readouterr().out
+    for word in ["ppo", "smoke", "varga7-random", "repeat"] if not arguments else ["--out", "--resume"]:
+        assert word in text
+
+
+def test_the_command_line_goes_before_the_preset(tmp_path):
+    file = tmp_path / "mine.toml"
+    file.write_text("reach = 0.25\nsegments = 7\n")
+    asked, given = parse(["ppo", "--preset", str(file), "--segments", "9", "--null-space", "0.1", "--out", "x"])
+    assert asked.config == PPO(reach=0.25, segments=9, null_space=0.1)
+    assert given == {"reach", "segments", "null_space"}
+    assert parse(["ppo", f"--preset={file}", "--hidden=3", "--out", "x"])[1] == {"reach", "segments", "hidden"}
+    assert parse(["td3", "--out", "x"])[1] == frozenset()
+
+
+def test_ctrl_c(tmp_path, capsys, monkeypatch):
+    def interrupted(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(command, "train_seeds", interrupted)
+    assert main(["ppo", *TINY, "--out", str(tmp_path)]) == 130
+    assert f"is in {tmp_path}; go on with --resume" in capsys.readouterr().err
+
+
+def test_a_process_that_dies_is_named(tmp_path, monkeypatch):
+    """Another seed's process is not disturbed."""
+    config = tiny("ppo")
+    monkeypatch.setattr(seeds, "_child", _dies_with_seed_7)
+    seven, eight = train_seeds(Job(config, tmp_path), [7, 8], workers=1, progress=False)
+    assert "its process has died (signal SIGKILL)" in seven.error
+    assert not eight.error
+    assert about(tmp_path / "seed-8")["weights_sha256"] == eight.weights_sha256
+
+
+def _dies_with_seed_7(job, seed, connection, child=seeds._child):
+    import os
+    import signal
+
+    if seed == 7:
+        os.kill(os.getpid(), signal.SIGKILL)
+    child(job, seed, connection)
+
+
+def test_unexpected_errors_of_a_child_are_told(tmp_path, monkeypatch, capfd):
+    monkeypatch.setattr(seeds, "_train", lambda *_: 1 / 0)
+
+    class Pipe:
+        sent = None
+
+        def send(self, message):
+            self.sent = message
+
+    pipe = Pipe()
+    seeds._child(Job(PPO(), tmp_path), 3, pipe)
+    assert pipe.sent.error == "ZeroDivisionError: division by zero"
+    assert "Traceback" in capfd.readouterr().err
+
+
+def test_from_the_shell(tmp_path):
+    """As a program of its own, with warnings as errors."""
+    arguments = [*TINY, "--out", str(tmp_path)]
+    done = subprocess.run(
+        [sys.executable, "-W", "error", ROOT / "train.py", "td3", *arguments, "--collect", "1"],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=tmp_path,
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    assert f"written to {tmp_path}" in done.stdout
+    assert about(tmp_path / "seed-0")["command"].startswith("python train.py td3 --scenario faitli3-regular")
+
+
+def test_no_seeds(tmp_path):
+    asked, given = parse(["ppo", *TINY, "--out", str(tmp_path)])
+    options = asked.options
+    object.__setattr__(options, "seeds", ())
+    with pytest.raises(TrainingError, match="seeds: expected at least one"):
+        command._train(asked, given, "")

@@ -1,0 +1,106 @@
+"""Configurations say what a run is, and refuse what makes none."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from baselines.training import presets
+from baselines.training.config.common import PPO, SAC, TD3, Config, differences
+from baselines.training.methods import METHODS, get
+from ikgym.exceptions import InvalidInputError, UnknownNameError
+
+KINDS = [method.config for method in METHODS.values()]
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=METHODS)
+def test_json_holds_all_of_it(kind):
+    config = kind(hidden=(3, 4), offsets=(1, 5), over="dls")
+    values = json.loads(json.dumps(config.to_json()))
+    assert kind.from_json(values) == config
+    assert differences(values, config.to_json()) == []
+
+
+@pytest.mark.parametrize(
+    ("kind", "values", "error", "message"),
+    [
+        (PPO, {"epoch": 3}, UnknownNameError, "no option of ppo 'epoch'. Did you mean 'epochs'"),
+        (SAC, {"epochs": 3}, UnknownNameError, "no option of sac 'epochs'"),
+        (PPO, {"activation": "sili"}, UnknownNameError, "Did you mean 'silu'"),
+        (TD3, {"reward": "lg"}, UnknownNameError, "no reward 'lg'"),
+        (PPO, {"hidden": []}, InvalidInputError, "hidden: expected at least one"),
+        (PPO, {"hidden": 64}, InvalidInputError, "hidden: expected whole numbers, got 64"),
+        (PPO, {"hidden": [8, 0]}, InvalidInputError, "hidden: expected a whole number of at least 1, got 0"),
+        (PPO, {"offsets": [2, 1]}, InvalidInputError, "offsets: expected"),
+        (PPO, {"reach": 0}, InvalidInputError, "reach: expected"),
+        (PPO, {"segments": 0}, InvalidInputError, "segments: expected"),
+        (PPO, {"steps": 0}, InvalidInputError, "steps: expected"),
+        (PPO, {"keep_best": "yes"}, InvalidInputError, "keep_best: expected true or false"),
+        (PPO, {"gamma": 1.5}, InvalidInputError, "gamma: expected a number above 0, at most 1"),
+        (PPO, {"learning_rate": -1}, InvalidInputError, "learning_rate: expected a finite number above 0"),
+        (PPO, {"target_kl": 0}, InvalidInputError, "target_kl"),
+        (SAC, {"temperature": 0}, InvalidInputError, "temperature"),
+        (SAC, {"buffer": 3}, InvalidInputError, "buffer: expected at least one transition of each arm, got 3"),
+        (TD3, {"noise": -0.1}, InvalidInputError, "noise"),
+    ],
+)
+def test_refused(kind, values, error, message):
+    with pytest.raises(error, match=message):
+        kind.from_json(values)
+
+
+def test_learning_rate_falls_by_equal_factors():
+    config = PPO(segments=3, learning_rate=1e-2, learning_rate_end=1e-4)
+    assert [config.learning_rate_of(n) for n in range(3)] == pytest.approx([1e-2, 1e-3, 1e-4], rel=1e-12)
+    assert PPO(segments=1, learning_rate=1e-2, learning_rate_end=1e-4).learning_rate_of(0) == 1e-2
+
+
+def test_scenario_is_cut():
+    assert PPO(steps=50).make_scenario().steps == 50
+    assert PPO(steps=5000).make_scenario().steps == 1000
+    with pytest.raises(UnknownNameError, match="Did you mean 'varga7-random'"):
+        PPO(scenario="varga7-rand").make_scenario()
+
+
+def test_differences_are_named():
+    there, here = {"a": 1, "b": 2, "c": None}, {"a": 1, "b": 3, "d": 4}
+    assert differences(there, here) == ["b (2 there, 3 here)", "c (None there, None here)", "d (None there, 4 here)"]
+
+
+def test_methods():
+    with pytest.raises(UnknownNameError, match=r"no method 'pp'\. Did you mean 'ppo'"):
+        get("pp")
+    assert all(method.config.method == name and method.config.__doc__ for name, method in METHODS.items())
+
+
+@pytest.mark.parametrize("name", presets.names())
+def test_presets_that_come_along(name):
+    """Each suits its method, or all of them."""
+    method = presets.read(name).get("method")
+    for kind in KINDS:
+        if method in (None, kind.method):
+            config, given = presets.configure(kind, name)
+            assert isinstance(config, Config)
+            assert given
+            config.make_scenario()
+
+
+def test_preset_files(tmp_path):
+    file = tmp_path / "mine.toml"
+    file.write_text('method = "ppo"\nhidden = [5]\nepochs = 2\n')
+    config, given = presets.configure(PPO, str(file))
+    assert (config, given) == (PPO(hidden=(5,), epochs=2), {"hidden", "epochs"})
+    with pytest.raises(InvalidInputError, match="is for ppo, not for sac"):
+        presets.configure(SAC, str(file))
+    file.write_text("epoch = 2\n")
+    with pytest.raises(UnknownNameError, match=r"no option of ppo 'epoch'\. Did you mean 'epochs'"):
+        presets.configure(PPO, str(file))
+    file.write_text("epochs = \n")
+    with pytest.raises(InvalidInputError, match="is no TOML"):
+        presets.configure(PPO, str(file))
+    with pytest.raises(InvalidInputError, match="Cannot read the preset"):
+        presets.configure(PPO, str(tmp_path / "none.toml"))
+    with pytest.raises(UnknownNameError, match=r"no preset 'smok'\. Did you mean 'smoke'"):
+        presets.configure(PPO, "smok")
+    assert presets.configure(PPO, None) == (PPO(), frozenset())

@@ -1,0 +1,33 @@
+"""Training curves are drawn from what runs have written down."""
+
+from __future__ import annotations
+
+import json
+
+from baselines.training.curves import curves, main
+
+
+def run(folder, seed, cost_ratios):
+    scores = [{"core_minutes": 0.5 * i, "cost ratio": cost_ratio} for i, cost_ratio in enumerate(cost_ratios)]
+    about = {"method": "ppo", "seed": seed, "config": {}, "validation": scores}
+    (folder / f"seed-{seed}").mkdir(parents=True)
+    (folder / f"seed-{seed}" / "run.json").write_text(json.dumps(about), encoding="utf-8")
+
+
+def test_a_line_a_seed(tmp_path):
+    run(tmp_path / "a", 0, [8.0, 4.0, 2.0])
+    run(tmp_path / "a", 1, [9.0, None, 3.0])
+    run(tmp_path / "b", 0, [7.0])
+    (axes,) = curves({"one": tmp_path / "a", "other": tmp_path / "b"}).axes
+    assert [line.get_ydata().tolist() for line in axes.lines] == [[8.0, 4.0, 2.0], [9.0, 3.0], [7.0]]
+    assert axes.lines[1].get_xdata().tolist() == [0.0, 1.0]
+
+
+def test_command_line(tmp_path, capsys):
+    run(tmp_path / "a", 0, [8.0, 4.0])
+    file = tmp_path / "curves.png"
+    assert main([f"one={tmp_path / 'a'}", "--write", str(file)]) == 0
+    assert file.read_bytes().startswith(b"\x89PNG")
+    assert main([f"one={tmp_path / 'none'}", "--write", str(file)]) == 2
+    assert main(["one", "--write", str(file)]) == 2
+    assert "expected NAME=DIR, got 'one'" in capsys.readouterr().err

@@ -1,0 +1,291 @@
+"""Trainers of Stable-Baselines3: what a segment does follows from their state and its number."""
+
+from __future__ import annotations
+
+import copy
+
+import numpy as np
+import pytest
+import torch
+
+from baselines.training import methods
+from baselines.training.randomness import episode_seed, reseed, settled
+from baselines.training.trainers.models import algorithm_of, answers, mean_network, weights_hash
+from ikgym import scenarios
+from ikgym.exceptions import InvalidInputError
+from tests.baselines.training.small import OVER, TINY, tiny
+from tests.comparison import identical
+
+METHODS = ["ppo", "sac", "td3"]
+NOISY = [
+    ("ppo", {}),
+    ("ppo", {"noise_steps": 4, "rollout": 10, "episodes": 2, "target_kl": 0.5}),
+    ("ppo", {"cut": 5, "segments": 5}),
+    ("sac", {"collect": 0}),
+    ("sac", {"noise_steps": 4}),
+    ("td3", {"buffer": 64}),
+    ("td3", {"noise_steps": 4, "policy_delay": 3}),
+]
+
+
+@pytest.fixture(autouse=True)
+def settle():
+    with settled():
+        yield
+
+
+def made(config, seed=1):
+    reseed(seed, None)
+    return methods.get(config.method).make(config, config.make_scenario(), seed)
+
+
+def play(trainer, numbers, seed=1):
+    metrics = []
+    for number in numbers:
+        reseed(seed, number)
+        metrics.append(trainer.segment(number))
+    return metrics
+
+
+@pytest.mark.parametrize(("method", "changes"), NOISY, ids=str)
+def test_a_segment_follows_from_state_and_number(method, changes, tmp_path):
+    """A trainer that was put where another one stood goes on like that one: same metrics, same weights, same state."""
+    config = tiny(method, **changes)
+    undisturbed = made(config)
+    play(undisturbed, [0, 1])
+    torch.save(undisturbed.state(), tmp_path / "state.pt")
+    at_two = weights_hash(undisturbed.model)
+    wanted = play(undisturbed, [2, 3])
+
+    other = made(config, seed=7)  # as if it were another one
+    play(other, [0], seed=7)
+    other = made(config)
+    other.restore(torch.load(tmp_path / "state.pt", weights_only=True))
+    assert weights_hash(other.model) == at_two
+    assert other.steps == 2 * config.envs * config.episodes * config.steps
+    assert play(other, [2, 3]) == wanted
+    assert weights_hash(other.model) == weights_hash(undisturbed.model) != at_two
+    assert same(other.state(), undisturbed.state())
+
+
+def same(a, b):
+    """Whether two states are the same bit for bit."""
+    if isinstance(a, dict):
+        return a.keys() == b.keys() and all(same(a[key], b[key]) for key in a)
+    if isinstance(a, (list, tuple)):
+        return len(a) == len(b) and all(map(same, a, b))
+    return identical(a.numpy(), b.numpy()) if isinstance(a, torch.Tensor) else a == b
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_every_part_of_the_state_matters(method):
+    """Without it, whatever it is, the segment to come is another one; but for counters that only count."""
+    config = tiny(method)
+    trainer = made(config)
+    play(trainer, [0, 1])
+    state = trainer.state()
+    play(trainer, [2])
+    wanted = weights_hash(trainer.model)
+    start = made(config).state()
+    for part in state:
+        for name in state[part]:
+            if name in {"_episode_num", "num_timesteps", "pos", "full"} or (name == "_n_updates" and method != "td3"):
+                continue
+            if name == "ent_coef_optimizer":  # with gradients that hardly change, Adam forgets little
+                continue
+            forgetful = copy.deepcopy(state)
+            if part == "buffer":
+                forgetful[part][name] = torch.zeros_like(state[part][name])
+                if name in {"dones", "timeouts"}:  # all episodes end by the clock, so one makes up for the other
+                    forgetful[part]["dones"], forgetful[part]["timeouts"] = torch.ones(()), torch.zeros(())
+                    forgetful[part] |= {"dones": torch.ones_like(state[part]["dones"])}
+                    forgetful[part] |= {"timeouts": torch.zeros_like(state[part]["dones"])}
+            else:
+                forgetful[part][name] = 1 if name == "_n_updates" else start[part][name]
+            other = made(config)
+            other.restore(forgetful)
+            play(other, [2])
+            assert weights_hash(other.model) != wanted, (part, name)
+
+
+def test_state_is_a_copy():
+    trainer = made(tiny("sac"))
+    play(trainer, [0, 1])
+    state = trainer.state()
+    before = copy.deepcopy(state)
+    play(trainer, [2])
+    assert same(state, before)
+    assert not same(trainer.state(), before)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_all_episodes_are_played_to_their_end(method):
+    trainer = made(tiny(method, episodes=2))
+    play(trainer, [0])
+    assert len(trainer.model.ep_info_buffer) == 2 * 4
+    assert trainer.steps == 2 * 4 * 20
+    assert (trainer._env.venv._envs._simulator.steps_made == 0).all()
+
+
+def test_episodes_grow():
+    """Over the first half of the segments, through what divides a segment; costs are those of whole episodes."""
+    trainer = made(tiny("ppo", cut=5, segments=8, batch_size=80))
+    lengths, costs = [], []
+    for number in range(8):
+        costs.append(play(trainer, [number])[0]["train/cost"])
+        lengths.append({episode["l"] for episode in trainer.model.ep_info_buffer})
+        assert len(trainer.model.ep_info_buffer) == 4 * 20 / lengths[-1].copy().pop()
+    assert lengths == [{5}, {5}, {10}, {20}, {20}, {20}, {20}, {20}]
+    returns = [-episode["r"] for episode in trainer.model.ep_info_buffer]
+    assert costs[-1] == pytest.approx(np.exp(np.mean(np.log(returns))))
+    with pytest.raises(InvalidInputError, match="cut: expected a divisor of the 20 steps of an episode, got 7"):
+        made(tiny("ppo", cut=7))
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_first_answers_are_almost_zero(method):
+    trainer = made(tiny(method, **{**OVER, "hidden": (64, 64)}))
+    trainer._env.seed(0)
+    given = answers(trainer.model, trainer._env.reset())
+    assert 0.0 < np.abs(given).max() < 0.05
+
+
+@pytest.mark.parametrize(("method", "changes"), NOISY, ids=str)
+def test_answers_are_those_of_the_model(method, changes):
+    model = made(tiny(method, **changes)).model
+    assert algorithm_of(model) == method
+    features = np.random.default_rng(0).normal(0.0, 3.0, (50, model.observation_space.shape[0])).astype(np.float32)
+    with torch.no_grad():
+        mean_network(model)[-1].weight.mul_(300.0)
+    wanted = model.predict(features, deterministic=True)[0]
+    given = answers(model, features)
+    assert np.abs(given).max() > 0.9
+    np.testing.assert_allclose(given, wanted, atol=1e-6)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_critics_warm_up_while_the_actor_rests(method):
+    trainer = made(tiny(method, critic_warmup=2, **({} if method == "ppo" else {"collect": 1})))
+    parts = trainer.state()["parameters"]["policy"]
+    rest = {name: tensor for name, tensor in parts.items() if resting(name)}
+    assert rest
+    play(trainer, [0, 1])
+    after = trainer.state()["parameters"]["policy"]
+    assert all(after[name].equal(tensor) for name, tensor in rest.items())
+    moved = [name for name, tensor in parts.items() if not after[name].equal(tensor)]
+    assert any("value_net" in name or "critic" in name for name in moved)
+    temperature = trainer.state()["others"].get("log_ent_coef")
+    if temperature is not None:
+        assert temperature.item() == pytest.approx(np.log(0.01), rel=1e-6)
+    assert all(parameter.requires_grad for parameter in trainer._actor())
+    play(trainer, [2])
+    finally_ = trainer.state()["parameters"]["policy"]
+    assert not any(finally_[name].equal(tensor) for name, tensor in rest.items())
+
+
+def resting(name):
+    return name.startswith(("mlp_extractor.policy_net", "action_net", "log_std", "actor."))
+
+
+def test_nothing_is_learned_while_memory_is_filled():
+    trainer = made(tiny("td3", collect=2))
+    before = weights_hash(trainer.model)
+    play(trainer, [0, 1])
+    assert weights_hash(trainer.model) == before
+    assert trainer.model.replay_buffer.size() == 40
+    play(trainer, [2])
+    assert weights_hash(trainer.model) != before
+
+
+def test_learning_rate_of_a_segment():
+    trainer = made(tiny("sac", learning_rate=1e-3, learning_rate_end=1e-5))
+    for number, wanted in enumerate([1e-3, 1e-4, 1e-5]):
+        play(trainer, [number])
+        rates = {group["lr"] for group in trainer.model.actor.optimizer.param_groups}
+        assert rates == {trainer.model.lr_schedule(0.5)} or number == 0  # at first it collects
+        assert trainer.model.lr_schedule(0.5) == pytest.approx(wanted)
+
+
+def test_training_noise_of_td3():
+    """Both kinds have the standard deviation asked for; one forgets itself at once, the other as slowly as asked."""
+    for steps in (1, 20):
+        noise = made(tiny("td3", noise=0.3, noise_steps=steps)).model.action_noise
+        reseed(0, 0)
+        noise.reset()
+        drawn = np.array([noise() for _ in range(20_000)])[100:]
+        assert drawn.std() == pytest.approx(0.3, rel=0.1)
+        lag = (drawn[:-20] * drawn[20:]).mean() / drawn.var()
+        assert lag == pytest.approx(0.0 if steps == 1 else np.exp(-1), abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("method", "changes", "message"),
+    [
+        ("ppo", {"rollout": 15}, "rollout: expected a divisor of the 20 steps of a segment, got 15"),
+        ("ppo", {"batch_size": 33}, "batch_size: expected a divisor of the 80 transitions"),
+        ("td3", {"train_every": 3}, "train_every: expected a divisor of the 20 steps"),
+        ("ppo", {"over": "oracle"}, "reference 'oracle'"),
+    ],
+)
+def test_refused(method, changes, message):
+    with pytest.raises(InvalidInputError, match=message):
+        made(tiny(method, **changes))
+
+
+def test_episodes_are_of_the_split_for_training():
+    split = scenarios.SPLITS["train"]
+    drawn = [episode_seed(seed, segment, 100) for seed in range(5) for segment in range(50)]
+    assert len(set(drawn)) == len(drawn)
+    assert min(drawn) >= split.start
+    assert max(drawn) + 100 <= split.stop
+    assert max(drawn) - min(drawn) > len(split) / 2
+    assert episode_seed(3, 4, len(split)) == split.start
+    with pytest.raises(InvalidInputError, match="envs: expected at most"):
+        episode_seed(3, 4, len(split) + 1)
+
+
+def test_seeding_is_all_there_is():
+    """The same for the same seed and segment, another for another; and what was drawn before does not matter."""
+
+    def drawn(seed, segment):
+        reseed(seed, segment)
+        return torch.rand(3).tolist(), np.random.random(3).tolist()  # noqa: NPY002
+
+    assert drawn(1, 2) == drawn(1, 2)
+    several = [drawn(seed, segment) for seed in (0, 1) for segment in (None, 0, 1)]
+    assert all(a != b for i, a in enumerate(several) for b in several[:i])
+
+
+def test_settled_leaves_torch_as_it_was():
+    threads = torch.get_num_threads()
+    assert threads == 1
+    assert torch.are_deterministic_algorithms_enabled()
+    torch.set_num_threads(2)
+    with settled():
+        assert torch.get_num_threads() == 1
+    assert torch.get_num_threads() == 2
+    torch.set_num_threads(1)
+
+
+@pytest.mark.slow
+def test_ppo_learns():
+    """Tracking by itself, from nothing: within seconds it comes ten times closer than an arm that does not move, which
+    a gradient with a wrong sign or scale would miss."""
+    config = methods.get("ppo").config(
+        **{
+            **TINY,
+            "steps": 100,
+            "hidden": (32, 32),
+            "segments": 30,
+            "envs": 16,
+            "batch_size": 200,
+            "learning_rate": 3e-3,
+            "learning_rate_end": 3e-4,
+            "gamma": 0.9,
+            "log_std_init": -1.0,
+        }
+    )
+    trainer = made(config)
+    costs = [metrics["train/cost"] for metrics in play(trainer, range(30))]
+    print(costs)
+    assert costs[-1] < 0.1 * costs[0]

@@ -1,1 +1,0 @@
-"""Training of agents: what `train.py` runs. The agents themselves, once trained, live in :mod:`baselines.agent`."""
