@@ -384,7 +384,7 @@ def _replace_rows(memory: Memory, fresh: Memory, rows: npt.NDArray[np.bool_]) ->
 
 
 @kernel
-def _cut_rows(qdot, limit, action, status, lost):  # type: ignore[no-untyped-def]
+def _cut_rows(qdot, limit, action, status, lost):
     """Joint velocities as fractions of their limit, within the box, row by row.
 
     Args:
@@ -419,7 +419,7 @@ def _cut_rows(qdot, limit, action, status, lost):  # type: ignore[no-untyped-def
 
 
 @kernel
-def _all_finite(q, qdot, pose, nominal, remaining):  # type: ignore[no-untyped-def]
+def _all_finite(q, qdot, pose, nominal, remaining):
     """Whether all numbers of a batch are finite, without the temporary arrays that NumPy makes."""
     for array in (q.ravel(), qdot.ravel(), pose.ravel(), nominal.ravel(), remaining.ravel()):
         for value in array:

@@ -35,7 +35,7 @@ def tables(effort: Effort = FULL) -> list[Table]:
 
 
 @njit
-def _loop(chain, q, rotation, position, jacobian):  # type: ignore[no-untyped-def]
+def _loop(chain, q, rotation, position, jacobian):
     for row in range(q.shape[0]):
         forward_and_jacobian(chain, q[row], rotation, position, jacobian)
 

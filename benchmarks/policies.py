@@ -77,7 +77,7 @@ def _iterating(task: str, rows: int, iterations: int) -> tuple[Callable[[], obje
 
 
 @njit
-def _steps(rounds, jacobian, error, damping, gram, x, out):  # type: ignore[no-untyped-def]
+def _steps(rounds, jacobian, error, damping, gram, x, out):
     for _ in range(rounds):
         damped_step(jacobian, error, damping, gram, x, out)
 

@@ -26,7 +26,7 @@ P_X_INSIDE = 2.0
 
 
 @inlined
-def _power(x, p):  # type: ignore[no-untyped-def]
+def _power(x, p):
     """The p-th power of x >= 0; whole exponents, the usual case, cost a few products instead of a call."""
     if p == 2.0:
         return x * x
@@ -42,14 +42,14 @@ def _power(x, p):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def value(x, delta, inside, outside):  # type: ignore[no-untyped-def]
+def value(x, delta, inside, outside):
     """|x / Δ| to the power ``inside`` up to |x| = Δ and ``outside`` beyond: one component of a cost."""
     r = abs(x) / delta
     return _power(r, outside if r > 1.0 else inside)
 
 
 @inlined
-def slope(x, delta, inside, outside):  # type: ignore[no-untyped-def]
+def slope(x, delta, inside, outside):
     """Derivative of :func:`value` by x."""
     r = abs(x) / delta
     p = outside if r > 1.0 else inside
@@ -59,7 +59,7 @@ def slope(x, delta, inside, outside):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def bend(x, delta, inside, outside):  # type: ignore[no-untyped-def]
+def bend(x, delta, inside, outside):
     """Second derivative of :func:`value` by x."""
     r = abs(x) / delta
     p = outside if r > 1.0 else inside
@@ -69,7 +69,7 @@ def bend(x, delta, inside, outside):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def tracking(cost, error):  # type: ignore[no-untyped-def]
+def tracking(cost, error):
     """Φ^X, the sum over the components of the tracking error. Shape of ``error`` (e,)."""
     total = 0.0
     for j in range(error.shape[0]):
@@ -78,21 +78,21 @@ def tracking(cost, error):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def tracking_gradient(cost, error, out):  # type: ignore[no-untyped-def]
+def tracking_gradient(cost, error, out):
     """∂Φ^X/∂error. Shapes (e,)."""
     for j in range(error.shape[0]):
         out[j] = slope(error[j], cost.delta_x, P_X_INSIDE, cost.p_x)
 
 
 @kernel
-def tracking_curvature(cost, error, out):  # type: ignore[no-untyped-def]
+def tracking_curvature(cost, error, out):
     """The diagonal of ∂²Φ^X/∂error². Shapes (e,)."""
     for j in range(error.shape[0]):
         out[j] = bend(error[j], cost.delta_x, P_X_INSIDE, cost.p_x)
 
 
 @kernel
-def velocity(cost, qdot):  # type: ignore[no-untyped-def]
+def velocity(cost, qdot):
     """Φ^U, the sum over all joints (the printed sum to 6 is a slip). Shape of ``qdot`` (n,)."""
     total = 0.0
     for j in range(qdot.shape[0]):
@@ -101,14 +101,14 @@ def velocity(cost, qdot):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def velocity_gradient(cost, qdot, out):  # type: ignore[no-untyped-def]
+def velocity_gradient(cost, qdot, out):
     """∂Φ^U/∂q̇. Shapes (n,)."""
     for j in range(qdot.shape[0]):
         out[j] = slope(qdot[j], cost.delta_qdot, cost.p_in, cost.p_out)
 
 
 @kernel
-def velocity_curvature(cost, qdot, out):  # type: ignore[no-untyped-def]
+def velocity_curvature(cost, qdot, out):
     """The diagonal of ∂²Φ^U/∂q̇². Shapes (n,)."""
     for j in range(qdot.shape[0]):
         out[j] = bend(qdot[j], cost.delta_qdot, cost.p_in, cost.p_out)

@@ -36,7 +36,7 @@ class Chain(NamedTuple):
 
 
 @kernel
-def forward(chain, q, rotation, position):  # type: ignore[no-untyped-def]
+def forward(chain, q, rotation, position):
     """Forward kinematics of one configuration.
 
     Args:
@@ -49,7 +49,7 @@ def forward(chain, q, rotation, position):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def forward_and_jacobian(chain, q, rotation, position, jacobian):  # type: ignore[no-untyped-def]
+def forward_and_jacobian(chain, q, rotation, position, jacobian):
     """Forward kinematics and geometric Jacobian of one configuration.
 
     Args:
@@ -75,7 +75,7 @@ def forward_and_jacobian(chain, q, rotation, position, jacobian):  # type: ignor
 
 
 @inlined
-def _walk(chain, q, rotation, position, jacobian, keep):  # type: ignore[no-untyped-def]
+def _walk(chain, q, rotation, position, jacobian, keep):
     """Goes along the chain; if told to keep them, leaves each joint's axis and point in ``jacobian``."""
     offsets, axes, prismatic = chain.offsets, chain.axes, chain.prismatic
     # The orientation so far is kept in nine scalars, which stay in registers; an array would not.
@@ -140,21 +140,21 @@ def _walk(chain, q, rotation, position, jacobian, keep):  # type: ignore[no-unty
 
 
 @kernel
-def forward_rows(chain, q, rotation, position):  # type: ignore[no-untyped-def]
+def forward_rows(chain, q, rotation, position):
     """:func:`forward` for N rows: ``q`` (N, n), ``rotation`` (N, 3, 3), ``position`` (N, 3)."""
     for row in range(q.shape[0]):
         forward(chain, q[row], rotation[row], position[row])
 
 
 @kernel
-def forward_and_jacobian_rows(chain, q, rotation, position, jacobian):  # type: ignore[no-untyped-def]
+def forward_and_jacobian_rows(chain, q, rotation, position, jacobian):
     """:func:`forward_and_jacobian` for N rows: as above, with ``jacobian`` (N, 6, n)."""
     for row in range(q.shape[0]):
         forward_and_jacobian(chain, q[row], rotation[row], position[row], jacobian[row])
 
 
 @kernel
-def joint_points(chain, q, points):  # type: ignore[no-untyped-def]
+def joint_points(chain, q, points):
     """Where each joint begins and ends, for drawing.
 
     Args:
@@ -177,13 +177,13 @@ def joint_points(chain, q, points):  # type: ignore[no-untyped-def]
 
 # Written out, since numba's matrix product needs SciPy.
 @kernel
-def _shift(rotation, vector, length, point):  # type: ignore[no-untyped-def]
+def _shift(rotation, vector, length, point):
     for i in range(3):
         point[i] += length * (rotation[i, 0] * vector[0] + rotation[i, 1] * vector[1] + rotation[i, 2] * vector[2])
 
 
 @kernel
-def _product(first, second):  # type: ignore[no-untyped-def]
+def _product(first, second):
     out = np.zeros((3, 3))
     for i in range(3):
         for j in range(3):

@@ -14,7 +14,7 @@ from ikgym.jit import inlined, kernel
 
 
 @kernel
-def rodrigues(axis, angle):  # type: ignore[no-untyped-def]
+def rodrigues(axis, angle):
     """The rotation about a unit axis (Varga 2021, eq. 8; Khan 2020, eq. 4.17).
 
     Args:
@@ -43,7 +43,7 @@ def rodrigues(axis, angle):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def quaternion(rotation):  # type: ignore[no-untyped-def]
+def quaternion(rotation):
     """The unit quaternion (w, x, y, z) with w >= 0 of a rotation.
 
     Args:
@@ -66,7 +66,7 @@ def quaternion(rotation):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def quaternion_of(r00, r01, r02, r10, r11, r12, r20, r21, r22):  # type: ignore[no-untyped-def]
+def quaternion_of(r00, r01, r02, r10, r11, r12, r20, r21, r22):
     """:func:`quaternion` of a matrix given element by element, by Shepperd's choice of the largest part.
 
     It keeps every division well away from 0/0, so that the quaternion is exact to rounding near 0 and near π alike.
@@ -99,7 +99,7 @@ def quaternion_of(r00, r01, r02, r10, r11, r12, r20, r21, r22):  # type: ignore[
 
 
 @kernel
-def rotation_vector(rotation):  # type: ignore[no-untyped-def]
+def rotation_vector(rotation):
     """The rotation vector (axis times angle) of a rotation, its angle between 0 and π.
 
     Replaces the arccos and the division by sin θ of Zhang 2020, eq. 52-54, which lose all digits near 0 and are
@@ -121,7 +121,7 @@ def rotation_vector(rotation):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def vector_factor(w, x, y, z):  # type: ignore[no-untyped-def]
+def vector_factor(w, x, y, z):
     """By what the vector part of a unit quaternion with w >= 0 must be multiplied to be the rotation vector."""
     sine = math.sqrt(x * x + y * y + z * z)
     # At 0 the factor angle / sine tends to 2.
@@ -129,7 +129,7 @@ def vector_factor(w, x, y, z):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def geodesic_angle(first, second):  # type: ignore[no-untyped-def]
+def geodesic_angle(first, second):
     """The angle of the rotation that leads from one orientation to another.
 
     Args:
@@ -154,5 +154,5 @@ def geodesic_angle(first, second):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _dot(a, b):  # type: ignore[no-untyped-def]
+def _dot(a, b):
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

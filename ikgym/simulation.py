@@ -144,7 +144,7 @@ _outcome = inlined(outcome)
 
 
 @kernel
-def first_not_finite(actions, active):  # type: ignore[no-untyped-def]
+def first_not_finite(actions, active):
     """The first active row of ``actions`` (N, n) with a NaN or an infinity, or -1."""
     for row in range(actions.shape[0]):
         if active[row]:
@@ -155,7 +155,7 @@ def first_not_finite(actions, active):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def step(  # type: ignore[no-untyped-def]
+def step(
     # Chain.
     offsets,
     axes,
@@ -266,7 +266,7 @@ def step(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _uniform(key, counter):  # type: ignore[no-untyped-def]
+def _uniform(key, counter):
     """The ``counter``-th number of a stream, uniform between -1 and 1 (SplitMix64).
 
     A counter instead of a generator's state: rows stay independent of each other and of the order they run in.
@@ -279,7 +279,7 @@ def _uniform(key, counter):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def nominal_rows(kind, frames, out):  # type: ignore[no-untyped-def]
+def nominal_rows(kind, frames, out):
     """Task coordinates of frames: ``frames`` (k, 12 or 3), ``out`` (k, m)."""
     for row in range(frames.shape[0]):
         task_kernels.frame_coordinates(kind, frames[row], out[row])

@@ -15,7 +15,7 @@ POSITION, SKEW, MATRIX, POSE = 0, 1, 2, 3
 
 
 @kernel
-def coordinates(kind, rotation, position, out):  # type: ignore[no-untyped-def]
+def coordinates(kind, rotation, position, out):
     """Task coordinates of a pose.
 
     Args:
@@ -39,7 +39,7 @@ def coordinates(kind, rotation, position, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def frame_coordinates(kind, frame, out):  # type: ignore[no-untyped-def]
+def frame_coordinates(kind, frame, out):
     """:func:`coordinates` of a frame of shape (12,), or (3,) where there is no orientation."""
     m, width = out.shape[0], frame.shape[0]
     if kind == SKEW:
@@ -54,7 +54,7 @@ def frame_coordinates(kind, frame, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def error(kind, nominal, coordinates, out):  # type: ignore[no-untyped-def]
+def error(kind, nominal, coordinates, out):
     """What is missing from coordinates to their nominal values.
 
     Args:
@@ -89,13 +89,13 @@ def error(kind, nominal, coordinates, out):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _rows(a, i, b, j):  # type: ignore[no-untyped-def]
+def _rows(a, i, b, j):
     """The product of a row of one rotation and a row of another, where they begin in their frames."""
     return a[i] * b[j] + a[i + 1] * b[j + 1] + a[i + 2] * b[j + 2]
 
 
 @kernel
-def jacobian(kind, rotation, geometric, out):  # type: ignore[no-untyped-def]
+def jacobian(kind, rotation, geometric, out):
     """Derivative of the task coordinates; for POSE that of -error where the error is 0.
 
     Args:
@@ -133,7 +133,7 @@ def jacobian(kind, rotation, geometric, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def error_jacobian(kind, error, jacobian, out):  # type: ignore[no-untyped-def]
+def error_jacobian(kind, error, jacobian, out):
     """Derivative of the error by the joint coordinates, exact for errors of any size.
 
     Args:

@@ -34,12 +34,14 @@ def policy_under(processing: Sees, problem: Problem) -> SolverPolicy | None:
         UnknownNameError: There is no such policy, or parameter of it.
         InvalidInputError: The policy is a reference, or an agent or made from one, or does not suit the scenario.
     """
-    if processing.over is None:
+    if processing.base_policy is None:
         return None
-    name, parameters = parse_policy(processing.over)
+    name, parameters = parse_policy(processing.base_policy)
     kind = registry.get(name)
     if kind.reference:
-        raise InvalidInputError(f"over: expected a policy that acts on what it sees, got the reference {name!r}.")
+        raise InvalidInputError(
+            f"base_policy: expected a policy that acts on what it sees, got the reference {name!r}."
+        )
     with _named_by_a_file():
         return kind(problem, **parameters)
 
@@ -51,7 +53,7 @@ def refuse_to_be_named() -> None:
         InvalidInputError: A file has.
     """
     if _naming.get():
-        raise InvalidInputError("over: expected a policy that is no agent and is not made from one.")
+        raise InvalidInputError("base_policy: expected a policy that is no agent and is not made from one.")
 
 
 @contextlib.contextmanager

@@ -48,15 +48,15 @@ class Processing(Frozen):
     | 1 | steps left, as a share of the furthest offset, at most 1 |
     | n | ⌊q̇ of the policy under the agent / s⌉; only where there is one |
 
-    The joint velocity is s · reach · (the answer of the network, cut to [-1, 1]), on top of that of the policy under
+    The joint velocity is s · action_scale · (the answer of the network, cut to [-1, 1]), on top of that of the policy under
     it, if there is one: an answer of 0 is that policy, bit for bit. Where the answer goes through the null space, it
     is multiplied by I − Jᵀ (J Jᵀ + λ I)⁻¹ J before, with the task Jacobian J of the model: the agent then moves the
     arm without moving its tool, but for directions that are nearly singular.
 
     Args:
         offsets: o, steps ahead at which the agent sees the nominal coordinates, rising, at least two.
-        reach: What an answer of 1 means, as a multiple of the speed. Above 0.
-        over: The policy under the agent, such as ``"dls:damping=1e-2"``; None for an agent that stands alone.
+        action_scale: What an answer of 1 means, as a multiple of the speed. Above 0.
+        base_policy: The policy under the agent, such as ``"dls:damping=1e-2"``; None for an agent that stands alone.
         null_space: λ of the projector, above 0; None for answers that are taken as they are.
 
     Raises:
@@ -64,18 +64,18 @@ class Processing(Frozen):
     """
 
     offsets: tuple[int, ...] = (1, 2, 10, 30, 60, 120, 240)
-    reach: float = 4.0
-    over: str | None = None
+    action_scale: float = 4.0
+    base_policy: str | None = None
     null_space: float | None = None
 
     def __post_init__(self) -> None:
         offsets = tuple(whole_number("offsets", o, at_least=1) for o in self.offsets)
         if len(offsets) < 2 or any(b <= a for a, b in itertools.pairwise(offsets)):
             raise InvalidInputError(f"offsets: expected at least two, each above the one before, got {self.offsets}.")
-        if self.over is not None and not isinstance(self.over, str):
-            raise InvalidInputError(f"over: expected a policy as text, got {self.over!r}.")
+        if self.base_policy is not None and not isinstance(self.base_policy, str):
+            raise InvalidInputError(f"base_policy: expected a policy as text, got {self.base_policy!r}.")
         object.__setattr__(self, "offsets", offsets)
-        object.__setattr__(self, "reach", number("reach", self.reach, above=0.0))
+        object.__setattr__(self, "action_scale", number("action_scale", self.action_scale, above=0.0))
         if self.null_space is not None:
             object.__setattr__(self, "null_space", number("null_space", self.null_space, above=0.0))
 
@@ -97,7 +97,7 @@ class Processing(Frozen):
     def size(self, problem: Problem) -> int:
         """The number of features."""
         n, e = problem.model.joints, problem.task.error_size
-        return (4 if self.over else 3) * n + (1 + len(self.offsets)) * e + 2
+        return (4 if self.base_policy else 3) * n + (1 + len(self.offsets)) * e + 2
 
     def features(self, problem: Problem, batch: Batch, base: FloatArray | None = None) -> Features:
         """The features of a batch.
@@ -147,7 +147,7 @@ class Processing(Frozen):
             problem.dt,
             problem.velocity_limit,
             np.array(self.offsets, dtype=np.int64),
-            self.reach,
+            self.action_scale,
             0.0 if self.null_space is None else self.null_space,
             batch.q,
             batch.nominal,
@@ -159,13 +159,13 @@ class Processing(Frozen):
 
 
 @inlined
-def compressed(x):  # type: ignore[no-untyped-def]
+def compressed(x):
     """Asinh x, cut at ±LARGEST."""
     return min(max(math.asinh(x), -LARGEST), LARGEST)
 
 
 @kernel
-def speed_of(kind, dt, offsets, nominal, velocities):  # type: ignore[no-untyped-def]
+def speed_of(kind, dt, offsets, nominal, velocities):
     """The speed of what is to come, in the unit of task velocities.
 
     Args:
@@ -186,7 +186,7 @@ def speed_of(kind, dt, offsets, nominal, velocities):  # type: ignore[no-untyped
 
 
 @kernel
-def speed_rows(kind, dt, offsets, nominal, velocities):  # type: ignore[no-untyped-def]
+def speed_rows(kind, dt, offsets, nominal, velocities):
     """What :func:`speed_of` gives, row by row.
 
     Args:
@@ -206,7 +206,7 @@ def speed_rows(kind, dt, offsets, nominal, velocities):  # type: ignore[no-untyp
 
 
 @kernel
-def feature_rows(  # type: ignore[no-untyped-def]
+def feature_rows(
     kind,
     prismatic,
     dt,
@@ -266,9 +266,7 @@ def feature_rows(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def action_rows(  # type: ignore[no-untyped-def]
-    chain, kind, dt, velocity_limit, offsets, reach, damping, q, nominal, answer, velocities, out
-):
+def action_rows(chain, kind, dt, velocity_limit, offsets, action_scale, damping, q, nominal, answer, velocities, out):
     """Adds what the answers mean to actions, row by row.
 
     Args:
@@ -277,7 +275,7 @@ def action_rows(  # type: ignore[no-untyped-def]
         dt: Δt in [s].
         velocity_limit: Shape (n,).
         offsets: Shape (p,).
-        reach: See :class:`Processing`.
+        action_scale: See :class:`Processing`.
         damping: λ of the projector, 0 for none.
         q: Shape (B, n).
         nominal: At the offsets. Shape (B, p, m).
@@ -291,13 +289,13 @@ def action_rows(  # type: ignore[no-untyped-def]
     if damping > 0.0:
         project_rows(chain, kind, damping, velocities.shape[1], q, answer)
     for row in range(q.shape[0]):
-        scale = reach * speed_of(kind, dt, offsets, nominal[row], velocities)
+        scale = action_scale * speed_of(kind, dt, offsets, nominal[row], velocities)
         for j in range(answer.shape[1]):
             out[row, j] += scale * answer[row, j] / velocity_limit[j]
 
 
 @kernel
-def project_rows(chain, kind, damping, size, q, velocity):  # type: ignore[no-untyped-def]
+def project_rows(chain, kind, damping, size, q, velocity):
     """Multiplies joint velocities by I − Jᵀ (J Jᵀ + λ I)⁻¹ J, in place.
 
     Args:

@@ -259,8 +259,10 @@ def _check_types(about: Mapping[str, Any], processing: Processing) -> None:
     """Insists on the types of what others rely on."""
     texts = about["scenario"]["name"], about["scenario"]["fingerprint"], about["task"]["name"], about["ikgym"]
     numbers = about["joints"], about["task"]["size"], about["task"]["error_size"], about["cost_version"]
-    over = processing.over is None or isinstance(processing.over, str)
-    if not (all(isinstance(text, str) for text in texts) and all(type(value) is int for value in numbers) and over):
+    base_policy = processing.base_policy is None or isinstance(processing.base_policy, str)
+    if not (
+        all(isinstance(text, str) for text in texts) and all(type(value) is int for value in numbers) and base_policy
+    ):
         raise InvalidInputError(f"expected names as texts and sizes as whole numbers, got {texts} and {numbers}")
     if not isinstance(about["training"], dict):
         raise InvalidInputError(f"training: expected an object, got {about['training']!r}")

@@ -118,7 +118,7 @@ def _layers(name: str, arrays: Sequence[npt.ArrayLike], axes: int) -> tuple[Sing
 
 
 @kernel
-def forward_rows(weights, biases, sizes, activation, squash, features, out):  # type: ignore[no-untyped-def]
+def forward_rows(weights, biases, sizes, activation, squash, features, out):
     """The forward pass, row by row.
 
     Sums run over the inputs outside and the outputs inside: that goes along the memory, and into vector instructions
@@ -159,7 +159,7 @@ def forward_rows(weights, biases, sizes, activation, squash, features, out):  # 
 
 
 @kernel
-def multiply_add(matrix, x, y):  # type: ignore[no-untyped-def]
+def multiply_add(matrix, x, y):
     """``y += W x`` with Wᵀ flat: shapes (inputs outputs,), (inputs,), (outputs,)."""
     n, i = y.shape[0], 0
     while i + SWEEP <= x.shape[0]:
@@ -178,7 +178,7 @@ def multiply_add(matrix, x, y):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def activate(activation, y):  # type: ignore[no-untyped-def]
+def activate(activation, y):
     """The activation, in place. Shape (outputs,)."""
     for j in range(y.shape[0]):
         value = y[j]

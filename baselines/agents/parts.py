@@ -22,7 +22,7 @@ class Sees(Protocol):
         """Steps ahead at which the nominal coordinates are seen."""
 
     @property
-    def over(self) -> str | None:
+    def base_policy(self) -> str | None:
         """The policy under the agent."""
 
     @property

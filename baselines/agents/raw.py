@@ -60,7 +60,7 @@ class RawObservation(Frozen):
         return cls(shown)
 
     @property
-    def over(self) -> None:
+    def base_policy(self) -> None:
         """There is no policy under the agent."""
         return
 

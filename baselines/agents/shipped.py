@@ -44,7 +44,7 @@ class ShippedAgent(LearnedPolicy):
 class AgentAlone(ShippedAgent):
     """Learned agent that stands alone, trained on `varga7-random` by ppo."""
 
-    hash: str = "88d79a3c1f84"
+    hash: str = "58a35cba801c"
 
     name: ClassVar[str] = "agent_alone"
 
@@ -53,6 +53,6 @@ class AgentAlone(ShippedAgent):
 class AgentResidual(ShippedAgent):
     """Learned correction of `rhc:horizon=400,iterations=1,blocks=30`, trained on `varga7-random` by imitate."""
 
-    hash: str = "0c43be320ae5"
+    hash: str = "2779d12cbe68"
 
     name: ClassVar[str] = "agent_residual"

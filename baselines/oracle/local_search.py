@@ -27,7 +27,7 @@ BLEND = 0.3
 
 
 @kernel
-def roll_outs(rules, grid, start, nominal, seed, paths, first, last):  # type: ignore[no-untyped-def]
+def roll_outs(rules, grid, start, nominal, seed, paths, first, last):
     """Sets paths that drift at random in the null space of the task; path 0 does not drift."""
     n, e = start.shape[0], _errors(rules, nominal)
     scratch = room_for(rules.kind, nominal.shape[1], 1, n).scratch
@@ -39,9 +39,7 @@ def roll_outs(rules, grid, start, nominal, seed, paths, first, last):  # type: i
 
 
 @kernel
-def settle(  # type: ignore[no-untyped-def]
-    rules, grid, start, nominal, exact, most, tolerance, paths, costs, gradients, made, first, last
-):
+def settle(rules, grid, start, nominal, exact, most, tolerance, paths, costs, gradients, made, first, last):
     """Improves each path by Newton's method; none gets worse.
 
     Args:
@@ -75,7 +73,7 @@ def settle(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def climb(rules, grid, start, nominal, seed, rounds, partners, paths, costs, first, last):  # type: ignore[no-untyped-def]
+def climb(rules, grid, start, nominal, seed, rounds, partners, paths, costs, first, last):
     """Local search: branches off each path again and again, and keeps what is cheaper.
 
     A branch leaves the path at a random knot, drifts in the null space, and goes its own way to the end or comes
@@ -129,7 +127,7 @@ def climb(rules, grid, start, nominal, seed, rounds, partners, paths, costs, fir
 
 
 @kernel
-def _blend(a, b, middle, width, out):  # type: ignore[no-untyped-def]
+def _blend(a, b, middle, width, out):
     """Goes over from path ``a`` to path ``b`` around the knot ``middle``; ``out`` may be one of them."""
     for k in range(out.shape[0]):
         share = min(max((k - middle) / width + 0.5, 0.0), 1.0)
@@ -138,6 +136,6 @@ def _blend(a, b, middle, width, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _errors(rules, nominal):  # type: ignore[no-untyped-def]
+def _errors(rules, nominal):
     """e, the components of the tracking error."""
     return 6 if rules.kind == task_kernels.POSE else nominal.shape[1]

@@ -15,7 +15,7 @@ SMALLEST_PIVOT = 1e-12
 
 
 @kernel
-def damped_step(jacobian, error, damping, gram, x, out):  # type: ignore[no-untyped-def]
+def damped_step(jacobian, error, damping, gram, x, out):
     """Δq = Jᵀ (J Jᵀ + λ I)⁻¹ e.
 
     Args:
@@ -40,7 +40,7 @@ def damped_step(jacobian, error, damping, gram, x, out):  # type: ignore[no-unty
 
 
 @kernel
-def damped_gram(jacobian, damping, out):  # type: ignore[no-untyped-def]
+def damped_gram(jacobian, damping, out):
     """The lower triangle of J Jᵀ + λ I: shapes (e, n), a number, (e, e)."""
     e, n = jacobian.shape
     for a in range(e):
@@ -52,7 +52,7 @@ def damped_gram(jacobian, damping, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def factorise(matrix):  # type: ignore[no-untyped-def]
+def factorise(matrix):
     """L D Lᵀ in place: L below the diagonal, D⁻¹ on it; from the lower triangle of ``matrix`` (e, e).
 
     Returns:
@@ -77,7 +77,7 @@ def factorise(matrix):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def solve(factor, x):  # type: ignore[no-untyped-def]
+def solve(factor, x):
     """Solves L D Lᵀ x = b in place; ``factor`` (e, e) from :func:`factorise`, ``x`` (e,) is b before."""
     e = x.shape[0]
     for k in range(e):
@@ -91,7 +91,7 @@ def solve(factor, x):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def scaled_inverse(factor, scale, out):  # type: ignore[no-untyped-def]
+def scaled_inverse(factor, scale, out):
     """Gives scale · (L D Lᵀ)⁻¹: shapes (e, e); ``factor`` from :func:`factorise` is destroyed."""
     e = factor.shape[0]
     # L becomes its inverse, column by column from the right.
@@ -110,7 +110,7 @@ def scaled_inverse(factor, scale, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def transposed_product(jacobian, vector, out):  # type: ignore[no-untyped-def]
+def transposed_product(jacobian, vector, out):
     """Jᵀ x: shapes (e, n), (e,), (n,)."""
     e, n = jacobian.shape
     for k in range(n):
@@ -121,7 +121,7 @@ def transposed_product(jacobian, vector, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def ran_away(here, start, longest):  # type: ignore[no-untyped-def]
+def ran_away(here, start, longest):
     """Whether a joint has gone farther than it can in one period: shapes (n,)."""
     excess = -np.inf
     for k in range(here.shape[0]):

@@ -11,7 +11,7 @@ from ikgym.jit import inlined, kernel
 
 
 @inlined
-def dot(a, b):  # type: ignore[no-untyped-def]
+def dot(a, b):
     """The scalar product; written out, since numba's own needs SciPy."""
     total = 0.0
     for i in range(a.shape[0]):
@@ -20,7 +20,7 @@ def dot(a, b):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def cholesky(matrix):  # type: ignore[no-untyped-def]
+def cholesky(matrix):
     """Cholesky factorisation in place: the lower triangle of ``matrix`` (m, m) becomes L with L Lᵀ = matrix.
 
     Returns:
@@ -44,7 +44,7 @@ def cholesky(matrix):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def cholesky_solve(factor, rhs):  # type: ignore[no-untyped-def]
+def cholesky_solve(factor, rhs):
     """Solves L Lᵀ x = rhs in place; ``factor`` (m, m) from :func:`cholesky`, ``rhs`` (m,) becomes x."""
     m = rhs.shape[0]
     for i in range(m):
@@ -58,7 +58,7 @@ def cholesky_solve(factor, rhs):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def inverse_of_factor(factor, out):  # type: ignore[no-untyped-def]
+def inverse_of_factor(factor, out):
     """(L Lᵀ)⁻¹, both triangles: ``factor`` (m, m) from :func:`cholesky` is destroyed; ``out`` (m, m)."""
     m = factor.shape[0]
     # L becomes its inverse, column by column from the right.
@@ -78,7 +78,7 @@ def inverse_of_factor(factor, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def orthogonal_columns(columns, rotations):  # type: ignore[no-untyped-def]
+def orthogonal_columns(columns, rotations):
     """Singular value decomposition in place, by one-sided Jacobi rotations (Hestenes).
 
     ``columns`` (r, c) becomes U Σ, ``rotations`` (c, c) becomes V: at the start the matrix is columns, at the end

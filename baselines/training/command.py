@@ -87,11 +87,11 @@ Each method has options of its own: {PROGRAM} METHOD --help
 
 {_listing("Scenarios", scenarios.names())}
 
-{_listing("Policies for --over", (name for name in registry.names() if not registry.get(name).reference))}
+{_listing("Policies for --base-policy", (name for name in registry.names() if not registry.get(name).reference))}
 
 Examples:
   python {PROGRAM} ppo --preset smoke --out runs/smoke
-  python {PROGRAM} ppo --over dls:damping=1e-2 --reach 0.5 --seeds 0 1 2 3 4 --workers 2 --out runs/over-dls
+  python {PROGRAM} ppo --base-policy dls:damping=1e-2 --action-scale 0.5 --seeds 0 1 2 3 4 --workers 2 --out runs/over-dls
   python {PROGRAM} imitate --preset residual --seeds 0 1 2 3 4 --workers 2 --out runs/residual
   python {PROGRAM} ppo --preset finetune --init runs/apg/seed-0/model.zip --out runs/finer
   python {PROGRAM} ppo --preset smoke --out runs/smoke --resume

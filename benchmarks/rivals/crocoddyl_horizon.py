@@ -123,7 +123,7 @@ class _Action(crocoddyl.ActionModelAbstract):  # type: ignore[misc]
 
 
 @kernel
-def _cost(chain, kind, cost, dt, origin, length, weight, nominal, x, qdot):  # type: ignore[no-untyped-def]
+def _cost(chain, kind, cost, dt, origin, length, weight, nominal, x, qdot):
     total = 0.0
     if length > 0.0:
         total += length * cost_kernels.velocity(cost, qdot)
@@ -138,9 +138,7 @@ def _cost(chain, kind, cost, dt, origin, length, weight, nominal, x, qdot):  # t
 
 
 @kernel
-def _derivatives(  # type: ignore[no-untyped-def]
-    chain, kind, cost, dt, origin, length, weight, nominal, x, qdot, by_x, by_u, by_xx, by_uu
-):
+def _derivatives(chain, kind, cost, dt, origin, length, weight, nominal, x, qdot, by_x, by_u, by_xx, by_uu):
     n = x.shape[0]
     by_x[:], by_u[:], by_xx[:], by_uu[:] = 0.0, 0.0, 0.0, 0.0
     if length > 0.0:

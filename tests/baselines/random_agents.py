@@ -26,10 +26,19 @@ def network(sizes, activation="silu", squash="clip", *, zero=False, seed=0):
 
 
 def write_agent(
-    file, scenario, over=None, *, zero=False, hidden=(16, 9), seed=0, offsets=OFFSETS, null_space=None, training=None
+    file,
+    scenario,
+    base_policy=None,
+    *,
+    zero=False,
+    hidden=(16, 9),
+    seed=0,
+    offsets=OFFSETS,
+    null_space=None,
+    training=None,
 ):
     """Writes an agent that suits a scenario, and gives its path as a text."""
-    processing = Processing(offsets=offsets, over=over, null_space=null_space)
+    processing = Processing(offsets=offsets, base_policy=base_policy, null_space=null_space)
     sizes = (processing.size(Problem.of(scenario)), *hidden, scenario.joints)
     save_agent(file, network(sizes, zero=zero, seed=seed), processing, scenario, training)
     return str(file)

@@ -102,7 +102,7 @@ class Line:
         """What it is, in words."""
         if self.training is None:
             return NEAR if self.preview <= PAPER else FAR
-        return AGENT if self.training.over is None else RESIDUAL
+        return AGENT if self.training.base_policy is None else RESIDUAL
 
     @property
     def learned(self) -> bool:

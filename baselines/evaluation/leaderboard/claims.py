@@ -52,9 +52,9 @@ def sentences(section: Section) -> list[str]:
         return ["- No agent has been entered: the lines are those of solvers.", *_solvers(near, far, means)]
     best = learned[0]
     out = [f"- The best agent is {_name(best, means)}{_few(best)}; it loses track in {best.lost} of {best.runs} runs."]
-    if best.training and best.training.over:
+    if best.training and best.training.base_policy:
         out.append(
-            f"- It adds to `{best.training.over}` and sees {best.preview} steps ahead: what that solver reaches is no "
+            f"- It adds to `{best.training.base_policy}` and sees {best.preview} steps ahead: what that solver reaches is no "
             "merit of the training. Compare it with the same solver alone."
         )
     alone = next((line for line in learned if line.kind == AGENT), None)

@@ -46,13 +46,13 @@ class Training:
 
     Args:
         method: Such as ``"ppo"``.
-        over: The policy under a residual agent; None where there is none.
+        base_policy: The policy under a residual agent; None where there is none.
         steps: Environment steps, or samples, of each training seed.
         core_minutes: Minutes times cores of each training seed.
     """
 
     method: str
-    over: str | None
+    base_policy: str | None
     steps: tuple[int, ...]
     core_minutes: tuple[float, ...]
 
@@ -134,15 +134,15 @@ def agent(name: str, directory: pathlib.Path) -> Entry:
     if not folders:
         raise ResultsError(f"{directory}: expected folders seed-0, seed-1, …, each with an agent; there is none.")
     runs = [_run(folders[seed] / "run.json") for seed in sorted(folders)]
-    kinds = {(method, over) for method, over, _, _ in runs}
+    kinds = {(method, base_policy) for method, base_policy, _, _ in runs}
     if len(kinds) > 1:
         raise ResultsError(f"{directory}: expected seeds of one training, got {' and '.join(sorted(map(str, kinds)))}.")
-    method, over, *_ = runs[0]
+    method, base_policy, *_ = runs[0]
     return Entry(
         name,
         tuple(policy_of(folders[seed]) for seed in sorted(folders)),
         tuple(sorted(folders)),
-        training=Training(method, over, tuple(run[2] for run in runs), tuple(run[3] for run in runs)),
+        training=Training(method, base_policy, tuple(run[2] for run in runs), tuple(run[3] for run in runs)),
     )
 
 
@@ -191,9 +191,9 @@ def _run(file: pathlib.Path) -> tuple[str, str | None, int, float]:
     """Method, policy underneath, steps and core-minutes of a training."""
     try:
         content = json.loads(file.read_text(encoding="utf-8"))
-        training, over = content["training"], content["processing"]["over"]
-        if not (over is None or isinstance(over, str)):
-            raise TypeError(f"over: expected the spec of a policy or null, got {over!r}")
-        return str(content["method"]), over, int(training["steps"]), float(training["core_minutes"])
+        training, base_policy = content["training"], content["processing"]["base_policy"]
+        if not (base_policy is None or isinstance(base_policy, str)):
+            raise TypeError(f"base_policy: expected the spec of a policy or null, got {base_policy!r}")
+        return str(content["method"]), base_policy, int(training["steps"]), float(training["core_minutes"])
     except (OSError, ValueError, TypeError, KeyError) as e:
         raise ResultsError(f"Cannot read what a training has cost from {file}: {e!r}.") from None

@@ -96,7 +96,7 @@ class Broyden(DampedLeastSquares):
 
 
 @kernel
-def learn_rows(chain, kind, gain, motion, correcting, now, known, before, learnt, estimate, shift):  # type: ignore[no-untyped-def]
+def learn_rows(chain, kind, gain, motion, correcting, now, known, before, learnt, estimate, shift):
     """Estimates of the Jacobian and the task shifts asked for, row by row.
 
     Args:

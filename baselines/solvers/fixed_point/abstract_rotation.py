@@ -147,7 +147,7 @@ class AbstractRotation(SolverPolicy):
 
 
 @kernel
-def iterate_rows(  # type: ignore[no-untyped-def]
+def iterate_rows(
     chain, kind, task_weights, joint_weights, counter, rule, tolerance, q, pose, target, pull, goal, angles, status
 ):
     """One inner iteration, row by row.
@@ -199,7 +199,7 @@ def iterate_rows(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _transposed(jacobian, weights, vector, out):  # type: ignore[no-untyped-def]
+def _transposed(jacobian, weights, vector, out):
     """J̃ᵀ ℱ times a vector: shapes (m, n), (m,), (m,), (n,)."""
     out[:] = 0.0
     for i in range(vector.shape[0]):

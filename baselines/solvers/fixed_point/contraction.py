@@ -62,7 +62,7 @@ def contraction(family: str, slope: float, d: float) -> Contraction:
 
 
 @kernel
-def evaluate(function, xi):  # type: ignore[no-untyped-def]
+def evaluate(function, xi):
     """F(ξ) of a :class:`Contraction`."""
     if function.family == 0:
         return function.slope * xi + function.d

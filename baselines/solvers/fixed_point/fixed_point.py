@@ -155,7 +155,7 @@ def jacobian_bound(arm: Arm, turning: float) -> float:
 
 
 @kernel
-def iterate_rows(  # type: ignore[no-untyped-def]
+def iterate_rows(
     chain,
     kind,
     branch,
@@ -244,7 +244,7 @@ def iterate_rows(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _contract(function, a, h, q):  # type: ignore[no-untyped-def]
+def _contract(function, a, h, q):
     """Eq. 1; where h = 0 its limit, which is to stay."""
     norm = math.sqrt(dot(h, h))
     if norm == 0.0:
@@ -255,7 +255,7 @@ def _contract(function, a, h, q):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _add_transposed(jacobian, missing, h):  # type: ignore[no-untyped-def]
+def _add_transposed(jacobian, missing, h):
     """Adds Jᵀ (f - x) to h, with ``missing`` = x - f of shape (e,); the joints past J's columns have no part."""
     for i in range(jacobian.shape[0]):
         for j in range(jacobian.shape[1]):
@@ -263,7 +263,7 @@ def _add_transposed(jacobian, missing, h):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _keep_direction(h, previous):  # type: ignore[no-untyped-def]
+def _keep_direction(h, previous):
     """Khan 2020, eq. 2.8: turns h about where it points away from the one before, which it then replaces."""
     sign = -1.0 if dot(h, previous) < 0.0 else 1.0
     for j in range(h.shape[0]):

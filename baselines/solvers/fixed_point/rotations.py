@@ -16,7 +16,7 @@ PARALLEL = 1e-15
 
 
 @kernel
-def plane(source, goal, e_a, e_b):  # type: ignore[no-untyped-def]
+def plane(source, goal, e_a, e_b):
     """The plane and the angle of the rotation that turns one vector into the direction of another.
 
     Between opposite vectors the plane is not determined; one through the coordinate axis furthest from them is taken.
@@ -56,7 +56,7 @@ def plane(source, goal, e_a, e_b):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def turn(e_a, e_b, angle, vector):  # type: ignore[no-untyped-def]
+def turn(e_a, e_b, angle, vector):
     """Turns a vector in place by eq. 2.11; exactly that matrix also where e_a and e_b are no unit vectors.
 
     Args:
@@ -79,7 +79,7 @@ def turn(e_a, e_b, angle, vector):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def adaptive_deform(realized, deformed, desired, rule, extended, out):  # type: ignore[no-untyped-def]
+def adaptive_deform(realized, deformed, desired, rule, extended, out):
     """The function AdaptiveDeform of section 4.1: a share of the rotation from B to A, applied to C.
 
     The three vectors get one dimension more, in which they reach the common length R_a; the listing's ``B'*B`` is
@@ -116,7 +116,7 @@ def adaptive_deform(realized, deformed, desired, rule, extended, out):  # type: 
 
 
 @kernel
-def _make_orthogonal(vector, unit):  # type: ignore[no-untyped-def]
+def _make_orthogonal(vector, unit):
     """Takes from a vector its part along a unit vector and gives it length 1; returns both parts' lengths."""
     along = dot(vector, unit)
     for i in range(vector.shape[0]):
@@ -129,7 +129,7 @@ def _make_orthogonal(vector, unit):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _extend(vector, radius, out):  # type: ignore[no-untyped-def]
+def _extend(vector, radius, out):
     """Appends what makes the length R_a; False where the vector is too long for that."""
     n = vector.shape[0]
     left = radius * radius - dot(vector, vector)

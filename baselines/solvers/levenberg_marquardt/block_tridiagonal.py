@@ -15,7 +15,7 @@ from ikgym.jit import kernel
 
 
 @kernel
-def horizon_step(jacobians, differences, damping, gram, gains, x, out):  # type: ignore[no-untyped-def]
+def horizon_step(jacobians, differences, damping, gram, gains, x, out):
     """ΔQ = Dᵀ (D Dᵀ + λ M)⁻¹ d, by blocks from the end of the horizon to its beginning and back.
 
     With S_n = J_n J_nᵀ + 2λ I and the gain K_j = λ S_j⁻¹, the elimination is a Riccati recursion:

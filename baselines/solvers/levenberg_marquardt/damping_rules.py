@@ -93,7 +93,7 @@ RULES: Mapping[str, Rule] = MappingProxyType(
 
 
 @kernel
-def damping_now(law, error, condition, stepped):  # type: ignore[no-untyped-def]
+def damping_now(law, error, condition, stepped):
     """λ(k)_(i).
 
     Args:
@@ -110,7 +110,7 @@ def damping_now(law, error, condition, stepped):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def damping_next(law, damping, error, error_before):  # type: ignore[no-untyped-def]
+def damping_next(law, damping, error, error_before):
     """λ(k)_(i+1) of a stepped law (14), (18), (44); of others λ as it is.
 
     Args:
@@ -130,7 +130,7 @@ def damping_next(law, damping, error, error_before):  # type: ignore[no-untyped-
 
 
 @kernel
-def condition_number(jacobian, rank, columns, rotations):  # type: ignore[no-untyped-def]
+def condition_number(jacobian, rank, columns, rotations):
     """cond(J): the largest singular value over the ``rank``-th, infinite where that is 0.
 
     Args:
@@ -159,7 +159,7 @@ def condition_number(jacobian, rank, columns, rotations):  # type: ignore[no-unt
 
 
 @kernel
-def _interval(bounds, value):  # type: ignore[no-untyped-def]
+def _interval(bounds, value):
     """How many bounds a value has reached."""
     i = 0
     while i < bounds.shape[0] and value >= bounds[i]:

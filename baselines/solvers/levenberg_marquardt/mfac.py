@@ -94,7 +94,7 @@ class ModelFreeAdaptiveControl(DampedIteration):
 
 
 @kernel
-def iterate_rows(  # type: ignore[no-untyped-def]
+def iterate_rows(
     chain,
     kind,
     size,

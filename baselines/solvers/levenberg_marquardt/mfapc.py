@@ -145,7 +145,7 @@ class ModelFreeAdaptivePredictiveControl(DampedIteration):
 
 
 @kernel
-def iterate_horizon_rows(  # type: ignore[no-untyped-def]
+def iterate_horizon_rows(
     chain,
     kind,
     size,

@@ -12,7 +12,7 @@ GOES_ON = -1
 
 
 @kernel
-def stop_test(value, norm, tolerance, step, most):  # type: ignore[no-untyped-def]
+def stop_test(value, norm, tolerance, step, most):
     """Whether to stop before the next step.
 
     Args:
@@ -33,7 +33,7 @@ def stop_test(value, norm, tolerance, step, most):  # type: ignore[no-untyped-de
 
 
 @kernel
-def adapted(alpha, norm, last_norm, rule):  # type: ignore[no-untyped-def]
+def adapted(alpha, norm, last_norm, rule):
     """α for the next step: larger where the norm fell, smaller where it rose, within its bounds.
 
     Args:
@@ -53,7 +53,7 @@ def adapted(alpha, norm, last_norm, rule):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def settle(status, value, first_value, limit, rule, row, qdot, alpha):  # type: ignore[no-untyped-def]
+def settle(status, value, first_value, limit, rule, row, qdot, alpha):
     """Finds out a blow-up that looks like convergence, and stops the arm after any.
 
     A gradient of 0 beyond all limits, at a cost that has risen, is no minimum: the finite differences have drowned.

@@ -126,7 +126,7 @@ class RecedingHorizonGradient(SolverPolicy):
 
 
 @kernel
-def descend_rows(  # type: ignore[no-untyped-def]
+def descend_rows(
     chain,
     kind,
     cost,

@@ -13,7 +13,7 @@ from ikgym.kinematics import forward, forward_and_jacobian
 
 
 @kernel
-def horizon_cost(chain, kind, cost, dt, q, nominal, qdot):  # type: ignore[no-untyped-def]
+def horizon_cost(chain, kind, cost, dt, q, nominal, qdot):
     """Φ, the sum of the stage costs over the horizon.
 
     Args:
@@ -33,7 +33,7 @@ def horizon_cost(chain, kind, cost, dt, q, nominal, qdot):  # type: ignore[no-un
 
 
 @kernel
-def difference_gradient(chain, kind, cost, dt, q, nominal, qdot, delta, gradient):  # type: ignore[no-untyped-def]
+def difference_gradient(chain, kind, cost, dt, q, nominal, qdot, delta, gradient):
     """∂Φ/∂q̇ by forward differences of ``delta`` (Varga 2021, section IV), and Φ; arguments as above.
 
     Args:
@@ -72,7 +72,7 @@ def difference_gradient(chain, kind, cost, dt, q, nominal, qdot, delta, gradient
 
 
 @kernel
-def _roll(chain, kind, cost, dt, here, nominal, qdot, first, stages, scratch):  # type: ignore[no-untyped-def]
+def _roll(chain, kind, cost, dt, here, nominal, qdot, first, stages, scratch):
     """Goes from ``here`` through the stages from ``first`` on, and sums their costs, which ``stages`` receives."""
     rotation, position, pose, error = scratch
     total = 0.0
@@ -88,13 +88,13 @@ def _roll(chain, kind, cost, dt, here, nominal, qdot, first, stages, scratch):  
 
 
 @kernel
-def _scratch(kind, nominal):  # type: ignore[no-untyped-def]
+def _scratch(kind, nominal):
     m = nominal.shape[1]
     return np.empty((3, 3)), np.empty(3), np.empty(m), np.empty(6 if kind == task_kernels.POSE else m)
 
 
 @kernel
-def analytic_gradient(chain, kind, cost, dt, q, nominal, qdot, gradient):  # type: ignore[no-untyped-def]
+def analytic_gradient(chain, kind, cost, dt, q, nominal, qdot, gradient):
     """∂Φ/∂q̇ by the chain rule, and Φ; arguments as in :func:`difference_gradient`."""
     steps, n = qdot.shape
     rotation, position, geometric = np.empty((3, 3)), np.empty(3), np.empty((6, n))
@@ -119,7 +119,7 @@ def analytic_gradient(chain, kind, cost, dt, q, nominal, qdot, gradient):  # typ
 
 
 @kernel
-def analytic_state_gradient(chain, kind, cost, nominal, q, qdot, by_q, by_qdot):  # type: ignore[no-untyped-def]
+def analytic_state_gradient(chain, kind, cost, nominal, q, qdot, by_q, by_qdot):
     """∂Φ/∂q(2 … HL) and ∂Φ/∂q̇(1 … HL - 1) with states and velocities taken for independent, and Φ.
 
     Args:
@@ -148,7 +148,7 @@ def analytic_state_gradient(chain, kind, cost, nominal, q, qdot, by_q, by_qdot):
 
 
 @kernel
-def difference_state_gradient(chain, kind, cost, dt, nominal, q, qdot, delta, by_q, by_qdot):  # type: ignore[no-untyped-def]
+def difference_state_gradient(chain, kind, cost, dt, nominal, q, qdot, delta, by_q, by_qdot):
     """:func:`analytic_state_gradient` by forward differences: ``delta`` in q̇, Δt ``delta`` in q.
 
     With these two a difference by a velocity in :func:`difference_gradient` is the sum of the differences by that
@@ -179,14 +179,14 @@ def difference_state_gradient(chain, kind, cost, dt, nominal, q, qdot, delta, by
 
 
 @kernel
-def _gradient_scratch(kind, nominal, n):  # type: ignore[no-untyped-def]
+def _gradient_scratch(kind, nominal, n):
     _, _, pose, error = _scratch(kind, nominal)
     e = error.shape[0]
     return pose, error, np.empty(e), np.empty((e, n)), np.empty((e, n))
 
 
 @kernel
-def _tracking_gradient(kind, cost, nominal, rotation, position, geometric, gradient, scratch):  # type: ignore[no-untyped-def]
+def _tracking_gradient(kind, cost, nominal, rotation, position, geometric, gradient, scratch):
     """Φ^X of one grid point, and its derivative by the joint coordinates there, which ``gradient`` (n,) receives."""
     pose, error, slope, jacobian, error_jacobian = scratch
     task_kernels.coordinates(kind, rotation, position, pose)

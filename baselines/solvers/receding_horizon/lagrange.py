@@ -65,7 +65,7 @@ class RecedingHorizonLagrange(RecedingHorizonGradient):
 
 
 @kernel
-def reduce_rows(  # type: ignore[no-untyped-def]
+def reduce_rows(
     chain,
     kind,
     cost,
@@ -119,7 +119,7 @@ def reduce_rows(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def factorise(dt, diagonal, ratio):  # type: ignore[no-untyped-def]
+def factorise(dt, diagonal, ratio):
     """L D Lᵀ of Δt² A Aᵀ of one joint, which has 1 + Δt², then 2 + Δt² on its diagonal and −1 beside it.
 
     Args:
@@ -136,7 +136,7 @@ def factorise(dt, diagonal, ratio):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def reduce_gradient(dt, diagonal, ratio, multipliers, by_q, by_qdot):  # type: ignore[no-untyped-def]
+def reduce_gradient(dt, diagonal, ratio, multipliers, by_q, by_qdot):
     """Turns ∇Φ into the reduced gradient, along which no constraint changes.
 
     Args:

@@ -95,7 +95,7 @@ class ResolvedRate(SolverPolicy, abc.ABC):
 
 
 @kernel
-def linearise(chain, kind, gain, q, pose, target, present, jacobian, shift):  # type: ignore[no-untyped-def]
+def linearise(chain, kind, gain, q, pose, target, present, jacobian, shift):
     """Task Jacobians and the task shifts asked for, row by row.
 
     Args:
@@ -119,7 +119,7 @@ def linearise(chain, kind, gain, q, pose, target, present, jacobian, shift):  # 
 
 
 @kernel
-def task_shift(kind, gain, pose, target, present, error, shift):  # type: ignore[no-untyped-def]
+def task_shift(kind, gain, pose, target, present, error, shift):
     """Δx = (X^N(k+1) - X^N(k)) + gain (X^N(k) - x(k)) of one row; ``error`` (e,) receives the last difference."""
     task_kernels.error(kind, target, present, shift)
     task_kernels.error(kind, present, pose, error)

@@ -48,7 +48,7 @@ class DampedLeastSquares(ResolvedRate):
 
 
 @kernel
-def damped_rows(jacobian, shift, damping, out):  # type: ignore[no-untyped-def]
+def damped_rows(jacobian, shift, damping, out):
     """Δq = Jᵀ (J Jᵀ + λ I)⁻¹ Δx, row by row: shapes (B, e, n), (B, e), a number, (B, n)."""
     e = jacobian.shape[1]
     gram, rhs = np.empty((e, e)), np.empty(e)

@@ -64,7 +64,7 @@ class GramSchmidt(ResolvedRate):
 
 
 @kernel
-def orthonormal_rows(jacobian, shift, truncation, full_rank, out, deficient):  # type: ignore[no-untyped-def]
+def orthonormal_rows(jacobian, shift, truncation, full_rank, out, deficient):
     """Δq along the orthonormalised rows of J, row by row of the batch.
 
     Args:
@@ -114,7 +114,7 @@ def orthonormal_rows(jacobian, shift, truncation, full_rank, out, deficient):  #
 
 
 @kernel
-def _take_off(rest, wanted, a, unit, given):  # type: ignore[no-untyped-def]
+def _take_off(rest, wanted, a, unit, given):
     """Takes the part along a unit vector off a row, and what that part makes off the row's demand."""
     part = dot(rest[a], unit)
     for k in range(unit.shape[0]):

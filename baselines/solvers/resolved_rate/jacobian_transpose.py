@@ -57,7 +57,7 @@ class JacobianTranspose(ResolvedRate):
 
 
 @kernel
-def transpose_rows(jacobian, shift, tolerance, out, stuck):  # type: ignore[no-untyped-def]
+def transpose_rows(jacobian, shift, tolerance, out, stuck):
     """Δq = α Jᵀ Δx row by row, and whether Jᵀ Δx is 0: shapes (B, e, n), (B, e), a number, (B, n), (B,)."""
     e, n = jacobian.shape[1], jacobian.shape[2]
     for row in range(jacobian.shape[0]):

@@ -51,7 +51,7 @@ class MoorePenrose(ResolvedRate):
 
 
 @kernel
-def pseudoinverse_rows(jacobian, shift, tolerance, full_rank, out, deficient):  # type: ignore[no-untyped-def]
+def pseudoinverse_rows(jacobian, shift, tolerance, full_rank, out, deficient):
     """Δq = J⁺ Δx by singular values, row by row.
 
     Args:

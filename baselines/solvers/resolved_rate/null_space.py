@@ -134,7 +134,7 @@ def _centre(model: Arm) -> tuple[FloatArray, FloatArray]:
 
 
 @kernel
-def task_rows(jacobian, velocity, out):  # type: ignore[no-untyped-def]
+def task_rows(jacobian, velocity, out):
     """J q̇ row by row: shapes (B, e, n), (B, n), (B, e)."""
     for row in range(jacobian.shape[0]):
         for a in range(jacobian.shape[1]):
@@ -145,7 +145,7 @@ def task_rows(jacobian, velocity, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def manipulability_rows(chain, q, lines, out):  # type: ignore[no-untyped-def]
+def manipulability_rows(chain, q, lines, out):
     """∂w/∂q row by row, w = √det(J Jᵀ) of the first ``lines`` (3 or 6) rows of the geometric Jacobian.
 
     ∂w/∂q_i = w tr(∂J/∂q_i J⁺), and the columns of J turn with the joints before them and are led by those behind:
@@ -190,7 +190,7 @@ def manipulability_rows(chain, q, lines, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _cross(x, y, out):  # type: ignore[no-untyped-def]
+def _cross(x, y, out):
     out[0] = x[1] * y[2] - x[2] * y[1]
     out[1] = x[2] * y[0] - x[0] * y[2]
     out[2] = x[0] * y[1] - x[1] * y[0]

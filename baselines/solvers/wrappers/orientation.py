@@ -60,7 +60,7 @@ def unfold(problem: Problem, batch: Batch, kept: Memory) -> tuple[Batch, Memory]
 
 
 @kernel
-def unfold_rows(chain, q, pose, nominal, known, last, whole_pose, whole_nominal):  # type: ignore[no-untyped-def]
+def unfold_rows(chain, q, pose, nominal, known, last, whole_pose, whole_nominal):
     """See :func:`unfold`, row by row.
 
     Args:
@@ -86,7 +86,7 @@ def unfold_rows(chain, q, pose, nominal, known, last, whole_pose, whole_nominal)
 
 
 @inlined
-def unfold_one(coordinates, expected, frame):  # type: ignore[no-untyped-def]
+def unfold_one(coordinates, expected, frame):
     """The frame of skew coordinates, the one of two whose cos θ has the sign of ``expected``: shapes (6,), (12,).
 
     Returns:

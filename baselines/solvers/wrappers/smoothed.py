@@ -141,7 +141,7 @@ class Smoothed(SolverPolicy):
 
 
 @kernel
-def pose_rows(chain, kind, q, out):  # type: ignore[no-untyped-def]
+def pose_rows(chain, kind, q, out):
     """Task coordinates of a chain, row by row: ``q`` (B, n), ``out`` (B, m)."""
     rotation, position = np.empty((3, 3)), np.empty(3)
     for row in range(q.shape[0]):

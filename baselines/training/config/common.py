@@ -21,7 +21,7 @@ Reward = Literal["cost", "log"]
 Algorithm = Literal["ppo", "sac", "td3"]
 
 #: Fields that a model of ``init`` has settled.
-SHAPE = ("over", "offsets", "reach", "null_space", "hidden", "activation")
+SHAPE = ("base_policy", "offsets", "action_scale", "null_space", "hidden", "activation")
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -43,13 +43,13 @@ class Config(Frozen):
     task: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
     """Task coordinates to train on, if not those of the scenario. Agents that know whole poses (pose) play scenarios
     that show skew coordinates, too, and better: those are folded, and singular where they are."""
-    over: Annotated[str | None, tyro.conf.arg(metavar="POLICY")] = None
+    base_policy: Annotated[str | None, tyro.conf.arg(metavar="POLICY")] = None
     """Policy under the agent, as NAME or NAME:PARAMETER=VALUE,…: the agent learns a correction of its actions, and an
     answer of 0 is that policy. The agent stands alone if left out."""
     offsets: Annotated[tuple[int, ...], tyro.conf.arg(metavar="N …")] = Processing.offsets
     """Steps ahead at which the agent sees the nominal coordinates, rising. Those that the policy under it must see, 1
     to its preview, have to come first."""
-    reach: Annotated[float, tyro.conf.arg(metavar="X")] = Processing.reach
+    action_scale: Annotated[float, tyro.conf.arg(metavar="X")] = Processing.action_scale
     """What an answer of 1 means, as a multiple of the speed of what is to come."""
     null_space: Annotated[float | None, tyro.conf.arg(metavar="λ")] = None
     """Lets answers move the arm without moving its tool, but for directions that are nearly singular: λ is the
@@ -69,7 +69,7 @@ class Config(Frozen):
     """Keep the agent of the best evaluation (by the geometric mean of the costs), not the last one."""
     init: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None
     """A model.zip of an earlier run to begin from: its actor, and its critics where the algorithm is the same. What
-    the agent sees and the shape of its network come with it: over, offsets, reach,
+    the agent sees and the shape of its network come with it: base_policy, offsets, action_scale,
     null_space, hidden and activation."""
 
     def __post_init__(self) -> None:
@@ -90,13 +90,13 @@ class Config(Frozen):
             self._settle("init", pathlib.Path(self.init))
         processing = self.processing
         self._settle("offsets", processing.offsets)
-        self._settle("reach", processing.reach)
+        self._settle("action_scale", processing.action_scale)
         self._settle("null_space", processing.null_space)
 
     @property
     def processing(self) -> Processing:
         """What the agent sees, and what its answers mean."""
-        return Processing(self.offsets, self.reach, self.over, self.null_space)
+        return Processing(self.offsets, self.action_scale, self.base_policy, self.null_space)
 
     def make_scenario(self) -> Scenario:
         """The scenario, with the task and cut to the steps asked for.

@@ -49,7 +49,7 @@ class ProcessedVecEnv(VecEnvWrapper):
     | `info["episode"]["r"]` | the true return, −cost of the episode, whatever the reward |
 
     >>> from stable_baselines3 import PPO
-    >>> env = ProcessedVecEnv(16, ikgym.scenarios.get("varga7-random"), Processing(over="dls", reach=0.5), "log")
+    >>> env = ProcessedVecEnv(16, ikgym.scenarios.get("varga7-random"), Processing(base_policy="dls", action_scale=0.5), "log")
     >>> model = PPO("MlpPolicy", env, n_steps=1000, batch_size=1000)
 
     Args:

@@ -148,7 +148,7 @@ class DifferentiableArm:
         own = answer.double().clamp(-1.0, 1.0)
         if processing.null_space is not None:
             own = _Projected.apply(q, own, self.scenario.model, self.scenario.task, processing.null_space)  # type: ignore[no-untyped-call]
-        own = processing.reach * speed * own / self._limit
+        own = processing.action_scale * speed * own / self._limit
         return own if base is None else base + own
 
 
@@ -281,7 +281,7 @@ def _powers(x: Tensor, inside: float, outside: float) -> Tensor:
 
 
 @kernel
-def error_rows(chain, kind, q, nominal, error, jacobian):  # type: ignore[no-untyped-def]
+def error_rows(chain, kind, q, nominal, error, jacobian):
     """Errors of the task coordinates and their derivatives, row by row.
 
     Args:

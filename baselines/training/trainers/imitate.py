@@ -120,7 +120,7 @@ class ImitateTrainer(DirectTrainer):
         scratch = np.empty((*nominal.shape[:2], problem.task.error_size))
         speed = speed_rows(problem.task.kind, problem.dt, np.array(processing.offsets), nominal, scratch)
         missing = (right if base is None else right - base) * problem.velocity_limit
-        answer: npt.NDArray[np.float64] = self._through(q, missing) / (processing.reach * speed[:, None])
+        answer: npt.NDArray[np.float64] = self._through(q, missing) / (processing.action_scale * speed[:, None])
         return answer.clip(-1.0, 1.0).astype(np.float32)
 
     def _through(self, q: FloatArray, velocity: FloatArray) -> FloatArray:

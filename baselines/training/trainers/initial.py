@@ -45,9 +45,9 @@ def settle(config: Config, given: Collection[str]) -> Config:
         return config
     file, network, processing = _read(config.init, Problem.of(config.make_scenario()))
     brought: dict[str, Any] = {
-        "over": processing.over,
+        "base_policy": processing.base_policy,
         "offsets": processing.offsets,
-        "reach": processing.reach,
+        "action_scale": processing.action_scale,
         "null_space": processing.null_space,
         "hidden": tuple(network.sizes[1:-1]),
         "activation": network.activation,

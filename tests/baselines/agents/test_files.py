@@ -21,7 +21,7 @@ from ikgym.exceptions import InvalidInputError
 from tests.baselines.random_agents import network, write_agent
 
 SCENARIO = ikgym.scenarios.get("varga7-fast")
-PROCESSING = Processing(offsets=(1, 2, 5), over="dls:damping=1e-2")
+PROCESSING = Processing(offsets=(1, 2, 5), base_policy="dls:damping=1e-2")
 SIZES = (PROCESSING.size(Problem.of(SCENARIO)), 12, 7)
 
 
@@ -57,7 +57,7 @@ def test_same_agents_make_same_files_and_others_have_another_hash(file, tmp_path
         save_agent(again, network(SIZES, "elu", "tanh", seed=1), PROCESSING, SCENARIO),
         save_agent(again, network(SIZES, "elu", "tanh"), PROCESSING, SCENARIO),
         save_agent(again, network(SIZES, "relu", "tanh"), PROCESSING, SCENARIO),
-        save_agent(again, network(SIZES, "elu", "tanh"), PROCESSING.replace(reach=1.0), SCENARIO),
+        save_agent(again, network(SIZES, "elu", "tanh"), PROCESSING.replace(action_scale=1.0), SCENARIO),
     }
     assert len(others - {digest}) == 4
     assert list(tmp_path.iterdir()) == [again, file] or list(tmp_path.iterdir()) == [file, again]
@@ -124,7 +124,7 @@ def forged(file, spoil):
         (lambda t, a: a["processing"].update(future=1), "no field of the processing 'future'"),
         (lambda t, a: a["processing"].update(offsets=5), "no agent that this version can read"),
         (lambda t, a: a["processing"].update(offsets=[2, 1]), "offsets: expected"),
-        (lambda t, a: a["processing"].update(over=5), "over: expected"),
+        (lambda t, a: a["processing"].update(base_policy=5), "base_policy: expected"),
         (lambda t, a: a.update(processing=3), "no agent that this version can read"),
         (lambda t, a: a.update(scenario="x"), "no agent that this version can read"),
         (lambda t, a: a.update(joints="7"), "names as texts and sizes as whole numbers"),

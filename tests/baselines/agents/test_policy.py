@@ -39,8 +39,8 @@ RANDOM = ikgym.scenarios.get("varga7-random").replace(steps=STEPS)
 # Policies under an agent: none; with memory; that sees two steps; that counts in its memory; with much memory; over
 # another one.
 UNDER = [None, "dls:gain=0.5", "rhc_gradient", "mfac", "rhc:horizon=3,iterations=1", "smoothed:policy=mfac"]
-KINDS = [*((over, None) for over in UNDER), ("dls", 1e-2)]
-contract = pytest.mark.parametrize(("over", "null_space"), KINDS)
+KINDS = [*((base_policy, None) for base_policy in UNDER), ("dls", 1e-2)]
+contract = pytest.mark.parametrize(("base_policy", "null_space"), KINDS)
 
 
 @pytest.fixture
@@ -48,8 +48,10 @@ def file(tmp_path):
     return write_agent(tmp_path / "mine.safetensors", FAST, "dls:damping=1e-2")
 
 
-def agent_for(tmp_path, scenario, over=None, **options):
-    return baselines.make("agent", scenario, path=write_agent(tmp_path / "a.safetensors", scenario, over, **options))
+def agent_for(tmp_path, scenario, base_policy=None, **options):
+    return baselines.make(
+        "agent", scenario, path=write_agent(tmp_path / "a.safetensors", scenario, base_policy, **options)
+    )
 
 
 def observations(scenario, preview, rows, seed=0):
@@ -68,9 +70,9 @@ def row(observation, i):
 
 class TestContract:
     @contract
-    def test_batch_equals_single_calls_and_memory_goes_by_rows(self, tmp_path, over, null_space):
+    def test_batch_equals_single_calls_and_memory_goes_by_rows(self, tmp_path, base_policy, null_space):
         for scenario in (RANDOM, ikgym.scenarios.get("khan8-q7q8").replace(steps=STEPS)):
-            policy = agent_for(tmp_path, scenario, over, null_space=null_space)
+            policy = agent_for(tmp_path, scenario, base_policy, null_space=null_space)
             states, batched = [None] * 3, None
             for k, observation in enumerate(observations(scenario, policy.preview, 3)):
                 start = np.array([k == 0, k % 2 == 0, k in (0, 2)])
@@ -82,8 +84,8 @@ class TestContract:
                     assert all(identical(a[0], b[i]) for a, b in zip(states[i], batched, strict=True))
 
     @contract
-    def test_rows_that_are_shared_out_to_threads_are_the_same(self, monkeypatch, tmp_path, over, null_space):
-        policy = agent_for(tmp_path, RANDOM, over, null_space=null_space)
+    def test_rows_that_are_shared_out_to_threads_are_the_same(self, monkeypatch, tmp_path, base_policy, null_space):
+        policy = agent_for(tmp_path, RANDOM, base_policy, null_space=null_space)
         threads, solve = set(), Agent.solve
 
         def watched(self, batch, memory):
@@ -102,8 +104,8 @@ class TestContract:
         assert len(threads) > 1
 
     @contract
-    def test_actions_are_in_the_box_and_nothing_is_changed(self, tmp_path, over, null_space):
-        policy = agent_for(tmp_path, FAST, over, null_space=null_space)
+    def test_actions_are_in_the_box_and_nothing_is_changed(self, tmp_path, base_policy, null_space):
+        policy = agent_for(tmp_path, FAST, base_policy, null_space=null_space)
         space, state = ikgym.RedundantIKEnv(FAST).action_space, None
         for observation in observations(FAST, policy.preview, 1):
             before = {key: value.copy() for key, value in observation.items()}
@@ -149,12 +151,12 @@ class TestContract:
 
 
 class TestUnder:
-    @pytest.mark.parametrize("over", UNDER[1:])
-    def test_an_answer_of_zero_is_the_policy_under_it(self, tmp_path, over):
+    @pytest.mark.parametrize("base_policy", UNDER[1:])
+    def test_an_answer_of_zero_is_the_policy_under_it(self, tmp_path, base_policy):
         noisy = ikgym.Disturbance(bias=0.01, noise=0.1)
         scenario = RANDOM.replace(steps=200, disturbance=noisy)
-        policy = agent_for(tmp_path, scenario, over, zero=True)
-        name, parameters = parse_policy(over)
+        policy = agent_for(tmp_path, scenario, base_policy, zero=True)
+        name, parameters = parse_policy(base_policy)
         under = baselines.make(name, scenario, **parameters)
         ours, theirs = rollout(scenario, policy, 3), rollout(scenario, under, 3)
         for field in dataclasses.fields(theirs):
@@ -180,9 +182,9 @@ class TestUnder:
             return [int(c[0]) for c in policy.operations(policy.predict(next(observations(FAST, OFFSETS, 1)))[1])]
 
         assert operations() == [0, 0, 0, 1]
-        assert operations(over="dls") == [0, 1, 1, 1]
+        assert operations(base_policy="dls") == [0, 1, 1, 1]
         assert operations(null_space=1e-2) == [0, 1, 1, 1]
-        assert operations(over="dls", null_space=1e-2) == [0, 2, 2, 1]
+        assert operations(base_policy="dls", null_space=1e-2) == [0, 2, 2, 1]
 
     def test_the_worse_status_counts(self, tmp_path):
         straight = ikgym.scenarios.get("varga7-fast").replace(start=np.zeros(7), steps=STEPS)
@@ -197,23 +199,26 @@ class TestUnder:
         assert np.abs(action).max() == 1.0
 
     @pytest.mark.parametrize(
-        ("over", "message"),
+        ("base_policy", "message"),
         [
             ("oracle", "got the reference 'oracle'"),
-            ("agent:x.safetensors", "over: expected a policy that is no agent and is not made from one"),
+            ("agent:x.safetensors", "base_policy: expected a policy that is no agent and is not made from one"),
             ("smoothed:policy=agent,options={'path': 'x.zip'}", "no agent and is not made from one"),
             ("smoothed:policy=oracle", "got the reference 'oracle'"),
             ("dls:damping=-1", "damping: expected"),
         ],
     )
-    def test_what_cannot_be_under_an_agent(self, tmp_path, over, message):
+    def test_what_cannot_be_under_an_agent(self, tmp_path, base_policy, message):
         with pytest.raises(InvalidInputError, match=rf"Agent .*a\.safetensors: .*{message}"):
-            agent_for(tmp_path, FAST, over)
+            agent_for(tmp_path, FAST, base_policy)
 
     def test_unknown_names_are_the_fault_of_the_file(self, tmp_path):
-        for over, message in {"dlss": "no policy 'dlss'", "dls:dampng=1": "no parameter of dls 'dampng'"}.items():
+        for base_policy, message in {
+            "dlss": "no policy 'dlss'",
+            "dls:dampng=1": "no parameter of dls 'dampng'",
+        }.items():
             with pytest.raises(ResultsError, match=rf"Agent .*a\.safetensors cannot be used: .*{message}"):
-                agent_for(tmp_path, FAST, over)
+                agent_for(tmp_path, FAST, base_policy)
 
     def test_smoothed_over_an_agent(self, tmp_path):
         path = write_agent(tmp_path / "a.safetensors", FAST, "dls")
@@ -323,9 +328,9 @@ class TestNames:
 def ship(tmp_path, monkeypatch):
     """Adds agents to those of the package."""
 
-    def add(*names, over="dls:damping=1e-2"):
+    def add(*names, base_policy="dls:damping=1e-2"):
         for number, name in enumerate(names):
-            write_agent(tmp_path / f"{name}.safetensors", FAST, over, seed=number, training={"method": "ppo"})
+            write_agent(tmp_path / f"{name}.safetensors", FAST, base_policy, seed=number, training={"method": "ppo"})
         classes = shipped.shipped_agents(tmp_path)
         monkeypatch.setattr(registry, "POLICIES", {**registry.POLICIES, **classes})
         return classes
@@ -352,7 +357,7 @@ class TestShipped:
         assert classes["agent_one"].__name__ == "AgentOne"
 
     def test_without_a_policy_under_it(self, ship):
-        assert ship("solo", over=None)["solo"].__doc__.startswith("Learned agent that stands alone, trained on")
+        assert ship("solo", base_policy=None)["solo"].__doc__.startswith("Learned agent that stands alone, trained on")
 
     def test_it_is_part_of_all_where_it_suits(self, ship):
         ship("agent_one")

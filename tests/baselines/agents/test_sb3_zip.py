@@ -36,7 +36,7 @@ from tests.baselines.random_agents import OFFSETS, write_agent
 from tests.comparison import identical
 
 SCENARIO = ikgym.scenarios.get("varga7-fast").replace(steps=6)
-PROCESSING = Processing(offsets=OFFSETS, over="dls:damping=1e-2")
+PROCESSING = Processing(offsets=OFFSETS, base_policy="dls:damping=1e-2")
 ALGORITHMS = {"ppo": PPO, "a2c": A2C, "sac": SAC, "td3": TD3, "ddpg": DDPG}
 ACTIVATIONS = {"relu": torch.nn.ReLU, "tanh": torch.nn.Tanh, "silu": torch.nn.SiLU, "elu": torch.nn.ELU}
 PREVIEW = 3
@@ -404,19 +404,19 @@ class TestMalice:
         assert mark.exists()
 
     @pytest.mark.parametrize(
-        "over",
+        "base_policy",
         [
             "agent:path={zip},trust=True",
             "smoothed:policy=agent,options={{'path': '{zip}', 'trust': True}}",
             "smoothed:policy=smoothed,options={{'policy': 'agent', 'options': {{'path': '{zip}', 'trust': True}}}}",
         ],
     )
-    def test_no_agent_can_call_for_another_that_is_trusted(self, file, mark, tmp_path, over):
+    def test_no_agent_can_call_for_another_that_is_trusted(self, file, mark, tmp_path, base_policy):
         model_of(env=environment()).save(file)
         with zipfile.ZipFile(file) as archive:
             data = archive.read("data")
         rewritten(file, data=serialised(Bomb(mark), data))
-        path = write_agent(tmp_path / "a.safetensors", SCENARIO, over.format(zip=file))
+        path = write_agent(tmp_path / "a.safetensors", SCENARIO, base_policy.format(zip=file))
         with pytest.raises(InvalidInputError, match="expected a policy that is no agent and is not made from one"):
             baselines.make("agent", SCENARIO, path=path)
         assert not mark.exists()

@@ -44,10 +44,10 @@ TEST_SEEDS = test_sets.SETS[places.MAIN].seeds
 KNOWN = [best_known.cost(scenarios.get(places.MAIN), seed) for seed in TEST_SEEDS[:2]]
 
 
-def fake(name="fake", dampings=(1e-2, 2e-2, 3e-2), *, over=None, method="ppo"):
+def fake(name="fake", dampings=(1e-2, 2e-2, 3e-2), *, base_policy=None, method="ppo"):
     """An agent whose training seeds are solvers."""
     count = len(dampings)
-    training = Training(method, over, tuple(1000 * (k + 1) for k in range(count)), (1.5,) * count)
+    training = Training(method, base_policy, tuple(1000 * (k + 1) for k in range(count)), (1.5,) * count)
     return Entry(name, tuple(("dls", {"damping": d}) for d in dampings), tuple(range(count)), training=training)
 
 
@@ -58,9 +58,9 @@ def line(name="dls", cost_ratios=((2.0, 8.0),), *, preview=1, seeds=(), error=0.
     return Line(name, dict(settings), preview, seeds, cost, errors, 1, 10.0, 20.0, 30.0, training)
 
 
-def learned(name, cost_ratios, *, over=None, **others):
+def learned(name, cost_ratios, *, base_policy=None, **others):
     count = len(cost_ratios)
-    training = Training("ppo", over, (1_000_000,) * count, (12.0,) * count)
+    training = Training("ppo", base_policy, (1_000_000,) * count, (12.0,) * count)
     return line(name, cost_ratios, seeds=tuple(range(count)), preview=240, training=training, **others)
 
 
@@ -219,18 +219,18 @@ class TestEntries:
             agents([f"mine={tmp_path}"])
 
     def test_seeds_of_different_trainings(self, tmp_path):
-        write_runs(tmp_path, 1, over="dls")
+        write_runs(tmp_path, 1, base_policy="dls")
         write_runs(tmp_path, 1, first=1)
         with pytest.raises(ResultsError, match="expected seeds of one training"):
             agents([f"mine={tmp_path}"])
 
 
-def write_runs(folder, seeds, *, first=0, method="ppo", over=None):
+def write_runs(folder, seeds, *, first=0, method="ppo", base_policy=None):
     for seed in range(first, first + seeds):
         run = {
             "method": method,
             "training": {"steps": 100 + seed, "core_minutes": 0.5},
-            "processing": {"over": over},
+            "processing": {"base_policy": base_policy},
         }
         (folder / f"seed-{seed}").mkdir(parents=True)
         (folder / f"seed-{seed}" / "run.json").write_text(json.dumps(run))
@@ -238,7 +238,11 @@ def write_runs(folder, seeds, *, first=0, method="ppo", over=None):
 
 def write_agent(folder, scenario, seed):
     """An agent that adds next to nothing to damped least squares."""
-    rng, where, processing = np.random.default_rng(seed), scenarios.get(scenario), Processing(over="dls", reach=1e-4)
+    rng, where, processing = (
+        np.random.default_rng(seed),
+        scenarios.get(scenario),
+        Processing(base_policy="dls", action_scale=1e-4),
+    )
     sizes = ((where.joints, processing.size(Problem.of(where))),)
     weights = tuple(rng.normal(size=size).astype(np.float32) for size in sizes)
     network = Network(weights, (np.zeros(where.joints, dtype=np.float32),))
@@ -330,8 +334,8 @@ class TestMeasure:
         assert found.lines[0].cost[0][0] == pytest.approx(row.total_cost, rel=1e-6)
 
     def test_agents_from_their_files(self, tmp_path):
-        write_runs(tmp_path / "mine", 2, over="dls")
-        write_runs(tmp_path / "other", 1, over="dls")
+        write_runs(tmp_path / "mine", 2, base_policy="dls")
+        write_runs(tmp_path / "other", 1, base_policy="dls")
         for seed in range(2):
             write_agent(tmp_path / "mine" / f"seed-{seed}", "varga7-random", seed)
         write_agent(tmp_path / "other" / "seed-0", "zhang6-lspb", 0)
@@ -357,7 +361,7 @@ class TestBoard:
         assert line().kind == line(preview=2).kind == NEAR
         assert line(preview=3).kind == FAR
         assert learned("x", ((1.0, 1.0),)).kind == AGENT
-        assert learned("x", ((1.0, 1.0),), over="dls").kind == RESIDUAL
+        assert learned("x", ((1.0, 1.0),), base_policy="dls").kind == RESIDUAL
 
     def test_shares(self):
         one = dataclasses.replace(line(), error=((0.0010, 0.0011), (0.0101, 0.051)), cost=((1.0, 1.0), (1.0, 1.0)))
@@ -389,7 +393,7 @@ class TestClaims:
             line("dls", ((4.0, 4.0),)),
             line("mfac", ((9.0, 4.0),)),
             line("rhc:horizon=100", ((1.0, 1.0),), preview=99),
-            learned("residual", ((2.0, 2.0),) * 5, over="dls"),
+            learned("residual", ((2.0, 2.0),) * 5, base_policy="dls"),
             learned("PPO", ((3.0, 3.0),) * 5),
             learned("lucky", ((1.5, 1.5),)),
         )
@@ -441,7 +445,7 @@ class TestPage:
                 line("dls", ((2.0, 2.0),), settings={"gain": 0.5}),
                 line("rhc_foresight", ((1.0, 1.0), (1.0, 1.21)), preview=1500, seeds=(0, 1)),
                 learned("PPO", ((3.0, 12.0),) * 5, error=0.06),
-                learned("few", ((1.1, 1.1),) * 2, over="dls"),
+                learned("few", ((1.1, 1.1),) * 2, base_policy="dls"),
             ),
             place,
         )
@@ -602,7 +606,7 @@ class TestCommandLine:
     def test_plays_writes_and_draws_up_again(self, tmp_path, capsys, monkeypatch):
         monkeypatch.setattr(command, "solvers", lambda *_: (*FEW[1:3], dataclasses.replace(FEW[3])))
         monkeypatch.setattr(entries, "policy_of", lambda folder: ("dls", {"damping": 10.0 ** -int(folder.name[5:])}))
-        write_runs(tmp_path / "ppo", 5, over="dls")
+        write_runs(tmp_path / "ppo", 5, base_policy="dls")
         file = tmp_path / "page" / "leaderboard.md"
         arguments = ["--agents", f"PPO from scratch={tmp_path / 'ppo'}", "--episodes", "1"]
         arguments += ["--out", str(tmp_path / "out"), "--write", str(file)]

@@ -23,7 +23,7 @@ TINY: dict[str, Any] = {
     "batch_size": 20,
 }
 #: Random episodes of seven joints, over a policy with a memory.
-OVER: dict[str, Any] = {**TINY, "scenario": "varga7-random", "over": "mfac", "reach": 0.5}
+OVER: dict[str, Any] = {**TINY, "scenario": "varga7-random", "base_policy": "mfac", "action_scale": 0.5}
 
 
 #: What else makes a run of a method short.

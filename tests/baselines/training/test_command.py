@@ -83,9 +83,12 @@ def test_repeat(several, tmp_path, capsys):
     ("arguments", "message"),
     [
         (["ppo", "--preset", "smok"], "There is no preset 'smok'. Did you mean 'smoke'?"),
-        (["ppo", *TINY, "--over", "dlss"], "There is no policy 'dlss'. Did you mean 'dls'?"),
-        (["ppo", *TINY, "--over", "oracle"], "got the reference 'oracle'"),
-        (["ppo", *TINY, "--over", "dls:dampin=1"], "There is no parameter of dls 'dampin'. Did you mean 'damping'?"),
+        (["ppo", *TINY, "--base-policy", "dlss"], "There is no policy 'dlss'. Did you mean 'dls'?"),
+        (["ppo", *TINY, "--base-policy", "oracle"], "got the reference 'oracle'"),
+        (
+            ["ppo", *TINY, "--base-policy", "dls:dampin=1"],
+            "There is no parameter of dls 'dampin'. Did you mean 'damping'?",
+        ),
         (["ppo", *TINY, "--scenario", "varga"], "There is no scenario 'varga'"),
         (["ppo", *TINY, "--workers", "0"], "workers: expected a whole number of at least 1, got 0"),
         (["ppo", *TINY, "--seeds", "-1"], "seeds: expected a whole number of at least 0, got -1"),
@@ -135,9 +138,9 @@ def test_the_command_line_goes_before_the_preset(tmp_path):
     file = tmp_path / "mine.toml"
     file.write_text("reach = 0.25\nsegments = 7\n")
     asked, given = parse(["ppo", "--preset", str(file), "--segments", "9", "--null-space", "0.1", "--out", "x"])
-    assert asked.config == PPO(reach=0.25, segments=9, null_space=0.1)
-    assert given == {"reach", "segments", "null_space"}
-    assert parse(["ppo", f"--preset={file}", "--hidden=3", "--out", "x"])[1] == {"reach", "segments", "hidden"}
+    assert asked.config == PPO(action_scale=0.25, segments=9, null_space=0.1)
+    assert given == {"action_scale", "segments", "null_space"}
+    assert parse(["ppo", f"--preset={file}", "--hidden=3", "--out", "x"])[1] == {"action_scale", "segments", "hidden"}
     assert parse(["td3", "--out", "x"])[1] == frozenset()
 
 

@@ -16,7 +16,7 @@ KINDS = [method.config for method in METHODS.values()]
 
 @pytest.mark.parametrize("kind", KINDS, ids=METHODS)
 def test_json_holds_all_of_it(kind):
-    config = kind(hidden=(3, 4), offsets=(1, 5), over="dls")
+    config = kind(hidden=(3, 4), offsets=(1, 5), base_policy="dls")
     values = json.loads(json.dumps(config.to_json()))
     assert kind.from_json(values) == config
     assert differences(values, config.to_json()) == []
@@ -33,7 +33,7 @@ def test_json_holds_all_of_it(kind):
         (PPO, {"hidden": 64}, InvalidInputError, "hidden: expected whole numbers, got 64"),
         (PPO, {"hidden": [8, 0]}, InvalidInputError, "hidden: expected a whole number of at least 1, got 0"),
         (PPO, {"offsets": [2, 1]}, InvalidInputError, "offsets: expected"),
-        (PPO, {"reach": 0}, InvalidInputError, "reach: expected"),
+        (PPO, {"action_scale": 0}, InvalidInputError, "action_scale: expected"),
         (PPO, {"segments": 0}, InvalidInputError, "segments: expected"),
         (PPO, {"steps": 0}, InvalidInputError, "steps: expected"),
         (PPO, {"keep_best": "yes"}, InvalidInputError, "keep_best: expected true or false"),

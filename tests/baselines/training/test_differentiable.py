@@ -107,8 +107,8 @@ def test_features_and_actions_are_those_of_the_processing(name, null_space):
     base = rng.uniform(-0.2, 0.2, q.shape)
     answer = rng.normal(size=q.shape).astype(np.float32)
     batch = batch_of(scenario, q, qdot, shown, remaining)
-    for over, under in ((None, None), ("dls", base)):
-        processing = Processing(OFFSETS, 2.0, over, null_space)
+    for base_policy, under in ((None, None), ("dls", base)):
+        processing = Processing(OFFSETS, 2.0, base_policy, null_space)
         tensor = None if under is None else torch.from_numpy(under)
         features, speed = arm.features(processing, q, qdot, shown, remaining, tensor)
         np.testing.assert_allclose(features.detach().numpy(), processing.features(problem, batch, under), atol=2e-6)

@@ -17,11 +17,11 @@ from ikgym.exceptions import InvalidInputError, UnknownNameError
 from tests.baselines.training.small import TINY
 
 SMALL = {name: TINY[name] for name in ("scenario", "steps", "hidden", "offsets", "segments", "envs")}
-OVER = {**SMALL, "scenario": "varga7-random", "over": "dls", "null_space": 1e-2}
+OVER = {**SMALL, "scenario": "varga7-random", "base_policy": "dls", "null_space": 1e-2}
 CONFIGS = {
     "apg": APG(**SMALL, window=7, windows=4),
     "apg over dls": APG(**OVER, window=7, windows=4, algorithm="td3"),
-    "apg, whole poses": APG(**{**OVER, "over": None}, task="pose", window=30, windows=1, algorithm="sac"),
+    "apg, whole poses": APG(**{**OVER, "base_policy": None}, task="pose", window=30, windows=1, algorithm="sac"),
     "imitate": Imitate(**SMALL, expert="dls", gradient_steps=5, batch_size=16, every=2, memory=70),
     "imitate over dls": Imitate(**OVER, expert="rhc:horizon=5", gradient_steps=5, batch_size=16, algorithm="sac"),
 }
@@ -111,7 +111,7 @@ def test_analytic_policy_gradient_learns():
         steps=60,
         hidden=(32, 32),
         offsets=(1, 2, 10, 30),
-        reach=5.0,
+        action_scale=5.0,
         envs=32,
         window=10,
         windows=40,
@@ -129,7 +129,7 @@ def test_imitation_learns():
     config = Imitate(
         scenario="varga7-random",
         steps=60,
-        over="dls:gain=0.02",
+        base_policy="dls:gain=0.02",
         hidden=(32, 32),
         offsets=(1, 2, 10, 30),
         expert="dls:gain=0.3,damping=1e-2",

@@ -17,7 +17,14 @@ from baselines.training.trainers.models import answers
 from ikgym.sb3 import RedundantIKVecEnv
 from tests.baselines.training.small import OVER, about, tiny
 
-SHAPE = {"hidden": (9, 7), "activation": "elu", "reach": 0.3, "over": "dls", "null_space": 0.1, "offsets": (1, 5)}
+SHAPE = {
+    "hidden": (9, 7),
+    "activation": "elu",
+    "action_scale": 0.3,
+    "base_policy": "dls",
+    "null_space": 0.1,
+    "offsets": (1, 5),
+}
 
 
 @pytest.fixture(scope="module")
@@ -79,11 +86,11 @@ def test_what_is_seen_comes_with_the_file(sources):
     config = tiny("ppo", init=sources["ppo"] / "model.zip", scenario="varga7-random")
     settled = settle(config, ())
     assert {name: getattr(settled, name) for name in SHAPE} == SHAPE
-    assert settle(config.replace(reach=0.3), ("reach",)) == settled
-    for name, value in {"reach": 0.5, "hidden": (9, 9), "over": "mfac", "null_space": 0.2}.items():
+    assert settle(config.replace(action_scale=0.3), ("action_scale",)) == settled
+    for name, value in {"action_scale": 0.5, "hidden": (9, 9), "base_policy": "mfac", "null_space": 0.2}.items():
         with pytest.raises(TrainingError, match=f"{name}: .*model.zip has .*, got .*: leave it out"):
             settle(config.replace(**{name: value}), (name,))
-    assert settle(config.replace(init=None), ("reach",)).reach == config.reach
+    assert settle(config.replace(init=None), ("action_scale",)).action_scale == config.action_scale
 
 
 @pytest.mark.parametrize(("source", "method", "fitting"), [("ppo", "sac", "ppo"), ("sac", "ppo", "sac or td3")])

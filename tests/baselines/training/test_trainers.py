@@ -224,7 +224,7 @@ def test_training_noise_of_td3():
         ("ppo", {"rollout": 15}, "rollout: expected a divisor of the 20 steps of a segment, got 15"),
         ("ppo", {"batch_size": 33}, "batch_size: expected a divisor of the 80 transitions"),
         ("td3", {"train_every": 3}, "train_every: expected a divisor of the 20 steps"),
-        ("ppo", {"over": "oracle"}, "reference 'oracle'"),
+        ("ppo", {"base_policy": "oracle"}, "reference 'oracle'"),
     ],
 )
 def test_refused(method, changes, message):

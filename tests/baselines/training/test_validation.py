@@ -22,17 +22,17 @@ def zero(features):
     return np.zeros((len(features), 7), np.float32)
 
 
-@pytest.mark.parametrize("over", ["dls", "mfac", "rhc_gradient:horizon=3"])
-def test_answers_of_zero_score_like_the_policy_under_them(over):
+@pytest.mark.parametrize("base_policy", ["dls", "mfac", "rhc_gradient:horizon=3"])
+def test_answers_of_zero_score_like_the_policy_under_them(base_policy):
     scenario = scenarios.get("varga7-random").replace(steps=40)
     seeds = validation_seeds(scenario, 3)
-    name, parameters = parse_policy(over)
+    name, parameters = parse_policy(base_policy)
     episodes = rollouts(scenario, baselines.make(name, scenario, **parameters), seeds)
     wanted = [float(np.sum(e.tracking_cost + e.velocity_cost)) for e in episodes]
-    costs, errors = play(zero, Processing(over=over), scenario, seeds)
+    costs, errors = play(zero, Processing(base_policy=base_policy), scenario, seeds)
     np.testing.assert_allclose(costs, wanted, rtol=1e-12)
     np.testing.assert_array_equal(errors, [e.position_error.max() for e in episodes])
-    score = validate(zero, Processing(over=over), scenario, 3)
+    score = validate(zero, Processing(base_policy=base_policy), scenario, 3)
     assert score.cost == pytest.approx(geometric_mean(wanted), rel=1e-12)
     assert (score.cost_ratio, score.episodes, score.lost) == (None, 3, 0.0)
     assert score.worst == pytest.approx(max(wanted), rel=1e-12)
@@ -45,18 +45,18 @@ def test_lost_arms_are_counted():
 
 def test_cost_ratio_is_over_the_reference(monkeypatch):
     scenario = scenarios.get("varga7-random").replace(steps=40)
-    costs, _ = play(zero, Processing(over="dls"), scenario, validation_seeds(scenario, 2))
+    costs, _ = play(zero, Processing(base_policy="dls"), scenario, validation_seeds(scenario, 2))
     record = {
         "fingerprint": fingerprint(scenario),
         "seeds": list(validation_seeds(scenario, 2)),
         "costs": costs / [2.0, 8.0],
     }
     monkeypatch.setattr(validation, "_records", lambda: [record])
-    score = validate(zero, Processing(over="dls"), scenario, 2)
+    score = validate(zero, Processing(base_policy="dls"), scenario, 2)
     assert score.cost_ratio == pytest.approx(4.0, rel=1e-12)
     assert score.worst == pytest.approx(8.0, rel=1e-12)
-    assert validate(zero, Processing(over="dls"), scenario, 3).cost_ratio is None
-    assert validate(zero, Processing(over="dls"), scenario.replace(dt=2e-3), 2).cost_ratio is None
+    assert validate(zero, Processing(base_policy="dls"), scenario, 3).cost_ratio is None
+    assert validate(zero, Processing(base_policy="dls"), scenario.replace(dt=2e-3), 2).cost_ratio is None
 
 
 def test_validation_seeds():

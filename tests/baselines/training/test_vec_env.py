@@ -35,15 +35,15 @@ def played(env, answers):
     return out
 
 
-@pytest.mark.parametrize("over", [None, *UNDER])
-def test_features_are_those_of_processing(over):
+@pytest.mark.parametrize("base_policy", [None, *UNDER])
+def test_features_are_those_of_processing(base_policy):
     """Those at the end of an episode included; the policy under the agent is asked by itself, observation by
     observation, and its memory is cleared where an episode begins."""
-    processing, problem = Processing(over=over), Problem.of(scenario())
+    processing, problem = Processing(base_policy=base_policy), Problem.of(scenario())
     env, plain = ProcessedVecEnv(N, scenario(), processing), RedundantIKVecEnv(N, scenario(), processing.offsets)
     under = None
-    if over is not None:
-        name, parameters = parse_policy(over)
+    if base_policy is not None:
+        name, parameters = parse_policy(base_policy)
         under = baselines.make(name, scenario(), **parameters)
 
     def expected(observation, state, starting):
@@ -79,11 +79,11 @@ def test_features_are_those_of_processing(over):
     assert ends == 2 * N
 
 
-@pytest.mark.parametrize("over", UNDER)
-def test_answers_of_zero_are_the_policy_under_it(over):
+@pytest.mark.parametrize("base_policy", UNDER)
+def test_answers_of_zero_are_the_policy_under_it(base_policy):
     """Bit for bit what an evaluation of that policy plays."""
-    name, parameters = parse_policy(over)
-    env = ProcessedVecEnv(N, scenario(), Processing(over=over))
+    name, parameters = parse_policy(base_policy)
+    env = ProcessedVecEnv(N, scenario(), Processing(base_policy=base_policy))
     env.seed(0)
     courses = [step[0] for step in played(env, [np.zeros((N, 7), np.float32)] * (STEPS - 1))]
     simulator = env.venv._envs._simulator
@@ -115,7 +115,7 @@ def test_rewards():
 
 def test_evaluation_of_stable_baselines3():
     """Without a warning; the returns are the environment's own."""
-    env = ProcessedVecEnv(2, scenario(), Processing(over="dls"), "log", 0.1)
+    env = ProcessedVecEnv(2, scenario(), Processing(base_policy="dls"), "log", 0.1)
 
     class Zero:
         def predict(self, observation, state=None, episode_start=None, deterministic=True):
@@ -131,9 +131,9 @@ def test_evaluation_of_stable_baselines3():
 
 
 def test_as_a_vec_env():
-    env = VecCheckNan(ProcessedVecEnv(2, scenario("zhang3-helix"), Processing(over="dls")), raise_exception=True)
+    env = VecCheckNan(ProcessedVecEnv(2, scenario("zhang3-helix"), Processing(base_policy="dls")), raise_exception=True)
     env.seed(0)
-    assert env.reset().shape == (2, Processing(over="dls").size(Problem.of(scenario("zhang3-helix"))))
+    assert env.reset().shape == (2, Processing(base_policy="dls").size(Problem.of(scenario("zhang3-helix"))))
     assert env.action_space.shape == (3,)
     assert env.get_attr("scenario")[0].name == "zhang3-helix"
     assert env.env_is_wrapped(ikgym.sb3.Monitor) == [True, True]
@@ -146,11 +146,11 @@ def test_bad_arguments():
     with pytest.raises(InvalidInputError, match="scale"):
         ProcessedVecEnv(2, scenario(), Processing(), "log", 0.0)
     with pytest.raises(UnknownNameError, match="Did you mean 'dls'"):
-        ProcessedVecEnv(2, scenario(), Processing(over="dlss"))
+        ProcessedVecEnv(2, scenario(), Processing(base_policy="dlss"))
     with pytest.raises(UnknownNameError, match="parameter of dls"):
-        ProcessedVecEnv(2, scenario(), Processing(over="dls:dampin=1"))
+        ProcessedVecEnv(2, scenario(), Processing(base_policy="dls:dampin=1"))
     with pytest.raises(InvalidInputError, match="reference 'oracle'"):
-        ProcessedVecEnv(2, scenario(), Processing(over="oracle"))
+        ProcessedVecEnv(2, scenario(), Processing(base_policy="oracle"))
     with pytest.raises(InvalidInputError, match="num_envs"):
         ProcessedVecEnv(0, scenario(), Processing())
 
@@ -162,7 +162,7 @@ def test_answers_need_something_seen():
 
 def test_cut_episodes_look_like_whole_ones():
     """An agent is not told that they are broken off; the return is that of the steps that were played."""
-    whole, cut = (ProcessedVecEnv(N, scenario(steps=30), Processing(over="mfac"), cut=c) for c in (None, 5))
+    whole, cut = (ProcessedVecEnv(N, scenario(steps=30), Processing(base_policy="mfac"), cut=c) for c in (None, 5))
     answers = np.random.default_rng(3).uniform(-1.0, 1.0, (6, N, 7)).astype(np.float32)
     courses = []
     for env in (whole, cut):

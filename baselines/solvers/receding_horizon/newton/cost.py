@@ -86,7 +86,7 @@ class Blocks(NamedTuple):
 
 
 @kernel
-def scratch_for(kind, m, n):  # type: ignore[no-untyped-def]
+def scratch_for(kind, m, n):
     """Scratch for task coordinates of ``m`` numbers and ``n`` joints."""
     e = 6 if kind == task_kernels.POSE else m
     return Scratch(
@@ -104,13 +104,13 @@ def scratch_for(kind, m, n):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def blocks_for(knots, n):  # type: ignore[no-untyped-def]
+def blocks_for(knots, n):
     """Room for the quadratic model of a path."""
     return Blocks(np.empty((knots, n)), np.empty((knots, n, n)), np.empty((knots, n, n)), np.empty((knots, n)))
 
 
 @kernel
-def true_cost(rules, grid, start, nominal, path, scratch):  # type: ignore[no-untyped-def]
+def true_cost(rules, grid, start, nominal, path, scratch):
     """The cost of a path, from the same kernels as the environment's; limits apart.
 
     Args:
@@ -139,7 +139,7 @@ def true_cost(rules, grid, start, nominal, path, scratch):  # type: ignore[no-un
 
 
 @kernel
-def merit(rules, grid, start, nominal, path, multipliers, scratch):  # type: ignore[no-untyped-def]
+def merit(rules, grid, start, nominal, path, multipliers, scratch):
     """The smooth function that Newton's method minimises: the cost with its kinks and limits held by multipliers.
 
     Args:
@@ -181,7 +181,7 @@ def merit(rules, grid, start, nominal, path, multipliers, scratch):  # type: ign
 
 
 @kernel
-def linearise(rules, grid, start, nominal, path, multipliers, advance, exact, scratch, blocks):  # type: ignore[no-untyped-def]
+def linearise(rules, grid, start, nominal, path, multipliers, advance, exact, scratch, blocks):
     """:func:`merit`, its gradient and its Hessian.
 
     Args:
@@ -285,7 +285,7 @@ def linearise(rules, grid, start, nominal, path, multipliers, advance, exact, sc
 
 
 @inlined
-def _tracking(cost, error, multiplier):  # type: ignore[no-untyped-def]
+def _tracking(cost, error, multiplier):
     """One component of Φ^X with its kink held: value, slope, curvature, λ, and the true value less λ's."""
     value = cost_kernels.value(error, cost.delta_x, P_X_INSIDE, cost.p_x)
     slope = cost_kernels.slope(error, cost.delta_x, P_X_INSIDE, cost.p_x)
@@ -310,7 +310,7 @@ def _tracking(cost, error, multiplier):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _velocity_limit(rules, j, velocity, multiplier, firmness):  # type: ignore[no-untyped-def]
+def _velocity_limit(rules, j, velocity, multiplier, firmness):
     limit, cost = rules.velocity_limit[j], rules.cost
     stiffness = (
         firmness * VELOCITY_STIFFNESS * cost_kernels.bend(limit, cost.delta_qdot, cost.p_in, max(cost.p_out, 2.0))
@@ -319,13 +319,13 @@ def _velocity_limit(rules, j, velocity, multiplier, firmness):  # type: ignore[n
 
 
 @inlined
-def _joint_limit(rules, j, q, multiplier, firmness):  # type: ignore[no-untyped-def]
+def _joint_limit(rules, j, q, multiplier, firmness):
     stiffness = firmness * JOINT_STIFFNESS * 2.0 / (rules.cost.delta_x * rules.cost.delta_x)
     return press(q, rules.lower[j], rules.upper[j], multiplier, stiffness, math.inf)
 
 
 @kernel
-def _second_order(kind, scratch, out):  # type: ignore[no-untyped-def]
+def _second_order(kind, scratch, out):
     """Σ slope_i ∂²error_i / ∂q², the lower triangle; for POSE as if the rotation error were small.
 
     With the geometric columns (v_j, w_j) and joint b not behind joint a: ∂v_a / ∂q_b = w_b × v_a, and for the rotation
@@ -371,7 +371,7 @@ def _second_order(kind, scratch, out):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _force(kind, slope, i, j):  # type: ignore[no-untyped-def]
+def _force(kind, slope, i, j):
     """∂Φ / ∂R_ij."""
     if kind == task_kernels.MATRIX:
         return -slope[3 * i + j]

@@ -57,7 +57,7 @@ def offsets(steps: int, blocks: int | None) -> Integers:
 
 
 @kernel
-def cut(at, steps, terminal, grid):  # type: ignore[no-untyped-def]
+def cut(at, steps, terminal, grid):
     """The grid of the knots ``at``, cut so that none lies more than ``steps`` ahead.
 
     A block of h steps is weighted by the trapezoidal rule: the tracking costs of its steps are (h - 1) / 2 times that
@@ -93,19 +93,19 @@ def cut(at, steps, terminal, grid):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def first_knots(grid, knots):  # type: ignore[no-untyped-def]
+def first_knots(grid, knots):
     """The first so many knots of a grid."""
     return Grid(grid.at[:knots], grid.length[:knots], grid.tracking[:knots], grid.velocity[:knots])
 
 
 @kernel
-def empty_grid(knots):  # type: ignore[no-untyped-def]
+def empty_grid(knots):
     """A grid to be filled by :func:`cut`."""
     return Grid(np.empty(knots, np.int64), np.empty(knots), np.empty(knots), np.empty(knots))
 
 
 @kernel
-def slide(old, path, qdot, new, out):  # type: ignore[no-untyped-def]
+def slide(old, path, qdot, new, out):
     """What is left of a path one step later, at the knots of a new grid; past its end it goes on as it ended.
 
     Args:
@@ -128,7 +128,7 @@ def slide(old, path, qdot, new, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def slide_multipliers(old, multipliers, new):  # type: ignore[no-untyped-def]
+def slide_multipliers(old, multipliers, new):
     """Multipliers one step later, in place: each knot takes over those of the old knot at its time or next after it.
 
     Args:

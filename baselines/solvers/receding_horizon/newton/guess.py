@@ -23,7 +23,7 @@ STREAM = 256
 
 
 @kernel
-def roll_out(rules, grid, start, nominal, first, drift, damping, path, scratch, gram, x):  # type: ignore[no-untyped-def]
+def roll_out(rules, grid, start, nominal, first, drift, damping, path, scratch, gram, x):
     """Goes from knot to knot by damped least squares, drifting in the null space of the task.
 
     Args:
@@ -64,7 +64,7 @@ def roll_out(rules, grid, start, nominal, first, drift, damping, path, scratch, 
 
 
 @inlined
-def uniform(key, counter):  # type: ignore[no-untyped-def]
+def uniform(key, counter):
     """A number between 0 and 1 for a key and a counter (SplitMix64); no state, so that rows stay independent."""
     z = np.uint64(key) * np.uint64(0xD1342543DE82EF95) + (np.uint64(counter) + np.uint64(1)) * np.uint64(
         0x9E3779B97F4A7C15
@@ -76,7 +76,7 @@ def uniform(key, counter):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def draw(seed, counter, drift):  # type: ignore[no-untyped-def]
+def draw(seed, counter, drift):
     """Draws the ``counter``-th guess of a seed: a drift, which ``drift`` (n,) receives; returns its damping."""
     n = drift.shape[0]
     square = 0.0
@@ -94,5 +94,5 @@ def draw(seed, counter, drift):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _between(bounds, share):  # type: ignore[no-untyped-def]
+def _between(bounds, share):
     return bounds[0] * (bounds[1] / bounds[0]) ** share

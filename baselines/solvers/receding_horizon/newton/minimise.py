@@ -39,7 +39,7 @@ class Room(NamedTuple):
 
 
 @kernel
-def room_for(kind, m, knots, n):  # type: ignore[no-untyped-def]
+def room_for(kind, m, knots, n):
     """Room for paths of up to ``knots`` knots of ``n`` joints, and task coordinates of ``m`` numbers."""
     return Room(
         scratch_for(kind, m, n),
@@ -52,7 +52,7 @@ def room_for(kind, m, knots, n):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def newton_step(blocks, knots, exact, damping, inverse, factor, step):  # type: ignore[no-untyped-def]
+def newton_step(blocks, knots, exact, damping, inverse, factor, step):
     """Solves (H + damping I) step = -gradient by blocks, from the first knot to the last and back.
 
     Args:
@@ -103,9 +103,7 @@ def newton_step(blocks, knots, exact, damping, inverse, factor, step):  # type: 
 
 
 @kernel
-def minimise(  # type: ignore[no-untyped-def]
-    rules, grid, start, nominal, path, multipliers, exact, most, tolerance, room
-):
+def minimise(rules, grid, start, nominal, path, multipliers, exact, most, tolerance, room):
     """Damped Newton steps from a path, until it is a minimum or they run out.
 
     Args:

@@ -12,7 +12,7 @@ from ikgym.jit import inlined
 
 
 @inlined
-def press(x, low, high, multiplier, stiffness, most):  # type: ignore[no-untyped-def]
+def press(x, low, high, multiplier, stiffness, most):
     """The largest of λ (x - bound) - (λ - λ₀)² / (2 ρ) over |λ| <= most; λ > 0 at ``high``, λ < 0 at ``low``.
 
     Args:

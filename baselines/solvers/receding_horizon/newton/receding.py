@@ -71,7 +71,7 @@ class Desk(NamedTuple):
 
 
 @kernel
-def plan_rows(  # type: ignore[no-untyped-def]  # noqa: D417  # the first arguments are described where they come from
+def plan_rows(  # noqa: D417  # the first arguments are described where they come from
     offsets,
     axes,
     prismatic,
@@ -215,7 +215,7 @@ def plan_rows(  # type: ignore[no-untyped-def]  # noqa: D417  # the first argume
 
 
 @kernel
-def _slide(old, path, multipliers, grid, desk):  # type: ignore[no-untyped-def]
+def _slide(old, path, multipliers, grid, desk):
     """Turns plan and multipliers into what is left of them one step later."""
     slide(old, path, desk.passed, grid, desk.path)
     slide_multipliers(old, multipliers, grid)
@@ -225,7 +225,7 @@ def _slide(old, path, multipliers, grid, desk):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _first_plan(rules, settings, grid, start, nominal, path, held, desk):  # type: ignore[no-untyped-def]
+def _first_plan(rules, settings, grid, start, nominal, path, held, desk):
     """The first plan of an episode: the cheapest of several roll-outs, each a few Newton steps on; the steps made."""
     made, best = 0, np.inf
     knots = path.shape[0]
@@ -254,9 +254,7 @@ def _first_plan(rules, settings, grid, start, nominal, path, held, desk):  # typ
 
 
 @kernel
-def _challenge(  # type: ignore[no-untyped-def]
-    rules, settings, old, grid, start, nominal, path, held, value, rival, rival_held, call, age, desk
-):
+def _challenge(rules, settings, old, grid, start, nominal, path, held, value, rival, rival_held, call, age, desk):
     """Improves the challenger, which branches off the plan at a random knot, and takes it over where it is cheaper.
 
     Returns:

@@ -1,0 +1,45 @@
+"""Only compiled kernels go without types: mypy lets functions pass that have none at all."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+SOURCES = [*ROOT.glob("ikgym/**/*.py"), *ROOT.glob("baselines/**/*.py"), *ROOT.glob("benchmarks/**/*.py")]
+KERNELS = {"kernel", "inlined", "njit"}
+
+
+def untyped(source: str) -> list[str]:
+    """The functions without any annotation that are no kernels, and not within one."""
+    out = []
+
+    def visit(node: ast.AST) -> None:
+        for child in ast.iter_child_nodes(node):
+            if isinstance(child, (ast.FunctionDef, ast.AsyncFunctionDef)):
+                if KERNELS & {d.id for d in map(_called, child.decorator_list) if isinstance(d, ast.Name)}:
+                    continue
+                if child.returns is None:
+                    out.append(child.name)
+            visit(child)
+
+    visit(ast.parse(source))
+    return out
+
+
+def _called(decorator: ast.expr) -> ast.expr:
+    return decorator.func if isinstance(decorator, ast.Call) else decorator
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_all_but_kernels_have_types(path):
+    assert untyped(path.read_text(encoding="utf-8")) == []
+
+
+def test_what_is_found():
+    assert untyped("def f(x): pass") == ["f"]
+    assert untyped("@kernel\ndef f(x):\n    return x") == []
+    assert untyped("class A:\n    def f(self): pass") == ["f"]
+    assert untyped("def f(x: int) -> int: return x") == []
