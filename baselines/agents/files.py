@@ -27,7 +27,7 @@ from ikgym.exceptions import InvalidInputError, UnknownNameError
 from ikgym.scenarios import Scenario
 
 #: The version of the format.
-FORMAT: Final = 1
+FORMAT: Final = 2
 #: The key of the JSON text in the metadata of the file.
 KEY: Final = "ikgym"
 SUFFIX: Final = ".safetensors"

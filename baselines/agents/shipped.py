@@ -44,15 +44,15 @@ class ShippedAgent(LearnedPolicy):
 class AgentAlone(ShippedAgent):
     """Learned agent that stands alone, trained on `varga7-random` by ppo."""
 
-    hash: str = "58a35cba801c"
+    hash: str = "3066b5c5b727"
 
     name: ClassVar[str] = "agent_alone"
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class AgentResidual(ShippedAgent):
-    """Learned correction of `rhc:horizon=400,iterations=1,blocks=30`, trained on `varga7-random` by imitate."""
+    """Learned correction of `rhc:horizon=400,iterations=1,move_blocks=30`, trained on `varga7-random` by imitate."""
 
-    hash: str = "2779d12cbe68"
+    hash: str = "74e1d75a6e95"
 
     name: ClassVar[str] = "agent_residual"

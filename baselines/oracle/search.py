@@ -23,8 +23,8 @@ from ikgym.validation import FloatArray
 VERSION = 2
 #: Receding horizons whose paths are starts, too.
 HORIZONS: tuple[Mapping[str, Any], ...] = (
-    {"horizon": 1001, "blocks": 48, "iterations": 1, "starts": 64, "challenge": 10, "stop_at_end": True},
-    {"horizon": 101, "blocks": 24, "iterations": 1, "starts": 64, "challenge": 10, "stop_at_end": True},
+    {"horizon": 1001, "move_blocks": 48, "iterations": 1, "starts": 64, "restart_steps": 10, "stop_at_end": True},
+    {"horizon": 101, "move_blocks": 24, "iterations": 1, "starts": 64, "restart_steps": 10, "stop_at_end": True},
 )
 # Newton steps of a path at full resolution, and the relative precision that ends them before.
 MOST, TOLERANCE = 300, 1e-12
@@ -111,7 +111,7 @@ def _known_paths(whole: Whole) -> dict[str, FloatArray]:
     if whole.knots == scenario.steps:
         for given in HORIZONS:
             horizon = max(min(int(given["horizon"]), scenario.steps + 1), 2)
-            fitting = {**given, "horizon": horizon, "blocks": min(int(given["blocks"]), horizon - 1)}
+            fitting = {**given, "horizon": horizon, "move_blocks": min(int(given["move_blocks"]), horizon - 1)}
             policy = RecedingHorizon.for_scenario(scenario, **fitting)
             out.setdefault(f"rhc, horizon {given['horizon']}", path_of(policy, scenario, seed))
     return out

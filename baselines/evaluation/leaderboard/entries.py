@@ -22,10 +22,10 @@ PAPER = 2
 #: The preset that draws at random, whose best seed is the reference where no best known cost is.
 FORESIGHT = "rhc_foresight"
 #: Receding horizons beside those that are registered: the paper's, exactly and in real time, and long ones with blocks.
-BLOCKED = ("rhc:horizon=100,iterations=1,blocks=23", "rhc:horizon=200,iterations=1,blocks=27")
+BLOCKED = ("rhc:horizon=100,iterations=1,move_blocks=23", "rhc:horizon=200,iterations=1,move_blocks=27")
 #: The same for a policy that is shown whole poses.
 UNFOLDED = tuple(
-    f"full_orientation:policy=rhc,options={{'horizon': {horizon}, 'iterations': 1, 'blocks': {blocks}}}"
+    f"full_orientation:policy=rhc,options={{'horizon': {horizon}, 'iterations': 1, 'move_blocks': {blocks}}}"
     for horizon, blocks in ((100, 23), (400, 30))
 )
 HORIZONS = ("rhc:horizon=3", "rhc:horizon=3,iterations=1", "rhc:horizon=100", *BLOCKED, *UNFOLDED)

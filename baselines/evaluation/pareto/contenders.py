@@ -85,9 +85,9 @@ def family(spec: str) -> tuple[str, int] | None:
         return None
     kinds: Mapping[frozenset[str], str] = {
         frozenset(): OPTIMUM,
-        frozenset({"blocks"}): OPTIMUM_BLOCKS,
+        frozenset({"move_blocks"}): OPTIMUM_BLOCKS,
         frozenset({"iterations"}): REAL_TIME,
-        frozenset({"iterations", "blocks"}): BLOCKS,
+        frozenset({"iterations", "move_blocks"}): BLOCKS,
     }
     return (kinds[frozenset(parameters)], horizon) if frozenset(parameters) in kinds else None
 
@@ -102,8 +102,8 @@ def _spec(family: str, horizon: int) -> str | None:
     spec = f"{RecedingHorizon.name}:horizon={horizon}" + (",iterations=1" if family in (REAL_TIME, BLOCKS) else "")
     if family in (OPTIMUM, REAL_TIME):
         return spec
-    return None if (knots := blocks(horizon)) is None else f"{spec},blocks={knots}"
+    return None if (knots := blocks(horizon)) is None else f"{spec},move_blocks={knots}"
 
 
 def _draws(policy: type[RecedingHorizon]) -> bool:
-    return policy.starts > 1 or policy.challenge > 0
+    return policy.starts > 1 or policy.restart_steps > 0

@@ -19,9 +19,9 @@ class RecedingHorizonForesight(RecedingHorizon):
 
     horizon: int = 1501
     iterations: int | None = 1
-    blocks: int | None = 48
+    move_blocks: int | None = 48
     stop_at_end: bool = True
     starts: int = 64
-    challenge: int = 20
+    restart_steps: int = 20
 
     name: ClassVar[str] = "rhc_foresight"

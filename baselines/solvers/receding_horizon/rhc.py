@@ -39,7 +39,7 @@ class RecedingHorizon(SolverPolicy):
         problem: What the policy is told of the scenario.
         horizon: HL, the number of grid points with the present one. At least 2; HL - 1 steps must be shown ahead.
         iterations: Newton steps in one control period, at least 30 in the first; None for as many as the optimum takes.
-        blocks: Knots of the horizon; None for one at each of its HL - 1 steps. Fewer are spaced out: two blocks of one
+        move_blocks: Knots of the horizon; None for one at each of its HL - 1 steps. Fewer are spaced out: two blocks of one
             step, then lengths that grow geometrically. Within a block the joint velocity is constant, and its tracking
             cost follows the trapezoidal rule.
         terminal_weight: Factor of the tracking cost at the last grid point, unless the episode ends before it; 1 is the
@@ -48,9 +48,9 @@ class RecedingHorizon(SolverPolicy):
             costs count no more.
         starts: Guesses from which the first plan of an episode is chosen: damped least squares from knot to knot, and
             with more than one the others with a random drift in the null space and random damping.
-        challenge: Newton steps of a challenger: a second plan, which branches off at a random knot into a random guess,
+        restart_steps: Newton steps of a challenger: a second plan, which branches off at a random knot into a random guess,
             and takes over when it is cheaper after its last step. 0 for none.
-        challenge_rate: Newton steps of the challenger in one control period.
+        restart_rate: Newton steps of the challenger in one control period.
         seed: Of the random guesses, which are the same in all episodes.
         tolerance: Relative precision of the horizon's cost at which it counts as minimal.
 
@@ -60,12 +60,12 @@ class RecedingHorizon(SolverPolicy):
 
     horizon: int = 30
     iterations: int | None = None
-    blocks: int | None = None
+    move_blocks: int | None = None
     terminal_weight: float = 1.0
     stop_at_end: bool = False
     starts: int = 1
-    challenge: int = 0
-    challenge_rate: int = 1
+    restart_steps: int = 0
+    restart_rate: int = 1
     seed: int = 0
     tolerance: float = 1e-7
 
@@ -82,18 +82,18 @@ class RecedingHorizon(SolverPolicy):
             raise InvalidInputError(f"horizon: expected at most {FARTHEST}, got {self.horizon}.")
         if self.iterations is not None:
             whole_number("iterations", self.iterations, at_least=1)
-        if self.blocks is not None and whole_number("blocks", self.blocks, at_least=1) >= self.horizon:
+        if self.move_blocks is not None and whole_number("move_blocks", self.move_blocks, at_least=1) >= self.horizon:
             raise InvalidInputError(
-                f"blocks: expected at most horizon - 1 = {self.horizon - 1}, a knot at each step, got {self.blocks}."
+                f"move_blocks: expected at most horizon - 1 = {self.horizon - 1}, a knot at each step, got {self.move_blocks}."
             )
         if not isinstance(self.stop_at_end, (bool, np.bool_)):
             raise InvalidInputError(f"stop_at_end: expected True or False, got {self.stop_at_end!r}.")
         terminal_weight = number("terminal_weight", self.terminal_weight, at_least=0.0)
-        for name, least in {"starts": 1, "challenge": 0, "challenge_rate": 1, "seed": 0}.items():
+        for name, least in {"starts": 1, "restart_steps": 0, "restart_rate": 1, "seed": 0}.items():
             if whole_number(name, getattr(self, name), at_least=least) > MOST:
                 raise InvalidInputError(f"{name}: expected at most {MOST}, got {getattr(self, name)}.")
         tolerance = number("tolerance", self.tolerance, above=0.0)
-        knots = offsets(self.horizon - 1, self.blocks)
+        knots = offsets(self.horizon - 1, self.move_blocks)
         knots.flags.writeable = False
         object.__setattr__(self, "offsets", knots)
         problem, model = self.problem, self.problem.model
@@ -104,8 +104,8 @@ class RecedingHorizon(SolverPolicy):
             -1 if self.iterations is None else self.iterations,
             tolerance,
             self.starts,
-            self.challenge,
-            self.challenge_rate,
+            self.restart_steps,
+            self.restart_rate,
             self.seed,
         )
         rules = (problem.task.kind, *problem.cost.parameters, problem.dt, model.lower, model.upper)
@@ -119,7 +119,7 @@ class RecedingHorizon(SolverPolicy):
     def memory(self, rows: int) -> Memory:
         """Plan and multipliers, of shapes (B, K, n) and (B, K, e + 2 n); those of the challenger; and two counters."""
         knots, n = len(self.offsets), self.problem.model.joints
-        wide, rival = self.problem.task.error_size + 2 * n, knots if self.challenge else 0
+        wide, rival = self.problem.task.error_size + 2 * n, knots if self.restart_steps else 0
         plans = (np.zeros((rows, k, width)) for k in (knots, rival) for width in (n, wide))
         return (*plans, np.zeros(rows, dtype=np.int64), np.zeros(rows, dtype=np.int64))
 

@@ -164,7 +164,9 @@ class TestEntries:
             for name in registry.names()
             if not (registry.get(name).reference or issubclass(registry.get(name), LearnedPolicy))
         }
-        assert {"rhc:horizon=3", "rhc:horizon=3,iterations=1", "rhc:horizon=200,iterations=1,blocks=27"} <= set(names)
+        assert {"rhc:horizon=3", "rhc:horizon=3,iterations=1", "rhc:horizon=200,iterations=1,move_blocks=27"} <= set(
+            names
+        )
 
     @pytest.mark.parametrize(
         ("name", "expected"),

@@ -115,8 +115,8 @@ class TestContenders:
         [
             ("rhc:horizon=30", (OPTIMUM, 30)),
             ("rhc:horizon=5,iterations=1", (REAL_TIME, 5)),
-            ("rhc:horizon=400,iterations=1,blocks=30", (BLOCKS, 400)),
-            ("rhc:horizon=400,blocks=30", (OPTIMUM_BLOCKS, 400)),
+            ("rhc:horizon=400,iterations=1,move_blocks=30", (BLOCKS, 400)),
+            ("rhc:horizon=400,move_blocks=30", (OPTIMUM_BLOCKS, 400)),
             ("rhc:horizon=30,starts=4", None),
             ("rhc", None),
             ("rhc_foresight:horizon=30", None),

@@ -140,12 +140,12 @@ def test_other_arms_and_tasks(name, horizon, count):
 @pytest.mark.parametrize(
     "parameters",
     [
-        {"horizon": 31, "blocks": 8},
-        {"horizon": 31, "blocks": 8, "terminal_weight": 20.0},
+        {"horizon": 31, "move_blocks": 8},
+        {"horizon": 31, "move_blocks": 8, "terminal_weight": 20.0},
         {"horizon": 9, "terminal_weight": 0.0},
         {"horizon": 9, "terminal_weight": 5.0},
-        {"horizon": 8, "blocks": 1},
-        {"horizon": 101, "blocks": 12},
+        {"horizon": 8, "move_blocks": 1},
+        {"horizon": 101, "move_blocks": 12},
     ],
 )
 def test_blocked_and_weighted_horizons(parameters):
@@ -157,11 +157,11 @@ def test_blocked_and_weighted_horizons(parameters):
     compare(policy, CasadiHorizon(policy.problem, len(policy.offsets)), costs, horizons, plans)
 
 
-@pytest.mark.parametrize("blocks", [None, 6])
+@pytest.mark.parametrize("move_blocks", [None, 6])
 @pytest.mark.parametrize("left", [1, 2, 3, 5])
 def test_the_horizon_ends_with_the_episode(left, blocks):
     scenario = ikgym.scenarios.get("varga7-fast")
-    policy = baselines.make("rhc", scenario, horizon=15, stop_at_end=True, blocks=blocks)
+    policy = baselines.make("rhc", scenario, horizon=15, stop_at_end=True, move_blocks=blocks)
     q, nominal = states_near(scenario, 14, 3, 1e-2)
     costs, horizons, plans, _ = planned(policy, q, nominal, remaining=left)
     compare(policy, CasadiHorizon(policy.problem, horizons[0].knots), costs, horizons, plans)
@@ -169,7 +169,7 @@ def test_the_horizon_ends_with_the_episode(left, blocks):
     moved = nominal.copy()
     moved[:, left:] += 0.1
     for ends in (True, False):
-        policy = baselines.make("rhc", scenario, horizon=15, stop_at_end=ends, blocks=blocks)
+        policy = baselines.make("rhc", scenario, horizon=15, stop_at_end=ends, move_blocks=blocks)
         answers = [policy.predict(observe(policy.problem, q, x, remaining=left))[0] for x in (nominal, moved)]
         assert identical(*answers) == ends
 
@@ -380,7 +380,7 @@ def test_newton_steps_do_not_grow_with_the_horizon():
     assert np.array_equal(np.multiply(policy.count(one)[:3], 10), longer.count(one)[:3])
 
 
-CHALLENGED = {"horizon": 40, "iterations": 1, "blocks": 12, "starts": 4, "challenge": 5}
+CHALLENGED = {"horizon": 40, "iterations": 1, "move_blocks": 12, "starts": 4, "restart_steps": 5}
 
 
 def pushed(policy):
@@ -410,7 +410,7 @@ def test_rows_of_a_batch_are_single_calls_with_challengers_and_starts(more):
 
 @pytest.mark.parametrize(("change", "same"), [({}, True), ({"seed": 1}, False)])
 def test_seeds(change, same):
-    base = {"horizon": 200, "blocks": 16, "starts": 6}
+    base = {"horizon": 200, "move_blocks": 16, "starts": 6}
     first, second = (episode("varga7-fast", "rhc_foresight", steps=60, **base, **c) for c in ({}, change))
     episode.cache_clear()
     assert (episode("varga7-fast", "rhc_foresight", steps=60, **base, **change) == second) is True
@@ -493,14 +493,14 @@ def test_status_and_iterations_are_said():
     [
         ({"horizon": 1}, "horizon: expected a whole number of at least 2, got 1"),
         ({"iterations": 0}, "iterations: expected a whole number of at least 1, got 0"),
-        ({"blocks": 0}, "blocks: expected a whole number of at least 1, got 0"),
-        ({"blocks": 30}, "blocks: expected at most horizon - 1 = 29, a knot at each step, got 30"),
+        ({"move_blocks": 0}, "move_blocks: expected a whole number of at least 1, got 0"),
+        ({"move_blocks": 30}, "move_blocks: expected at most horizon - 1 = 29, a knot at each step, got 30"),
         ({"terminal_weight": -1.0}, "terminal_weight: expected a finite number of at least 0"),
         ({"terminal_weight": np.inf}, "terminal_weight: expected a finite number"),
         ({"stop_at_end": 1}, "stop_at_end: expected True or False, got 1"),
         ({"starts": 0}, "starts: expected a whole number of at least 1"),
-        ({"challenge": -1}, "challenge: expected a whole number of at least 0"),
-        ({"challenge_rate": 0}, "challenge_rate: expected a whole number of at least 1"),
+        ({"restart_steps": -1}, "restart_steps: expected a whole number of at least 0"),
+        ({"restart_rate": 0}, "restart_rate: expected a whole number of at least 1"),
         ({"seed": -1}, "seed: expected a whole number of at least 0"),
         ({"tolerance": 0.0}, "tolerance: expected a finite number above 0"),
     ],
