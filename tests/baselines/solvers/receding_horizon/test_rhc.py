@@ -157,7 +157,7 @@ def test_blocked_and_weighted_horizons(parameters):
     compare(policy, CasadiHorizon(policy.problem, len(policy.offsets)), costs, horizons, plans)
 
 
-@pytest.mark.parametrize("move_blocks", [None, 6])
+@pytest.mark.parametrize("blocks", [None, 6])
 @pytest.mark.parametrize("left", [1, 2, 3, 5])
 def test_the_horizon_ends_with_the_episode(left, blocks):
     scenario = ikgym.scenarios.get("varga7-fast")
