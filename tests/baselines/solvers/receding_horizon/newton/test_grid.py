@@ -27,7 +27,7 @@ def test_offsets_rise_to_the_end_by_growing_blocks(horizon):
         assert (np.diff(lengths[:-1]) >= -1).all()  # but for rounding, they grow
 
 
-@pytest.mark.parametrize("move_blocks", [None, 7, 8, 100])
+@pytest.mark.parametrize("blocks", [None, 7, 8, 100])
 def test_offsets_of_a_knot_at_each_step(blocks):
     assert offsets(7, blocks).tolist() == [1, 2, 3, 4, 5, 6, 7]
 
