@@ -95,13 +95,14 @@ class RedundantIKEnv(gym.Env[Any, Any]):
     Truncated by the environment itself after the scenario's `steps`; never terminated.
 
     Args:
-        scenario: A scenario or the name of one, see `ikgym.scenarios.names()`.
+        scenario: A scenario or what names one: a registered name, a file ending in `.toml`, or
+            `"package.module:attribute"`; see `ikgym.scenarios.find`.
         preview: How many steps ahead the nominal coordinates are shown, or which ones.
         render_mode: None, `"human"` (a window) or `"rgb_array"`.
 
     Raises:
         UnknownNameError: There is no such scenario.
-        InvalidInputError: The preview or the render mode is not valid.
+        InvalidInputError: The scenario, the preview or the render mode is not valid.
     """
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": ["human", "rgb_array"], "render_fps": 50}  # type: ignore[misc]
@@ -116,7 +117,7 @@ class RedundantIKEnv(gym.Env[Any, Any]):
             raise InvalidInputError(
                 f"render_mode: expected None or one of {self.metadata['render_modes']}, got {render_mode!r}."
             )
-        self.scenario = resolve(scenario)
+        self.scenario = scenarios.find(scenario)
         self.render_mode = render_mode
         self.observation_space = observation_space(self.scenario, preview)
         self.action_space = action_space(self.scenario)
@@ -228,12 +229,3 @@ def checked_options(options: dict[str, Any] | None, known: Sequence[str]) -> dic
         raise InvalidInputError(f"options: expected None or a dict, got {options!r}.")
     known_names("option of reset", options, known)
     return options
-
-
-def resolve(scenario: str | Scenario) -> Scenario:
-    """A scenario, or the one of a name.
-
-    Raises:
-        UnknownNameError: There is no such scenario.
-    """
-    return scenario if isinstance(scenario, Scenario) else scenarios.get(scenario)

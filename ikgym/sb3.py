@@ -48,12 +48,12 @@ class RedundantIKVecEnv(VecEnv):
 
     Args:
         num_envs: N.
-        scenario: A scenario or the name of one, see `ikgym.scenarios.names()`.
+        scenario: A scenario or what names one, see `ikgym.scenarios.find`.
         preview: How many steps ahead the nominal coordinates are shown, or which ones.
 
     Raises:
         UnknownNameError: There is no such scenario.
-        InvalidInputError: N or the preview is not valid.
+        InvalidInputError: N, the scenario or the preview is not valid.
     """
 
     def __init__(self, num_envs: int = 1, scenario: str | Scenario = "varga7-fast", preview: Preview = 2) -> None:

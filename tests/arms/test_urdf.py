@@ -450,7 +450,8 @@ OFFSET = '<origin xyz="0.1 -0.2 0.35" rpy="0 0 1.5707963267948966"/>'
 @pytest.mark.parametrize("rotated", [False, True])
 def test_a_tool_offset_is_a_fixed_joint_at_the_tip(write, rotated):
     inside = OFFSET if rotated else OFFSET.replace("1.5707963267948966", "0")
-    with_tool = WHOLE.replace("</robot>", f'<link name="end"/>{joint("mount2", "tool", "end", "fixed", inside)}</robot>')
+    end = '<link name="end"/>' + joint("mount2", "tool", "end", "fixed", inside)
+    with_tool = WHOLE.replace("</robot>", f"{end}</robot>")
     arm = from_urdf(write(WHOLE), tip="tool", tool=[0.1, -0.2, 0.35], tool_rotation=TURN if rotated else None)
     for q in np.random.default_rng(1).uniform(-3, 3, (20, 4)):
         rotation, position = arm.forward(q)
