@@ -22,6 +22,9 @@ logger = logging.getLogger("ikgym")
 # Stamps of whole modules, by name.
 _stamps: dict[str, str] = {}
 
+# Names of kernels for which there is no folder on disk.
+_not_kept: set[str] = set()
+
 
 def kernel(function: Any) -> Any:
     """Compiles a function when it is first called; the machine code is kept on disk.
@@ -37,11 +40,17 @@ def inlined(function: Any) -> Any:
     return _cached(function, inline="always")
 
 
+def kept_on_disk() -> bool:
+    """Whether there is a folder to keep the machine code of all kernels in, so that it is compiled only once."""
+    return not _not_kept
+
+
 def _cached(function: Any, **options: Any) -> Any:
     try:
         compiled = njit(cache=True, nogil=True, **options)(function)
     except RuntimeError:
         # Neither the folder of the package nor the user's own can be written.
+        _not_kept.add(f"{function.__module__}.{function.__qualname__}")
         logger.info("No folder to keep machine code in: %s is compiled anew in each process.", function.__qualname__)
         return njit(nogil=True, **options)(function)
     # Not public, and absent where compilation is switched off: then numba's own stamp has to do.

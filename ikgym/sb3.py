@@ -107,7 +107,7 @@ class RedundantIKVecEnv(VecEnv):
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         for row in np.flatnonzero(ended).tolist():
             infos[row] = {
-                **{key: final["final_info"][key][row].item() for key in REPORTED},
+                **{key: final["final_info"][key][row].item() for key in REPORTED if key in final["final_info"]},
                 "TimeLimit.truncated": True,
                 "terminal_observation": final["final_obs"][row],
                 "episode": self._summary(row),

@@ -172,6 +172,8 @@ class RedundantIKVectorEnv(gym.vector.VectorEnv[Observation, npt.NDArray[np.floa
             "clipped": out.clipped > 0.0,
             "time": self._simulator.steps_made * self.scenario.dt,
         }
+        if not self.scenario.task.has_orientation:
+            del columns["orientation_error"]
         infos: Infos = {}
         for key, column in columns.items():
             infos[key] = np.where(rows, column, column.dtype.type(0))

@@ -13,12 +13,13 @@ import os
 from collections.abc import Callable
 
 from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.preview import Preview
 from ikgym.registry import Registry
 from ikgym.scenarios.catalogue import SCENARIOS
 from ikgym.scenarios.disturbance import Disturbance
 from ikgym.scenarios.importing import imported
 from ikgym.scenarios.reading import load
-from ikgym.scenarios.scenario import Preview, Scenario
+from ikgym.scenarios.scenario import Scenario
 from ikgym.validation import whole_number
 
 __all__ = ["SPLITS", "Disturbance", "Preview", "Scenario", "find", "get", "load", "names", "register", "seeds"]

@@ -14,6 +14,8 @@ from gymnasium.utils import seeding
 from ikgym.arms import Arm
 from ikgym.cost import TrackingCost
 from ikgym.exceptions import InvalidInputError
+from ikgym.preview import Preview
+from ikgym.preview import furthest as furthest
 from ikgym.scenarios import writing
 from ikgym.scenarios.disturbance import Disturbance
 from ikgym.simulation import nominal_rows
@@ -23,8 +25,6 @@ from ikgym.validation import FloatArray, Frozen, frozen_array, number, per_joint
 
 # A start given by `options={"q": …}` may be this far from home in each joint, in [rad] or [m].
 START_RANGE = 2.0 * np.pi
-
-Preview = int | Sequence[int]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -271,13 +271,3 @@ class Scenario(Frozen):
         if self.random and seed is None:
             raise InvalidInputError(f"Scenario {self.name!r} is random: a seed says which episode is meant.")
         return self.trajectory.sample(seeding.np_random(seed)[0]) if self.random else self.trajectory
-
-
-def furthest(preview: Preview) -> int:
-    """How many steps a preview looks ahead.
-
-    Raises:
-        InvalidInputError: It is no whole number of at least 0, nor a sequence of them.
-    """
-    steps: list[Any] = list(preview) if isinstance(preview, (tuple, list)) else [preview]
-    return max((whole_number("preview", step, at_least=0) for step in steps), default=0)

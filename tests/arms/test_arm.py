@@ -15,7 +15,7 @@ ARRAYS = ("offsets", "axes", "tool", "tool_rotation", "lower", "upper", "velocit
 
 
 def parts(**changes):
-    """The arguments of an arm with a turning and a sliding joint."""
+    """The arguments of an arm with a revolute and a prismatic joint."""
     return {
         "name": "two",
         "offsets": [[0.0, 0, 1], [1, 0, 0]],
