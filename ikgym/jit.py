@@ -7,6 +7,7 @@ of all that it may reach.
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import logging
 import sys
@@ -78,9 +79,12 @@ def _origin(value: object) -> str:
     """The name of the module of ours that a kernel comes from, or that has kernels; nothing for all else."""
     if isinstance(value, Dispatcher):
         return str(value.py_func.__module__)
-    if isinstance(value, ModuleType) and any(isinstance(v, Dispatcher) for v in vars(value).values()):
-        return value.__name__
-    return ""
+    return value.__name__ if isinstance(value, ModuleType) and _has_kernels(value) else ""
+
+
+@functools.cache  # kernels are many, and numpy, which all of their modules have, holds hundreds of names
+def _has_kernels(module: ModuleType) -> bool:
+    return any(isinstance(value, Dispatcher) for value in vars(module).values())
 
 
 def _source(module: str) -> bytes:

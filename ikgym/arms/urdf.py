@@ -5,16 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from ikgym.arms.arm import Arm, UrdfReference
 from ikgym.arms.home import from_home
-from ikgym.arms.urdf_check import MOVING, UrdfJoint, read_chain
 from ikgym.exceptions import InvalidInputError, MissingDependencyError
 from ikgym.validation import FloatArray, frozen_array, rotation_matrix
+
+if TYPE_CHECKING:
+    from ikgym.arms.urdf_check import UrdfJoint
 
 # Descriptions of whole humanoids take a few hundred kilobytes.
 MAX_BYTES = 16 * 2**20
@@ -66,6 +68,9 @@ def from_urdf(
         UnknownNameError: There is no link of that name; the message has the nearest one.
         MissingDependencyError: Pinocchio is not installed.
     """
+    # XML parsers are slow to import, and seldom needed.
+    from ikgym.arms.urdf_check import MOVING, read_chain
+
     try:
         robot, joints = read_chain(_content(path), base, tip)
         moving = [joint for joint in joints if joint.kind in MOVING]
@@ -121,7 +126,7 @@ def _home(joints: Sequence[UrdfJoint]) -> _Home:
         tip = data.oMf[model.getFrameId(f"link{len(joints)}")]
     except Exception as error:  # whatever Pinocchio raises, it is about this file
         raise InvalidInputError(f"expected a URDF that Pinocchio can read, got its error: {error}") from error
-    prismatic = np.array([joint.kind == "prismatic" for joint in joints if joint.kind in MOVING])
+    prismatic = np.array([joint.kind == "prismatic" for joint in joints if joint.kind != "fixed"])
     return _Home(
         axes=np.where(prismatic, jacobian[:3], jacobian[3:]).T,
         points=np.array([placement.translation for placement in data.oMi][1:]),

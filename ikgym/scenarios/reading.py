@@ -6,7 +6,6 @@ import contextlib
 import dataclasses
 import os
 import pathlib
-import tomllib
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -72,6 +71,8 @@ def load(file: str | os.PathLike[str]) -> Scenario:
 
 
 def _table(file: str | os.PathLike[str]) -> Table:
+    import tomllib  # seldom needed, and slow to import
+
     try:
         return tomllib.loads(pathlib.Path(file).read_bytes().decode())
     except tomllib.TOMLDecodeError as error:

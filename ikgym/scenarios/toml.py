@@ -6,7 +6,6 @@ dependency, and matrices stand in rows, which the libraries for it write one num
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Mapping
 from typing import Any, TypeVar
 
@@ -64,6 +63,8 @@ def only_numbers(key: str, value: object) -> None:
 
 def _text(value: Any) -> str:
     if isinstance(value, str):
+        import json  # seldom needed, and slow to import
+
         # JSON escapes all that TOML wants escaped but the character 127.
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     if isinstance(value, (bool, np.bool_)):
