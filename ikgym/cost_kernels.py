@@ -93,7 +93,7 @@ def tracking_curvature(cost, error, out):
 
 @kernel
 def velocity(cost, qdot):
-    """Φ^U, the sum over all joints (the printed sum to 6 is a slip). Shape of ``qdot`` (n,)."""
+    """Φ^U, the sum over all joints (the printed sum to 6 is a misprint). Shape of ``qdot`` (n,)."""
     total = 0.0
     for j in range(qdot.shape[0]):
         total += value(qdot[j], cost.delta_qdot, cost.p_in, cost.p_out)

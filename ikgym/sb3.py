@@ -116,7 +116,7 @@ class RedundantIKVecEnv(VecEnv):
         return observation, rewards.astype(np.float32), ended, infos
 
     def close(self) -> None:
-        """Nothing is open; there is no harm in closing."""
+        """Nothing is open; closing does nothing."""
         self._envs.close()
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
@@ -128,7 +128,7 @@ class RedundantIKVecEnv(VecEnv):
         return [getattr(self._rows[index], attr_name) for index in self._get_indices(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
-        """Gives rows an attribute that they did not have before; the arms heed none.
+        """Gives rows an attribute that they did not have before; the arms use none.
 
         Raises:
             AttributeError: It is one of those that all arms share, such as the scenario: make another environment.

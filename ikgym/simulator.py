@@ -15,7 +15,7 @@ from ikgym.preview import FARTHEST as FARTHEST
 from ikgym.preview import Preview
 from ikgym.preview import offsets as offsets
 from ikgym.scenarios import Scenario
-from ikgym.simulation import Law, Outcome, State, outcome
+from ikgym.simulation import Constants, Outcome, State, outcome
 from ikgym.trajectories import Trajectory
 from ikgym.validation import FloatArray, float_array
 
@@ -67,7 +67,7 @@ class Simulator:
         self._last_block = self._point[self.preview[-1] :] // self._block
         self._blocks_known = np.zeros(tables, dtype=np.int64)
         self._episodes: list[Trajectory] = [scenario.trajectory] * tables
-        self._law = Law(
+        self._shared = Constants(
             kind=scenario.task.kind,
             dt=scenario.dt,
             velocity_limit=scenario.velocity_limit,
@@ -96,7 +96,7 @@ class Simulator:
         parts = self._outcome(np.arange(self._count, dtype=np.float64))[1:6]
         self._parts = [slice(int(part.flat[0]), int(part.flat[-1]) + 1) for part in parts]
         # The kernels take tuples apart, see simulation.step: what never changes is taken apart once.
-        self._constants = (*scenario.arm.chain, *self._law, *scenario.cost.parameters, *self._state)
+        self._constants = (*scenario.arm.chain, *self._shared, *scenario.cost.parameters, *self._state)
         self._all = np.ones(rows, dtype=np.bool_)
         self._own_start = np.zeros(rows, dtype=np.bool_)
         with announced("the simulation kernels"):
@@ -118,7 +118,7 @@ class Simulator:
         """
         scenario, state = self.scenario, self._state
         rows = np.flatnonzero(active)
-        noisy = bool(self._law.noise.any())
+        noisy = bool(self._shared.noise.any())
         for row in rows.tolist():
             episode = scenario.trajectory.sample(generators[row])
             if scenario.random:

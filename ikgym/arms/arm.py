@@ -218,7 +218,7 @@ def _unit_axes(name: str, axes: FloatArray) -> FloatArray:
             what = "the zero vector" if length == 0.0 else f"{axes[i].tolist()} of length {length:.6g}"
             raise InvalidInputError(
                 f"Axis of joint {i} of arm {name!r}: expected a unit vector, got {what}. Nothing is normalised for "
-                "you, since a wrong length most often is a slip; divide the axis by its length if it is meant."
+                "you, since a wrong length most often is a mistake; divide the axis by its length if it is meant."
             )
     # A unit vector divided by its rounded length again may change in the last bit: a copy of an arm is that arm.
     exact = np.abs(lengths - 1.0) <= ROUNDING
