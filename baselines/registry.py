@@ -130,8 +130,7 @@ def make(name: str, scenario: str | Scenario, **parameters: Any) -> SolverPolicy
     """
     policy = get(name)
     known_names(f"parameter of {name}", parameters, policy.parameter_names())
-    resolved = scenario if isinstance(scenario, Scenario) else scenarios.get(scenario)
-    return policy.for_scenario(resolved, **parameters)
+    return policy.for_scenario(scenarios.find(scenario), **parameters)
 
 
 #: Classes that have been asked for.

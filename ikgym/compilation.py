@@ -1,4 +1,4 @@
-"""A word to the user while kernels are compiled, which happens once and takes a while."""
+"""A message to the user while kernels are compiled, which takes a while and seldom happens."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import contextlib
 import logging
 import threading
 from collections.abc import Iterator
+
+from ikgym import jit
 
 logger = logging.getLogger("ikgym")
 
@@ -18,12 +20,21 @@ def announced(what: str, patience: float = 2.0) -> Iterator[None]:
         what: What is being compiled.
         patience: Time after which the user is told, in [s].
     """
-    timer = threading.Timer(
-        patience, logger.warning, [f"Compiling {what}; this happens once, the result is cached on disk."]
-    )
+    timer = threading.Timer(patience, _tell, [what])
     timer.daemon = True
     timer.start()
     try:
         yield
     finally:
         timer.cancel()
+
+
+def _tell(what: str) -> None:
+    if jit.kept_on_disk():
+        logger.warning("Compiling %s; this happens once, the machine code is kept on disk.", what)
+    else:
+        logger.warning(
+            "Compiling %s; this happens once in each process, since there is no folder to keep machine code in. "
+            "NUMBA_CACHE_DIR can name one.",
+            what,
+        )

@@ -20,8 +20,8 @@ class TrackingCost(Frozen):
 
     Per component j, ``Φ^X_j = |e_j / Δx|^P`` with P = 2 inside ``|e_j| <= Δx`` and ``P_X`` outside, and
     ``Φ^U_j = |q̇_j / Δq̇|^P`` with ``P_in`` inside ``|q̇_j| <= Δq̇`` and ``P_out`` outside. Both are continuous;
-    their slopes jump where the exponent changes. Small errors and small velocities are nearly free, large ones
-    are very dear.
+    their gradients jump where the exponent changes. Small errors and small velocities are nearly free, large ones
+    are very costly.
 
     Args:
         delta_x: Δx, the tracking error that counts as 1, in [m] and [rad] (or as a number, for parts of a

@@ -17,8 +17,8 @@ class CostParameters(NamedTuple):
     p_in: float
 
 
-#: Which costs these kernels calculate: raised by whoever changes a value that they give. Best known costs and frozen
-#: evaluation sets belong to one version, and are refused or set aside under another.
+#: Which costs these kernels calculate: raised by whoever changes a value that they give. Best known costs and test
+#: sets belong to one version, and are refused or set aside under another.
 COST_VERSION = 1
 
 # The exponent of small tracking errors is not a parameter: "the usual quadratic tracking rule".
@@ -49,18 +49,18 @@ def value(x, delta, inside, outside):
 
 
 @inlined
-def slope(x, delta, inside, outside):
-    """Derivative of :func:`value` by x."""
+def gradient(x, delta, inside, outside):
+    """Derivative of :func:`value` with respect to x."""
     r = abs(x) / delta
     p = outside if r > 1.0 else inside
-    steepness = p * _power(r, p - 1.0) / delta
-    # At rest the cost is flat, also for p = 1, where any slope between -1/Δ and 1/Δ would do.
-    return steepness if x > 0.0 else (-steepness if x < 0.0 else 0.0)
+    size = p * _power(r, p - 1.0) / delta
+    # At rest the cost is flat, also for p = 1, where any gradient between -1/Δ and 1/Δ is right.
+    return size if x > 0.0 else (-size if x < 0.0 else 0.0)
 
 
 @inlined
-def bend(x, delta, inside, outside):
-    """Second derivative of :func:`value` by x."""
+def curvature(x, delta, inside, outside):
+    """Second derivative of :func:`value` with respect to x."""
     r = abs(x) / delta
     p = outside if r > 1.0 else inside
     if p == 1.0:
@@ -81,19 +81,19 @@ def tracking(cost, error):
 def tracking_gradient(cost, error, out):
     """∂Φ^X/∂error. Shapes (e,)."""
     for j in range(error.shape[0]):
-        out[j] = slope(error[j], cost.delta_x, P_X_INSIDE, cost.p_x)
+        out[j] = gradient(error[j], cost.delta_x, P_X_INSIDE, cost.p_x)
 
 
 @kernel
 def tracking_curvature(cost, error, out):
     """The diagonal of ∂²Φ^X/∂error². Shapes (e,)."""
     for j in range(error.shape[0]):
-        out[j] = bend(error[j], cost.delta_x, P_X_INSIDE, cost.p_x)
+        out[j] = curvature(error[j], cost.delta_x, P_X_INSIDE, cost.p_x)
 
 
 @kernel
 def velocity(cost, qdot):
-    """Φ^U, the sum over all joints (the printed sum to 6 is a slip). Shape of ``qdot`` (n,)."""
+    """Φ^U, the sum over all joints (the printed sum to 6 is a misprint). Shape of ``qdot`` (n,)."""
     total = 0.0
     for j in range(qdot.shape[0]):
         total += value(qdot[j], cost.delta_qdot, cost.p_in, cost.p_out)
@@ -104,11 +104,11 @@ def velocity(cost, qdot):
 def velocity_gradient(cost, qdot, out):
     """∂Φ^U/∂q̇. Shapes (n,)."""
     for j in range(qdot.shape[0]):
-        out[j] = slope(qdot[j], cost.delta_qdot, cost.p_in, cost.p_out)
+        out[j] = gradient(qdot[j], cost.delta_qdot, cost.p_in, cost.p_out)
 
 
 @kernel
 def velocity_curvature(cost, qdot, out):
     """The diagonal of ∂²Φ^U/∂q̇². Shapes (n,)."""
     for j in range(qdot.shape[0]):
-        out[j] = bend(qdot[j], cost.delta_qdot, cost.p_in, cost.p_out)
+        out[j] = curvature(qdot[j], cost.delta_qdot, cost.p_in, cost.p_out)

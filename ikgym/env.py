@@ -17,22 +17,10 @@ from ikgym.spaces import action_space, observation_space
 from ikgym.validation import FloatArray, known_names
 
 OBSERVED = ("q", "qdot", "pose", "nominal", "remaining")
-#: The keys of `info` after a step.
+#: The keys of `info` after a step; the orientation error is there where the task has an orientation.
 REPORTED = ("tracking_cost", "velocity_cost", "position_error", "orientation_error", "clipped", "time")
 #: The keys that the options of a reset may have.
 OPTIONS = ("q",)
-
-
-class NotApplicable(np.float64):
-    """A NaN that equals itself, so that equal infos compare equal; what has no orientation has no error of it."""
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, NotApplicable)
-
-    def __ne__(self, other: object) -> bool:
-        return not self == other
-
-    __hash__ = np.float64.__hash__
 
 
 class RedundantIKEnv(gym.Env[Any, Any]):
@@ -80,7 +68,7 @@ class RedundantIKEnv(gym.Env[Any, Any]):
     | `tracking_cost` | Φ^X | 1 |
     | `velocity_cost` | Φ^U | 1 |
     | `position_error` | distance of the tool point from its nominal position | [m] |
-    | `orientation_error` | geodesic angle to the nominal orientation; NaN where the task has none | [rad] |
+    | `orientation_error` | geodesic angle to the nominal orientation; absent where the task has none | [rad] |
     | `clipped` | whether the action left its box | bool |
     | `time` | time since the start | [s] |
 
@@ -95,13 +83,14 @@ class RedundantIKEnv(gym.Env[Any, Any]):
     Truncated by the environment itself after the scenario's `steps`; never terminated.
 
     Args:
-        scenario: A scenario or the name of one, see `ikgym.scenarios.names()`.
+        scenario: A scenario or what names one: a registered name, a file ending in `.toml`, or
+            `"package.module:attribute"`; see `ikgym.scenarios.find`.
         preview: How many steps ahead the nominal coordinates are shown, or which ones.
         render_mode: None, `"human"` (a window) or `"rgb_array"`.
 
     Raises:
         UnknownNameError: There is no such scenario.
-        InvalidInputError: The preview or the render mode is not valid.
+        InvalidInputError: The scenario, the preview or the render mode is not valid.
     """
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": ["human", "rgb_array"], "render_fps": 50}  # type: ignore[misc]
@@ -116,7 +105,7 @@ class RedundantIKEnv(gym.Env[Any, Any]):
             raise InvalidInputError(
                 f"render_mode: expected None or one of {self.metadata['render_modes']}, got {render_mode!r}."
             )
-        self.scenario = resolve(scenario)
+        self.scenario = scenarios.find(scenario)
         self.render_mode = render_mode
         self.observation_space = observation_space(self.scenario, preview)
         self.action_space = action_space(self.scenario)
@@ -168,20 +157,22 @@ class RedundantIKEnv(gym.Env[Any, Any]):
             )
         seen, (tracking, velocity, position, orientation, clipped) = self._simulator.step_one(action)
         self._step += 1
-        info = {
+        info: dict[str, Any] = {
             "tracking_cost": tracking,
             "velocity_cost": velocity,
             "position_error": position,
-            "orientation_error": orientation if self._has_orientation else NotApplicable("nan"),
-            "clipped": clipped > 0.0,
-            "time": self._step * self._dt,
         }
+        # A NaN differs from itself, and Gymnasium's checker insists on equal infos: what does not exist is left out.
+        if self._has_orientation:
+            info["orientation_error"] = orientation
+        info["clipped"] = clipped > 0.0
+        info["time"] = self._step * self._dt
         if self._renderer is not None:
             self._draw_later(seen["q"], position, orientation)
         return seen, -(tracking + velocity), False, self._step == self._steps, info
 
     def render(self) -> npt.NDArray[np.uint8] | None:
-        """Draws the arm, the nominal and the realised path, and the error over time.
+        """Draws the arm, the nominal and the actual path, and the error over time.
 
         Returns:
             The picture in mode ``"rgb_array"``, of shape (height, width, 3); None in mode ``"human"``.
@@ -228,12 +219,3 @@ def checked_options(options: dict[str, Any] | None, known: Sequence[str]) -> dic
         raise InvalidInputError(f"options: expected None or a dict, got {options!r}.")
     known_names("option of reset", options, known)
     return options
-
-
-def resolve(scenario: str | Scenario) -> Scenario:
-    """A scenario, or the one of a name.
-
-    Raises:
-        UnknownNameError: There is no such scenario.
-    """
-    return scenario if isinstance(scenario, Scenario) else scenarios.get(scenario)

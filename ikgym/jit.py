@@ -7,6 +7,7 @@ of all that it may reach.
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import logging
 import sys
@@ -21,6 +22,9 @@ logger = logging.getLogger("ikgym")
 
 # Stamps of whole modules, by name.
 _stamps: dict[str, str] = {}
+
+# Names of kernels for which there is no folder on disk.
+_not_kept: set[str] = set()
 
 
 def kernel(function: Any) -> Any:
@@ -37,11 +41,17 @@ def inlined(function: Any) -> Any:
     return _cached(function, inline="always")
 
 
+def kept_on_disk() -> bool:
+    """Whether there is a folder to keep the machine code of all kernels in, so that it is compiled only once."""
+    return not _not_kept
+
+
 def _cached(function: Any, **options: Any) -> Any:
     try:
         compiled = njit(cache=True, nogil=True, **options)(function)
     except RuntimeError:
         # Neither the folder of the package nor the user's own can be written.
+        _not_kept.add(f"{function.__module__}.{function.__qualname__}")
         logger.info("No folder to keep machine code in: %s is compiled anew in each process.", function.__qualname__)
         return njit(nogil=True, **options)(function)
     # Not public, and absent where compilation is switched off: then numba's own stamp has to do.
@@ -69,9 +79,12 @@ def _origin(value: object) -> str:
     """The name of the module of ours that a kernel comes from, or that has kernels; nothing for all else."""
     if isinstance(value, Dispatcher):
         return str(value.py_func.__module__)
-    if isinstance(value, ModuleType) and any(isinstance(v, Dispatcher) for v in vars(value).values()):
-        return value.__name__
-    return ""
+    return value.__name__ if isinstance(value, ModuleType) and _has_kernels(value) else ""
+
+
+@functools.cache  # kernels are many, and numpy, which all of their modules have, holds hundreds of names
+def _has_kernels(module: ModuleType) -> bool:
+    return any(isinstance(value, Dispatcher) for value in vars(module).values())
 
 
 def _source(module: str) -> bytes:

@@ -23,7 +23,7 @@ class Chain(NamedTuple):
     Attributes:
         offsets: From the frame of the joint before to the joint, in [m]. Shape (n, 3).
         axes: Unit vectors in the joints' own frames. Shape (n, 3).
-        prismatic: True where a joint slides. Shape (n,).
+        prismatic: True where a joint is prismatic. Shape (n,).
         tool: Tool point in the last frame, in [m]. Shape (3,).
         tool_rotation: Orientation of the tool in the last frame. Shape (3, 3).
     """
@@ -161,7 +161,7 @@ def joint_points(chain, q, points):
         chain: The arm, a :class:`Chain`.
         q: Joint coordinates in [rad] or [m]. Shape (n,).
         points: Receives per joint its point before and after its motion in [m]; they differ where the joint
-            slides. Shape (n, 2, 3).
+            is prismatic. Shape (n, 2, 3).
     """
     rotation = np.eye(3)
     here = np.zeros(3)

@@ -30,8 +30,14 @@ class Registry(Generic[Member]):
             make: Called without arguments, once, when the member is first asked for.
 
         Raises:
-            InvalidInputError: The name is taken.
+            InvalidInputError: The name is taken, or no text; or the maker cannot be called.
         """
+        if not isinstance(name, str) or not name.strip():
+            raise InvalidInputError(f"{self.kind}: expected a text as its name, got {name!r}.")
+        if not callable(make):
+            raise InvalidInputError(
+                f"The {self.kind} {name!r}: expected a function without arguments that makes it, got {make!r}."
+            )
         if name in self._makers:
             raise InvalidInputError(f"The {self.kind} {name!r} is registered already.")
         self._makers[name] = make

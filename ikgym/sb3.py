@@ -48,12 +48,12 @@ class RedundantIKVecEnv(VecEnv):
 
     Args:
         num_envs: N.
-        scenario: A scenario or the name of one, see `ikgym.scenarios.names()`.
+        scenario: A scenario or what names one, see `ikgym.scenarios.find`.
         preview: How many steps ahead the nominal coordinates are shown, or which ones.
 
     Raises:
         UnknownNameError: There is no such scenario.
-        InvalidInputError: N or the preview is not valid.
+        InvalidInputError: N, the scenario or the preview is not valid.
     """
 
     def __init__(self, num_envs: int = 1, scenario: str | Scenario = "varga7-fast", preview: Preview = 2) -> None:
@@ -107,7 +107,7 @@ class RedundantIKVecEnv(VecEnv):
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         for row in np.flatnonzero(ended).tolist():
             infos[row] = {
-                **{key: final["final_info"][key][row].item() for key in REPORTED},
+                **{key: final["final_info"][key][row].item() for key in REPORTED if key in final["final_info"]},
                 "TimeLimit.truncated": True,
                 "terminal_observation": final["final_obs"][row],
                 "episode": self._summary(row),
@@ -116,7 +116,7 @@ class RedundantIKVecEnv(VecEnv):
         return observation, rewards.astype(np.float32), ended, infos
 
     def close(self) -> None:
-        """Nothing is open; there is no harm in closing."""
+        """Nothing is open; closing does nothing."""
         self._envs.close()
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
@@ -128,7 +128,7 @@ class RedundantIKVecEnv(VecEnv):
         return [getattr(self._rows[index], attr_name) for index in self._get_indices(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
-        """Gives rows an attribute that they did not have before; the arms heed none.
+        """Gives rows an attribute that they did not have before; the arms use none.
 
         Raises:
             AttributeError: It is one of those that all arms share, such as the scenario: make another environment.

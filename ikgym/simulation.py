@@ -23,7 +23,7 @@ Integers = npt.NDArray[np.int64]
 Flags = npt.NDArray[np.bool_]
 
 
-class Law(NamedTuple):
+class Constants(NamedTuple):
     """What is the same in all rows and at all times.
 
     Attributes:
@@ -162,7 +162,7 @@ def step(
     prismatic,
     tool,
     tool_rotation,
-    # Law.
+    # Constants.
     kind,
     dt,
     velocity_limit,
@@ -195,9 +195,9 @@ def step(
 ):
     """Moves rows, and observes them.
 
-    The arguments are the parts of :class:`Chain`, :class:`Law`, :class:`CostParameters` and :class:`State`; then the
-    block of an outcome (see :func:`outcome`), written in place; the rows that are meant, of shape (N,); whether they
-    move or are observed where they are; the first row, and the row after the last.
+    The arguments are the parts of :class:`Chain`, :class:`Constants`, :class:`CostParameters` and :class:`State`; then
+    the block of an outcome (see :func:`outcome`), written in place; the rows that are meant, of shape (N,); whether
+    they move or are observed where they are; the first row, and the row after the last.
 
     The tuples are taken apart by the caller: numba takes their parts over one by one in less time, and would count
     references at each access to a part, which in the loop over rows takes longer than the kinematics.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -12,8 +11,11 @@ from ikgym import simulation
 from ikgym.compilation import announced
 from ikgym.exceptions import InvalidInputError
 from ikgym.parallel import in_chunks
-from ikgym.scenarios import Preview, Scenario
-from ikgym.simulation import Law, Outcome, State, outcome
+from ikgym.preview import FARTHEST as FARTHEST
+from ikgym.preview import Preview
+from ikgym.preview import offsets as offsets
+from ikgym.scenarios import Scenario
+from ikgym.simulation import Constants, Outcome, State, outcome
 from ikgym.trajectories import Trajectory
 from ikgym.validation import FloatArray, float_array
 
@@ -25,9 +27,6 @@ GRAIN_STEP = 256
 GRAIN_RESET = 4
 # Rows whose nominal frames are computed at a time: their intermediate results stay small.
 PIECE = 64
-
-# A preview beyond would fill the memory before it served any policy.
-FARTHEST = 1_000_000
 
 # What the nominal frames of all rows may take, in bytes: of many long episodes only what is near is kept.
 MEMORY = 2**26
@@ -68,7 +67,7 @@ class Simulator:
         self._last_block = self._point[self.preview[-1] :] // self._block
         self._blocks_known = np.zeros(tables, dtype=np.int64)
         self._episodes: list[Trajectory] = [scenario.trajectory] * tables
-        self._law = Law(
+        self._shared = Constants(
             kind=scenario.task.kind,
             dt=scenario.dt,
             velocity_limit=scenario.velocity_limit,
@@ -97,7 +96,7 @@ class Simulator:
         parts = self._outcome(np.arange(self._count, dtype=np.float64))[1:6]
         self._parts = [slice(int(part.flat[0]), int(part.flat[-1]) + 1) for part in parts]
         # The kernels take tuples apart, see simulation.step: what never changes is taken apart once.
-        self._constants = (*scenario.arm.chain, *self._law, *scenario.cost.parameters, *self._state)
+        self._constants = (*scenario.arm.chain, *self._shared, *scenario.cost.parameters, *self._state)
         self._all = np.ones(rows, dtype=np.bool_)
         self._own_start = np.zeros(rows, dtype=np.bool_)
         with announced("the simulation kernels"):
@@ -119,7 +118,7 @@ class Simulator:
         """
         scenario, state = self.scenario, self._state
         rows = np.flatnonzero(active)
-        noisy = bool(self._law.noise.any())
+        noisy = bool(self._shared.noise.any())
         for row in rows.tolist():
             episode = scenario.trajectory.sample(generators[row])
             if scenario.random:
@@ -289,29 +288,3 @@ def observation(out: Outcome) -> Observation:
         "nominal": out.nominal[0],
         "remaining": out.remaining[0],
     }
-
-
-def offsets(preview: Preview) -> tuple[int, ...]:
-    """The steps ahead that a preview shows.
-
-    Args:
-        preview: An int p for 1 … p, or a sequence of steps ahead.
-
-    Raises:
-        InvalidInputError: It is neither, or not rising, or below 1.
-    """
-    if isinstance(preview, (tuple, list)) and preview:
-        ahead = tuple(preview)
-        rising = all(map(_is_whole, ahead)) and all(a < b for a, b in itertools.pairwise(ahead))
-        if rising and ahead[0] >= 1 and ahead[-1] <= FARTHEST:
-            return tuple(int(step) for step in ahead)
-    elif _is_whole(preview) and 1 <= preview <= FARTHEST:  # type: ignore[operator]  # a whole number
-        return tuple(range(1, preview + 1))  # type: ignore[operator]
-    raise InvalidInputError(
-        "preview: expected a whole number of at least 1, or rising steps ahead such as (1, 10, 40), none above "
-        f"{FARTHEST}, got {preview!r}."
-    )
-
-
-def _is_whole(value: object) -> bool:
-    return isinstance(value, (int, np.integer)) and not isinstance(value, bool)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from gymnasium import spaces
 
-from ikgym.scenarios import Preview, Scenario
-from ikgym.simulator import offsets
+from ikgym.preview import Preview, offsets
+from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray
 
 # Rounding of sums over an episode and of products of rotations must not leave the box.

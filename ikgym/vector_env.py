@@ -12,7 +12,8 @@ from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
-from ikgym.env import OPTIONS, RedundantIKEnv, checked_options, resolve
+from ikgym import scenarios
+from ikgym.env import OPTIONS, RedundantIKEnv, checked_options
 from ikgym.exceptions import InvalidInputError, ResetNeededError, UnknownNameError
 from ikgym.scenarios import Preview, Scenario
 from ikgym.simulation import Outcome
@@ -42,14 +43,14 @@ class RedundantIKVectorEnv(gym.vector.VectorEnv[Observation, npt.NDArray[np.floa
 
     Args:
         num_envs: N.
-        scenario: A scenario or the name of one, see `ikgym.scenarios.names()`.
+        scenario: A scenario or what names one, see `ikgym.scenarios.find`.
         preview: How many steps ahead the nominal coordinates are shown, or which ones.
         autoreset_mode: A mode of Gymnasium, or its value such as ``"SameStep"``.
         render_mode: None; there is nothing to see of N arms. Make a single environment to render.
 
     Raises:
         UnknownNameError: There is no such scenario or autoreset mode.
-        InvalidInputError: N, the preview or the render mode is not valid.
+        InvalidInputError: N, the scenario, the preview or the render mode is not valid.
     """
 
     def __init__(
@@ -67,7 +68,7 @@ class RedundantIKVectorEnv(gym.vector.VectorEnv[Observation, npt.NDArray[np.floa
         self.num_envs = whole_number("num_envs", num_envs, at_least=1)
         self.autoreset_mode = _autoreset_mode(autoreset_mode)
         self.metadata = {**RedundantIKEnv.metadata, "autoreset_mode": self.autoreset_mode}
-        self.scenario = resolve(scenario)
+        self.scenario = scenarios.find(scenario)
         self.single_observation_space = observation_space(self.scenario, preview)
         self.single_action_space = action_space(self.scenario)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
@@ -171,6 +172,8 @@ class RedundantIKVectorEnv(gym.vector.VectorEnv[Observation, npt.NDArray[np.floa
             "clipped": out.clipped > 0.0,
             "time": self._simulator.steps_made * self.scenario.dt,
         }
+        if not self.scenario.task.has_orientation:
+            del columns["orientation_error"]
         infos: Infos = {}
         for key, column in columns.items():
             infos[key] = np.where(rows, column, column.dtype.type(0))

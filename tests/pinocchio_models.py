@@ -19,8 +19,8 @@ class ToolState(NamedTuple):
 def model_of(arm: Arm) -> tuple[pin.Model, int]:
     """The model of an arm, and the number of its tool's frame."""
     model, parent = pin.Model(), 0
-    for i, (offset, axis, slides) in enumerate(zip(arm.offsets, arm.axes, arm.prismatic, strict=True)):
-        kind = pin.JointModelPrismaticUnaligned if slides else pin.JointModelRevoluteUnaligned
+    for i, (offset, axis, prismatic) in enumerate(zip(arm.offsets, arm.axes, arm.prismatic, strict=True)):
+        kind = pin.JointModelPrismaticUnaligned if prismatic else pin.JointModelRevoluteUnaligned
         parent = model.addJoint(parent, kind(axis), pin.SE3(np.eye(3), offset), f"joint{i}")
     tool = pin.SE3(arm.tool_rotation, arm.tool)
     return model, model.addFrame(pin.Frame("tool", parent, 0, tool, pin.FrameType.OP_FRAME))

@@ -6,10 +6,12 @@ import logging
 import os
 import subprocess
 import sys
+import threading
 
 import numba.core.dispatcher
 import pytest
 
+from ikgym import compilation, jit
 from ikgym.jit import kernel
 
 CALLEE = "from {jit}\nSCALE = {scale}\n@kernel\ndef scaled(x):\n    return SCALE * x\n"
@@ -61,6 +63,8 @@ def test_without_a_folder_to_write_to(monkeypatch, caplog):
         raise RuntimeError("cannot cache function: no locator available")
 
     monkeypatch.setattr(numba.core.dispatcher.FunctionCache, "__init__", no_locator)
+    monkeypatch.setattr(jit, "_not_kept", set())
+    assert jit.kept_on_disk()
     with caplog.at_level(logging.INFO, logger="ikgym"):
 
         @kernel
@@ -69,6 +73,11 @@ def test_without_a_folder_to_write_to(monkeypatch, caplog):
 
     assert double(4) == 8
     assert "compiled anew in each process" in caplog.text
+    assert not jit.kept_on_disk()
+    with compilation.announced("the test", patience=0.01):
+        threading.Event().wait(0.2)
+    assert "Compiling the test; this happens once in each process, since there is no folder" in caplog.text
+    assert "kept on disk" not in caplog.text
 
 
 @pytest.mark.parametrize("module", ["ikgym", "baselines"])

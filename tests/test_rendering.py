@@ -160,17 +160,17 @@ def test_prismatic_joints_have_an_artist_of_their_own():
         observation, *_ = move(env)
     env.render()
     points = env.scenario.arm.joint_points(observation["q"])
-    slides = np.array(env.scenario.arm.prismatic)
+    prismatic = np.array(env.scenario.arm.prismatic)
     drawn = np.transpose(artist(env, "prismatic joint").get_data_3d())
-    np.testing.assert_array_equal(drawn[:2], points[slides][0])
+    np.testing.assert_array_equal(drawn[:2], points[prismatic][0])
     assert np.linalg.norm(drawn[1] - drawn[0]) > 0.01
     assert np.isnan(drawn[2]).all()
     turning = np.transpose(artist(env, "revolute joint").get_data_3d())
-    np.testing.assert_array_equal(turning, points[~slides, 1])
+    np.testing.assert_array_equal(turning, points[~prismatic, 1])
     assert artist(env, "prismatic joint").get_marker() != artist(env, "revolute joint").get_marker()
-    # The link is interrupted where the joint slides.
+    # The link is interrupted where the joint is prismatic.
     links = np.transpose(artist(env, "links").get_data_3d())
-    assert np.isnan(links).all(axis=1).sum() == slides.sum()
+    assert np.isnan(links).all(axis=1).sum() == prismatic.sum()
 
 
 @pytest.mark.parametrize(("name", "shown"), [("varga7-fast", True), ("zhang6-lspb", False)])
@@ -191,9 +191,9 @@ def test_tool_target_and_paths_are_where_they_should_be():
     np.testing.assert_allclose(np.ravel(artist(env, "tool").get_data_3d()), tool)
     np.testing.assert_allclose(np.ravel(artist(env, "target").get_data_3d()), nominal[4])
     np.testing.assert_allclose(np.transpose(artist(env, "nominal path").get_data_3d()), nominal)
-    realised = np.transpose(artist(env, "realised path").get_data_3d())
-    assert len(realised) == 5
-    np.testing.assert_allclose(realised[-1], tool)
+    actual = np.transpose(artist(env, "actual path").get_data_3d())
+    assert len(actual) == 5
+    np.testing.assert_allclose(actual[-1], tool)
 
 
 @pytest.mark.parametrize(("name", "panels"), [("varga7-fast", 2), ("zhang3-helix", 1)])

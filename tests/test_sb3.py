@@ -94,7 +94,6 @@ def test_returned_types_are_those_of_dummy_vec_env():
     assert rewards.dtype == np.float32
     assert ended.dtype == np.bool_
     for key, value in infos[0].items():
-        # The single environment has a NaN of its own kind where a task has no orientation.
         assert type(value) is type(wanted[0][key])
     for key, value in infos[0]["episode"].items():
         assert type(value) is type(wanted[0]["episode"][key])

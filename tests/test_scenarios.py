@@ -225,7 +225,7 @@ def test_an_error_in_a_chunk_is_not_lost(monkeypatch):
 def test_long_compilation_is_announced(caplog):
     with compilation.announced("nothing much", patience=0.01):
         threading.Event().wait(0.2)
-    assert "Compiling nothing much; this happens once" in caplog.text
+    assert "Compiling nothing much; this happens once, the machine code is kept on disk." in caplog.text
     caplog.clear()
     with compilation.announced("nothing much", patience=10.0):
         pass

@@ -110,7 +110,7 @@ def test_threads_do_not_disturb_each_other(monkeypatch):
 def test_many_arms_take_little_memory(name):
     """All arrays of a simulator of 16,384 arms, and one outcome."""
     simulator = Simulator(ikgym.scenarios.get(name), 16_384, 2)
-    taken = sum(array.nbytes for array in (*simulator._state, *simulator._law) if isinstance(array, np.ndarray))
+    taken = sum(array.nbytes for array in (*simulator._state, *simulator._shared) if isinstance(array, np.ndarray))
     assert taken + simulator.observe().numbers.nbytes < 100e6
 
 
@@ -138,7 +138,7 @@ def test_what_goes_out_shares_no_memory(make):
     for _ in range(2):
         observation, _, _, _, info = env.step(actions)
         seen += [*observation.values(), *(value for value in info.values() if isinstance(value, np.ndarray))]
-    inside = [array for array in (*env._simulator._state, *env._simulator._law) if isinstance(array, np.ndarray)]
+    inside = [array for array in (*env._simulator._state, *env._simulator._shared) if isinstance(array, np.ndarray)]
     for a, b in itertools.chain(itertools.combinations(seen, 2), itertools.product(seen, [*inside, actions])):
         assert not np.shares_memory(a, b)
     assert all(array.flags.c_contiguous and array.flags.writeable for array in seen)

@@ -15,12 +15,14 @@ from ikgym.arms.denavit_hartenberg import from_dh
 from ikgym.arms.urdf import from_urdf
 from ikgym.registry import Registry
 
-__all__ = ["Arm", "from_dh", "from_urdf", "get", "names", "register"]
+__all__ = ["SHIPPED", "Arm", "from_dh", "from_urdf", "get", "names", "register"]
 
 _registry: Registry[Arm] = Registry("arm")
 for _family in (varga, faitli, khan, zhang):
     for _name, _make in _family.ARMS.items():
         _registry.register(_name, _make)
+#: The arms of this package: what names one of them can be read by everyone.
+SHIPPED = frozenset(_registry.names())
 
 
 def get(name: str) -> Arm:

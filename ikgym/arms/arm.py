@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -13,13 +15,34 @@ from ikgym.exceptions import InvalidInputError
 from ikgym.kinematics import Chain
 from ikgym.validation import UNIT_TOLERANCE, FloatArray, Frozen, float_array, frozen_array, read_only, rotation_matrix
 
+# What is this close to unit length is a unit vector that was rounded: three parts cannot come closer in general.
+ROUNDING = 4e-16
+
+
+class UrdfReference(NamedTuple):
+    """Where an arm from a URDF file came from; see :func:`ikgym.arms.from_urdf`.
+
+    Attributes:
+        file: The file, as an absolute path.
+        base: The link that the arm begins at, None for the root.
+        tip: The link that it ends at, None for the only leaf.
+        tool: Tool point in the frame of the tip in [m], None for its origin. Shape (3,).
+        tool_rotation: Orientation of the tool in the frame of the tip, None for that frame's. Shape (3, 3).
+    """
+
+    file: Path
+    base: str | None
+    tip: str | None
+    tool: FloatArray | None
+    tool_rotation: FloatArray | None
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Arm(Frozen):
     """A serial arm, ``H = H_1 … H_n · H_tool`` (Varga 2021, eq. 6; Khan 2020, eq. 3.12).
 
-    Each joint is ``H_i = Trans(offset_i) · Rot(axis_i, q_i)``, or ``Trans(offset_i + q_i · axis_i)`` where it
-    slides. All link frames are parallel to the base at q = 0; fixed rotations between links are absorbed into
+    Each joint is ``H_i = Trans(offset_i) · Rot(axis_i, q_i)``, or ``Trans(offset_i + q_i · axis_i)`` where it is
+    prismatic. All link frames are parallel to the base at q = 0; fixed rotations between links are absorbed into
     the axes, the offsets and the tool's home orientation, which loses no generality. For arms in another form see
     :func:`ikgym.arms.from_dh` and :func:`ikgym.arms.from_urdf`.
 
@@ -28,7 +51,7 @@ class Arm(Frozen):
         offsets: From the frame of the joint before to the joint, in [m]. Shape (n, 3).
         axes: The joints' axes. Shape (n, 3). Unit vectors: an axis whose length differs from 1 by more than
             1e-6 is an error, within that it is scaled to unit length.
-        prismatic: True where a joint slides, one entry a joint. All joints turn if it is left out.
+        prismatic: True where a joint is prismatic, one entry a joint. All are revolute if it is left out.
         tool: Tool point in the last frame, in [m]. Shape (3,).
         tool_rotation: Orientation of the tool in the last frame, a rotation matrix to within 1e-6, which is made
             exactly orthogonal. Shape (3, 3).
@@ -51,6 +74,8 @@ class Arm(Frozen):
     upper: FloatArray | None = None
     velocity_limit: FloatArray | None = None
     chain: Chain = dataclasses.field(init=False, repr=False)
+    #: The URDF file that the arm was read from, None for all other arms and for changed copies.
+    urdf: UrdfReference | None = dataclasses.field(init=False, repr=False, default=None)
 
     def __post_init__(self) -> None:
         offsets = frozen_array(f"offsets of arm {self.name!r}", self.offsets, (None, 3))
@@ -151,7 +176,7 @@ class Arm(Frozen):
         )
 
     def joint_points(self, q: npt.ArrayLike) -> FloatArray:
-        """Where each joint begins and ends, in the base frame; the two differ where a joint slides.
+        """Where each joint begins and ends, in the base frame; the two differ where a joint is prismatic.
 
         Args:
             q: Joint coordinates in [rad] or [m]. Shape (n,).
@@ -170,14 +195,14 @@ class Arm(Frozen):
         """A radius around the base that the tool point never leaves, in [m].
 
         Args:
-            travel: Largest absolute joint coordinates; only those of sliding joints count. Shape (n,).
+            travel: Largest absolute joint coordinates; only those of prismatic joints count. Shape (n,).
 
         Raises:
             InvalidInputError: travel has the wrong length or is not finite.
         """
-        sliding = float_array("travel", travel, (self.joints,))[self.chain.prismatic]
+        prismatic = float_array("travel", travel, (self.joints,))[self.chain.prismatic]
         links = np.linalg.norm(self.offsets, axis=1).sum() + np.linalg.norm(self.tool)
-        return float(links + np.abs(sliding).sum())
+        return float(links + np.abs(prismatic).sum())
 
     def _rows(self, q: npt.ArrayLike) -> tuple[FloatArray, tuple[int, ...]]:
         array = float_array("q", q)
@@ -193,9 +218,11 @@ def _unit_axes(name: str, axes: FloatArray) -> FloatArray:
             what = "the zero vector" if length == 0.0 else f"{axes[i].tolist()} of length {length:.6g}"
             raise InvalidInputError(
                 f"Axis of joint {i} of arm {name!r}: expected a unit vector, got {what}. Nothing is normalised for "
-                "you, since a wrong length most often is a slip; divide the axis by its length if it is meant."
+                "you, since a wrong length most often is a mistake; divide the axis by its length if it is meant."
             )
-    return axes / lengths[:, None]
+    # A unit vector divided by its rounded length again may change in the last bit: a copy of an arm is that arm.
+    exact = np.abs(lengths - 1.0) <= ROUNDING
+    return np.where(exact[:, None], axes, axes / lengths[:, None])
 
 
 def _limits(name: str, what: str, value: npt.ArrayLike | None, n: int, default: float) -> FloatArray:

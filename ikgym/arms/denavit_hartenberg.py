@@ -38,7 +38,7 @@ def from_dh(
         d: Link offsets in [m]. Shape (n,).
         alpha: Link twists in [rad]. Shape (n,).
         theta: Joint angles at q = 0 in [rad], zeros if left out. Shape (n,).
-        prismatic: True where a joint slides, one entry a joint. All joints turn if it is left out.
+        prismatic: True where a joint is prismatic, one entry a joint. All are revolute if it is left out.
         convention: ``"standard"``: H_i = Rot_z(θ_i) Trans_z(d_i) Trans_x(a_i) Rot_x(α_i). ``"modified"``
             (Craig): H_i = Rot_x(α_i) Trans_x(a_i) Rot_z(θ_i) Trans_z(d_i), where row i holds what Craig writes
             as a_{i-1} and α_{i-1}.
@@ -70,7 +70,7 @@ def from_dh(
         link = _screw_x(alpha[i], a[i])
         if convention == "modified":
             frame = frame @ link
-        # The joint turns about, or slides along, the z axis of the frame in front of its own screw.
+        # The joint turns about, or moves along, the z axis of the frame in front of its own screw.
         axes[i], points[i] = frame[:3, 2], frame[:3, 3]
         frame = frame @ turn
         if convention == "standard":

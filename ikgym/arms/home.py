@@ -31,7 +31,7 @@ def from_home(
         name: What the arm is called.
         axes: The joints' unit axes at q = 0. Shape (n, 3).
         points: A point on each axis at q = 0 in [m]. Shape (n, 3).
-        prismatic: True where a joint slides, one entry a joint.
+        prismatic: True where a joint is prismatic, one entry a joint.
         rotation: Orientation of the tool at q = 0. Shape (3, 3).
         position: Tool point at q = 0 in [m]. Shape (3,).
         lower: Lower limits of the joints in [rad] or [m]. Shape (n,).

@@ -41,7 +41,7 @@ ROTATIONS = 2 * np.array(
 
 def khan8_approximate() -> Arm:
     """The solver's model: canonical axes, lengths 1, 1.5 and 2 m."""
-    return Arm("khan8_approximate", _segments(1.0, 1.5, 2.0), APPROXIMATE_AXES, tool=np.array([2.5, 2.5, 2.5]))
+    return Arm("khan8_approximate", _segments(1.0, 1.5, 2.0), _unit(APPROXIMATE_AXES), tool=np.array([2.5, 2.5, 2.5]))
 
 
 def khan8() -> Arm:
@@ -51,7 +51,7 @@ def khan8() -> Arm:
         rodrigues(x, a) @ rodrigues(y, b) @ rodrigues(z, c) @ axis
         for (a, b, c), axis in zip(ROTATIONS, APPROXIMATE_AXES, strict=True)
     ]
-    return Arm("khan8", _segments(1.2, 1.8, 2.2), np.array(axes), tool=np.array([2.6, 2.4, 2.3]))
+    return Arm("khan8", _segments(1.2, 1.8, 2.2), _unit(np.array(axes)), tool=np.array([2.6, 2.4, 2.3]))
 
 
 def _segments(l1: float, l2: float, l3: float) -> FloatArray:
@@ -68,6 +68,12 @@ def _segments(l1: float, l2: float, l3: float) -> FloatArray:
             [l3, l2, -l1],
         ]
     )
+
+
+def _unit(axes: FloatArray) -> FloatArray:
+    """Axes whose length differs from 1 by the rounding of their parts alone, divided by it."""
+    scaled: FloatArray = axes / np.linalg.norm(axes, axis=1)[:, None]
+    return scaled
 
 
 ARMS = {"khan8": khan8, "khan8_approximate": khan8_approximate}

@@ -5,15 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
-from ikgym.arms.arm import Arm
+from ikgym.arms.arm import Arm, UrdfReference
 from ikgym.arms.home import from_home
-from ikgym.arms.urdf_check import MOVING, UrdfJoint, read_chain
 from ikgym.exceptions import InvalidInputError, MissingDependencyError
-from ikgym.validation import FloatArray
+from ikgym.validation import FloatArray, frozen_array, rotation_matrix
+
+if TYPE_CHECKING:
+    from ikgym.arms.urdf_check import UrdfJoint
 
 # Descriptions of whole humanoids take a few hundred kilobytes.
 MAX_BYTES = 16 * 2**20
@@ -29,7 +32,13 @@ class _Home(NamedTuple):
 
 
 def from_urdf(
-    path: str | PathLike[str], *, base: str | None = None, tip: str | None = None, name: str | None = None
+    path: str | PathLike[str],
+    *,
+    base: str | None = None,
+    tip: str | None = None,
+    name: str | None = None,
+    tool: npt.ArrayLike | None = None,
+    tool_rotation: npt.ArrayLike | None = None,
 ) -> Arm:
     """An arm from the chain between two links of a URDF file.
 
@@ -43,23 +52,32 @@ def from_urdf(
     Args:
         path: The file.
         base: The link to begin at, whose frame becomes the base frame. The root link if it is left out.
-        tip: The link to end at, whose frame becomes the tool's. The only leaf below the base if it
-            is left out.
+        tip: The link to end at, whose frame becomes the tool's if there is no tool offset. The only leaf below the
+            base if it is left out.
         name: What the arm is called, the name of the robot in the file if it is left out.
+        tool: Tool point in the frame of the tip, in [m]; the frame's origin if it is left out. Shape (3,).
+        tool_rotation: Orientation of the tool in the frame of the tip, a rotation matrix; that of the frame if it
+            is left out. Shape (3, 3).
 
     Returns:
-        The arm. Lengths in [m], angles in [rad], as in the file.
+        The arm. Lengths in [m], angles in [rad], as in the file. Its :attr:`Arm.urdf` remembers where it came from.
 
     Raises:
-        InvalidInputError: The file cannot be read, is no URDF, or has no such chain from base to tip.
+        InvalidInputError: The file cannot be read, is no URDF, or has no such chain from base to tip; or the tool
+            offset has a wrong shape or is no rotation.
         UnknownNameError: There is no link of that name; the message has the nearest one.
         MissingDependencyError: Pinocchio is not installed.
     """
+    # XML parsers are slow to import, and seldom needed.
+    from ikgym.arms.urdf_check import MOVING, read_chain
+
     try:
         robot, joints = read_chain(_content(path), base, tip)
         moving = [joint for joint in joints if joint.kind in MOVING]
-        home = _home(joints)
-        return from_home(
+        tool = None if tool is None else frozen_array("tool", tool, (3,))
+        tool_rotation = None if tool_rotation is None else rotation_matrix("tool_rotation", tool_rotation)
+        home = _with_tool(_home(joints), tool, tool_rotation)
+        arm = from_home(
             robot if name is None else name,
             home.axes,
             home.points,
@@ -70,8 +88,17 @@ def from_urdf(
             upper=[joint.upper for joint in moving],
             velocity_limit=[joint.velocity for joint in moving],
         )
+        object.__setattr__(arm, "urdf", UrdfReference(Path(path).resolve(), base, tip, tool, tool_rotation))
+        return arm
     except InvalidInputError as error:
         raise InvalidInputError(f"{path}: {error}") from error
+
+
+def _with_tool(tip: _Home, tool: FloatArray | None, tool_rotation: FloatArray | None) -> _Home:
+    """The arm with a tool at its tip; without an offset bit for bit as it was."""
+    if tool is not None:
+        tip = tip._replace(position=tip.position + tip.rotation @ tool)
+    return tip if tool_rotation is None else tip._replace(rotation=tip.rotation @ tool_rotation)
 
 
 def _content(path: str | PathLike[str]) -> bytes:
@@ -99,9 +126,9 @@ def _home(joints: Sequence[UrdfJoint]) -> _Home:
         tip = data.oMf[model.getFrameId(f"link{len(joints)}")]
     except Exception as error:  # whatever Pinocchio raises, it is about this file
         raise InvalidInputError(f"expected a URDF that Pinocchio can read, got its error: {error}") from error
-    slides = np.array([joint.kind == "prismatic" for joint in joints if joint.kind in MOVING])
+    prismatic = np.array([joint.kind == "prismatic" for joint in joints if joint.kind != "fixed"])
     return _Home(
-        axes=np.where(slides, jacobian[:3], jacobian[3:]).T,
+        axes=np.where(prismatic, jacobian[:3], jacobian[3:]).T,
         points=np.array([placement.translation for placement in data.oMi][1:]),
         rotation=np.array(tip.rotation),
         position=np.array(tip.translation),

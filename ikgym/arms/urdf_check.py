@@ -16,7 +16,7 @@ from ikgym.validation import known_names
 MOVING = ("revolute", "continuous", "prismatic")
 READABLE = (*MOVING, "fixed")
 KINDS = (*READABLE, "floating", "planar")
-# Files round their axes, to (0.71, 0.71, 0) at worst; a length further from 1 is a slip.
+# Files round their axes, to (0.71, 0.71, 0) at worst; a length further from 1 is a mistake.
 AXIS_TOLERANCE = 1e-2
 # Parsers of URDF call themselves once a link: a chain of thousands overflows their stack, and that is the end
 # of the whole process.

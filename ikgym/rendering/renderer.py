@@ -106,7 +106,7 @@ class Renderer:
         return scene.pixels()
 
     def close(self) -> None:
-        """Closes the window, if there is one; closing twice does no harm."""
+        """Closes the window, if there is one; closing twice is allowed."""
         if self._in_window:
             import matplotlib.pyplot as plt
 

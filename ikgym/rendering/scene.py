@@ -46,19 +46,19 @@ class Scene:
 
     def __init__(self, figure: Figure, arm: Arm, title: str, has_orientation: bool) -> None:
         self.figure, self._title = figure, title
-        self._slides = arm.chain.prismatic
+        self._prismatic = arm.chain.prismatic
         self._background: Any = None
         figure.set_layout_engine("none")
         self._moving: list[Artist] = []
         self._space: Any = figure.add_axes((0.01, 0.165, 0.55, 0.78), projection="3d", proj_type="ortho")
         self._dress_space()
-        # Drawn in this order, so that the thin nominal path stays visible on the realised one.
-        self._realised = self._line("realised path", color=BLUE, lw=2.6)
+        # Drawn in this order, so that the thin nominal path stays visible on the actual one.
+        self._actual = self._line("actual path", color=BLUE, lw=2.6)
         self._nominal = self._line("nominal path", color=INK, lw=0.9)
         self._links = self._line("links", color=STEEL, lw=4.0, solid_capstyle="round", solid_joinstyle="round")
         self._base = self._line("base", ls="", marker="^", ms=11, mfc=INK, mec=INK)
-        # The dashes are the way that a joint has slid, the square (point 1 of each 3) is where it stands.
-        self._sliding = self._line(
+        # The dashes are the way that a prismatic joint has moved, the square (point 1 of each 3) is where it stands.
+        self._rails = self._line(
             "prismatic joint",
             color=ORANGE,
             lw=2.6,
@@ -68,7 +68,7 @@ class Scene:
             mec=INK,
             markevery=(1, 3),
         )
-        self._turning = self._line("revolute joint", ls="", marker="o", ms=6, mfc="white", mec=INK, mew=1.3)
+        self._revolute = self._line("revolute joint", ls="", marker="o", ms=6, mfc="white", mec=INK, mew=1.3)
         self._tool = self._line("tool", ls="", marker="D", ms=5.5, mfc=VERMILION, mec=INK, mew=0.8)
         self._target = self._line("target", ls="", marker="o", ms=11, mfc="none", mec=GREEN, mew=1.6)
         self._base.set_data_3d(np.zeros((3, 1)))
@@ -117,13 +117,13 @@ class Scene:
         """
         links, gap = [np.zeros(3)], np.full(3, np.nan)
         path = thinned(tool, stride(len(nominal)))
-        for (begin, end), slides in zip(joints, self._slides, strict=True):
-            links += [begin, gap, end] if slides else [end]
-        sliding = joints[self._slides]
+        for (begin, end), prismatic in zip(joints, self._prismatic, strict=True):
+            links += [begin, gap, end] if prismatic else [end]
+        rails = joints[self._prismatic]
         self._links.set_data_3d(np.vstack([*links, path[-1]]).T)
-        self._sliding.set_data_3d(np.insert(sliding, 2, np.nan, axis=1).reshape(-1, 3).T)
-        self._turning.set_data_3d(joints[~self._slides, 1].T)
-        self._realised.set_data_3d(path.T)
+        self._rails.set_data_3d(np.insert(rails, 2, np.nan, axis=1).reshape(-1, 3).T)
+        self._revolute.set_data_3d(joints[~self._prismatic, 1].T)
+        self._actual.set_data_3d(path.T)
         self._tool.set_data_3d(path[-1:].T)
         self._target.set_data_3d(nominal[len(tool) - 1, :, None])
 
@@ -201,11 +201,11 @@ class Scene:
         ]
 
     def _legend(self) -> None:
-        joints = [self._turning, self._sliding] if self._slides.any() else [self._turning]
-        if self._slides.all():
-            joints = [self._sliding]
+        joints = [self._revolute, self._rails] if self._prismatic.any() else [self._revolute]
+        if self._prismatic.all():
+            joints = [self._rails]
         self.figure.legend(
-            handles=[self._base, *joints, self._tool, self._target, self._nominal, self._realised],
+            handles=[self._base, *joints, self._tool, self._target, self._nominal, self._actual],
             loc="lower left",
             bbox_to_anchor=(0.01, 0.0),
             ncols=4,

@@ -3,19 +3,26 @@
 >>> import ikgym
 >>> ikgym.scenarios.get("varga7-fast").steps
 3000
+
+A scenario of your own is made in Python, or read from a file; see :func:`find` for all the ways to name one.
 """
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 
 from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.preview import Preview
 from ikgym.registry import Registry
 from ikgym.scenarios.catalogue import SCENARIOS
-from ikgym.scenarios.scenario import Disturbance, Preview, Scenario
+from ikgym.scenarios.disturbance import Disturbance
+from ikgym.scenarios.importing import imported
+from ikgym.scenarios.reading import load
+from ikgym.scenarios.scenario import Scenario
 from ikgym.validation import whole_number
 
-__all__ = ["SPLITS", "Disturbance", "Preview", "Scenario", "get", "names", "register", "seeds"]
+__all__ = ["SPLITS", "Disturbance", "Preview", "Scenario", "find", "get", "load", "names", "register", "seeds"]
 
 #: Reset seeds of the random scenarios, by what they are for. Scores are published on the test seeds, counted from
 #: their first; nothing may be trained or tuned on them, nor on those for validation.
@@ -47,17 +54,51 @@ def names() -> tuple[str, ...]:
     return _registry.names()
 
 
-def register(name: str, make: Callable[[], Scenario]) -> None:
+def register(scenario: Scenario | str, make: Callable[[], Scenario] | None = None) -> None:
     """Adds a scenario of your own.
 
     Args:
-        name: Its new name.
-        make: Called without arguments when the scenario is first asked for.
+        scenario: The scenario, which is registered under its own name; or a name, with the function that makes it.
+        make: Called without arguments when the scenario of that name is first asked for.
 
     Raises:
-        InvalidInputError: The name is taken.
+        InvalidInputError: The name is taken or no text, or there is nothing that makes the scenario.
     """
-    _registry.register(name, make)
+    if not isinstance(scenario, Scenario):
+        _registry.register(scenario, make)  # type: ignore[arg-type]  # checked there
+    elif make is None:
+        _registry.register(scenario.name, lambda: scenario)
+    else:
+        raise InvalidInputError(f"make: expected none beside the scenario {scenario.name!r}, got {make!r}.")
+
+
+def find(item: Scenario | str | os.PathLike[str]) -> Scenario:
+    """A scenario, in whichever way it is named.
+
+    Args:
+        item: A scenario; a registered name; a file that ends in ``.toml``; or ``"package.module:attribute"``, where
+            the attribute is a scenario or a function that makes one. Registered names take precedence.
+
+    Raises:
+        UnknownNameError: There is no scenario of that name; the message has the nearest one.
+        InvalidInputError: The file or the module does not give a scenario, or the item is nothing of all this.
+        MissingDependencyError: The file names a URDF file, and Pinocchio is not installed.
+    """
+    if isinstance(item, Scenario):
+        return item
+    if isinstance(item, os.PathLike):
+        return load(item)
+    if not isinstance(item, str):
+        raise InvalidInputError(
+            "scenario: expected a Scenario, a name of one, a file ending in .toml or 'package.module:attribute', got "
+            f"{item!r}."
+        )
+    if item not in names():
+        if item.endswith(".toml"):
+            return load(item)
+        if ":" in item:
+            return imported(item)
+    return get(item)
 
 
 def seeds(split: str, episodes: int) -> tuple[int, ...]:

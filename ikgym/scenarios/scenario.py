@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 from collections.abc import Sequence
 from typing import Any, Self
 
@@ -13,6 +14,10 @@ from gymnasium.utils import seeding
 from ikgym.arms import Arm
 from ikgym.cost import TrackingCost
 from ikgym.exceptions import InvalidInputError
+from ikgym.preview import Preview
+from ikgym.preview import furthest as furthest
+from ikgym.scenarios import writing
+from ikgym.scenarios.disturbance import Disturbance
 from ikgym.simulation import nominal_rows
 from ikgym.tasks import Task
 from ikgym.trajectories import Trajectory, frames_of
@@ -20,33 +25,6 @@ from ikgym.validation import FloatArray, Frozen, frozen_array, number, per_joint
 
 # A start given by `options={"q": …}` may be this far from home in each joint, in [rad] or [m].
 START_RANGE = 2.0 * np.pi
-
-Preview = int | Sequence[int]
-
-
-@dataclasses.dataclass(frozen=True)
-class Disturbance(Frozen):
-    """What the drives add to the joint velocity that was asked for.
-
-    Args:
-        bias: A constant, in [rad/s] or [m/s]. A number, or one a joint.
-        noise: Bound of a uniform random part, drawn anew at each step, in [rad/s] or [m/s]. A number, or one a
-            joint.
-
-    Raises:
-        InvalidInputError: A number is not finite, or a bound negative.
-    """
-
-    bias: float | tuple[float, ...] = 0.0
-    noise: float | tuple[float, ...] = 0.0
-
-    def __post_init__(self) -> None:
-        for name in ("bias", "noise"):
-            value = frozen_array(name, getattr(self, name))
-            if value.ndim > 1 or (name == "noise" and (value < 0.0).any()):
-                least = " of at least 0" if name == "noise" else ""
-                raise InvalidInputError(f"{name}: expected a number{least} or one a joint, got {value.tolist()}.")
-            object.__setattr__(self, name, float(value) if value.ndim == 0 else tuple(value.tolist()))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -106,8 +84,9 @@ class Scenario(Frozen):
                 raise InvalidInputError(
                     f"{field} of scenario {self.name!r}: expected {kind.__name__}, got {getattr(self, field)!r}."
                 )
-        if not isinstance(self.name, str):
-            raise InvalidInputError(f"name of a scenario: expected a text, got {self.name!r}.")
+        for field in ("name", "source"):
+            if not isinstance(getattr(self, field), str):
+                raise InvalidInputError(f"{field} of a scenario: expected a text, got {getattr(self, field)!r}.")
         n = self.arm.joints
         settle("model", self.arm if self.model is None else self.model)
         if not isinstance(self.model, Arm) or self.model.joints != n:
@@ -146,6 +125,23 @@ class Scenario(Frozen):
         if "arm" in changes and self.model is self.arm:
             changes.setdefault("model", None)
         return super().replace(**changes)
+
+    def save(self, file: str | os.PathLike[str]) -> None:
+        """Writes the scenario to a TOML file, which :func:`ikgym.scenarios.load` reads; every number stays exact.
+
+        An arm of this package is written as its name, one from a URDF file as a reference to that file, relative to
+        the new one, and any other in numbers.
+
+        Args:
+            file: A name that ends in ``.toml``. A file that is there already is replaced.
+
+        Raises:
+            InvalidInputError: The scenario has a part that no file can hold, such as a trajectory of your own class,
+                or the file cannot be written. No file has changed then.
+        """
+        if type(self) is not Scenario:
+            raise InvalidInputError(f"save: expected a Scenario itself, got a {type(self).__name__}.")
+        writing.save(self._fields(), file)
 
     @property
     def joints(self) -> int:
@@ -275,13 +271,3 @@ class Scenario(Frozen):
         if self.random and seed is None:
             raise InvalidInputError(f"Scenario {self.name!r} is random: a seed says which episode is meant.")
         return self.trajectory.sample(seeding.np_random(seed)[0]) if self.random else self.trajectory
-
-
-def furthest(preview: Preview) -> int:
-    """How many steps a preview looks ahead.
-
-    Raises:
-        InvalidInputError: It is no whole number of at least 0, nor a sequence of them.
-    """
-    steps: list[Any] = list(preview) if isinstance(preview, (tuple, list)) else [preview]
-    return max((whole_number("preview", step, at_least=0) for step in steps), default=0)

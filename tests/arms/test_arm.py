@@ -15,7 +15,7 @@ ARRAYS = ("offsets", "axes", "tool", "tool_rotation", "lower", "upper", "velocit
 
 
 def parts(**changes):
-    """The arguments of an arm with a turning and a sliding joint."""
+    """The arguments of an arm with a revolute and a prismatic joint."""
     return {
         "name": "two",
         "offsets": [[0.0, 0, 1], [1, 0, 0]],
@@ -164,3 +164,13 @@ def test_an_arm_is_made_once_under_its_own_name():
 def test_a_taken_name_is_refused():
     with pytest.raises(InvalidInputError, match="arm 'varga7' is registered already"):
         arms.register("varga7", lambda: Arm(**parts()))
+
+
+def test_a_copy_is_the_arm_bit_for_bit():
+    """Unit vectors whose length rounds to another number than 1 are not divided by it again."""
+    axes = np.random.default_rng(0).normal(size=(200, 3))
+    arm = Arm("many", np.zeros((200, 3)), axes / np.linalg.norm(axes, axis=1)[:, None])
+    np.testing.assert_array_equal(arm.replace(name="copy").axes, arm.axes)
+    rough = Arm("rough", np.zeros((200, 3)), arm.axes * (1 + 1e-9))
+    np.testing.assert_array_equal(rough.replace(name="copy").axes, rough.axes)
+    assert (np.linalg.norm(rough.axes, axis=1) - 1).max() < 1e-15

@@ -25,8 +25,8 @@ def trans(axis, length):
 def product(a, d, alpha, theta, prismatic, convention, q):
     """The table read as its definition says."""
     pose = np.eye(4)
-    for i, slides in enumerate(prismatic):
-        turn = rot(2, theta[i] + q[i] * (not slides)) @ trans(2, d[i] + q[i] * slides)
+    for i, linear in enumerate(prismatic):
+        turn = rot(2, theta[i] + q[i] * (not linear)) @ trans(2, d[i] + q[i] * linear)
         if convention == "standard":
             pose = pose @ turn @ trans(0, a[i]) @ rot(0, alpha[i])
         else:
@@ -55,7 +55,7 @@ def test_a_table_is_the_product_of_its_matrices(prismatic, convention):
         agree(arm, q, product(a, d, alpha, theta, prismatic, convention, q))
 
 
-def test_a_scara_slides_along_its_flipped_z():
+def test_a_scara_moves_along_its_flipped_z():
     """Two parallel turning joints, a quill that points down, and a wrist."""
     arm = from_dh(
         "scara",

@@ -441,3 +441,53 @@ def test_an_arm_from_a_file_can_be_registered(write):
         # The suites over the registry must not depend on the order of tests.
         arms._registry._makers.pop("from a file")
         arms._registry._made.pop("from a file")
+
+
+TURN = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
+OFFSET = '<origin xyz="0.1 -0.2 0.35" rpy="0 0 1.5707963267948966"/>'
+
+
+@pytest.mark.parametrize("rotated", [False, True])
+def test_a_tool_offset_is_a_fixed_joint_at_the_tip(write, rotated):
+    inside = OFFSET if rotated else OFFSET.replace("1.5707963267948966", "0")
+    end = '<link name="end"/>' + joint("mount2", "tool", "end", "fixed", inside)
+    with_tool = WHOLE.replace("</robot>", f"{end}</robot>")
+    arm = from_urdf(write(WHOLE), tip="tool", tool=[0.1, -0.2, 0.35], tool_rotation=TURN if rotated else None)
+    for q in np.random.default_rng(1).uniform(-3, 3, (20, 4)):
+        rotation, position = arm.forward(q)
+        coordinates = dict(zip(["turn", "spin", "slide", "roll"], q, strict=True))
+        expected = pinocchio_pose(with_tool, "world", "end", coordinates)
+        np.testing.assert_allclose(rotation, expected.rotation, rtol=0, atol=1e-12)
+        np.testing.assert_allclose(position, expected.translation, rtol=0, atol=1e-12)
+
+
+def test_the_jacobian_is_that_at_the_tool_point(write):
+    xml = robot(*PAIR, joint("mount", "c", "end", "fixed", OFFSET), links=("a", "b", "c", "end"))
+    arm = from_urdf(write(robot(*PAIR)), tool=[0.1, -0.2, 0.35], tool_rotation=TURN)
+    model = pin.buildModelFromXML(xml)
+    for q in np.random.default_rng(2).uniform(-3, 3, (20, 2)):
+        expected = tool_state(model, model.getFrameId("end"), q).jacobian
+        np.testing.assert_allclose(arm.jacobian(q), expected, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("tool", "message"),
+    [
+        ({"tool": [0.1, 0.2]}, r"tool: expected shape \(3,\), got \(2,\)"),
+        ({"tool": [0.1, 0.2, np.nan]}, "tool: expected finite numbers"),
+        ({"tool_rotation": 2 * np.eye(3)}, "tool_rotation: expected a rotation matrix"),
+    ],
+)
+def test_bad_tool_offsets_are_refused(write, tool, message):
+    with pytest.raises(InvalidInputError, match=rf"arm\.urdf: {message}"):
+        from_urdf(write(robot(*PAIR)), **tool)
+
+
+def test_an_arm_remembers_its_file_until_it_is_changed(write, monkeypatch):
+    path = write(robot(*PAIR))
+    monkeypatch.chdir(path.parent)
+    arm = from_urdf(path.name, tip="c", tool=[0, 0, 0.1])
+    assert (arm.urdf.file, arm.urdf.base, arm.urdf.tip) == (path.resolve(), None, "c")
+    np.testing.assert_array_equal(arm.urdf.tool, [0, 0, 0.1])
+    assert arm.replace(tool=np.zeros(3)).urdf is None
+    assert arms.get("varga7").urdf is None

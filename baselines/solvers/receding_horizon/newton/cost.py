@@ -250,9 +250,9 @@ def linearise(rules, grid, start, nominal, path, multipliers, advance, exact, sc
                 value = often[k] * cost_kernels.value(velocity, cost.delta_qdot, cost.p_in, cost.p_out)
                 total += value
                 true += value
-                slope = often[k] * cost_kernels.slope(velocity, cost.delta_qdot, cost.p_in, cost.p_out)
+                slope = often[k] * cost_kernels.gradient(velocity, cost.delta_qdot, cost.p_in, cost.p_out)
                 felt = max(abs(velocity), REST * cost.delta_qdot)
-                bend = often[k] * cost_kernels.bend(felt, cost.delta_qdot, cost.p_in, cost.p_out)
+                bend = often[k] * cost_kernels.curvature(felt, cost.delta_qdot, cost.p_in, cost.p_out)
             if multipliers[k, e + j] != 0.0 or abs(velocity) > limits[j]:
                 if advance:
                     multipliers[k, e + j] = _velocity_limit(rules, j, velocity, multipliers[k, e + j], firmness)[1]
@@ -288,8 +288,8 @@ def linearise(rules, grid, start, nominal, path, multipliers, advance, exact, sc
 def _tracking(cost, error, multiplier):
     """One component of Φ^X with its kink held: value, slope, curvature, λ, and the true value less λ's."""
     value = cost_kernels.value(error, cost.delta_x, P_X_INSIDE, cost.p_x)
-    slope = cost_kernels.slope(error, cost.delta_x, P_X_INSIDE, cost.p_x)
-    bend = cost_kernels.bend(error, cost.delta_x, P_X_INSIDE, cost.p_x)
+    slope = cost_kernels.gradient(error, cost.delta_x, P_X_INSIDE, cost.p_x)
+    bend = cost_kernels.curvature(error, cost.delta_x, P_X_INSIDE, cost.p_x)
     steepness = cost.p_x - P_X_INSIDE
     if steepness <= 0.0:
         return value, slope, bend, 0.0, 0.0
@@ -313,7 +313,7 @@ def _tracking(cost, error, multiplier):
 def _velocity_limit(rules, j, velocity, multiplier, firmness):
     limit, cost = rules.velocity_limit[j], rules.cost
     stiffness = (
-        firmness * VELOCITY_STIFFNESS * cost_kernels.bend(limit, cost.delta_qdot, cost.p_in, max(cost.p_out, 2.0))
+        firmness * VELOCITY_STIFFNESS * cost_kernels.curvature(limit, cost.delta_qdot, cost.p_in, max(cost.p_out, 2.0))
     )
     return press(velocity, -limit, limit, multiplier, stiffness, math.inf)
 

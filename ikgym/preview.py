@@ -1,0 +1,54 @@
+"""Previews: which steps ahead the nominal coordinates are shown."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ikgym.exceptions import InvalidInputError
+from ikgym.validation import whole_number
+
+#: An int p shows the steps 1 … p ahead, a sequence just those that it names.
+Preview = int | Sequence[int]
+
+# A preview beyond would fill the memory before it served any policy.
+FARTHEST = 1_000_000
+
+
+def offsets(preview: Preview) -> tuple[int, ...]:
+    """The steps ahead that a preview shows.
+
+    Args:
+        preview: An int p for 1 … p, or a sequence of steps ahead.
+
+    Raises:
+        InvalidInputError: It is neither, or not rising, or below 1.
+    """
+    if isinstance(preview, (tuple, list)) and preview:
+        ahead = tuple(preview)
+        rising = all(map(_is_whole, ahead)) and all(a < b for a, b in itertools.pairwise(ahead))
+        if rising and ahead[0] >= 1 and ahead[-1] <= FARTHEST:
+            return tuple(int(step) for step in ahead)
+    elif _is_whole(preview) and 1 <= preview <= FARTHEST:  # type: ignore[operator]  # a whole number
+        return tuple(range(1, preview + 1))  # type: ignore[operator]
+    raise InvalidInputError(
+        "preview: expected a whole number of at least 1, or rising steps ahead such as (1, 10, 40), none above "
+        f"{FARTHEST}, got {preview!r}."
+    )
+
+
+def furthest(preview: Preview) -> int:
+    """How many steps a preview looks ahead.
+
+    Raises:
+        InvalidInputError: It is no whole number of at least 0, nor a sequence of them.
+    """
+    steps: list[Any] = list(preview) if isinstance(preview, (tuple, list)) else [preview]
+    return max((whole_number("preview", step, at_least=0) for step in steps), default=0)
+
+
+def _is_whole(value: object) -> bool:
+    return isinstance(value, (int, np.integer)) and not isinstance(value, bool)

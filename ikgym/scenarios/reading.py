@@ -1,0 +1,135 @@
+"""Scenarios as TOML files: reading."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import os
+import pathlib
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from ikgym import arms, tasks
+from ikgym.arms import Arm
+from ikgym.cost import TrackingCost
+from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.scenarios.disturbance import Disturbance
+from ikgym.scenarios.scenario import Scenario
+from ikgym.scenarios.toml import checked, only_numbers
+from ikgym.trajectories import KINDS, Trajectory
+from ikgym.validation import known_names
+
+Table = dict[str, Any]
+
+#: The keys of an arm that is read from a URDF file, and what each is.
+URDF_TEXTS = {
+    "urdf": "a URDF file, relative to this file",
+    "name": "a text",
+    "base": "the name of a link",
+    "tip": "the name of a link",
+}
+URDF_NUMBERS = ("tool", "tool_rotation")
+
+
+def load(file: str | os.PathLike[str]) -> Scenario:
+    """The scenario of a file.
+
+    Args:
+        file: A TOML file, as :meth:`Scenario.save` writes it. Paths of URDF files in it are relative to it.
+
+    Returns:
+        The scenario, checked like one that is made in Python.
+
+    Raises:
+        InvalidInputError: The file cannot be read, lacks a key, or a value is of a wrong type, length or range; the
+            message names file and key.
+        UnknownNameError: There is no such key, arm, task or kind of trajectory; the message has the nearest one.
+        MissingDependencyError: An arm comes from a URDF file, and Pinocchio is not installed.
+    """
+    with _named(f"{file}: ", f" in {file}"):
+        table = _table(file)
+        known_names("key", table, [f.name for f in dataclasses.fields(Scenario)])
+        folder = pathlib.Path(file).parent
+        parts: Table = {
+            "name": checked(table, "name", str, "a text"),
+            "task": tasks.get(checked(table, "task", str, "the name of a task")),
+            "arm": _arm(table, "arm", folder),
+            "trajectory": _trajectory(checked(table, "trajectory", dict, "a table")),
+        }
+        if "model" in table:
+            parts["model"] = _arm(table, "model", folder)
+        for key, kind in {"cost": TrackingCost, "disturbance": Disturbance}.items():
+            if key in table:
+                parts[key] = _made(key, kind, checked(table, key, dict, "a table"))
+        if "source" in table:
+            parts["source"] = checked(table, "source", str, "a text")
+        checked(table, "velocity_limit", object, "a number, or one a joint")
+        numbers = {key: value for key, value in table.items() if key not in parts}
+        for key, value in numbers.items():
+            only_numbers(key, value)
+        return Scenario(**parts, **numbers)
+
+
+def _table(file: str | os.PathLike[str]) -> Table:
+    import tomllib  # seldom needed, and slow to import
+
+    try:
+        return tomllib.loads(pathlib.Path(file).read_bytes().decode())
+    except tomllib.TOMLDecodeError as error:
+        raise InvalidInputError(f"expected TOML, got a fault: {error}.") from None
+    except UnicodeDecodeError as error:
+        raise InvalidInputError(f"expected a text in UTF-8: {error}.") from None
+    except (OSError, TypeError, ValueError, RecursionError) as error:
+        raise InvalidInputError(f"expected a TOML file, got none that can be read: {error}.") from None
+
+
+def _arm(table: Table, key: str, folder: pathlib.Path) -> Arm:
+    value = checked(table, key, object, "the name of an arm or a table")
+    if isinstance(value, str):
+        return arms.get(value)
+    arm = checked(table, key, dict, "the name of an arm or a table")
+    if "urdf" not in arm:
+        return _made(key, Arm, arm, texts=("name",), truths=("prismatic",))  # type: ignore[no-any-return]
+    with _named(f"[{key}] ", f" of [{key}]"):
+        known_names("key", arm, (*URDF_TEXTS, *URDF_NUMBERS))
+        for name in set(arm).intersection(URDF_NUMBERS):
+            only_numbers(name, arm[name])
+        texts = {name: checked(arm, name, str, meant) for name, meant in URDF_TEXTS.items() if name in arm}
+        path = folder / texts.pop("urdf")
+        return arms.from_urdf(path, **texts, **{name: arm[name] for name in URDF_NUMBERS if name in arm})
+
+
+def _trajectory(table: Table) -> Trajectory:
+    with _named("[trajectory] ", " of [trajectory]"):
+        kind = checked(table, "kind", str, f"one of {', '.join(KINDS)}")
+        known_names("kind", [kind], KINDS)
+    return _made("trajectory", KINDS[kind], {key: value for key, value in table.items() if key != "kind"})  # type: ignore[no-any-return]
+
+
+def _made(
+    key: str, kind: type[Any], table: Mapping[str, Any], texts: tuple[str, ...] = (), truths: tuple[str, ...] = ()
+) -> Any:
+    """A part of a scenario, made from its table; all of its values are numbers but those named."""
+    fields = [f for f in dataclasses.fields(kind) if f.init]
+    with _named(f"[{key}] ", f" of [{key}]"):
+        known_names("key", table, [f.name for f in fields])
+        for f in fields:
+            if f.default is f.default_factory is dataclasses.MISSING:
+                checked(table, f.name, object, "a text" if f.name in texts else "numbers")
+        for name, value in table.items():
+            if name in texts:
+                checked(table, name, str, "a text")
+            elif name not in truths:
+                only_numbers(name, value)
+        return kind(**table)
+
+
+@contextlib.contextmanager
+def _named(before: str, after: str) -> Iterator[None]:
+    """Says in errors which file and which table they are about."""
+    try:
+        yield
+    except UnknownNameError as error:
+        raise UnknownNameError(f"{error.kind}{after}", error.name, error.available) from None
+    except InvalidInputError as error:
+        raise InvalidInputError(f"{before}{error}") from None

@@ -1,0 +1,87 @@
+"""What all nominal trajectories have in common."""
+
+from __future__ import annotations
+
+import abc
+import typing
+
+import numpy as np
+
+from ikgym.arms import Arm
+from ikgym.exceptions import InvalidInputError
+from ikgym.validation import FloatArray, Frozen
+
+
+class Trajectory(Frozen, abc.ABC):
+    """What all trajectories have."""
+
+    #: Whether an episode's trajectory is drawn when it begins.
+    random: typing.ClassVar[bool] = False
+    #: Whether the trajectory prescribes orientations.
+    has_orientation: typing.ClassVar[bool] = True
+
+    def sample(self, rng: np.random.Generator) -> Trajectory:
+        """The trajectory of one episode.
+
+        Args:
+            rng: The episode's generator; a fixed trajectory does not touch it.
+        """
+        del rng
+        return self
+
+    def joint_path(self, times: FloatArray) -> FloatArray | None:
+        """The nominal joint coordinates in [rad] or [m], or None for a path in Cartesian space.
+
+        Args:
+            times: Times in [s]. Shape (k,).
+
+        Returns:
+            Joint coordinates. Shape (k, n).
+        """
+        del times
+        return None
+
+    @abc.abstractmethod
+    def frames(self, times: FloatArray, model: Arm) -> FloatArray:
+        """The nominal poses.
+
+        Args:
+            times: Times in [s]. Shape (k,).
+            model: The arm through whose kinematics a joint path is mapped.
+
+        Returns:
+            Per time the 9 numbers of the rotation, row by row, and the 3 of the position in [m]; the position
+            alone where there is no orientation. Shape (k, 12) or (k, 3).
+        """
+
+    def joint_bound(self) -> FloatArray | None:
+        """Absolute joint coordinates that no nominal motion exceeds, in [rad] or [m]; None in Cartesian space.
+
+        Returns:
+            The bounds. Shape (n,).
+        """
+        return None
+
+    def reach(self, times: FloatArray, model: Arm) -> float:
+        """A radius around the base that the nominal positions do not leave, in [m].
+
+        Args:
+            times: All times of an episode in [s]. Shape (k,).
+            model: The arm through whose kinematics a joint path is mapped.
+        """
+        bound = self.joint_bound()
+        if bound is not None:
+            return model.reach(bound)
+        return float(np.linalg.norm(self.frames(times, model)[:, -3:], axis=1).max())
+
+    def check(self, model: Arm) -> None:
+        """Insists that the trajectory suits an arm.
+
+        Raises:
+            InvalidInputError: It has another number of joints.
+        """
+        bound = self.joint_bound()
+        if bound is not None and len(bound) != model.joints:
+            raise InvalidInputError(
+                f"Trajectory: expected {model.joints} joints, as arm {model.name!r} has, got {len(bound)}."
+            )

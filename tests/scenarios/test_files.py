@@ -1,0 +1,360 @@
+"""Scenarios as files: nothing is lost on the way, and every mistake in a file is named."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import os
+import tomllib
+import typing
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import ikgym
+from baselines.fingerprints import fingerprint
+from ikgym import scenarios
+from ikgym.arms import Arm, from_urdf
+from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.scenarios import Disturbance, Scenario, load
+from ikgym.scenarios.toml import document
+from ikgym.trajectories import KINDS, Helix, Sinusoid, Trajectory
+from tests.arms.test_urdf import LIMIT, joint, robot
+from tests.comparison import identical
+
+PAIR = robot(joint("j1", "a", "b"), joint("j2", "b", "c", inside='<axis xyz="0 0 1"/>' + LIMIT))
+FAST = scenarios.get("varga7-fast")
+
+AXES = np.random.default_rng(0).normal(size=(3, 3))
+OWN = Arm(
+    'own "arm" \\ größe\n\x7f',
+    np.random.default_rng(1).normal(size=(3, 3)),
+    AXES / np.linalg.norm(AXES, axis=1)[:, None],
+    (False, True, False),
+    tool=np.array([0.1, 1 / 3, -1e-300]),
+    lower=np.array([-1.0, -np.inf, -0.0]),
+    upper=np.array([1.0, np.inf, 2.0]),
+    velocity_limit=np.array([1.0, 2.0, np.inf]),
+)
+#: A scenario in which nothing has its default.
+WHOLE = Scenario(
+    "whole",
+    OWN,
+    ikgym.tasks.get("position"),
+    Sinusoid(np.array([0.1, 0.2, 1 / 3]), frequency=[1, 2, 3], phase=0.1, offset=-1e-17, sigmoid=0.7),
+    velocity_limit=[1.0, 2.0, math.pi],
+    cost=ikgym.TrackingCost(2e-3, 2.5, 0.7, 3.5, 1.5),
+    dt=1 / 3,
+    steps=17,
+    model=OWN.replace(name="model", tool=np.array([1.0, 2.0, 3.0])),
+    start=np.array([0.1, 0.2, 0.3]),
+    initial_pose=np.array([1e100, 5e-324, -0.0]),
+    iterations_per_point=(3, 2),
+    disturbance=Disturbance(bias=(0.1, -0.2, 0.3), noise=0.01),
+    source="a test",
+)
+
+
+def fields(part):
+    """All that a part is made of, in plain values."""
+    if dataclasses.is_dataclass(part):
+        return [
+            type(part).__name__,
+            {f.name: fields(getattr(part, f.name)) for f in dataclasses.fields(part) if f.init},
+        ]
+    return "None" if part is None else part
+
+
+@pytest.mark.parametrize("name", scenarios.names())
+def test_every_scenario_survives_its_file(name, tmp_path):
+    scenario, file = scenarios.get(name), tmp_path / "x.toml"
+    scenario.save(file)
+    read = load(file)
+    assert fingerprint(read) == fingerprint(scenario)
+    assert identical(fields(read), fields(scenario))
+    assert (read.model is read.arm) is (scenario.model is scenario.arm)
+
+
+def test_nothing_is_lost(tmp_path):
+    WHOLE.save(tmp_path / "x.toml")
+    read = load(tmp_path / "x.toml")
+    assert identical(fields(read), fields(WHOLE))
+    assert fingerprint(read) == fingerprint(WHOLE)
+    read.save(tmp_path / "y.toml")
+    assert (tmp_path / "y.toml").read_bytes() == (tmp_path / "x.toml").read_bytes()
+
+
+def test_every_kind_of_trajectory_has_its_name():
+    module = ikgym.trajectories
+    kinds = [k for k in map(module.__dict__.get, module.__all__) if isinstance(k, type) and k is not Trajectory]
+    assert set(KINDS.values()) == set(kinds)
+    assert {type(scenarios.get(name).trajectory) for name in scenarios.names()} == set(kinds), "one is not tested"
+
+
+VALUES = st.one_of(st.booleans(), st.integers(), st.floats(allow_nan=False), st.text(), st.lists(st.floats(-1, 1)))
+
+
+@given(st.dictionaries(st.from_regex(r"[a-z_]\w*", fullmatch=True).filter(str.isascii), VALUES))
+def test_what_is_written_is_what_is_read(values):
+    assert tomllib.loads(document({**values, "Table": values})) == {**values, "Table": values}
+
+
+def test_matrices_stand_in_rows():
+    assert document({"m": np.eye(2), "left_out": None}) == "m = [\n  [1.0, 0.0],\n  [0.0, 1.0],\n]\n"
+
+
+# Arms.
+
+
+@pytest.fixture
+def urdf(tmp_path):
+    """A URDF file beside the folder of scenario files, and an arm from it."""
+    path = tmp_path / "arms" / "two.urdf"
+    path.parent.mkdir()
+    path.write_text(PAIR)
+    return path
+
+
+def on_urdf(path, **where):
+    arm = from_urdf(path, **where)
+    sinusoid = Sinusoid(np.array([0.1, 0.2]))
+    return Scenario("mine", arm, ikgym.tasks.get("pose"), sinusoid, velocity_limit=3.0, steps=20)
+
+
+@pytest.mark.parametrize(
+    "where",
+    [
+        {},
+        {
+            "name": "mine",
+            "base": "a",
+            "tip": "c",
+            "tool": [0, 0, 0.1],
+            "tool_rotation": [[0, -1, 0], [1, 0, 0], [0, 0, 1]],
+        },
+    ],
+)
+def test_an_arm_from_a_urdf_is_a_reference_to_it(urdf, where, tmp_path, monkeypatch):
+    scenario, file = on_urdf(urdf, **where), tmp_path / "scenarios" / "mine.toml"
+    scenario.save(file)
+    table = tomllib.loads(file.read_text())["arm"]
+    assert table["urdf"] == "../arms/two.urdf"
+    assert set(table) == {"urdf", "name", *where}
+    # The path is relative to the file, not to where Python runs, and both may move together.
+    (tmp_path / "moved").mkdir()
+    for folder in ("arms", "scenarios"):
+        (tmp_path / folder).rename(tmp_path / "moved" / folder)
+    monkeypatch.chdir(tmp_path)
+    read = load("moved/scenarios/mine.toml")
+    assert identical(fields(read), fields(scenario))
+    assert fingerprint(read) == fingerprint(scenario)
+
+
+@pytest.mark.parametrize("change", ["gone", "another", "faulty"])
+def test_an_arm_whose_urdf_has_changed_is_written_in_numbers(urdf, change, tmp_path):
+    scenario = on_urdf(urdf)
+    if change == "gone":
+        urdf.unlink()
+    else:
+        urdf.write_text(PAIR.replace("0 0 1", "0 1 0") if change == "another" else "rubbish")
+    scenario.save(tmp_path / "x.toml")
+    assert "urdf" not in tomllib.loads((tmp_path / "x.toml").read_text())["arm"]
+    assert identical(fields(load(tmp_path / "x.toml")), fields(scenario))
+
+
+def test_an_arm_of_your_own_is_written_in_numbers_though_it_has_a_name_of_ours(tmp_path):
+    scenario = FAST.replace(arm=FAST.arm.replace(tool=np.array([2.0, 0.0, 0.0])))
+    scenario.save(tmp_path / "x.toml")
+    assert identical(fields(load(tmp_path / "x.toml")), fields(scenario))
+    FAST.save(tmp_path / "y.toml")
+    assert tomllib.loads((tmp_path / "y.toml").read_text())["arm"] == "varga7"
+
+
+# What no file can hold.
+
+
+class OwnTrajectory(Helix):
+    """Derived from a known kind, and another one all the same."""
+
+
+class OwnArm(Arm):
+    pass
+
+
+class OwnScenario(Scenario):
+    pass
+
+
+HELIX = scenarios.get("zhang3-helix")
+
+
+@pytest.mark.parametrize(
+    ("scenario", "message"),
+    [
+        (
+            HELIX.replace(trajectory=OwnTrajectory([0, 0, 0], 1, 1, 1)),
+            "'zhang3-helix' cannot be written: trajectory: expected one of Sinusoid, .* got a OwnTrajectory",
+        ),
+        (FAST.replace(arm=OwnArm(**FAST.arm._fields())), "arm 'varga7': expected Arm itself, got OwnArm"),
+        (
+            FAST.replace(task=FAST.task.replace(name="mine")),
+            "task: expected one of position, skew, matrix, pose, which a file can name, got Task",
+        ),
+        (FAST.replace(name="\ud800"), "cannot be written: .* surrogates not allowed"),
+        (OwnScenario(**FAST._fields()), "expected a Scenario itself, got a OwnScenario"),
+        (FAST.replace(arm=FAST.arm.replace(name=3)), "name of the arm: expected a text, got 3"),
+    ],
+)
+def test_what_cannot_be_written_says_so_and_leaves_the_file_alone(scenario, message, tmp_path):
+    file = tmp_path / "x.toml"
+    file.write_text("before")
+    with pytest.raises(InvalidInputError, match=message):
+        scenario.save(file)
+    assert file.read_text() == "before"
+    assert [file.name for file in tmp_path.iterdir()] == ["x.toml"]
+
+
+def test_a_failed_write_leaves_the_file_alone(tmp_path, monkeypatch):
+    file = tmp_path / "x.toml"
+    file.write_text("before")
+
+    def full(_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(InvalidInputError, match=r"Cannot write .*x\.toml: .*No space left"):
+        FAST.save(file)
+    assert file.read_text() == "before"
+    assert [file.name for file in tmp_path.iterdir()] == ["x.toml"]
+
+
+@pytest.mark.parametrize("name", ["x.txt", "x", 3, "bad\0name.toml", ".toml/"])
+def test_bad_names_of_files(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InvalidInputError, match=r"expected a path that ends in \.toml, got|Cannot write"):
+        FAST.save(name)
+    assert not list(tmp_path.iterdir())
+
+
+# Mistakes in a file.
+
+GOOD: dict[str, typing.Any] = {
+    "name": "'mine'",
+    "arm": "'varga7'",
+    "task": "'skew'",
+    "velocity_limit": "20.0",
+    "trajectory": "{kind = 'sinusoid', amplitude = [1, 1, 1, 1, 1, 1, 1]}",
+}
+
+
+def written(tmp_path, changes):
+    keys = {**GOOD, **changes}
+    file = tmp_path / "mine.toml"
+    file.write_text("\n".join(f"{key} = {value}" for key, value in keys.items() if value is not None))
+    return file
+
+
+def test_what_has_a_default_may_be_left_out(tmp_path):
+    read = load(written(tmp_path, {}))
+    made = Scenario("mine", FAST.arm, FAST.task, Sinusoid(np.ones(7)), velocity_limit=20.0)
+    assert identical(fields(read), fields(made))
+
+
+UNKNOWN = {
+    "key": ({"stepps": "3"}, r"no key in .*mine\.toml 'stepps'\. Did you mean 'steps'\?"),
+    "arm": ({"arm": "'varga8'"}, r"no arm in .*mine\.toml 'varga8'\. Did you mean 'varga7'\?"),
+    "task": ({"task": "'skwe'"}, r"no task in .*mine\.toml 'skwe'\. Did you mean 'skew'\?"),
+    "kind": (
+        {"trajectory": "{kind = 'sinus'}"},
+        r"no kind of \[trajectory\] in .*mine\.toml 'sinus'\. Did you mean 'sinusoid'\?",
+    ),
+    "parameter": (
+        {"trajectory": "{kind = 'sinusoid', amplitude = [1], frequencies = 1}"},
+        r"no key of \[trajectory\] in .*mine\.toml 'frequencies'\. Did you mean 'frequency'\?",
+    ),
+    "cost": ({"cost": "{delta = 1}"}, r"no key of \[cost\] in .*mine\.toml 'delta'\. Did you mean 'delta_x'"),
+    "disturbance": ({"disturbance": "{nois = 1}"}, r"of \[disturbance\] .*'nois'\. Did you mean 'noise'"),
+    "arm's": ({"arm": "{name = 'a', axis = []}"}, r"no key of \[arm\] in .*'axis'\. Did you mean 'axes'"),
+    "urdf's": ({"model": "{urdf = 'a.urdf', tipp = 'c'}"}, r"no key of \[model\] in .*'tipp'\. Did you mean 'tip'"),
+}
+
+
+@pytest.mark.parametrize(("changes", "message"), UNKNOWN.values(), ids=UNKNOWN)
+def test_unknown_names_are_answered_with_the_nearest(changes, message, tmp_path):
+    with pytest.raises(UnknownNameError, match=message):
+        load(written(tmp_path, changes))
+
+
+SEVEN = "[1, 1, 1, 1, 1, 1, 1]"
+BAD = {
+    "no name": ({"name": None}, "name: expected a text, got no such key"),
+    "no arm": ({"arm": None}, "arm: expected the name of an arm or a table, got no such key"),
+    "no task": ({"task": None}, "task: expected the name of a task, got no such key"),
+    "no trajectory": ({"trajectory": None}, "trajectory: expected a table, got no such key"),
+    "no limit": ({"velocity_limit": None}, "velocity_limit: expected a number, or one a joint, got no such key"),
+    "name": ({"name": "3"}, "name: expected a text, got 3"),
+    "source": ({"source": "[]"}, r"source: expected a text, got \[\]"),
+    "arm": ({"arm": "3"}, "arm: expected the name of an arm or a table, got 3"),
+    "trajectory": ({"trajectory": "'sinusoid'"}, "trajectory: expected a table, got 'sinusoid'"),
+    "cost": ({"cost": "1.0"}, "cost: expected a table, got 1.0"),
+    "truth": ({"velocity_limit": "true"}, "velocity_limit: expected numbers, got True"),
+    "text": ({"dt": "'0.1'"}, "dt: expected numbers, got '0.1'"),
+    "array": ({"dt": "[0.1]"}, r"dt: expected a finite number above 0, got \[0.1\]"),
+    "fraction": ({"steps": "1.5"}, "steps: expected a whole number of at least 1, got 1.5"),
+    "range": ({"steps": "0"}, "steps: expected a whole number of at least 1, got 0"),
+    "nan": ({"dt": "nan"}, "dt: expected a finite number above 0, got nan"),
+    "date": ({"dt": "2026-01-01"}, "dt: expected numbers, got datetime"),
+    "length": ({"velocity_limit": "[1, 2]"}, r"velocity_limit: expected shape \(7,\), got \(2,\)"),
+    "start": ({"start": "[1, 2]"}, r"start: expected shape \(7,\), got \(2,\)"),
+    "ragged": ({"start": "[[1], [1, 2]]"}, "start: expected an array of real numbers"),
+    "huge": ({"start": f"[{10**400}, 1]"}, "start: expected an array of real numbers"),
+    "held": ({"iterations_per_point": "[2, 0]"}, "iterations_per_point: expected a whole number of at least 1, got 0"),
+    "no kind": ({"trajectory": "{amplitude = [1]}"}, r"\[trajectory\] kind: expected one of sinusoid, .*, got no such"),
+    "no amplitude": ({"trajectory": "{kind = 'sinusoid'}"}, r"\[trajectory\] amplitude: expected numbers, got no such"),
+    "amplitude": (
+        {"trajectory": "{kind = 'sinusoid', amplitude = [true, 1]}"},
+        r"\[trajectory\] amplitude: expected numbers, got True",
+    ),
+    "joints": (
+        {"trajectory": "{kind = 'sinusoid', amplitude = [1, 1]}"},
+        "expected 7 joints, as arm 'varga7' has, got 2",
+    ),
+    "range of scale": (
+        {"trajectory": f"{{kind = 'random_sinusoid', amplitude = {SEVEN}, scale = [1, 0]}}"},
+        r"\[trajectory\] scale: expected a range \(low, high\), got \(1, 0\)",
+    ),
+    "delta_x": ({"cost": "{delta_x = 0}"}, r"\[cost\] delta_x: expected a finite number above 0, got 0"),
+    "noise": ({"disturbance": "{noise = -1}"}, r"\[disturbance\] noise: expected a number of at least 0"),
+    "no offsets": ({"arm": "{name = 'varga7'}"}, r"\[arm\] offsets: expected numbers, got no such key"),
+    "axes": (
+        {"arm": "{name = 'a', offsets = [[0, 0, 1]], axes = [[0, 0, 2]]}"},
+        r"\[arm\] Axis of joint 0 .* expected a unit vector",
+    ),
+    "prismatic": (
+        {"arm": "{name = 'a', offsets = [[0, 0, 1]], axes = [[0, 0, 1]], prismatic = [0]}"},
+        r"\[arm\] prismatic of arm 'a': expected 1 truth values",
+    ),
+    "no file": ({"arm": "{urdf = 'a.urdf'}"}, r"\[arm\] .*a\.urdf: expected a URDF file, got none that can be read"),
+    "urdf": ({"arm": "{urdf = 3}"}, r"\[arm\] urdf: expected a URDF file, relative to this file, got 3"),
+    "tip": ({"arm": "{urdf = 'a.urdf', tip = 3}"}, r"\[arm\] tip: expected the name of a link, got 3"),
+    "tool": ({"arm": "{urdf = 'a.urdf', tool = 'x'}"}, r"\[arm\] tool: expected numbers, got 'x'"),
+    "no toml": ({"name": "'"}, "expected TOML, got a fault"),
+    "deep": ({"dt": "[" * 10**5}, "expected a TOML file, got none that can be read|expected TOML"),
+}
+
+
+@pytest.mark.parametrize(("changes", "message"), BAD.values(), ids=BAD)
+def test_bad_files_are_refused(changes, message, tmp_path):
+    with pytest.raises(InvalidInputError, match=rf"mine\.toml: .*{message}|mine\.toml: ({message})"):
+        load(written(tmp_path, changes))
+
+
+def test_what_cannot_be_read_is_refused(tmp_path):
+    for file in (tmp_path, tmp_path / "missing.toml", "bad\0name", 7.5, None):
+        with pytest.raises(InvalidInputError, match="expected a TOML file, got none that can be read"):
+            load(file)
+    (tmp_path / "latin.toml").write_bytes("name = 'größe'".encode("latin-1"))
+    with pytest.raises(InvalidInputError, match=r"latin\.toml: expected a text in UTF-8"):
+        load(tmp_path / "latin.toml")

@@ -1,0 +1,146 @@
+"""The ways to name a scenario: an object, a registered name, a file, a place in a module."""
+
+from __future__ import annotations
+
+import pathlib
+import sys
+
+import gymnasium as gym
+import pytest
+
+import baselines
+import ikgym
+from ikgym import scenarios
+from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.sb3 import RedundantIKVecEnv
+
+FAST = scenarios.get("varga7-fast")
+MODULE = """
+import ikgym
+
+SHORT = ikgym.scenarios.get("varga7-fast").replace(name="short", steps=3)
+
+def make_short():
+    return SHORT
+
+def fail():
+    return 1 / 0
+
+number = 3
+"""
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """The current folder, with a file and a module of the user's own."""
+    monkeypatch.chdir(tmp_path)
+    FAST.replace(name="short", steps=3).save("short.toml")
+    (tmp_path / "my_scenarios.py").write_text(MODULE)
+    (tmp_path / "my_faulty.py").write_text("import no_such_module")
+    (tmp_path / "my_package").mkdir()
+    (tmp_path / "my_package" / "arms.py").write_text(MODULE)
+    # As in a console command, where Python does not search the current folder by itself.
+    monkeypatch.setattr(sys, "path", [place for place in sys.path if place not in ("", str(tmp_path))])
+    yield tmp_path
+    for name in ("my_scenarios", "my_faulty", "my_package", "my_package.arms"):
+        sys.modules.pop(name, None)
+
+
+@pytest.fixture
+def registry(monkeypatch):
+    monkeypatch.setattr(scenarios._registry, "_makers", dict(scenarios._registry._makers))
+    monkeypatch.setattr(scenarios._registry, "_made", dict(scenarios._registry._made))
+
+
+ITEMS = [
+    "short.toml",
+    pathlib.Path("short.toml"),
+    "my_scenarios:SHORT",
+    "my_scenarios:make_short",
+    "my_package.arms:make_short",
+    FAST.replace(name="short", steps=3),
+]
+
+
+@pytest.mark.parametrize("item", ITEMS, ids=str)
+def test_find(folder, item):
+    before = list(sys.path)
+    found = scenarios.find(item)
+    assert (found.name, found.steps, found.arm.name) == ("short", 3, "varga7")
+    assert sys.path == before
+
+
+def test_a_scenario_is_found_as_it_is():
+    assert scenarios.find(FAST) is FAST
+    assert scenarios.find("varga7-fast") is FAST
+
+
+def test_registered_names_take_precedence(folder, registry):
+    scenarios.register("short.toml", lambda: FAST)
+    scenarios.register("my_scenarios:SHORT", lambda: FAST)
+    assert scenarios.find("short.toml") is scenarios.find("my_scenarios:SHORT") is FAST
+
+
+@pytest.mark.parametrize(
+    ("item", "error", "message"),
+    [
+        ("varga7-fats", UnknownNameError, r"There is no scenario 'varga7-fats'\. Did you mean 'varga7-fast'\?"),
+        (3, InvalidInputError, r"scenario: expected a Scenario, a name of one, a file ending in \.toml or .* got 3"),
+        (None, InvalidInputError, "got None"),
+        ("shot.toml", InvalidInputError, r"shot\.toml: expected a TOML file, got none that can be read"),
+        ("my_scenarios:SHOT", UnknownNameError, r"attribute of my_scenarios 'SHOT'\. Did you mean 'SHORT'\?"),
+        ("my_scenarios:number", InvalidInputError, "expected a Scenario or what makes one, got 3"),
+        ("my_scenarios:fail", InvalidInputError, "making it failed: ZeroDivisionError: division by zero"),
+        ("no_such:x", InvalidInputError, "no_such cannot be imported: ModuleNotFoundError: No module named 'no_such'"),
+        ("my_faulty:x", InvalidInputError, "my_faulty cannot be imported: .*No module named 'no_such_module'"),
+        ("my_scenarios:", InvalidInputError, "expected 'package.module:attribute', got 'my_scenarios:'"),
+        (":x", InvalidInputError, "expected 'package.module:attribute', got ':x'"),
+        ("a b:x", InvalidInputError, "expected 'package.module:attribute', got 'a b:x'"),
+    ],
+)
+def test_what_is_not_found(folder, item, error, message):
+    with pytest.raises(error, match=message):
+        scenarios.find(item)
+
+
+@pytest.mark.parametrize("item", ITEMS, ids=str)
+def test_all_that_takes_a_scenario_finds_it(folder, item):
+    assert gym.make("RedundantIK-v0", scenario=item).unwrapped.scenario.steps == 3
+    assert gym.make_vec("RedundantIK-v0", num_envs=2, scenario=item).unwrapped.scenario.steps == 3
+    assert RedundantIKVecEnv(2, item).scenario.steps == 3
+    policy = baselines.make("dls", item)
+    observation, _ = ikgym.RedundantIKEnv(item, policy.preview).reset()
+    assert policy.predict(observation)[0].shape == (7,)
+
+
+def test_a_scenario_is_registered_under_its_name(registry):
+    mine = FAST.replace(name="mine", steps=3)
+    scenarios.register(mine)
+    assert scenarios.get("mine") is mine
+    assert "mine" in scenarios.names()
+    with pytest.raises(InvalidInputError, match="scenario 'mine' is registered already"):
+        scenarios.register(mine)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("new",), "The scenario 'new': expected a function without arguments that makes it, got None"),
+        (("new", 3), "The scenario 'new': expected a function without arguments that makes it, got 3"),
+        ((3, lambda: FAST), "scenario: expected a text as its name, got 3"),
+        ((None,), "scenario: expected a text as its name, got None"),
+        ((" ", lambda: FAST), "scenario: expected a text as its name, got ' '"),
+        ((FAST.replace(name=""),), "scenario: expected a text as its name, got ''"),
+        ((FAST.replace(name="new"), lambda: FAST), "make: expected none beside the scenario 'new', got <function"),
+    ],
+)
+def test_bad_registrations_are_refused(arguments, message, registry):
+    before = scenarios.names()
+    with pytest.raises(InvalidInputError, match=message):
+        scenarios.register(*arguments)
+    assert scenarios.names() == before
+
+
+def test_arms_are_registered_with_the_same_checks():
+    with pytest.raises(InvalidInputError, match="The arm 'new': expected a function without arguments"):
+        ikgym.arms.register("new", ikgym.arms.get("varga7"))

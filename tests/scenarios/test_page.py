@@ -1,0 +1,70 @@
+"""What docs/scenarios.md says of scenarios of one's own holds."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import ikgym
+from ikgym.scenarios import Scenario
+from ikgym.scenarios.reading import URDF_NUMBERS, URDF_TEXTS
+from tests.arms.test_urdf import joint, robot
+
+ROOT = Path(__file__).parents[2]
+TEXT = (ROOT / "docs" / "scenarios.md").read_text(encoding="utf-8").split("## A scenario of your own")[1]
+WHOLE, ON_URDF = re.findall(r"```toml\n(.*?)```", TEXT, re.DOTALL)
+(SNIPPET,) = re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL)
+
+
+@pytest.fixture
+def registry(monkeypatch):
+    monkeypatch.setattr(ikgym.scenarios._registry, "_makers", dict(ikgym.scenarios._registry._makers))
+    monkeypatch.setattr(ikgym.scenarios._registry, "_made", dict(ikgym.scenarios._registry._made))
+
+
+def test_the_example_is_the_file_of_the_examples():
+    assert tomllib.loads(WHOLE) == tomllib.loads((ROOT / "examples" / "planar4.toml").read_text(encoding="utf-8"))
+
+
+def test_the_file_and_the_lines_of_python_give_the_same(tmp_path, monkeypatch, registry):
+    monkeypatch.chdir(tmp_path)
+    Path("page.toml").write_text(WHOLE, encoding="utf-8")
+    assert len([line for line in SNIPPET.splitlines() if line and not line.startswith("import")]) <= 10
+    exec(SNIPPET, {})
+    page, mine = (ikgym.scenarios.load(f"{name}.toml") for name in ("page", "mine"))
+    assert ikgym.scenarios.get("planar4-wave").steps == page.steps == mine.steps
+    assert page.cost == mine.cost
+    np.testing.assert_allclose(page.nominal(), mine.nominal(), rtol=0, atol=1e-12)
+
+
+def test_the_table_of_keys_is_complete():
+    keys = re.findall(r"^\| `(\w+)` \|.*\| (.*) \|$", TEXT, re.MULTILINE)
+    fields = {f.name: f for f in dataclasses.fields(Scenario)}
+    assert sorted(key for key, _ in keys) == sorted(fields)
+    for key, default in keys:
+        needed = fields[key].default is fields[key].default_factory is dataclasses.MISSING
+        assert (default == "an error") is needed, key
+        if isinstance(fields[key].default, (int, float)):
+            assert float(default) == fields[key].default
+
+
+def test_the_arm_from_a_urdf_is_read(tmp_path):
+    arm = tomllib.loads(ON_URDF)["arm"]
+    assert set(arm) <= {*URDF_TEXTS, *URDF_NUMBERS}
+    (tmp_path / "robots").mkdir()
+    xml = robot(joint("j1", "base_link", "b"), joint("j2", "b", "flange"), links=("base_link", "b", "flange"))
+    (tmp_path / arm["urdf"]).write_text(xml)
+    head, trajectory = WHOLE.split("[arm]")[0], "[trajectory]\nkind = 'sinusoid'\namplitude = [0.1, 0.1]\n"
+    (tmp_path / "x.toml").write_text(head + ON_URDF + trajectory, encoding="utf-8")
+    scenario = ikgym.scenarios.load(tmp_path / "x.toml")
+    assert scenario.arm.joints == 2
+    np.testing.assert_allclose(scenario.arm.forward([0, 0])[1], [0, 0, 0.1])
+
+
+def test_the_kinds_of_trajectories_are_named():
+    assert all(f"`{kind}`" in TEXT for kind in ikgym.trajectories.KINDS)
