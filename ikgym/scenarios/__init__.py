@@ -7,6 +7,8 @@
 
 from __future__ import annotations
 
+import functools
+import importlib
 from collections.abc import Callable
 
 from ikgym.exceptions import InvalidInputError, UnknownNameError
@@ -15,7 +17,7 @@ from ikgym.scenarios.catalogue import SCENARIOS
 from ikgym.scenarios.scenario import Disturbance, Preview, Scenario
 from ikgym.validation import whole_number
 
-__all__ = ["SPLITS", "Disturbance", "Preview", "Scenario", "get", "names", "register", "seeds"]
+__all__ = ["SPLITS", "Disturbance", "Preview", "Scenario", "find", "get", "names", "register", "seeds"]
 
 #: Reset seeds of the random scenarios, by what they are for. Scores are published on the test seeds, counted from
 #: their first; nothing may be trained or tuned on them, nor on those for validation.
@@ -40,6 +42,27 @@ def get(name: str) -> Scenario:
     if not isinstance(scenario, Scenario):
         raise InvalidInputError(f"Scenario {name!r}: its maker gave {scenario!r}, which is no Scenario.")
     return scenario
+
+
+def find(item: str | Scenario) -> Scenario:
+    """The scenario that is meant by a scenario, its name, or ``"package.module:attribute"``.
+
+    Raises:
+        UnknownNameError: There is no scenario of that name.
+        InvalidInputError: The attribute cannot be imported, or is no scenario.
+    """
+    if isinstance(item, Scenario):
+        return item
+    if not isinstance(item, str) or ":" not in item:
+        return get(item)
+    module, _, attribute = item.partition(":")
+    try:
+        found = functools.reduce(getattr, attribute.split("."), importlib.import_module(module))
+    except Exception as e:  # whatever the module of somebody else raises
+        raise InvalidInputError(f"Scenario {item!r}: cannot be imported: {type(e).__name__}: {e}.") from e
+    if not isinstance(found, Scenario):
+        raise InvalidInputError(f"Scenario {item!r}: expected a Scenario, got {found!r}.")
+    return found
 
 
 def names() -> tuple[str, ...]:

@@ -221,7 +221,7 @@ def test_a_job_played_elsewhere_gives_the_same_row():
     (job,) = make_plan("varga7-fast", "dls", steps=STEPS).jobs
     ((_, row, series),) = play([pickle.loads(pickle.dumps(job))])
     assert timeless([row]) == timeless([play([job])[0][1]])
-    assert set(series) >= {"time", "pose", "nominal", "q", "qdot", "nominal_q", "position_error", "sliding"}
+    assert set(series) >= {"time", "pose", "nominal", "q", "qdot", "nominal_q", "position_error", "prismatic"}
 
 
 def test_workers_change_nothing_but_the_times(tmp_path):
