@@ -191,7 +191,7 @@ def _columns(names: Mapping[int, str]) -> list[Column]:
         Column("total", "cost", lambda s: number(s.total_cost.mean)),
         Column("tracking", "cost", lambda s: number(s.tracking_cost)),
         Column("velocity", "cost", lambda s: number(s.velocity_cost)),
-        Column("cost ratio", "", lambda s: number(None if s.cost_ratio is None else s.cost_ratio.mean)),
+        Column("cost", "ratio", lambda s: number(None if s.cost_ratio is None else s.cost_ratio.mean)),
         Column("pos max", "[mm]", lambda s: number(s.position_error_max, 1e3)),
         Column("ori max", "[mrad]", lambda s: number(s.orientation_error_max, 1e3)),
         Column("q̇ peak", "", lambda s: number(s.qdot_peak)),
