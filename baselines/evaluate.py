@@ -20,8 +20,7 @@ from typing import Annotated, Literal
 import tyro
 
 from baselines.evaluation import report
-from baselines.evaluation.entrants import ALL, AnyPolicy
-from baselines.evaluation.foreign import Wrap
+from baselines.evaluation.entrants import ALL, AnyPolicy, Wrap
 from baselines.evaluation.machine import describe
 from baselines.evaluation.manual import manual
 from baselines.evaluation.plan import Plan, make_plan

@@ -11,8 +11,7 @@ import numpy as np
 
 from baselines.evaluation import metrics
 from baselines.evaluation import test_sets as known_sets
-from baselines.evaluation.entrants import ALL, AnyPolicy, Entrant, entrants
-from baselines.evaluation.foreign import Wrap
+from baselines.evaluation.entrants import ALL, AnyPolicy, Entrant, Wrap, entrants
 from baselines.evaluation.rollout import Player
 from baselines.files import ResultsError
 from baselines.fingerprints import fingerprint

@@ -15,8 +15,7 @@ from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
 from baselines.canonical import canonical, jsonable
-from baselines.evaluation.entrants import check_sendable
-from baselines.evaluation.foreign import ForeignPolicy, play_wrapped
+from baselines.evaluation.entrants import ForeignPolicy, check_sendable, play_wrapped
 from baselines.evaluation.machine import describe
 from baselines.evaluation.metrics import Row, measure
 from baselines.evaluation.plan import Job

@@ -15,8 +15,7 @@ from matplotlib.figure import Figure
 from threadpoolctl import threadpool_limits
 
 from baselines.episode import added_up
-from baselines.evaluation.entrants import AnyPolicy, entrant
-from baselines.evaluation.foreign import Wrap
+from baselines.evaluation.entrants import AnyPolicy, Wrap, entrant
 from baselines.evaluation.plots import tracking as picture
 from baselines.evaluation.rollout import Episode
 from baselines.evaluation.runner import play_episodes
