@@ -106,7 +106,7 @@ class ForeignEntrant(Entrant):
             offsets(own)
         except InvalidInputError as e:
             raise InvalidInputError(f"Policy {self.name!r}: {e}") from None
-        shown: Preview = own
+        shown: Preview = tuple(own) if isinstance(own, list) else own
         return shown
 
 

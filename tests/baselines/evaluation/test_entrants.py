@@ -232,6 +232,8 @@ def test_what_others_are_shown():
     assert evaluate("varga7-fast", Bare(), steps=3, preview=(2, 9))[0].preview == 9
     with pytest.raises(InvalidInputError, match=r"'Bare': nobody says how many steps ahead .* Give preview=…"):
         evaluate("varga7-fast", Bare(), steps=3)
+    model.preview = [2, 5]
+    assert evaluate("varga7-fast", model, steps=3)[0].preview == 5
     model.preview = (4, 1)
     with pytest.raises(InvalidInputError, match="'Seeing': preview: expected a whole number of at least 1, or rising"):
         evaluate("varga7-fast", model, steps=3)
