@@ -2,6 +2,8 @@
 
 >>> from baselines.evaluate import evaluate
 >>> rows = evaluate("varga7-fast", ["dls", ("rhc_gradient", {"horizon": 5})])
+>>> rows.skipped
+()
 """
 
 from __future__ import annotations
@@ -12,37 +14,34 @@ import datetime
 import pathlib
 import shlex
 import sys
-import textwrap
 from collections.abc import Iterable, Sequence
 from typing import Annotated, Literal
 
 import tyro
 
-from baselines import registry
 from baselines.evaluation import report
-from baselines.evaluation import test_sets as known_sets
+from baselines.evaluation.entrants import ALL, AnyPolicy, Wrap
 from baselines.evaluation.machine import describe
-from baselines.evaluation.metrics import Row
-from baselines.evaluation.plan import ALL, Plan, make_plan
-from baselines.evaluation.results import Results
+from baselines.evaluation.manual import manual
+from baselines.evaluation.plan import Plan, make_plan
+from baselines.evaluation.results import Results, Rows
 from baselines.evaluation.runner import run
 from baselines.files import write
-from baselines.spec import PolicySpec
-from ikgym import scenarios as scenario_registry
 from ikgym.exceptions import IkgymError
-from ikgym.scenarios import Scenario
+from ikgym.scenarios import Preview, Scenario
 from ikgym.validation import whole_number
 
 
 def evaluate(
     scenarios: str | Scenario | Iterable[str | Scenario] = (),
-    policies: PolicySpec | Iterable[PolicySpec] = ALL,
+    policies: AnyPolicy | Iterable[AnyPolicy] = ALL,
     *,
     test_sets: str | Iterable[str] = (),
     episodes: int = 1,
     split: str = "test",
     steps: int | None = None,
-    preview: int | None = None,
+    preview: Preview | None = None,
+    wrap: Wrap | None = None,
     timed: int | Literal["all"] = 1,
     trust: bool = False,
     workers: int = 1,
@@ -51,41 +50,51 @@ def evaluate(
     overwrite: bool = False,
     plots: bool = True,
     progress: bool = False,
-) -> list[Row]:
+) -> Rows:
     """Plays all policies on all scenarios, and measures them.
 
     Episodes of one policy in one scenario are played together, but for those that are timed. Everything but the time
     columns is the same at every run, however many are timed and whatever the number of workers. A policy that does not
-    suit a scenario is left out there.
+    suit a scenario is left out there, and named in what is returned.
 
     Args:
-        scenarios: Scenarios or their names; ``"all"`` stands for all that are registered.
+        scenarios: Scenarios, their names, ``"file.toml"`` or ``"package.module:attribute"``; ``"all"`` stands for all
+            that are registered.
         policies: Names, names with parameters such as ``"dls:damping=1e-2"``, or pairs such as
-            ``("dls", {"damping": 1e-2})``; ``"agent:PATH"`` for an agent in a file; ``"all"`` stands for all that are
-            registered.
+            ``("dls", {"damping": 1e-2})``; ``"agent:PATH"`` for an agent in a file; classes and instances of
+            :class:`baselines.SolverPolicy`; any object or class with the `predict` of Stable-Baselines3;
+            ``"package.module:Class"`` for one of those; ``"all"`` stands for all that are registered. What must be
+            given an argument to be made, such as a class with ``__init__(self, scenario)``, is given the scenario.
+            What is no :class:`baselines.SolverPolicy` is called for one arm at a time, and once more before the first
+            step, which does not count.
         test_sets: Names of test sets, see :mod:`baselines.evaluation.test_sets`, instead of scenarios, episodes,
             split and steps.
         episodes: Episodes of a random scenario: the first of the split. A scenario that is the same at every reset
             has one, with seed 0.
         split: Where the seeds of random scenarios come from, see :data:`ikgym.scenarios.SPLITS`.
         steps: Most steps of an episode, for trials; the scenarios' own if left out.
-        preview: Steps ahead that policies are shown; what each asks for if left out.
+        preview: Steps ahead that policies are shown, or which ones, such as (1, 10, 40); what each asks for by its
+            attribute `preview` if left out.
+        wrap: Wraps the environment for policies that are no :class:`baselines.SolverPolicy`, as an agent needs it that
+            was trained on a wrapped one: ``wrap(env) -> env``. Costs and errors are those below the wrappers.
         timed: Episodes of each policy in each scenario that are played alone, with the clock; ``"all"`` for all.
         trust: Whether files of agents may run code of their own, see :class:`baselines.agents.policy.Agent`.
         workers: Processes that play episodes; 1 means this one. More than one need a main module that may be
             imported, that is with ``if __name__ == "__main__":``.
         out: Where files go; nowhere if left out.
         resume: Goes on with what is in `out`.
-        overwrite: Throws away what is in `out`.
+        overwrite: Overwrites what is in `out`.
         plots: Whether to draw plots; needs `out`.
         progress: Whether to show a bar on stderr.
 
     Returns:
-        One row an episode, policy by policy within each scenario.
+        One row an episode, policy by policy within each scenario: a list, whose `skipped` names the policies that do
+        not suit a scenario.
 
     Raises:
         UnknownNameError: There is no such scenario, policy, parameter, split or test set.
-        InvalidInputError: A value is out of range, a policy refuses what it is shown, or a test set has drifted or
+        InvalidInputError: A value is out of range, a policy cannot be imported, refuses what it is shown, is shown
+            nothing, cannot go to a worker or chooses no action; nothing suits any scenario; a test set has drifted or
             is to be changed.
         ResultsError: `out` cannot be read or written, or is not to be gone on with; the file of an agent cannot be
             used.
@@ -99,6 +108,7 @@ def evaluate(
         split=split,
         steps=steps,
         preview=preview,
+        wrap=wrap,
         timed=timed,
         trust=trust,
     )
@@ -125,19 +135,19 @@ def _carry_out(
     plots: bool,
     progress: bool,
     command: str,
-) -> list[Row]:
+) -> Rows:
     whole_number("workers", workers, at_least=1)
     results = None if out is None else Results(out, plan, describe(), resume=resume, overwrite=overwrite)
     left = [job for job in plan.jobs if results is None or not results.done(job)]
     rows = {} if results is None else {row.key: row for row in results.rows}
     with contextlib.closing(run(left, workers=workers, progress=progress)) as batches:
-        for outcomes in batches:
-            rows.update({job.key: row for job, row, _ in outcomes})
+        for played in batches:
+            rows.update({one.job.key: one.row for one in played})
             if results is not None:
-                results.add(outcomes)
+                results.add(played)
     if results is not None:
         _finish(results, plan, plots=plots, progress=progress, command=command)
-    return [rows[job.key] for job in plan.jobs]
+    return Rows([rows[job.key] for job in plan.jobs], plan.skipped)
 
 
 def _finish(results: Results, plan: Plan, *, plots: bool, progress: bool, command: str) -> None:
@@ -160,11 +170,13 @@ class Options:
     """What the command line takes."""
 
     scenarios: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME …")] = ()
-    """Names of scenarios, or: all. If neither scenarios nor test sets are named: varga7-fast."""
+    """Names of scenarios, FILE.toml, MODULE:ATTRIBUTE, or: all. If neither scenarios nor test sets are named:
+    varga7-fast."""
     test_sets: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME …")] = ()
     """Names of test sets, which say themselves what is played: instead of scenarios, episodes, split and steps."""
     policies: Annotated[tuple[str, ...], tyro.conf.arg(metavar="POLICY …")] = (ALL,)
-    """Policies as NAME or NAME:PARAMETER=VALUE,PARAMETER=VALUE, or agent:PATH for an agent in a file, or: all."""
+    """Policies as NAME or NAME:PARAMETER=VALUE,PARAMETER=VALUE, agent:PATH for an agent in a file, MODULE:CLASS for
+    one of your own, also of a module in the current folder, or: all."""
     episodes: Annotated[int, tyro.conf.arg(metavar="N")] = 1
     """Episodes of each random scenario: the first seeds of the split. Other scenarios are the same at every reset and
     have one episode, with seed 0."""
@@ -184,7 +196,7 @@ class Options:
     resume: bool = False
     """Go on with the results in the folder: what is done already is not done again."""
     overwrite: bool = False
-    """Throw away the results in the folder."""
+    """Overwrite the results in the folder."""
     workers: Annotated[int, tyro.conf.arg(metavar="N")] = 1
     """Processes that play episodes at the same time. They change nothing but the times, which are the truer the
     fewer processes there are."""
@@ -192,58 +204,6 @@ class Options:
     """Draw plots into the folder."""
     operations: bool = False
     """Print what a step costs in evaluations of the kinematics, factorisations and measured poses, too."""
-
-
-def manual() -> str:
-    """The text of ``--help`` above the options."""
-    policies = (name + (" (reference)" if report.is_reference(name) else "") for name in registry.names())
-    return f"""\
-Plays every policy on every scenario, and measures costs, errors, joint velocities and the time per step.
-
-{_listing("Scenarios", scenario_registry.names())}
-
-{_listing("Test sets", known_sets.names())}
-
-{_listing("Policies", (*policies, "agent:PATH (an agent in a file)"))}
-
-Examples:
-  python -m baselines.evaluate
-  python -m baselines.evaluate --policies dls dls:damping=1e-2 rhc_gradient:alpha_max=5e-4,horizon=5
-  python -m baselines.evaluate --scenarios varga7-random --episodes 20 --workers 4 --out results/random
-  python -m baselines.evaluate --scenarios varga7-random --episodes 50 --out results/random --resume
-  python -m baselines.evaluate --test-sets varga7-random --policies rhc_gradient --out results/test
-  python -m baselines.evaluate --scenarios varga7-random --policies agent:runs/mine.safetensors dls
-
-Files in the folder of --out, each replaced in one go, so that a run may be stopped at any time:
-  results.json  a list of rows, one an episode, written anew after each batch
-  results.csv   the same as a table
-  README.md     tables, plots and conditions
-  plots/        for each scenario: tracking and errors, joint velocities, joint paths, cost against time
-  series/       what the plots show, as .npz
-
-Columns:
-  scenario, policy, parameters, seed, steps      which episode it is
-  total_cost = tracking_cost + velocity_cost     sum of -reward
-  cost ratio                                         total_cost / best known cost, null where there is none above 1e-9
-  position_error_max, position_error_rms         distance from the nominal position in [m]
-  orientation_error_max, orientation_error_rms   geodesic angle in [rad], null where the task has none
-  qdot_peak, qdot_rms, qdot_total_variation      of the joint velocities, in [rad/s] or [m/s]
-  time_first_us                                  wall time of the first call of the policy in [µs]
-  time_p50_us, time_p99_us                       that of the later calls, null where the episode was not timed
-  deadline_misses                                later calls that were longer than the time step of the scenario
-  status                                         the worst of the episode
-  machine                                        CPU, cores and versions
-  iterations, status_counts                      mean iterations in one step, and how many steps ended how
-  preview                                        steps ahead that were shown, the furthest of some
-  fingerprint                                    digest of the scenario and the version of the cost
-  test_set                                       digest of the test set, null where there is none
-  operations                                     mean kinematics, Jacobians, factorisations, measurements in a step
-
-Costs and errors of scenarios that hold their nominal points are those of the last step of each point."""
-
-
-def _listing(title: str, names: Iterable[str]) -> str:
-    return textwrap.fill(f"{title}: {', '.join(names)}.", 100, subsequent_indent="  ", break_on_hyphens=False)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -262,6 +222,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         description=manual(),
         args=arguments,
     )
+    if (here := str(pathlib.Path.cwd())) not in sys.path:
+        sys.path.append(here)  # for modules of the user, where a console command does not look
     try:
         plan = make_plan(
             options.scenarios or (() if options.test_sets else ("varga7-fast",)),

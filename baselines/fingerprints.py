@@ -29,6 +29,11 @@ def fingerprint(scenario: Scenario) -> str:
     return _digest(cost_kernels.COST_VERSION, _canonical(parts))
 
 
+def same(one: object, other: object) -> bool:
+    """Whether two frozen objects, such as problems, have the same content, numbers in arrays up to rounding."""
+    return canonical(_canonical(one)) == canonical(_canonical(other))
+
+
 def episode_hash(scenario: Scenario | str, seed: int) -> str:
     """Twelve digits that stand for one episode: its scenario, the version of the cost, and its seed.
 

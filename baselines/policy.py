@@ -138,7 +138,7 @@ class SolverPolicy(Frozen, abc.ABC):
 
     problem: Problem
 
-    #: The name in the registry.
+    #: What messages call the policy; that of the class if left out. Results have the name in the registry.
     name: ClassVar[str]
     #: Whether the policy knows more than its observation: a reference, not a contender.
     reference: ClassVar[bool] = False
@@ -150,6 +150,12 @@ class SolverPolicy(Frozen, abc.ABC):
     nameless: ClassVar[str | None] = None
     #: Parameters without which nobody can tell whether the policy suits a scenario.
     decisive: ClassVar[tuple[str, ...]] = ()
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        """A policy that gives itself no name, nor has one of its base, is called by its class."""
+        super().__init_subclass__(**options)
+        if getattr(cls, "name", None) in {None, *(base.__name__ for base in cls.__mro__[1:])}:
+            cls.name = cls.__name__
 
     @classmethod
     def for_scenario(cls, scenario: Scenario, **parameters: Any) -> Self:

@@ -8,7 +8,9 @@ from __future__ import annotations
 import functools
 import importlib
 import importlib.metadata
+import inspect
 import re
+import sys
 from typing import Any
 
 from baselines.policy import SolverPolicy
@@ -19,6 +21,9 @@ from ikgym.validation import known_names
 
 #: The entry points that other packages register policies by: ``name = "module:Class"``.
 GROUP = "ikgym.policies"
+
+#: How a place is written: ``package.module:Class``.
+PLACE = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*(\.[^\W\d]\w*)*")
 
 _SOLVERS = "baselines.solvers"
 
@@ -61,22 +66,24 @@ def names() -> tuple[str, ...]:
 def register(name: str, place: str | type[SolverPolicy]) -> None:
     """Adds a policy of your own.
 
+    Results have the name that it is registered by, whatever the class calls itself.
+
     Args:
         name: Its new name.
         place: Where its class is, ``"package.module:Class"``, imported when it is first asked for; or the class.
 
     Raises:
-        InvalidInputError: The name is taken or no name, or the place has another form.
+        InvalidInputError: The name is taken or no name, the place has another form, or the class is no policy.
     """
     if not isinstance(name, str) or not re.fullmatch(r"\w[\w.-]*", name):
         raise InvalidInputError(f"policy: expected a name of letters, digits, '_', '-' and '.', got {name!r}.")
     if name in names() or name in _incomplete:
         raise InvalidInputError(f"The policy {name!r} is registered already.")
     if isinstance(place, type):
-        where = f"{place.__module__}:{place.__qualname__}"
-        _classes[name] = _policy(where, place)
-        place = where
-    _places[name] = _checked(name, place)
+        _classes[name] = checked_class(place)
+        _places[name] = place_of(place)
+    else:
+        _places[name] = _checked(place)
 
 
 def get(name: str) -> type[SolverPolicy]:
@@ -86,13 +93,28 @@ def get(name: str) -> type[SolverPolicy]:
         UnknownNameError: There is no such policy; the message has the nearest name.
         InvalidInputError: What it was registered with cannot be imported, or is no policy.
     """
-    if name in _classes:
-        return _classes[name]
-    known = {**_entry_points(), **_places, **_incomplete}
-    if not isinstance(name, str) or name not in known:
-        raise UnknownNameError("policy", name, known)
-    kind = _classes[name] = resolve(known[name])
-    return kind
+    if not known(name):
+        raise UnknownNameError("policy", name, (*names(), *_incomplete))
+    if name not in _classes:
+        _classes[name] = resolve({**_entry_points(), **_places, **_incomplete}[name])
+    return _classes[name]
+
+
+def known(name: object) -> bool:
+    """Whether there is a policy of that name; nothing is imported to tell."""
+    return isinstance(name, str) and (name in names() or name in _incomplete)
+
+
+def name_of(kind: type[SolverPolicy]) -> str:
+    """What results call a class: the name that it is registered by, else its place."""
+    place = place_of(kind)
+    named = (name for name, where in {**_entry_points(), **_places, **_incomplete}.items() if where == place)
+    return next((name for name in named if get(name) is kind), place)
+
+
+def place_of(kind: type[Any]) -> str:
+    """Where a class is: ``"package.module:Class"``."""
+    return f"{kind.__module__}:{kind.__qualname__}"
 
 
 def resolve(place: str) -> type[SolverPolicy]:
@@ -104,12 +126,32 @@ def resolve(place: str) -> type[SolverPolicy]:
     Raises:
         InvalidInputError: It cannot be imported, or is no class of policies.
     """
-    module, _, attribute = place.partition(":")
+    return checked_class(load(place), place)
+
+
+def load(place: str) -> object:
+    """Whatever is at a place.
+
+    Args:
+        place: ``"package.module:attribute"``.
+
+    Raises:
+        InvalidInputError: It has another form, or cannot be imported.
+    """
+    module, _, attribute = _checked(place).partition(":")
     try:
-        kind = functools.reduce(getattr, attribute.split("."), importlib.import_module(module))
-    except (ImportError, AttributeError) as e:
-        raise InvalidInputError(f"Policy {place!r}: cannot be imported: {e}.") from None
-    return _policy(place, kind)
+        return functools.reduce(getattr, attribute.split("."), importlib.import_module(module))
+    except Exception as e:  # whatever the module of somebody else raises
+        raise InvalidInputError(f"Policy {place!r}: cannot be imported: {type(e).__name__}: {e}.") from e
+
+
+def imported(place: str) -> object:
+    """What is at a place whose module has been imported; None where it has not, or there is nothing."""
+    module, _, attribute = place.partition(":")
+    found: object = sys.modules.get(module)
+    for name in attribute.split("."):
+        found = getattr(found, name, None)
+    return found
 
 
 def make(name: str, scenario: str | Scenario, **parameters: Any) -> SolverPolicy:
@@ -139,18 +181,31 @@ _classes: dict[str, type[SolverPolicy]] = {}
 
 @functools.cache
 def _entry_points() -> dict[str, str]:
-    """What other packages have registered; what has the name of one of ours is theirs to rename."""
-    found = importlib.metadata.entry_points(group=GROUP)
-    return {one.name: _checked(one.name, one.value) for one in found}
+    """What other packages have registered; what has the name of one of ours is theirs to rename.
+
+    Nothing is checked before it is asked for: one bad entry must not take the other policies away.
+    """
+    # Extras behind the place, as in "module:Class [extra]", are for installers.
+    return {one.name: one.value.partition("[")[0].strip() for one in importlib.metadata.entry_points(group=GROUP)}
 
 
-def _policy(place: str, kind: object) -> type[SolverPolicy]:
+def checked_class(kind: object, place: str | None = None) -> type[SolverPolicy]:
+    """The same class.
+
+    Raises:
+        InvalidInputError: It is none of policies, or is abstract.
+    """
+    if place is None:
+        place = place_of(kind) if isinstance(kind, type) else repr(kind)
     if not (isinstance(kind, type) and issubclass(kind, SolverPolicy)):
         raise InvalidInputError(f"Policy {place!r}: expected a class derived from SolverPolicy, got {kind!r}.")
+    if inspect.isabstract(kind):
+        missing = ", ".join(sorted(kind.__abstractmethods__))
+        raise InvalidInputError(f"Policy {place!r}: the class lacks {missing}.")
     return kind
 
 
-def _checked(name: str, place: object) -> str:
-    if not isinstance(place, str) or not re.fullmatch(r"[\w.]+:[\w.]+", place):
-        raise InvalidInputError(f"Policy {name!r}: expected 'package.module:Class', got {place!r}.")
+def _checked(place: object) -> str:
+    if not isinstance(place, str) or not PLACE.fullmatch(place):
+        raise InvalidInputError(f"policy: expected 'package.module:Class', got {place!r}.")
     return place

@@ -41,6 +41,30 @@ def parse_policy(spec: PolicySpec) -> tuple[str, dict[str, Any]]:
     return name, parameters
 
 
+def parse_place(spec: object) -> tuple[str, dict[str, Any]] | None:
+    """Place and parameters of a policy that is no registered one.
+
+    Args:
+        spec: ``"package.module:Class"``, ``"package.module:Class:parameter=value,…"``, or a pair of the first and
+            parameters. What begins with the name of a registered policy is not meant.
+
+    Returns:
+        The place and the parameters; None where the specification has another form.
+
+    Raises:
+        InvalidInputError: The parameters have another form, or one is given twice.
+    """
+    text, given = spec if isinstance(spec, tuple) and len(spec) == 2 else (spec, None)
+    if not isinstance(text, str) or not isinstance(given, (Mapping, type(None))):
+        return None
+    module, _, rest = text.strip().partition(":")
+    attribute, more, parameters = rest.partition(":")
+    place = f"{module}:{attribute}"
+    if registry.known(module) or not registry.PLACE.fullmatch(place) or (more and given is not None):
+        return None
+    return place, (_parse_parameters(text, parameters) if more else dict(given or {}))
+
+
 def _parse_parameters(spec: str, text: str) -> dict[str, Any]:
     out: dict[str, Any] = {}
     for part in _split(text):

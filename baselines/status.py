@@ -11,6 +11,9 @@ class Status(enum.IntEnum):
     A row of results has the worst status of its episode.
     """
 
+    #: Nothing is said: the policy is no solver of this package, such as a model of Stable-Baselines3.
+    UNKNOWN = -1
+
     #: The solver found what it looks for; for a solver without iterations: its formula applied.
     CONVERGED = 0
     #: The iterations ran out first; the last iterate was used.

@@ -32,7 +32,7 @@ __all__ = [
     "tasks",
     "trajectories",
 ]
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 if "RedundantIK-v0" not in gym.registry:
     gym.register(

@@ -9,6 +9,7 @@ import pytest
 
 import baselines
 import ikgym
+from baselines import registry
 from baselines.evaluate import evaluate
 from docs.tables import PAGES, filled
 
@@ -102,10 +103,36 @@ def test_changelog_counts_right():
     assert f"## {ikgym.__version__}" in text or "## Unreleased" in text
 
 
-def test_evaluation_snippet_runs(capsys):
-    (snippet,) = re.findall(r"```python\n(.*?)```", (PAGES / "evaluation.md").read_text(encoding="utf-8"), re.DOTALL)
-    exec(snippet, {})
-    assert "('dls', 0.01, " in capsys.readouterr().out
+def snippets_of(page):
+    return re.findall(r"```python\n(.*?)```", (PAGES / page).read_text(encoding="utf-8"), re.DOTALL)
+
+
+def test_evaluation_snippets_run(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    names = {}
+    for snippet in snippets_of("evaluation.md"):
+        exec(compile(snippet, "evaluation.md", "exec", dont_inherit=True), names)
+    printed = capsys.readouterr().out
+    assert "('dls', 0.01, " in printed
+    assert "(200, 7)" in printed
+    assert "Still unknown 2" in printed
+    assert {file.name for file in tmp_path.iterdir()} == {"dls.csv", "dls.png"}
+
+
+def test_policies_snippets_run(monkeypatch):
+    monkeypatch.setattr(registry, "_places", dict(registry._places))
+    monkeypatch.setattr(registry, "_classes", dict(registry._classes))
+    own, real = snippets_of("policies.md")
+    names = {"__name__": __name__}
+    exec(compile(own, "policies.md", "exec", dont_inherit=True), names)
+    assert [(row.policy, row.parameters.get("gain")) for row in names["rows"]] == [
+        ("proportional", 1.0),
+        ("proportional", 0.5),
+        ("dls", 1.0),
+    ]
+    exec(compile(real, "policies.md", "exec", dont_inherit=True), names)
+    assert abs(names["arm"].forward(names["measured"])[1] - names["positions"][100]).max() < 5e-2  # of an arm of 5 m
+    assert baselines.track("varga7-fast", "rhc_gradient", steps=100).q[-1] == pytest.approx(names["measured"])
 
 
 def test_changelog_names_every_policy():

@@ -66,7 +66,7 @@ def plan(
                 if variant[0] in unsuited:
                     continue
                 raise
-            # No course is kept: there are many contenders, and nobody draws them.
+            # No trajectory log is kept: there are many contenders, and nobody draws them.
             out.setdefault(contender.spec, []).extend(dataclasses.replace(job, first=False) for job in jobs)
     return out
 
@@ -87,7 +87,7 @@ def play(
         folder: For the results.
         workers: Processes for what needs no clock.
         resume: Goes on with what is in the folder.
-        overwrite: Throws away what is in the folder.
+        overwrite: Overwrites what is in the folder.
         progress: Whether to show bars on stderr.
 
     Raises:
@@ -100,7 +100,7 @@ def play(
     for timed in (False, True):
         part = [job for job in left if job.timed == timed]
         with contextlib.closing(run(part, workers=1 if timed else workers, progress=progress)) as batches:
-            for outcomes in batches:
-                results.add(outcomes)
+            for played in batches:
+                results.add(played)
     rows = {row.key: row for row in results.rows}
     return {spec: [rows[job.key] for job in jobs] for spec, jobs in plans.items()}

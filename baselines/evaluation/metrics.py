@@ -52,13 +52,14 @@ class Row:
             played together with others.
         time_p99_us: Its 99th percentile, in [µs].
         deadline_misses: Calls, but for the first, that took longer than the scenario's Δt.
-        status: The worst status of the episode.
+        status: The worst status of the episode; unknown of policies that say nothing of themselves.
         machine: What it ran on, see :func:`baselines.evaluation.machine.describe`.
-        iterations: Mean iterations of the policy in one step.
+        iterations: Mean iterations of the policy in one step; None where they are not known.
         status_counts: How many steps ended with which status.
         preview: Steps ahead that the policy was shown; the furthest where it was shown some of them.
         fingerprint: Tells scenarios apart that share a name, see :func:`baselines.fingerprints.fingerprint`.
-        operations: Mean numbers of operations in one step, see :class:`baselines.policy.Operations`.
+        operations: Mean numbers of operations in one step, see :class:`baselines.policy.Operations`; empty where they
+            are not known.
         time_first_us: Wall time of the first call of the policy, in [µs].
         test_set: The digest of the test set that the episode belongs to, see :mod:`baselines.evaluation.test_sets`.
     """
@@ -84,7 +85,7 @@ class Row:
     deadline_misses: int | None
     status: str
     machine: dict[str, Any]
-    iterations: float
+    iterations: float | None
     status_counts: dict[str, int]
     preview: int
     fingerprint: str
@@ -145,6 +146,7 @@ def measure(
     counted = scenario.counted()[1:]
     angles = episode.orientation_error[counted] if scenario.task.has_orientation else None
     statuses = collections.Counter(episode.status.tolist())
+    worst, operations = Status(max(statuses)), episode.operations._asdict()
     return Row(
         scenario=scenario.name,
         policy=policy,
@@ -165,13 +167,13 @@ def measure(
         time_p50_us=float(np.percentile(later, 50)) / 1e3 if timed else None,
         time_p99_us=float(np.percentile(later, 99)) / 1e3 if timed else None,
         deadline_misses=int((later > 1e9 * scenario.dt).sum()) if timed else None,
-        status=Status(max(statuses)).label,
+        status=worst.label,
         machine=dict(machine),
-        iterations=float(episode.iterations.mean()),
+        iterations=None if worst is Status.UNKNOWN else float(episode.iterations.mean()),
         status_counts={Status(status).label: count for status, count in sorted(statuses.items())},
         preview=preview,
         fingerprint=fingerprint,
-        operations={name: float(count.mean()) for name, count in episode.operations._asdict().items()},
+        operations={name: float(count.mean()) for name, count in operations.items() if len(count)},
         time_first_us=float(episode.time_ns[0]) / 1e3 if timed else None,
         test_set=test_set,
     )
@@ -224,7 +226,7 @@ class Summary:
         time_p99_us: The largest, in [µs].
         deadline_misses: Their sum.
         status: The worst.
-        operations: Means over the episodes.
+        operations: Means over the episodes; empty where they are not known.
         time_first_us: The largest, in [µs].
     """
 

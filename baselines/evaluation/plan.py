@@ -5,25 +5,21 @@ from __future__ import annotations
 import dataclasses
 import sys
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any, Final, Literal
+from typing import Any, Literal
 
 import numpy as np
 
-from baselines import registry
-from baselines.canonical import jsonable
 from baselines.evaluation import metrics
 from baselines.evaluation import test_sets as known_sets
+from baselines.evaluation.entrants import ALL, AnyPolicy, Entrant, Wrap, entrants
+from baselines.evaluation.rollout import Player
 from baselines.files import ResultsError
 from baselines.fingerprints import fingerprint
-from baselines.policy import SolverPolicy
-from baselines.spec import PolicySpec, parse_policy
 from ikgym import scenarios as scenario_registry
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Preview, Scenario
+from ikgym.simulator import offsets
 from ikgym.validation import whole_number
-
-#: Stands for all scenarios, or all policies.
-ALL: Final = "all"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -33,10 +29,11 @@ class Job:
     Args:
         scenario: What is to be tracked.
         policy: The name of who tracks it.
-        given: The parameters that the policy is made with.
+        entrant: Who tracks it, before it is made for the scenario.
+        given: The parameters that the policy is made with for this episode.
         parameters: All of its parameters, as they stand in the row.
         seed: The reset seed.
-        first: Whether it is the first episode of its policy in its scenario, whose course is kept for plots.
+        first: Whether it is the first episode of its policy in its scenario, whose trajectory log is kept for plots.
         timed: Whether it is played alone, by single calls with the clock.
         preview: Steps ahead that the policy is shown, or which ones.
         fingerprint: Of the scenario.
@@ -45,6 +42,7 @@ class Job:
 
     scenario: Scenario
     policy: str
+    entrant: Entrant
     given: Mapping[str, Any]
     parameters: Mapping[str, Any]
     seed: int
@@ -59,14 +57,14 @@ class Job:
         """The key of the row to come."""
         return metrics.key(self.scenario.name, self.policy, self.parameters, self.seed, self.scenario.steps)
 
-    def make(self) -> SolverPolicy:
+    def make(self) -> Player:
         """The policy.
 
         Raises:
             ResultsError: It is no longer what it was when the job was planned: the file behind it has changed.
         """
-        policy = registry.make(self.policy, self.scenario, **self.given)
-        now = {name: jsonable(policy.parameters[name]) for name in self.parameters}
+        policy = self.entrant.make(self.scenario, self.given, self.preview)
+        now = self.entrant.parameters(self.scenario, policy)
         if now != self.parameters:
             raise ResultsError(f"{self.policy} has changed since the evaluation began: {self.parameters} is now {now}.")
         return policy
@@ -91,26 +89,28 @@ class Plan:
 
 def make_plan(
     scenarios: str | Scenario | Iterable[str | Scenario],
-    policies: PolicySpec | Iterable[PolicySpec],
+    policies: AnyPolicy | Iterable[AnyPolicy],
     *,
     test_sets: str | Iterable[str] = (),
     episodes: int = 1,
     split: str = "test",
     steps: int | None = None,
-    preview: int | None = None,
+    preview: Preview | None = None,
+    wrap: Wrap | None = None,
     timed: int | Literal["all"] = 1,
     trust: bool = False,
 ) -> Plan:
     """All episodes of an evaluation, policy by policy within each scenario.
 
     Args:
-        scenarios: Scenarios or their names; ``"all"`` stands for all that are registered.
-        policies: Names with or without parameters; ``"all"`` stands for all that are registered.
+        scenarios: Scenarios, or what :func:`ikgym.scenarios.find` takes; ``"all"`` stands for all that are registered.
+        policies: What :func:`baselines.evaluation.entrants.entrants` takes; ``"all"`` stands for all registered ones.
         test_sets: Names of test sets, instead of scenarios; they say themselves which episodes are played.
         episodes: Episodes of a random scenario. One that is the same at every reset has one, with seed 0.
         split: Where the seeds of random scenarios come from, see :data:`ikgym.scenarios.SPLITS`.
         steps: Most steps of an episode; the scenarios' own if left out.
-        preview: Steps ahead that policies are shown; what each asks for if left out.
+        preview: Steps ahead that policies are shown, or which ones; what each asks for if left out.
+        wrap: Wraps the environment for those that are no :class:`baselines.SolverPolicy`.
         timed: Episodes of each policy in each scenario that are timed, ``"all"`` for all of them.
         trust: Whether the files of all agents given are trusted, see :class:`baselines.agents.policy.Agent`.
 
@@ -128,25 +128,23 @@ def make_plan(
         )
     drawn = scenario_registry.seeds(split, episodes)
     if preview is not None:
-        whole_number("preview", preview, at_least=1)
+        offsets(preview)
     clocked = sys.maxsize if timed == ALL else whole_number("timed", timed, at_least=1)
-    specs = [(name, _trusting(name, given) if trust else given) for name, given in _specs(policies)]
+    everyone = entrants(policies, trust=trust, wrap=wrap)
     jobs: dict[tuple[str, str, str, int, int], Job] = {}
     skipped: list[Skipped] = []
-    for scenario, seeds, label in [*_frozen(sets), *_drawn(listed, drawn)]:
+    for scenario, seeds, label in [*_fixed(sets), *_drawn(listed, drawn)]:
         digest = fingerprint(scenario)
-        for name, given in specs:
-            if reason := _unsuited(scenario, name, given, seeds[0]):
-                skipped.append(Skipped(scenario.name, name, reason))
+        for one in everyone:
+            if reason := one.unsuited(scenario, seeds[0], preview):
+                skipped.append(Skipped(scenario.name, one.name, reason))
                 continue
-            policy = registry.make(name, scenario, **_with_seed(scenario, name, given, seeds[0]))
-            hidden = _with_seed(scenario, name, {}, seeds[0]).keys() - given.keys()
-            own = {k: jsonable(v) for k, v in policy.parameters.items() if k not in hidden}
-            shown = policy.preview if preview is None else preview
+            policy = one.make(scenario, one.for_episode(scenario, seeds[0]), preview)
+            own, shown = one.parameters(scenario, policy), one.shown(policy, preview)
             for number, seed in enumerate(seeds):
-                with_seed = _with_seed(scenario, name, given, seed)
+                given = one.for_episode(scenario, seed)
                 first, alone = number == 0, number < clocked
-                job = Job(scenario, name, with_seed, own, seed, first, alone, shown, digest, label)
+                job = Job(scenario, one.name, one, given, own, seed, first, alone, shown, digest, label)
                 jobs.setdefault(job.key, job)
     if not jobs:
         raise InvalidInputError(
@@ -159,7 +157,7 @@ def make_plan(
     return Plan(tuple(jobs.values()), tuple(skipped))
 
 
-def _frozen(names: Iterable[str]) -> Iterator[tuple[Scenario, tuple[int, ...], str | None]]:
+def _fixed(names: Iterable[str]) -> Iterator[tuple[Scenario, tuple[int, ...], str | None]]:
     """The scenarios of test sets, their seeds and their digests."""
     for one in map(known_sets.get, names):
         yield one.scenario, one.seeds, one.digest
@@ -181,7 +179,7 @@ def _scenarios(given: str | Scenario | Iterable[str | Scenario], steps: int | No
     for item in (given,) if isinstance(given, (str, Scenario)) else given:
         names = scenario_registry.names() if isinstance(item, str) and item == ALL else (item,)
         for name in names:
-            scenario = name if isinstance(name, Scenario) else scenario_registry.get(name)
+            scenario = scenario_registry.find(name)
             if steps is not None:
                 scenario = scenario.replace(steps=min(steps, scenario.steps))
             known = out.setdefault(scenario.name, scenario)
@@ -191,37 +189,3 @@ def _scenarios(given: str | Scenario | Iterable[str | Scenario], steps: int | No
                     "scenario.replace(name=…), or nobody can tell their results apart."
                 )
     return list(out.values())
-
-
-def _specs(given: PolicySpec | Iterable[PolicySpec]) -> list[tuple[str, dict[str, Any]]]:
-    single = isinstance(given, str) or (isinstance(given, tuple) and len(given) == 2 and isinstance(given[1], Mapping))
-    out: list[tuple[str, dict[str, Any]]] = []
-    for spec in (given,) if single else given:
-        if isinstance(spec, str) and spec == ALL:
-            out.extend((name, {}) for name in registry.names())
-        else:
-            out.append(parse_policy(spec))  # type: ignore[arg-type]
-    return out
-
-
-def _with_seed(scenario: Scenario, name: str, given: Mapping[str, Any], seed: int) -> dict[str, Any]:
-    """The parameters, with the episode's seed for a reference that has to know which one it plays."""
-    policy = registry.get(name)
-    if scenario.random and policy.reference and "seed" in policy.parameter_names():
-        return {"seed": seed, **given}
-    return dict(given)
-
-
-def _trusting(name: str, given: Mapping[str, Any]) -> dict[str, Any]:
-    """The parameters, with the trust in its file for a policy that asks for it."""
-    return {"trust": True, **given} if "trust" in registry.get(name).parameter_names() else dict(given)
-
-
-def _unsuited(scenario: Scenario, name: str, given: Mapping[str, Any], seed: int) -> str | None:
-    """Why a policy does not suit a scenario; a policy that is refused with other parameters only is not unsuited."""
-    decisive = {key: given[key] for key in registry.get(name).decisive if key in given}
-    try:
-        registry.make(name, scenario, **_with_seed(scenario, name, decisive, seed))
-    except InvalidInputError as e:
-        return str(e)
-    return None

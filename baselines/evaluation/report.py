@@ -27,7 +27,7 @@ NOTHING = "–"
 Pictures = Mapping[str, Sequence[tuple[str, pathlib.PurePath]]]
 #: The group of plots that show all policies.
 OVERVIEW = "overview"
-REFERENCE_NOTE = "* reference: knows what no observation shows"
+REFERENCE_NOTE = "* reference: has privileged information"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -170,8 +170,12 @@ def labels(summaries: Sequence[Summary]) -> dict[int, str]:
 
 
 def is_reference(policy: str) -> bool:
-    """Whether a policy knows more than its observation."""
-    return policy in registry.names() and registry.get(policy).reference
+    """Whether a policy has privileged information, as far as it can be told without importing code of others."""
+    try:
+        kind = registry.get(policy) if registry.known(policy) else registry.imported(policy)
+    except IkgymError:
+        return False
+    return bool(getattr(kind, "reference", False))
 
 
 def heading(scenario: str, summaries: Sequence[Summary]) -> str:
@@ -187,7 +191,7 @@ def _columns(names: Mapping[int, str]) -> list[Column]:
         Column("total", "cost", lambda s: number(s.total_cost.mean)),
         Column("tracking", "cost", lambda s: number(s.tracking_cost)),
         Column("velocity", "cost", lambda s: number(s.velocity_cost)),
-        Column("cost ratio", "", lambda s: number(None if s.cost_ratio is None else s.cost_ratio.mean)),
+        Column("cost", "ratio", lambda s: number(None if s.cost_ratio is None else s.cost_ratio.mean)),
         Column("pos max", "[mm]", lambda s: number(s.position_error_max, 1e3)),
         Column("ori max", "[mrad]", lambda s: number(s.orientation_error_max, 1e3)),
         Column("q̇ peak", "", lambda s: number(s.qdot_peak)),
@@ -227,7 +231,7 @@ def _operations(names: Mapping[int, str]) -> list[Column]:
     """The columns of the operation audit."""
 
     def column(title: str, unit: str, name: str) -> Column:
-        return Column(title, unit, lambda s: number(s.operations[name]))
+        return Column(title, unit, lambda s: number(s.operations.get(name)))
 
     return [
         _policy(names),
@@ -280,7 +284,7 @@ def _notes(rows: Sequence[Row]) -> list[str]:
         "cost ratio: total cost / best known cost, – where none is known; p50, p99: time of a call after the first; "
         "misses: such calls longer than Δt"
     )
-    notes.append("pos, ori: position and orientation error; q̇ peak in rad/s, in m/s for joints that slide")
+    notes.append("pos, ori: position and orientation error; q̇ peak in rad/s, in m/s for prismatic joints")
     if any(summary.episodes > 1 for summaries in by_scenario(rows).values() for summary in summaries):
         notes.append(
             "several episodes: costs and cost ratio are geometric means, errors, q̇ peak, p99 and status the worst, p50 "

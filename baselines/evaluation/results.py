@@ -11,15 +11,17 @@ import pathlib
 import re
 import tempfile
 import zipfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+import ikgym
 from baselines.canonical import canonical
 from baselines.evaluation.metrics import Row
-from baselines.evaluation.plan import Job, Plan
+from baselines.evaluation.plan import Job, Plan, Skipped
+from baselines.evaluation.runner import Played
 from baselines.files import ResultsError, write
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import SPLITS
@@ -29,18 +31,30 @@ from ikgym.scenarios.scenario import furthest
 COLUMNS = tuple(field.name for field in dataclasses.fields(Row))
 
 
+class Rows(list[Row]):
+    """The rows of an evaluation, and what was left out of it.
+
+    Attributes:
+        skipped: Policies that do not suit a scenario, and why not.
+    """
+
+    def __init__(self, rows: Iterable[Row] = (), skipped: Sequence[Skipped] = ()) -> None:
+        super().__init__(rows)
+        self.skipped = tuple(skipped)
+
+
 class Results:
     """The folder of an evaluation.
 
-    `results.json` holds all rows and is written anew after each batch of episodes; the courses of the first episodes
-    lie in `series/SCENARIO/POLICY-….npz`. Every file is replaced in one go, so that none is ever half written.
+    `results.json` holds all rows and is written anew after each batch of episodes; the trajectory logs of the first
+    episodes lie in `series/SCENARIO/POLICY-….npz`. Every file is replaced in one go, so that none is ever half written.
 
     Args:
         directory: The folder; made if it is not there.
         plan: What is to be done. Its rows stand in its order, after those that the folder had besides.
         machine: What it is done on, see :func:`baselines.evaluation.machine.describe`.
         resume: Goes on with what is there.
-        overwrite: Throws away what is there.
+        overwrite: Overwrites what is there.
 
     Raises:
         ResultsError: The folder cannot be written; has results, and neither flag is given; is to be gone on with
@@ -57,9 +71,14 @@ class Results:
         overwrite: bool = False,
     ) -> None:
         if resume and overwrite:
-            raise ResultsError("--resume keeps the results that are there, --overwrite throws them away: choose one.")
+            raise ResultsError("--resume keeps the results that are there, --overwrite replaces them: choose one.")
         self.directory = directory
         self._file = directory / "results.json"
+        if resume and (untold := [job.policy for job in plan.jobs if not job.entrant.told_apart]):
+            raise ResultsError(
+                f"--resume: results of the object {untold[0]} cannot be told from those of another one. Give a place "
+                "such as 'package.module:make_policy', or choose --overwrite."
+            )
         self._order = [job.key for job in plan.jobs]
         try:
             there = self._file.exists()
@@ -67,7 +86,7 @@ class Results:
             raise ResultsError(f"Cannot read {self._file}: {e.strerror}.") from None
         if there and not (resume or overwrite):
             raise ResultsError(
-                f"{self._file} is there already: go on with it by --resume, throw it away by --overwrite, "
+                f"{self._file} is there already: go on with it by --resume, replace it by --overwrite, "
                 "or choose another directory."
             )
         _check_writable(directory)
@@ -84,24 +103,24 @@ class Results:
         return besides + [self._rows[key] for key in self._order if key in self._rows]
 
     def done(self, job: Job) -> bool:
-        """Whether an episode has been played, timed if it is to be, and its course kept where it is to be."""
+        """Whether an episode has been played, timed if it is to be, and its trajectory log kept where it is to be."""
         row = self._rows.get(job.key)
         untimed = job.timed and (row is None or row.time_first_us is None)
         return row is not None and not untimed and not (job.first and not self.series_file(job).exists())
 
-    def add(self, outcomes: Iterable[tuple[Job, Row, Mapping[str, npt.NDArray[Any]] | None]]) -> None:
+    def add(self, played: Iterable[Played]) -> None:
         """Keeps results.
 
         Args:
-            outcomes: What was done, what came out, and the course of the episode where it is kept.
+            played: What was done, and what came out.
 
         Raises:
             ResultsError: The folder cannot be written.
         """
-        for job, row, series in outcomes:
-            if series is not None:
+        for job, row, log in played:
+            if log is not None:
                 file = io.BytesIO()
-                np.savez_compressed(file, allow_pickle=False, **series)
+                np.savez_compressed(file, allow_pickle=False, **log)
                 write(self.series_file(job), file.getvalue())
             self._rows[row.key] = row
         self.save()
@@ -130,13 +149,13 @@ class Results:
         write(self.directory / "results.csv", text.getvalue().encode())
 
     def series_file(self, of: Job | Row) -> pathlib.Path:
-        """Where the course of the first episode of a policy in a scenario is kept."""
+        """Where the trajectory log of the first episode of a policy in a scenario is kept."""
         scenario = of.scenario if isinstance(of, Row) else of.scenario.name
         digest = hashlib.sha256(canonical(of.parameters).encode()).hexdigest()[:8]
         return self.directory / "series" / slug(scenario) / f"{slug(of.policy)}-{digest}.npz"
 
     def series(self, row: Row) -> dict[str, npt.NDArray[Any]]:
-        """The course of the first episode of a row's policy in its scenario.
+        """The trajectory log of the first episode of a row's policy in its scenario.
 
         Raises:
             ResultsError: The file is missing or damaged.
@@ -174,7 +193,7 @@ def read_rows(file: pathlib.Path) -> list[Row]:
     """The rows of a results.json.
 
     Raises:
-        ResultsError: It cannot be read, or is damaged; nothing is deleted.
+        ResultsError: It cannot be read, was written by a version with other columns, or is damaged; nothing is deleted.
     """
 
     def refuse(constant: str) -> None:
@@ -194,11 +213,23 @@ def read_rows(file: pathlib.Path) -> list[Row]:
         try:
             row = Row.from_json(values)
         except InvalidInputError as e:
+            if (version := _other_version(values)) is not None:
+                raise ResultsError(
+                    f"{file} was written by ikgym {version}, this is {ikgym.__version__}: in row {number} {e}. Read it "
+                    "with that version, or evaluate again with --overwrite."
+                ) from None
             raise ResultsError(f"{file} is damaged: in row {number} {e}. {advice}") from None
         if row.key in rows:
             raise ResultsError(f"{file} is damaged: row {number} is there twice. {advice}")
         rows[row.key] = row
     return list(rows.values())
+
+
+def _other_version(values: object) -> str | None:
+    """The version that wrote a row, if it says so and is not this one."""
+    machine = values.get("machine") if isinstance(values, Mapping) else None
+    version = machine.get("ikgym") if isinstance(machine, Mapping) else None
+    return version if isinstance(version, str) and version != ikgym.__version__ else None
 
 
 def slug(name: str) -> str:

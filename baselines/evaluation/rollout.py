@@ -6,12 +6,14 @@ import dataclasses
 import gc
 import time
 from collections.abc import Callable, Sequence
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from baselines.episode import play
-from baselines.policy import Batch, Memory, Operations, SolverPolicy
+from baselines.policy import Batch, Operations, Report
+from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Preview, Scenario
 from ikgym.simulation import Outcome
 from ikgym.simulator import Observation, observation
@@ -22,6 +24,30 @@ TICK = 100
 
 #: Called now and then, while no clock runs, with the number of steps made since the last call.
 Tick = Callable[[int], object]
+
+
+class Player(Protocol):
+    """What the loop asks of a policy: a :class:`baselines.SolverPolicy`, or what stands for one."""
+
+    @property
+    def name(self) -> str:
+        """What messages call it."""
+
+    @property
+    def preview(self) -> Preview:
+        """Steps ahead that it asks for, or which ones."""
+
+    def predict(self, observation: Any, state: Any = None) -> tuple[npt.NDArray[Any], Any]:
+        """Actions, and the state for the next call, which is never None."""
+
+    def report(self, state: Any) -> Report:
+        """Status and iterations of the call that returned a state."""
+
+    def diagnostics(self, state: Any) -> dict[str, FloatArray]:
+        """What it shows of how it came to its action."""
+
+    def operations(self, state: Any) -> Operations:
+        """What the call that returned a state has cost; arrays of length 0 where nobody counts."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -39,7 +65,8 @@ class Episode:
         status: Values of :class:`baselines.Status`. Shape (steps,).
         iterations: Iterations of the policy. Shape (steps,).
         time_ns: Wall time of the call of `predict`, in [ns]. Shape (steps,), or (0,) where the calls were not timed.
-        operations: What the steps have cost, see :class:`baselines.policy.Operations`, its arrays of shape (steps,).
+        operations: What the steps have cost, see :class:`baselines.policy.Operations`, its arrays of shape (steps,),
+            or (0,) where nobody counts.
         diagnostics: What the policy showed of how it came to its action, by name, see
             :meth:`SolverPolicy.diagnostics`; each of shape (steps, …).
     """
@@ -60,10 +87,11 @@ class Episode:
 
 def rollout(
     scenario: Scenario,
-    policy: SolverPolicy,
+    policy: Player,
     seed: int,
     *,
     preview: Preview | None = None,
+    timed: bool = True,
     tick: Tick | None = None,
 ) -> Episode:
     """Plays one episode by single calls of the policy, each of them timed.
@@ -76,21 +104,22 @@ def rollout(
         policy: Who tracks it.
         seed: The reset seed.
         preview: What the policy is shown; what it asks for if left out.
+        timed: Whether the times of the calls are kept.
         tick: See :data:`Tick`.
 
     Returns:
         The recorded episode.
 
     Raises:
-        InvalidInputError: The preview is none, or shorter than the policy needs.
+        InvalidInputError: The preview is none, or shorter than the policy needs; an action is refused.
     """
-    (episode,) = _play(scenario, policy, [seed], preview, tick, alone=True)
+    (episode,) = _play(scenario, policy, [seed], preview, tick, alone=True, timed=timed)
     return episode
 
 
 def rollouts(
     scenario: Scenario,
-    policy: SolverPolicy,
+    policy: Player,
     seeds: Sequence[int],
     *,
     preview: Preview | None = None,
@@ -109,33 +138,57 @@ def rollouts(
         For each seed what :func:`rollout` gives, bit for bit, but no times.
 
     Raises:
-        InvalidInputError: The preview is none, or shorter than the policy needs.
+        InvalidInputError: The preview is none, or shorter than the policy needs; an action is refused.
     """
-    return _play(scenario, policy, seeds, preview, tick, alone=False)
+    return _play(scenario, policy, seeds, preview, tick, alone=False, timed=False)
+
+
+def finite(action: npt.NDArray[Any], policy: Player, scenario: Scenario, seeds: Sequence[int], steps: int) -> None:
+    """Refuses actions that are not finite, and says whose they are.
+
+    Args:
+        action: Of shape (n,), or (B, n).
+        policy: Who chose them.
+        scenario: What is tracked.
+        seeds: The reset seeds of the B arms.
+        steps: Steps made before.
+
+    Raises:
+        InvalidInputError: An action is not finite.
+    """
+    if np.isfinite(action).all():
+        return
+    rows = action.reshape(len(seeds), -1)
+    row = int(np.argmin(np.isfinite(rows).all(axis=1)))
+    raise InvalidInputError(
+        f"{policy.name} in {scenario.name}, seed {seeds[row]}, step {steps + 1}: expected finite actions, got "
+        f"{rows[row].tolist()}."
+    )
 
 
 def _play(
     scenario: Scenario,
-    policy: SolverPolicy,
+    policy: Player,
     seeds: Sequence[int],
     preview: Preview | None,
     tick: Tick | None,
     *,
     alone: bool,
+    timed: bool,
 ) -> list[Episode]:
     rows, steps, n, m = len(seeds), scenario.steps, scenario.joints, scenario.task.size
     shown = policy.preview if preview is None else preview
     q, qdot, pose = np.empty((rows, steps, n)), np.empty((rows, steps, n)), np.empty((rows, steps, m))
     tracking, velocity, position, orientation = np.empty((4, rows, steps))
     status, iterations = np.empty((2, rows, steps), dtype=np.int64)
-    time_ns = np.empty(steps if alone else 0, dtype=np.int64)
+    time_ns = np.empty(steps if timed else 0, dtype=np.int64)
     diagnostics: dict[str, FloatArray] = {}
 
     clock = time.perf_counter_ns
-    state: Memory | None = None
+    state: Any = None
     made = 0
 
-    def act(out: Outcome) -> npt.NDArray[np.float32]:
+    def act(out: Outcome) -> npt.NDArray[Any]:
         nonlocal state
         seen = _seen(out, alone)
         if made == 0:
@@ -144,15 +197,15 @@ def _play(
         begin = clock()
         action, state = policy.predict(seen, state)
         end = clock()
-        if alone:
+        if timed:
             time_ns[made] = end - begin
+        finite(action, policy, scenario, seeds, made)
         return action
 
     collecting = gc.isenabled()
     gc.disable()
     try:
         for k, out in enumerate(play(scenario, seeds, act, preview=shown, single=alone)):
-            assert state is not None
             report = policy.report(state)
             q[:, k], qdot[:, k], pose[:, k] = out.q, out.qdot, out.pose
             tracking[:, k], velocity[:, k] = out.tracking_cost, out.velocity_cost

@@ -9,28 +9,24 @@ import sys
 from collections.abc import Generator, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
-from typing import Any
+from typing import NamedTuple
 
-import numpy as np
-import numpy.typing as npt
 from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
 from baselines.canonical import canonical, jsonable
+from baselines.evaluation.entrants import ForeignPolicy, check_sendable, play_wrapped
 from baselines.evaluation.machine import describe
 from baselines.evaluation.metrics import Row, measure
 from baselines.evaluation.plan import Job
-from baselines.evaluation.rollout import Episode, Tick, rollout, rollouts
+from baselines.evaluation.rollout import Episode, Player, Tick, rollout, rollouts
+from baselines.evaluation.trajectory_log import TrajectoryLog, trajectory_log
 from baselines.oracle import best_known
 from ikgym.exceptions import IkgymError
+from ikgym.scenarios import Preview, Scenario
 from ikgym.scenarios.scenario import furthest
 
-#: The course of an episode, as arrays by name.
-Series = dict[str, npt.NDArray[Any]]
-#: A job, its row, and the course of the episode if the job is a first one.
-Outcome = tuple[Job, Row, Series | None]
-
-#: Most episodes that are played in step: their courses are in memory until all of them are done.
+#: Most episodes that are played in step: what happens in them is in memory until all of them are done.
 MOST = 64
 
 
@@ -38,7 +34,21 @@ class WorkerError(IkgymError):
     """A worker process has died."""
 
 
-def run(jobs: Sequence[Job], *, workers: int, progress: bool) -> Generator[list[Outcome], None, None]:
+class Played(NamedTuple):
+    """A job that is done.
+
+    Attributes:
+        job: What was to be done.
+        row: What came out.
+        log: The trajectory log of the episode if the job is a first one.
+    """
+
+    job: Job
+    row: Row
+    log: TrajectoryLog | None
+
+
+def run(jobs: Sequence[Job], *, workers: int, progress: bool) -> Generator[list[Played], None, None]:
     """Plays jobs in batches, and hands out what came of each batch as soon as it is done.
 
     Args:
@@ -50,10 +60,13 @@ def run(jobs: Sequence[Job], *, workers: int, progress: bool) -> Generator[list[
         What came of the jobs of a batch.
 
     Raises:
-        InvalidInputError: A policy refuses what it is shown.
+        InvalidInputError: A policy refuses what it is shown, cannot go to a worker, or chooses no action.
         WorkerError: A worker process has died.
     """
     parts, done = batches(jobs), 0
+    elsewhere = workers > 1 and len(parts) > 1
+    if elsewhere:
+        check_sendable({job.entrant: None for job in jobs})
     with tqdm(
         total=sum(job.scenario.steps for job in jobs),
         disable=not progress or not jobs,
@@ -71,15 +84,15 @@ def run(jobs: Sequence[Job], *, workers: int, progress: bool) -> Generator[list[
             job = batch[0]
             bar.set_description(f"{job.scenario.name} · {job.policy} ({done}/{len(jobs)})", refresh=False)
 
-        if workers == 1 or len(parts) < 2:
+        if not elsewhere:
             for batch in parts:
                 announce(batch)
                 yield play(batch, bar.update)
         else:
-            for batch, outcomes in _in_processes(parts, workers):
+            for batch, played in _in_processes(parts, workers):
                 announce(batch)
                 bar.update(sum(job.scenario.steps for job in batch))
-                yield outcomes
+                yield played
 
 
 def batches(jobs: Iterable[Job]) -> list[list[Job]]:
@@ -100,7 +113,7 @@ def _together(job: Job) -> tuple[object, ...]:
     return job.scenario.name, job.policy, canonical(job.parameters), canonical(jsonable(job.given)), job.timed
 
 
-def play(batch: Sequence[Job], tick: Tick | None = None) -> list[Outcome]:
+def play(batch: Sequence[Job], tick: Tick | None = None) -> list[Played]:
     """Plays jobs of one policy in one scenario together; a timed one has to be alone.
 
     Args:
@@ -108,15 +121,41 @@ def play(batch: Sequence[Job], tick: Tick | None = None) -> list[Outcome]:
         tick: See :data:`baselines.evaluation.rollout.Tick`.
     """
     first = batch[0]
-    scenario, policy = first.scenario, first.make()
+    seeds = [job.seed for job in batch]
     # The matrices of one arm are too small to share out, and threads would blur the times. Environment variables
     # would be heeded only by libraries that are not loaded yet, and NumPy is.
     with threadpool_limits(limits=1):
-        if first.timed:
-            episodes = [rollout(scenario, policy, first.seed, preview=first.preview, tick=tick)]
-        else:
-            episodes = rollouts(scenario, policy, [job.seed for job in batch], preview=first.preview, tick=tick)
-    return [(job, _row(job, e), course(job, e) if job.first else None) for job, e in zip(batch, episodes, strict=True)]
+        episodes = play_episodes(first.scenario, first.make(), seeds, first.preview, timed=first.timed, tick=tick)
+    return [
+        Played(job, _row(job, one), trajectory_log(job.scenario, job.seed, one) if job.first else None)
+        for job, one in zip(batch, episodes, strict=True)
+    ]
+
+
+def play_episodes(
+    scenario: Scenario, policy: Player, seeds: Sequence[int], preview: Preview, *, timed: bool, tick: Tick | None = None
+) -> list[Episode]:
+    """Plays episodes of a policy, together where it may be called for many arms.
+
+    Args:
+        scenario: What is to be tracked.
+        policy: Who tracks it.
+        seeds: The reset seeds; of what is timed, one.
+        preview: What the policy is shown.
+        timed: Whether to keep the times of single calls.
+        tick: See :data:`baselines.evaluation.rollout.Tick`.
+
+    Raises:
+        InvalidInputError: The policy refuses what it is shown, or chooses no action.
+    """
+    if isinstance(policy, ForeignPolicy):
+        if policy.wrap is not None:
+            return [play_wrapped(scenario, policy, seed, timed=timed, tick=tick) for seed in seeds]
+        return [rollout(scenario, policy, seed, preview=preview, timed=timed, tick=tick) for seed in seeds]
+    if timed:
+        (seed,) = seeds
+        return [rollout(scenario, policy, seed, preview=preview, tick=tick)]
+    return rollouts(scenario, policy, seeds, preview=preview, tick=tick)
 
 
 def _row(job: Job, episode: Episode) -> Row:
@@ -134,35 +173,7 @@ def _row(job: Job, episode: Episode) -> Row:
     )
 
 
-def course(job: Job, episode: Episode) -> Series:
-    """What plots show of an episode, at the steps that count.
-
-    Returns:
-        ``time`` in [s], of shape (k,), and over it ``nominal`` and ``pose`` (k, m), ``q`` and ``qdot`` (k, n),
-        ``position_error`` and, where there is one, ``orientation_error`` (k,); ``nominal_q`` (k, n) where there is a
-        nominal joint path; ``sliding`` says which joints slide, of shape (n,).
-    """
-    scenario = job.scenario
-    after = np.flatnonzero(scenario.counted())
-    kept = after - 1
-    series: Series = {
-        "time": after * scenario.dt,
-        "nominal": scenario.nominal(job.seed)[after],
-        "pose": episode.pose[kept],
-        "q": episode.q[kept],
-        "qdot": episode.qdot[kept],
-        "position_error": episode.position_error[kept],
-        "sliding": np.array(scenario.arm.prismatic, dtype=np.bool_),
-    }
-    if scenario.task.has_orientation:
-        series["orientation_error"] = episode.orientation_error[kept]
-    path = scenario.nominal_joint_path(job.seed)
-    if path is not None:
-        series["nominal_q"] = path[after]
-    return series
-
-
-def _in_processes(parts: Sequence[list[Job]], workers: int) -> Iterator[tuple[list[Job], list[Outcome]]]:
+def _in_processes(parts: Sequence[list[Job]], workers: int) -> Iterator[tuple[list[Job], list[Played]]]:
     # Spawned, not forked: a fork would inherit numba's and the BLAS's threads without their locks' owners.
     context = multiprocessing.get_context("spawn")
     others = set(multiprocessing.active_children())

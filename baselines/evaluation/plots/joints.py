@@ -17,7 +17,7 @@ Series = Mapping[str, npt.NDArray[Any]]
 
 def draw_velocities(title: str, course: Series) -> Figure:
     """Joint velocities over the episode, and closer where they fluctuate most."""
-    time, qdot, sliding = course["time"], course["qdot"], course["sliding"]
+    time, qdot, sliding = course["time"], course["qdot"], course["prismatic"]
     window = busiest(qdot)
     drawn = style.figure(4.6)
     whole, close = drawn.subplots(2, 1)
@@ -49,7 +49,7 @@ def draw_paths(title: str, course: Series) -> Figure:
         axes = drawn.add_subplot(grid[joint // columns, joint % columns])
         (realised,) = axes.plot(time, q[:, joint], color=style.COLOURS[0], lw=1.4)
         (meant,) = axes.plot(time, nominal[:, joint], color=style.COLOURS[1], lw=1.2, ls=(0, (4, 3)))
-        unit = "[m]" if course["sliding"][joint] else "[rad]"
+        unit = "[m]" if course["prismatic"][joint] else "[rad]"
         last = joint + columns >= joints
         style.dress(axes, ylabel=rf"$q_{{{joint + 1}}}$ {unit}", xlabel="time [s]" if last else "", ticks=12 // columns)
         axes.margins(x=0.01)

@@ -3,6 +3,7 @@ import dataclasses
 import json
 import pathlib
 import pickle
+import re
 import subprocess
 import sys
 
@@ -50,6 +51,9 @@ def run_all(out=None, **changes):
 
 def test_order_and_seeds_of_the_rows():
     rows = run_all()
+    assert isinstance(rows, list)
+    assert [(one.scenario, one.policy) for one in rows.skipped] == [("zhang3-helix", "follow_nominal")]
+    assert "Cartesian" in rows.skipped[0].reason
     assert [(row.scenario, row.policy, row.seed) for row in rows] == [
         ("varga7-random", "dls", 2_000_000),
         ("varga7-random", "dls", 2_000_001),
@@ -221,7 +225,7 @@ def test_a_job_played_elsewhere_gives_the_same_row():
     (job,) = make_plan("varga7-fast", "dls", steps=STEPS).jobs
     ((_, row, series),) = play([pickle.loads(pickle.dumps(job))])
     assert timeless([row]) == timeless([play([job])[0][1]])
-    assert set(series) >= {"time", "pose", "nominal", "q", "qdot", "nominal_q", "position_error", "sliding"}
+    assert set(series) >= {"time", "pose", "nominal", "q", "qdot", "nominal_q", "position_error", "prismatic"}
 
 
 def test_workers_change_nothing_but_the_times(tmp_path):
@@ -263,7 +267,7 @@ def test_files(tmp_path):
     assert len(list(tmp_path.glob("series/zhang3-helix/*.npz"))) == 2
 
 
-def test_series_are_the_course_of_the_first_episode_at_the_steps_that_count(tmp_path):
+def test_series_are_the_trajectory_log_of_the_first_episode_at_the_steps_that_count(tmp_path):
     held = ikgym.scenarios.get("khan8-q7q8")
     (row,) = evaluate(held, "dls", steps=620, out=tmp_path, plots=False)
     plan = make_plan(held, "dls", steps=620)
@@ -336,7 +340,7 @@ def test_resuming_a_finished_run_plays_nothing(tmp_path, monkeypatch):
     assert run_all(tmp_path, resume=True) == rows
 
 
-def test_a_course_that_is_missing_is_played_again(tmp_path):
+def test_a_trajectory_log_that_is_missing_is_played_again(tmp_path):
     rows = run_all(tmp_path)
     (file,) = tmp_path.glob("series/zhang3-helix/dls-*.npz")
     file.unlink()
@@ -395,6 +399,40 @@ def test_damaged_results_are_named_and_kept(tmp_path, content, message):
         run_all(tmp_path, resume=True)
     assert str(file) in str(caught.value)
     assert file.read_bytes() == content.encode("utf-8", "surrogateescape")
+
+
+def renamed(row, old, new):
+    return {(new if name == old else name): value for name, value in row.items()}
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda row: renamed(row, "cost_ratio", "regret"),
+        lambda row: renamed(row, "test_set", "frozen"),
+        lambda row: {name: value for name, value in row.items() if name != "operations"},
+        lambda row: {**row, "qddot_peak": 1.0},
+        lambda row: {**row, "status": "no such status"},
+    ],
+)
+def test_rows_of_another_version_are_refused_with_its_number(tmp_path, capsys, change):
+    arguments = {"steps": 5, "out": tmp_path, "plots": False}
+    evaluate("varga7-random", "dls", **arguments)
+    file = tmp_path / "results.json"
+    (row,) = strict_json(file)
+    file.write_text(json.dumps([{**change(row), "machine": {**row["machine"], "ikgym": "0.1.0"}}]), encoding="utf-8")
+    before = file.read_bytes()
+    message = rf"was written by ikgym 0\.1\.0, this is {re.escape(ikgym.__version__)}: in row 0 .*evaluate again"
+    with pytest.raises(ResultsError, match=message):
+        evaluate("varga7-random", "dls", resume=True, **arguments)
+    assert file.read_bytes() == before
+    assert main(["--scenarios", "varga7-random", "--steps", "5", "--out", str(tmp_path), "--resume"]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+    # The same in a file of this version is damage.
+    file.write_text(json.dumps([change(row)]), encoding="utf-8")
+    with pytest.raises(ResultsError, match="is damaged: in row 0"):
+        read_rows(file)
+    assert len(evaluate("varga7-random", "dls", overwrite=True, **arguments)) == 1
 
 
 def test_a_row_that_is_there_twice_is_damage(tmp_path):
@@ -483,7 +521,7 @@ def test_results_of_another_cost_are_not_gone_on_with(tmp_path, monkeypatch):
         evaluate("varga7-random", "dls", steps=5, out=tmp_path, resume=True, plots=False)
 
 
-def test_a_frozen_set_from_the_command_line(capsys, tmp_path):
+def test_a_test_set_from_the_command_line(capsys, tmp_path):
     assert main(["--test-sets", "varga7-random", "--policies", "dls", "--no-plots", "--out", str(tmp_path)]) == 0
     assert "varga7-random: 64 episodes of 1000 steps" in capsys.readouterr().out
     rows = read_rows(tmp_path / "results.json")

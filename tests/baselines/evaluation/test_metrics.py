@@ -43,7 +43,7 @@ def handmade(steps=4, **changes):
         "time_ns": np.full(steps, 1000, dtype=np.int64),
     }
     return Episode(
-        inside={},
+        diagnostics={},
         operations=Operations(*np.ones((4, steps), dtype=np.int64)),
         **{**arrays, **{k: np.asarray(v) for k, v in changes.items()}},
     )
@@ -97,7 +97,7 @@ def test_the_warm_up_call_leaves_no_trace_in_the_episode():
     class Counting:
         preview = solver.preview
         report = staticmethod(solver.report)
-        inside = staticmethod(solver.diagnostics)
+        diagnostics = staticmethod(solver.diagnostics)
         operations = staticmethod(solver.operations)
 
         def predict(self, observation, state=None):

@@ -92,7 +92,7 @@ def test_table():
         "converged",
     ]
     assert lines[5].startswith("follow_nominal *")
-    assert "* reference: knows what no observation shows" in text
+    assert "* reference: has privileged information" in text
     assert "[mm]" in lines[2]
     assert "[mrad]" in lines[2]
     assert "episodes" not in text
@@ -239,7 +239,7 @@ def course(steps=60, coordinates=6, joints=7, **changes):
         "qdot": rng.normal(size=(steps, joints)),
         "position_error": rng.uniform(1e-3, 1, steps),
         "orientation_error": rng.uniform(1e-3, 1, steps),
-        "sliding": np.arange(joints) == 2,
+        "prismatic": np.arange(joints) == 2,
     }
     return {**series, **changes}
 

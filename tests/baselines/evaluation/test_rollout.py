@@ -63,7 +63,7 @@ def test_one_call_of_the_policy_a_step():
     class Watched:
         preview = solver.preview
         report = staticmethod(solver.report)
-        inside = staticmethod(solver.diagnostics)
+        diagnostics = staticmethod(solver.diagnostics)
         operations = staticmethod(solver.operations)
 
         def predict(self, observation, state=None):

@@ -1,0 +1,70 @@
+"""Whoever is evaluated, before it is made for a scenario."""
+
+from __future__ import annotations
+
+import abc
+import dataclasses
+from collections.abc import Mapping
+from typing import Any
+
+from baselines.evaluation.rollout import Player
+from ikgym.exceptions import InvalidInputError
+from ikgym.scenarios import Preview, Scenario
+from ikgym.simulator import offsets
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Entrant(abc.ABC):
+    """Who is evaluated, before it is made for a scenario.
+
+    Args:
+        name: What rows call it.
+    """
+
+    name: str
+
+    #: Whether rows tell it from another one of its name, so that results of both cannot be taken for each other.
+    told_apart = True
+
+    def for_episode(self, scenario: Scenario, seed: int) -> dict[str, Any]:
+        """The parameters that it is made with for one episode."""
+        del scenario, seed
+        return {}
+
+    @abc.abstractmethod
+    def make(self, scenario: Scenario, given: Mapping[str, Any], preview: Preview | None) -> Player:
+        """Who plays, made with what :meth:`for_episode` gave.
+
+        Raises:
+            IkgymError: It cannot be made.
+        """
+
+    @abc.abstractmethod
+    def parameters(self, scenario: Scenario, player: Player) -> dict[str, Any]:
+        """The parameters that rows have."""
+
+    @abc.abstractmethod
+    def unsuited(self, scenario: Scenario, seed: int, preview: Preview | None) -> str | None:
+        """Why it does not suit a scenario; None where it does."""
+
+    @abc.abstractmethod
+    def shown(self, player: Player, preview: Preview | None) -> Preview:
+        """The steps ahead that it is shown.
+
+        Raises:
+            InvalidInputError: They are not those that it needs.
+        """
+
+
+def covering(player: Player, preview: Preview | None) -> Preview:
+    """What a solver is shown: what it asks for, or something that has it in the place where it looks for it.
+
+    Raises:
+        InvalidInputError: Steps ahead that are no whole range are not those that it asks for.
+    """
+    if preview is None or isinstance(preview, int):
+        return player.preview if preview is None else preview
+    needed, shown = offsets(player.preview), offsets(preview)
+    if shown[: len(needed)] != needed or not (isinstance(player.preview, int) or shown == needed):
+        raise InvalidInputError(f"{player.name} needs to be shown the steps {needed} ahead, got preview={preview}.")
+    return preview

@@ -1,0 +1,126 @@
+"""Policies of our own kind: by class, made already, or registered and not to be had."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any
+
+from baselines.canonical import jsonable
+from baselines.evaluation.entrants.base import Entrant, covering
+from baselines.evaluation.rollout import Player
+from baselines.fingerprints import same
+from baselines.policy import Problem, SolverPolicy
+from ikgym.exceptions import InvalidInputError
+from ikgym.scenarios import Preview, Scenario
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class SolverEntrant(Entrant):
+    """A class of policies with its parameters.
+
+    Args:
+        name: What rows call it.
+        kind: The class.
+        given: The parameters that it is made with.
+    """
+
+    kind: type[SolverPolicy]
+    given: Mapping[str, Any]
+
+    def for_episode(self, scenario: Scenario, seed: int) -> dict[str, Any]:
+        """The parameters, with the episode's seed for a reference that has to know which one it plays."""
+        return {**self._seeded(scenario, seed), **self.given}
+
+    def make(self, scenario: Scenario, given: Mapping[str, Any], preview: Preview | None) -> SolverPolicy:
+        """See :meth:`Entrant.make`."""
+        del preview
+        return self.kind.for_scenario(scenario, **given)
+
+    def parameters(self, scenario: Scenario, player: Player) -> dict[str, Any]:
+        """All parameters, but for the seed that a reference was given for its episode."""
+        assert isinstance(player, SolverPolicy)
+        hidden = self._seeded(scenario, 0).keys() - self.given.keys()
+        return {name: jsonable(value) for name, value in player.parameters.items() if name not in hidden}
+
+    def unsuited(self, scenario: Scenario, seed: int, preview: Preview | None) -> str | None:
+        """See :meth:`Entrant.unsuited`; a policy that is refused with other parameters only is not unsuited."""
+        decisive = {key: self.given[key] for key in self.kind.decisive if key in self.given}
+        try:
+            self.make(scenario, {**self._seeded(scenario, seed), **decisive}, preview)
+        except InvalidInputError as e:
+            return str(e)
+        return None
+
+    def shown(self, player: Player, preview: Preview | None) -> Preview:
+        """See :meth:`Entrant.shown`."""
+        return covering(player, preview)
+
+    def _seeded(self, scenario: Scenario, seed: int) -> dict[str, Any]:
+        asks = scenario.random and self.kind.reference and "seed" in self.kind.parameter_names()
+        return {"seed": seed} if asks else {}
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class InstanceEntrant(Entrant):
+    """A policy that has been made for a scenario already.
+
+    Args:
+        name: What rows call it.
+        policy: The policy.
+    """
+
+    policy: SolverPolicy
+
+    def make(self, scenario: Scenario, given: Mapping[str, Any], preview: Preview | None) -> SolverPolicy:
+        """See :meth:`Entrant.make`."""
+        del scenario, given, preview
+        return self.policy
+
+    def parameters(self, scenario: Scenario, player: Player) -> dict[str, Any]:
+        """All parameters."""
+        del scenario, player
+        return {name: jsonable(value) for name, value in self.policy.parameters.items()}
+
+    def unsuited(self, scenario: Scenario, seed: int, preview: Preview | None) -> str | None:
+        """See :meth:`Entrant.unsuited`."""
+        del seed, preview
+        if self.policy.reference and scenario.random:
+            return f"{self.name} has privileged information on one episode: give its name, not an instance of it."
+        mine, there = self.policy.problem, Problem.of(scenario)
+        for field in dataclasses.fields(Problem):
+            if not same(getattr(mine, field.name), getattr(there, field.name)):
+                return f"{self.name} was made for a scenario with another {field.name}."
+        return None
+
+    def shown(self, player: Player, preview: Preview | None) -> Preview:
+        """See :meth:`Entrant.shown`."""
+        return covering(player, preview)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class BrokenEntrant(Entrant):
+    """A registered policy that cannot be imported: one of all, and no reason to leave the others out.
+
+    Args:
+        name: What rows call it.
+        reason: Why not.
+    """
+
+    reason: str
+
+    def make(self, scenario: Scenario, given: Mapping[str, Any], preview: Preview | None) -> Player:
+        """See :meth:`Entrant.make`."""
+        raise InvalidInputError(self.reason)
+
+    def parameters(self, scenario: Scenario, player: Player) -> dict[str, Any]:
+        """None."""
+        raise InvalidInputError(self.reason)
+
+    def unsuited(self, scenario: Scenario, seed: int, preview: Preview | None) -> str:
+        """See :meth:`Entrant.unsuited`."""
+        return self.reason
+
+    def shown(self, player: Player, preview: Preview | None) -> Preview:
+        """See :meth:`Entrant.shown`."""
+        raise InvalidInputError(self.reason)

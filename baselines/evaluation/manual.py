@@ -1,0 +1,65 @@
+"""The text of ``python -m baselines.evaluate --help`` above the options."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterable
+
+from baselines import registry
+from baselines.evaluation import report, test_sets
+from ikgym import scenarios
+
+
+def manual() -> str:
+    """What is played, examples, files and columns."""
+    policies = (name + (" (reference)" if report.is_reference(name) else "") for name in registry.names())
+    return f"""\
+Plays every policy on every scenario, and measures costs, errors, joint velocities and the time per step.
+
+{_listing("Scenarios", scenarios.names())}
+
+{_listing("Test sets", test_sets.names())}
+
+{_listing("Policies", (*policies, "agent:PATH (an agent in a file)", "package.module:Class"))}
+
+Examples:
+  python -m baselines.evaluate
+  python -m baselines.evaluate --policies dls dls:damping=1e-2 rhc_gradient:alpha_max=5e-4,horizon=5
+  python -m baselines.evaluate --scenarios varga7-random --episodes 20 --workers 4 --out results/random
+  python -m baselines.evaluate --scenarios varga7-random --episodes 50 --out results/random --resume
+  python -m baselines.evaluate --test-sets varga7-random --policies rhc_gradient --out results/test
+  python -m baselines.evaluate --scenarios varga7-random --policies agent:runs/mine.safetensors dls
+  python -m baselines.evaluate --scenarios lab.toml my_module:scenario --policies my_module:MyPolicy dls
+
+Files in the folder of --out, each replaced in one go, so that a run may be stopped at any time:
+  results.json  a list of rows, one an episode, written anew after each batch
+  results.csv   the same as a table
+  README.md     tables, plots and conditions
+  plots/        for each scenario: tracking and errors, joint velocities, joint paths, cost against time
+  series/       what the plots show, as .npz
+
+Columns:
+  scenario, policy, parameters, seed, steps      which episode it is
+  total_cost = tracking_cost + velocity_cost     sum of -reward
+  cost_ratio                                     total_cost / best known cost, null where there is none above 1e-9
+  position_error_max, position_error_rms         distance from the nominal position in [m]
+  orientation_error_max, orientation_error_rms   geodesic angle in [rad], null where the task has none
+  qdot_peak, qdot_rms, qdot_total_variation      of the joint velocities, in [rad/s] or [m/s]
+  time_first_us                                  wall time of the first call of the policy in [µs]
+  time_p50_us, time_p99_us                       that of the later calls, null where the episode was not timed
+  deadline_misses                                later calls that were longer than the time step of the scenario
+  status                                         the worst of the episode, unknown where the policy says none
+  machine                                        CPU, cores and versions
+  iterations, status_counts                      mean iterations in one step, null where nobody counts, and how many
+                                                 steps ended how
+  preview                                        steps ahead that were shown, the furthest of some
+  fingerprint                                    digest of the scenario and the version of the cost
+  test_set                                       digest of the test set, null where there is none
+  operations                                     mean kinematics, Jacobians, factorisations, measurements in a step,
+                                                 empty where nobody counts
+
+Costs and errors of scenarios that hold their nominal points are those of the last step of each point."""
+
+
+def _listing(title: str, names: Iterable[str]) -> str:
+    return textwrap.fill(f"{title}: {', '.join(names)}.", 100, subsequent_indent="  ", break_on_hyphens=False)

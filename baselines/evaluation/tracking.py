@@ -1,0 +1,171 @@
+"""One episode of one policy as a trajectory: times, joint coordinates and velocities, errors, costs."""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import io
+import os
+import pathlib
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.figure import Figure
+from threadpoolctl import threadpool_limits
+
+from baselines.episode import added_up
+from baselines.evaluation.entrants import AnyPolicy, Wrap, entrant
+from baselines.evaluation.plots import tracking as picture
+from baselines.evaluation.rollout import Episode
+from baselines.evaluation.runner import play_episodes
+from baselines.evaluation.trajectory_log import trajectory_log
+from baselines.files import write
+from baselines.status import Status
+from ikgym import scenarios
+from ikgym.exceptions import InvalidInputError
+from ikgym.scenarios import Preview, Scenario
+from ikgym.validation import FloatArray, read_only, whole_number
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Tracking:
+    """What happened in an episode; row k is what came of the step that ended at ``times[k]``. All arrays are read-only.
+
+    Args:
+        scenario: The name of the scenario.
+        policy: The name of the policy, as rows of an evaluation have it.
+        parameters: The parameters of the policy, as far as they are known.
+        seed: The reset seed.
+        times: Ends of the steps, in [s]. Shape (steps,).
+        q: Joint coordinates, in [rad] or [m]. Shape (steps, n).
+        qdot: Joint velocities applied, in [rad/s] or [m/s]. Shape (steps, n).
+        pose: Task coordinates. Shape (steps, m).
+        nominal: Task coordinates of the reference trajectory. Shape (steps, m).
+        position_error: Distance from the nominal position in [m]. Shape (steps,).
+        orientation_error: Geodesic angle in [rad], NaN where the task has no orientation. Shape (steps,).
+        tracking_cost: Φ^X, 0 where the step does not count. Shape (steps,).
+        velocity_cost: Φ^U, 0 where the step does not count. Shape (steps,).
+        statuses: Values of :class:`baselines.Status`. Shape (steps,).
+        prismatic: Which joints are prismatic. Shape (n,).
+    """
+
+    scenario: str
+    policy: str
+    parameters: dict[str, Any]
+    seed: int
+    times: FloatArray
+    q: FloatArray
+    qdot: FloatArray
+    pose: FloatArray
+    nominal: FloatArray
+    position_error: FloatArray
+    orientation_error: FloatArray
+    tracking_cost: FloatArray
+    velocity_cost: FloatArray
+    statuses: npt.NDArray[np.int64]
+    prismatic: npt.NDArray[np.bool_]
+    _log: dict[str, npt.NDArray[Any]] = dataclasses.field(repr=False)
+
+    @property
+    def total_cost(self) -> float:
+        """Sum of −reward, as in the row of an evaluation."""
+        return float(added_up(self.tracking_cost + self.velocity_cost))
+
+    @property
+    def status(self) -> Status:
+        """The worst status."""
+        return Status(int(self.statuses.max()))
+
+    def columns(self) -> dict[str, npt.NDArray[Any]]:
+        """All numbers by name and unit, one number a step, as :meth:`to_csv` writes them."""
+        units = ["m" if prismatic else "rad" for prismatic in self.prismatic]
+        out: dict[str, npt.NDArray[Any]] = {"time [s]": self.times}
+        out |= {f"q{j} [{unit}]": self.q[:, j - 1] for j, unit in enumerate(units, 1)}
+        out |= {f"qdot{j} [{unit}/s]": self.qdot[:, j - 1] for j, unit in enumerate(units, 1)}
+        for name, values in (("pose", self.pose), ("nominal", self.nominal)):
+            # The position comes last; parts of a rotation have no unit.
+            parts = [("1" if i < values.shape[1] - 3 else "m") for i in range(values.shape[1])]
+            out |= {f"{name}{i} [{unit}]": values[:, i - 1] for i, unit in enumerate(parts, 1)}
+        out["position_error [m]"] = self.position_error
+        out["orientation_error [rad]"] = self.orientation_error
+        out["tracking_cost [1]"] = self.tracking_cost
+        out["velocity_cost [1]"] = self.velocity_cost
+        out["status"] = np.array([Status(status).label for status in self.statuses.tolist()])
+        return out
+
+    def to_csv(self, file: str | os.PathLike[str]) -> None:
+        """Writes one line a step; the head has the units, and numbers that are no numbers are left empty.
+
+        Raises:
+            ResultsError: The file cannot be written.
+        """
+        columns = self.columns()
+        text = io.StringIO(newline="")
+        table = csv.writer(text, lineterminator="\n")
+        table.writerow(columns)
+        for cells in zip(*(values.tolist() for values in columns.values()), strict=True):
+            table.writerow(["" if cell != cell else cell for cell in cells])
+        write(pathlib.Path(file), text.getvalue().encode())
+
+    def plot(self) -> Figure:
+        """Task coordinates with those of the reference, and errors, over time, at the steps that count."""
+        return picture.draw(f"{self.scenario}: {self.policy}", [(self.policy, self._log)])
+
+
+def track(
+    scenario: str | Scenario,
+    policy: AnyPolicy,
+    *,
+    seed: int = 0,
+    preview: Preview | None = None,
+    steps: int | None = None,
+    wrap: Wrap | None = None,
+) -> Tracking:
+    """Plays one episode, from the reset to the end.
+
+    >>> baselines.track("varga7-fast", "dls").to_csv("dls.csv")
+
+    Args:
+        scenario: What is to be tracked, as :func:`ikgym.scenarios.find` takes it.
+        policy: Who tracks it, one policy as :func:`baselines.evaluate.evaluate` takes it.
+        seed: The reset seed.
+        preview: Steps ahead that the policy is shown, or which ones; what it asks for if left out.
+        steps: Most steps; the scenario's own if left out.
+        wrap: Wraps the environment for a policy that is no :class:`baselines.SolverPolicy`.
+
+    Raises:
+        UnknownNameError: There is no such scenario, policy or parameter.
+        InvalidInputError: A value is out of range, the policy does not suit the scenario, is shown too little, or
+            chooses no action.
+    """
+    found = scenarios.find(scenario)
+    if steps is not None:
+        found = found.replace(steps=min(whole_number("steps", steps, at_least=1), found.steps))
+    whole_number("seed", seed, at_least=0)
+    one = entrant(policy, wrap=wrap)
+    if reason := one.unsuited(found, seed, preview):
+        raise InvalidInputError(f"{one.name} does not suit {found.name}: {reason}")
+    player = one.make(found, one.for_episode(found, seed), preview)
+    shown = one.shown(player, preview)
+    with threadpool_limits(limits=1):
+        (episode,) = play_episodes(found, player, [seed], shown, timed=True)
+    return _tracking(found, one.name, one.parameters(found, player), seed, episode)
+
+
+def _tracking(scenario: Scenario, policy: str, parameters: dict[str, Any], seed: int, episode: Episode) -> Tracking:
+    arrays = {
+        "times": scenario.dt * np.arange(1, scenario.steps + 1),
+        "nominal": scenario.nominal(seed)[1:],
+        "statuses": episode.status,
+        "prismatic": np.array(scenario.arm.prismatic, dtype=np.bool_),
+        **{
+            name: getattr(episode, name)
+            for name in (
+                "q", "qdot", "pose", "position_error", "orientation_error", "tracking_cost", "velocity_cost",
+            )
+        },
+    }  # fmt: skip
+    kept: dict[str, Any] = {name: read_only(np.array(values)) for name, values in arrays.items()}
+    log = trajectory_log(scenario, seed, episode)
+    return Tracking(scenario.name, policy, parameters, seed, **kept, _log=log)

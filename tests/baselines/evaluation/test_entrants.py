@@ -1,0 +1,519 @@
+"""Whoever is evaluated: classes, instances, places, and whatever has the `predict` of Stable-Baselines3."""
+
+from __future__ import annotations
+
+import os
+import pathlib
+import pickle
+import subprocess
+import sys
+import textwrap
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+import baselines
+import ikgym
+from baselines.evaluate import evaluate, main
+from baselines.evaluation.metrics import TIME_COLUMNS, Row, summarise
+from baselines.evaluation.plan import make_plan
+from baselines.evaluation.report import table
+from baselines.evaluation.results import read_rows
+from baselines.files import ResultsError
+from baselines.policy import Problem
+from baselines.solvers.resolved_rate.dls import DampedLeastSquares
+from ikgym.exceptions import InvalidInputError, UnknownNameError
+
+ROOT = pathlib.Path(__file__).parents[3]
+HELIX, STEPS = "zhang3-helix", 20
+
+
+class Borrowed:
+    """Damped least squares with no more than a predict; notes what it is called with."""
+
+    preview = 1
+
+    def __init__(self, scenario=HELIX, **parameters):
+        self.solver = baselines.make("dls", scenario, **parameters)
+        self.calls = []
+
+    def predict(self, observation, state=None, episode_start=None, deterministic=False):
+        self.calls.append((state, episode_start.tolist(), deterministic))
+        action, _ = self.solver.predict(observation)
+        return action, (0 if state is None else state) + 1
+
+
+class Made(Borrowed):
+    """Must be given the scenario."""
+
+    def __init__(self, scenario, damping=1e-3):
+        super().__init__(scenario, damping=damping)
+
+
+class Bare:
+    """Says nothing of what it is to be shown."""
+
+    def predict(self, observation, state=None, episode_start=None, deterministic=False):
+        return np.zeros_like(observation["q"], dtype=np.float32), None
+
+
+class Seeing(Bare):
+    preview = (1, 4)
+
+    def predict(self, observation, state=None, episode_start=None, deterministic=False):
+        self.shape = observation["nominal"].shape
+        return super().predict(observation)
+
+
+def make_borrowed():
+    return Borrowed()
+
+
+def make_solver(scenario):
+    return baselines.make("dls", scenario)
+
+
+def refuse(scenario):
+    raise InvalidInputError("only for seven joints")
+
+
+borrowed = Borrowed()
+number = 3
+
+
+def here(name):
+    return f"{__name__}:{name}"
+
+
+def numbers(row):
+    """What does not depend on who is asked."""
+    told = {"policy", "parameters", "status", "status_counts", "iterations", "operations", *TIME_COLUMNS}
+    return {name: value for name, value in row.to_json().items() if name not in told}
+
+
+@pytest.fixture(scope="module")
+def solved():
+    return evaluate(HELIX, "dls", steps=STEPS)[0]
+
+
+# Policies of our own kind
+
+
+def test_classes_instances_and_pairs_are_named_as_they_are_registered(solved):
+    instance = baselines.make("dls", HELIX)
+    ways = [DampedLeastSquares, instance, ("dls", {}), (DampedLeastSquares, {}), here("DampedLeastSquares")]
+    for way in ways:
+        (row,) = evaluate(HELIX, way, steps=STEPS)
+        assert (row.policy, row.parameters, row.operations) == ("dls", solved.parameters, solved.operations)
+        assert numbers(row) == numbers(solved)
+    assert len(evaluate(HELIX, ways, steps=STEPS)) == 1
+    rows = evaluate(HELIX, [(DampedLeastSquares, {"damping": 0.1}), "dls:damping=0.2"], steps=STEPS)
+    assert [row.parameters["damping"] for row in rows] == [0.1, 0.2]
+    (row,) = evaluate(HELIX, here("DampedLeastSquares:damping=0.1"), steps=STEPS)
+    assert numbers(row) == numbers(rows[0])
+
+
+def test_a_class_that_nobody_registered_is_named_by_its_place():
+    class Mine(DampedLeastSquares):
+        pass
+
+    (row,) = evaluate(HELIX, Mine, steps=3)
+    assert row.policy == f"{__name__}:{Mine.__qualname__}"
+    with pytest.raises(UnknownNameError, match=r"no parameter of .*Mine 'dampin'"):
+        evaluate(HELIX, (Mine, {"dampin": 1}), steps=3)
+
+
+@pytest.mark.parametrize(
+    ("change", "what"),
+    [({"dt": 0.5}, "dt"), ({"velocity_limit": 3.0}, "velocity_limit"), ({"cost": ikgym.TrackingCost(p_x=2)}, "cost")],
+)
+def test_an_instance_plays_only_what_it_was_made_for(change, what):
+    scenario = ikgym.scenarios.get(HELIX)
+    policy = baselines.make("dls", scenario)
+    other = scenario.replace(name="other", **change)
+    rows = evaluate([scenario, other], policy, steps=3)
+    assert [row.scenario for row in rows] == [HELIX]
+    assert [(one.scenario, one.policy) for one in rows.skipped] == [("other", "dls")]
+    assert rows.skipped[0].reason == f"dls was made for a scenario with another {what}."
+    with pytest.raises(InvalidInputError, match="Nothing to evaluate: dls in varga7-fast: dls was made for a scenario"):
+        evaluate("varga7-fast", policy)
+
+
+def test_an_instance_that_knows_one_episode_does_not_play_others():
+    handed = baselines.make("follow_nominal", "varga7-random", seed=3)
+    rows = evaluate("varga7-random", [handed, "dls"], steps=3)
+    assert [row.policy for row in rows] == ["dls"]
+    assert "privileged information on one episode" in rows.skipped[0].reason
+
+
+# Policies of others
+
+
+def test_an_object_with_a_predict_is_scored_as_a_solver_is(solved):
+    model = Borrowed()
+    (row,) = evaluate(HELIX, model, steps=STEPS)
+    assert numbers(row) == numbers(solved)
+    assert (row.policy, row.parameters, row.status) == ("Borrowed", {}, "unknown")
+    assert row.status_counts == {"unknown": STEPS}
+    assert (row.iterations, row.operations) == (None, {})
+    assert row.time_p50_us > 0
+    assert Row.from_json(row.to_json()) == row
+    # One call that does not count, then one a step, with its own memory, begun once.
+    assert model.calls[0] == (None, [True], True)
+    assert model.calls[1:] == [(k or None, [k == 0], True) for k in range(STEPS)]
+
+
+def test_unknown_numbers_are_dashes_in_the_table():
+    rows = evaluate(HELIX, [borrowed, "dls"], steps=3)
+    text = table(rows, operations=True)
+    assert "Borrowed" in text
+    assert "unknown" in text
+    assert summarise(rows)[0].operations == {}
+
+
+def test_episodes_of_others_are_played_one_by_one_and_only_some_have_times():
+    options = {"episodes": 3, "steps": 5}
+    rows = evaluate("varga7-random", here("Made"), **options)
+    assert [row.time_p50_us is None for row in rows] == [False, True, True]
+    expected = evaluate("varga7-random", "dls", **options)
+    assert [numbers(row) for row in rows] == [numbers(row) for row in expected]
+
+
+@pytest.mark.parametrize(
+    ("policy", "name", "parameters"),
+    [
+        (here("Borrowed"), here("Borrowed"), {}),
+        (here("Borrowed:damping=1e-3"), here("Borrowed"), {"damping": 1e-3}),
+        ((here("Made"), {"damping": 1e-3}), here("Made"), {"damping": 1e-3}),
+        (here("Made"), here("Made"), {}),
+        (Made, here("Made"), {}),
+        ((Made, {"damping": 1e-3}), here("Made"), {"damping": 1e-3}),
+        (here("borrowed"), here("borrowed"), {}),
+        (here("make_borrowed"), here("make_borrowed"), {}),
+    ],
+)
+def test_places_classes_and_factories(solved, policy, name, parameters):
+    (row,) = evaluate(HELIX, policy, steps=STEPS)
+    assert (row.policy, row.parameters, row.status) == (name, parameters, "unknown")
+    assert numbers(row) == numbers(solved)
+
+
+def test_a_factory_may_make_a_solver(solved):
+    (row,) = evaluate(HELIX, here("make_solver"), steps=STEPS)
+    assert (row.policy, row.parameters, row.status) == (here("make_solver"), solved.parameters, solved.status)
+    assert numbers(row) == numbers(solved)
+
+
+def test_objects_that_share_a_class_get_names_of_their_own():
+    one, other = Borrowed(), Borrowed(damping=0.1)
+    rows = evaluate(HELIX, [one, other, one], steps=STEPS)
+    assert [row.policy for row in rows] == ["Borrowed", "Borrowed-2"]
+    assert rows[0].total_cost != rows[1].total_cost
+
+    class dls(Borrowed):  # noqa: N801  # takes the name of a registered policy
+        pass
+
+    assert [row.policy for row in evaluate(HELIX, [dls(), "dls"], steps=3)] == ["dls-2", "dls"]
+
+
+def test_parameters_that_an_object_states_are_in_its_row():
+    model = Borrowed()
+    model.parameters = {"width": (64, 64)}
+    assert evaluate(HELIX, model, steps=3)[0].parameters == {"width": [64, 64]}
+
+
+def test_what_others_are_shown():
+    model = Seeing()
+    assert evaluate("varga7-fast", model, steps=3)[0].preview == 4
+    assert model.shape == (2, 6)
+    assert evaluate("varga7-fast", model, steps=3, preview=7)[0].preview == 7
+    assert model.shape[0] == 7
+    assert evaluate("varga7-fast", Bare(), steps=3, preview=(2, 9))[0].preview == 9
+    with pytest.raises(InvalidInputError, match=r"'Bare': nobody says how many steps ahead .* Give preview=…"):
+        evaluate("varga7-fast", Bare(), steps=3)
+    model.preview = [2, 5]
+    assert evaluate("varga7-fast", model, steps=3)[0].preview == 5
+    model.preview = (4, 1)
+    with pytest.raises(InvalidInputError, match="'Seeing': preview: expected a whole number of at least 1, or rising"):
+        evaluate("varga7-fast", model, steps=3)
+
+
+def test_solvers_are_shown_nothing_that_they_would_misread():
+    assert evaluate("varga7-fast", "rhc_gradient:iterations=1", steps=2, preview=(1, 2, 9))[0].preview == 9
+    with pytest.raises(InvalidInputError, match=r"needs to be shown the steps \(1, 2\) ahead, got preview=\(1, 10\)"):
+        evaluate("varga7-fast", "rhc_gradient", steps=2, preview=(1, 10))
+
+
+class Answering(Bare):
+    """Answers with something else at its fourth call, the third that counts."""
+
+    preview = 1
+
+    def __init__(self, answer):
+        self.answer, self.made = answer, 0
+
+    def predict(self, observation, state=None, episode_start=None, deterministic=False):
+        self.made += 1
+        return self.answer() if self.made == 4 else super().predict(observation)
+
+
+def fail():
+    raise KeyError("weights")
+
+
+@pytest.mark.parametrize(
+    ("answer", "message"),
+    [
+        (lambda: (np.array([0.0, np.nan, 0.0]), None), r"Answering in zhang3-helix, seed 0, step 3: expected finite"),
+        (lambda: ([0.0, np.inf, 0.0], None), r"step 3: expected finite actions, got \[0\.0, inf, 0\.0\]"),
+        (lambda: np.zeros(3), r"Answering: expected predict to return \(action, state\)"),
+        (lambda: (None, None), "Answering: expected an action of numbers, got None"),
+        (lambda: (np.zeros((1, 3)), None), r"action: expected shape \(3,\), got \(1, 3\)"),
+        (fail, "Answering: predict raised KeyError: 'weights'"),
+    ],
+)
+def test_answers_that_are_no_actions(answer, message):
+    with pytest.raises(InvalidInputError, match=message):
+        evaluate(HELIX, Answering(answer), steps=STEPS)
+
+
+def test_actions_of_solvers_that_are_not_finite_are_named_too():
+    class Wild(DampedLeastSquares):
+        def predict(self, observation, state=None, episode_start=None, deterministic=True):
+            action, state = super().predict(observation, state, episode_start)
+            return action * np.where(observation["remaining"] == 997, np.nan, 1.0), state
+
+    with pytest.raises(InvalidInputError, match=r"seed 2000000, step 4: expected finite actions"):
+        evaluate("varga7-random", Wild, episodes=2)
+
+
+@pytest.mark.parametrize(
+    ("policy", "message"),
+    [
+        (3, "expected a name, 'package.module:Class', a class, or something with the predict"),
+        (dict, "expected a class with the predict of Stable-Baselines3"),
+        (here("number"), "something with a predict, or what makes one, got 3"),
+        (here("nothing"), "has no attribute 'nothing'"),
+        ("no_such_module:Policy", "No module named 'no_such_module'"),
+        (here("Problem"), "cannot be made: TypeError"),
+        (here("Borrowed:dampin=1"), "There is no parameter of dls 'dampin'"),
+        (here("refuse"), "Nothing to evaluate: .*refuse in zhang3-helix: only for seven joints"),
+        (here("Borrowed:damping"), "expected name:parameter=value"),
+    ],
+)
+def test_what_is_no_policy_is_refused(policy, message):
+    assert Problem
+    with pytest.raises((InvalidInputError, UnknownNameError), match=message):
+        evaluate(HELIX, policy, steps=3)
+
+
+def test_what_does_not_suit_a_scenario_is_named_with_the_reason():
+    class Trained(Bare):
+        preview = 2
+        observation_space = ikgym.RedundantIKEnv("varga7-fast", preview=2).observation_space
+        action_space = ikgym.RedundantIKEnv("varga7-fast", preview=2).action_space
+
+    rows = evaluate(["varga7-fast", HELIX], [Trained(), "dls", "follow_nominal"], steps=3)
+    assert [(row.scenario, row.policy) for row in rows] == [
+        ("varga7-fast", "Trained"),
+        ("varga7-fast", "dls"),
+        ("varga7-fast", "follow_nominal"),
+        (HELIX, "dls"),
+    ]
+    assert [(one.scenario, one.policy) for one in rows.skipped] == [(HELIX, "Trained"), (HELIX, "follow_nominal")]
+    assert "Trained has observations of the shape {" in rows.skipped[0].reason
+    alone = evaluate(["varga7-fast", HELIX], Trained(), steps=3)
+    assert [one.policy for one in alone.skipped] == ["Trained"]
+    assert evaluate(HELIX, "dls", steps=3).skipped == ()
+
+
+# Wrapped environments
+
+
+class Flat(Bare):
+    """Plays what FlattenObservation shows."""
+
+    preview = 1
+
+    def __init__(self, scenario=HELIX):
+        self.solver, self.space = baselines.make("dls", scenario), ikgym.RedundantIKEnv(scenario, 1).observation_space
+
+    def predict(self, observation, state=None, episode_start=None, deterministic=False):
+        assert observation.ndim == 1
+        action, _ = self.solver.predict(gym.spaces.unflatten(self.space, observation))
+        return action, None
+
+
+def flattened(env):
+    return gym.wrappers.TransformReward(gym.wrappers.FlattenObservation(env), lambda reward: 1e3 * reward)
+
+
+def test_a_wrapped_environment_is_scored_below_its_wrappers(solved):
+    rows = evaluate(HELIX, [Flat(), "dls"], steps=STEPS, wrap=flattened)
+    assert [row.policy for row in rows] == ["Flat", "dls"]
+    for row in rows:
+        assert numbers(row) == numbers(solved)
+    with pytest.raises(InvalidInputError, match="Flat: predict raised"):
+        evaluate(HELIX, Flat(), steps=STEPS)
+
+
+def test_random_episodes_of_a_wrapped_environment():
+    options = {"episodes": 2, "steps": 5}
+    rows = evaluate("varga7-random", Flat("varga7-random"), wrap=flattened, **options)
+    assert [numbers(row) for row in rows] == [numbers(row) for row in evaluate("varga7-random", "dls", **options)]
+    assert [row.time_p50_us is None for row in rows] == [False, True]
+
+
+class NoSeed(gym.Wrapper):
+    def reset(self, *, seed=None, options=None):
+        return self.env.reset()
+
+
+class Elsewhere(gym.Wrapper):
+    def reset(self, *, seed=None, options=None):
+        return self.env.reset(seed=seed, options={"q": np.zeros(3)})
+
+
+class FirstStep(gym.Wrapper):
+    def reset(self, *, seed=None, options=None):
+        _, info = self.env.reset(seed=seed)
+        return self.env.step(np.zeros(3, dtype=np.float32))[0], info
+
+
+@pytest.mark.parametrize(
+    ("wrap", "message"),
+    [
+        (lambda env: 3, "wrap: expected the environment that it was given in wrappers, got 3"),
+        (lambda env: gym.make("RedundantIK-v0", scenario=HELIX), "expected the environment that it was given"),
+        (lambda env: env.nothing, "wrap: raised AttributeError on zhang3-helix"),
+        (lambda env: gym.wrappers.TimeLimit(env, 5), "ended after 5 of 20 steps"),
+        (NoSeed, r"expected reset\(seed=0\) to reach the environment"),
+        (Elsewhere, "expected resets without options"),
+        (FirstStep, "and 1 steps"),
+    ],
+)
+def test_wrappers_that_change_the_episode_are_refused(wrap, message):
+    with pytest.raises(InvalidInputError, match=message):
+        evaluate(HELIX, Borrowed(), steps=STEPS, wrap=wrap)
+
+
+def test_there_must_be_somebody_to_wrap_for():
+    with pytest.raises(InvalidInputError, match="wrap: expected a policy that it is for"):
+        evaluate(HELIX, "dls", steps=STEPS, wrap=flattened)
+
+
+# Models of Stable-Baselines3
+
+
+def test_models_of_stable_baselines3():
+    from stable_baselines3 import PPO
+
+    env = gym.make("RedundantIK-v0", scenario=ikgym.scenarios.get(HELIX).replace(steps=STEPS), preview=2)
+    options = {"n_steps": 8, "batch_size": 8, "device": "cpu", "seed": 0}
+    plain = PPO("MultiInputPolicy", env, **options)
+    flat = PPO("MlpPolicy", gym.wrappers.FlattenObservation(env), **options)
+    (row,) = evaluate(HELIX, plain, steps=STEPS, preview=2)
+    assert (row.policy, row.status) == ("PPO", "unknown")
+    observation, _ = env.reset(seed=0)
+    total = 0.0
+    for _ in range(STEPS):
+        observation, reward, _, _, _ = env.step(plain.predict(observation, deterministic=True)[0])
+        total -= reward
+    assert row.total_cost == total
+    wrapped = evaluate(HELIX, flat, steps=STEPS, preview=2, wrap=gym.wrappers.FlattenObservation)
+    assert (wrapped[0].policy, wrapped[0].preview) == ("PPO", 2)
+    with pytest.raises(InvalidInputError, match="PPO has observations of the shape"):
+        evaluate(HELIX, flat, steps=STEPS, preview=2)
+    with pytest.raises(InvalidInputError, match="'PPO': nobody says how many steps ahead"):
+        evaluate(HELIX, plain, steps=STEPS)
+
+
+# Workers and folders
+
+
+def test_others_go_to_worker_processes_if_they_can(solved):
+    policies = [here("Borrowed"), Borrowed()]
+    rows = evaluate(HELIX, policies, steps=STEPS, workers=2)
+    assert [numbers(row) for row in rows] == [numbers(solved)] * 2
+
+    class Hidden(Borrowed):
+        pass
+
+    with pytest.raises(InvalidInputError, match=r"Hidden cannot be sent to worker processes .*: use one worker"):
+        evaluate(HELIX, [Hidden(), "dls"], steps=3, workers=2)
+    assert len(evaluate(HELIX, Hidden(), steps=3, workers=2)) == 1  # one batch needs no worker
+    job = pickle.loads(pickle.dumps(make_plan(HELIX, here("Borrowed"), steps=3).jobs[0]))
+    assert job.make().name == here("Borrowed")
+
+
+def test_results_of_an_object_are_never_taken_for_those_of_another(tmp_path):
+    options = {"steps": 3, "out": tmp_path, "plots": False}
+    evaluate(HELIX, [Borrowed(), here("Borrowed")], **options)
+    with pytest.raises(ResultsError, match="results of the object Borrowed cannot be told from those of another"):
+        evaluate(HELIX, Borrowed(damping=0.1), resume=True, **options)
+    assert [row.policy for row in read_rows(tmp_path / "results.json")] == ["Borrowed", here("Borrowed")]
+    (row,) = evaluate(HELIX, here("Borrowed"), resume=True, **options)
+    assert row == read_rows(tmp_path / "results.json")[1]
+
+
+# The command line
+
+MINE = """
+import numpy as np
+import ikgym
+
+
+class Proportional:
+    preview = 1
+
+    def __init__(self, scenario, gain=1.0):
+        self.arm, self.dt, self.limit, self.gain = scenario.model, scenario.dt, scenario.velocity_limit, gain
+
+    def predict(self, observation, state=None, episode_start=None, deterministic=True):
+        error = observation["nominal"][0] - observation["pose"]
+        jacobian = self.arm.jacobian(observation["q"])[:3]
+        qdot = self.gain * jacobian.T @ error / np.linalg.norm(jacobian @ jacobian.T) / self.dt
+        return np.clip(qdot / self.limit, -1, 1).astype(np.float32), state
+
+
+slow = ikgym.scenarios.get("zhang3-helix").replace(name="slow", steps=12)
+"""
+
+
+def test_a_policy_of_fifteen_lines_outside_the_tree_is_evaluated_by_one_command(tmp_path):
+    (tmp_path / "mine.py").write_text(MINE)
+    assert len([line for line in MINE.splitlines() if line.strip()]) <= 15
+    command = ["-m", "baselines.evaluate", "--policies", "mine:Proportional", "mine:Proportional:gain=0.5", "dls"]
+    done = subprocess.run(
+        [sys.executable, "-W", "error", *command, "--scenarios", "mine:slow", HELIX, "--steps", "15", "--out", "out"],
+        cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(ROOT)}, capture_output=True, text=True, timeout=120,
+        check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert "slow: 12 steps" in done.stdout
+    assert "mine:Proportional" in done.stdout
+    rows = read_rows(tmp_path / "out" / "results.json")
+    assert {row.policy for row in rows} == {"mine:Proportional", "dls"}
+    assert len(rows) == 6
+    assert list((tmp_path / "out" / "plots").glob("slow/*.png"))
+
+
+def test_modules_are_found_in_the_current_folder(tmp_path, monkeypatch, capsys):
+    name = "module_of_the_current_folder"
+    (tmp_path / f"{name}.py").write_text(textwrap.dedent(MINE))
+    (tmp_path / "broken_module.py").write_text("1 / 0")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [entry for entry in sys.path if entry])
+    assert main(["--policies", f"{name}:Proportional", "--scenarios", f"{name}:slow"]) == 0
+    assert f"{name}:Proportional" in capsys.readouterr().out
+    for policy, message in [
+        (f"{name}:Proportionl", "has no attribute 'Proportionl'"),
+        ("broken_module:Policy", "ZeroDivisionError"),
+        ("dls:Policy", "expected name:parameter=value"),
+    ]:
+        assert main(["--policies", policy, "--steps", "3"]) == 2
+        printed = capsys.readouterr()
+        assert printed.err.startswith("error: ")
+        assert message in printed.err
+        assert printed.err.count("\n") == 1

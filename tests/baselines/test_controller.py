@@ -1,0 +1,106 @@
+"""A policy on an arm, without an environment."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import baselines
+import ikgym
+from baselines.controller import Controller
+from ikgym.exceptions import InvalidInputError
+
+STEPS = 25
+
+
+def scenario(name="varga7-fast"):
+    return ikgym.scenarios.get(name).replace(steps=STEPS)
+
+
+def driven(which, name, pose, **parameters):
+    """Joint coordinates of a loop of our own, after each step."""
+    controller = Controller(baselines.make(name, which, **parameters), STEPS)
+    nominal, q = which.nominal(0, controller.ahead), np.array(which.first_q(which.trajectory))
+    out = []
+    for k in range(STEPS):
+        qdot = controller.step(q, pose(which, q), nominal[k + 1 : k + 1 + controller.ahead])
+        q = q + which.dt * qdot
+        out.append(q)
+    return np.array(out)
+
+
+@pytest.mark.parametrize(
+    ("name", "parameters"),
+    [("dls", {}), ("rhc_gradient", {}), ("rhc", {"horizon": 8, "stop_at_end": True}), ("smoothed", {})],
+)
+@pytest.mark.parametrize(
+    "pose",
+    [
+        lambda which, q: which.task.coordinates(*which.arm.forward(q)),
+        lambda which, q: which.arm.forward(q),
+        lambda which, q: None,
+    ],
+    ids=["coordinates", "rotation and position", "of the model"],
+)
+def test_it_moves_the_arm_as_the_environment_does(name, parameters, pose):
+    which = scenario()
+    expected = baselines.track(which, (name, parameters)).q
+    np.testing.assert_allclose(driven(which, name, pose, **parameters), expected, rtol=0, atol=1e-12)
+
+
+def test_the_reference_may_be_rotations_and_positions():
+    which = scenario("zhang6-lspb")
+    policy = baselines.make("rhc_gradient", which)
+    q = np.array(which.first_q(which.trajectory))
+    rotation, position = which.model.forward(np.stack([q + 1e-3, q + 2e-3]))
+    one = Controller(policy).step(q, None, (rotation, position))
+    np.testing.assert_array_equal(one, Controller(policy).step(q, None, which.task.coordinates(rotation, position)))
+    assert np.abs(one).max() > 0
+
+
+def test_it_remembers_until_it_is_reset():
+    which = scenario()
+    controller = Controller(baselines.make("smoothed", which))
+    q, nominal = which.first_q(which.trajectory), which.nominal(0, 3)[1:]
+    made = [controller.step(q, None, nominal) for _ in range(3)]
+    assert (made[0] != made[2]).any()
+    assert controller.report.iterations.shape == (1,)
+    controller.reset()
+    np.testing.assert_array_equal([controller.step(q, None, nominal) for _ in range(3)], made)
+    controller.reset()
+    with pytest.raises(InvalidInputError, match="expected a step to be made first"):
+        controller.report  # noqa: B018
+
+
+def test_joint_velocities_stay_within_their_limit_and_are_our_own():
+    which = scenario().replace(velocity_limit=0.01)
+    controller = Controller(baselines.make("dls", which))
+    qdot = controller.step(which.first_q(which.trajectory), None, which.nominal(0)[-1:] + 0.1)
+    assert np.abs(qdot).max() == pytest.approx(0.01)
+    qdot[:] = 99.0
+    controller.step(which.first_q(which.trajectory), None, which.nominal(0)[-1:])
+    assert controller._qdot.max() <= 0.01 + 1e-9
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((np.zeros(6), None, np.zeros((2, 6))), r"q: expected shape \(7,\), got \(6,\)"),
+        ((np.full(7, np.nan), None, np.zeros((2, 6))), "q: expected finite numbers"),
+        ((np.zeros(7), np.zeros(5), np.zeros((2, 6))), r"pose: expected shape \(6,\), got \(5,\)"),
+        ((np.zeros(7), None, np.zeros(6)), r"reference: expected shape \(any, 6\), got \(6,\)"),
+        ((np.zeros(7), None, np.zeros((1, 6))), "rhc_gradient needs to be shown 2 steps ahead"),
+    ],
+)
+def test_bad_measurements_are_refused(arguments, message):
+    with pytest.raises(InvalidInputError, match=message):
+        Controller(baselines.make("rhc_gradient", scenario())).step(*arguments)
+
+
+def test_who_may_control():
+    with pytest.raises(InvalidInputError, match="expected a SolverPolicy, got 'dls'"):
+        Controller("dls")
+    with pytest.raises(InvalidInputError, match="privileged information on one episode: give its steps"):
+        Controller(baselines.make("follow_nominal", scenario()))
+    with pytest.raises(InvalidInputError, match="steps: expected a whole number of at least 1"):
+        Controller(baselines.make("dls", scenario()), 0)

@@ -1,0 +1,254 @@
+"""The registry of policies: names without imports, policies of others, and what is refused."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import importlib.metadata
+import subprocess
+import sys
+import textwrap
+from typing import ClassVar
+
+import numpy as np
+import pytest
+
+import baselines
+from baselines import registry
+from baselines.evaluate import evaluate
+from baselines.evaluation.plan import make_plan
+from baselines.policy import Solution, SolverPolicy, statuses
+from baselines.solvers.resolved_rate.dls import DampedLeastSquares
+from ikgym.exceptions import InvalidInputError, UnknownNameError
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Still(SolverPolicy):
+    """Does not move, and gives itself no name."""
+
+    def solve(self, batch, memory):
+        rows = len(batch.q)
+        return Solution(np.zeros_like(batch.q), memory, statuses(rows), np.zeros(rows, dtype=np.int64))
+
+    def count(self, iterations):
+        return 0, 0, 0, 0
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Misnamed(Still):
+    """Calls itself what another policy is registered by."""
+
+    name: ClassVar[str] = "dls"
+
+
+class Looking(Still):
+    """Must be shown two steps ahead."""
+
+    @property
+    def preview(self):
+        return 2
+
+
+@pytest.fixture(autouse=True)
+def unchanged(monkeypatch):
+    """What a test registers is forgotten after it."""
+    monkeypatch.setattr(registry, "_places", dict(registry._places))
+    monkeypatch.setattr(registry, "_classes", dict(registry._classes))
+
+
+@pytest.fixture
+def entry_points(monkeypatch):
+    """Stands for packages of others that are installed."""
+
+    def install(**places):
+        found = [importlib.metadata.EntryPoint(name, value, registry.GROUP) for name, value in places.items()]
+        monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: found)
+        monkeypatch.setattr(registry, "_entry_points", functools.cache(registry._entry_points.__wrapped__))
+
+    return install
+
+
+def fresh_process(code):
+    done = subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(code)], capture_output=True, text=True, timeout=120, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_names_import_no_policy_and_read_no_agent():
+    printed = fresh_process(
+        """
+        import sys
+        opened = []
+        sys.addaudithook(lambda event, args: opened.append(str(args[0])) if event == "open" else None)
+        import baselines
+        names = baselines.names()
+        assert "rhc" in names and "agent_alone" in names and "oracle" in names
+        print([m for m in sys.modules if m.startswith(("baselines.solvers", "baselines.agents", "baselines.oracle",
+            "baselines.evaluation", "matplotlib", "torch"))])
+        print([file for file in opened if file.endswith(".safetensors")])
+        assert len(opened) > 10
+        """
+    )
+    assert printed == "[]\n[]\n"
+
+
+def test_the_evaluation_is_there_after_a_plain_import():
+    printed = fresh_process(
+        """
+        import sys
+        import baselines
+        assert "baselines.evaluation" not in sys.modules
+        print(len(baselines.evaluate.evaluate("zhang3-helix", "dls", steps=3)))
+        print(baselines.controller.Controller.__name__)
+        """
+    )
+    assert printed == "1\nController\n"
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        baselines.nothing  # noqa: B018
+
+
+@pytest.mark.parametrize("name", baselines.names())
+def test_names_of_ours_lead_to_classes_of_that_name(name):
+    assert registry.get(name).name == name
+    assert registry.name_of(registry.get(name)) == name
+
+
+def test_a_registered_class_is_a_policy_like_others():
+    baselines.register("still", Still)
+    assert baselines.names()[-1 - len(registry._entry_points())] == "still"
+    assert baselines.get("still") is Still
+    assert isinstance(baselines.make("still", "zhang3-helix"), Still)
+    rows = evaluate("zhang3-helix", ["still"], steps=3)
+    assert [(row.policy, row.status) for row in rows] == [("still", "converged")]
+    assert "still" in {job.policy for job in make_plan("zhang3-helix", "all", steps=2).jobs}
+
+
+def test_a_registered_place_is_imported_when_it_is_asked_for(tmp_path, monkeypatch):
+    (tmp_path / "lazy_module.py").write_text(
+        "from baselines.solvers.resolved_rate.dls import DampedLeastSquares\nclass Lazy(DampedLeastSquares): pass\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    baselines.register("lazy", "lazy_module:Lazy")
+    assert "lazy" in baselines.names()
+    assert "lazy_module" not in sys.modules
+    (row,) = evaluate("zhang3-helix", "lazy:damping=1e-2", steps=3)
+    assert (row.policy, row.parameters["damping"]) == ("lazy", 1e-2)
+    assert row.total_cost == evaluate("zhang3-helix", "dls:damping=1e-2", steps=3)[0].total_cost
+
+
+def test_results_have_the_registered_name_whatever_the_class_calls_itself():
+    baselines.register("mine", Misnamed)
+    rows = evaluate("zhang3-helix", ["mine", Misnamed, baselines.make("mine", "zhang3-helix"), "dls"], steps=3)
+    assert [row.policy for row in rows] == ["mine", "dls"]  # three ways to say the same, done once
+    assert rows[0].total_cost != rows[1].total_cost
+
+
+def test_messages_name_a_class_without_a_name():
+    assert (Still.name, Looking.name, DampedLeastSquares.name) == ("Still", "Looking", "dls")
+    baselines.register("looking", Looking)
+    with pytest.raises(InvalidInputError, match="Looking needs to be shown 2 steps ahead"):
+        evaluate("zhang3-helix", "looking", steps=3, preview=1)
+    with pytest.raises(InvalidInputError, match=r"what Looking\.predict returned"):
+        baselines.make("looking", "zhang3-helix")._recall((1,), None, 1)
+
+
+@pytest.mark.parametrize(
+    "place",
+    ["dls", "package.module", "package.module:", ":Class", "a:b:c", "..:..", "1a:B", "a b:C", 3, None],
+)
+def test_bad_places_are_refused_and_leave_nothing_behind(place):
+    with pytest.raises(InvalidInputError, match=r"expected 'package\.module:Class', got"):
+        baselines.register("mine", place)
+    assert "mine" not in baselines.names()
+
+
+@pytest.mark.parametrize("name", ["", "a b", "a:b", ".a", "-a", 3, None])
+def test_bad_names_are_refused(name):
+    with pytest.raises(InvalidInputError, match="expected a name of letters, digits"):
+        baselines.register(name, Still)
+
+
+@pytest.mark.parametrize("name", ["dls", "agent"])
+def test_names_that_are_taken_are_refused(name):
+    with pytest.raises(InvalidInputError, match=f"The policy '{name}' is registered already"):
+        baselines.register(name, Still)
+
+
+def test_classes_that_are_no_policies_are_refused_and_leave_nothing_behind():
+    class Unfinished(SolverPolicy):
+        def count(self, iterations):
+            return 0, 0, 0, 0
+
+    with pytest.raises(InvalidInputError, match="expected a class derived from SolverPolicy"):
+        baselines.register("mine", dict)
+    with pytest.raises(InvalidInputError, match="Unfinished': the class lacks solve"):
+        baselines.register("mine", Unfinished)
+    assert "mine" not in baselines.names()
+
+
+def test_a_class_inside_a_function_may_be_registered():
+    class Local(Still):
+        pass
+
+    baselines.register("local", Local)
+    assert baselines.get("local") is Local
+    assert registry.name_of(Local) == "local"
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (None, "ModuleNotFoundError: No module named 'other_module'"),
+        ("x = 1", "has no attribute 'Policy'"),
+        ("class Policy(", "SyntaxError"),
+        ("raise RuntimeError('no licence')", "RuntimeError: no licence"),
+        ("Policy = 3", "expected a class derived from SolverPolicy, got 3"),
+    ],
+)
+def test_places_that_lead_nowhere(tmp_path, monkeypatch, content, message):
+    if content is not None:
+        (tmp_path / "other_module.py").write_text(content)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "other_module", raising=False)
+    baselines.register("mine", "other_module:Policy")
+    with pytest.raises(InvalidInputError, match=message):
+        baselines.get("mine")
+    monkeypatch.delitem(sys.modules, "other_module", raising=False)
+
+
+def test_packages_of_others_bring_policies(entry_points):
+    entry_points(theirs=f"{__name__}:Still", extra=f"{__name__}:Misnamed [fast]")
+    assert baselines.names()[-2:] == ("theirs", "extra")
+    assert baselines.get("theirs").__name__ == "Still"
+    assert evaluate("zhang3-helix", "theirs", steps=2)[0].policy == "theirs"
+    assert baselines.get("extra").__name__ == "Misnamed"
+
+
+def test_names_of_ours_take_precedence_over_those_of_others(entry_points):
+    entry_points(dls=f"{__name__}:Still")
+    assert baselines.names().count("dls") == 1
+    assert baselines.get("dls") is DampedLeastSquares
+
+
+def test_a_bad_entry_point_takes_nobody_else_away(entry_points):
+    entry_points(broken="not_installed.module:Policy", nonsense="::", theirs=f"{__name__}:Still")
+    assert baselines.names()[-3:] == ("broken", "nonsense", "theirs")
+    assert baselines.get("theirs").__name__ == "Still"
+    with pytest.raises(InvalidInputError, match="No module named 'not_installed'"):
+        baselines.get("broken")
+    with pytest.raises(InvalidInputError, match=r"expected 'package\.module:Class', got '::'"):
+        evaluate("zhang3-helix", "nonsense", steps=2)
+    plan = make_plan("zhang3-helix", "all", steps=2)
+    assert {"dls", "theirs"} <= {job.policy for job in plan.jobs}
+    reasons = {one.policy: one.reason for one in plan.skipped}
+    assert "No module named 'not_installed'" in reasons["broken"]
+    assert "expected 'package.module:Class'" in reasons["nonsense"]
+
+
+def test_an_unknown_name_comes_with_the_nearest():
+    with pytest.raises(UnknownNameError, match=r"There is no policy 'dsl'\. Did you mean 'dls'"):
+        baselines.get("dsl")
+    with pytest.raises(UnknownNameError, match="There is no policy 3"):
+        baselines.get(3)
