@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 import time
 from collections.abc import Callable, Mapping
 from typing import Any, Protocol
@@ -185,7 +186,8 @@ class Recorder(gym.Wrapper[Any, Any, Any, Any]):
         result = self.env.step(action)
         seen, info = result[0], result[-1]
         if not self.ended:
-            numbers = (info[key] for key in ("tracking_cost", "velocity_cost", "position_error", "orientation_error"))
+            numbers = [info[key] for key in ("tracking_cost", "velocity_cost", "position_error")]
+            numbers.append(info.get("orientation_error", math.nan))  # absent where the task has none
             # Copies: wrappers may write into what they are handed.
             self.rows.append((*(seen[key].copy() for key in ("q", "qdot", "pose")), *map(np.asarray, numbers)))
         return result
