@@ -11,7 +11,7 @@ from baselines.papers.paper import Claim, Finding, verdict
 from baselines.papers.runs import Runs
 from baselines.papers.zhang.episodes import HELIX, constant, jacobians_used, listed, predictive, settled_from
 from baselines.registry import make
-from baselines.solvers.levenberg_marquardt.damped import typical_link
+from baselines.solvers.levenberg_marquardt.damping_parameters import typical_link
 from ikgym.trajectories import StraightLine
 from ikgym.validation import FloatArray
 

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from baselines.policy import Batch
 from baselines.solvers.fixed_point.fixed_point import FixedPoint, jacobian_bound
-from baselines.solvers.references.nominal_path import HandedPath
+from baselines.solvers.references.privileged_path import PrivilegedPath
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 from ikgym.kinematics import Chain
@@ -18,7 +18,7 @@ from ikgym.validation import FloatArray, frozen_array, read_only, whole_number
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class FixedPointExtended(HandedPath, FixedPoint):
+class FixedPointExtended(PrivilegedPath, FixedPoint):
     """:class:`FixedPoint` with x extended by the end point of a link, which brings q back to the nominal joint path.
 
     A reference, not a contender: where that end point should be follows from the nominal joint path, which no

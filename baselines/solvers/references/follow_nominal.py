@@ -9,12 +9,12 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.policy import Batch, Memory, Solution, statuses
-from baselines.solvers.references.nominal_path import HandedPath
+from baselines.solvers.references.privileged_path import PrivilegedPath
 from ikgym.validation import FloatArray, frozen_array
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class FollowNominal(HandedPath):
+class FollowNominal(PrivilegedPath):
     """Goes from wherever the arm is to the nominal joint coordinates of the next step.
 
     A reference, not a contender: it knows the joint path, which no observation shows. Its tracking error is zero

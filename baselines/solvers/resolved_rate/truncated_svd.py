@@ -8,8 +8,8 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
+from baselines.solvers.linear_algebra import pseudoinverse_rows
 from baselines.solvers.resolved_rate.base import ResolvedRate, status_of
-from baselines.solvers.resolved_rate.moore_penrose import pseudoinverse_rows
 from ikgym.exceptions import InvalidInputError
 from ikgym.validation import FloatArray, number
 
