@@ -91,7 +91,7 @@ def _static_error(runs: Runs) -> Finding:
 
 
 def _no_static_error(runs: Runs) -> Finding:
-    """The kinematics bend, so that an error of the second order in the velocity is left, and no more than that."""
+    """The curvature of the kinematics leaves an error of the second order in the velocity, and no more than that."""
     orders, evidence = [], []
     for name, horizon in (("MFAC", 1), ("MFAPC, n = 5", 5)):
         fast, slow = (float(np.linalg.norm(_ramp(runs, v, 0.0, horizon)[0])) for v in (1e-2, 1e-3))
@@ -99,7 +99,7 @@ def _no_static_error(runs: Runs) -> Finding:
         evidence.append(f"{name}: {1e6 * fast:.3g} µm at 10 mm a sample, {1e6 * slow:.2g} µm at 1 mm")
     return verdict(
         min(orders) > 1.9,
-        f"{'; '.join(evidence)}: of order {min(orders):.2f} in the velocity, from the bend of the kinematics",
+        f"{'; '.join(evidence)}: of order {min(orders):.2f} in the velocity, from the curvature of the kinematics",
         order=min(orders),
     )
 

@@ -47,7 +47,7 @@ class DampedIteration(SolverPolicy, abc.ABC):
         decay: a₂. At least 1.
         threshold: t₁, in the units of the error, [m] and [rad]. Above 0.
         restart: Whether λ begins anew where the error rises above the threshold (Remark 2).
-        carry: Whether λ goes on from period to period, instead of beginning anew.
+        carry: Whether λ is kept from period to period, instead of beginning anew.
         weight: ω. Above 0.
         error_bounds: Where the rows of the look-up meet, in the units of the error; ascending, each bound belongs to
             the row behind it.
@@ -107,11 +107,17 @@ class DampedIteration(SolverPolicy, abc.ABC):
 
     def diagnostics(self, state: Memory) -> dict[str, FloatArray]:
         """The remembered λ as ``lambda``, of shape (B,): of the last iteration, or what a stepped law made of it."""
-        return {"lambda": _memory_in(state).damping}
+        _status, _iterations, *memory = state
+        return {"lambda": DampingMemory(*memory).damping}
 
     def operations(self, state: Memory) -> Operations:
-        """See :meth:`SolverPolicy.operations`; the factorisations are those counted while solving."""
-        return super().operations(state)._replace(factorisations=_memory_in(state).factorised.copy())
+        """See :meth:`SolverPolicy.operations`; the factorisations are those counted while solving.
+
+        A state without memory, as a rollout passes it, tells of none: one factorisation an iteration is given then.
+        """
+        _status, iterations, *memory = state
+        factorised = DampingMemory(*memory).factorised if memory else iterations
+        return super().operations(state)._replace(factorisations=factorised.copy())
 
     def solve(self, batch: Batch, memory: Memory) -> Solution:
         """See :meth:`SolverPolicy.solve`."""
@@ -132,9 +138,3 @@ class DampedIteration(SolverPolicy, abc.ABC):
             memory: A plain :class:`DampingMemory`, changed in place.
             found: Plain :class:`Iterates`, changed in place.
         """
-
-
-def _memory_in(state: Memory) -> DampingMemory:
-    """The memory in what `predict` returned."""
-    _status, _iterations, *memory = state
-    return DampingMemory(*memory)

@@ -19,7 +19,7 @@ from ikgym.validation import FloatArray
 
 LOOKUP, PROPORTIONAL, STEPPED = 0, 1, 2
 
-# A λ that goes on growing stays a number: at this size the arm stands still.
+# Keeps a growing λ finite: at this size the arm stands still.
 LARGEST = 1e100
 
 

@@ -45,7 +45,7 @@ class ModelFreeAdaptiveControl(DampedIteration):
     reach; ``rank_deficient`` where it does not and J had lost rank with a λ of 0, or too small to count, the
     directions lost being left out; ``diverged`` where the iterates are no numbers, or lead away from the point faster
     than the velocity limit: the arm is stopped for one step. The printed (14) takes back no bad step: out of reach,
-    where λ falls while the Jacobian loses rank, it wanders, while ``sugihara`` comes to rest.
+    where λ falls while the Jacobian loses rank, it does not converge, while ``sugihara`` does.
 
     For a ramp of velocity v per period one step with a constant J leaves the error U diag(λ/σ²) Uᵀ v (eq. 10).
 

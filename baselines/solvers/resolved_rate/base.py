@@ -42,7 +42,7 @@ class ResolvedRate(SolverPolicy, abc.ABC):
     Args:
         problem: What the policy is told of the scenario.
         gain: Share of the present error that is taken back in one step, K Δt with the feedback gain K in [1/s].
-            Above 0; 1 is dead beat, 2 the limit of stability.
+            Above 0; 1 is deadbeat control, 2 the limit of stability.
 
     Raises:
         InvalidInputError: The gain is not between 0 and 2.

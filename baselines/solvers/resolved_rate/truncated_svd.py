@@ -20,7 +20,7 @@ class TruncatedSVD(ResolvedRate):
 
     The joint shift is at most ‖Δx‖ / (threshold σ_max). Within the directions that are kept nothing is distorted,
     unlike with damping; those left out are not tracked at all until their singular value has grown again, when the
-    error piled up is taken back at once: the joint velocity jumps. Wherever one is left out the status says
+    accumulated error is taken back at once: the joint velocity jumps. Wherever one is left out the status says
     ``rank_deficient``.
 
     Args:
