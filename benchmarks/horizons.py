@@ -7,8 +7,8 @@ from collections.abc import Callable
 from typing import Any
 
 import ikgym
-from benchmarks.horizon_solvers import EXACT, linear_quadratic, policies, rivals
 from benchmarks.effort import FULL, Effort
+from benchmarks.horizon_solvers import EXACT, linear_quadratic, policies, rivals
 from benchmarks.states import along
 from benchmarks.table import Column, Table
 from benchmarks.timing import medians

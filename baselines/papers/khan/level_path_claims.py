@@ -72,8 +72,8 @@ def _orientation_relaxes(runs: Runs) -> Finding:
     return verdict(
         _steps_until(angle[peak:], 0.1 * angle[peak]) < 1500,
         f"both arms are upright at home, so it starts at 0, grows to {angle[peak]:.2f} rad after {peak + 1} inner "
-        f"steps while the position approaches its target, is half of that {half:.0f} steps later and a tenth {tenth_text}; "
-        f"root mean square after 1 s {late:.2f} rad",
+        f"steps while the position approaches its target, is half of that {half:.0f} steps later and a tenth "
+        f"{tenth_text}; root mean square after 1 s {late:.2f} rad",
         peak_rad=float(angle[peak]),
         steps_to_peak=peak + 1,
         steps_from_peak_to_half=half,

@@ -31,7 +31,7 @@ def damped_horizon_step(jacobians, differences, damping, scratch, out):
     Returns:
         False where a Jacobian has lost rank and λ is too small to count; ``out`` is of no use then.
     """
-    gram, gains, x = scratch
+    _, gains, x = scratch
     n = x.shape[0]
     for j in range(n - 1, -1, -1):
         if not _eliminate(j, jacobians[j], differences[j], damping, scratch):

@@ -24,10 +24,10 @@ OBJECTIVES = ("posture", "joint_centring", "manipulability")
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class NullSpace(MoorePenrose):
-    """Pursues a secondary objective in the directions that the task leaves free: q̇ = J⁺ ẋ + (I − J⁺ J) z (Liégeois 1977).
+    """Follows a secondary objective in the null space of the task: q̇ = J⁺ ẋ + (I − J⁺ J) z (Liégeois 1977).
 
-    Varga 2021 (section I, its references 10 to 12) and Khan 2020 name the method. The secondary
-    objective gives a joint velocity z, of which only the part is used that moves no task coordinate:
+    Varga 2021 (section I, its references 10 to 12) and Khan 2020 name the method. The secondary objective
+    gives a joint velocity z, of which only the part is used that moves no task coordinate:
 
     - ``posture``: z = K (q_posture − q).
     - ``joint_centring``: z = K (r_min / r)² (q_middle − q), joint by joint, with the ranges r between the limits
@@ -39,8 +39,8 @@ class NullSpace(MoorePenrose):
       kink, z is 0.
 
     The first part is Moore–Penrose, or damped least squares if there is a damping. J⁺ in the second part is never
-    damped, or the task would be disturbed. An arm without redundancy is moved by the secondary objective in singular poses
-    only, where a direction is free for once.
+    damped, or the task would be disturbed. An arm without redundancy is moved by the secondary objective in singular
+    poses only, where the Jacobian has a null space.
 
     Args:
         problem: What the policy is told of the scenario.

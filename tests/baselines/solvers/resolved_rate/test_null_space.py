@@ -75,8 +75,8 @@ def test_manipulability_gradient_against_central_differences(name, lines):
     problem = dataclasses.replace(Problem.of(scenario), task=ikgym.tasks.get("pose" if lines == 6 else "position"))
     policy = baselines.registry.get("null_space")(problem, objective="manipulability")
     q = np.random.default_rng(lines).uniform(-1.5, 1.5, (10, scenario.joints))
-    gradient = policy.objective_gradient(q) * model.reach(np.zeros(scenario.joints)) ** 3
-    for x, gradient in zip(q, slope, strict=True):
+    gradients = policy.objective_gradient(q) * model.reach(np.zeros(scenario.joints)) ** 3
+    for x, gradient in zip(q, gradients, strict=True):
         if manipulability(model, x, lines) < 1e-3:
             continue
         unit = 1e-5 * np.eye(scenario.joints)
