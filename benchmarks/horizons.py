@@ -7,8 +7,8 @@ from collections.abc import Callable
 from typing import Any
 
 import ikgym
-from benchmarks.contenders import EXACT, linear_quadratic, policies, rivals
 from benchmarks.effort import FULL, Effort
+from benchmarks.horizon_solvers import EXACT, linear_quadratic, policies, rivals
 from benchmarks.states import along
 from benchmarks.table import Column, Table
 from benchmarks.timing import medians
@@ -56,8 +56,8 @@ def _table(name: str, grid: int, effort: Effort, conditions: str) -> Table:
     states = along(scenario, grid - 1, effort.states, effort.lead)
     others, skipped = rivals(scenario, grid)
     warmed = {
-        (label, i): contender.warmed(state)
-        for label, contender in (policies(scenario, grid) | others).items()
+        (label, i): solver.warmed(state)
+        for label, solver in (policies(scenario, grid) | others).items()
         for i, state in enumerate(states)
     }
     calls: dict[tuple[str, int], Callable[[], Any]] = {key: call for key, (call, _) in warmed.items()}

@@ -12,7 +12,7 @@ from numba import njit
 import baselines
 import ikgym
 from baselines.policy import Batch
-from baselines.solvers.damped_step import damped_step
+from baselines.solvers.linear_algebra import damped_step
 from benchmarks.effort import FULL, Effort
 from benchmarks.table import Column, Table
 from benchmarks.timing import medians

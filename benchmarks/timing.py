@@ -14,7 +14,7 @@ Name = TypeVar("Name", bound=Hashable)
 def medians(calls: Mapping[Name, Call], rounds: int = 15, seconds: float = 0.05) -> dict[Name, float]:
     """The median time of each call in [s].
 
-    Machines are noisy: what is compared takes turns, round by round, so that a slow spell hits all alike.
+    Machines are noisy: what is compared takes turns, round by round, so that a slow period affects all alike.
 
     Args:
         calls: What to time, by name. Each is called once before anything counts.

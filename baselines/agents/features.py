@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.policy import Batch, Problem
-from baselines.solvers.damped_step import damped_step
+from baselines.solvers.linear_algebra import damped_step
 from ikgym import task_kernels
 from ikgym.exceptions import InvalidInputError
 from ikgym.jit import inlined, kernel

@@ -12,14 +12,14 @@ import numpy.typing as npt
 from baselines.oracle.cache import solve
 from baselines.oracle.optimum import Search
 from baselines.policy import Batch, Memory, Problem, Solution, statuses
-from baselines.solvers.references.nominal_path import HandedPath
+from baselines.solvers.references.privileged_path import PrivilegedPath
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray, whole_number
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Oracle(HandedPath):
+class Oracle(PrivilegedPath):
     """Plays the optimum of its episode, see :func:`baselines.oracle.solve`.
 
     A reference, not a contender: it knows the whole trajectory and the arm itself, solves the episode when it is first

@@ -7,7 +7,13 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from ikgym.jit import inlined, kernel
+
+# Pivots below this share of the largest diagonal element are rounding: J has lost rank, or nearly so, and λ is too
+# small to count. Singular values tell which; solving on would amplify the rounding.
+SMALLEST_PIVOT = 1e-12
 
 
 @inlined
@@ -122,3 +128,153 @@ def orthogonal_columns(columns, rotations):
                     rotations[i, p], rotations[i, q] = cosine * x - sine * y, sine * x + cosine * y
         if not rotated:
             return
+
+
+@kernel
+def pseudoinverse_rows(jacobian, shift, tolerance, full_rank, out, deficient):
+    """Δq = J⁺ Δx by singular values, row by row.
+
+    Args:
+        jacobian: J. Shape (B, e, n).
+        shift: Δx. Shape (B, e).
+        tolerance: Singular values below this share of the largest count as zero.
+        full_rank: The rank that J has where nothing is lost.
+        out: Receives Δq. Shape (B, n).
+        deficient: Receives whether the rank is lower. Shape (B,).
+    """
+    e, n = jacobian.shape[1], jacobian.shape[2]
+    columns, left = np.empty((n, e)), np.empty((e, e))
+    squares = np.empty(e)
+    for row in range(jacobian.shape[0]):
+        # Jᵀ = (V Σ) Uᵀ: the columns become V Σ, the rotations U.
+        for a in range(e):
+            for k in range(n):
+                columns[k, a] = jacobian[row, a, k]
+        orthogonal_columns(columns, left)
+        largest = 0.0
+        for a in range(e):
+            squares[a] = 0.0
+            for k in range(n):
+                squares[a] += columns[k, a] * columns[k, a]
+            largest = max(largest, squares[a])
+        rank = 0
+        out[row] = 0.0
+        for a in range(e):
+            if squares[a] <= tolerance * tolerance * largest or squares[a] == 0.0:
+                continue
+            rank += 1
+            amount = 0.0
+            for b in range(e):
+                amount += left[b, a] * shift[row, b]
+            amount /= squares[a]
+            for k in range(n):
+                out[row, k] += amount * columns[k, a]
+        deficient[row] = rank < full_rank
+
+
+@kernel
+def damped_step(jacobian, error, damping, gram, x, out):
+    """One damped step Δq = Jᵀ (J Jᵀ + λ I)⁻¹ e, in the small space (Zhang 2020, eq. 5 and 13).
+
+    The matrix is factorised as L D Lᵀ, which needs no root and one division a row.
+
+    Args:
+        jacobian: J. Shape (e, n).
+        error: e. Shape (e,).
+        damping: λ, at least 0.
+        gram: Scratch. Shape (e, e).
+        x: Scratch. Shape (e,).
+        out: Receives Δq. Shape (n,).
+
+    Returns:
+        False where J has lost rank and λ is too small to count; ``out`` is untouched then.
+    """
+    damped_gram(jacobian, damping, gram)
+    if not ldl(gram):
+        return False
+    for a in range(x.shape[0]):
+        x[a] = error[a]
+    ldl_solve(gram, x)
+    transposed_product(jacobian, x, out)
+    return True
+
+
+@kernel
+def damped_gram(jacobian, damping, out):
+    """The lower triangle of J Jᵀ + λ I: shapes (e, n), a number, (e, e)."""
+    e, n = jacobian.shape
+    for a in range(e):
+        for b in range(a + 1):
+            total = damping if a == b else 0.0
+            for k in range(n):
+                total += jacobian[a, k] * jacobian[b, k]
+            out[a, b] = total
+
+
+@kernel
+def ldl(matrix):
+    """L D Lᵀ in place: L below the diagonal, D⁻¹ on it; from the lower triangle of ``matrix`` (e, e).
+
+    Returns:
+        False where the matrix is not positive definite to working precision; then its content is of no use.
+    """
+    e = matrix.shape[0]
+    largest = 0.0
+    for j in range(e):
+        largest = max(largest, matrix[j, j])
+    for j in range(e):
+        if not matrix[j, j] > SMALLEST_PIVOT * largest:
+            return False
+        inverse = 1.0 / matrix[j, j]
+        matrix[j, j] = inverse
+        for i in range(j + 1, e):
+            share = matrix[i, j] * inverse
+            for k in range(j + 1, i + 1):
+                matrix[i, k] -= share * matrix[k, j]
+        for i in range(j + 1, e):
+            matrix[i, j] *= inverse
+    return True
+
+
+@kernel
+def ldl_solve(factor, x):
+    """Solves L D Lᵀ x = b in place; ``factor`` (e, e) from :func:`ldl`, ``x`` (e,) is b before."""
+    e = x.shape[0]
+    for k in range(e):
+        for i in range(k + 1, e):
+            x[i] -= factor[i, k] * x[k]
+    for k in range(e):
+        x[k] *= factor[k, k]
+    for k in range(e - 1, 0, -1):
+        for i in range(k):
+            x[i] -= factor[k, i] * x[k]
+
+
+@kernel
+def ldl_scaled_inverse(factor, scale, out):
+    """Gives scale · (L D Lᵀ)⁻¹: shapes (e, e); ``factor`` from :func:`ldl` is destroyed."""
+    e = factor.shape[0]
+    # L becomes its inverse, column by column from the right.
+    for j in range(e - 2, -1, -1):
+        for i in range(e - 1, j, -1):
+            total = factor[i, j]
+            for k in range(j + 1, i):
+                total += factor[i, k] * factor[k, j]
+            factor[i, j] = -total
+    for a in range(e):
+        for b in range(a + 1):
+            total = factor[a, a] * (factor[a, b] if b < a else 1.0)
+            for k in range(a + 1, e):
+                total += factor[k, a] * factor[k, k] * factor[k, b]
+            out[a, b] = out[b, a] = scale * total
+
+
+@kernel
+def transposed_product(jacobian, vector, out):
+    """Jᵀ x: shapes (e, n), (e,), (n,)."""
+    e, n = jacobian.shape
+    for k in range(n):
+        total = 0.0
+        for a in range(e):
+            total += jacobian[a, k] * vector[a]
+        out[k] = total

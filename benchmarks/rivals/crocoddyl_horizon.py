@@ -122,6 +122,7 @@ class _Action(crocoddyl.ActionModelAbstract):  # type: ignore[misc]
             data.Fx, data.Fu = np.eye(len(x)), self.length * np.eye(len(x))
 
 
+# Numbers and arrays one by one in both kernels: a call a knot, the time of which is compared, enters them from Python.
 @kernel
 def _cost(chain, kind, cost, dt, origin, length, weight, nominal, x, qdot):
     total = 0.0
@@ -142,12 +143,12 @@ def _derivatives(chain, kind, cost, dt, origin, length, weight, nominal, x, qdot
     n = x.shape[0]
     by_x[:], by_u[:], by_xx[:], by_uu[:] = 0.0, 0.0, 0.0, 0.0
     if length > 0.0:
-        bend = np.empty(n)
+        curvature = np.empty(n)
         cost_kernels.velocity_gradient(cost, qdot, by_u)
-        cost_kernels.velocity_curvature(cost, qdot, bend)
+        cost_kernels.velocity_curvature(cost, qdot, curvature)
         for j in range(n):
             by_u[j] *= length
-            by_uu[j, j] = length * bend[j]
+            by_uu[j, j] = length * curvature[j]
     if weight > 0.0:
         e = 6 if kind == task_kernels.POSE else nominal.shape[0]
         rotation, position, geometric, pose = (
@@ -156,16 +157,22 @@ def _derivatives(chain, kind, cost, dt, origin, length, weight, nominal, x, qdot
             np.empty((6, n)),
             np.empty(nominal.shape[0]),
         )
-        error, slope, bend, jacobian, by_q = np.empty(e), np.empty(e), np.empty(e), np.empty((e, n)), np.empty((e, n))
+        error, gradient, curvature, jacobian, by_q = (
+            np.empty(e),
+            np.empty(e),
+            np.empty(e),
+            np.empty((e, n)),
+            np.empty((e, n)),
+        )
         forward_and_jacobian(chain, origin + dt * x, rotation, position, geometric)
         task_kernels.coordinates(kind, rotation, position, pose)
         task_kernels.error(kind, nominal, pose, error)
         task_kernels.jacobian(kind, rotation, geometric, jacobian)
         task_kernels.error_jacobian(kind, error, jacobian, by_q)
-        cost_kernels.tracking_gradient(cost, error, slope)
-        cost_kernels.tracking_curvature(cost, error, bend)
+        cost_kernels.tracking_gradient(cost, error, gradient)
+        cost_kernels.tracking_curvature(cost, error, curvature)
         for k in range(e):
             for i in range(n):
-                by_x[i] += weight * dt * slope[k] * by_q[k, i]
+                by_x[i] += weight * dt * gradient[k] * by_q[k, i]
                 for j in range(n):
-                    by_xx[i, j] += weight * dt * dt * bend[k] * by_q[k, i] * by_q[k, j]
+                    by_xx[i, j] += weight * dt * dt * curvature[k] * by_q[k, i] * by_q[k, j]

@@ -10,7 +10,7 @@ import pytest
 import baselines
 import ikgym
 from baselines.policy import Problem
-from benchmarks import contenders, effort, environments, horizons, kernels, policies, states, timing
+from benchmarks import effort, environments, horizon_solvers, horizons, kernels, policies, states, timing
 from benchmarks.rivals.numpy_horizon import Horizon, plan_cost
 
 
@@ -97,27 +97,27 @@ def test_chains_have_as_many_joints_as_they_say(joints):
     assert arm.forward(np.zeros(joints))[1] == pytest.approx([0.1, 0.0, 0.3 * (joints + 1)])
 
 
-def test_costs_of_contenders_are_those_of_their_plans():
+def test_costs_of_solvers_are_those_of_their_plans():
     scenario = ikgym.scenarios.get("varga7-slow")
     (seen,) = states.along(scenario, preview=4, count=1, lead=2)
-    others, _ = contenders.rivals(scenario, 5)
+    others, _ = horizon_solvers.rivals(scenario, 5)
     costs = {}
-    for label, contender in (contenders.policies(scenario, 5) | others).items():
-        call, answer = contender.warmed(seen)
+    for label, solver in (horizon_solvers.policies(scenario, 5) | others).items():
+        call, answer = solver.warmed(seen)
         found = answer(call())
         assert found.q.shape == (4, 7)
         horizon = Horizon(seen[-1]["q"], seen[-1]["nominal"])
         assert found.cost == pytest.approx(plan_cost(Problem.of(scenario), horizon, found.q))
         assert found.iterations >= 1
         costs[label] = found.cost
-    # The rest of the contenders are what the optimum is compared with.
+    # The rest of the solvers are what the optimum is compared with.
     assert min(costs.values()) == pytest.approx(costs["CasADi, IPOPT"], rel=1e-4)
     assert costs["rhc_gradient, analytic"] > costs["CasADi, IPOPT"]
 
 
 def test_what_is_not_installed_is_named(monkeypatch):
-    monkeypatch.setitem(contenders.RIVALS, "Somebody", ("no_such_module", "Nobody", {}))
-    found, skipped = contenders.rivals(ikgym.scenarios.get("varga7-slow"), 3)
+    monkeypatch.setitem(horizon_solvers.RIVALS, "Somebody", ("no_such_module", "Nobody", {}))
+    found, skipped = horizon_solvers.rivals(ikgym.scenarios.get("varga7-slow"), 3)
     assert "Somebody" not in found
     assert any(why.startswith("Somebody") and "ikgym[rivals]" in why for why in skipped)
 

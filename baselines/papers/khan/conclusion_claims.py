@@ -11,7 +11,7 @@ from baselines.papers.paper import Claim, Finding, verdict
 from baselines.papers.runs import Runs
 from baselines.status import Status
 
-_RIVALS = ("moore_penrose", "broyden")
+_COMPARED = ("moore_penrose", "broyden")
 
 
 def _counter_rotation(runs: Runs) -> Finding:
@@ -101,12 +101,12 @@ def _inversion_free(runs: Runs) -> Finding:
 
 def _no_exploration(runs: Runs) -> Finding:
     """An advantage is one where the others need what this method does not."""
-    episodes = {policy: runs.play(Q7Q8, policy) for policy in (METHOD, *_RIVALS)}
+    episodes = {policy: runs.play(Q7Q8, policy) for policy in (METHOD, *_COMPARED)}
     measured = {policy: float(e.operations.measurements.mean()) for policy, e in episodes.items()}
     errors = {policy: settled_errors(at_points(runs, Q7Q8, policy))["rms_position_error_m"] for policy in episodes}
     parts = [f"`{p}` {measured[p]:.0f} a step, {1e3 * errors[p]:.1e} mm" for p in episodes]
     return verdict(
-        all(measured[p] > measured[METHOD] for p in _RIVALS),
+        all(measured[p] > measured[METHOD] for p in _COMPARED),
         f"poses measured, and root mean square of the position error after 1 s: {'; '.join(parts)}",
         measurements=measured,
         rms_position_error_m=errors,
@@ -115,7 +115,7 @@ def _no_exploration(runs: Runs) -> Finding:
 
 def _less_hectic(runs: Runs) -> Finding:
     numbers = {}
-    for policy in (METHOD, *_RIVALS):
+    for policy in (METHOD, *_COMPARED):
         episode = runs.play(Q7Q8, policy)
         numbers[policy] = {
             "peak_rad_per_s": float(np.abs(episode.qdot).max()),
@@ -129,7 +129,7 @@ def _less_hectic(runs: Runs) -> Finding:
     ]
     mine = numbers[METHOD]
     return verdict(
-        all(mine["peak_rad_per_s"] < numbers[p]["peak_rad_per_s"] for p in _RIVALS),
+        all(mine["peak_rad_per_s"] < numbers[p]["peak_rad_per_s"] for p in _COMPARED),
         f"peak velocities and sum of all joints' travel: {'; '.join(parts)}; the velocity limit is 50 rad/s",
         **numbers,
     )

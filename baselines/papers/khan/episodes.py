@@ -27,7 +27,7 @@ class Points(NamedTuple):
     Attributes:
         time: s in [s]. Shape (k,).
         nominal: Nominal task coordinates. Shape (k, 12).
-        pose: Realised ones. Shape (k, 12).
+        pose: Actual ones. Shape (k, 12).
         position_error: In [m]. Shape (k,).
         orientation_error: In [rad]. Shape (k,).
         q: Joint coordinates in [rad]. Shape (k, 8).

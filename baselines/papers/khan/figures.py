@@ -22,7 +22,7 @@ def _tracking(title: str, points: Points) -> Drawn:
     )
     labels = ("$X_1$ [m]", "$X_2$ [m]", "$X_3$ [m]", "rotation from\nhome [rad]")
     panels = [
-        Panel(label, [Curve("realised", points.time, a), Curve("nominal", points.time, b, dashed=True)])
+        Panel(label, [Curve("actual", points.time, a), Curve("nominal", points.time, b, dashed=True)])
         for label, a, b in zip(labels, real, nominal, strict=True)
     ]
     return Drawn(
@@ -30,7 +30,7 @@ def _tracking(title: str, points: Points) -> Drawn:
         {
             **settled_errors(points),
             "nominal_extent_m": np.ptp(points.nominal[:, 9:], axis=0).tolist(),
-            "realised_extent_m": np.ptp(points.settled(points.pose[:, 9:]), axis=0).tolist(),
+            "actual_extent_m": np.ptp(points.settled(points.pose[:, 9:]), axis=0).tolist(),
         },
     )
 

@@ -34,12 +34,12 @@ def _level(runs: Runs) -> Finding:
     nominal = scenario.nominal()
     vectors = turned(nominal)
     height, tilt = float(np.ptp(nominal[:, 11])), float(np.abs(vectors[:, :2]).max())
-    realised = at_points(runs, Q1)
-    varies = float(np.ptp(realised.settled(realised.pose[:, 11])))
+    actual = at_points(runs, Q1)
+    varies = float(np.ptp(actual.settled(actual.pose[:, 11])))
     return verdict(
         height < 1e-12 and tilt < 1e-12,
         f"X₃ᴺ varies by {height:.0e} m, and the axis of the nominal rotation leans off the vertical by at most "
-        f"{tilt:.0e} rad; realised, X₃ varies by {1e3 * varies:.0f} mm after 1 s",
+        f"{tilt:.0e} rad; actual, X₃ varies by {1e3 * varies:.0f} mm after 1 s",
         height_m=height,
         tilt_rad=tilt,
     )
@@ -72,8 +72,8 @@ def _orientation_relaxes(runs: Runs) -> Finding:
     return verdict(
         _steps_until(angle[peak:], 0.1 * angle[peak]) < 1500,
         f"both arms are upright at home, so it starts at 0, grows to {angle[peak]:.2f} rad after {peak + 1} inner "
-        f"steps while the position is pulled in, is half of that {half:.0f} steps later and a tenth {tenth_text}; "
-        f"root mean square after 1 s {late:.2f} rad",
+        f"steps while the position approaches its target, is half of that {half:.0f} steps later and a tenth "
+        f"{tenth_text}; root mean square after 1 s {late:.2f} rad",
         peak_rad=float(angle[peak]),
         steps_to_peak=peak + 1,
         steps_from_peak_to_half=half,

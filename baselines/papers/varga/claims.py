@@ -175,7 +175,7 @@ CLAIMS = (
     ),
     Claim(
         "other joint paths",
-        "Nominal and realised joint paths differ: the solution is ambiguous, and an optimal one was chosen.",
+        "Nominal and actual joint paths differ: the solution is ambiguous, and an optimal one was chosen.",
         "section IV, fig. 4",
         "largest distance of the joint coordinates from the nominal ones",
         _other_joints,

@@ -22,7 +22,7 @@ def _times(runs: Runs, name: str) -> FloatArray:
 
 
 def _coordinates(title: str, runs: Runs, name: str, episode: Episode, columns: list[int], labels: list[str]) -> Drawn:
-    """Some task coordinates, nominal and realised, above their errors."""
+    """Some task coordinates, nominal and actual, above their errors."""
     scenario, time = runs.scenario(name), _times(runs, name)
     nominal = scenario.nominal()[1:]
     error = nominal - episode.pose
@@ -30,10 +30,10 @@ def _coordinates(title: str, runs: Runs, name: str, episode: Episode, columns: l
     tracks, errors = [], []
     for column, label in zip(columns, labels, strict=True):
         tracks += [
-            Curve(f"{label} realised", time, episode.pose[:, column]),
+            Curve(f"{label} actual", time, episode.pose[:, column]),
             Curve(f"{label} nominal", time, nominal[:, column], dashed=True),
         ]
-        errors.append(Curve(f"{label} realised", time, error[:, column]))
+        errors.append(Curve(f"{label} actual", time, error[:, column]))
     figure = picture(title, [Panel(f"coordinates {unit}", tracks), Panel(f"tracking error {unit}", errors)], height=2.6)
     angle = episode.orientation_error
     return Drawn(
@@ -62,10 +62,10 @@ def _joints(title: str, runs: Runs, name: str, episode: Episode) -> Drawn:
     nominal = episode.q if path is None else path[1:]
     panels = [
         Panel(
-            f"$q_{i + 1}$ [{'m' if slides else 'rad'}]",
-            [Curve("realised", time, episode.q[:, i]), Curve("nominal", time, nominal[:, i], dashed=True)],
+            f"$q_{i + 1}$ [{'m' if prismatic else 'rad'}]",
+            [Curve("actual", time, episode.q[:, i]), Curve("nominal", time, nominal[:, i], dashed=True)],
         )
-        for i, slides in enumerate(scenario.arm.prismatic)
+        for i, prismatic in enumerate(scenario.arm.prismatic)
     ]
     apart = np.abs(episode.q - nominal).max(axis=0)
     return Drawn(picture(title, panels, columns=2, height=1.6), {"largest_separation_rad_or_m": apart.tolist()})
@@ -74,8 +74,8 @@ def _joints(title: str, runs: Runs, name: str, episode: Episode) -> Drawn:
 def busiest(qdot: FloatArray) -> slice:
     """The steps of a close-up: where the velocities fluctuate most."""
     width = min(WINDOW, len(qdot) - 2)
-    bends = np.square(np.diff(qdot, 2, axis=0)).sum(axis=1)
-    start = int(sliding_window_view(bends, width).sum(axis=1).argmax())
+    second_differences = np.square(np.diff(qdot, 2, axis=0)).sum(axis=1)
+    start = int(sliding_window_view(second_differences, width).sum(axis=1).argmax())
     return slice(start, start + width)
 
 

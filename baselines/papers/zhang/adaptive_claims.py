@@ -11,7 +11,7 @@ from baselines.papers.paper import Claim, Finding, verdict
 from baselines.papers.runs import Runs
 from baselines.papers.zhang.episodes import HELIX, constant, jacobians_used, listed, predictive, settled_from
 from baselines.registry import make
-from baselines.solvers.levenberg_marquardt.damped import typical_link
+from baselines.solvers.levenberg_marquardt.damping_parameters import typical_link
 from ikgym.trajectories import StraightLine
 from ikgym.validation import FloatArray
 
@@ -91,7 +91,7 @@ def _static_error(runs: Runs) -> Finding:
 
 
 def _no_static_error(runs: Runs) -> Finding:
-    """The kinematics bend, so that an error of the second order in the velocity is left, and no more than that."""
+    """The curvature of the kinematics leaves an error of the second order in the velocity, and no more than that."""
     orders, evidence = [], []
     for name, horizon in (("MFAC", 1), ("MFAPC, n = 5", 5)):
         fast, slow = (float(np.linalg.norm(_ramp(runs, v, 0.0, horizon)[0])) for v in (1e-2, 1e-3))
@@ -99,7 +99,7 @@ def _no_static_error(runs: Runs) -> Finding:
         evidence.append(f"{name}: {1e6 * fast:.3g} µm at 10 mm a sample, {1e6 * slow:.2g} µm at 1 mm")
     return verdict(
         min(orders) > 1.9,
-        f"{'; '.join(evidence)}: of order {min(orders):.2f} in the velocity, from the bend of the kinematics",
+        f"{'; '.join(evidence)}: of order {min(orders):.2f} in the velocity, from the curvature of the kinematics",
         order=min(orders),
     )
 

@@ -12,7 +12,7 @@ from baselines.papers.runs import Runs
 from baselines.papers.zhang.episodes import HELIX, LINE, listed
 from baselines.policy import Batch
 from baselines.registry import make
-from baselines.solvers.levenberg_marquardt.damped import typical_link
+from baselines.solvers.levenberg_marquardt.damping_parameters import typical_link
 from baselines.solvers.levenberg_marquardt.mfapc import EXAMPLE_1
 from baselines.status import Status
 

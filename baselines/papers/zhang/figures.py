@@ -50,7 +50,7 @@ def _tracking(runs: Runs) -> Drawn:
     real, nominal = outputs(scenario, episode), scenario.nominal()
     k = _samples(len(real))
     rows = [
-        (f"{name} [m]", [Curve("realised", k, real[:, i]), Curve("desired", k, nominal[:, i], dashed=True)])
+        (f"{name} [m]", [Curve("actual", k, real[:, i]), Curve("desired", k, nominal[:, i], dashed=True)])
         for i, name in enumerate(AXES)
     ]
     start = settled_from(episode)
@@ -111,7 +111,7 @@ def _line_tracking(runs: Runs) -> Drawn:
         ("position [m]", real[:, 9:], nominal[:, 9:]),
         ("rotation from the start [rad]", turns[0], turns[1]),
     ):
-        curves = [Curve(f"{name} realised", k, ours[:, i]) for i, name in enumerate(names)]
+        curves = [Curve(f"{name} actual", k, ours[:, i]) for i, name in enumerate(names)]
         curves += [Curve(f"{name} desired", k, wanted[:, i], dashed=True) for i, name in enumerate(names)]
         rows.append((label, curves))
     return Drawn(

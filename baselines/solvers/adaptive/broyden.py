@@ -3,21 +3,40 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from baselines.policy import Batch, Memory, Solution
-from baselines.solvers.resolved_rate.base import task_shift
+from baselines.solvers.arm_task import arm_task_of, plain_arm_task, pose_arrays, task_shift
+from baselines.solvers.resolved_rate.base import NominalMemory
 from baselines.solvers.resolved_rate.dls import DampedLeastSquares
 from ikgym import task_kernels
 from ikgym.exceptions import UnknownNameError
-from ikgym.jit import kernel
+from ikgym.jit import inlined, kernel
 from ikgym.kinematics import forward_and_jacobian
-from ikgym.validation import number
+from ikgym.validation import FloatArray, number
 
 LEARNS = ("correction", "jacobian")
+
+
+class BroydenMemory(NamedTuple):
+    """What is remembered from the step before.
+
+    Attributes:
+        nominal: X^N(k), see :class:`baselines.solvers.resolved_rate.base.NominalMemory`. Shape (B, m).
+        known: Whether there was a step before. Shape (B,).
+        learnt: The correction of the Jacobian or the Jacobian. Shape (B, e, n).
+        q: Joint coordinates in [rad] or [m]. Shape (B, n).
+        pose: Measured task coordinates. Shape (B, m).
+    """
+
+    nominal: FloatArray
+    known: npt.NDArray[np.bool_]
+    learnt: FloatArray
+    q: FloatArray
+    pose: FloatArray
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -63,32 +82,30 @@ class Broyden(DampedLeastSquares):
         object.__setattr__(self, "motion", number("motion", self.motion, above=0.0))
 
     def memory(self, rows: int) -> Memory:
-        """As :meth:`ResolvedRate.memory`, then what is learnt, (B, e, n), and q and the pose of the step before."""
+        """A :class:`BroydenMemory` without a step before."""
         n, task = self.problem.model.joints, self.problem.task
         learnt = np.zeros((rows, task.error_size, n))
-        return *super().memory(rows), learnt, np.zeros((rows, n)), np.zeros((rows, task.size))
+        before = NominalMemory(*super().memory(rows))
+        q, pose = np.zeros((rows, n)), np.zeros((rows, task.size))
+        return BroydenMemory(before.nominal, before.known, learnt, q, pose)
 
     def solve(self, batch: Batch, memory: Memory) -> Solution:
         """See :meth:`SolverPolicy.solve`; iterations are 0 where nothing has been measured before, 1 later."""
-        present, known, learnt, q, pose = memory
-        learnt, estimate, shift = learnt.copy(), np.empty_like(learnt), np.empty(learnt.shape[:2])
+        before = BroydenMemory(*memory)
+        learnt = before.learnt.copy()
+        estimate, shift = np.empty_like(learnt), np.empty(learnt.shape[:2])
         target = batch.nominal[:, 0].copy()
         learn_rows(
-            self.problem.model.chain,
-            self.problem.task.kind,
-            self.gain,
-            self.motion,
-            self.learns == "correction",
+            plain_arm_task(self.problem),
+            (self.gain, self.motion, self.learns == "correction"),
             (batch.q, batch.pose, target),
-            known,
-            (q, pose, present),
-            learnt,
+            (before.nominal, before.known, learnt, before.q, before.pose),
             estimate,
             shift,
         )
         step, status = self.invert(estimate, shift)
-        remembered = (target, np.ones_like(known), learnt, batch.q.copy(), batch.pose.copy())
-        return Solution(step / self.problem.dt, remembered, status, known.astype(np.int64))
+        remembered = BroydenMemory(target, np.ones_like(before.known), learnt, batch.q.copy(), batch.pose.copy())
+        return Solution(step / self.problem.dt, remembered, status, before.known.astype(np.int64))
 
     def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
         """One factorisation and one measurement; one Jacobian, where it is learnt at the start only."""
@@ -96,48 +113,51 @@ class Broyden(DampedLeastSquares):
 
 
 @kernel
-def learn_rows(chain, kind, gain, motion, correcting, now, known, before, learnt, estimate, shift):
+def learn_rows(arm_task, rule, observed, memory, estimate, shift):
     """Estimates of the Jacobian and the task shifts asked for, row by row.
 
     Args:
-        chain: The model of the arm.
-        kind: The kind of task coordinates.
-        gain: Share of the present error to take back.
-        motion: ε.
-        correcting: Whether a correction of the model's Jacobian is learnt, or the Jacobian itself.
-        now: Joint coordinates (B, n), measured task coordinates (B, m) and X^N(k+1) of shape (B, m).
-        known: Whether there was a step before. Shape (B,).
-        before: Joint and task coordinates at the step before, and X^N(k); as above.
-        learnt: The correction or the Jacobian, changed in place. Shape (B, e, n).
+        arm_task: The model of the arm and the task, a plain :class:`ArmTask`.
+        rule: The share of the present error to take back, ε, and whether a correction of the model's Jacobian is
+            learnt, or the Jacobian itself.
+        observed: A plain :class:`Observed` with X^N(k+1).
+        memory: A plain :class:`BroydenMemory`; what is learnt is changed in place.
         estimate: Receives B. Shape (B, e, n).
         shift: Receives the task shifts. Shape (B, e).
     """
-    q, pose, target = now
-    q_before, pose_before, present = before
+    gain, motion, correcting = rule
+    (chain, kind), (q, pose, target), before = arm_task_of(arm_task), observed, BroydenMemory(*memory)
     e, n = estimate.shape[1], estimate.shape[2]
-    rotation, position, geometric = np.empty((3, 3)), np.empty(3), np.empty((6, n))
+    rotation, position, geometric, _ = pose_arrays(n, pose.shape[1])
     error, moved, jacobian = np.empty(e), np.empty(n), np.zeros((e, n))
     for row in range(q.shape[0]):
-        if correcting or not known[row]:
+        known, learnt = before.known[row], before.learnt[row]
+        if correcting or not known:
             forward_and_jacobian(chain, q[row], rotation, position, geometric)
             task_kernels.jacobian(kind, rotation, geometric, jacobian)
         if not correcting:
-            if not known[row]:
-                learnt[row] = jacobian
+            if not known:
+                learnt[:] = jacobian
             jacobian[:] = 0.0
-        if known[row]:
+        if known:
             square = motion * motion
             for k in range(n):
-                moved[k] = q[row, k] - q_before[row, k]
+                moved[k] = q[row, k] - before.q[row, k]
                 square += moved[k] * moved[k]
-            task_kernels.error(kind, pose[row], pose_before[row], error)  # Δy
-            for a in range(e):
-                for k in range(n):
-                    error[a] -= (jacobian[a, k] + learnt[row, a, k]) * moved[k]
-                for k in range(n):
-                    learnt[row, a, k] += error[a] * moved[k] / square
+            task_kernels.error(kind, pose[row], before.pose[row], error)  # Δy
+            _learn(jacobian, moved, square, error, learnt)
         for a in range(e):
             for k in range(n):
-                estimate[row, a, k] = jacobian[a, k] + learnt[row, a, k]
-        asked = present[row] if known[row] else pose[row]
-        task_shift(kind, gain, pose[row], target[row], asked, error, shift[row])
+                estimate[row, a, k] = jacobian[a, k] + learnt[a, k]
+        present = before.nominal[row] if known else pose[row]
+        task_shift(kind, gain, pose[row], target[row], present, error, shift[row])
+
+
+@inlined
+def _learn(jacobian, moved, square, error, learnt):
+    """Broyden's formula for one row: shapes (e, n), (n,), a number, (e,), which is overwritten, and (e, n)."""
+    for a in range(error.shape[0]):
+        for k in range(moved.shape[0]):
+            error[a] -= (jacobian[a, k] + learnt[a, k]) * moved[k]
+        for k in range(moved.shape[0]):
+            learnt[a, k] += error[a] * moved[k] / square

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from collections.abc import Sequence
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from baselines.policy import Batch, Memory, Solution, SolverPolicy
+from baselines.solvers.arm_task import arm_task_of, plain_arm_task, pose_arrays
 from baselines.solvers.fixed_point.rotations import adaptive_deform, plane, turn
 from baselines.solvers.linear_algebra import dot
 from baselines.status import Status
@@ -35,6 +37,36 @@ class Angles(NamedTuple):
     abstract_rotation: FloatArray
 
 
+class RotationMemory(NamedTuple):
+    """What is remembered from the step before.
+
+    Attributes:
+        direction: h(n-1), zero at the start. Shape (B, n).
+        angles: The angles of both rotations, those of :class:`Angles`. Shape (B, 2).
+    """
+
+    direction: FloatArray
+    angles: FloatArray
+
+
+class RotationRule(NamedTuple):
+    """What the parameters of the policy say to the kernel.
+
+    Attributes:
+        task_weights: The diagonal of ℱ. Shape (m,).
+        joint_weights: The diagonal of 𝒲. Shape (n,).
+        counter_rotation: Whether 𝒩 is applied.
+        deformation: R_a, λ_a, ``epsa`` and ``q_pp_max``.
+        tolerance: ‖xᴺ - f‖ up to which the iteration has converged.
+    """
+
+    task_weights: FloatArray
+    joint_weights: FloatArray
+    counter_rotation: bool
+    deformation: tuple[float, float, float, float]
+    tolerance: float
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
 class AbstractRotation(SolverPolicy):
     """Turns q by a share of the rotation that leads from what is measured to what is wanted (eq. 3.16, section 4.1).
@@ -48,8 +80,8 @@ class AbstractRotation(SolverPolicy):
     in their plane. Where all three are short beside R_a this is q + λ_a 𝒲 𝒩 J̃ᵀ ℱ (xᴺ - f): a transposed-Jacobian
     step, which contracts for λ_a σ_max² < 2 if the model is close. A vector b that is not short, |b| = R_a sin β,
     makes the step 1/cos β times longer along b, and cos β times shorter across. At rest J̃ᵀ ℱ (xᴺ - f) = 0, up to
-    the listing's limiting by tanh, which shrinks q by about q³ / (3 q_pp_max²) in every step: the joints creep home
-    in the directions that the task leaves free.
+    the listing's limiting by tanh, which shrinks q by about q³ / (3 q_pp_max²) in every step: the joints move slowly
+    towards 0 in the directions that the task leaves free.
 
     The counter-rotation 𝒩 turns h(n) = J̃ᵀ ℱ (xᴺ - f) into the direction of h(n-1), as it was before its own
     rotation; otherwise no direction could ever change. It is n × n, without which eq. 3.16 does not fit together
@@ -103,13 +135,14 @@ class AbstractRotation(SolverPolicy):
             raise InvalidInputError(f"counter_rotation: expected True or False, got {self.counter_rotation!r}.")
 
     def memory(self, rows: int) -> Memory:
-        """h(n-1), zero at the start, of shape (B, n), and the angles of the last step, of shape (B, 2)."""
-        return np.zeros((rows, self.problem.model.joints)), np.full((rows, 2), np.nan)
+        """A :class:`RotationMemory` without a step before."""
+        return RotationMemory(np.zeros((rows, self.problem.model.joints)), np.full((rows, 2), np.nan))
 
     @staticmethod
     def angles(state: Memory) -> Angles:
         """The angles of both rotations in the call that returned a state."""
-        angles = state[3]
+        _status, _iterations, *memory = state
+        angles = RotationMemory(*memory).angles
         return Angles(angles[:, 0].copy(), angles[:, 1].copy())
 
     def diagnostics(self, state: Memory) -> dict[str, FloatArray]:
@@ -118,28 +151,19 @@ class AbstractRotation(SolverPolicy):
 
     def solve(self, batch: Batch, memory: Memory) -> Solution:
         """See :meth:`SolverPolicy.solve`."""
-        task = self.problem.task
         rows, n = batch.q.shape
-        pull, angles = memory[0].copy(), np.empty((rows, 2))
+        kept = RotationMemory(RotationMemory(*memory).direction.copy(), np.empty((rows, 2)))
         goal, status = np.empty((rows, n)), np.empty(rows, dtype=np.int64)
-        iterate_rows(
-            self.problem.model.chain,
-            # The coordinates of `pose` are those of `matrix`, and the method knows no other error than a difference.
-            task_kernels.MATRIX if task.kind == task_kernels.POSE else task.kind,
-            *self._weights,
-            self.counter_rotation,
-            (self.r_a, self.lambda_a, self.epsa, self.q_pp_max),
-            self.tolerance,
-            batch.q,
-            batch.pose,
-            np.ascontiguousarray(batch.nominal[:, 0]),
-            pull,
-            goal,
-            angles,
-            status,
-        )
+        observed = batch.q, batch.pose, np.ascontiguousarray(batch.nominal[:, 0])
+        turn_rows(plain_arm_task(self.problem), self._rule, observed, tuple(kept), goal, status)
         qdot = (goal - batch.q) / self.problem.dt
-        return Solution(qdot, (pull, angles), status, np.ones(rows, dtype=np.int64))
+        return Solution(qdot, kept, status, np.ones(rows, dtype=np.int64))
+
+    @functools.cached_property
+    def _rule(self) -> tuple[Any, ...]:
+        """A plain :class:`RotationRule`."""
+        deformation = self.r_a, self.lambda_a, self.epsa, self.q_pp_max
+        return *self._weights, self.counter_rotation, deformation, self.tolerance
 
     def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
         """One Jacobian of the model, one measurement, nothing inverted."""
@@ -147,55 +171,48 @@ class AbstractRotation(SolverPolicy):
 
 
 @kernel
-def iterate_rows(
-    chain, kind, task_weights, joint_weights, counter, rule, tolerance, q, pose, target, pull, goal, angles, status
-):
+def turn_rows(arm_task, rule, observed, memory, goal, status):
     """One inner iteration, row by row.
 
     Args:
-        chain: The model of the arm.
-        kind: The kind of task coordinates.
-        task_weights: The diagonal of ℱ. Shape (m,).
-        joint_weights: The diagonal of 𝒲. Shape (n,).
-        counter: Whether 𝒩 is applied.
-        rule: R_a, λ_a, ``epsa`` and ``q_pp_max``.
-        tolerance: ‖xᴺ - f‖ up to which the iteration has converged.
-        q: Joint coordinates. Shape (B, n).
-        pose: Measured task coordinates f. Shape (B, m).
-        target: Nominal task coordinates xᴺ. Shape (B, m).
-        pull: h(n-1), replaced by h(n). Shape (B, n).
+        arm_task: The model of the arm and the task, a plain :class:`ArmTask`.
+        rule: A plain :class:`RotationRule`.
+        observed: A plain :class:`Observed` with f and xᴺ.
+        memory: A plain :class:`RotationMemory`, overwritten.
         goal: Receives the next joint coordinates. Shape (B, n).
-        angles: Receives the angles of both rotations. Shape (B, 2).
         status: Receives values of :class:`Status`. Shape (B,).
     """
+    (chain, kind), method, (q, pose, target) = arm_task_of(arm_task), RotationRule(*rule), observed
+    # The coordinates of `pose` are those of `matrix`, and the method knows no other error than a difference.
+    kind = task_kernels.MATRIX if kind == task_kernels.POSE else kind
+    task_weights, joint_weights, (direction, angles) = method.task_weights, method.joint_weights, memory
     n, m = q.shape[1], pose.shape[1]
-    rotation, position = np.empty((3, 3)), np.empty(3)
-    geometric, jacobian = np.empty((6, n)), np.empty((m, n))
-    error, h, realized, desired = np.empty(m), np.empty(n), np.empty(n), np.empty(n)
-    e_a, e_b, extended = np.empty(n), np.empty(n), np.empty((3, n + 1))
+    rotation, position, geometric, _ = pose_arrays(n, m)
+    jacobian, error, extended = np.empty((m, n)), np.empty(m), np.empty((3, n + 1))
+    h, actual, desired, e_a, e_b = np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty(n)
     for row in range(q.shape[0]):
         forward_and_jacobian(chain, q[row], rotation, position, geometric)
         task_kernels.jacobian(kind, rotation, geometric, jacobian)
         for i in range(m):
             error[i] = target[row, i] - pose[row, i]
         _transposed(jacobian, task_weights, error, h)
-        _transposed(jacobian, task_weights, pose[row], realized)
+        _transposed(jacobian, task_weights, pose[row], actual)
         _transposed(jacobian, task_weights, target[row], desired)
         angles[row, 0] = 0.0
-        if counter:
-            angles[row, 0] = plane(h, pull[row], e_a, e_b)
-            turn(e_a, e_b, angles[row, 0], realized)
+        if method.counter_rotation:
+            angles[row, 0] = plane(h, direction[row], e_a, e_b)
+            turn(e_a, e_b, angles[row, 0], actual)
             turn(e_a, e_b, angles[row, 0], desired)
         for j in range(n):
-            pull[row, j] = h[j]
-            realized[j] *= joint_weights[j]
+            direction[row, j] = h[j]
+            actual[j] *= joint_weights[j]
             desired[j] *= joint_weights[j]
         goal[row] = q[row]
-        angles[row, 1] = adaptive_deform(realized, q[row], desired, rule, extended, goal[row])
+        angles[row, 1] = adaptive_deform(actual, q[row], desired, method.deformation, extended, goal[row])
         if math.isnan(angles[row, 1]):
             status[row] = _NO_ROTATION
         else:
-            status[row] = _CONVERGED if math.sqrt(dot(error, error)) <= tolerance else _LIMIT
+            status[row] = _CONVERGED if math.sqrt(dot(error, error)) <= method.tolerance else _LIMIT
 
 
 @kernel

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from baselines.policy import Batch
 from baselines.solvers.fixed_point.fixed_point import FixedPoint, jacobian_bound
-from baselines.solvers.references.nominal_path import HandedPath
+from baselines.solvers.references.privileged_path import PrivilegedPath
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 from ikgym.kinematics import Chain
@@ -18,11 +18,11 @@ from ikgym.validation import FloatArray, frozen_array, read_only, whole_number
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class FixedPointExtended(HandedPath, FixedPoint):
+class FixedPointExtended(PrivilegedPath, FixedPoint):
     """:class:`FixedPoint` with x extended by the end point of a link, which brings q back to the nominal joint path.
 
-    A reference, not a contender: where that end point should be follows from the nominal joint path, which no
-    observation shows (a tool position leaves the elbow up to four places). The paper has it, since it makes its
+    A reference, not a solver to compare with: where that end point should be follows from the nominal joint path, which
+    is privileged information (a tool position leaves the elbow up to four places). The paper has it, since it makes its
     trajectories in joint space. h becomes Jᵀ (f(q) - x) + J_ℓᵀ (p_ℓ(q) - p_ℓᴺ), with both points of the model.
 
     Args:
@@ -30,7 +30,7 @@ class FixedPointExtended(HandedPath, FixedPoint):
         transformation: ``"transpose"``; nothing else fits a longer x.
         family: See :class:`FixedPoint`, like all up to the tolerance.
         slope: The factor in F.
-        a: A; if left out it heeds the longer Jacobian.
+        a: A; if left out, chosen for the longer Jacobian.
         d: D.
         iterations: Iterations in one step.
         tolerance: Norm of both errors together after the last up to which the status is ``converged``.

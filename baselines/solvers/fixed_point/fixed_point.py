@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
-from typing import ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from baselines.policy import Batch, Memory, Solution, SolverPolicy
+from baselines.solvers.arm_task import arm_task_of, plain_arm_task, pose_arrays
 from baselines.solvers.fixed_point.contraction import Contraction, contraction, evaluate
 from baselines.solvers.linear_algebra import dot
 from baselines.status import Status
@@ -26,6 +28,48 @@ _TRANSPOSE, _SIGN = TRANSFORMATIONS["transpose"], TRANSFORMATIONS["sign"]
 _CONVERGED, _LIMIT, _DIVERGED = int(Status.CONVERGED), int(Status.ITERATION_LIMIT), int(Status.DIVERGED)
 # ‖∂x/∂q‖² of the orientation's numbers for a joint that turns at 1 rad/s, at most.
 _TURNING = {task_kernels.POSITION: 0.0, task_kernels.SKEW: 1.0, task_kernels.MATRIX: 2.0, task_kernels.POSE: 1.0}
+
+
+class DirectionMemory(NamedTuple):
+    """What the transformation ``"sign"`` remembers of the last iteration of the step before.
+
+    Attributes:
+        direction: σ (f - x), zero where there was none. Shape (B, n).
+    """
+
+    direction: FloatArray
+
+
+class FixedPointRule(NamedTuple):
+    """What the parameters of the policy say to the kernel.
+
+    Attributes:
+        transformation: One of the numbers in TRANSFORMATIONS.
+        function: F.
+        a: A.
+        iterations: How many are made.
+        tolerance: ‖f - x‖ up to which they have converged.
+        longest: How far the joints can go in one step, in [rad] or [m]. Shape (n,).
+    """
+
+    transformation: int
+    function: Contraction
+    a: float
+    iterations: int
+    tolerance: float
+    longest: FloatArray
+
+
+class Extension(NamedTuple):
+    """What x is extended by: a point of the arm, and where it should be.
+
+    Attributes:
+        chain: The chain to the point.
+        points: Where it should be, in [m]; of no columns if x is not extended. Shape (B, 3 or 0).
+    """
+
+    chain: Chain
+    points: FloatArray
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -53,7 +97,7 @@ class FixedPoint(SolverPolicy):
         family: The family of F, ``"affine"`` or ``"sigmoid"``.
         slope: The factor in F; ½ in the paper.
         a: A, negative with a rising F and ``"transpose"``. If left out, the paper's -1 where 2/σ_max² allows it, and
-            -2/(|F'(ξ*)| ‖J‖²) where it may not, from a bound of ‖J‖² by the lengths of the links, with sliding
+            -2/(|F'(ξ*)| ‖J‖²) where it may not, from a bound of ‖J‖² by the lengths of the links, with prismatic
             joints at home.
         d: D.
         iterations: Iterations in one step; all of them are made.
@@ -93,33 +137,27 @@ class FixedPoint(SolverPolicy):
         number("tolerance", self.tolerance, at_least=0.0)
 
     def memory(self, rows: int) -> Memory:
-        """The last f - x, zero at the start, of shape (B, n), where the sign depends on it; else nothing."""
-        return (np.zeros((rows, self.problem.model.joints)),) if self.transformation == "sign" else ()
+        """A :class:`DirectionMemory` without a step before, where the sign depends on it; else nothing."""
+        zeros = np.zeros((rows, self.problem.model.joints))
+        return DirectionMemory(zeros) if self.transformation == "sign" else ()
 
     def solve(self, batch: Batch, memory: Memory) -> Solution:
         """See :meth:`SolverPolicy.solve`."""
         problem = self.problem
         rows = len(batch.q)
         q, status = batch.q.copy(), np.empty(rows, dtype=np.int64)
-        previous = memory[0].copy() if memory else np.empty((rows, 0))
+        previous = DirectionMemory(*memory).direction.copy() if memory else np.empty((rows, 0))
         branch, points = self._extension(batch)
         iterate_rows(
-            problem.model.chain,
-            problem.task.kind,
-            branch,
-            TRANSFORMATIONS[self.transformation],
-            self.function,
-            self.a,
-            self.iterations,
-            self.tolerance,
-            problem.velocity_limit * problem.dt,
+            plain_arm_task(problem),
+            (tuple(branch), points),
+            self._method,
             np.ascontiguousarray(batch.nominal[:, 0]),
-            points,
             previous,
             q,
             status,
         )
-        kept = (previous,) if memory else ()
+        kept = DirectionMemory(previous) if memory else ()
         return Solution((q - batch.q) / problem.dt, kept, status, np.full(rows, self.iterations))
 
     def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
@@ -128,12 +166,18 @@ class FixedPoint(SolverPolicy):
             return 1, iterations, 0, 0
         return iterations + 1, 0, 0, 0
 
+    @functools.cached_property
+    def _method(self) -> tuple[Any, ...]:
+        """A plain :class:`FixedPointRule`."""
+        transformation, longest = TRANSFORMATIONS[self.transformation], self.problem.velocity_limit * self.problem.dt
+        return transformation, tuple(self.function), self.a, self.iterations, self.tolerance, longest
+
     def _extension(self, batch: Batch) -> tuple[Chain, FloatArray]:
         """What x is extended by: the chain to another point of the arm, and its nominal position; here nothing."""
         return self.problem.model.chain, np.empty((len(batch.q), 0))
 
     def _jacobian_bound(self) -> float:
-        """A number that ‖J‖² does not exceed, with sliding joints at home."""
+        """A number that ‖J‖² does not exceed, with prismatic joints at home."""
         return jacobian_bound(self.problem.model, _TURNING[self.problem.task.kind])
 
     def _contracting(self) -> float:
@@ -146,7 +190,7 @@ def jacobian_bound(arm: Arm, turning: float) -> float:
     """The sum over the joints of the largest ‖∂x/∂q_j‖², by the lengths of the links.
 
     Args:
-        arm: The arm; its sliding joints are taken to be at home.
+        arm: The arm; its prismatic joints are taken to be at home.
         turning: What the orientation's numbers add for a joint that turns.
     """
     links = np.append(np.linalg.norm(arm.offsets[1:], axis=1), np.linalg.norm(arm.tool))
@@ -155,44 +199,25 @@ def jacobian_bound(arm: Arm, turning: float) -> float:
 
 
 @kernel
-def iterate_rows(
-    chain,
-    kind,
-    branch,
-    transformation,
-    function,
-    a,
-    iterations,
-    tolerance,
-    farthest,
-    target,
-    points,
-    previous,
-    q,
-    status,
-):
+def iterate_rows(arm_task, extension, method, target, previous, q, status):
     """The iterations of one step, row by row.
 
     Args:
-        chain: The model of the arm.
-        kind: The kind of task coordinates.
-        branch: The chain to the point that x is extended by.
-        transformation: One of the numbers in TRANSFORMATIONS.
-        function: F, a :class:`Contraction`.
-        a: A.
-        iterations: How many.
-        tolerance: ‖f - x‖ up to which they have converged.
-        farthest: How far the joints can go in one step, in [rad] or [m]. Shape (n,).
+        arm_task: The model of the arm and the task, a plain :class:`ArmTask`.
+        extension: A plain :class:`Extension`.
+        method: A plain :class:`FixedPointRule`.
         target: x. Shape (B, m).
-        points: Where the branch should end, in [m]; of no columns if there is none. Shape (B, 3 or 0).
-        previous: With the sign variant, the last f - x; replaced. Shape (B, n).
+        previous: With the sign variant, the last f - x; overwritten. Shape (B, n).
         q: Joint coordinates, changed in place. Shape (B, n).
         status: Receives values of :class:`Status`. Shape (B,).
     """
-    n, m, joints = q.shape[1], target.shape[1], branch.axes.shape[0]
+    (chain, kind), chain_to_point, points = arm_task_of(arm_task), Chain(*extension[0]), extension[1]
+    transformation, numbers, a, iterations, tolerance, longest = method
+    function = Contraction(*numbers)
+    n, m, joints = q.shape[1], target.shape[1], chain_to_point.axes.shape[0]
     e = 6 if kind == task_kernels.POSE else m
-    rotation, position, pose, error = np.empty((3, 3)), np.empty(3), np.empty(m), np.empty(e)
-    geometric, jacobian, partial = np.empty((6, n)), np.empty((e, n)), np.empty((6, joints))
+    rotation, position, geometric, pose = pose_arrays(n, m)
+    error, jacobian, partial = np.empty(e), np.empty((e, n)), np.empty((6, joints))
     h, start, missing = np.empty(n), np.empty(n), np.empty(3)
     for row in range(q.shape[0]):
         here = q[row]
@@ -216,9 +241,9 @@ def iterate_rows(
                     h[j] = -error[j]
             if points.shape[1] > 0:
                 if last:
-                    forward(branch, here[:joints], rotation, position)
+                    forward(chain_to_point, here[:joints], rotation, position)
                 else:
-                    forward_and_jacobian(branch, here[:joints], rotation, position, partial)
+                    forward_and_jacobian(chain_to_point, here[:joints], rotation, position, partial)
                 for i in range(3):
                     missing[i] = points[row, i] - position[i]
                 square += dot(missing, missing)
@@ -235,7 +260,7 @@ def iterate_rows(
         # Further off than at the start, and further away than the drives can go.
         if not residual <= first:
             for j in range(n):
-                if not abs(here[j] - start[j]) <= farthest[j]:
+                if not abs(here[j] - start[j]) <= longest[j]:
                     status[row] = _DIVERGED
         if status[row] == _DIVERGED:
             here[:] = start

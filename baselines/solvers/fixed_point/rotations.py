@@ -79,14 +79,14 @@ def turn(e_a, e_b, angle, vector):
 
 
 @kernel
-def adaptive_deform(realized, deformed, desired, rule, extended, out):
+def adaptive_deform(actual, deformed, desired, rule, extended, out):
     """The function AdaptiveDeform of section 4.1: a share of the rotation from B to A, applied to C.
 
     The three vectors get one dimension more, in which they reach the common length R_a; the listing's ``B'*B`` is
     read as ``A'*B``, without which nothing is orthogonal to B.
 
     Args:
-        realized: b, ``realized_prev``. Shape (n,).
+        actual: b, ``realized_prev``. Shape (n,).
         deformed: c, ``deformed_prev``. Shape (n,).
         desired: a, ``desired_now``. Shape (n,).
         rule: R_a, λ_a, ``epsa`` and ``q_pp_max``.
@@ -99,7 +99,7 @@ def adaptive_deform(realized, deformed, desired, rule, extended, out):
     """
     radius, share, epsilon, largest = rule
     a, b, c = extended[0], extended[1], extended[2]
-    if not (_extend(desired, radius, a) and _extend(realized, radius, b) and _extend(deformed, radius, c)):
+    if not (_extend(desired, radius, a) and _extend(actual, radius, b) and _extend(deformed, radius, c)):
         return math.nan
     along = dot(a, b) / (radius * radius)
     for i in range(a.shape[0]):

@@ -10,12 +10,12 @@ apart, which is the shortcut (38).
 
 from __future__ import annotations
 
-from baselines.solvers.damped_step import damped_gram, factorise, scaled_inverse, solve, transposed_product
-from ikgym.jit import kernel
+from baselines.solvers.linear_algebra import damped_gram, ldl, ldl_scaled_inverse, ldl_solve, transposed_product
+from ikgym.jit import inlined, kernel
 
 
 @kernel
-def horizon_step(jacobians, differences, damping, gram, gains, x, out):
+def damped_horizon_step(jacobians, differences, damping, scratch, out):
     """ΔQ = Dᵀ (D Dᵀ + λ M)⁻¹ d, by blocks from the end of the horizon to its beginning and back.
 
     With S_n = J_n J_nᵀ + 2λ I and the gain K_j = λ S_j⁻¹, the elimination is a Riccati recursion:
@@ -25,33 +25,42 @@ def horizon_step(jacobians, differences, damping, gram, gains, x, out):
         jacobians: J_1 … J_n. Shape (n, e, joints).
         differences: d. Shape (n, e).
         damping: λ, at least 0.
-        gram: Scratch. Shape (e, e).
-        gains: Scratch. Shape (n, e, e).
-        x: Scratch. Shape (n, e).
+        scratch: Arrays for S_j, K and x. Shapes (e, e), (n, e, e), (n, e).
         out: Receives ΔQ. Shape (n, joints).
 
     Returns:
         False where a Jacobian has lost rank and λ is too small to count; ``out`` is of no use then.
     """
-    n, e = x.shape
+    _, gains, x = scratch
+    n = x.shape[0]
     for j in range(n - 1, -1, -1):
-        damped_gram(jacobians[j], damping if j == 0 else 2.0 * damping, gram)
-        for a in range(e):
-            x[j, a] = differences[j, a]
-        if damping > 0.0 and j + 1 < n:
-            for a in range(e):
-                x[j, a] += damping * x[j + 1, a]
-                for b in range(a + 1):
-                    gram[a, b] -= damping * gains[j + 1, a, b]
-        if not factorise(gram):
+        if not _eliminate(j, jacobians[j], differences[j], damping, scratch):
             return False
-        solve(gram, x[j])
-        if damping > 0.0 and j > 0:
-            scaled_inverse(gram, damping, gains[j])
     for j in range(n):
         if damping > 0.0 and j > 0:
-            for a in range(e):
-                for b in range(e):
+            for a in range(x.shape[1]):
+                for b in range(x.shape[1]):
                     x[j, a] += gains[j, a, b] * x[j - 1, b]
         transposed_product(jacobians[j], x[j], out[j])
     return True
+
+
+@inlined
+def _eliminate(j, jacobian, difference, damping, scratch):
+    """Block j: S_j⁻¹ b_j, and K_j for the block before; False where S_j cannot be factorised."""
+    gram, gains, x = scratch
+    n, e = x.shape
+    damped_gram(jacobian, damping if j == 0 else 2.0 * damping, gram)
+    for a in range(e):
+        x[j, a] = difference[a]
+    if damping > 0.0 and j + 1 < n:
+        for a in range(e):
+            x[j, a] += damping * x[j + 1, a]
+            for b in range(a + 1):
+                gram[a, b] -= damping * gains[j + 1, a, b]
+    solved = ldl(gram)
+    if solved:
+        ldl_solve(gram, x[j])
+        if damping > 0.0 and j > 0:
+            ldl_scaled_inverse(gram, damping, gains[j])
+    return solved

@@ -14,12 +14,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from baselines.solvers.linear_algebra import orthogonal_columns
-from ikgym.jit import kernel
+from ikgym.jit import inlined, kernel
 from ikgym.validation import FloatArray
 
 LOOKUP, PROPORTIONAL, STEPPED = 0, 1, 2
 
-# A λ that goes on growing stays a number: at this size the arm stands still.
+# Keeps a growing λ finite: at this size the arm stands still.
 LARGEST = 1e100
 
 
@@ -130,15 +130,15 @@ def damping_next(law, damping, error, error_before):
 
 
 @kernel
-def condition_number(jacobian, rank, columns, rotations):
+def condition_number(jacobian, rank, scratch):
     """cond(J): the largest singular value over the ``rank``-th, infinite where that is 0.
 
     Args:
         jacobian: J. Shape (e, n).
         rank: The rank that J has where nothing is lost, lower than e where coordinates are redundant.
-        columns: Scratch. Shape (max(e, n), min(e, n)).
-        rotations: Scratch. Shape (min(e, n), min(e, n)).
+        scratch: Two arrays from :func:`condition_scratch`.
     """
+    columns, rotations = scratch
     e, n = jacobian.shape
     for a in range(e):
         for k in range(n):
@@ -156,6 +156,13 @@ def condition_number(jacobian, rank, columns, rotations):
     squares.sort()
     smallest, largest = squares[squares.shape[0] - rank], squares[-1]
     return math.sqrt(largest / smallest) if smallest > 0.0 else np.inf
+
+
+@inlined
+def condition_scratch(size, n):
+    """What :func:`condition_number` works with. Shapes (max(e, n), min(e, n)) and (min(e, n), min(e, n))."""
+    narrow = min(size, n)
+    return np.empty((max(size, n), narrow)), np.empty((narrow, narrow))
 
 
 @kernel

@@ -10,23 +10,31 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from baselines.policy import Batch, Memory, Solution
-from baselines.solvers.damped_step import ran_away
-from baselines.solvers.levenberg_marquardt.block_tridiagonal import horizon_step
-from baselines.solvers.levenberg_marquardt.damped import DampedIteration
-from baselines.solvers.levenberg_marquardt.damping_rules import condition_number, damping_next, damping_now
-from baselines.solvers.levenberg_marquardt.mfac import RANK_TOLERANCE
-from baselines.solvers.linear_algebra import dot
-from baselines.solvers.resolved_rate.moore_penrose import pseudoinverse_rows
-from baselines.status import Status
+from baselines.policy import Batch, Memory
+from baselines.solvers.arm_task import arm_task_of, plain_arm_task, pose_arrays
+from baselines.solvers.levenberg_marquardt.base import DampedIteration
+from baselines.solvers.levenberg_marquardt.block_tridiagonal import damped_horizon_step
+from baselines.solvers.levenberg_marquardt.damping_rules import (
+    DampingLaw,
+    condition_number,
+    condition_scratch,
+    damping_next,
+    damping_now,
+)
+from baselines.solvers.levenberg_marquardt.iteration import (
+    CONVERGED,
+    DEFICIENT,
+    DIVERGED,
+    LIMIT,
+    RANK_TOLERANCE,
+    stop_run_away,
+)
+from baselines.solvers.linear_algebra import dot, pseudoinverse_rows
 from ikgym import task_kernels
 from ikgym.exceptions import UnknownNameError
-from ikgym.jit import kernel
+from ikgym.jit import inlined, kernel
 from ikgym.kinematics import forward, forward_and_jacobian
 from ikgym.validation import whole_number
-
-_CONVERGED, _LIMIT = int(Status.CONVERGED), int(Status.ITERATION_LIMIT)
-_DEFICIENT, _DIVERGED = int(Status.RANK_DEFICIENT), int(Status.DIVERGED)
 
 JACOBIANS = ("predicted", "constant")
 STOPS = ("horizon", "first_point")
@@ -61,8 +69,8 @@ class ModelFreeAdaptivePredictiveControl(DampedIteration):
     :class:`mfac.ModelFreeAdaptiveControl`, and so is the first shift at λ = 0 (38) for any n.
 
     The test (40) asks that the whole predicted path meet its points. At λ = 0 the points behind the first are met
-    but to the second order of the motion per period, and with λ > 0 the first shift vanishes where the points ahead
-    pull as hard as the first one holds, beside the point: on a moving trajectory the printed δ is out of reach and
+    but to the second order of the motion per period, and with λ > 0 the first shift vanishes beside the point, where
+    the terms of the points ahead and of the first one cancel: on a moving trajectory the printed δ is out of reach and
     the status ``iteration_limit``. ``stop="first_point"`` asks it of the point that the arm is sent to only.
 
     Statuses are those of :class:`baselines.solvers.levenberg_marquardt.mfac.ModelFreeAdaptiveControl`.
@@ -104,36 +112,17 @@ class ModelFreeAdaptivePredictiveControl(DampedIteration):
         """The n points that lie ahead."""
         return self.horizon
 
-    def solve(self, batch: Batch, memory: Memory) -> Solution:
-        """See :meth:`SolverPolicy.solve`."""
-        problem = self.problem
-        damping, error, factorised = self._start(memory)
-        rows = len(batch.q)
-        q, status, iterations = batch.q.copy(), np.empty(rows, dtype=np.int64), np.empty(rows, dtype=np.int64)
+    def iterate(self, batch: Batch, memory: Memory, found: Memory) -> None:
+        """See :meth:`DampedIteration.iterate`."""
         iterate_horizon_rows(
-            problem.model.chain,
-            problem.task.kind,
-            problem.task.error_size,
-            self.rank,
-            self.law,
-            problem.dt * problem.velocity_limit,
-            batch.q,
-            batch.pose,
-            batch.nominal,
-            self.horizon,
-            self.jacobians == "predicted",
-            self.stop == "horizon",
-            self.tolerance,
-            self.iterations,
-            self.one_step,
-            q,
-            damping,
-            error,
-            factorised,
-            status,
-            iterations,
+            plain_arm_task(self.problem),
+            tuple(self.law),
+            tuple(self.limits),
+            (self.horizon, self.jacobians == "predicted", self.stop == "horizon"),
+            (batch.q, batch.pose, batch.nominal),
+            memory,
+            found,
         )
-        return Solution((q - batch.q) / problem.dt, (damping, error, factorised), status, iterations)
 
     def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
         """One Jacobian at the start, where all n are the same, then n poses and 1 or n Jacobians an iteration."""
@@ -145,72 +134,41 @@ class ModelFreeAdaptivePredictiveControl(DampedIteration):
 
 
 @kernel
-def iterate_horizon_rows(
-    chain,
-    kind,
-    size,
-    rank,
-    law,
-    longest,
-    start,
-    pose,
-    nominal,
-    horizon,
-    predicted,
-    whole_horizon,
-    tolerance,
-    most,
-    one_step,
-    q,
-    damping,
-    error_before,
-    factorised,
-    status,
-    iterations,
-):
-    """The iteration (34)-(41) row by row; see :func:`mfac.iterate_rows` for what is not here.
+def iterate_horizon_rows(arm_task, law, limits, ahead, observed, memory, found):
+    """The iteration (34)-(41) row by row; see :func:`mfac.iterate_rows`.
 
     Args:
-        chain: The model of the arm.
-        kind: The kind of task coordinates.
-        size: Components of the error, e.
-        rank: The rank that J has where nothing is lost.
-        law: The damping law.
-        longest: Way of each joint in one period at the velocity limit. Shape (n,).
-        start: q(k-1). Shape (B, n).
-        pose: Measured task coordinates. Shape (B, m).
-        nominal: Nominal task coordinates ahead. Shape (B, at least the horizon, m).
-        horizon: n of the paper.
-        predicted: Whether the Jacobians follow the predicted path (56).
-        whole_horizon: Whether (40) is tested, else the first point only.
-        tolerance: δ.
-        most: N_up.
-        one_step: Whether to apply (27), (28) once to the measured pose instead.
-        q: Receives q(k); holds ``start`` before. Shape (B, n).
-        damping: λ, goes on. Shape (B,).
-        error_before: Norm of the error before, goes on. Shape (B,).
-        factorised: Receives the matrices factorised. Shape (B,).
-        status: Receives values of :class:`Status`. Shape (B,).
-        iterations: Receives the iterations made. Shape (B,).
+        arm_task: The model of the arm and the task, a plain :class:`ArmTask`.
+        law: A plain :class:`DampingLaw`.
+        limits: Plain :class:`IterationLimits`.
+        ahead: n of the paper, whether the Jacobians follow the predicted path (56), and whether (40) is tested or the
+            first point only.
+        observed: A plain :class:`Observed`, its nominal coordinates of shape (B, at least n, m).
+        memory: A plain :class:`DampingMemory`, changed in place.
+        found: Plain :class:`Iterates`, changed in place.
     """
-    n, m = start.shape[1], pose.shape[1]
-    rotation, position, geometric = np.empty((3, 3)), np.empty(3), np.empty((6, n))
-    coordinates, present = np.empty(m), np.empty(m)
-    path, jacobians = np.empty((horizon, n)), np.empty((horizon, size, n))
+    (chain, kind), rule = arm_task_of(arm_task), DampingLaw(*law)
+    size, rank, longest, tolerance, most, one_step = limits
+    horizon, predicted, whole_horizon = ahead
+    start, poses, nominal = observed
+    damping, error_before, factorised = memory
+    q, status, iterations = found
+    n, m = start.shape[1], poses.shape[1]
+    rotation, position, geometric, coordinates = pose_arrays(n, m)
+    present, path, jacobians = np.empty(m), np.empty((horizon, n)), np.empty((horizon, size, n))
     residuals, differences, error = np.empty((horizon, size)), np.empty((horizon, size)), np.empty(size)
-    gram, gains, x = np.empty((size, size)), np.empty((horizon, size, size)), np.empty((horizon, size))
-    steps, lost = np.empty((horizon, n)), np.empty(horizon, dtype=np.bool_)
-    columns, rotations = np.empty((max(n, size), min(n, size))), np.empty((min(n, size), min(n, size)))
+    blocks = np.empty((size, size)), np.empty((horizon, size, size)), np.empty((horizon, size))
+    steps, lost, scratch = np.empty((horizon, n)), np.empty(horizon, dtype=np.bool_), condition_scratch(size, n)
     for row in range(start.shape[0]):
         here = q[row]
-        status[row], i, first = _LIMIT, 0, 0.0
+        status[row], i, first = LIMIT, 0, 0.0
         while True:
             # y(k)_(i), J(k)_(i) and the residuals of all points from there (55).
             forward_and_jacobian(chain, here, rotation, position, geometric)
             task_kernels.jacobian(kind, rotation, geometric, jacobians[0])
             task_kernels.coordinates(kind, rotation, position, present)
             for j in range(horizon):
-                task_kernels.error(kind, nominal[row, j], pose[row] if one_step else present, residuals[j])
+                task_kernels.error(kind, nominal[row, j], poses[row] if one_step else present, residuals[j])
             # The rest of the predicted path: y(k+j)_(i) and J(k+j)_(i) (34), (35).
             first_square = dot(residuals[0], residuals[0])
             square = first_square
@@ -233,44 +191,56 @@ def iterate_horizon_rows(
             if i == 0:
                 first = first_square
             if not np.isfinite(norm):
-                status[row] = _DIVERGED
+                status[row] = DIVERGED
                 break
             if (norm if whole_horizon else np.sqrt(first_square)) <= tolerance and not one_step:  # (40)
-                status[row] = _CONVERGED
+                status[row] = CONVERGED
                 break
             if i == most:
                 break
             condition = 1.0
-            if law.condition_bounds.shape[0] > 0:
+            if rule.condition_bounds.shape[0] > 0:
                 for j in range(horizon if predicted and i > 0 else 1):
-                    condition = max(condition, condition_number(jacobians[j], rank, columns, rotations))
+                    condition = max(condition, condition_number(jacobians[j], rank, scratch))
                     factorised[row] += 1
-            damping[row] = damping_now(law, norm, condition, damping[row])  # (37)
-            for j in range(horizon):
-                for a in range(size):
-                    differences[j, a] = residuals[j, a] - (residuals[j - 1, a] if j > 0 else 0.0)
+            damping[row] = damping_now(rule, norm, condition, damping[row])  # (37)
+            _difference(residuals, differences)
             factorised[row] += horizon
-            if not horizon_step(jacobians, differences, damping[row], gram, gains, x, steps):  # (36)
+            if not damped_horizon_step(jacobians, differences, damping[row], blocks, steps):  # (36)
                 pseudoinverse_rows(jacobians, differences, RANK_TOLERANCE, rank, steps, lost)  # (38)
                 factorised[row] += horizon
                 if lost.any():
-                    status[row] = _DEFICIENT
-            damping[row] = damping_next(law, damping[row], norm, error_before[row])  # (44)
+                    status[row] = DEFICIENT
+            damping[row] = damping_next(rule, damping[row], norm, error_before[row])  # (44)
             error_before[row] = norm
-            for k in range(n):
-                shifted = here[k]
-                for j in range(horizon):
-                    shifted += steps[j, k]
-                    path[j, k] = shifted  # (56)
-                here[k] = path[0, k]  # (57), (41)
+            _apply(steps, path, here)
             i += 1
             if one_step:
-                if status[row] == _LIMIT:
-                    status[row] = _CONVERGED
+                if status[row] == LIMIT:
+                    status[row] = CONVERGED
                 break
         iterations[row] = i
-        if not one_step and status[row] != _CONVERGED and first_square > first and ran_away(here, start[row], longest):
-            status[row] = _DIVERGED
-        if status[row] == _DIVERGED:
+        if not one_step and first_square > first:
+            stop_run_away(here, start[row], longest, status[row : row + 1])
+        if status[row] == DIVERGED:
             here[:] = start[row]
-            damping[row], error_before[row] = law.damping, np.inf
+            damping[row], error_before[row] = rule.damping, np.inf
+
+
+@inlined
+def _difference(residuals, out):
+    """D of :mod:`block_tridiagonal`: shapes (n, e)."""
+    for j in range(residuals.shape[0]):
+        for a in range(residuals.shape[1]):
+            out[j, a] = residuals[j, a] - (residuals[j - 1, a] if j > 0 else 0.0)
+
+
+@inlined
+def _apply(steps, path, here):
+    """The predicted path (56), the first point of which is the next iterate (57), (41)."""
+    for k in range(here.shape[0]):
+        shifted = here[k]
+        for j in range(steps.shape[0]):
+            shifted += steps[j, k]
+            path[j, k] = shifted
+        here[k] = path[0, k]

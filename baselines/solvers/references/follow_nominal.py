@@ -1,4 +1,4 @@
-"""The privileged reference: plays the nominal joint path that the trajectory was made from."""
+"""Plays the nominal joint path that the trajectory was made from, which is privileged information."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.policy import Batch, Memory, Solution, statuses
-from baselines.solvers.references.nominal_path import HandedPath
+from baselines.solvers.references.privileged_path import PrivilegedPath
 from ikgym.validation import FloatArray, frozen_array
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class FollowNominal(HandedPath):
+class FollowNominal(PrivilegedPath):
     """Goes from wherever the arm is to the nominal joint coordinates of the next step.
 
-    A reference, not a contender: it knows the joint path, which no observation shows. Its tracking error is zero
+    A reference, not a solver to compare with: the joint path is privileged information. Its tracking error is zero
     (where model and arm are the same), its joint velocities are whatever the path asks for, so that solvers with
     foresight can do better at the cost.
 

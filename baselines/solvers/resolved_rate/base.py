@@ -4,18 +4,31 @@ from __future__ import annotations
 
 import abc
 import dataclasses
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from baselines.policy import Batch, Memory, Solution, SolverPolicy
+from baselines.solvers.arm_task import arm_task_of, plain_arm_task, pose_arrays, task_shift
 from baselines.status import Status
 from ikgym import task_kernels
 from ikgym.exceptions import InvalidInputError
 from ikgym.jit import kernel
 from ikgym.kinematics import forward_and_jacobian
 from ikgym.validation import FloatArray, number
+
+
+class NominalMemory(NamedTuple):
+    """What is remembered from the step before.
+
+    Attributes:
+        nominal: X^N(k), the nominal task coordinates that the step before was to reach. Shape (B, m).
+        known: Whether there was a step before. Shape (B,).
+    """
+
+    nominal: FloatArray
+    known: npt.NDArray[np.bool_]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -29,7 +42,7 @@ class ResolvedRate(SolverPolicy, abc.ABC):
     Args:
         problem: What the policy is told of the scenario.
         gain: Share of the present error that is taken back in one step, K Δt with the feedback gain K in [1/s].
-            Above 0; 1 is dead beat, 2 the limit of stability.
+            Above 0; 1 is deadbeat control, 2 the limit of stability.
 
     Raises:
         InvalidInputError: The gain is not between 0 and 2.
@@ -43,28 +56,25 @@ class ResolvedRate(SolverPolicy, abc.ABC):
             raise InvalidInputError(f"gain: expected a number above 0 and below 2, got {self.gain:g}.")
 
     def memory(self, rows: int) -> Memory:
-        """X^N(k), of shape (B, m), and whether it is known, of shape (B,)."""
-        return np.zeros((rows, self.problem.task.size)), np.zeros(rows, dtype=np.bool_)
+        """A :class:`NominalMemory` without a step before."""
+        return NominalMemory(np.zeros((rows, self.problem.task.size)), np.zeros(rows, dtype=np.bool_))
 
     def solve(self, batch: Batch, memory: Memory) -> Solution:
         """See :meth:`SolverPolicy.solve`."""
-        present, known = memory
+        before = NominalMemory(*memory)
         rows, n = batch.q.shape
         size = self.problem.task.error_size
         jacobian, shift = np.empty((rows, size, n)), np.empty((rows, size))
-        linearise(
-            self.problem.model.chain,
-            self.problem.task.kind,
+        task_shift_rows(
+            plain_arm_task(self.problem),
             self.gain,
-            batch.q,
-            batch.pose,
-            np.ascontiguousarray(batch.nominal[:, 0]),
-            np.where(known[:, None], present, batch.pose),
+            (batch.q, batch.pose, np.ascontiguousarray(batch.nominal[:, 0])),
+            np.where(before.known[:, None], before.nominal, batch.pose),
             jacobian,
             shift,
         )
         step, status = self.move(batch.q, jacobian, shift)
-        remembered = (batch.nominal[:, 0].copy(), np.ones(rows, dtype=np.bool_))
+        remembered = NominalMemory(batch.nominal[:, 0].copy(), np.ones(rows, dtype=np.bool_))
         return Solution(step / self.problem.dt, remembered, status, np.ones(rows, dtype=np.int64))
 
     def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
@@ -95,36 +105,24 @@ class ResolvedRate(SolverPolicy, abc.ABC):
 
 
 @kernel
-def linearise(chain, kind, gain, q, pose, target, present, jacobian, shift):
+def task_shift_rows(arm_task, gain, observed, present, jacobian, shift):
     """Task Jacobians and the task shifts asked for, row by row.
 
     Args:
-        chain: The model of the arm.
-        kind: The kind of task coordinates.
+        arm_task: The model of the arm and the task, a plain :class:`ArmTask`.
         gain: Share of the present error to take back.
-        q: Joint coordinates. Shape (B, n).
-        pose: Measured task coordinates. Shape (B, m).
-        target: X^N(k+1). Shape (B, m).
+        observed: A plain :class:`Observed` with X^N(k+1).
         present: X^N(k). Shape (B, m).
         jacobian: Receives the task Jacobians. Shape (B, e, n).
         shift: Receives the task shifts. Shape (B, e).
     """
-    rotation, position = np.empty((3, 3)), np.empty(3)
-    geometric = np.empty((6, q.shape[1]))
+    (chain, kind), (q, pose, target) = arm_task_of(arm_task), observed
+    rotation, position, geometric, _ = pose_arrays(q.shape[1], pose.shape[1])
     error = np.empty(shift.shape[1])
     for row in range(q.shape[0]):
         forward_and_jacobian(chain, q[row], rotation, position, geometric)
         task_kernels.jacobian(kind, rotation, geometric, jacobian[row])
         task_shift(kind, gain, pose[row], target[row], present[row], error, shift[row])
-
-
-@kernel
-def task_shift(kind, gain, pose, target, present, error, shift):
-    """Δx = (X^N(k+1) - X^N(k)) + gain (X^N(k) - x(k)) of one row; ``error`` (e,) receives the last difference."""
-    task_kernels.error(kind, target, present, shift)
-    task_kernels.error(kind, present, pose, error)
-    for i in range(error.shape[0]):
-        shift[i] += gain * error[i]
 
 
 def status_of(rank_deficient: npt.NDArray[Any]) -> npt.NDArray[np.int64]:

@@ -9,8 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.policy import statuses
-from baselines.solvers.damped_step import damped_gram, transposed_product
-from baselines.solvers.linear_algebra import cholesky, cholesky_solve
+from baselines.solvers.linear_algebra import cholesky, cholesky_solve, damped_gram, transposed_product
 from baselines.solvers.resolved_rate.base import ResolvedRate
 from ikgym.jit import kernel
 from ikgym.validation import FloatArray, number

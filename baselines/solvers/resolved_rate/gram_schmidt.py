@@ -19,7 +19,7 @@ from ikgym.validation import FloatArray, number
 class GramSchmidt(ResolvedRate):
     """A solution without a cost function, by Gram–Schmidt orthonormalisation: a RECONSTRUCTION.
 
-    Khan 2020 (section 2, its reference 44) names a method that evades the minimisation of any cost function by the
+    Khan 2020 (section 2, its reference 44) names a method that avoids the minimisation of any cost function by the
     Gram–Schmidt algorithm. The original text is not at hand; what follows is this project's reading of that sentence.
 
     The rows of J are orthonormalised one after another, the longest remainder first. A row a with the remainder

@@ -62,21 +62,21 @@ def transpose_rows(jacobian, shift, tolerance, out, stuck):
     e, n = jacobian.shape[1], jacobian.shape[2]
     for row in range(jacobian.shape[0]):
         j, dx, dq = jacobian[row], shift[row], out[row]
-        pull = size = wanted = length = 0.0
+        squared = size = wanted = length = 0.0
         for k in range(n):
             dq[k] = 0.0
             for a in range(e):
                 dq[k] += j[a, k] * dx[a]
                 size += j[a, k] * j[a, k]
-            pull += dq[k] * dq[k]
+            squared += dq[k] * dq[k]
         for a in range(e):
             wanted += dx[a] * dx[a]
             made = 0.0
             for k in range(n):
                 made += j[a, k] * dq[k]
             length += made * made
-        none = pull <= tolerance * tolerance * size * wanted or length == 0.0
+        none = squared <= tolerance * tolerance * size * wanted or length == 0.0
         stuck[row] = none and wanted > 0.0
-        alpha = 0.0 if none else pull / length
+        alpha = 0.0 if none else squared / length
         for k in range(n):
             dq[k] *= alpha

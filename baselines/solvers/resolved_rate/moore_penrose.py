@@ -8,10 +8,9 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from baselines.solvers.linear_algebra import orthogonal_columns
+from baselines.solvers.linear_algebra import pseudoinverse_rows
 from baselines.solvers.resolved_rate.base import ResolvedRate, status_of
 from ikgym.exceptions import InvalidInputError
-from ikgym.jit import kernel
 from ikgym.validation import FloatArray, number
 
 
@@ -48,45 +47,3 @@ class MoorePenrose(ResolvedRate):
         out, deficient = np.empty((rows, n)), np.empty(rows, dtype=np.bool_)
         pseudoinverse_rows(jacobian, shift, self.rank_tolerance, self.full_rank, out, deficient)
         return out, status_of(deficient)
-
-
-@kernel
-def pseudoinverse_rows(jacobian, shift, tolerance, full_rank, out, deficient):
-    """Δq = J⁺ Δx by singular values, row by row.
-
-    Args:
-        jacobian: J. Shape (B, e, n).
-        shift: Δx. Shape (B, e).
-        tolerance: Singular values below this share of the largest count as zero.
-        full_rank: The rank that J has where nothing is lost.
-        out: Receives Δq. Shape (B, n).
-        deficient: Receives whether the rank is lower. Shape (B,).
-    """
-    e, n = jacobian.shape[1], jacobian.shape[2]
-    columns, left = np.empty((n, e)), np.empty((e, e))
-    squares = np.empty(e)
-    for row in range(jacobian.shape[0]):
-        # Jᵀ = (V Σ) Uᵀ: the columns become V Σ, the rotations U.
-        for a in range(e):
-            for k in range(n):
-                columns[k, a] = jacobian[row, a, k]
-        orthogonal_columns(columns, left)
-        largest = 0.0
-        for a in range(e):
-            squares[a] = 0.0
-            for k in range(n):
-                squares[a] += columns[k, a] * columns[k, a]
-            largest = max(largest, squares[a])
-        rank = 0
-        out[row] = 0.0
-        for a in range(e):
-            if squares[a] <= tolerance * tolerance * largest or squares[a] == 0.0:
-                continue
-            rank += 1
-            amount = 0.0
-            for b in range(e):
-                amount += left[b, a] * shift[row, b]
-            amount /= squares[a]
-            for k in range(n):
-                out[row, k] += amount * columns[k, a]
-        deficient[row] = rank < full_rank

@@ -1,4 +1,4 @@
-"""Resolved rate with a second aim in the null space of the task."""
+"""Resolved rate with a secondary objective in the null space of the task."""
 
 from __future__ import annotations
 
@@ -24,23 +24,23 @@ OBJECTIVES = ("posture", "joint_centring", "manipulability")
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class NullSpace(MoorePenrose):
-    """Goes on with a second aim wherever the task leaves it free: q̇ = J⁺ ẋ + (I − J⁺ J) z (Liégeois 1977).
+    """Follows a secondary objective in the null space of the task: q̇ = J⁺ ẋ + (I − J⁺ J) z (Liégeois 1977).
 
-    Varga 2021 (section I, its references 10 to 12) and Khan 2020 name the method. The second aim is a joint
-    velocity z, of which only the part is used that moves no task coordinate:
+    Varga 2021 (section I, its references 10 to 12) and Khan 2020 name the method. The secondary objective
+    gives a joint velocity z, of which only the part is used that moves no task coordinate:
 
     - ``posture``: z = K (q_posture − q).
     - ``joint_centring``: z = K (r_min / r)² (q_middle − q), joint by joint, with the ranges r between the limits
-      and the smallest of them r_min; that is Liégeois's gradient, scaled so that K is the pull on the joint with
+      and the smallest of them r_min; that is Liégeois's gradient, scaled so that K is the gain of the joint with
       the smallest range. Joints without two finite limits are left alone.
     - ``manipulability``: z = K ∂(w / ℓᵏ)/∂q, Yoshikawa's w = √det(J Jᵀ) of the geometric Jacobian (of its linear
       rows where the task has no orientation), made free of units with the arm's reach ℓ in [m], without the strokes
-      of sliding joints; k = 3 for the three linear rows. The gradient is exact. In a singular pose, where w has a
+      of prismatic joints; k = 3 for the three linear rows. The gradient is exact. In a singular pose, where w has a
       kink, z is 0.
 
     The first part is Moore–Penrose, or damped least squares if there is a damping. J⁺ in the second part is never
-    damped, or the task would be disturbed. An arm without redundancy is moved by the second aim in singular poses
-    only, where a direction is free for once.
+    damped, or the task would be disturbed. An arm without redundancy is moved by the secondary objective in singular
+    poses only, where the Jacobian has a null space.
 
     Args:
         problem: What the policy is told of the scenario.
@@ -62,7 +62,7 @@ class NullSpace(MoorePenrose):
     posture: float | Sequence[float] = 0.0
     damping: float = 1e-3
     _target: FloatArray = dataclasses.field(init=False, repr=False)
-    _pull: FloatArray = dataclasses.field(init=False, repr=False)
+    _joint_gain: FloatArray = dataclasses.field(init=False, repr=False)
 
     name: ClassVar[str] = "null_space"
 
@@ -78,19 +78,19 @@ class NullSpace(MoorePenrose):
             )
         posture = per_joint("posture", self.posture, model.joints)
         centring = self.objective == "joint_centring"
-        target, pull = _centre(model) if centring else (posture, np.ones(model.joints))
+        target, gains = _centre(model) if centring else (posture, np.ones(model.joints))
         for field, value in {
             "secondary_gain": gain,
             "posture": float(posture[0]) if np.ndim(self.posture) == 0 else tuple(posture.tolist()),
             "damping": number("damping", self.damping, at_least=0.0),
             "_target": read_only(target),
-            "_pull": read_only(pull),
+            "_joint_gain": read_only(gains),
         }.items():
             object.__setattr__(self, field, value)
 
     def move(self, q: FloatArray, jacobian: FloatArray, shift: FloatArray) -> tuple[FloatArray, npt.NDArray[np.int64]]:
         """See :meth:`ResolvedRate.move`."""
-        aim = self.problem.dt * self.secondary_gain * self.slope(q)
+        aim = self.problem.dt * self.secondary_gain * self.objective_gradient(q)
         disturbance = np.empty_like(shift)
         task_rows(jacobian, aim, disturbance)
         if self.damping == 0.0:
@@ -102,10 +102,10 @@ class NullSpace(MoorePenrose):
         taken_off, _ = self.invert(jacobian, disturbance)
         return first + (aim - taken_off), statuses(len(aim))
 
-    def slope(self, q: FloatArray) -> FloatArray:
-        """The second aim z / K, at joint coordinates in [rad] or [m]. Shapes (B, n)."""
+    def objective_gradient(self, q: FloatArray) -> FloatArray:
+        """The secondary objective's z / K, at joint coordinates in [rad] or [m]. Shapes (B, n)."""
         if self.objective != "manipulability":
-            return self._pull * (self._target - q)
+            return self._joint_gain * (self._target - q)
         model, lines = self.problem.model, 6 if self.problem.task.has_orientation else 3
         out = np.empty_like(q)
         manipulability_rows(model.chain, q, lines, out)
@@ -126,11 +126,11 @@ def _centre(model: Arm) -> tuple[FloatArray, FloatArray]:
             f"objective 'joint_centring': expected an arm with joint limits, {model.name!r} has none; "
             "objective 'posture' goes to joint coordinates of your choice."
         )
-    target, pull = np.zeros(model.joints), np.zeros(model.joints)
+    target, gains = np.zeros(model.joints), np.zeros(model.joints)
     span = upper[limited] - lower[limited]
     target[limited] = 0.5 * (lower[limited] + upper[limited])
-    pull[limited] = (span.min() / span) ** 2
-    return target, pull
+    gains[limited] = (span.min() / span) ** 2
+    return target, gains
 
 
 @kernel
@@ -148,7 +148,7 @@ def task_rows(jacobian, velocity, out):
 def manipulability_rows(chain, q, lines, out):
     """∂w/∂q row by row, w = √det(J Jᵀ) of the first ``lines`` (3 or 6) rows of the geometric Jacobian.
 
-    ∂w/∂q_i = w tr(∂J/∂q_i J⁺), and the columns of J turn with the joints before them and are led by those behind:
+    ∂w/∂q_i = w tr(∂J/∂q_i J⁺), and the columns of J depend on the joints before them and on those behind:
     ∂J_j/∂q_i is (ω_i × v_j, ω_i × ω_j) for i ≤ j, and (ω_j × v_i, 0) for i > j.
 
     Args:

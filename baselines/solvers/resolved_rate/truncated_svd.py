@@ -8,8 +8,8 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
+from baselines.solvers.linear_algebra import pseudoinverse_rows
 from baselines.solvers.resolved_rate.base import ResolvedRate, status_of
-from baselines.solvers.resolved_rate.moore_penrose import pseudoinverse_rows
 from ikgym.exceptions import InvalidInputError
 from ikgym.validation import FloatArray, number
 
@@ -20,7 +20,7 @@ class TruncatedSVD(ResolvedRate):
 
     The joint shift is at most ‖Δx‖ / (threshold σ_max). Within the directions that are kept nothing is distorted,
     unlike with damping; those left out are not tracked at all until their singular value has grown again, when the
-    error piled up is taken back at once: the joint velocity jumps. Wherever one is left out the status says
+    accumulated error is taken back at once: the joint velocity jumps. Wherever one is left out the status says
     ``rank_deficient``.
 
     Args:

@@ -6,8 +6,7 @@ import math
 
 import numpy as np
 
-from baselines.solvers.damped_step import damped_step
-from baselines.solvers.linear_algebra import dot
+from baselines.solvers.linear_algebra import damped_step, dot
 from ikgym import task_kernels
 from ikgym.jit import inlined, kernel
 from ikgym.kinematics import forward_and_jacobian

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import ikgym
-from baselines.solvers.damped_step import damped_step, factorise, scaled_inverse, solve
-from baselines.solvers.levenberg_marquardt.block_tridiagonal import horizon_step
+from baselines.solvers.levenberg_marquardt.block_tridiagonal import damped_horizon_step
+from baselines.solvers.linear_algebra import damped_step, ldl, ldl_scaled_inverse, ldl_solve
 
 
 def printed(jacobians, residuals, damping):
@@ -26,7 +26,7 @@ def by_blocks(jacobians, residuals, damping):
     n, e, joints = jacobians.shape
     differences = np.diff(residuals, axis=0, prepend=np.zeros((1, e)))
     out, scratch = np.empty((n, joints)), (np.empty((e, e)), np.empty((n, e, e)), np.empty((n, e)))
-    solved = horizon_step(jacobians, differences, damping, *scratch, out)
+    solved = damped_horizon_step(jacobians, differences, damping, scratch, out)
     return out if solved else None
 
 
@@ -79,18 +79,18 @@ def test_the_factors(e):
     half, rhs = rng.normal(size=(e, e + 2)), rng.normal(size=e)
     matrix = half @ half.T + 0.1 * np.eye(e)
     factor, x, inverse = np.tril(matrix), rhs.copy(), np.empty((e, e))
-    assert factorise(factor)
+    assert ldl(factor)
     lower = np.tril(factor, -1) + np.eye(e)
     np.testing.assert_allclose(lower / np.diag(factor) @ lower.T, matrix, atol=1e-12)
-    solve(factor, x)
+    ldl_solve(factor, x)
     np.testing.assert_allclose(matrix @ x, rhs, atol=1e-12)
-    scaled_inverse(factor, 3.0, inverse)
+    ldl_scaled_inverse(factor, 3.0, inverse)
     np.testing.assert_allclose(inverse, 3.0 * np.linalg.inv(matrix), atol=1e-11)
 
 
 @pytest.mark.parametrize("matrix", [[[0.0]], [[1.0, 1.0], [1.0, 1.0]], [[1.0, 2.0], [2.0, 1.0]], [[np.nan]]])
 def test_what_is_not_positive_definite_is_refused(matrix):
-    assert not factorise(np.array(matrix))
+    assert not ldl(np.array(matrix))
 
 
 def test_one_damped_step():

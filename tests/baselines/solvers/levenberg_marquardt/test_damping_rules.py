@@ -7,7 +7,7 @@ import pytest
 
 import baselines
 import ikgym
-from baselines.solvers.levenberg_marquardt.damped import typical_link
+from baselines.solvers.levenberg_marquardt.damping_parameters import typical_link
 from baselines.solvers.levenberg_marquardt.damping_rules import RULES, condition_number, damping_next, damping_now
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 
@@ -109,8 +109,8 @@ def test_condition_number(name):
         rank = min(e, n, 6)
         sigma = np.linalg.svd(jacobian, compute_uv=False)
         scratch = np.empty((max(e, n), min(e, n))), np.empty((min(e, n), min(e, n)))
-        assert condition_number(jacobian, rank, *scratch) == pytest.approx(sigma[0] / sigma[rank - 1], rel=1e-9)
-    assert condition_number(np.zeros((3, 4)), 3, np.empty((4, 3)), np.empty((3, 3))) == np.inf
+        assert condition_number(jacobian, rank, scratch) == pytest.approx(sigma[0] / sigma[rank - 1], rel=1e-9)
+    assert condition_number(np.zeros((3, 4)), 3, (np.empty((4, 3)), np.empty((3, 3)))) == np.inf
 
 
 @pytest.mark.parametrize(

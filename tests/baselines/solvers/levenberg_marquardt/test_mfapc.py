@@ -250,7 +250,7 @@ def test_operations_are_what_is_called(numbers, monkeypatch):
     weights = {
         "forward": 0,
         "forward_and_jacobian": 0,
-        "horizon_step": 3,
+        "damped_horizon_step": 3,
         "pseudoinverse_rows": 3,
         "condition_number": 1,
     }

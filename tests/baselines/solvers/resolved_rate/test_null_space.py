@@ -37,7 +37,7 @@ def test_changes_no_task_velocity(name, aim, damping):
     step, status = policy.move(q, jacobian, shift)
     plain, same = without.move(q, jacobian, shift)
     assert status.tolist() == same.tolist()
-    aims = scenario.dt * gain * policy.slope(q)
+    aims = scenario.dt * gain * policy.objective_gradient(q)
     largest = np.linalg.norm(jacobian, 2, axis=(1, 2))
     for j, a, b, z, sigma in zip(jacobian, step, plain, aims, largest, strict=True):
         size = np.linalg.norm(z) + np.linalg.norm(b)
@@ -75,8 +75,8 @@ def test_manipulability_gradient_against_central_differences(name, lines):
     problem = dataclasses.replace(Problem.of(scenario), task=ikgym.tasks.get("pose" if lines == 6 else "position"))
     policy = baselines.registry.get("null_space")(problem, objective="manipulability")
     q = np.random.default_rng(lines).uniform(-1.5, 1.5, (10, scenario.joints))
-    slope = policy.slope(q) * model.reach(np.zeros(scenario.joints)) ** 3
-    for x, gradient in zip(q, slope, strict=True):
+    gradients = policy.objective_gradient(q) * model.reach(np.zeros(scenario.joints)) ** 3
+    for x, gradient in zip(q, gradients, strict=True):
         if manipulability(model, x, lines) < 1e-3:
             continue
         unit = 1e-5 * np.eye(scenario.joints)
@@ -86,7 +86,7 @@ def test_manipulability_gradient_against_central_differences(name, lines):
 
 def test_no_pull_where_the_manipulability_has_a_kink():
     policy = baselines.make("null_space", "varga7-fast", objective="manipulability")
-    assert np.isfinite(policy.slope(np.zeros((1, 7)))).all()
+    assert np.isfinite(policy.objective_gradient(np.zeros((1, 7)))).all()
 
 
 @pytest.mark.parametrize("objective", ["posture", "joint_centring", "manipulability"])
@@ -126,7 +126,7 @@ def test_centring_leaves_joints_without_limits_alone():
     lower[[1, 4]], upper[[1, 4]], upper[2] = [-1.0, 0.0], [3.0, 2.0], 1.0
     arm = dataclasses.replace(scenario.arm, lower=lower, upper=upper)
     policy = baselines.make("null_space", scenario.replace(arm=arm, model=arm), objective="joint_centring")
-    np.testing.assert_allclose(policy.slope(np.full((1, 7), 0.5))[0], [0, 0.5 * 0.25, 0, 0, 0.5, 0, 0])
+    np.testing.assert_allclose(policy.objective_gradient(np.full((1, 7), 0.5))[0], [0, 0.5 * 0.25, 0, 0, 0.5, 0, 0])
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""References that are handed the nominal joint path, which no observation shows."""
+"""The base of references whose privileged information is a joint path."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray, whole_number
 
 
-class HandedPath(SolverPolicy, abc.ABC):
+class PrivilegedPath(SolverPolicy, abc.ABC):
     """Base of policies with the fields ``seed``, which episode of a random scenario is played, and ``path``.
 
-    The path holds the nominal joint coordinates, one row a step, in [rad] or [m]. Shape (steps + 1, n).
+    The path is privileged information: joint coordinates, one row a step, in [rad] or [m]. Shape (steps + 1, n).
     """
 
     seed: int | None
@@ -27,7 +27,7 @@ class HandedPath(SolverPolicy, abc.ABC):
 
     @classmethod
     def for_scenario(cls, scenario: Scenario, **parameters: Any) -> Self:
-        """See :meth:`SolverPolicy.for_scenario`; unlike others this policy is handed the joint path.
+        """See :meth:`SolverPolicy.for_scenario`; unlike others this policy is given the nominal joint path.
 
         Raises:
             InvalidInputError: The scenario has no joint path, or is random and there is no seed.

@@ -24,9 +24,9 @@ class Answer(NamedTuple):
 
     Attributes:
         q: Joint coordinates at the knots, in [rad] or [m]. Shape (K, n).
-        cost: By :func:`benchmarks.rivals.numpy_horizon.plan_cost`, for all contenders alike.
+        cost: By :func:`benchmarks.rivals.numpy_horizon.plan_cost`, for all solvers alike.
         iterations: Iterations made.
-        converged: Whether the contender says that it has found an optimum.
+        converged: Whether the solver says that it has found an optimum.
     """
 
     q: FloatArray
@@ -35,7 +35,7 @@ class Answer(NamedTuple):
     converged: bool
 
 
-class Contender(abc.ABC):
+class HorizonSolver(abc.ABC):
     """A solver of the horizon with HL grid points in one scenario."""
 
     @abc.abstractmethod
@@ -47,14 +47,14 @@ class Contender(abc.ABC):
         """
 
 
-class PolicyContender(Contender):
+class PolicySolver(HorizonSolver):
     """A policy: what is timed is its `predict`."""
 
     def __init__(self, policy: SolverPolicy) -> None:
         self.policy = policy
 
     def warmed(self, observations: Sequence[Observation]) -> tuple[Callable[[], Any], Callable[[Any], Answer]]:
-        """See :meth:`Contender.warmed`."""
+        """See :meth:`HorizonSolver.warmed`."""
         state = None
         for observation in observations[:-1]:
             _, state = self.policy.predict(observation, state)
@@ -69,14 +69,14 @@ class PolicyContender(Contender):
         return lambda: self.policy.predict(last, state), answer
 
 
-class RivalContender(Contender):
+class RivalSolver(HorizonSolver):
     """Someone else's solver, which starts from its last plan, one step on."""
 
     def __init__(self, rival: Any) -> None:
         self.rival = rival
 
     def warmed(self, observations: Sequence[Observation]) -> tuple[Callable[[], Any], Callable[[Any], Answer]]:
-        """See :meth:`Contender.warmed`."""
+        """See :meth:`HorizonSolver.warmed`."""
         start = None
         *before, last = (Horizon(o["q"], o["nominal"][: self.rival.knots]) for o in observations)
         for horizon in before:
@@ -90,7 +90,7 @@ class RivalContender(Contender):
 
 
 def plan_of(policy: SolverPolicy, observation: Observation, state: Any) -> FloatArray:
-    """The joint coordinates at the knots that a policy has in mind. Shape (K, n)."""
+    """The joint coordinates at the knots of a policy's plan. Shape (K, n)."""
     if isinstance(policy, RecedingHorizon):
         plan: FloatArray = policy.plan(state)[0]
         return plan
@@ -99,18 +99,18 @@ def plan_of(policy: SolverPolicy, observation: Observation, state: Any) -> Float
     return out
 
 
-def policies(scenario: Scenario, grid: int) -> dict[str, Contender]:
+def policies(scenario: Scenario, grid: int) -> dict[str, HorizonSolver]:
     """The policies that plan over a horizon, by label."""
     return {
-        label: PolicyContender(baselines.make(name, scenario, horizon=grid, **kwargs))
+        label: PolicySolver(baselines.make(name, scenario, horizon=grid, **kwargs))
         for label, (name, kwargs, most) in POLICIES.items()
         if grid <= most
     }
 
 
-def rivals(scenario: Scenario, grid: int) -> tuple[dict[str, Contender], tuple[str, ...]]:
+def rivals(scenario: Scenario, grid: int) -> tuple[dict[str, HorizonSolver], tuple[str, ...]]:
     """What others solve the same problem by, by label, and what is left out."""
-    out: dict[str, Contender] = {}
+    out: dict[str, HorizonSolver] = {}
     skipped = []
     for label, (module, name, kwargs) in RIVALS.items():
         try:
@@ -118,7 +118,7 @@ def rivals(scenario: Scenario, grid: int) -> tuple[dict[str, Contender], tuple[s
         except ImportError as e:
             skipped.append(f'{label}: {e}; pip install "ikgym[rivals]"')
         else:
-            out[label] = RivalContender(rival(Problem.of(scenario), grid - 1, **kwargs))
+            out[label] = RivalSolver(rival(Problem.of(scenario), grid - 1, **kwargs))
     return out, tuple(skipped)
 
 

@@ -1,0 +1,140 @@
+"""What the iterations of Zhang 2020 share as policies: the choice of a damping rule, and its memory."""
+
+from __future__ import annotations
+
+import abc
+import dataclasses
+from typing import Any
+
+import numpy as np
+
+from baselines.policy import Batch, Memory, Operations, Solution, SolverPolicy
+from baselines.solvers.levenberg_marquardt.damping_parameters import checked_parameters, damping_law, truth
+from baselines.solvers.levenberg_marquardt.damping_rules import DampingLaw
+from baselines.solvers.levenberg_marquardt.iteration import DampingMemory, Iterates, IterationLimits
+from ikgym.validation import FloatArray, number, whole_number
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class DampedIteration(SolverPolicy, abc.ABC):
+    """Base of :class:`mfac.ModelFreeAdaptiveControl` and its predictive sibling: λ and when to stop.
+
+    A number that is left out takes its default from the rule, scaled by the length l of the model's typical link: λ
+    with l², as Remark 2 recommends, errors with l. A number that the rule does not have is an error.
+
+    ===============  =============================================  ==============================================
+    rule             λ                                              numbers
+    ===============  =============================================  ==============================================
+    ``constant``     as given (Remark 3); 0 is the shortcut (38)    damping
+    ``error_ratio``  × growth where the error rose, / decay where   damping, growth, decay, carry
+                     it did not (14)
+    ``threshold``    × growth where the error is above a bound,     damping, growth, decay, threshold, restart,
+                     / decay where not (18), and with carry (44)    carry
+    ``table``        look-up by the error and cond(J) (Table I)     error_bounds, condition_bounds, dampings
+    ``condition``    look-up by cond(J) (37)                        condition_bounds, dampings
+    ``sugihara``     ½ weight ‖e‖² + damping                        weight, damping
+    ``chan``         ½ weight ‖e‖²                                  weight
+    ===============  =============================================  ==============================================
+
+    ``error_ratio`` and ``threshold`` are read literally: what an error does to λ shows in the iteration behind it.
+
+    Args:
+        problem: What the policy is told of the scenario.
+        rule: The rule for λ.
+        damping: λ, or λ of the first iteration, or what is added. In the square of the Jacobian's units, [m²] and
+            [1]; at least 0.
+        growth: a₁. At least 1.
+        decay: a₂. At least 1.
+        threshold: t₁, in the units of the error, [m] and [rad]. Above 0.
+        restart: Whether λ begins anew where the error rises above the threshold (Remark 2).
+        carry: Whether λ is kept from period to period, instead of beginning anew.
+        weight: ω. Above 0.
+        error_bounds: Where the rows of the look-up meet, in the units of the error; ascending, each bound belongs to
+            the row behind it.
+        condition_bounds: Where its columns meet; likewise.
+        dampings: λ by rows and columns; a plain sequence where there are only columns.
+        tolerance: δ, norm of the error at which the iteration stops, in the units of the task. At least 0.
+        iterations: N_up, most iterations of one period. At least 1.
+        one_step: Whether to apply the formula once to the measured pose instead.
+
+    Raises:
+        InvalidInputError: A number is out of its range, or does not belong to the rule.
+        UnknownNameError: There is no such rule.
+    """
+
+    rule: str = "constant"
+    damping: float | None = None
+    growth: float | None = None
+    decay: float | None = None
+    threshold: float | None = None
+    restart: bool | None = None
+    carry: bool | None = None
+    weight: float | None = None
+    error_bounds: tuple[float, ...] | None = None
+    condition_bounds: tuple[float, ...] | None = None
+    dampings: tuple[Any, ...] | None = None
+    tolerance: float = 1e-10
+    iterations: int = 500
+    one_step: bool = False
+    law: DampingLaw = dataclasses.field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        given = {name: getattr(self, name) for name in self.parameter_names()}
+        checked = checked_parameters(self.rule, given, self.problem.model)
+        for name, value in checked.items():
+            object.__setattr__(self, name, value)
+        number("tolerance", self.tolerance, at_least=0.0)
+        whole_number("iterations", self.iterations, at_least=1)
+        truth("one_step", self.one_step)
+        object.__setattr__(self, "law", damping_law(self.rule, checked))
+
+    @property
+    def rank(self) -> int:
+        """The rank of a Jacobian that has lost nothing; with redundant coordinates it is that of a rigid motion."""
+        return min(self.problem.task.error_size, self.problem.model.joints, 6)
+
+    @property
+    def limits(self) -> IterationLimits:
+        """When the iteration stops, as the kernels see it."""
+        problem = self.problem
+        longest = problem.dt * problem.velocity_limit
+        size, rank = problem.task.error_size, self.rank
+        return IterationLimits(size, rank, longest, self.tolerance, self.iterations, self.one_step)
+
+    def memory(self, rows: int) -> Memory:
+        """A :class:`DampingMemory` without a step before."""
+        return DampingMemory(np.full(rows, self.law.damping), np.full(rows, np.inf), np.zeros(rows, dtype=np.int64))
+
+    def diagnostics(self, state: Memory) -> dict[str, FloatArray]:
+        """The remembered λ as ``lambda``, of shape (B,): of the last iteration, or what a stepped law made of it."""
+        _status, _iterations, *memory = state
+        return {"lambda": DampingMemory(*memory).damping}
+
+    def operations(self, state: Memory) -> Operations:
+        """See :meth:`SolverPolicy.operations`; the factorisations are those counted while solving.
+
+        A state without memory, as a rollout passes it, tells of none: one factorisation an iteration is given then.
+        """
+        _status, iterations, *memory = state
+        factorised = DampingMemory(*memory).factorised if memory else iterations
+        return super().operations(state)._replace(factorisations=factorised.copy())
+
+    def solve(self, batch: Batch, memory: Memory) -> Solution:
+        """See :meth:`SolverPolicy.solve`."""
+        rows = len(batch.q)
+        before = DampingMemory(*(memory if self.carry else self.memory(rows)))
+        kept = DampingMemory(before.damping.copy(), before.error.copy(), np.zeros(rows, dtype=np.int64))
+        found = Iterates(batch.q.copy(), np.empty(rows, dtype=np.int64), np.empty(rows, dtype=np.int64))
+        # Plain tuples, see :mod:`baselines.solvers.arm_task`.
+        self.iterate(batch, tuple(kept), tuple(found))
+        return Solution((found.q - batch.q) / self.problem.dt, kept, found.status, found.iterations)
+
+    @abc.abstractmethod
+    def iterate(self, batch: Batch, memory: Memory, found: Memory) -> None:
+        """Runs the iteration on all rows.
+
+        Args:
+            batch: The observations.
+            memory: A plain :class:`DampingMemory`, changed in place.
+            found: Plain :class:`Iterates`, changed in place.
+        """
