@@ -6,9 +6,8 @@ import dataclasses
 
 import numpy as np
 
-from baselines.evaluation.leaderboard.board import AGENT, FAR, NEAR, Line, Section
-from baselines.evaluation.leaderboard.statistics import interval
-from baselines.evaluation.metrics import geometric_mean
+from baselines.evaluation.pages.measurement import AGENT, FAR, NEAR, Line, Section
+from baselines.evaluation.pages.statistics import interval
 from baselines.evaluation.report import number
 from ikgym.validation import FloatArray
 
@@ -19,7 +18,7 @@ class Comparison:
 
     Args:
         ratio: Geometric mean of its cost divided by the other's.
-        low: Lower end of its interval, see :func:`baselines.evaluation.leaderboard.statistics.interval`.
+        low: Lower end of its interval, see :func:`baselines.evaluation.pages.statistics.interval`.
         high: Upper end.
     """
 
@@ -41,8 +40,8 @@ class Comparison:
 def sentences(section: Section) -> list[str]:
     """What the main set says of agents beside solvers, as lines of Markdown."""
     cost_ratios = section.cost_ratios()
-    means = {label: mean(values) for label, values in cost_ratios.items()}
-    ranked = sorted(section.lines, key=lambda line: means[line.label])
+    means = {label: spread.mean for label, spread in section.spreads().items()}
+    ranked = section.ranked()
     # An agent with too few seeds says something only where there is no other.
     learned = [line for line in ranked if line.learned]
     learned = [line for line in learned if line.benchmark] or learned
@@ -54,8 +53,8 @@ def sentences(section: Section) -> list[str]:
     out = [f"- The best agent is {_name(best, means)}{_few(best)}; it loses track in {best.lost} of {best.runs} runs."]
     if best.training and best.training.base_policy:
         out.append(
-            f"- It adds to `{best.training.base_policy}` and sees {best.preview} steps ahead: what that solver reaches is no "
-            "merit of the training. Compare it with the same solver alone."
+            f"- It adds to `{best.training.base_policy}` and sees {best.preview} steps ahead: what that solver reaches "
+            "is no merit of the training. Compare it with the same solver alone."
         )
     alone = next((line for line in learned if line.kind == AGENT), None)
     if alone is None:
@@ -69,11 +68,6 @@ def sentences(section: Section) -> list[str]:
         f"- Its cost is {r} times that of {_name(line, means)}, which looks further."
         for r, line in zip(ratios, far, strict=True)
     ]
-
-
-def mean(cost_ratios: FloatArray) -> float:
-    """The geometric mean over all runs."""
-    return geometric_mean([float(value) for value in np.ravel(cost_ratios)])
 
 
 def _beside_near(best: Line, near: list[Line], cost_ratios: dict[str, FloatArray], means: dict[str, float]) -> str:

@@ -1,4 +1,4 @@
-"""What is tried for each solver: settings in stages, each of which starts from the best of the stage before.
+"""The search grids: what is tried for each solver, in stages, each of which starts from the best of the stage before.
 
 A solver may not look further ahead than it does as it is, so no grid has a horizon in it.
 """
@@ -9,13 +9,11 @@ import itertools
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-#: Values of parameters by name.
-Settings = Mapping[str, Any]
-#: The settings of a stage; each is added to the best of the stage before.
-Stage = Sequence[Settings]
+#: The parameters of each trial of a stage, by name; each is added to the best of the stage before.
+Stage = Sequence[Mapping[str, Any]]
 
 
-def product(**values: Sequence[Any]) -> list[Settings]:
+def product(**values: Sequence[Any]) -> list[Mapping[str, Any]]:
     """All combinations of some parameters' values."""
     return [dict(zip(values, chosen, strict=True)) for chosen in itertools.product(*values.values())]
 

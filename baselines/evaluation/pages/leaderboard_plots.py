@@ -1,4 +1,4 @@
-"""The plots: the geometric means with their intervals, and performance profiles."""
+"""The plots of the leaderboard: the geometric means with their intervals, and performance profiles."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from baselines.evaluation.leaderboard.board import AGENT, FAR, NEAR, REFERENCE, RESIDUAL
-from baselines.evaluation.leaderboard.statistics import profile
+from baselines.evaluation.pages.measurement import AGENT, FAR, NEAR, REFERENCE, RESIDUAL
+from baselines.evaluation.pages.statistics import profile
 from baselines.evaluation.plots import style
 from baselines.evaluation.report import number
 from ikgym.validation import FloatArray

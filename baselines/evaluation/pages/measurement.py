@@ -1,29 +1,33 @@
-"""What was measured: lines of costs and errors by seed and episode, and the file that keeps them."""
+"""The one table model: costs, errors and times of each entry on each set of episodes, and the file that keeps them."""
 
 from __future__ import annotations
 
 import dataclasses
 import json
 import pathlib
-import statistics
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Self
 
 import numpy as np
 
-from baselines.evaluation.compact import DIGITS, one_line, rounded, with_list
-from baselines.evaluation.leaderboard import places
-from baselines.evaluation.leaderboard.entries import ENOUGH, FORESIGHT, PAPER, Entry, Training, label
-from baselines.evaluation.metrics import Row
-from baselines.evaluation.pareto.points import LOST
+from baselines.evaluation.metrics import Row, Spread, times
+from baselines.evaluation.pages import sets
+from baselines.evaluation.pages.entries import ENOUGH, FORESIGHT, PAPER, Entry, Training, label
+from baselines.evaluation.pages.jsonlines import DIGITS, one_line, rounded, with_list
 from baselines.files import ResultsError, write
 from baselines.fingerprints import fingerprint
 from baselines.oracle import best_known
 from ikgym.exceptions import InvalidInputError
 from ikgym.validation import FloatArray
 
+#: An arm that was farther from its nominal position than this has lost track, in [m].
+LOST = 0.05
+#: Of the files; those of another one are refused.
+FORMAT = 2
 #: Kinds of lines, in the order of the legend.
 AGENT, RESIDUAL, FAR, NEAR, REFERENCE = "agent", "residual agent", "solver with foresight", "solver", "reference"
+#: A number of each run: a row a seed, a column an episode.
+Runs = tuple[tuple[float, ...], ...]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -36,7 +40,9 @@ class Line:
         preview: Steps ahead that it sees.
         seeds: Seeds of training, or of the policy; none where nothing is drawn at random.
         cost: Total cost of each episode, a row a seed; one row where there is none.
-        error: Largest distance from the nominal position in [m], likewise.
+        error: Largest distance from the nominal position in [m], likewise; None in what was measured when only the
+            number of runs that lost track was kept.
+        lost: How many runs lost track.
         timed: Episodes that were played with the clock.
         time_p50_us: Median of the medians over the calls after the first, in [µs]; None where nothing was timed.
         time_p99_us: Largest 99th percentile of them, in [µs].
@@ -48,8 +54,9 @@ class Line:
     settings: Mapping[str, Any]
     preview: int
     seeds: tuple[int, ...]
-    cost: tuple[tuple[float, ...], ...]
-    error: tuple[tuple[float, ...], ...]
+    cost: Runs
+    error: Runs | None
+    lost: int
     timed: int
     time_p50_us: float | None
     time_p99_us: float | None
@@ -59,38 +66,30 @@ class Line:
     @classmethod
     def of(cls, entry: Entry, rows: Sequence[Row]) -> Self:
         """The line of an entry's rows, seed by seed."""
-        count = max(len(entry.seeds), 1)
-
-        def table(numbers: Iterable[float], digits: int) -> tuple[tuple[float, ...], ...]:
-            each = [rounded(value, digits) for value in numbers]
-            size = len(each) // count
-            return tuple(tuple(each[k * size : (k + 1) * size]) for k in range(count))
-
-        def times(name: str, of: Any) -> float | None:
-            found = [time for row in rows if (time := getattr(row, name)) is not None]
-            return rounded(of(found)) if found else None
-
+        clocked = times(rows)
+        p50, p99, first = (None if time is None else rounded(time) for time in clocked[1:])
         return cls(
             name=entry.name,
             settings=dict(entry.settings),
             preview=max(int(np.max(row.preview)) for row in rows),
             seeds=entry.seeds,
-            cost=table((row.total_cost for row in rows), DIGITS),
-            error=table((row.position_error_max for row in rows), 4),
-            timed=sum(row.time_p50_us is not None for row in rows),
-            time_p50_us=times("time_p50_us", statistics.median),
-            time_p99_us=times("time_p99_us", max),
-            time_first_us=times("time_first_us", max),
+            cost=_by_seed(entry, (rounded(row.total_cost, DIGITS) for row in rows)),
+            error=_by_seed(entry, (rounded(row.position_error_max) for row in rows)),
+            lost=sum(row.position_error_max > LOST for row in rows),
+            timed=clocked.timed,
+            time_p50_us=p50,
+            time_p99_us=p99,
+            time_first_us=first,
             training=entry.training,
         )
 
     @classmethod
     def from_json(cls, values: Mapping[str, Any]) -> Self:
-        """The line of what :meth:`Board.save` wrote of it."""
-        tables = {name: tuple(tuple(row) for row in values[name]) for name in ("cost", "error")}
+        """The line of what :meth:`Measurement.save` wrote of it."""
+        runs = {name: values[name] and tuple(map(tuple, values[name])) for name in ("cost", "error")}
         given = values["training"]
         training = given and Training(**{**given, **{n: tuple(given[n]) for n in ("steps", "core_minutes")}})
-        return cls(**{**values, **tables, "seeds": tuple(values["seeds"]), "training": training})
+        return cls(**{**values, **runs, "seeds": tuple(values["seeds"]), "training": training})
 
     @property
     def label(self) -> str:
@@ -114,14 +113,9 @@ class Line:
         """Whether it has seeds enough to be more than an anecdote."""
         return not self.learned or len(self.seeds) >= ENOUGH
 
-    def within(self, distance: float) -> float:
-        """The share of all runs that never were farther from the nominal position, in [m]."""
-        return float(np.mean(np.array(self.error) <= distance))
-
-    @property
-    def lost(self) -> int:
-        """How many runs lost track."""
-        return int((np.array(self.error) > LOST).sum())
+    def within(self, distance: float) -> float | None:
+        """The share of all runs that never were farther from the nominal position, in [m]; None if not kept."""
+        return None if self.error is None else float(np.mean(np.array(self.error) <= distance))
 
     @property
     def runs(self) -> int:
@@ -134,7 +128,7 @@ class Section:
     """A set of episodes and all that was measured on it.
 
     Args:
-        name: One of :func:`baselines.evaluation.leaderboard.places.names`.
+        name: Of the test set or the scenario, see :func:`baselines.evaluation.pages.sets.get`.
         fingerprint: Of the scenario.
         test_set: The digest of the test set; None where it is none.
         seeds: The reset seeds.
@@ -150,9 +144,14 @@ class Section:
     @property
     def best_known(self) -> list[float] | None:
         """The best known cost of each episode; None where one is not known."""
-        scenario = places.get(self.name)
+        scenario = sets.get(self.name)
         costs = [cost for seed in self.seeds if (cost := best_known.cost(scenario, seed)) is not None]
         return costs if len(costs) == len(self.seeds) else None
+
+    @property
+    def quantity(self) -> str:
+        """What :meth:`cost_ratios` states, in words."""
+        return "cost ratio" if self.best_known is not None else f"cost relative to {FORESIGHT}"
 
     @property
     def reference(self) -> FloatArray:
@@ -165,32 +164,41 @@ class Section:
         """
         if (known := self.best_known) is not None:
             return np.array(known)
-        for line in self.lines:
-            if line.label == FORESIGHT:
-                lowest: FloatArray = np.array(line.cost).min(axis=0)
-                return lowest
-        raise InvalidInputError(f"{self.name} has no best known costs, and {FORESIGHT} was not played to stand in.")
+        costs = [row for line in self.lines if line.label.partition(":")[0] == FORESIGHT for row in line.cost]
+        if not costs:
+            raise InvalidInputError(f"{self.name} has no best known costs, and {FORESIGHT} was not played to stand in.")
+        lowest: FloatArray = np.array(costs).min(axis=0)
+        return lowest
 
     def cost_ratios(self) -> dict[str, FloatArray]:
         """The cost of each line relative to the reference, by its label. Shape (s, e) each."""
         reference = self.reference
         return {line.label: np.array(line.cost) / reference for line in self.lines}
 
+    def spreads(self) -> dict[str, Spread]:
+        """The cost ratio of each line over all of its runs, by its label."""
+        return {name: Spread.of(dict(enumerate(np.ravel(r).tolist()))) for name, r in self.cost_ratios().items()}
+
+    def ranked(self) -> list[Line]:
+        """The lines from the lowest geometric mean on."""
+        spreads = self.spreads()
+        return sorted(self.lines, key=lambda line: spreads[line.label].mean)
+
     @property
     def stale(self) -> bool:
         """Whether the scenario, or the cost, is no longer what was measured."""
-        return fingerprint(places.get(self.name)) != self.fingerprint
+        return fingerprint(sets.get(self.name)) != self.fingerprint
 
 
 @dataclasses.dataclass(frozen=True)
-class Board:
-    """The leaderboard.
+class Measurement:
+    """What a page is made from.
 
     Args:
         command: What measured it.
         date: When, as YYYY-MM-DD.
         machine: On what, see :func:`baselines.evaluation.machine.describe`.
-        sections: The test set first, then the changed scenarios.
+        sections: What came out, by sets of episodes.
     """
 
     command: str
@@ -199,12 +207,12 @@ class Board:
     sections: tuple[Section, ...]
 
     def save(self, file: pathlib.Path) -> None:
-        """Writes it as JSON, a line of the leaderboard a line.
+        """Writes it as JSON, a line of the table a line.
 
         Raises:
             ResultsError: The file cannot be written.
         """
-        head = {"command": self.command, "date": self.date, "machine": dict(self.machine)}
+        head = {"format": FORMAT, "command": self.command, "date": self.date, "machine": dict(self.machine)}
         sections = []
         for one in self.sections:
             about = {name: value for name, value in vars(one).items() if name != "lines"}
@@ -216,10 +224,12 @@ class Board:
         """What :meth:`save` wrote.
 
         Raises:
-            ResultsError: It cannot be read, or is damaged.
+            ResultsError: It cannot be read, is damaged, or has another format.
         """
         try:
             content = json.loads(file.read_text(encoding="utf-8"))
+            if (there := content.pop("format", 1)) != FORMAT:
+                raise ResultsError(f"{file}: expected format {FORMAT}, got {there}. Measure again with --out.")
             sections = [
                 Section(**{**one, "seeds": tuple(one["seeds"]), "lines": tuple(map(Line.from_json, one["lines"]))})
                 for one in content["sections"]
@@ -227,3 +237,9 @@ class Board:
             return cls(**{**content, "sections": tuple(sections)})
         except (OSError, ValueError, TypeError, KeyError, AttributeError) as e:
             raise ResultsError(f"Cannot read what was measured from {file}: {e!r}.") from None
+
+
+def _by_seed(entry: Entry, numbers: Iterable[float]) -> Runs:
+    each = list(numbers)
+    size = len(each) // max(len(entry.seeds), 1)
+    return tuple(tuple(each[first : first + size]) for first in range(0, len(each), size))

@@ -1,4 +1,4 @@
-"""Who is on the leaderboard: all solvers as they are and tuned, and trained agents from their folders."""
+"""What is measured for the leaderboard: all solvers as they are and tuned, and trained agents from their folders."""
 
 from __future__ import annotations
 
@@ -6,14 +6,15 @@ import dataclasses
 import json
 import pathlib
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import Any
 
 from baselines import registry
 from baselines.agents.policy import LearnedPolicy
-from baselines.evaluation.leaderboard.tuning import Tuned
-from baselines.evaluation.pareto.contenders import SEEDS
+from baselines.evaluation.pages.sets import MAIN
 from baselines.files import ResultsError
+from baselines.solvers.receding_horizon.rhc import RecedingHorizon
 from baselines.spec import parse_policy
 from ikgym.exceptions import InvalidInputError
 
@@ -21,23 +22,26 @@ from ikgym.exceptions import InvalidInputError
 PAPER = 2
 #: The preset that draws at random, whose best seed is the reference where no best known cost is.
 FORESIGHT = "rhc_foresight"
-#: Receding horizons beside those that are registered: the paper's, exactly and in real time, and long ones with blocks.
+#: Receding horizons beside those that are registered: the paper's, to the optimum and with one iteration, and long
+#: ones with move blocks.
 BLOCKED = ("rhc:horizon=100,iterations=1,move_blocks=23", "rhc:horizon=200,iterations=1,move_blocks=27")
-#: The same for a policy that is shown whole poses.
-UNFOLDED = tuple(
+#: The same for a policy that is shown the full orientation.
+FULL_ORIENTATION = tuple(
     f"full_orientation:policy=rhc,options={{'horizon': {horizon}, 'iterations': 1, 'move_blocks': {blocks}}}"
     for horizon, blocks in ((100, 23), (400, 30))
 )
-HORIZONS = ("rhc:horizon=3", "rhc:horizon=3,iterations=1", "rhc:horizon=100", *BLOCKED, *UNFOLDED)
+HORIZONS = ("rhc:horizon=3", "rhc:horizon=3,iterations=1", "rhc:horizon=100", *BLOCKED, *FULL_ORIENTATION)
 #: The solvers that are also played where no solver was tuned and no agent trained, as they are and tuned.
 GENERAL = (
     *("dls", "full_orientation", "null_space", "mfac", "rhc_gradient"),
-    *(*HORIZONS[:2], *BLOCKED, *UNFOLDED, FORESIGHT),
+    *(*HORIZONS[:2], *BLOCKED, *FULL_ORIENTATION, FORESIGHT),
 )
 #: Training seeds below which a mean over them is no benchmark.
 ENOUGH = 5
 #: Episodes of each policy that are played with the clock.
 TIMED = 2
+#: Seeds of a policy that draws at random.
+SEEDS = (0, 1, 2)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -46,7 +50,7 @@ class Training:
 
     Args:
         method: Such as ``"ppo"``.
-        base_policy: The policy under a residual agent; None where there is none.
+        base_policy: The base policy of a residual agent; None where there is none.
         steps: Environment steps, or samples, of each training seed.
         core_minutes: Minutes times cores of each training seed.
     """
@@ -59,7 +63,7 @@ class Training:
 
 @dataclasses.dataclass(frozen=True)
 class Entry:
-    """A line of the leaderboard to be played; it is a :class:`baselines.evaluation.contest.Contender`.
+    """A line of a table, to be measured: one policy, or the same policy with several seeds.
 
     Args:
         name: What it is called: a solver's spec, or the name of an agent.
@@ -78,7 +82,7 @@ class Entry:
     timed: int = TIMED
 
     @property
-    def spec(self) -> str:
+    def label(self) -> str:
         """What tells it from all others."""
         return label(self.name, self.settings)
 
@@ -104,20 +108,42 @@ def short(name: str) -> str:
     return f"{outer} {inner}" + (":" + ",".join(f"{key}={value}" for key, value in options.items()) if options else "")
 
 
-def solvers(tuned: Iterable[Tuned] = ()) -> tuple[Entry, ...]:
+def solvers(tuned: Mapping[str, Mapping[str, Any]] = MappingProxyType({})) -> tuple[Entry, ...]:
     """All registered solvers as they are, some receding horizons, and what tuning made of them.
 
-    References, which know what no observation shows, are left out, and so are agents that come with the package:
-    agents are entered with all of their training seeds, see :func:`agents`.
+    References, which have privileged information, are left out, and so are agents that come with the package: agents
+    are entered with all of their training seeds, see :func:`agents`.
 
     Args:
-        tuned: The best settings; a solver that they do not change is not listed twice.
+        tuned: The best settings of solvers, by their specs; one that they do not change is not listed twice.
     """
     classes = {name: registry.get(name) for name in registry.names()}
-    specs = [name for name, kind in classes.items() if not (kind.reference or issubclass(kind, LearnedPolicy))]
-    plain = [_solver(spec, parse_policy(spec)) for spec in (*specs, *HORIZONS)]
-    better = [_solver(one.spec, one.variant, one.settings) for one in tuned if one.settings]
-    return (*plain, *better)
+    names = [name for name, kind in classes.items() if not (kind.reference or issubclass(kind, LearnedPolicy))]
+    better = (solver(spec, settings) for spec, settings in tuned.items() if settings)
+    return (*map(solver, (*names, *HORIZONS)), *better)
+
+
+def solver(spec: str, settings: Mapping[str, Any] = MappingProxyType({}), *, timed: int = TIMED) -> Entry:
+    """A solver; one that draws at random is entered with several seeds.
+
+    Args:
+        spec: Its name and parameters, see :data:`baselines.spec.PolicySpec`.
+        settings: Parameters that were searched.
+        timed: Episodes that are played with the clock, of each seed.
+    """
+    name, parameters = parse_policy(spec)
+    given, kind = {**parameters, **settings}, registry.get(name)
+    draws = issubclass(kind, RecedingHorizon) and (kind.starts > 1 or kind.restart_steps > 0)
+    if not draws:
+        return Entry(spec, ((name, given),), settings=dict(settings), timed=timed)
+    return Entry(spec, tuple((name, {**given, "seed": seed}) for seed in SEEDS), SEEDS, dict(settings), timed=timed)
+
+
+def playing(name: str, entries: Sequence[Entry]) -> list[Entry]:
+    """Who plays a set of the leaderboard: all on the main test set; agents and some solvers, untimed, elsewhere."""
+    return [
+        one if name == MAIN else dataclasses.replace(one, timed=0) for one in entries if name == MAIN or one.general
+    ]
 
 
 def agent(name: str, directory: pathlib.Path) -> Entry:
@@ -180,15 +206,8 @@ def policy_of(folder: pathlib.Path) -> tuple[str, dict[str, Any]]:
     return "agent", {"path": str(file)}
 
 
-def _solver(spec: str, variant: tuple[str, dict[str, Any]], settings: Mapping[str, Any] | None = None) -> Entry:
-    name, parameters = variant
-    if name != FORESIGHT:
-        return Entry(spec, (variant,), settings=settings or {})
-    return Entry(spec, tuple((name, {**parameters, "seed": seed}) for seed in SEEDS), SEEDS, settings or {})
-
-
 def _run(file: pathlib.Path) -> tuple[str, str | None, int, float]:
-    """Method, policy underneath, steps and core-minutes of a training."""
+    """Method, base policy, steps and core-minutes of a training."""
     try:
         content = json.loads(file.read_text(encoding="utf-8"))
         training, base_policy = content["training"], content["processing"]["base_policy"]

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import json
 import math
 import pathlib
 from collections.abc import Iterable, Mapping
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
-from baselines.evaluation.compact import DIGITS, one_line, rounded, with_list
-from baselines.evaluation.contest import plan
-from baselines.evaluation.leaderboard.grids import GRIDS, Settings, Stage
-from baselines.evaluation.metrics import Row, geometric_mean
-from baselines.evaluation.runner import run
+from baselines.evaluation.metrics import geometric_mean
+from baselines.evaluation.pages.entries import Entry
+from baselines.evaluation.pages.grids import GRIDS, Stage
+from baselines.evaluation.pages.jsonlines import DIGITS, one_line, rounded, with_list
+from baselines.evaluation.pages.measure import plan, play
 from baselines.files import ResultsError, write
 from baselines.fingerprints import fingerprint
 from baselines.spec import parse_policy
@@ -42,7 +41,7 @@ class Tuned:
     """
 
     spec: str
-    settings: Settings
+    settings: Mapping[str, Any]
     tried: int
     default: float
     tuned: float
@@ -65,7 +64,7 @@ class Tuning:
         fingerprint: Of that scenario.
         split: Where the episodes come from.
         episodes: The first so many seeds of the split.
-        solvers: What came out.
+        solvers: What came out of it.
 
     Raises:
         InvalidInputError: The split is that for testing.
@@ -82,6 +81,11 @@ class Tuning:
     def __post_init__(self) -> None:
         if self.split == "test":
             raise InvalidInputError("Nothing may be tuned on the split 'test', which scores are published on.")
+
+    @property
+    def settings(self) -> dict[str, Mapping[str, Any]]:
+        """The best settings of each solver, by its spec."""
+        return {one.spec: one.settings for one in self.solvers}
 
     @property
     def seeds(self) -> tuple[int, ...]:
@@ -120,22 +124,18 @@ class Tuning:
         return out
 
 
-@dataclasses.dataclass(frozen=True)
-class _Trial:
-    """A solver with settings, as a contender."""
+class Trial(NamedTuple):
+    """A solver with settings that are tried."""
 
     solver: str
-    settings: Settings
-    timed: int = 1
+    settings: Mapping[str, Any]
 
     @property
-    def spec(self) -> str:
-        return one_line({"solver": self.solver, **self.settings})
-
-    @property
-    def variants(self) -> list[tuple[str, dict[str, Any]]]:
+    def entry(self) -> Entry:
+        """What is measured; its name tells it from all other trials."""
         name, parameters = parse_policy(self.solver)
-        return [(name, {**parameters, **self.settings})]
+        variant = name, {**parameters, **self.settings}
+        return Entry(one_line({"solver": self.solver, **self.settings}), (variant,), timed=0)
 
 
 def tune(
@@ -166,16 +166,16 @@ def tune(
         WorkerError: A worker process has died.
     """
     stages = {solver: tuple(stages) for solver, stages in grids.items()}
-    costs: dict[str, dict[str, tuple[float, Settings]]] = {solver: {} for solver in grids}
+    costs: dict[str, dict[str, tuple[float, Mapping[str, Any]]]] = {solver: {} for solver in grids}
     for number in range(-1, max(map(len, stages.values()))):
         trials = []
         for solver, known in costs.items():
             best = min(known.values(), key=lambda one: one[0])[1] if known else {}
             stage: Stage = ({},) if number < 0 else next(iter(stages[solver][number : number + 1]), ())
-            found = [_Trial(solver, {**best, **settings}) for settings in stage]
-            trials += [trial for trial in found if trial.spec not in known]
+            found = [Trial(solver, {**best, **settings}) for settings in stage]
+            trials += [trial for trial in found if trial.entry.name not in known]
         for trial, cost in zip(trials, _costs(trials, episodes, workers, progress), strict=True):
-            costs[trial.solver][trial.spec] = cost, trial.settings
+            costs[trial.solver][trial.entry.name] = cost, trial.settings
     solvers = []
     for solver, known in costs.items():
         (default, _), (lowest, settings) = next(iter(known.values())), min(known.values(), key=lambda one: one[0])
@@ -183,16 +183,9 @@ def tune(
     return Tuning(command, date, SCENARIO, fingerprint(scenarios.get(SCENARIO)), SPLIT, episodes, tuple(solvers))
 
 
-def _costs(trials: list[_Trial], episodes: int, workers: int, progress: bool) -> list[float]:
+def _costs(trials: list[Trial], episodes: int, workers: int, progress: bool) -> list[float]:
     """The geometric mean of each trial's total costs; infinite where one is no number."""
-    plans = plan(scenarios.get(SCENARIO), trials, episodes, split=SPLIT)
-    untimed = {job.key: dataclasses.replace(job, timed=False) for jobs in plans.values() for job in jobs}
-    rows: dict[Any, Row] = {}
-    with contextlib.closing(run(list(untimed.values()), workers=workers, progress=progress)) as batches:
-        for outcomes in batches:
-            rows |= {row.key: row for _, row, _ in outcomes}
-    out = []
-    for trial in trials:
-        totals = [rows[job.key].total_cost for job in plans[trial.spec]]
-        out.append(geometric_mean(totals) if all(map(math.isfinite, totals)) else math.inf)
-    return out
+    plans = plan(scenarios.get(SCENARIO), [trial.entry for trial in trials], episodes, split=SPLIT)
+    rows = play(plans, workers=workers, progress=progress)
+    totals = [[row.total_cost for row in rows[trial.entry.name]] for trial in trials]
+    return [geometric_mean(some) if all(map(math.isfinite, some)) else math.inf for some in totals]

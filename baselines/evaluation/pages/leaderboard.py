@@ -1,4 +1,4 @@
-"""The page: what the numbers say, tables and plots, all of it worked out from what was measured."""
+"""The leaderboard: what the numbers say, tables and plots, all of it worked out from what was measured."""
 
 from __future__ import annotations
 
@@ -9,21 +9,29 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from baselines.evaluation.leaderboard import pictures as drawing
-from baselines.evaluation.leaderboard import places
-from baselines.evaluation.leaderboard.board import AGENT, FAR, NEAR, REFERENCE, RESIDUAL, Board, Line, Section
-from baselines.evaluation.leaderboard.claims import few, mean, quoted, sentences
-from baselines.evaluation.leaderboard.entries import ENOUGH, FORESIGHT, PAPER, label, short
-from baselines.evaluation.leaderboard.statistics import interval
-from baselines.evaluation.leaderboard.tuning import UPDATE, Tuning
-from baselines.evaluation.markdown import table
-from baselines.evaluation.pareto.page import TIMES
-from baselines.evaluation.pareto.points import LOST
+from baselines.evaluation.metrics import Spread
+from baselines.evaluation.pages import leaderboard_plots as plots
+from baselines.evaluation.pages import sets
+from baselines.evaluation.pages.claims import few, quoted, sentences
+from baselines.evaluation.pages.entries import ENOUGH, FORESIGHT, PAPER, label, short
+from baselines.evaluation.pages.markdown import IMAGES, conditions, episodes, folded, runs, share, table, time
+from baselines.evaluation.pages.measurement import (
+    AGENT,
+    FAR,
+    LOST,
+    NEAR,
+    REFERENCE,
+    RESIDUAL,
+    Line,
+    Measurement,
+    Section,
+)
+from baselines.evaluation.pages.statistics import interval
+from baselines.evaluation.pages.tuning import UPDATE, Tuning
 from baselines.evaluation.report import NOTHING, number
 from ikgym.validation import FloatArray
 
-#: Where the plots lie, seen from the page.
-IMAGES = pathlib.PurePath("images")
+#: The plots, seen from the page.
 MEANS, PROFILES = IMAGES / "leaderboard-means.png", IMAGES / "leaderboard-profiles.png"
 #: Lines of the profiles besides agents: the best that look further, and the best that do not.
 SHOWN = {FAR: 2, NEAR: 5}
@@ -33,7 +41,7 @@ WITHIN = (0.010, 0.001)
 DETERMINISTIC = "deterministic"
 
 INTRODUCTION = f"""\
-Trained agents beside all solvers, on the [test set](evaluation.md#test-sets) `{places.MAIN}`: 64 test episodes that
+Trained agents beside all solvers, on the [test set](evaluation.md#test-sets) `{sets.MAIN}`: 64 test episodes that
 nobody was trained or tuned on. Written by `python -m baselines.leaderboard`, see [conditions](#conditions); everything
 below is worked out from what was measured, which lies in [leaderboard.json](leaderboard.json).
 """
@@ -56,8 +64,8 @@ LEGEND = f"""\
 - **Steps** (of the environment, or samples) and **core-min** (minutes × cores) are what a training seed has cost, in
   the mean.
 - Kinds: a **{NEAR}** looks no further than the paper's horizon, {PAPER} steps ahead, a **{FAR}** does; an **{AGENT}**
-  stands alone, a **{RESIDUAL}** adds to a solver's answer; a **{REFERENCE}** knows what no observation shows. *Tuned*
-  solvers have [settings that were searched](#tuned-solvers) on validation episodes.
+  stands alone, a **{RESIDUAL}** adds to the action of a base policy; a **{REFERENCE}** has privileged information.
+  *Tuned* solvers have [settings that were searched](#tuned-solvers) on validation episodes.
 - **Bold** is the lowest geometric mean of each kind.
 """
 
@@ -68,28 +76,24 @@ ones the best solvers.
 """
 
 
-def pictures(board: Board) -> Iterator[tuple[pathlib.PurePath, Figure]]:
+def pictures(measurement: Measurement) -> Iterator[tuple[pathlib.PurePath, Figure]]:
     """The plots, and where they lie, seen from the page."""
-    section = board.sections[0]
-    cost_ratios = section.cost_ratios()
-    marks = [drawing.Mark(f"{ORACLE} (best known)", REFERENCE, 1.0, 1.0, 1.0)]
-    for line in _ranked(section):
-        values = cost_ratios[line.label]
-        marks.append(drawing.Mark(_plain(line), line.kind, mean(values), *_interval(values)))
-    many = f"{section.name}, {len(section.seeds)} test episodes"
-    yield MEANS, drawing.means(many, marks)
+    section = measurement.sections[0]
+    cost_ratios, spreads = section.cost_ratios(), section.spreads()
+    marks = [plots.Mark(f"{ORACLE} (best known)", REFERENCE, 1.0, 1.0, 1.0)]
+    for line in section.ranked():
+        low, high = _interval(cost_ratios[line.label])
+        marks.append(plots.Mark(_plain(line), line.kind, spreads[line.label].mean, low, high))
+    title = f"{section.name}, {len(section.seeds)} test episodes"
+    yield MEANS, plots.means(title, marks)
     shown = profiled(section)
-    yield (
-        PROFILES,
-        drawing.profiles(
-            many, {_plain(line): cost_ratios[line.label] for line in shown}, {_plain(line): line.kind for line in shown}
-        ),
-    )
+    curves = {_plain(line): cost_ratios[line.label] for line in shown}
+    yield PROFILES, plots.profiles(title, curves, {_plain(line): line.kind for line in shown})
 
 
 def profiled(section: Section) -> list[Line]:
     """The lines whose profile is drawn: all agents, and the best solvers, from the best on."""
-    ranked, left = _ranked(section), dict(SHOWN)
+    ranked, left = section.ranked(), dict(SHOWN)
     out = []
     for line in ranked:
         if not line.learned:
@@ -99,72 +103,66 @@ def profiled(section: Section) -> list[Line]:
     return out
 
 
-def page(board: Board, tuning: Tuning) -> str:
+def page(measurement: Measurement, tuning: Tuning) -> str:
     """The page as Markdown.
 
     Args:
-        board: What was measured; its first section is the main set.
+        measurement: What was measured; its first section is the main test set.
         tuning: How the tuned solvers came to their settings.
 
     Raises:
         MissingDependencyError: There is no scipy, which the intervals need.
     """
-    section = board.sections[0]
+    section = measurement.sections[0]
     out = ["# Leaderboard", "", INTRODUCTION, "## What it says", "", *sentences(section), ""]
     out += ["## All lines", "", f"![Geometric means of the cost ratio]({MEANS.as_posix()})", ""]
     out += [*_main(section), "", LEGEND, *_medians(section)]
     out += ["## Performance profiles", "", f"![Performance profiles]({PROFILES.as_posix()})", "", PROFILE]
-    out += [*_generalisation(board.sections[1:]), *_tuned(tuning)]
-    out += ["## Conditions", "", f"- command: `{board.command}`", f"- date: {board.date}"]
-    out += [f"- machine: {', '.join(f'{name} {value}' for name, value in board.machine.items())}"]
-    out += [f"- `{one.name}`: fingerprint {one.fingerprint}, {_set(one)}" for one in board.sections]
-    out += [f"- {TIMES}"]
+    out += [*_generalisation(measurement.sections[1:]), *_tuned(tuning), *conditions(measurement)]
     return "\n".join(out) + "\n"
 
 
 def _main(section: Section) -> list[str]:
-    cost_ratios = section.cost_ratios()
+    cost_ratios, spreads = section.cost_ratios(), section.spreads()
     head = ["policy", "kind", "cost ratio", "95 %", "median", "p90", "worst", *(f"≤ {1e3 * w:g} mm" for w in WITHIN)]
     head += ["lost", "p50 [µs]", "p99 [µs]", "seeds", "steps", "core-min"]
     lines = [[f"`{ORACLE}`", REFERENCE, "1.000", NOTHING, *["1.000"] * 3, *[NOTHING] * 8]]
     best: set[str] = set()
-    for line in _ranked(section):
-        values, first = cost_ratios[line.label], line.kind not in best
+    for line in section.ranked():
+        spread, first = spreads[line.label], line.kind not in best
         best.add(line.kind)
         cells = [
             quoted(line),
             line.kind + (", tuned" if line.settings else ""),
-            number(mean(values)),
-            _range(values),
-            *map(number, (float(np.median(values)), float(np.percentile(values, 90)), float(values.max()))),
-            *(_share(line.within(distance)) for distance in WITHIN),
-            _share(line.lost / line.runs),
-            *map(_time, (line.time_p50_us, line.time_p99_us)),
+            number(spread.mean),
+            _range(cost_ratios[line.label]),
+            *map(number, (spread.median, spread.p90, spread.worst)),
+            *map(share, (*map(line.within, WITHIN), line.lost / line.runs)),
+            *map(time, (line.time_p50_us, line.time_p99_us)),
             _seeds(line),
             *_cost(line),
         ]
-        lines.append([f"**{cell}**" if first and number in (0, 2) else cell for number, cell in enumerate(cells)])
+        lines.append([f"**{cell}**" if first and column in (0, 2) else cell for column, cell in enumerate(cells)])
     return table(head, lines, text=(0, 1))
 
 
 def _medians(section: Section) -> list[str]:
-    cost_ratios = section.cost_ratios()
+    cost_ratios, spreads = section.cost_ratios(), section.spreads()
     lines = [
         [
             quoted(line),
-            number(float(np.median(values))),
-            _range(values, np.median),
+            number(spreads[line.label].median),
+            _range(cost_ratios[line.label], np.median),
             str(line.preview),
-            f"{max(len(line.seeds), 1)} × {len(section.seeds)}",
+            runs(line, section),
             str(line.timed),
-            _time(line.time_first_us),
+            time(line.time_first_us),
         ]
-        for line in _ranked(section)
-        for values in [cost_ratios[line.label]]
+        for line in section.ranked()
     ]
     head = ["policy", "median", "95 %", "steps ahead", "runs", "timed", "first call [µs]"]
-    summary = "<summary>Intervals of the median, how far each looks ahead, runs and first calls</summary>"
-    return ["<details>", summary, "", *table(head, lines, text=(0,)), "", "</details>", ""]
+    summary = "Intervals of the median, how far each looks ahead, runs and first calls"
+    return folded(summary, table(head, lines, text=(0,)))
 
 
 def _generalisation(sections: Sequence[Section]) -> list[str]:
@@ -178,29 +176,22 @@ def _generalisation(sections: Sequence[Section]) -> list[str]:
         "",
     ]
     for one in sections:
-        known = one.best_known is not None
-        out.append(
-            f"- `{one.name}`: {places.CHANGED[one.name][1]}; {_set(one)}; "
-            + ("cost ratios." if known else f"relative to `{FORESIGHT}`.")
-        )
+        stated = "cost ratios" if one.best_known is not None else f"relative to `{FORESIGHT}`"
+        out.append(f"- `{one.name}`: {sets.CHANGED[one.name][1]}; {episodes(one)}; {stated}.")
     heads = [text for one in sections for text in (f"`{one.name}`", "95 %", "worst", "lost")]
-    by_label = [{line.label: line for line in one.lines} for one in sections]
-    values = [one.cost_ratios() for one in sections]
-    labels = list(dict.fromkeys(line.label for one in sections for line in _ranked(one)))
-    lines = []
-    for name in labels:
-        line = next(lines_of[name] for lines_of in by_label if name in lines_of)
-        cells = [quoted(line), line.kind]
-        for lines_of, cost_ratios in zip(by_label, values, strict=True):
-            if name not in lines_of:
-                cells += [NOTHING] * 4
-                continue
-            there = lines_of[name]
-            spread = _range(cost_ratios[name]) if np.size(cost_ratios[name]) > 1 else NOTHING
-            cells += [number(mean(cost_ratios[name])), spread, number(float(cost_ratios[name].max()))]
-            cells.append(_share(there.lost / there.runs))
-        lines.append(cells)
-    return [*out, "", *table(["policy", "kind", *heads], lines, text=(0, 1)), ""]
+    entered = {line.label: line for one in sections for line in one.ranked()}
+    cells = {name: [quoted(line), line.kind] for name, line in entered.items()}
+    for one in sections:
+        there = {line.label: line for line in one.lines}
+        cost_ratios, spreads = one.cost_ratios(), one.spreads()
+        for name, row in cells.items():
+            row += _changed(there[name], cost_ratios[name], spreads[name]) if name in there else [NOTHING] * 4
+    return [*out, "", *table(["policy", "kind", *heads], list(cells.values()), text=(0, 1)), ""]
+
+
+def _changed(line: Line, cost_ratios: FloatArray, spread: Spread) -> list[str]:
+    between = _range(cost_ratios) if line.runs > 1 else NOTHING
+    return [number(spread.mean), between, number(spread.worst), share(line.lost / line.runs)]
 
 
 def _tuned(tuning: Tuning) -> list[str]:
@@ -209,7 +200,7 @@ def _tuned(tuning: Tuning) -> list[str]:
         f"Searched with `{UPDATE}` on the first {tuning.episodes} {tuning.split} episodes of `{tuning.scenario}`, in "
         "stages over grids, for the lowest geometric mean of the total cost (which needs no best known cost: dividing "
         "by it changes no order). No test episode was played for it. What was searched is in "
-        "`baselines/evaluation/leaderboard/grids.py`, the result in `baselines/data/tuned.json`. No setting lets a "
+        "`baselines/evaluation/pages/grids.py`, the result in `baselines/data/tuned.json`. No setting lets a "
         "solver look further ahead.",
         "",
     ]
@@ -226,11 +217,6 @@ def _tuned(tuning: Tuning) -> list[str]:
     ]
     head = ["solver", "settings", "tried", "cost as it is", "cost tuned", "ratio"]
     return [*out, *table(head, lines, text=(0, 1)), ""]
-
-
-def _ranked(section: Section) -> list[Line]:
-    means = {label: mean(values) for label, values in section.cost_ratios().items()}
-    return sorted(section.lines, key=lambda line: means[line.label])
 
 
 def _interval(values: FloatArray) -> tuple[float, float]:
@@ -254,20 +240,6 @@ def _cost(line: Line) -> tuple[str, str]:
         return NOTHING, NOTHING
     steps, minutes = statistics.fmean(line.training.steps), statistics.fmean(line.training.core_minutes)
     return number(steps) if steps >= 1e6 else f"{steps:,.0f}", number(minutes)
-
-
-def _set(one: Section) -> str:
-    count = len(one.seeds)
-    many = f"{count} episode{'s' * (count > 1)}"
-    return f"{many}, test set {one.test_set}" if one.test_set else many
-
-
-def _share(share: float) -> str:
-    return f"{100.0 * share:.0f} %"
-
-
-def _time(microseconds: float | None) -> str:
-    return NOTHING if microseconds is None else f"{microseconds:,.0f}"
 
 
 def _plain(line: Line) -> str:

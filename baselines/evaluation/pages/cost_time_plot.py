@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from baselines.evaluation.plots import style
-from baselines.evaluation.plots.cost_time import Mark, height, label, scatter
+from baselines.evaluation.plots.cost_time import COST_RATIO, Mark, height, label, scatter
 
 FRONT = "#cfcfcf"
 
@@ -20,7 +20,7 @@ def draw(
     families: Mapping[str, Sequence[Mark]],
     front: Sequence[Mark],
     *,
-    cost_ratio: bool,
+    quantity: str,
     several: bool,
     deadline: float,
 ) -> Figure:
@@ -31,19 +31,19 @@ def draw(
         marks: Policies that stand for themselves.
         families: The members of each family, from short to long.
         front: Those that no other beats in time or value without being worse in the other, from fast to slow.
-        cost_ratio: Whether values are cost ratios; costs if not.
+        quantity: What the values are, in words.
         several: Whether there are several episodes, so that bars show their spread.
         deadline: The time that a step may take, in [µs].
     """
     drawn = style.figure(6.8)
     axes = drawn.subplots()
-    # Members first: their names are short and belong close to them.
-    everyone = [*(member for members in families.values() for member in members), *marks]
-    scatter(axes, everyone, cost_ratio=cost_ratio, several=several, room=0.12)
+    members = [member for of in families.values() for member in of]
+    scatter(axes, [*members, *marks], quantity=quantity, several=several, room=0.12)
+    cost_ratio = quantity == COST_RATIO
     handles: list[Artist] = []
-    for members in families.values():
-        xs, ys = [m.time for m in members], [height(m.value.mean, cost_ratio=cost_ratio) for m in members]
-        handles += axes.plot(xs, ys, color=members[0].colour, lw=1.5, marker="o", ms=4.5, zorder=2.5)
+    for of in families.values():
+        xs, ys = [m.time for m in of], [height(m.value.mean, cost_ratio=cost_ratio) for m in of]
+        handles += axes.plot(xs, ys, color=of[0].colour, lw=1.5, marker="o", ms=4.5, zorder=2.5)
     # A staircase: up to the time of the next one this is the best that is to be had.
     xs = [*(mark.time for mark in front for _ in "12"), axes.get_xlim()[1]][1:]
     ys = [height(mark.value.mean, cost_ratio=cost_ratio) for mark in front for _ in "12"]
@@ -62,15 +62,22 @@ def draw(
             fontsize=style.SMALL - 0.5,
             color=style.STEEL,
         )
-    dot = Line2D([], [], color=style.STEEL, marker="o", ls="", ms=6)
-    entries: list[tuple[Artist, str]] = [
-        *((handle, f"{name}, by horizon") for handle, name in zip(handles, families, strict=True)),
-        (dot, "other policies"),
-        (stairs[0], "Pareto front"),
-    ]
+    handles.append(stairs[0])
+    names = [*(f"{name}, by horizon" for name in families), "Pareto front"]
     if several:
-        entries.append((Line2D([], [], color=style.STEEL, lw=2.4), "mean to 90th percentile"))
-        entries.append((Line2D([], [], color=style.STEEL, lw=0.7, marker="_", ms=5), "and on to the worst"))
-    style.legend(drawn, title, [handle for handle, _ in entries], [name for _, name in entries])
-    label(drawn, everyone, list(families.values()))
+        handles += [Line2D([], [], color=style.STEEL, lw=2.4), Line2D([], [], color=style.STEEL, lw=0.7, marker="_")]
+        names += ["mean to 90th percentile", "and on to the worst"]
+    style.legend(drawn, title, handles, names)
+    drawn.legend(
+        [Line2D([], [], color=mark.colour, marker=mark.marker, ls="", ms=6) for mark in marks],
+        [mark.name for mark in marks],
+        loc="outside right center",
+        fontsize=style.SMALL - 0.5,
+        frameon=False,
+        handlelength=1.0,
+    )
+    # Named are the front, and of each family the shortest and the longest horizon; legend and table have the others.
+    ends = [member for of in families.values() for member in (of[0], of[-1])]
+    named = list({id(mark): mark for mark in (*front, *ends)}.values())
+    label(drawn, named, [mark for mark in (*members, *marks) if mark not in named])
     return drawn
