@@ -2,7 +2,7 @@
 
 import sys
 
-from baselines.evaluation.leaderboard.__main__ import main
+from baselines.evaluation.pages.command import main
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -7,7 +7,7 @@ import dataclasses
 import math
 import statistics
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -250,6 +250,34 @@ class Summary:
     time_first_us: float | None
 
 
+class Times(NamedTuple):
+    """Times of single calls over those of several episodes that were timed; None where none was.
+
+    Attributes:
+        timed: How many episodes were timed.
+        p50_us: Median of the medians, in [µs].
+        p99_us: The largest, in [µs].
+        first_us: The longest first call, in [µs].
+    """
+
+    timed: int
+    p50_us: float | None
+    p99_us: float | None
+    first_us: float | None
+
+
+def times(rows: Iterable[Row]) -> Times:
+    """The times of some rows, put together."""
+    timed = [row for row in rows if row.time_p50_us is not None]
+    medians = [row.time_p50_us for row in timed if row.time_p50_us is not None]
+    return Times(
+        len(timed),
+        statistics.median(medians) if medians else None,
+        max((row.time_p99_us for row in timed if row.time_p99_us is not None), default=None),
+        max((row.time_first_us for row in timed if row.time_first_us is not None), default=None),
+    )
+
+
 def summarise(rows: Iterable[Row]) -> list[Summary]:
     """One summary for each policy with its parameters in each scenario, in the order of their first rows.
 
@@ -281,7 +309,7 @@ def _summary(rows: Sequence[Row]) -> Summary:
     first = rows[0]
     cost_ratios = {row.seed: row.cost_ratio for row in rows if row.cost_ratio is not None}
     angles = [row.orientation_error_max for row in rows if row.orientation_error_max is not None]
-    medians = [row.time_p50_us for row in rows if row.time_p50_us is not None]
+    clocked = times(rows)
     misses = [row.deadline_misses for row in rows if row.deadline_misses is not None]
     return Summary(
         scenario=first.scenario,
@@ -296,12 +324,12 @@ def _summary(rows: Sequence[Row]) -> Summary:
         position_error_max=max(row.position_error_max for row in rows),
         orientation_error_max=max(angles) if angles else None,
         qdot_peak=max(row.qdot_peak for row in rows),
-        time_p50_us=statistics.median(medians) if medians else None,
-        time_p99_us=max((row.time_p99_us for row in rows if row.time_p99_us is not None), default=None),
+        time_p50_us=clocked.p50_us,
+        time_p99_us=clocked.p99_us,
         deadline_misses=sum(misses) if misses else None,
         status=max((row.status for row in rows), key=lambda status: Status[status.upper()]),
         operations={name: statistics.fmean(row.operations[name] for row in rows) for name in first.operations},
-        time_first_us=max((row.time_first_us for row in rows if row.time_first_us is not None), default=None),
+        time_first_us=clocked.first_us,
     )
 
 

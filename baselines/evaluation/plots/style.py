@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from itertools import product
 from typing import Any
 
+import numpy as np
 import PIL.Image
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
@@ -77,7 +78,9 @@ def looks(number: int) -> dict[str, Any]:
 def legend(drawn: Figure, title: str, handles: Sequence[Artist], names: Sequence[str]) -> None:
     """Title and legend above all axes, where they cover nothing."""
     lengths = [len(re.sub(r"\$[^$]*\$", "qi", name)) + LINE for name in names]  # formulas are short once typeset
-    across = len(names) if sum(lengths) <= LETTERS else max(LETTERS // max(lengths), 1)
+    # A legend fills its columns one after the other, each as wide as its longest name.
+    fits = (n for n in range(len(names), 0, -1) if sum(map(max, np.array_split(lengths, n))) <= LETTERS)
+    across = int(next(fits, 1))
     drawn.legend(
         handles,
         names,

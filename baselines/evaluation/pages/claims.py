@@ -1,0 +1,115 @@
+"""What the numbers say, in sentences that are worked out from them."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from baselines.evaluation.pages.measurement import AGENT, FAR, NEAR, Line, Section
+from baselines.evaluation.pages.statistics import interval
+from baselines.evaluation.report import number
+from ikgym.validation import FloatArray
+
+
+@dataclasses.dataclass(frozen=True)
+class Comparison:
+    """A line beside another one on the same episodes.
+
+    Args:
+        ratio: Geometric mean of its cost divided by the other's.
+        low: Lower end of its interval, see :func:`baselines.evaluation.pages.statistics.interval`.
+        high: Upper end.
+    """
+
+    ratio: float
+    low: float
+    high: float
+
+    @classmethod
+    def of(cls, one: FloatArray, other: FloatArray) -> Comparison:
+        """Compares episode by episode, with the geometric mean of the other's seeds, if it has several."""
+        logs = np.log(one) - np.log(other).mean(axis=0)
+        low, high = interval(logs)
+        return cls(*(float(np.exp(value)) for value in (logs.mean(), low, high)))
+
+    def __str__(self) -> str:
+        return f"{number(self.ratio)} ({number(self.low)} to {number(self.high)})"
+
+
+def sentences(section: Section) -> list[str]:
+    """What the main set says of agents beside solvers, as lines of Markdown."""
+    cost_ratios = section.cost_ratios()
+    means = {label: spread.mean for label, spread in section.spreads().items()}
+    ranked = section.ranked()
+    # An agent with too few seeds says something only where there is no other.
+    learned = [line for line in ranked if line.learned]
+    learned = [line for line in learned if line.benchmark] or learned
+    near = [line for line in ranked if line.kind == NEAR]
+    far = [line for line in ranked if line.kind == FAR]
+    if not learned:
+        return ["- No agent has been entered: the lines are those of solvers.", *_solvers(near, far, means)]
+    best = learned[0]
+    out = [f"- The best agent is {_name(best, means)}{_few(best)}; it loses track in {best.lost} of {best.runs} runs."]
+    if best.training and best.training.base_policy:
+        out.append(
+            f"- It adds to `{best.training.base_policy}` and sees {best.preview} steps ahead: what that solver reaches "
+            "is no merit of the training. Compare it with the same solver alone."
+        )
+    alone = next((line for line in learned if line.kind == AGENT), None)
+    if alone is None:
+        out.append("- No agent stands alone, without a solver under it.")
+    elif alone is not best:
+        out.append(f"- The best without a solver under it is {_name(alone, means)}{_few(alone)}.")
+    if near:
+        out.append(_beside_near(best, near, cost_ratios, means))
+    ratios = [Comparison.of(cost_ratios[best.label], cost_ratios[line.label]) for line in far]
+    return out + [
+        f"- Its cost is {r} times that of {_name(line, means)}, which looks further."
+        for r, line in zip(ratios, far, strict=True)
+    ]
+
+
+def _beside_near(best: Line, near: list[Line], cost_ratios: dict[str, FloatArray], means: dict[str, float]) -> str:
+    lower = [line for line in near if means[line.label] <= means[best.label]]
+    first = near[0]
+    ratio = Comparison.of(cost_ratios[best.label], cost_ratios[first.label])
+    if lower:
+        names = ", ".join(_name(line, means) for line in lower)
+        return (
+            "- The best agent is **not** below every solver that looks no further than the paper's horizon: "
+            f"{len(lower)} of {len(near)} are as low or lower, namely {names}. Its cost is {ratio} times that of the "
+            "best of them."
+        )
+    return (
+        f"- The best agent is below all {len(near)} solvers that look no further than the paper's horizon: its cost is "
+        f"{ratio} times that of the best of them, {_name(first, means)}."
+    )
+
+
+def _solvers(near: list[Line], far: list[Line], means: dict[str, float]) -> list[str]:
+    out = []
+    if near:
+        out.append(f"- The best solver that looks no further than the paper's horizon is {_name(near[0], means)}.")
+    if far:
+        out.append(f"- The best solver that looks further is {_name(far[0], means)}.")
+    return out
+
+
+def _name(line: Line, means: dict[str, float]) -> str:
+    return f"{quoted(line)} ({number(means[line.label])})"
+
+
+def quoted(line: Line) -> str:
+    """A line's name in Markdown: solvers as code."""
+    tail = ", tuned" if line.settings else ""
+    return line.name if line.learned else f"`{line.name}`{tail}"
+
+
+def _few(line: Line) -> str:
+    return "" if line.benchmark else f" ({few(line)})"
+
+
+def few(line: Line) -> str:
+    """What has to be said of an agent with too few seeds."""
+    return f"{len(line.seeds)} seed{'s' * (len(line.seeds) > 1)}: not a benchmark"

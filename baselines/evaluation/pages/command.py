@@ -1,0 +1,215 @@
+"""The command line: ``python -m baselines.leaderboard``."""
+
+from __future__ import annotations
+
+import dataclasses
+import datetime
+import pathlib
+import shlex
+import sys
+from collections.abc import Sequence
+from typing import Annotated, Final, Literal
+
+import tyro
+
+from baselines.evaluation.machine import describe
+from baselines.evaluation.pages import cost_time, families, leaderboard, sets
+from baselines.evaluation.pages.entries import FORESIGHT, HORIZONS, Entry, agents, playing, solvers
+from baselines.evaluation.pages.markdown import table
+from baselines.evaluation.pages.measure import measure
+from baselines.evaluation.pages.measurement import Measurement, Section
+from baselines.evaluation.pages.tuning import DATA, EPISODES, Tuning, tune
+from baselines.evaluation.plots.style import small_png
+from baselines.evaluation.report import number
+from baselines.files import write
+from ikgym.exceptions import IkgymError, InvalidInputError
+
+#: The names of the pages on the command line.
+Page = Literal["leaderboard", "cost-time"]
+LEADERBOARD: Final = "leaderboard"
+COST_TIME: Final = "cost-time"
+
+
+@dataclasses.dataclass(frozen=True)
+class Options:
+    """What the command line takes."""
+
+    pages: Annotated[tuple[Page, ...], tyro.conf.arg(metavar="PAGE …")] = (LEADERBOARD, COST_TIME)
+    """The pages: leaderboard, cost-time. What both need is played once."""
+    out: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="DIR")] = None
+    """Folder for the results. If left out nothing is played, and --write writes the pages anew from what lies beside
+    them."""
+    write: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="DIR")] = None
+    """Folder for the pages, such as docs; what was measured goes beside each as .json, plots into images/. That of the
+    results if left out."""
+    agents: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=DIR …")] = ()
+    """Agents for the leaderboard: what to call each, and the folder of its training seeds, with
+    DIR/seed-N/agent.safetensors and DIR/seed-N/run.json."""
+    sets: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME …")] = ()
+    """Test sets and scenarios of the cost-time page. If left out all test sets, and the fixed scenarios but for those
+    that hold their points."""
+    tune: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None
+    """Search the settings of all solvers on validation episodes, and write them here; nothing else is done. The
+    leaderboard reads baselines/data/tuned.json."""
+    episodes: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
+    """The first so many episodes of each set, or of the search, for trials."""
+    quick: bool = False
+    """A trial: some solvers, two episodes, one seed of each policy."""
+    resume: bool = False
+    """Continue with the results in the folder: what is done already is not done again."""
+    overwrite: bool = False
+    """Delete the results in the folder."""
+    workers: Annotated[int, tyro.conf.arg(metavar="N")] = 1
+    """Processes that play what is not timed. What is timed is played in one, after that."""
+
+
+MANUAL = """\
+Plays trained agents and all solvers on test sets and scenarios, and writes the leaderboard and the cost-time page.
+
+Examples:
+  python -m baselines.leaderboard --tune baselines/data/tuned.json
+  python -m baselines.leaderboard --out results/pages --agents "PPO=results/ppo" --write docs
+  python -m baselines.leaderboard --pages cost-time --out results/quick --quick
+  python -m baselines.leaderboard --write docs
+
+Files:
+  DIR/SET/results.json             rows as python -m baselines.evaluate has them
+  leaderboard.md, cost_time.md     what the numbers say, tables and plots
+  leaderboard.json, cost_time.json what they are made from
+  images/*.png                     the plots"""
+
+#: Who plays in a quick trial.
+QUICK = ("dls", "mfac", "rhc_gradient", *HORIZONS[:2], FORESIGHT)
+#: What a quick trial of the cost-time page plays, and the horizons.
+QUICK_SETS, SHORT = (sets.MAIN, "varga7-fast"), (3, 10, 30)
+
+
+def measured(options: Options, command: str, tuning: Tuning) -> dict[str, Measurement]:
+    """What the pages are made from: played, or read from the files beside them.
+
+    Raises:
+        IkgymError: Something expected went wrong, see :func:`baselines.evaluation.pages.measure.measure`.
+    """
+    if options.out is None:
+        if options.write is None:
+            raise InvalidInputError(
+                "Expected --out, where the results go, --write, the folder of the pages to be written anew, or --tune."
+            )
+        if options.agents:
+            raise InvalidInputError("--agents are played: expected --out, where the results go.")
+        return {page: _read(_file(options.write, page).with_suffix(".json")) for page in options.pages}
+    entered = _entered(options, tuning)
+    found: dict[str, list[Section]] = {page: [] for page in options.pages}
+    for name in dict.fromkeys(name for by_set in entered.values() for name in by_set):
+        sections = measure(
+            name,
+            {page: by_set[name] for page, by_set in entered.items() if name in by_set},
+            options.out,
+            episodes=2 if options.quick and options.episodes is None else options.episodes,
+            workers=options.workers,
+            resume=options.resume,
+            overwrite=options.overwrite,
+            progress=True,
+        )
+        for page, section in sections.items():
+            found[page].append(section)
+    return {page: Measurement(command, _today(), describe(), tuple(sections)) for page, sections in found.items()}
+
+
+def draw_up(measurement: Measurement, page: str, tuning: Tuning, folder: pathlib.Path) -> None:
+    """Writes a page, its plots, and what they are made from.
+
+    Raises:
+        ResultsError: A file cannot be written.
+        MissingDependencyError: There is no scipy.
+    """
+    file = _file(folder, page)
+    measurement.save(file.with_suffix(".json"))
+    drawn = (leaderboard if page == LEADERBOARD else cost_time).pictures(measurement)
+    for where, figure in drawn:
+        write(folder / where, small_png(figure))
+    text = leaderboard.page(measurement, tuning) if page == LEADERBOARD else cost_time.page(measurement)
+    write(file, text.encode())
+
+
+def search(options: Options, command: str, file: pathlib.Path) -> str:
+    """Searches settings, writes them, and returns them as a table.
+
+    Raises:
+        IkgymError: Something expected went wrong, see :func:`baselines.evaluation.pages.tuning.tune`.
+    """
+    found = tune(command, _today(), episodes=options.episodes or EPISODES, workers=options.workers, progress=True)
+    found.save(file)
+    lines = [
+        [one.spec, *map(number, (one.default, one.tuned, one.tuned / one.default)), str(dict(one.settings))]
+        for one in found.solvers
+    ]
+    return "\n".join(table(["solver", "as it is", "tuned", "ratio", "settings"], lines, text=(0, 4)))
+
+
+def _entered(options: Options, tuning: Tuning) -> dict[str, dict[str, list[Entry]]]:
+    """Who plays what, by page and set of episodes."""
+    out: dict[str, dict[str, list[Entry]]] = {}
+    if LEADERBOARD in options.pages:
+        everyone = [*agents(options.agents), *_quick(options, solvers(tuning.settings))]
+        out[LEADERBOARD] = {name: playing(name, everyone) for name in sets.leaderboard()}
+    if COST_TIME in options.pages:
+        names = options.sets or (QUICK_SETS if options.quick else sets.cost_time())
+        compared = families.entries(SHORT if options.quick else families.HORIZONS)
+        first = [dataclasses.replace(one, variants=one.variants[:1], seeds=one.seeds[:1]) for one in compared]
+        out[COST_TIME] = {name: first if options.quick else list(compared) for name in names}
+    return out
+
+
+def _quick(options: Options, everyone: Sequence[Entry]) -> list[Entry]:
+    return [one for one in everyone if one.name in QUICK or not options.quick]
+
+
+def _read(file: pathlib.Path) -> Measurement:
+    written = Measurement.load(file)
+    if changed := [one.name for one in written.sections if one.stale]:
+        raise InvalidInputError(f"{', '.join(changed)}: changed since it was measured; measure again with --out.")
+    return written
+
+
+def _file(folder: pathlib.Path, page: str) -> pathlib.Path:
+    return folder / f"{page.replace('-', '_')}.md"
+
+
+def _today() -> str:
+    return datetime.datetime.now(datetime.UTC).date().isoformat()
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """The command line.
+
+    Args:
+        arguments: What stands behind the command; taken from the process if left out.
+
+    Returns:
+        The exit code: 0, 2 where something expected went wrong, 130 after Ctrl-C.
+    """
+    arguments = sys.argv[1:] if arguments is None else list(arguments)
+    options = tyro.cli(Options, prog="python -m baselines.leaderboard", description=MANUAL, args=arguments)
+    command = shlex.join(["python", "-m", "baselines.leaderboard", *arguments])
+    folder = options.write or options.out or pathlib.Path()
+    try:
+        if options.tune is not None:
+            print(search(options, command, options.tune))
+            print(f"written to {options.tune}")
+            return 0
+        tuning = Tuning.load(DATA)
+        for page, measurement in measured(options, command, tuning).items():
+            draw_up(measurement, page, tuning, folder)
+            print(f"written to {_file(folder, page)}")
+    except IkgymError as e:
+        print(f"error: {' '.join(str(e).split())}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print(f"\nStopped. What was finished is in {options.out}; continue with --resume.", file=sys.stderr)
+        return 130
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,200 @@
+"""The cost–time page: how to choose, plots and tables, all of it worked out from what was measured."""
+
+from __future__ import annotations
+
+import pathlib
+from collections.abc import Iterator
+
+from matplotlib.figure import Figure
+
+from baselines.evaluation.metrics import Spread
+from baselines.evaluation.pages import cost_time_plot, sets
+from baselines.evaluation.pages.entries import FORESIGHT
+from baselines.evaluation.pages.families import FAMILIES, family, presets
+from baselines.evaluation.pages.markdown import IMAGES, conditions, folded, runs, share, table, time
+from baselines.evaluation.pages.measurement import LOST, Line, Measurement, Section
+from baselines.evaluation.plots import style
+from baselines.evaluation.plots.cost_time import Mark
+from baselines.evaluation.report import NOTHING, number
+from baselines.evaluation.results import slug
+
+# Colours: of the families, of presets, and of all others.
+COLOURS, PRESET, OTHER = style.COLOURS[:4], style.COLOURS[4], style.STEEL
+# Of policies that stand for themselves, whose names stand in the legend.
+MARKERS = "osD^v<>PX*phd8H"
+BEST = "●"
+
+INTRODUCTION = f"""\
+Every policy that a user can choose, by what it costs and how long a step takes it: all registered ones as they are,
+`rhc` by horizon, computed in four ways, and its presets with and without knowing where the episode ends. References,
+which have privileged information, are left out. Written by `python -m baselines.leaderboard`, see
+[conditions](#conditions); everything below is worked out from what was measured, which lies in
+[cost_time.json](cost_time.json).
+
+- **Cost ratio** is the total cost divided by the [best known cost](evaluation.md#best-known-costs) of the episode:
+  geometric mean, median, 90th percentile and worst over the episodes. A mean hinges on one or two of them: look at the
+  worst, too. Where a best known cost is missing, costs are relative to the lowest over the seeds of `{FORESIGHT}`.
+- **Lost** is the share of episodes in which the arm was at some time more than {1e3 * LOST:g} mm away from where it
+  should have been.
+- **p50, p99** are of calls of `predict` after the first, in the episodes that were played alone, with the clock: the
+  median of the medians, and the largest 99th percentile. The **first** call, the longest of the episodes, stands apart:
+  an episode can begin when it is done.
+- {BEST} marks the **Pareto front**: no other policy has both a lower cost ratio and a lower median time.
+- Played are the [test sets](evaluation.md#test-sets), and each fixed scenario once, but for those that hold their
+  points, where the task is to iterate. The column of episodes says how many each line has.
+- Presets that draw at random were played with several seeds of their own, put together here: 3 × 64 are three seeds.
+- `rhc` to the optimum makes as many Newton steps as it takes; with one iteration it makes one in each control period
+  (the real-time iteration); with blocks (move blocks) it has fewer knots, closer together near the present.
+"""
+
+
+def pictures(measurement: Measurement) -> Iterator[tuple[pathlib.PurePath, Figure]]:
+    """The plot of each set, and where it lies, seen from the page."""
+    for one in measurement.sections:
+        yield _file(one), _picture(one)
+
+
+def page(measurement: Measurement) -> str:
+    """The page as Markdown."""
+    out = ["# Cost against time", "", INTRODUCTION, "## How to choose", ""]
+    for one in [one for one in measurement.sections if len(one.seeds) > 1] or measurement.sections:
+        out += _choice(one)
+    for one in measurement.sections:
+        out += _section(one)
+    return "\n".join([*out, *conditions(measurement)]) + "\n"
+
+
+def front(section: Section, by: str = "time_p50_us") -> list[str]:
+    """The lines that no other beats in time or cost ratio without being worse in the other, from fast to slow.
+
+    Args:
+        section: A set of episodes.
+        by: Which of a line's times.
+    """
+    means = {name: spread.mean for name, spread in section.spreads().items()}
+    out: list[str] = []
+    timed = [line for line in section.lines if getattr(line, by) is not None]
+    for line in sorted(timed, key=lambda line: (getattr(line, by), means[line.label])):
+        if not out or means[line.label] < means[out[-1]]:
+            out.append(line.label)
+    return out
+
+
+def _choice(one: Section) -> list[str]:
+    """What to take for which time, what the horizon and the shortcuts do, and what it is worth to know the end."""
+    by_label, spreads = {line.label: line for line in one.lines}, one.spreads()
+    head = ["a step takes up to [µs]", "policy", *_heads(one), "p50 [µs]", "first [µs]"]
+    lines = [
+        [
+            time(by_label[spec].time_p99_us),
+            f"`{spec}`",
+            *_values(one, by_label[spec], spreads[spec]),
+            *map(time, (by_label[spec].time_p50_us, by_label[spec].time_first_us)),
+        ]
+        for spec in front(one, "time_p99_us")
+    ]
+    out = [f"On `{one.name}`, take the last line whose time (p99) you can spare; the {one.quantity} falls:", ""]
+    out += [*table(head, lines, text=(1,)), "", *_horizons(one), ""]
+    return out + [text for name in presets() for text in _worth_of_the_end(one, name)]
+
+
+def _worth_of_the_end(one: Section, name: str) -> list[str]:
+    knows, looks_on = (one.spreads().get(f"{name}:stop_at_end={flag}") for flag in (True, False))
+    if knows is None or looks_on is None:
+        return []
+    mean, median = (100.0 * (a / b - 1.0) for a, b in ((looks_on.mean, knows.mean), (looks_on.median, knows.median)))
+    return [
+        f"Not to know where the episode ends (`stop_at_end=False`) changes the {one.quantity} of `{name}` by "
+        f"{mean:+.1f} % in the geometric mean, by {median:+.1f} % in the median.",
+        "",
+    ]
+
+
+def _horizons(one: Section) -> list[str]:
+    """The families by horizon."""
+    members = {key: line for line in one.lines if (key := family(line.name))}
+    spreads = one.spreads()
+    lines = []
+    for horizon in sorted({horizon for _, horizon in members}):
+        cells = [str(horizon)]
+        for name in FAMILIES:
+            member = members.get((name, horizon))
+            cells += [number(spreads[member.label].mean), time(member.time_p50_us)] if member else [NOTHING, NOTHING]
+        lines.append(cells)
+    head = ["horizon", *(text for name in FAMILIES for text in (f"{name}: {one.quantity}", "p50 [µs]"))]
+    return table(head, lines)
+
+
+def _section(one: Section) -> list[str]:
+    out = [f"## {one.name}: {_episodes(one)}", ""]
+    out += [f"![{one.quantity.capitalize()} against time per step in {one.name}]({_file(one).as_posix()})", ""]
+    best, spreads = set(front(one)), one.spreads()
+    head = ["", "policy", *_heads(one), "p50 [µs]", "p99 [µs]", "first [µs]", "episodes", "timed"]
+    lines = [
+        [
+            BEST if line.label in best else "",
+            f"`{line.label}`",
+            *_values(one, line, spreads[line.label]),
+            *map(time, (line.time_p50_us, line.time_p99_us, line.time_first_us)),
+            runs(line, one) if line.seeds else str(len(one.seeds)),
+            str(line.timed),
+        ]
+        for line in one.ranked()
+    ]
+    rows = table(head, lines, text=(1,))
+    return [*out, *rows, ""] if len(one.seeds) > 1 else [*out, *folded(f"All policies on {one.name}", rows)]
+
+
+def _episodes(one: Section) -> str:
+    many = f"{len(one.seeds)} episodes of " if len(one.seeds) > 1 else ""
+    return f"{many}{sets.get(one.name).steps:,} steps"
+
+
+def _heads(one: Section) -> list[str]:
+    """The heads of what :func:`_values` gives."""
+    spread = ["median", "p90"] if len(one.seeds) > 1 else []
+    return [one.quantity, *spread, "worst", "lost"]
+
+
+def _values(one: Section, line: Line, spread: Spread) -> list[str]:
+    """Geometric mean, median, 90th percentile, worst, and the share that lost track; of one episode mean and worst."""
+    between = (spread.median, spread.p90) if len(one.seeds) > 1 else ()
+    return [*map(number, (spread.mean, *between, spread.worst)), share(line.lost / line.runs)]
+
+
+def _file(one: Section) -> pathlib.PurePath:
+    return IMAGES / f"cost-time-{slug(one.name)}.png"
+
+
+def _picture(one: Section) -> Figure:
+    spreads, marks = one.spreads(), {}
+    families: dict[str, list[Mark]] = {name: [] for name in FAMILIES}
+    plain: list[Mark] = []
+    for line in one.lines:
+        if line.time_p50_us is None:
+            continue
+        member = family(line.name)
+        colour = COLOURS[FAMILIES.index(member[0])] if member else PRESET if _preset(line) else OTHER
+        name = str(member[1]) if member else _short(line.label)
+        marker = MARKERS[len(plain) % len(MARKERS)] if member is None else "o"
+        mark = Mark(line.time_p50_us, spreads[line.label], name, colour, member is not None, marker)
+        marks[line.label] = mark
+        (families[member[0]] if member else plain).append(mark)
+    return cost_time_plot.draw(
+        f"{one.name}, {_episodes(one)}",
+        plain,
+        {name: members for name, members in families.items() if members},
+        [marks[name] for name in front(one)],
+        quantity=one.quantity,
+        several=len(one.seeds) > 1,
+        deadline=1e6 * sets.get(one.name).dt,
+    )
+
+
+def _preset(line: Line) -> bool:
+    return line.name.partition(":")[0] in presets()
+
+
+def _short(spec: str) -> str:
+    """A policy on a plot: ``rhc_foresight, stop_at_end off``."""
+    return spec.replace(":stop_at_end=", ", stop_at_end ").replace("True", "on").replace("False", "off")

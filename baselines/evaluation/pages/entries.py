@@ -1,0 +1,218 @@
+"""What is measured for the leaderboard: all solvers as they are and tuned, and trained agents from their folders."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import pathlib
+import re
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import Any
+
+from baselines import registry
+from baselines.agents.policy import LearnedPolicy
+from baselines.evaluation.pages.sets import MAIN
+from baselines.files import ResultsError
+from baselines.solvers.receding_horizon.rhc import RecedingHorizon
+from baselines.spec import parse_policy
+from ikgym.exceptions import InvalidInputError
+
+#: How far the receding horizon of Varga 2021 looks ahead: HL = 3 grid points, of which one is the present.
+PAPER = 2
+#: The preset that draws at random, whose best seed is the reference where no best known cost is.
+FORESIGHT = "rhc_foresight"
+#: Receding horizons beside those that are registered: the paper's, to the optimum and with one iteration, and long
+#: ones with move blocks.
+BLOCKED = ("rhc:horizon=100,iterations=1,move_blocks=23", "rhc:horizon=200,iterations=1,move_blocks=27")
+#: The same for a policy that is shown the full orientation.
+FULL_ORIENTATION = tuple(
+    f"full_orientation:policy=rhc,options={{'horizon': {horizon}, 'iterations': 1, 'move_blocks': {blocks}}}"
+    for horizon, blocks in ((100, 23), (400, 30))
+)
+HORIZONS = ("rhc:horizon=3", "rhc:horizon=3,iterations=1", "rhc:horizon=100", *BLOCKED, *FULL_ORIENTATION)
+#: The solvers that are also played where no solver was tuned and no agent trained, as they are and tuned.
+GENERAL = (
+    *("dls", "full_orientation", "null_space", "mfac", "rhc_gradient"),
+    *(*HORIZONS[:2], *BLOCKED, *FULL_ORIENTATION, FORESIGHT),
+)
+#: Training seeds below which a mean over them is no benchmark.
+ENOUGH = 5
+#: Episodes of each policy that are played with the clock.
+TIMED = 2
+#: Seeds of a policy that draws at random.
+SEEDS = (0, 1, 2)
+
+
+@dataclasses.dataclass(frozen=True)
+class Training:
+    """What the training of an agent has cost.
+
+    Args:
+        method: Such as ``"ppo"``.
+        base_policy: The base policy of a residual agent; None where there is none.
+        steps: Environment steps, or samples, of each training seed.
+        core_minutes: Minutes times cores of each training seed.
+    """
+
+    method: str
+    base_policy: str | None
+    steps: tuple[int, ...]
+    core_minutes: tuple[float, ...]
+
+
+@dataclasses.dataclass(frozen=True)
+class Entry:
+    """A line of a table, to be measured: one policy, or the same policy with several seeds.
+
+    Args:
+        name: What it is called: a solver's spec, or the name of an agent.
+        variants: Name and parameters of the policy, for each of its seeds.
+        seeds: Those seeds; none where nothing is drawn at random.
+        settings: Parameters that were searched on validation episodes; none for a solver as it is, and for agents.
+        training: What it has cost to train; None for solvers.
+        timed: Episodes of each seed that are played with the clock.
+    """
+
+    name: str
+    variants: tuple[tuple[str, Mapping[str, Any]], ...]
+    seeds: tuple[int, ...] = ()
+    settings: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+    training: Training | None = None
+    timed: int = TIMED
+
+    @property
+    def label(self) -> str:
+        """What tells it from all others."""
+        return label(self.name, self.settings)
+
+    @property
+    def general(self) -> bool:
+        """Whether it is played on changed scenarios, too."""
+        return self.training is not None or self.name in GENERAL
+
+
+def label(name: str, settings: Mapping[str, Any]) -> str:
+    """What to call a solver or an agent, so that one that was tuned differs from itself as it is."""
+    return f"{name}, tuned" if settings else name
+
+
+def short(name: str) -> str:
+    """The name of a solver where there is little room: ``full_orientation rhc:horizon=3`` for a wrapper."""
+    if ":" not in name:
+        return name
+    outer, parameters = parse_policy(name)
+    inner, options = parameters.pop("policy", None), parameters.pop("options", {})
+    if inner is None or parameters:
+        return name
+    return f"{outer} {inner}" + (":" + ",".join(f"{key}={value}" for key, value in options.items()) if options else "")
+
+
+def solvers(tuned: Mapping[str, Mapping[str, Any]] = MappingProxyType({})) -> tuple[Entry, ...]:
+    """All registered solvers as they are, some receding horizons, and what tuning made of them.
+
+    References, which have privileged information, are left out, and so are agents that come with the package: agents
+    are entered with all of their training seeds, see :func:`agents`.
+
+    Args:
+        tuned: The best settings of solvers, by their specs; one that they do not change is not listed twice.
+    """
+    classes = {name: registry.get(name) for name in registry.names()}
+    names = [name for name, kind in classes.items() if not (kind.reference or issubclass(kind, LearnedPolicy))]
+    better = (solver(spec, settings) for spec, settings in tuned.items() if settings)
+    return (*map(solver, (*names, *HORIZONS)), *better)
+
+
+def solver(spec: str, settings: Mapping[str, Any] = MappingProxyType({}), *, timed: int = TIMED) -> Entry:
+    """A solver; one that draws at random is entered with several seeds.
+
+    Args:
+        spec: Its name and parameters, see :data:`baselines.spec.PolicySpec`.
+        settings: Parameters that were searched.
+        timed: Episodes that are played with the clock, of each seed.
+    """
+    name, parameters = parse_policy(spec)
+    given, kind = {**parameters, **settings}, registry.get(name)
+    draws = issubclass(kind, RecedingHorizon) and (kind.starts > 1 or kind.restart_steps > 0)
+    if not draws:
+        return Entry(spec, ((name, given),), settings=dict(settings), timed=timed)
+    return Entry(spec, tuple((name, {**given, "seed": seed}) for seed in SEEDS), SEEDS, dict(settings), timed=timed)
+
+
+def playing(name: str, entries: Sequence[Entry]) -> list[Entry]:
+    """Who plays a set of the leaderboard: all on the main test set; agents and some solvers, untimed, elsewhere."""
+    return [
+        one if name == MAIN else dataclasses.replace(one, timed=0) for one in entries if name == MAIN or one.general
+    ]
+
+
+def agent(name: str, directory: pathlib.Path) -> Entry:
+    """A trained agent: a folder with a folder ``seed-N`` for each training seed.
+
+    Args:
+        name: What to call it.
+        directory: Where ``seed-*/agent.safetensors`` and ``seed-*/run.json`` lie.
+
+    Raises:
+        ResultsError: There is no training seed, a file is missing or damaged, or the seeds were trained differently.
+    """
+    folders = {int(found[1]): f for f in directory.glob("seed-*") if (found := re.fullmatch(r"seed-(\d+)", f.name))}
+    if not folders:
+        raise ResultsError(f"{directory}: expected folders seed-0, seed-1, …, each with an agent; there is none.")
+    runs = [_run(folders[seed] / "run.json") for seed in sorted(folders)]
+    kinds = {(method, base_policy) for method, base_policy, _, _ in runs}
+    if len(kinds) > 1:
+        raise ResultsError(f"{directory}: expected seeds of one training, got {' and '.join(sorted(map(str, kinds)))}.")
+    method, base_policy, *_ = runs[0]
+    return Entry(
+        name,
+        tuple(policy_of(folders[seed]) for seed in sorted(folders)),
+        tuple(sorted(folders)),
+        training=Training(method, base_policy, tuple(run[2] for run in runs), tuple(run[3] for run in runs)),
+    )
+
+
+def agents(given: Sequence[str]) -> tuple[Entry, ...]:
+    """The agents that the command line names.
+
+    Args:
+        given: ``NAME=DIR`` each.
+
+    Raises:
+        InvalidInputError: A text has another form, or two agents, or an agent and a solver, share a name.
+        ResultsError: See :func:`agent`.
+    """
+    taken = {entry.name for entry in solvers()}
+    out: dict[str, Entry] = {}
+    for text in given:
+        name, _, directory = (part.strip() for part in text.partition("="))
+        if not (name and directory):
+            raise InvalidInputError(f"--agents: expected NAME=DIR, got {text!r}.")
+        if name in out or name in taken:
+            raise InvalidInputError(f"--agents: the name {name!r} is taken; expected one of its own for each agent.")
+        out[name] = agent(name, pathlib.Path(directory))
+    return tuple(out.values())
+
+
+def policy_of(folder: pathlib.Path) -> tuple[str, dict[str, Any]]:
+    """The policy of one training seed, from its folder.
+
+    Raises:
+        ResultsError: There is no agent in it.
+    """
+    file = folder / "agent.safetensors"
+    if not file.is_file():
+        raise ResultsError(f"{file} is missing: export the agent, or remove its folder.")
+    return "agent", {"path": str(file)}
+
+
+def _run(file: pathlib.Path) -> tuple[str, str | None, int, float]:
+    """Method, base policy, steps and core-minutes of a training."""
+    try:
+        content = json.loads(file.read_text(encoding="utf-8"))
+        training, base_policy = content["training"], content["processing"]["base_policy"]
+        if not (base_policy is None or isinstance(base_policy, str)):
+            raise TypeError(f"base_policy: expected the spec of a policy or null, got {base_policy!r}")
+        return str(content["method"]), base_policy, int(training["steps"]), float(training["core_minutes"])
+    except (OSError, ValueError, TypeError, KeyError) as e:
+        raise ResultsError(f"Cannot read what a training has cost from {file}: {e!r}.") from None

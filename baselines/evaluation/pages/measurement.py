@@ -1,0 +1,245 @@
+"""The one table model: costs, errors and times of each entry on each set of episodes, and the file that keeps them."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import pathlib
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, Self
+
+import numpy as np
+
+from baselines.evaluation.metrics import Row, Spread, times
+from baselines.evaluation.pages import sets
+from baselines.evaluation.pages.entries import ENOUGH, FORESIGHT, PAPER, Entry, Training, label
+from baselines.evaluation.pages.jsonlines import DIGITS, one_line, rounded, with_list
+from baselines.files import ResultsError, write
+from baselines.fingerprints import fingerprint
+from baselines.oracle import best_known
+from ikgym.exceptions import InvalidInputError
+from ikgym.validation import FloatArray
+
+#: An arm that was farther from its nominal position than this has lost track, in [m].
+LOST = 0.05
+#: Of the files; those of another one are refused.
+FORMAT = 2
+#: Kinds of lines, in the order of the legend.
+AGENT, RESIDUAL, FAR, NEAR, REFERENCE = "agent", "residual agent", "solver with foresight", "solver", "reference"
+#: A number of each run: a row a seed, a column an episode.
+Runs = tuple[tuple[float, ...], ...]
+
+
+@dataclasses.dataclass(frozen=True)
+class Line:
+    """A solver or an agent on a set of episodes.
+
+    Args:
+        name: The solver's spec, or the agent's name.
+        settings: Parameters that were searched on validation episodes; none for a solver as it is, and for agents.
+        preview: Steps ahead that it sees.
+        seeds: Seeds of training, or of the policy; none where nothing is drawn at random.
+        cost: Total cost of each episode, a row a seed; one row where there is none.
+        error: Largest distance from the nominal position in [m], likewise; None in what was measured when only the
+            number of runs that lost track was kept.
+        lost: How many runs lost track.
+        timed: Episodes that were played with the clock.
+        time_p50_us: Median of the medians over the calls after the first, in [µs]; None where nothing was timed.
+        time_p99_us: Largest 99th percentile of them, in [µs].
+        time_first_us: Longest first call, in [µs].
+        training: What it has cost to train; None for solvers.
+    """
+
+    name: str
+    settings: Mapping[str, Any]
+    preview: int
+    seeds: tuple[int, ...]
+    cost: Runs
+    error: Runs | None
+    lost: int
+    timed: int
+    time_p50_us: float | None
+    time_p99_us: float | None
+    time_first_us: float | None
+    training: Training | None
+
+    @classmethod
+    def of(cls, entry: Entry, rows: Sequence[Row]) -> Self:
+        """The line of an entry's rows, seed by seed."""
+        clocked = times(rows)
+        p50, p99, first = (None if time is None else rounded(time) for time in clocked[1:])
+        return cls(
+            name=entry.name,
+            settings=dict(entry.settings),
+            preview=max(int(np.max(row.preview)) for row in rows),
+            seeds=entry.seeds,
+            cost=_by_seed(entry, (rounded(row.total_cost, DIGITS) for row in rows)),
+            error=_by_seed(entry, (rounded(row.position_error_max) for row in rows)),
+            lost=sum(row.position_error_max > LOST for row in rows),
+            timed=clocked.timed,
+            time_p50_us=p50,
+            time_p99_us=p99,
+            time_first_us=first,
+            training=entry.training,
+        )
+
+    @classmethod
+    def from_json(cls, values: Mapping[str, Any]) -> Self:
+        """The line of what :meth:`Measurement.save` wrote of it."""
+        runs = {name: values[name] and tuple(map(tuple, values[name])) for name in ("cost", "error")}
+        given = values["training"]
+        training = given and Training(**{**given, **{n: tuple(given[n]) for n in ("steps", "core_minutes")}})
+        return cls(**{**values, **runs, "seeds": tuple(values["seeds"]), "training": training})
+
+    @property
+    def label(self) -> str:
+        """What tells it from all others."""
+        return label(self.name, self.settings)
+
+    @property
+    def kind(self) -> str:
+        """What it is, in words."""
+        if self.training is None:
+            return NEAR if self.preview <= PAPER else FAR
+        return AGENT if self.training.base_policy is None else RESIDUAL
+
+    @property
+    def learned(self) -> bool:
+        """Whether it was trained."""
+        return self.training is not None
+
+    @property
+    def benchmark(self) -> bool:
+        """Whether it has seeds enough to be more than an anecdote."""
+        return not self.learned or len(self.seeds) >= ENOUGH
+
+    def within(self, distance: float) -> float | None:
+        """The share of all runs that never were farther from the nominal position, in [m]; None if not kept."""
+        return None if self.error is None else float(np.mean(np.array(self.error) <= distance))
+
+    @property
+    def runs(self) -> int:
+        """Seeds × episodes."""
+        return int(np.size(self.cost))
+
+
+@dataclasses.dataclass(frozen=True)
+class Section:
+    """A set of episodes and all that was measured on it.
+
+    Args:
+        name: Of the test set or the scenario, see :func:`baselines.evaluation.pages.sets.get`.
+        fingerprint: Of the scenario.
+        test_set: The digest of the test set; None where it is none.
+        seeds: The reset seeds.
+        lines: What was measured.
+    """
+
+    name: str
+    fingerprint: str
+    test_set: str | None
+    seeds: tuple[int, ...]
+    lines: tuple[Line, ...]
+
+    @property
+    def best_known(self) -> list[float] | None:
+        """The best known cost of each episode; None where one is not known."""
+        scenario = sets.get(self.name)
+        costs = [cost for seed in self.seeds if (cost := best_known.cost(scenario, seed)) is not None]
+        return costs if len(costs) == len(self.seeds) else None
+
+    @property
+    def quantity(self) -> str:
+        """What :meth:`cost_ratios` states, in words."""
+        return "cost ratio" if self.best_known is not None else f"cost relative to {FORESIGHT}"
+
+    @property
+    def reference(self) -> FloatArray:
+        """What the costs are stated relative to: the best known ones, else the lowest over the foresight's seeds.
+
+        One seed would not do: even that preset loses track now and then, and all others would seem to excel there.
+
+        Raises:
+            InvalidInputError: There is neither.
+        """
+        if (known := self.best_known) is not None:
+            return np.array(known)
+        costs = [row for line in self.lines if line.label.partition(":")[0] == FORESIGHT for row in line.cost]
+        if not costs:
+            raise InvalidInputError(f"{self.name} has no best known costs, and {FORESIGHT} was not played to stand in.")
+        lowest: FloatArray = np.array(costs).min(axis=0)
+        return lowest
+
+    def cost_ratios(self) -> dict[str, FloatArray]:
+        """The cost of each line relative to the reference, by its label. Shape (s, e) each."""
+        reference = self.reference
+        return {line.label: np.array(line.cost) / reference for line in self.lines}
+
+    def spreads(self) -> dict[str, Spread]:
+        """The cost ratio of each line over all of its runs, by its label."""
+        return {name: Spread.of(dict(enumerate(np.ravel(r).tolist()))) for name, r in self.cost_ratios().items()}
+
+    def ranked(self) -> list[Line]:
+        """The lines from the lowest geometric mean on."""
+        spreads = self.spreads()
+        return sorted(self.lines, key=lambda line: spreads[line.label].mean)
+
+    @property
+    def stale(self) -> bool:
+        """Whether the scenario, or the cost, is no longer what was measured."""
+        return fingerprint(sets.get(self.name)) != self.fingerprint
+
+
+@dataclasses.dataclass(frozen=True)
+class Measurement:
+    """What a page is made from.
+
+    Args:
+        command: What measured it.
+        date: When, as YYYY-MM-DD.
+        machine: On what, see :func:`baselines.evaluation.machine.describe`.
+        sections: What came out, by sets of episodes.
+    """
+
+    command: str
+    date: str
+    machine: Mapping[str, Any]
+    sections: tuple[Section, ...]
+
+    def save(self, file: pathlib.Path) -> None:
+        """Writes it as JSON, a line of the table a line.
+
+        Raises:
+            ResultsError: The file cannot be written.
+        """
+        head = {"format": FORMAT, "command": self.command, "date": self.date, "machine": dict(self.machine)}
+        sections = []
+        for one in self.sections:
+            about = {name: value for name, value in vars(one).items() if name != "lines"}
+            sections.append(with_list(about, "lines", [one_line(dataclasses.asdict(line)) for line in one.lines]))
+        write(file, (with_list(head, "sections", sections) + "\n").encode())
+
+    @classmethod
+    def load(cls, file: pathlib.Path) -> Self:
+        """What :meth:`save` wrote.
+
+        Raises:
+            ResultsError: It cannot be read, is damaged, or has another format.
+        """
+        try:
+            content = json.loads(file.read_text(encoding="utf-8"))
+            if (there := content.pop("format", 1)) != FORMAT:
+                raise ResultsError(f"{file}: expected format {FORMAT}, got {there}. Measure again with --out.")
+            sections = [
+                Section(**{**one, "seeds": tuple(one["seeds"]), "lines": tuple(map(Line.from_json, one["lines"]))})
+                for one in content["sections"]
+            ]
+            return cls(**{**content, "sections": tuple(sections)})
+        except (OSError, ValueError, TypeError, KeyError, AttributeError) as e:
+            raise ResultsError(f"Cannot read what was measured from {file}: {e!r}.") from None
+
+
+def _by_seed(entry: Entry, numbers: Iterable[float]) -> Runs:
+    each = list(numbers)
+    size = len(each) // max(len(entry.seeds), 1)
+    return tuple(tuple(each[first : first + size]) for first in range(0, len(each), size))

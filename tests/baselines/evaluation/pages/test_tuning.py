@@ -1,0 +1,103 @@
+"""The search of settings on validation episodes, and its file."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from baselines import registry
+from baselines.evaluate import evaluate
+from baselines.evaluation.pages import entries, sets
+from baselines.evaluation.pages.grids import GRIDS, decades, product
+from baselines.evaluation.pages.tuning import DATA, EPISODES, UPDATE, Tuned, Tuning, tune
+from baselines.files import ResultsError
+from baselines.spec import parse_policy
+from ikgym import scenarios
+from ikgym.exceptions import InvalidInputError
+from tests.baselines.evaluation.pages.builders import TEST_SEEDS
+
+GRID = {"dls": (product(gain=(0.5, 1.0), damping=(1e-2,)), product(gain=(0.7,)))}
+
+
+@pytest.fixture(scope="module")
+def found():
+    return tune("a command", "2000-01-01", grids=GRID, episodes=2)
+
+
+class TestTuning:
+    def test_it_is_the_lowest_cost_of_what_was_tried(self, found):
+        (one,) = found.solvers
+        tried = [{}, {"gain": 0.5, "damping": 1e-2}, {"gain": 1.0, "damping": 1e-2}, {"gain": 0.7, "damping": 1e-2}]
+        rows = evaluate(sets.MAIN, [("dls", settings) for settings in tried], episodes=2, split="validation")
+        costs = np.exp(np.log([row.total_cost for row in rows]).reshape(4, 2).mean(axis=1))
+        assert one.settings == tried[int(costs.argmin())]
+        assert (one.tried, one.default, one.tuned) == (4, pytest.approx(costs[0]), pytest.approx(costs.min()))
+
+    def test_a_stage_starts_from_the_best_of_the_one_before(self, monkeypatch):
+        def bowl(trials, *_):
+            wanted = {"damping": 1e-2, "gain": 0.7}
+            return [1.0 + sum(trial.settings.get(n, 9.0) != value for n, value in wanted.items()) for trial in trials]
+
+        monkeypatch.setattr("baselines.evaluation.pages.tuning._costs", bowl)
+        stages = (product(damping=(1e-3, 1e-2, 1e-1)), (), product(gain=(0.5, 0.7)))
+        (one,) = tune("a", "b", grids={"dls": stages}).solvers
+        assert one == Tuned("dls", {"damping": 1e-2, "gain": 0.7}, 6, 3.0, 1.0)
+
+    def test_no_test_episode_is_played(self, monkeypatch):
+        seen = []
+
+        def spy(jobs, **_):
+            seen.extend(job.seed for job in jobs)
+            raise KeyboardInterrupt
+
+        monkeypatch.setattr("baselines.evaluation.pages.measure.run", spy)
+        with pytest.raises(KeyboardInterrupt):
+            tune("a command", "2000-01-01", grids=GRID, episodes=EPISODES)
+        assert len(set(seen)) == EPISODES
+        assert set(seen) <= set(scenarios.SPLITS["validation"])
+        assert not set(seen) & set(scenarios.SPLITS["test"])
+
+    def test_nothing_better_is_no_setting(self):
+        found = tune("a", "b", grids={"dls": (product(damping=(1e3,)),)}, episodes=1)
+        assert found.solvers[0].settings == {}
+        assert found.solvers[0].tuned == found.solvers[0].default
+
+    def test_a_file_is_read_as_it_was_written(self, found, tmp_path):
+        found.save(tmp_path / "it.json")
+        assert Tuning.load(tmp_path / "it.json") == found
+
+    def test_what_is_refused(self, found, tmp_path):
+        file = tmp_path / "it.json"
+        for text in ("", "[]", '{"solvers": []}'):
+            file.write_text(text)
+            with pytest.raises(ResultsError, match=r"it\.json"):
+                Tuning.load(file)
+        dataclasses.replace(found, fingerprint="0" * 12).save(file)
+        with pytest.raises(ResultsError, match="changed since"):
+            Tuning.load(file)
+        with pytest.raises(InvalidInputError, match="split 'test'"):
+            dataclasses.replace(found, split="test")
+
+    def test_grids_look_no_further(self):
+        assert decades(-2, 0) == (0.01, 0.032, 0.1, 0.32, 1.0)
+        scenario = scenarios.get(sets.MAIN)
+        for spec, stages in GRIDS.items():
+            name, parameters = parse_policy(spec)
+            ahead = registry.make(name, scenario, **parameters).preview
+            assert ahead <= entries.PAPER
+            for settings in stages[0]:
+                assert registry.make(name, scenario, **{**parameters, **settings}).preview == ahead
+
+    def test_the_file_in_the_tree(self):
+        there = Tuning.load(DATA)
+        assert (there.scenario, there.split, there.episodes) == (sets.MAIN, "validation", EPISODES)
+        assert set(there.seeds) <= set(scenarios.SPLITS["validation"])
+        assert not set(there.seeds) & set(TEST_SEEDS)
+        assert {one.spec for one in there.solvers} == set(GRIDS), f"stale: {UPDATE}"
+        assert all(one.tuned <= one.default for one in there.solvers)
+
+    def test_a_part_of_it_tuned_again(self):
+        there = Tuning.load(DATA)
+        (then,) = [one for one in there.solvers if one.spec == "dls"]
+        rows = evaluate(sets.MAIN, [then.variant], episodes=there.episodes, split="validation")
+        assert np.exp(np.log([row.total_cost for row in rows]).mean()) == pytest.approx(then.tuned, rel=1e-4)
