@@ -16,7 +16,7 @@ from torch import nn
 from baselines.agents import files, sb3_zip
 from baselines.agents.features import Processing
 from baselines.agents.network import Network
-from baselines.agents.parts import AgentFile
+from baselines.agents.protocols import AgentFile
 from baselines.policy import Problem
 from baselines.training.config.common import SHAPE, Algorithm, Config
 from baselines.training.errors import TrainingError
