@@ -83,6 +83,8 @@ def feature_rows(
 ):
     """The features of :class:`Processing`, row by row.
 
+    Entered once a `predict`: with its arrays one by one a call takes 3 µs, with named tuples of them 13 µs.
+
     Args:
         kind: Of task coordinates, see :mod:`ikgym.task_kernels`.
         prismatic: Which joints are prismatic. Shape (n,).
@@ -127,6 +129,8 @@ def feature_rows(
 @kernel
 def action_rows(chain, kind, dt, velocity_limit, offsets, action_scale, damping, q, nominal, output, velocities, out):
     """Adds what the network outputs mean to actions, row by row.
+
+    Entered once a `predict`: with its arguments one by one a call takes 3.0 µs, with a named tuple of them 3.9 µs.
 
     Args:
         chain: The model of the arm.
