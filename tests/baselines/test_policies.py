@@ -49,7 +49,7 @@ def policy_for(name, on):
     try:
         return baselines.make(name, scenario(on), **seed)
     except InvalidInputError:
-        # An agent suits the arms of its size, and only skew coordinates can be unfolded.
+        # An agent suits the arms of its size, and only skew coordinates have an ambiguity to resolve.
         folded = name != "full_orientation" or scenario(on).task.name == "skew"
         if folded and not (issubclass(get(name), ShippedAgent) or (name, on) in UNSUITED):
             assert name in HANDED_THE_PATH

@@ -52,7 +52,7 @@ class Smoothed(NamedWrapper):
     usual 1. Receding horizons, which ask for what is missing in very few steps, diverge.
 
     The filter is stable for ΛΔt < 2, and does not overshoot for ΛΔt ≤ 1. Status and iterations are those of the
-    policy inside. References, which know more than they see, cannot be smoothed.
+    inner policy. References, which know more than they see, cannot be smoothed.
 
     Args:
         problem: What the policy is told of the scenario.
