@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import enum
 
+import numpy as np
+import numpy.typing as npt
+
 
 class Status(enum.IntEnum):
     """What a solver says of one step, from good to bad.
@@ -31,3 +34,8 @@ class Status(enum.IntEnum):
     def label(self) -> str:
         """The name in results, for example ``iteration_limit``."""
         return self.name.lower()
+
+
+def statuses(rows: int, status: Status = Status.CONVERGED) -> npt.NDArray[np.int64]:
+    """The same status for all rows. Shape (B,)."""
+    return np.full(rows, int(status))

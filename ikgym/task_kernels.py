@@ -8,7 +8,10 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from ikgym.jit import inlined, kernel
+from ikgym.kinematics import forward
 from ikgym.rotations import quaternion_of, vector_factor
 
 POSITION, SKEW, MATRIX, POSE = 0, 1, 2, 3
@@ -166,3 +169,19 @@ def error_jacobian(kind, error, jacobian, out):
         for i in range(e):
             for j in range(n):
                 out[i, j] = -jacobian[i, j]
+
+
+@kernel
+def pose_rows(chain, kind, q, out):
+    """Task coordinates of a chain, row by row.
+
+    Args:
+        chain: The arm, see :class:`ikgym.kinematics.Chain`.
+        kind: Of task coordinates.
+        q: Joint coordinates in [rad] or [m]. Shape (B, n).
+        out: Receives the task coordinates. Shape (B, m).
+    """
+    rotation, position = np.empty((3, 3)), np.empty(3)
+    for row in range(q.shape[0]):
+        forward(chain, q[row], rotation, position)
+        coordinates(kind, rotation, position, out[row])

@@ -1,35 +1,28 @@
-"""What an agent sees, and what its answer means: one definition for training and evaluation."""
+"""What an agent sees, and what the output of its network means: one definition for training and evaluation."""
 
 from __future__ import annotations
 
 import dataclasses
 import itertools
-import math
 from collections.abc import Mapping
 from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
 
+from baselines.agents.feature_kernels import LARGEST, action_rows, feature_rows, project_rows, speed_rows
 from baselines.policy import Batch, Problem
-from baselines.solvers.linear_algebra import damped_step
-from ikgym import task_kernels
 from ikgym.exceptions import InvalidInputError
-from ikgym.jit import inlined, kernel
-from ikgym.kinematics import forward_and_jacobian
 from ikgym.validation import FloatArray, Frozen, known_names, number, whole_number
 
-Features = npt.NDArray[np.float32]
+__all__ = ("LARGEST", "Features", "Processing", "project_rows", "speed_rows")
 
-#: Beyond this no feature goes: asinh has turned 1e5 into 12 there.
-LARGEST = 12.0
-#: Added to the speed of what is to come, in [m/s], [rad/s] or [1/s]: at rest there is nothing to measure by.
-SLOWEST = 0.02
+Features = npt.NDArray[np.float32]
 
 
 @dataclasses.dataclass(frozen=True)
 class Processing(Frozen):
-    """From observations to the features of a network, and from its answer to actions.
+    """From observations to the features of a network, and from its output to actions.
 
     Precision at 1 kHz needs more than the raw observation: an error of 1 mm hides in the fourth digit of a pose, and
     costs of slow and fast trajectories are decades apart. So all velocities are measured by the speed s of what is to
@@ -39,25 +32,25 @@ class Processing(Frozen):
 
     | number | feature |
     |---|---|
-    | 2 n | sin q_j and cos q_j; of a joint that slides ⌊q_j⌉ and 0 |
+    | 2 n | sin q_j and cos q_j; of a prismatic joint ⌊q_j⌉ and 0 |
     | n | ⌊q̇_j / s⌉ |
     | e | ⌊(present error) / Δx⌉, with Δx of the cost; X^N(k) is extrapolated from what o_1 and o_2 show |
     | e | ⌊(X^N(k + o_1) − x(k)) / (o_1 Δt s)⌉, the task velocity that would undo the error |
     | e each | ⌊v_i / s⌉, with v_i the mean nominal velocity from o_i to o_(i+1) |
     | 1 | ln s |
     | 1 | steps left, as a share of the furthest offset, at most 1 |
-    | n | ⌊q̇ of the policy under the agent / s⌉; only where there is one |
+    | n | ⌊q̇ of the base policy / s⌉; only where there is one |
 
-    The joint velocity is s · action_scale · (the answer of the network, cut to [-1, 1]), on top of that of the policy under
-    it, if there is one: an answer of 0 is that policy, bit for bit. Where the answer goes through the null space, it
-    is multiplied by I − Jᵀ (J Jᵀ + λ I)⁻¹ J before, with the task Jacobian J of the model: the agent then moves the
-    arm without moving its tool, but for directions that are nearly singular.
+    The joint velocity is s · action_scale · (the network output, cut to [-1, 1]), on top of that of the base policy, if
+    there is one: the agent then is a residual policy, and an output of 0 is the base policy, bit for bit. Where the
+    output goes through the null space, it is multiplied by I − Jᵀ (J Jᵀ + λ I)⁻¹ J before, with the task Jacobian J of
+    the model: the agent then moves the arm without moving its tool, but for directions that are nearly singular.
 
     Args:
         offsets: o, steps ahead at which the agent sees the nominal coordinates, rising, at least two.
-        action_scale: What an answer of 1 means, as a multiple of the speed. Above 0.
-        base_policy: The policy under the agent, such as ``"dls:damping=1e-2"``; None for an agent that stands alone.
-        null_space: λ of the projector, above 0; None for answers that are taken as they are.
+        action_scale: What a network output of 1 means, as a multiple of the speed. Above 0.
+        base_policy: The policy that the agent corrects, such as ``"dls:damping=1e-2"``; None for one that stands alone.
+        null_space: λ of the projector, above 0; None for outputs that are taken as they are.
 
     Raises:
         InvalidInputError: Offsets do not rise from 1 or more, or a number is out of its range.
@@ -105,7 +98,7 @@ class Processing(Frozen):
         Args:
             problem: What the agent is told of the scenario.
             batch: Observations; `nominal` at the offsets. Shape (B, …).
-            base: Actions of the policy under the agent, None where there is none. Shape (B, n).
+            base: Actions of the base policy, None where there is none. Shape (B, n).
 
         Returns:
             Shape (B, f), as float32.
@@ -127,14 +120,14 @@ class Processing(Frozen):
         return out
 
     def action(
-        self, problem: Problem, batch: Batch, answer: npt.NDArray[Any], base: FloatArray | None = None
+        self, problem: Problem, batch: Batch, output: npt.NDArray[Any], base: FloatArray | None = None
     ) -> FloatArray:
         """Actions, as fractions of the velocity limit, that may lie beyond the box.
 
         Args:
             problem: As in :meth:`features`.
             batch: As in :meth:`features`.
-            answer: Of the network. Shape (B, n).
+            output: Of the network. Shape (B, n).
             base: As in :meth:`features`.
 
         Returns:
@@ -151,175 +144,8 @@ class Processing(Frozen):
             0.0 if self.null_space is None else self.null_space,
             batch.q,
             batch.nominal,
-            answer.astype(np.float64),
+            output.astype(np.float64),
             np.empty((len(self.offsets), problem.task.error_size)),
             out,
         )
         return out
-
-
-@inlined
-def compressed(x):
-    """Asinh x, cut at ±LARGEST."""
-    return min(max(math.asinh(x), -LARGEST), LARGEST)
-
-
-@kernel
-def speed_of(kind, dt, offsets, nominal, velocities):
-    """The speed of what is to come, in the unit of task velocities.
-
-    Args:
-        kind: Of task coordinates, see :mod:`ikgym.task_kernels`.
-        dt: Δt in [s].
-        offsets: Shape (p,).
-        nominal: At the offsets. Shape (p, m).
-        velocities: Receives the mean velocities between the offsets in its first rows. Shape (p, e).
-    """
-    square, parts = 0.0, offsets.shape[0] - 1
-    for i in range(parts):
-        task_kernels.error(kind, nominal[i + 1], nominal[i], velocities[i])
-        duration = (offsets[i + 1] - offsets[i]) * dt
-        for a in range(velocities.shape[1]):
-            velocities[i, a] /= duration
-            square += velocities[i, a] * velocities[i, a]
-    return SLOWEST + math.sqrt(square / (parts * velocities.shape[1]))
-
-
-@kernel
-def speed_rows(kind, dt, offsets, nominal, velocities):
-    """What :func:`speed_of` gives, row by row.
-
-    Args:
-        kind: Of task coordinates, see :mod:`ikgym.task_kernels`.
-        dt: Δt in [s].
-        offsets: Shape (p,).
-        nominal: At the offsets. Shape (B, p, m).
-        velocities: Receives the mean velocities between the offsets in its first rows. Shape (B, p, e).
-
-    Returns:
-        Shape (B,).
-    """
-    out = np.empty(nominal.shape[0])
-    for row in range(nominal.shape[0]):
-        out[row] = speed_of(kind, dt, offsets, nominal[row], velocities[row])
-    return out
-
-
-@kernel
-def feature_rows(
-    kind,
-    prismatic,
-    dt,
-    delta_x,
-    velocity_limit,
-    offsets,
-    q,
-    qdot,
-    pose,
-    nominal,
-    remaining,
-    base,
-    velocities,
-    out,
-):
-    """The features of :class:`Processing`, row by row.
-
-    Args:
-        kind: Of task coordinates, see :mod:`ikgym.task_kernels`.
-        prismatic: Which joints slide. Shape (n,).
-        dt: Δt in [s].
-        delta_x: Δx of the cost.
-        velocity_limit: Shape (n,).
-        offsets: Shape (p,).
-        q: Shape (B, n).
-        qdot: Shape (B, n).
-        pose: Shape (B, m).
-        nominal: At the offsets. Shape (B, p, m).
-        remaining: Shape (B, 1).
-        base: Shape (B, n), or (B, 0) where there is none.
-        velocities: Scratch. Shape (p, e).
-        out: Receives the features. Shape (B, f).
-    """
-    n, (p, e) = q.shape[1], velocities.shape
-    for row in range(q.shape[0]):
-        features = out[row]
-        speed = speed_of(kind, dt, offsets, nominal[row], velocities)
-        for j in range(n):
-            if prismatic[j]:
-                features[2 * j], features[2 * j + 1] = compressed(q[row, j]), 0.0
-            else:
-                features[2 * j], features[2 * j + 1] = math.sin(q[row, j]), math.cos(q[row, j])
-            features[2 * n + j] = compressed(qdot[row, j] / speed)
-        error, lead = velocities[p - 1], offsets[0] * dt
-        task_kernels.error(kind, nominal[row, 0], pose[row], error)
-        at = 3 * n
-        for a in range(e):
-            features[at + a] = compressed((error[a] - lead * velocities[0, a]) / delta_x)
-            features[at + e + a] = compressed(error[a] / (lead * speed))
-            for i in range(p - 1):
-                features[at + (2 + i) * e + a] = compressed(velocities[i, a] / speed)
-        at += (1 + p) * e
-        features[at] = math.log(speed)
-        features[at + 1] = min(remaining[row, 0] / offsets[p - 1], 1.0)
-        for j in range(base.shape[1]):
-            features[at + 2 + j] = compressed(base[row, j] * velocity_limit[j] / speed)
-
-
-@kernel
-def action_rows(chain, kind, dt, velocity_limit, offsets, action_scale, damping, q, nominal, answer, velocities, out):
-    """Adds what the answers mean to actions, row by row.
-
-    Args:
-        chain: The model of the arm.
-        kind: Of task coordinates, see :mod:`ikgym.task_kernels`.
-        dt: Δt in [s].
-        velocity_limit: Shape (n,).
-        offsets: Shape (p,).
-        action_scale: See :class:`Processing`.
-        damping: λ of the projector, 0 for none.
-        q: Shape (B, n).
-        nominal: At the offsets. Shape (B, p, m).
-        answer: Of the network; cut in place. Shape (B, n).
-        velocities: Scratch. Shape (p, e).
-        out: The actions. Shape (B, n).
-    """
-    for row in range(q.shape[0]):
-        for j in range(answer.shape[1]):
-            answer[row, j] = min(max(answer[row, j], -1.0), 1.0)
-    if damping > 0.0:
-        project_rows(chain, kind, damping, velocities.shape[1], q, answer)
-    for row in range(q.shape[0]):
-        scale = action_scale * speed_of(kind, dt, offsets, nominal[row], velocities)
-        for j in range(answer.shape[1]):
-            out[row, j] += scale * answer[row, j] / velocity_limit[j]
-
-
-@kernel
-def project_rows(chain, kind, damping, size, q, velocity):
-    """Multiplies joint velocities by I − Jᵀ (J Jᵀ + λ I)⁻¹ J, in place.
-
-    Args:
-        chain: The model of the arm.
-        kind: Of task coordinates, see :mod:`ikgym.task_kernels`.
-        damping: λ, above 0.
-        size: e, errors of the task.
-        q: Shape (B, n).
-        velocity: Shape (B, n).
-    """
-    n = q.shape[1]
-    rotation, position, geometric = np.empty((3, 3)), np.empty(3), np.empty((6, n))
-    jacobian, gram, moved, taken_off = np.empty((size, n)), np.empty((size, size)), np.empty(size), np.empty(n)
-    scratch = np.empty(size)
-    for row in range(q.shape[0]):
-        forward_and_jacobian(chain, q[row], rotation, position, geometric)
-        task_kernels.jacobian(kind, rotation, geometric, jacobian)
-        for a in range(size):
-            moved[a] = 0.0
-            for j in range(n):
-                moved[a] += jacobian[a, j] * velocity[row, j]
-        # Damping that is too small to count leaves nothing of the answer, rather than rounding errors.
-        if not damped_step(jacobian, moved, damping, gram, scratch, taken_off):
-            velocity[row] = 0.0
-            continue
-        for j in range(n):
-            velocity[row, j] -= taken_off[j]

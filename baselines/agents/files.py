@@ -2,25 +2,25 @@
 
 from __future__ import annotations
 
-import difflib
 import hashlib
 import itertools
 import json
 import pathlib
-import textwrap
 from collections.abc import Mapping
-from typing import Any, Final, NoReturn
+from typing import Any, Final
 
 import numpy as np
 from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
 import ikgym
+from baselines.agents.base_policy import check_base_policy
 from baselines.agents.features import Processing
 from baselines.agents.network import Network, Singles
-from baselines.agents.parts import AgentFile
+from baselines.agents.protocols import AgentFile
+from baselines.agents.untrusted import parse_json, read, refuse
 from baselines.canonical import canonical
-from baselines.files import ResultsError, write
+from baselines.files import write
 from baselines.fingerprints import fingerprint
 from ikgym import cost_kernels
 from ikgym.exceptions import InvalidInputError, UnknownNameError
@@ -28,15 +28,12 @@ from ikgym.scenarios import Scenario
 
 #: The version of the format.
 FORMAT: Final = 2
+#: The ikgym that reads a format of before.
+READERS: Final = {1: "0.1.0"}
 #: The key of the JSON text in the metadata of the file.
 KEY: Final = "ikgym"
-SUFFIX: Final = ".safetensors"
-
-# Files of agents are small; what is larger is none, and is not read. In bytes.
-MOST = 2**28
+#: Most bytes of a header.
 MOST_HEADER = 2**20
-# Letters of a message: what is in a damaged file may be long.
-MOST_WORDS = 600
 
 # What is raised by descriptions that are JSON, and no more.
 _UNREADABLE = (InvalidInputError, UnknownNameError, KeyError, TypeError, ValueError, OverflowError)
@@ -54,7 +51,7 @@ def save_agent(
     Args:
         file: Where to; usually ``NAME.safetensors``.
         network: Its network.
-        processing: What it sees, and what its answers mean.
+        processing: What it sees, and what its outputs mean.
         scenario: What it was trained on.
         training: How, in whatever JSON can say.
 
@@ -164,13 +161,17 @@ def check_described(source: str, about: Mapping[str, Any]) -> Processing:
     """The processing in what :func:`description` wrote, all of it being of the right type.
 
     Raises:
-        ResultsError: Something is missing, or of another type.
+        ResultsError: Something is missing, of another type, or the base policy is one that a file must not name.
     """
     try:
         processing = Processing.from_json(dict(about["processing"]))
         _check_types(about, processing)
     except _UNREADABLE as e:
         refuse(source, f"is no agent that this version can read: {_said(e)}")
+    try:
+        check_base_policy(processing.base_policy)
+    except (InvalidInputError, UnknownNameError) as e:
+        refuse(source, f"cannot be used: {str(e).removesuffix('.')}")
     return processing
 
 
@@ -178,54 +179,9 @@ def check_format(source: str, about: Mapping[str, Any]) -> None:
     """Refuses what another version has written."""
     version = about.get("format")
     if isinstance(version, bool) or version != FORMAT:
-        refuse(source, f"is of another version: expected format {FORMAT}, got {version!r}")
-
-
-def parse_json(source: str, text: bytes) -> dict[str, Any]:
-    """The object in a JSON text of unknown origin.
-
-    Raises:
-        ResultsError: It is none.
-    """
-    try:
-        value = json.loads(text.decode())
-    except (ValueError, RecursionError) as e:
-        refuse(source, f"is damaged: {e}")
-    if not isinstance(value, dict):
-        refuse(source, f"is damaged: expected a JSON object, got {type(value).__name__}")
-    return value
-
-
-def read(file: pathlib.Path) -> bytes:
-    """All bytes of a file that is not too large to be an agent's.
-
-    Raises:
-        ResultsError: There is no such file, the message has the nearest; it is too large, or cannot be read.
-    """
-    try:
-        if not file.is_file():
-            refuse(str(file), "is no file" if file.exists() else "does not exist", _near(file))
-        size = file.stat().st_size
-        if size > MOST:
-            refuse(str(file), f"is too large for an agent: expected at most {MOST} bytes, got {size}")
-        with file.open("rb") as stream:
-            return stream.read(MOST)
-    except (OSError, ValueError) as e:
-        refuse(str(file), f"cannot be read: {getattr(e, 'strerror', None) or e}")
-
-
-def refuse(source: str, why: str, hint: str = "") -> NoReturn:
-    """Raises the error of a file that cannot be used."""
-    raise ResultsError(f"Agent {source} {textwrap.shorten(why, MOST_WORDS, placeholder=' …')}.{hint}")
-
-
-def _near(file: pathlib.Path) -> str:
-    """The hint at what may have been meant."""
-    if not file.parent.is_dir():
-        return f" There is no folder {file.parent}."
-    names = sorted(other.name for other in file.parent.iterdir() if other.suffix in {SUFFIX, ".zip"})
-    nearest = difflib.get_close_matches(file.name, names, n=1, cutoff=0.5)
-    return f" Did you mean {str(file.with_name(nearest[0]))!r}?" if nearest else ""
+        hint = READERS.get(version) if type(version) is int else None
+        needed = "" if hint is None else f", which ikgym {hint} reads"
+        refuse(source, f"is of another version: expected format {FORMAT}, got {version!r}{needed}")
 
 
 def _tensors(network: Network) -> list[tuple[str, Singles]]:

@@ -1,4 +1,4 @@
-"""The network of an agent: a multi-layer perceptron in float32, one kernel from features to answer."""
+"""The network of an agent: a multi-layer perceptron in float32, one kernel from features to output."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ Singles = npt.NDArray[np.float32]
 
 #: What may stand between the layers, by the number that the kernel knows it by.
 ACTIVATIONS = ("linear", "relu", "tanh", "silu", "elu")
-#: What brings the last layer into [-1, 1]: PPO and A2C cut it off, SAC, TD3 and DDPG bend it.
+#: What brings the last layer into [-1, 1]: PPO and A2C cut it off, SAC, TD3 and DDPG put tanh behind it.
 SQUASHES = ("clip", "tanh")
 
 # Inputs that are added up in one sweep over the outputs: each sweep reads and writes all outputs.
 SWEEP = 8
 
 _RELU, _TANH, _SILU, _ELU = (ACTIVATIONS.index(name) for name in ("relu", "tanh", "silu", "elu"))
-_BEND = SQUASHES.index("tanh")
+_SQUASH_TANH = SQUASHES.index("tanh")
 _ONE = np.float32(1.0)
 
 
@@ -82,11 +82,11 @@ class Network(Frozen):
 
     @property
     def outputs(self) -> int:
-        """The number of answers."""
+        """The number of joints that are moved."""
         return self.sizes[-1]
 
-    def answer(self, features: Singles) -> Singles:
-        """What the network answers; a row of a batch is the single call, bit for bit.
+    def forward(self, features: Singles) -> Singles:
+        """The output of the network; a row of a batch is the single call, bit for bit.
 
         Args:
             features: Shape (B, inputs).
@@ -131,7 +131,7 @@ def forward_rows(weights, biases, sizes, activation, squash, features, out):
         activation: Index in :data:`ACTIVATIONS`.
         squash: Index in :data:`SQUASHES`.
         features: Shape (B, inputs).
-        out: Receives the answers. Shape (B, outputs).
+        out: Receives the outputs. Shape (B, outputs).
     """
     layers, widest = sizes.shape[0] - 1, sizes.max()
     x, y = np.empty(widest, np.float32), np.empty(widest, np.float32)
@@ -149,7 +149,7 @@ def forward_rows(weights, biases, sizes, activation, squash, features, out):
             x, y = y, x
         for j in range(out.shape[1]):
             value = x[j]
-            if squash == _BEND:
+            if squash == _SQUASH_TANH:
                 value = np.float32(math.tanh(value))
             elif value > _ONE:
                 value = _ONE

@@ -4,69 +4,64 @@ from __future__ import annotations
 
 import abc
 import dataclasses
-import functools
 import os
 import pathlib
-from collections.abc import Iterable
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
-from baselines.agents import files
-from baselines.agents.base_policy import Outlook, policy_under, refuse_to_be_named
-from baselines.agents.parts import AgentFile
+from baselines.agents import files, untrusted
+from baselines.agents.protocols import AgentFile
+from baselines.agents.view import AgentView
 from baselines.files import ResultsError
-from baselines.policy import Batch, Memory, Operations, Problem, Solution, SolverPolicy, statuses
+from baselines.policy import Batch, Memory, Operations, Problem, Solution, statuses
 from baselines.solvers.wrappers import orientation
+from baselines.wrapper import Wrapper
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 from ikgym.scenarios import Preview
 from ikgym.simulator import offsets as checked_offsets
-from ikgym.validation import FloatArray
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class LearnedPolicy(SolverPolicy, abc.ABC):
-    """A network between the features of an observation and an action, perhaps on top of another policy.
+class LearnedPolicy(Wrapper, abc.ABC):
+    """A network between the features of an observation and an action, perhaps on top of a base policy.
 
     It plays every scenario whose features have the shape of those that it was trained on, be it another one. The
-    policy under it sees what it would see alone, and has its memory in that of the agent: an answer of 0 is that
-    policy, bit for bit.
+    base policy sees what it would see alone, and has its memory in that of the agent: a network output of 0 is the
+    base policy, bit for bit.
 
     Its preview is a tuple of steps ahead. Observations that show 1, 2, … up to the furthest of them do, too. An agent
-    that was trained on whole poses plays scenarios that show skew coordinates, too: they are unfolded, see
-    :func:`baselines.solvers.wrappers.orientation.unfold`, which takes all steps up to the furthest.
+    that was trained on whole poses plays scenarios that show skew coordinates, too: their 90° ambiguity is resolved by
+    :func:`baselines.solvers.wrappers.orientation.resolve_orientation`, which takes all steps up to the furthest.
 
     Args:
         problem: What the policy is told of the scenario.
 
     Raises:
         ResultsError: There is no such file, or it cannot be used.
-        InvalidInputError: The scenario does not fit the agent, or the policy under it.
+        InvalidInputError: The scenario does not fit the agent, or the base policy.
     """
 
     #: What was read.
     file: AgentFile = dataclasses.field(init=False, repr=False)
-    #: The policy under the agent.
-    base: SolverPolicy | None = dataclasses.field(init=False, repr=False)
-    #: What the agent and the policy under it are told: the problem, or that of whole poses.
-    told: Problem = dataclasses.field(init=False, repr=False)
+    #: What it sees of the problem, or of that of whole poses.
+    view: AgentView = dataclasses.field(init=False, repr=False)
 
     grain: ClassVar[int] = 32
-    composed: ClassVar[bool] = True
+    from_file: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        refuse_to_be_named()
         file = self.load()
-        told = _told(file, self.problem)
-        _check_size(file, told)
+        problem = _problem_for(file, self.problem)
+        _check_size(file, problem)
         try:
-            base = policy_under(file.processing, told)
+            view = AgentView.of(file.processing, problem)
         except UnknownNameError as e:
             raise ResultsError(f"Agent {file.source} cannot be used: {e}") from None
         except InvalidInputError as e:
             raise InvalidInputError(f"Agent {file.source}: {e}") from None
-        for field, value in {"file": file, "base": base, "told": told}.items():
+        for field, value in {"file": file, "view": view, "inner": view.base}.items():
             object.__setattr__(self, field, value)
 
     @abc.abstractmethod
@@ -80,85 +75,56 @@ class LearnedPolicy(SolverPolicy, abc.ABC):
     @property
     def preview(self) -> Preview:
         """The steps ahead that are seen, or how many there are up to the furthest."""
-        return self.outlook.furthest if self._unfolds else self.outlook.preview
-
-    @functools.cached_property
-    def outlook(self) -> Outlook:
-        """What the agent and the policy under it see."""
-        return Outlook.of(self.file.processing, self.base)
+        return self.view.preview.furthest if self._resolves else self.view.preview.shown
 
     @property
-    def _unfolds(self) -> bool:
-        return self.told is not self.problem
+    def _resolves(self) -> bool:
+        """Whether the agent knows whole poses, and the scenario shows skew coordinates."""
+        return self.view.problem is not self.problem
 
-    def memory(self, rows: int) -> Memory:
-        """That of the policy under the agent, and before it that of the unfolding where there is one."""
-        return *(orientation.memory(rows) if self._unfolds else ()), *(self.base.memory(rows) if self.base else ())
+    def own_memory(self, rows: int) -> Memory:
+        """That of the orientation where its ambiguity is resolved."""
+        return orientation.start_memory(rows) if self._resolves else ()
 
     def solve(self, batch: Batch, memory: Memory) -> Solution:
         """See :meth:`SolverPolicy.solve`."""
-        if not self._unfolds:
-            return self._answer(batch, memory)
-        seen, kept = orientation.unfold(self.problem, batch, memory[:2])
-        solution = self._answer(seen, memory[2:])
-        return solution._replace(memory=(*kept, *solution.memory))
-
-    def _answer(self, batch: Batch, memory: Memory) -> Solution:
-        """The solution for what the agent is told."""
-        processing = self.file.processing
-        base: FloatArray | None = None
-        if self.base is None:
-            kept: Memory = ()
-            status, iterations = statuses(len(batch.q)), np.ones(len(batch.q), dtype=np.int64)
-        else:
-            # Not its solve, so that what is not finite or beyond the limit is dealt with as if it were alone.
-            shown = batch._replace(nominal=self.outlook.of_policy(batch.nominal))
-            action, (status, iterations, *inside) = self.base.act(shown, memory)
-            base, kept = action.astype(np.float64), tuple(inside)
-        batch = batch._replace(nominal=self.outlook.of_agent(batch.nominal))
-        features = processing.features(self.told, batch, base)
-        fractions = processing.action(self.told, batch, self.file.network.answer(features), base)
-        return Solution(fractions * self.problem.velocity_limit, kept, status, iterations)
-
-    def operations(self, state: Memory) -> Operations:
-        """Those of the policy under the agent, which may keep count in its memory."""
-        return (
-            super().operations(state)
-            if self.base is None
-            else self._counted(self.base.operations(self._inner_state(state)))
-        )
-
-    def diagnostics(self, state: Memory) -> dict[str, FloatArray]:
-        """What the policy under the agent shows of itself."""
-        return {} if self.base is None else self.base.diagnostics(self._inner_state(state))
-
-    def _inner_state(self, state: Memory) -> Memory:
-        """The state of the policy under the agent."""
-        return (*state[:2], *state[4:]) if self._unfolds else state
+        own, inside = self.split(memory)
+        if self._resolves:
+            batch, own = orientation.resolve_orientation(self.problem, batch, own)
+        seen = self.view.see(batch, inside)
+        fractions = self.view.action(seen, self.file.network.forward(seen.features))
+        qdot = fractions * self.problem.velocity_limit
+        if seen.step is None:
+            return Solution(qdot, own, statuses(len(qdot)), np.ones(len(qdot), dtype=np.int64))
+        return self.solution(qdot, own, seen.step)
 
     def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
-        """Those of the policy under the agent, or a measurement; what a projector into the null space takes."""
-        return self._counted((0, 0, 0, 1) if self.base is None else self.base.count(iterations))
+        """Those of the base policy, or a measurement; what a projector into the null space takes."""
+        if self.inner is not None:
+            return super().count(iterations)
+        return self.counted(Operations(*map(np.asarray, (0, 0, 0, 1))))
 
-    def _counted(self, counts: Iterable[Any]) -> Operations:
-        """With a Jacobian and a factorisation more where answers go through the null space, a pose where it unfolds."""
-        forwards, jacobians, factorisations, measurements = map(np.asarray, counts)
-        more, pose = int(self.file.processing.null_space is not None), int(self._unfolds)
-        return Operations(forwards + pose, jacobians + more, factorisations + more, measurements)
+    def counted(self, inside: Operations) -> Operations:
+        """With a Jacobian and a factorisation for the null space, and a pose where the orientation is resolved."""
+        projected = int(self.file.processing.null_space is not None)
+        return inside._replace(
+            forward_kinematics=inside.forward_kinematics + int(self._resolves),
+            jacobians=inside.jacobians + projected,
+            factorisations=inside.factorisations + projected,
+        )
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Agent(LearnedPolicy):
     """An agent from a file: one of ours (`.safetensors`), or a model of Stable-Baselines3 (`.zip`).
 
-    Reading runs nothing that is in the file. A model is rebuilt from its names, numbers and plain texts, if it is a
-    multi-layer perceptron of PPO, A2C, SAC, TD3 or DDPG, see :mod:`baselines.agents.sb3_zip`; with `trust` it is loaded
-    by Stable-Baselines3, whatever it is and does.
+    Reading one of ours runs nothing that is in it. A model needs `trust`: Stable-Baselines3 loads it then, and runs
+    whatever code is in the file.
 
     Args:
         problem: What the policy is told of the scenario.
         path: The file.
-        trust: Whether a model may run its own code. Only for files whose maker you know.
+        trust: Whether a model may run its own code. Only for files whose maker you know; no file can grant it.
         offsets: Steps ahead at which a model sees the nominal coordinates that was trained on the observation itself;
             1, 2, … if left out, as its file does not tell. Files that do tell are not to be contradicted.
         hash: The first twelve digits of the agent's hash, to insist on; in results those of the agent that played.
@@ -194,7 +160,8 @@ class Agent(LearnedPolicy):
     def load(self) -> AgentFile:
         """See :meth:`LearnedPolicy.load`."""
         file = pathlib.Path(self.path).expanduser()
-        if file.suffix == ".zip":
+        if file.suffix == untrusted.ZIP:
+            untrusted.check_trust(file, trust=self.trust)
             # Only these files need a learning library.
             from baselines.agents import sb3_zip
 
@@ -204,10 +171,10 @@ class Agent(LearnedPolicy):
         return files.load_agent(file)
 
 
-def _told(file: AgentFile, problem: Problem) -> Problem:
+def _problem_for(file: AgentFile, problem: Problem) -> Problem:
     """The problem as the agent knows it."""
     trained = file.about.get("task", {}).get("name")
-    return orientation.whole(problem) if (trained, problem.task.name) == ("pose", "skew") else problem
+    return orientation.full_problem(problem) if (trained, problem.task.name) == ("pose", "skew") else problem
 
 
 def _check_size(file: AgentFile, problem: Problem) -> None:

@@ -21,7 +21,7 @@ ORDER = ("nominal", "pose", "q", "qdot", "remaining")
 
 @dataclasses.dataclass(frozen=True)
 class RawObservation(Frozen):
-    """All numbers of the observation as float32, part by part as in :data:`ORDER`; the answer is the action.
+    """All numbers of the observation as float32, part by part as in :data:`ORDER`; the network output is the action.
 
     Args:
         offsets: Steps ahead at which the nominal coordinates are seen.
@@ -61,12 +61,12 @@ class RawObservation(Frozen):
 
     @property
     def base_policy(self) -> None:
-        """There is no policy under the agent."""
+        """There is none."""
         return
 
     @property
     def null_space(self) -> None:
-        """Answers go through no projector."""
+        """Outputs go through no projector."""
         return
 
     def size(self, problem: Problem) -> int:
@@ -81,8 +81,8 @@ class RawObservation(Frozen):
         return np.concatenate(parts, axis=1, dtype=np.float32, casting="same_kind")
 
     def action(
-        self, problem: Problem, batch: Batch, answer: npt.NDArray[Any], base: FloatArray | None = None
+        self, problem: Problem, batch: Batch, output: npt.NDArray[Any], base: FloatArray | None = None
     ) -> FloatArray:
-        """The answer, in float64."""
+        """The network output, in float64."""
         del problem, batch, base
-        return answer.astype(np.float64)
+        return output.astype(np.float64)

@@ -1,4 +1,4 @@
-"""Networks of Stable-Baselines3 rebuilt from the names, shapes and numbers of their tensors, and from plain texts."""
+"""The actor of a model of Stable-Baselines3, from the names and numbers of its tensors."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ _HARMLESS: Final = {
 
 
 def network_of(state: State, arguments: Mapping[str, Any]) -> Network:
-    """The actor's network, with which a model answers deterministically.
+    """The actor's network, with which a model acts deterministically.
 
     Args:
         state: The tensors of the model's policy.

@@ -6,9 +6,9 @@ import dataclasses
 import pathlib
 from typing import ClassVar
 
-from baselines.agents import files
-from baselines.agents.parts import AgentFile
+from baselines.agents import files, untrusted
 from baselines.agents.policy import LearnedPolicy
+from baselines.agents.protocols import AgentFile
 from baselines.files import ResultsError
 
 FOLDER = pathlib.Path(__file__).parents[1] / "data" / "agents"
@@ -34,7 +34,7 @@ class ShippedAgent(LearnedPolicy):
 
     def load(self) -> AgentFile:
         """See :meth:`LearnedPolicy.load`."""
-        file = files.parse_agent(self.name, files.read(self.folder / f"{self.name}{files.SUFFIX}"))
+        file = files.parse_agent(self.name, untrusted.read(self.folder / f"{self.name}{untrusted.SUFFIX}"))
         if self.hash != file.digits:
             raise ResultsError(f"Agent {self.name} has the hash {file.digits}, expected {self.hash!r}.")
         return file

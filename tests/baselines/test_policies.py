@@ -22,6 +22,7 @@ from baselines.agents.shipped import ShippedAgent
 from baselines.policy import Problem, Solution, SolverPolicy, statuses
 from baselines.registry import get
 from baselines.status import Status
+from baselines.wrapper import Wrapper
 from ikgym import parallel
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 from ikgym.simulator import Simulator
@@ -48,7 +49,7 @@ def policy_for(name, on):
     try:
         return baselines.make(name, scenario(on), **seed)
     except InvalidInputError:
-        # An agent suits the arms of its size, and only skew coordinates can be unfolded.
+        # An agent suits the arms of its size, and only skew coordinates have an ambiguity to resolve.
         folded = name != "full_orientation" or scenario(on).task.name == "skew"
         if folded and not (issubclass(get(name), ShippedAgent) or (name, on) in UNSUITED):
             assert name in HANDED_THE_PATH
@@ -117,6 +118,63 @@ def test_rows_that_are_shared_out_to_threads_are_the_same(monkeypatch, name, on)
         assert identical(action, expected)
         assert identical(shared, whole)
     assert len(threads) > 1
+
+
+# Solvers whose memory has no names yet.
+UNNAMED = {
+    *("moore_penrose", "dls", "jacobian_transpose", "weighted_pseudoinverse", "null_space", "truncated_svd"),
+    *("gram_schmidt", "broyden", "abstract_rotation", "mfac", "mfapc"),
+    *("rhc_gradient", "rhc_lagrange", "rhc", "rhc_foresight"),
+}
+
+
+@pytest.mark.parametrize("name", baselines.names())
+def test_memory_is_a_named_tuple(name, monkeypatch):
+    policy = baselines.make(name, scenario("varga7-fast"))
+    own = policy.own_memory(1) if isinstance(policy, Wrapper) else policy.memory(1)
+    assert name in UNNAMED or own == () or hasattr(own, "_fields")
+    handed, solve = [], type(policy).solve
+
+    def watched(self, batch, memory):
+        handed.append(memory)
+        return solve(self, batch, memory)
+
+    monkeypatch.setattr(type(policy), "solve", watched)
+    state = None
+    for observation in observations("varga7-fast", policy.preview, 2):
+        _, state = policy.predict(observation, state, np.array([False, True]))
+        # The state is flat, and its memory has the names that `memory` gives it.
+        assert type(state) is tuple
+        assert type(policy.memory_of(state)) is type(policy.memory(1))
+        assert identical(tuple(policy.memory_of(state)), state[2:])
+    assert {type(memory) for memory in handed} == {type(policy.memory(1))}
+
+
+@pytest.mark.parametrize("feedback", ["calculated", "measured"])
+@pytest.mark.parametrize("name", [name for name in baselines.names() if not get(name).reference])
+def test_any_policy_inside_smoothed(name, feedback):
+    """At its first step, the inner policy sees what it would see alone; its state is found in the wrapper's."""
+    short = scenario("varga7-fast")
+    alone, policy = baselines.make(name, short), baselines.make("smoothed", short, policy=name, feedback=feedback)
+    assert policy.preview == alone.preview
+    assert policy.options == alone.parameters
+    own, inside = policy.split(policy.memory(3))
+    assert own._fields == ("known", "q", "qdot", "smooth")
+    assert identical(tuple(inside), tuple(alone.memory(3)))
+    state, forwards = None, int(feedback == "calculated")
+    for k, observation in enumerate(observations("varga7-fast", policy.preview, 3)):
+        action, state = policy.predict(observation, state)
+        assert [array.shape for array in state[2:]] == [array.shape for array in (*own, *inside)]
+        inner_state = policy.inner_state(state)
+        assert identical(policy.report(state), alone.report(inner_state))
+        assert identical(policy.diagnostics(state), alone.diagnostics(inner_state))
+        ours, theirs = policy.operations(state), alone.operations(inner_state)
+        assert identical(ours.jacobians, theirs.jacobians)
+        assert identical(ours.forward_kinematics, theirs.forward_kinematics + forwards)
+        if k == 0:
+            np.testing.assert_array_equal(action, 0.0)
+            if feedback == "measured":
+                assert identical(inner_state, alone.predict(observation)[1])
 
 
 @contract

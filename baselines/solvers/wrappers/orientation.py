@@ -1,39 +1,56 @@
-"""The whole orientation behind skew coordinates, told from how they came about."""
+"""The whole orientation behind skew coordinates: their 90° ambiguity, resolved by how the motion goes on."""
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
-from baselines.policy import Batch, Memory, Problem
+from baselines.policy import Batch, Problem
 from ikgym import task_kernels, tasks
 from ikgym.exceptions import InvalidInputError
 from ikgym.jit import inlined, kernel
 from ikgym.kinematics import forward
+from ikgym.validation import FloatArray
 
 
-def whole(problem: Problem) -> Problem:
+class OrientationMemory(NamedTuple):
+    """What :func:`resolve_orientation` remembers.
+
+    Attributes:
+        cosines: cos θ of the last two nominal orientations. Shape (B, 2).
+        known: Whether they are known. Shape (B,).
+    """
+
+    cosines: FloatArray
+    known: npt.NDArray[np.bool_]
+
+
+def full_problem(problem: Problem) -> Problem:
     """The problem with whole poses instead of skew coordinates.
 
     Raises:
         InvalidInputError: Its task is not `skew`.
     """
     if problem.task.kind != task_kernels.SKEW:
-        raise InvalidInputError(f"expected the task 'skew', whose orientation is folded, got {problem.task.name!r}.")
+        raise InvalidInputError(
+            f"expected the task 'skew', whose orientation is ambiguous beyond 90°, got {problem.task.name!r}."
+        )
     return problem.replace(task=tasks.get("pose"))
 
 
-def memory(rows: int) -> Memory:
-    """What :func:`unfold` remembers: cos θ of the last two nominal orientations, (B, 2), and whether they are known.
+def start_memory(rows: int) -> OrientationMemory:
+    """The memory at the start of an episode.
 
     Args:
         rows: B.
     """
-    return np.zeros((rows, 2)), np.zeros(rows, dtype=np.bool_)
+    return OrientationMemory(np.zeros((rows, 2)), np.zeros(rows, dtype=np.bool_))
 
 
-def unfold(problem: Problem, batch: Batch, kept: Memory) -> tuple[Batch, Memory]:
+def resolve_orientation(problem: Problem, batch: Batch, memory: OrientationMemory) -> tuple[Batch, OrientationMemory]:
     """Whole poses for skew coordinates.
 
     The skew part of a rotation by θ about a is sin θ · a: it is the same for θ and π − θ, and stands still at 90°,
@@ -46,47 +63,46 @@ def unfold(problem: Problem, batch: Batch, kept: Memory) -> tuple[Batch, Memory]
     Args:
         problem: With the task `skew`.
         batch: Observations, `nominal` at the steps 1, 2, … ahead. Shapes (B, …).
-        kept: What :func:`memory` or the last call gave.
+        memory: What :func:`start_memory` or the last call gave.
 
     Returns:
         The observations as the task `pose` has them, and what is to be remembered.
     """
     rows, ahead = batch.nominal.shape[:2]
     pose, nominal = np.empty((rows, 12)), np.empty((rows, ahead, 12))
-    last, known = kept
-    last = last.copy()
-    unfold_rows(problem.model.chain, batch.q, batch.pose, batch.nominal, known, last, pose, nominal)
-    return batch._replace(pose=pose, nominal=nominal), (last, np.ones(rows, dtype=np.bool_))
+    cosines = memory.cosines.copy()
+    resolve_rows(problem.model.chain, batch.q, batch.pose, batch.nominal, memory.known, cosines, pose, nominal)
+    return batch._replace(pose=pose, nominal=nominal), OrientationMemory(cosines, np.ones(rows, dtype=np.bool_))
 
 
 @kernel
-def unfold_rows(chain, q, pose, nominal, known, last, whole_pose, whole_nominal):
-    """See :func:`unfold`, row by row.
+def resolve_rows(chain, q, pose, nominal, known, cosines, whole_pose, whole_nominal):
+    """See :func:`resolve_orientation`, row by row.
 
     Args:
         chain: The model of the arm.
         q: Joint coordinates in [rad] or [m]. Shape (B, n).
         pose: Measured skew coordinates. Shape (B, 6).
         nominal: Skew coordinates of the next points. Shape (B, p, 6).
-        known: Whether the last orientations are known. Shape (B,).
-        last: cos θ of X^N(k - 1) and X^N(k); becomes that of X^N(k) and X^N(k + 1). Shape (B, 2).
+        known: Whether the cosines are known. Shape (B,).
+        cosines: cos θ of X^N(k - 1) and X^N(k); becomes that of X^N(k) and X^N(k + 1). Shape (B, 2).
         whole_pose: Receives the frames of the arm. Shape (B, 12).
         whole_nominal: Receives those of the next points. Shape (B, p, 12).
     """
     rotation, position = np.empty((3, 3)), np.empty(3)
     for row in range(q.shape[0]):
         forward(chain, q[row], rotation, position)
-        cosine = unfold_one(pose[row], 0.5 * (rotation[0, 0] + rotation[1, 1] + rotation[2, 2] - 1.0), whole_pose[row])
-        before, now = (last[row, 0], last[row, 1]) if known[row] else (cosine, cosine)
+        cosine = resolve_one(pose[row], 0.5 * (rotation[0, 0] + rotation[1, 1] + rotation[2, 2] - 1.0), whole_pose[row])
+        before, now = (cosines[row, 0], cosines[row, 1]) if known[row] else (cosine, cosine)
         for i in range(nominal.shape[1]):
-            following = unfold_one(nominal[row, i], 2.0 * now - before, whole_nominal[row, i])
+            following = resolve_one(nominal[row, i], 2.0 * now - before, whole_nominal[row, i])
             before, now = now, following
             if i == 0:
-                last[row, 0], last[row, 1] = before, now
+                cosines[row, 0], cosines[row, 1] = before, now
 
 
 @inlined
-def unfold_one(coordinates, expected, frame):
+def resolve_one(coordinates, expected, frame):
     """The frame of skew coordinates, the one of two whose cos θ has the sign of ``expected``: shapes (6,), (12,).
 
     Returns:

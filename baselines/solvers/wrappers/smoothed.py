@@ -3,26 +3,38 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from baselines import registry
-from baselines.policy import Batch, Memory, Operations, Solution, SolverPolicy
-from ikgym import task_kernels
+from baselines.policy import Batch, Memory, Operations, Solution
+from baselines.wrapper import NamedWrapper
 from ikgym.exceptions import InvalidInputError, UnknownNameError
-from ikgym.jit import kernel
-from ikgym.kinematics import forward
-from ikgym.scenarios import Preview
-from ikgym.validation import FloatArray, known_names, number
+from ikgym.task_kernels import pose_rows
+from ikgym.validation import FloatArray, number
 
 FEEDBACKS = ("calculated", "measured")
 
 
+class SmoothedMemory(NamedTuple):
+    """What the filter remembers; the memory of the inner policy stands behind it.
+
+    Attributes:
+        known: Whether the rest is known. Shape (B,).
+        q: The calculated joint coordinates in [rad] or [m]. Shape (B, n).
+        qdot: The calculated joint velocities in [rad/s] or [m/s]. Shape (B, n).
+        smooth: q̇ˢ, to be sent next. Shape (B, n).
+    """
+
+    known: npt.NDArray[np.bool_]
+    q: FloatArray
+    qdot: FloatArray
+    smooth: FloatArray
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
-class Smoothed(SolverPolicy):
+class Smoothed(NamedWrapper):
     """Lets the arm follow the joint path of another policy through a filter of second order.
 
     The smoothed path obeys (Λ + d/dt)² qˢ = Λ² q (eq. 13). The printed eq. 16 lacks a dot; it is
@@ -32,19 +44,19 @@ class Smoothed(SolverPolicy):
     A constant velocity is followed 2/Λ late.
 
     The paper smooths the calculated q(t) afterwards, so that the calculation does not know of the smoothing. That is
-    ``feedback="calculated"``: the policy inside sees the arm where its own velocities would have brought the model,
+    ``feedback="calculated"``: the inner policy sees the arm where its own velocities would have brought the model,
     and runs as if it were alone. What a wrong model, disturbed drives or a saturated velocity do to the pose is then
-    seen by nobody, and stays. With ``"measured"`` the policy inside sees the arm as it is, and its velocities go on
+    seen by nobody, and stays. With ``"measured"`` the inner policy sees the arm as it is, and its velocities go on
     to make up q(t). The lag is then part of its loop: a resolved rate of gain g is stable where all z with
     (z − 1)(z − 1 + ΛΔt)² = −(ΛΔt)² g lie inside the unit circle, that is for g < 0.35 at ΛΔt = 0.3 and not with the
-    usual 1. Receding horizons, which ask for what is missing in very few steps, blow up.
+    usual 1. Receding horizons, which ask for what is missing in very few steps, diverge.
 
     The filter is stable for ΛΔt < 2, and does not overshoot for ΛΔt ≤ 1. Status and iterations are those of the
-    policy inside. References, which know more than they see, cannot be smoothed.
+    inner policy. References, which know more than they see, cannot be smoothed.
 
     Args:
         problem: What the policy is told of the scenario.
-        policy: The name of the policy inside.
+        policy: The name of the inner policy.
         options: Its parameters; those left out have its defaults.
         relaxation: Λ in [1/s], above 0 and below 2/Δt.
         feedback: ``"calculated"`` as in the paper, or ``"measured"``.
@@ -55,21 +67,13 @@ class Smoothed(SolverPolicy):
     """
 
     policy: str = "rhc_gradient"
-    options: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     relaxation: float = 300.0
     feedback: str = "calculated"
-    inner: SolverPolicy = dataclasses.field(init=False, repr=False)
 
     name: ClassVar[str] = "smoothed"
-    composed: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        kind = registry.get(self.policy)
-        if kind.reference:
-            raise InvalidInputError(f"policy: expected one that acts on what it sees, got the reference {kind.name!r}.")
-        if not isinstance(self.options, Mapping):
-            raise InvalidInputError(f"options: expected the parameters of {kind.name} by name, got {self.options!r}.")
-        known_names(f"parameter of {kind.name}", self.options, kind.parameter_names())
+        super().__post_init__()
         relaxation = number("relaxation", self.relaxation, above=0.0)
         if relaxation * self.problem.dt >= 2.0:
             raise InvalidInputError(
@@ -77,73 +81,44 @@ class Smoothed(SolverPolicy):
             )
         if self.feedback not in FEEDBACKS:
             raise UnknownNameError("feedback", self.feedback, FEEDBACKS)
-        inner = kind(self.problem, **self.options)
-        for field, value in {"inner": inner, "options": inner.parameters, "relaxation": relaxation}.items():
-            object.__setattr__(self, field, value)
+        object.__setattr__(self, "relaxation", relaxation)
 
-    @property
-    def preview(self) -> Preview:
-        """That of the policy inside."""
-        return self.inner.preview
-
-    def memory(self, rows: int) -> Memory:
-        """Whether the rest is known, (B,); calculated q and q̇, and q̇ˢ, (B, n); the memory of the policy inside."""
+    def own_memory(self, rows: int) -> SmoothedMemory:
+        """See :meth:`Wrapper.own_memory`."""
         n = self.problem.model.joints
-        own = (np.zeros((rows, n)), np.zeros((rows, n)), np.zeros((rows, n)))
-        return np.zeros(rows, dtype=np.bool_), *own, *self.inner.memory(rows)
+        return SmoothedMemory(
+            np.zeros(rows, dtype=np.bool_), np.zeros((rows, n)), np.zeros((rows, n)), np.zeros((rows, n))
+        )
 
     def solve(self, batch: Batch, memory: Memory) -> Solution:
         """See :meth:`SolverPolicy.solve`."""
-        known, calculated, qdot, smooth, *inside = memory
-        dt, lambda_ = self.problem.dt, self.relaxation
-        calculated = np.where(known[:, None], calculated, batch.q)
+        own, inside = self.split(memory)
+        dt, lambda_, limit = self.problem.dt, self.relaxation, self.problem.velocity_limit
+        known = own.known[:, None]
+        calculated = np.where(known, own.q, batch.q)
         seen = batch
         if self.feedback == "calculated":
-            seen = batch._replace(q=calculated, qdot=np.where(known[:, None], qdot, batch.qdot))
-            seen = seen._replace(pose=self._pose(calculated))
-        nothing = np.zeros(len(known), dtype=np.int64)
-        # Through its own predict, so that what is not finite or beyond the limit is dealt with as if it were alone.
-        action, (status, iterations, *inside) = self.inner.predict(seen._asdict(), (nothing, nothing, *inside))
-        velocity = action.astype(np.float64) * self.problem.velocity_limit
+            qdot = np.where(known, own.qdot, batch.qdot)
+            seen = batch._replace(q=calculated, qdot=qdot, pose=self._pose(calculated))
+        step = self.ask(seen, inside)
+        velocity = step.action.astype(np.float64) * limit
         # What is beyond the limit the arm will not do.
-        sent = np.clip(smooth, -self.problem.velocity_limit, self.problem.velocity_limit)
-        bend = lambda_**2 * (calculated - batch.q) - 2.0 * lambda_ * sent  # eq. 16
-        kept = (np.ones_like(known), calculated + dt * velocity, velocity, sent + dt * bend)  # eq. 17
-        return Solution(smooth.copy(), (*kept, *inside), status, iterations)
+        sent = np.clip(own.smooth, -limit, limit)
+        acceleration = lambda_**2 * (calculated - batch.q) - 2.0 * lambda_ * sent  # eq. 16
+        kept = SmoothedMemory(
+            np.ones_like(own.known), calculated + dt * velocity, velocity, sent + dt * acceleration
+        )  # eq. 17
+        return self.solution(own.smooth.copy(), kept, step)
 
-    def operations(self, state: Memory) -> Operations:
-        """Those of the policy inside, which may keep count in its memory."""
-        return Operations(*self._counted(self.inner.operations(self._inner_state(state))))
-
-    def diagnostics(self, state: Memory) -> dict[str, FloatArray]:
-        """What the policy inside shows of itself."""
-        return self.inner.diagnostics(self._inner_state(state))
-
-    def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
-        """Those of the policy inside."""
-        return self._counted(self.inner.count(iterations))
-
-    def _counted(self, inside: tuple[Any, ...]) -> tuple[Any, ...]:
+    def counted(self, inside: Operations) -> Operations:
         """What is calculated is a forward kinematics more, and no pose is measured."""
-        forwards, jacobians, factorisations, measurements = inside
         if self.feedback == "measured":
             return inside
-        return forwards + 1, jacobians, factorisations, measurements * 0
-
-    def _inner_state(self, state: Memory) -> Memory:
-        own = len(state) - len(self.inner.memory(1))
-        return *state[:2], *state[own:]
+        return inside._replace(
+            forward_kinematics=inside.forward_kinematics + 1, measurements=np.zeros_like(inside.measurements)
+        )
 
     def _pose(self, q: FloatArray) -> FloatArray:
         out = np.empty((len(q), self.problem.task.size))
         pose_rows(self.problem.model.chain, self.problem.task.kind, q, out)
         return out
-
-
-@kernel
-def pose_rows(chain, kind, q, out):
-    """Task coordinates of a chain, row by row: ``q`` (B, n), ``out`` (B, m)."""
-    rotation, position = np.empty((3, 3)), np.empty(3)
-    for row in range(q.shape[0]):
-        forward(chain, q[row], rotation, position)
-        task_kernels.coordinates(kind, rotation, position, out[row])

@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 import torch
 
-from baselines.agents.base_policy import Outlook, policy_under
 from baselines.agents.features import Features, Processing
+from baselines.agents.view import AgentView, Seen
 from baselines.policy import Batch, Memory, Problem
 from ikgym.exceptions import ResetNeededError
 from ikgym.scenarios import Preview, Scenario
@@ -18,9 +18,9 @@ from ikgym.validation import FloatArray
 
 
 class View:
-    """From observations to features, and from answers to actions, with the policy under the agent in between.
+    """From observations to features, and from network outputs to actions: :class:`AgentView` with a memory.
 
-    That policy is asked once for each observation, and has its own memory, which is cleared where an episode begins.
+    The base policy is asked once for each observation. Its memory is cleared where an episode begins.
 
     Args:
         processing: Of the agent.
@@ -28,21 +28,19 @@ class View:
 
     Raises:
         UnknownNameError: There is no such policy, or parameter of it.
-        InvalidInputError: The policy cannot be under the agent, see :func:`baselines.agents.base_policy.policy_under`.
+        InvalidInputError: The base policy is refused, see :func:`baselines.agents.base_policy.make_base_policy`.
     """
 
     def __init__(self, processing: Processing, scenario: Scenario) -> None:
         self.processing, self.problem = processing, Problem.of(scenario)
-        self._under = policy_under(processing, self.problem)
-        self._outlook = Outlook.of(processing, self._under)
+        self._view = AgentView.of(processing, self.problem)
         self._memory: Memory | None = None
-        self._base: FloatArray | None = None
-        self._batch: Batch | None = None
+        self._seen: Seen | None = None
 
     @property
     def preview(self) -> Preview:
         """Which nominal points observations have to show."""
-        return self._outlook.preview
+        return self._view.preview.shown
 
     @property
     def size(self) -> int:
@@ -51,8 +49,8 @@ class View:
 
     @property
     def base(self) -> FloatArray | None:
-        """Actions of the policy under the agent for what was last seen, None where there is none. Shape (N, n)."""
-        return self._base
+        """Actions of the base policy for what was last seen, None where there is none. Shape (N, n)."""
+        return None if self._seen is None else self._seen.base
 
     def see(self, observation: Observation, starting: npt.NDArray[np.bool_]) -> Features:
         """The features of what the arms show now.
@@ -64,14 +62,12 @@ class View:
         Returns:
             Shape (N, f).
         """
-        if self._under is not None:
-            action, self._memory = self._under.predict(self._shown(observation), self._memory, starting)
-            self._base = action.astype(np.float64)
-        self._batch = self._seen(observation)
-        return self._features(self._batch, self._base)
+        self._seen = self._view.see(_batch(observation), self._recall(starting))
+        self._memory = () if self._seen.step is None else self._seen.step.memory
+        return _aligned(self._seen.features)
 
     def glance(self, observation: Observation, rows: npt.NDArray[np.int64]) -> Features:
-        """The features of what some arms show at the end of their episode, where no answer follows.
+        """The features of what some arms show at the end of their episode, where no action follows.
 
         Args:
             observation: With a leading axis of R.
@@ -80,39 +76,39 @@ class View:
         Returns:
             Shape (R, f).
         """
-        base = None
-        if self._under is not None and self._memory is not None:
-            memory = tuple(array[rows] for array in self._memory)
-            action, _ = self._under.predict(self._shown(observation), memory)
-            base = action.astype(np.float64)
-        return self._features(self._seen(observation), base)
+        memory = tuple(array[rows] for array in self._memory or ())
+        return _aligned(self._view.see(_batch(observation), memory).features)
 
-    def act(self, answer: npt.NDArray[Any]) -> FloatArray:
-        """What answers to the features last seen mean, as fractions of the velocity limit.
+    def act(self, output: npt.NDArray[Any]) -> FloatArray:
+        """What network outputs for the features last seen mean, as fractions of the velocity limit.
 
         Args:
-            answer: Shape (N, n).
+            output: Shape (N, n).
 
         Raises:
             ResetNeededError: Nothing has been seen yet.
         """
-        if self._batch is None:
-            raise ResetNeededError("Answers need something that was seen: call reset() first.")
-        return self.processing.action(self.problem, self._batch, answer, self._base)
+        if self._seen is None:
+            raise ResetNeededError("Actions need something that was seen: call reset() first.")
+        return self._view.action(self._seen, output)
 
-    def _features(self, batch: Batch, base: FloatArray | None) -> Features:
-        features = self.processing.features(self.problem, batch, base)
-        # In memory of PyTorch, which is aligned: what a matrix product rounds to may depend on where its operands lie,
-        # and a run must give the same each time.
-        out: Features = torch.empty(features.shape).numpy()
-        out[:] = features
-        return out
+    def _recall(self, starting: npt.NDArray[np.bool_]) -> Memory:
+        """The memory of the base policy, cleared where an episode begins."""
+        base = self._view.base
+        if base is None:
+            return ()
+        if self._memory is None:
+            return base.memory(len(starting))
+        return base.restarted(self._memory, starting) if starting.any() else self._memory
 
-    def _seen(self, observation: Observation) -> Batch:
-        """What the agent sees."""
-        batch = Batch(*[observation[key] for key in Batch._fields])
-        return batch._replace(nominal=self._outlook.of_agent(batch.nominal))
 
-    def _shown(self, observation: Observation) -> Observation:
-        """What the policy under it sees."""
-        return {**observation, "nominal": self._outlook.of_policy(observation["nominal"])}
+def _batch(observation: Observation) -> Batch:
+    return Batch(*[np.ascontiguousarray(observation[key], dtype=np.float64) for key in Batch._fields])
+
+
+def _aligned(features: Features) -> Features:
+    # In memory of PyTorch, which is aligned: what a matrix product rounds to may depend on where its operands lie,
+    # and a run must give the same each time.
+    out: Features = torch.empty(features.shape).numpy()
+    out[:] = features
+    return out

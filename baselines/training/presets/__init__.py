@@ -9,6 +9,7 @@ import pathlib
 import tomllib
 from typing import Any
 
+from baselines.spec import refuse_trust
 from baselines.training.config.common import Config
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 
@@ -28,17 +29,20 @@ def read(preset: str) -> dict[str, Any]:
 
     Raises:
         UnknownNameError: There is no such preset; the message has the nearest name.
-        InvalidInputError: The file cannot be read, or is no TOML.
+        InvalidInputError: The file cannot be read, is no TOML, or trusts the file of an agent.
     """
     file = pathlib.Path(preset) if preset.endswith(".toml") else FOLDER / f"{preset}.toml"
     if file.parent == FOLDER and preset not in names():
         raise UnknownNameError("preset", preset, names())
     try:
-        return tomllib.loads(file.read_text(encoding="utf-8"))
+        options = tomllib.loads(file.read_text(encoding="utf-8"))
     except OSError as e:
         raise InvalidInputError(f"Cannot read the preset {file}: {e.strerror}.") from None
     except ValueError as e:
         raise InvalidInputError(f"The preset {file} is no TOML: {e}.") from None
+    for name in {"base_policy", "expert"} & options.keys():
+        refuse_trust(options[name], f"The preset {file}: {name}")
+    return options
 
 
 def configure(kind: type[Config], preset: str | None) -> tuple[Config, frozenset[str]]:

@@ -10,7 +10,7 @@ import numpy.typing as npt
 import torch
 from torch import Tensor
 
-from baselines.agents.base_policy import Outlook, policy_under
+from baselines.agents.base_policy import SharedPreview, make_base_policy
 from baselines.policy import Memory, Problem
 from baselines.training.config.direct import APG
 from baselines.training.randomness import sequence
@@ -100,9 +100,9 @@ class APGTrainer(DirectTrainer):
     def __init__(self, config: APG, scenario: Scenario, seed: int) -> None:
         super().__init__(config, scenario, seed)
         self._arm = DifferentiableArm(scenario)
-        policy = policy_under(config.processing, Problem.of(scenario))
+        policy = make_base_policy(config.processing, Problem.of(scenario))
         self._under = None if policy is None else PolicyUnder(policy, scenario.arm)
-        self._outlook = Outlook.of(config.processing, policy)
+        self._outlook = SharedPreview.of(config.processing, policy)
         self._counted = scenario.counted()
         rows, steps = config.envs, scenario.steps
         memory = () if policy is None else policy.memory(rows)
@@ -167,7 +167,7 @@ class APGTrainer(DirectTrainer):
         remaining = (self._scenario.steps - arms.made)[:, None].astype(np.float64)
         base = None
         if self._under is not None:
-            shown = self._nominal(range(1, self._outlook.under + 1))
+            shown = self._nominal(range(1, self._outlook.base + 1))
             base, arms.memory = self._under(q, qdot, shown, remaining, arms.memory, slopes=slopes)
         features, speed = self._arm.features(config.processing, q, qdot, nominal, remaining, base)
         answer = self._answers(features.float())

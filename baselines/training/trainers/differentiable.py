@@ -15,7 +15,6 @@ from torch.autograd.function import once_differentiable
 
 from baselines.agents.features import LARGEST, Processing, project_rows, speed_rows
 from baselines.policy import Memory, SolverPolicy
-from baselines.solvers.wrappers.smoothed import pose_rows
 from ikgym import task_kernels
 from ikgym.arms import Arm
 from ikgym.cost_kernels import P_X_INSIDE
@@ -23,6 +22,7 @@ from ikgym.exceptions import InvalidInputError
 from ikgym.jit import kernel
 from ikgym.kinematics import forward_and_jacobian
 from ikgym.scenarios import Scenario
+from ikgym.task_kernels import pose_rows
 from ikgym.tasks import Task
 from ikgym.validation import FloatArray
 
@@ -194,7 +194,7 @@ class PolicyUnder:
         kept = tuple(np.concatenate([array] * copies) for array in memory) if slopes else memory
         nothing = np.zeros(len(moved), dtype=np.int64)
         action, state = self._policy.predict(seen, (nothing, nothing, *kept))
-        after = tuple(array[:rows] for array in state[2:])
+        after = tuple(array[:rows] for array in self._policy.memory_of(state))
         if not slopes:
             return torch.from_numpy(action.astype(np.float64)), after
         actions = action.astype(np.float64).reshape(copies, rows, n)

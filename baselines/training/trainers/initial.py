@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import io
 import pathlib
 import pickle
@@ -13,10 +14,11 @@ import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
 from torch import nn
 
-from baselines.agents import files, sb3_zip
+from baselines.agents import files, untrusted
 from baselines.agents.features import Processing
 from baselines.agents.network import Network
-from baselines.agents.parts import AgentFile
+from baselines.agents.protocols import AgentFile
+from baselines.agents.sb3_network import network_of
 from baselines.policy import Problem
 from baselines.training.config.common import SHAPE, Algorithm, Config
 from baselines.training.errors import TrainingError
@@ -102,10 +104,33 @@ def begin_from(model: BaseAlgorithm, config: Config) -> None:
 
 def _read(path: pathlib.Path, problem: Problem) -> tuple[AgentFile, Network, Processing]:
     """The agent of a file, which is one of ours."""
-    file = sb3_zip.load_zip(path, problem) if path.suffix == ".zip" else files.load_agent(path)
+    file = _read_zip(path) if path.suffix == ".zip" else files.load_agent(path)
     if not isinstance(file.network, Network) or not isinstance(file.processing, Processing):
         raise TrainingError(f"{path} is no model that was trained here: it does not see the features of an agent.")
     return file, file.network, file.processing
+
+
+def _read_zip(path: pathlib.Path) -> AgentFile:
+    """The agent of a model that was saved here, from its tensors and texts; nothing in it is executed."""
+    source, content = str(path), untrusted.read(path)
+    try:
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            about = untrusted.parse_json(source, archive.read("ikgym.json"))
+            arguments = untrusted.parse_json(source, archive.read("data"))["policy_kwargs"]
+            weights = torch.load(io.BytesIO(archive.read("policy.pth")), map_location="cpu", weights_only=True)
+        plain = {name: value for name, value in arguments.items() if not name.startswith(":")}
+        network = network_of({name: tensor.numpy() for name, tensor in weights.items()}, plain)
+    except KeyError:
+        raise TrainingError(
+            f"{path} is no model that was trained here: it does not see the features of an agent."
+        ) from None
+    except zipfile.BadZipFile as e:
+        untrusted.refuse(source, f"is damaged, or no .zip file: {e}")
+    except (RuntimeError, ValueError, pickle.PickleError) as e:
+        raise TrainingError(f"Cannot begin from {path}: {e}") from None
+    files.check_format(source, about)
+    processing = files.check_described(source, about)
+    return AgentFile(source, network, processing, about, hashlib.sha256(content).hexdigest())
 
 
 def _load_all(model: BaseAlgorithm, path: pathlib.Path) -> bool:

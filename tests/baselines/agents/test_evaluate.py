@@ -8,7 +8,6 @@ import pytest
 
 import ikgym
 from baselines import registry
-from baselines.agents import shipped
 from baselines.evaluate import evaluate, main, manual
 from baselines.evaluation import report
 from baselines.evaluation.metrics import TIME_COLUMNS, summarise
@@ -48,7 +47,7 @@ def test_rows(file):
     assert list(report.labels(summarise(rows)).values()) == [f"agent:path={file}"]
 
 
-def test_an_agent_that_corrects_nothing_costs_what_the_policy_under_it_costs(tmp_path):
+def test_an_agent_that_corrects_nothing_costs_what_its_base_policy_costs(tmp_path):
     zero = write_agent(tmp_path / "zero.safetensors", SCENARIO, "dls:damping=1e-2", zero=True)
     ours, theirs = run(zero), evaluate("varga7-random", "dls:damping=1e-2", episodes=3, steps=STEPS)
     assert [row.total_cost for row in ours] == [row.total_cost for row in theirs]
@@ -127,10 +126,7 @@ def test_command_line(file, tmp_path, capsys):
     assert "agent:" in manual()
 
 
-def test_agents_of_the_package_go_by_their_names(tmp_path, monkeypatch):
-    write_agent(tmp_path / "agent_one.safetensors", SCENARIO, "dls:damping=1e-2")
-    monkeypatch.setattr(registry, "POLICIES", {**registry.POLICIES, **shipped.shipped_agents(tmp_path)})
-    monkeypatch.setattr(report, "POLICIES", registry.POLICIES)
-    rows = evaluate("varga7-random", ["agent_one", "dls"], steps=STEPS)
-    assert list(report.labels(summarise(rows)).values()) == ["agent_one", "dls"]
-    assert rows[0].parameters == {"hash": registry.make("agent_one", SCENARIO).file.digits}
+def test_agents_of_the_package_go_by_their_names():
+    rows = evaluate("varga7-random", ["agent_alone", "dls"], steps=STEPS)
+    assert list(report.labels(summarise(rows)).values()) == ["agent_alone", "dls"]
+    assert rows[0].parameters == {"hash": registry.make("agent_alone", SCENARIO).file.digits}

@@ -116,9 +116,10 @@ def forged(file, spoil):
 @pytest.mark.parametrize(
     ("spoil", "message"),
     [
-        (lambda t, a: a.update(format=2), "of another version: expected format 1, got 2"),
+        (lambda t, a: a.update(format=1), "of another version: expected format 2, got 1, which ikgym 0.1.0 reads"),
+        (lambda t, a: a.update(format=3), "of another version: expected format 2, got 3"),
         (lambda t, a: a.update(format=True), "of another version"),
-        (lambda t, a: a.pop("format"), "of another version: expected format 1, got None"),
+        (lambda t, a: a.pop("format"), "of another version: expected format 2, got None"),
         (lambda t, a: a.pop("network"), "the key 'network' is missing"),
         (lambda t, a: a.pop("processing"), "the key 'processing' is missing"),
         (lambda t, a: a["processing"].update(future=1), "no field of the processing 'future'"),

@@ -43,7 +43,7 @@ def features(rows, size, seed=1):
 def test_answers_are_those_of_the_formula(activation, squash, sizes):
     net = network(sizes, activation, squash)
     x = features(50, sizes[0])
-    answers = net.answer(x)
+    answers = net.forward(x)
     assert answers.dtype == np.float32
     np.testing.assert_allclose(answers, written_out(net, x), atol=1e-5)
     assert np.abs(answers).max() <= 1.0
@@ -54,23 +54,23 @@ def test_answers_are_those_of_the_formula(activation, squash, sizes):
 def test_rows_are_single_calls(activation):
     net = network((76, 64, 33, 7), activation)
     x = features(70, 76)
-    whole = net.answer(x)
+    whole = net.forward(x)
     for rows in (1, 2, 5):
-        parts = [net.answer(x[i : i + rows]) for i in range(0, len(x), rows)]
+        parts = [net.forward(x[i : i + rows]) for i in range(0, len(x), rows)]
         assert identical(np.concatenate(parts), whole)
-    assert identical(net.answer(x[::-1]), whole[::-1].copy())
+    assert identical(net.forward(x[::-1]), whole[::-1].copy())
 
 
 def test_extreme_numbers():
     for activation in ACTIVATIONS:
         net = network((4, 8, 2), activation)
-        assert np.abs(net.answer(np.full((1, 4), 1e30, dtype=np.float32))).max() <= 1.0
-        assert np.isfinite(net.answer(np.full((1, 4), -1e30, dtype=np.float32))).all()
+        assert np.abs(net.forward(np.full((1, 4), 1e30, dtype=np.float32))).max() <= 1.0
+        assert np.isfinite(net.forward(np.full((1, 4), -1e30, dtype=np.float32))).all()
 
 
 def test_a_sum_that_overflows_is_no_answer():
     net = Network((np.array([[3e38, 3e38], [3e38, -3e38]]), np.ones((1, 2))), (np.zeros(2), np.zeros(1)), "linear")
-    assert np.isnan(net.answer(np.array([[-3e38, 3e38]], dtype=np.float32))).all()
+    assert np.isnan(net.forward(np.array([[-3e38, 3e38]], dtype=np.float32))).all()
 
 
 def test_a_call_takes_less_than_50_us():
@@ -78,7 +78,7 @@ def test_a_call_takes_less_than_50_us():
         net, x, times = network(sizes), features(1, 76), []
         for _ in range(300):
             begin = time.perf_counter()
-            net.answer(x)
+            net.forward(x)
             times.append(time.perf_counter() - begin)
         # The best: the others tell of what else the machine does.
         assert min(times) < 50e-6
@@ -87,10 +87,10 @@ def test_a_call_takes_less_than_50_us():
 def test_networks_are_frozen_copies():
     weights, biases = [np.ones((2, 3))], [np.zeros(2)]
     net = Network(tuple(weights), tuple(biases))
-    before = net.answer(np.ones((1, 3), dtype=np.float32))
+    before = net.forward(np.ones((1, 3), dtype=np.float32))
     weights[0][:] = 7.0
     for other in (net, copy.deepcopy(net), pickle.loads(pickle.dumps(net))):
-        assert identical(other.answer(np.ones((1, 3), dtype=np.float32)), before)
+        assert identical(other.forward(np.ones((1, 3), dtype=np.float32)), before)
         arrays = [*other.weights, *other.biases, *(a for a in other._constants if isinstance(a, np.ndarray))]
         assert not any(array.flags.writeable for array in arrays)
     assert net.sizes == (3, 2)
@@ -126,4 +126,4 @@ def test_unknown_names():
 @pytest.mark.parametrize("x", [np.ones((1, 2)), np.ones((1, 3), dtype=np.float32), np.ones(2, dtype=np.float32)])
 def test_features_of_another_shape_or_type(x):
     with pytest.raises(InvalidInputError, match=r"features: expected float32 of shape \(any, 2\), got"):
-        network((2, 2)).answer(x)
+        network((2, 2)).forward(x)

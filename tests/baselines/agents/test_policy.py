@@ -18,8 +18,9 @@ import baselines
 import ikgym
 from baselines import registry
 from baselines.agents import shipped
+from baselines.agents.base_policy import make_base_policy
 from baselines.agents.features import Processing
-from baselines.agents.files import save_agent
+from baselines.agents.files import load_agent, save_agent
 from baselines.agents.policy import Agent
 from baselines.evaluation.plan import make_plan
 from baselines.evaluation.rollout import rollout, rollouts
@@ -35,11 +36,11 @@ from tests.comparison import identical
 STEPS = 6
 FAST = ikgym.scenarios.get("varga7-fast").replace(steps=STEPS)
 RANDOM = ikgym.scenarios.get("varga7-random").replace(steps=STEPS)
+POSE = ikgym.tasks.get("pose")
 
-# Policies under an agent: none; with memory; that sees two steps; that counts in its memory; with much memory; over
-# another one.
-UNDER = [None, "dls:gain=0.5", "rhc_gradient", "mfac", "rhc:horizon=3,iterations=1", "smoothed:policy=mfac"]
-KINDS = [*((base_policy, None) for base_policy in UNDER), ("dls", 1e-2)]
+# Base policies: none; with memory; that sees two steps; that counts in its memory; with much memory; a wrapper.
+BASES = [None, "dls:gain=0.5", "rhc_gradient", "mfac", "rhc:horizon=3,iterations=1", "smoothed:policy=mfac"]
+KINDS = [*((base_policy, None) for base_policy in BASES), ("dls", 1e-2)]
 contract = pytest.mark.parametrize(("base_policy", "null_space"), KINDS)
 
 
@@ -69,6 +70,19 @@ def row(observation, i):
 
 
 class TestContract:
+    @contract
+    def test_memory_is_that_of_the_base_policy_behind_its_own(self, tmp_path, base_policy, null_space):
+        for on in (RANDOM.replace(task=POSE), RANDOM):  # the second has to resolve orientations
+            if base_policy is not None and "mfac" in base_policy and on is RANDOM:
+                continue
+            path = write_agent(
+                tmp_path / "a.safetensors", RANDOM.replace(task=POSE), base_policy, null_space=null_space
+            )
+            policy = baselines.make("agent", on, path=path)
+            own, inside = policy.split(policy.memory(2))
+            assert hasattr(own, "_fields") == (on is RANDOM)
+            assert identical(inside, () if policy.inner is None else tuple(policy.inner.memory(2)))
+
     @contract
     def test_batch_equals_single_calls_and_memory_goes_by_rows(self, tmp_path, base_policy, null_space):
         for scenario in (RANDOM, ikgym.scenarios.get("khan8-q7q8").replace(steps=STEPS)):
@@ -150,31 +164,31 @@ class TestContract:
         assert identical(loaded.predict(observation), policy.predict(observation))
 
 
-class TestUnder:
-    @pytest.mark.parametrize("base_policy", UNDER[1:])
-    def test_an_answer_of_zero_is_the_policy_under_it(self, tmp_path, base_policy):
+class TestBasePolicy:
+    @pytest.mark.parametrize("base_policy", BASES[1:])
+    def test_an_output_of_zero_is_the_base_policy(self, tmp_path, base_policy):
         noisy = ikgym.Disturbance(bias=0.01, noise=0.1)
         scenario = RANDOM.replace(steps=200, disturbance=noisy)
         policy = agent_for(tmp_path, scenario, base_policy, zero=True)
         name, parameters = parse_policy(base_policy)
-        under = baselines.make(name, scenario, **parameters)
-        ours, theirs = rollout(scenario, policy, 3), rollout(scenario, under, 3)
+        base = baselines.make(name, scenario, **parameters)
+        ours, theirs = rollout(scenario, policy, 3), rollout(scenario, base, 3)
         for field in dataclasses.fields(theirs):
             if field.name != "time_ns":
                 mine, other = getattr(ours, field.name), getattr(theirs, field.name)
                 assert identical(mine, other), field.name
         observation = next(observations(scenario, policy.preview, 2))
-        shown = {**observation, "nominal": observation["nominal"][:, : under.preview]}
-        states = policy.predict(observation)[1], under.predict(shown)[1]
+        shown = {**observation, "nominal": observation["nominal"][:, : base.preview]}
+        states = policy.predict(observation)[1], base.predict(shown)[1]
         assert identical(*states)
-        assert identical(policy.operations(states[0]), under.operations(states[1]))
-        assert identical(policy.diagnostics(states[0]), under.diagnostics(states[1]))
+        assert identical(policy.operations(states[0]), base.operations(states[1]))
+        assert identical(policy.diagnostics(states[0]), base.diagnostics(states[1]))
 
-    def test_an_answer_adds_to_it(self, tmp_path):
+    def test_an_output_adds_to_it(self, tmp_path):
         policy = agent_for(tmp_path, FAST, "dls")
         observation = next(observations(FAST, policy.preview, 1))
-        under, _ = baselines.make("dls", FAST).predict(observation)
-        assert (policy.predict(observation)[0] != under).all()
+        base, _ = baselines.make("dls", FAST).predict(observation)
+        assert (policy.predict(observation)[0] != base).all()
 
     def test_operations_without_one_and_through_the_null_space(self, tmp_path):
         def operations(**options):
@@ -202,15 +216,34 @@ class TestUnder:
         ("base_policy", "message"),
         [
             ("oracle", "got the reference 'oracle'"),
-            ("agent:x.safetensors", "base_policy: expected a policy that is no agent and is not made from one"),
-            ("smoothed:policy=agent,options={'path': 'x.zip'}", "no agent and is not made from one"),
             ("smoothed:policy=oracle", "got the reference 'oracle'"),
             ("dls:damping=-1", "damping: expected"),
         ],
     )
-    def test_what_cannot_be_under_an_agent(self, tmp_path, base_policy, message):
+    def test_what_cannot_be_a_base_policy(self, tmp_path, base_policy, message):
         with pytest.raises(InvalidInputError, match=rf"Agent .*a\.safetensors: .*{message}"):
             agent_for(tmp_path, FAST, base_policy)
+
+    @pytest.mark.parametrize(
+        "base_policy",
+        [
+            "agent:x.safetensors",
+            "agent_alone",
+            "smoothed:policy=agent,options={'path': 'x.zip'}",
+            "smoothed:policy=agent_residual",
+            "smoothed:policy=smoothed,options={'policy': 'agent', 'options': {'path': 'x.zip'}}",
+        ],
+    )
+    def test_a_file_names_no_other_file(self, tmp_path, base_policy):
+        message = (
+            r"Agent .*a\.safetensors cannot be used: base_policy: expected a policy that is no agent and is not made"
+        )
+        path = write_agent(tmp_path / "a.safetensors", FAST, base_policy)
+        for reads in (lambda: load_agent(tmp_path / "a.safetensors"), lambda: baselines.make("agent", FAST, path=path)):
+            with pytest.raises(ResultsError, match=message):
+                reads()
+        with pytest.raises(InvalidInputError, match="base_policy: expected a policy that is no agent"):
+            make_base_policy(Processing(base_policy=base_policy), Problem.of(FAST))
 
     def test_unknown_names_are_the_fault_of_the_file(self, tmp_path):
         for base_policy, message in {
@@ -327,12 +360,19 @@ class TestNames:
 @pytest.fixture
 def ship(tmp_path, monkeypatch):
     """Adds agents to those of the package."""
+    monkeypatch.setattr(registry, "_places", dict(registry._places))
+    monkeypatch.setattr(registry, "_classes", dict(registry._classes))
 
     def add(*names, base_policy="dls:damping=1e-2"):
+        classes = {}
         for number, name in enumerate(names):
-            write_agent(tmp_path / f"{name}.safetensors", FAST, base_policy, seed=number, training={"method": "ppo"})
-        classes = shipped.shipped_agents(tmp_path)
-        monkeypatch.setattr(registry, "POLICIES", {**registry.POLICIES, **classes})
+            path = tmp_path / f"{name}.safetensors"
+            write_agent(path, FAST, base_policy, seed=number, training={"method": "ppo"})
+            digits = load_agent(path).digits
+            body = {"__annotations__": {"hash": "str"}, "hash": digits, "name": name, "folder": tmp_path}
+            kind = type(name, (shipped.ShippedAgent,), body)
+            classes[name] = dataclasses.dataclass(frozen=True, eq=False)(kind)
+            baselines.register(name, classes[name])
         return classes
 
     return add
@@ -341,7 +381,6 @@ def ship(tmp_path, monkeypatch):
 class TestShipped:
     def test_each_file_is_a_policy(self, ship):
         classes = ship("agent_one", "agent_two")
-        assert list(classes) == ["agent_one", "agent_two"]
         assert {"agent_one", "agent_two"} < set(baselines.names())
         for name, kind in classes.items():
             policy = baselines.make(name, FAST)
@@ -351,13 +390,6 @@ class TestShipped:
             again = baselines.make(name, FAST, **policy.parameters)
             observation = next(observations(FAST, policy.preview, 2))
             assert identical(again.predict(observation), policy.predict(observation))
-            assert kind.__doc__ == (
-                "Learned correction of the actions of `dls:damping=1e-2`, trained on `varga7-fast` by ppo."
-            )
-        assert classes["agent_one"].__name__ == "AgentOne"
-
-    def test_without_a_policy_under_it(self, ship):
-        assert ship("solo", base_policy=None)["solo"].__doc__.startswith("Learned agent that stands alone, trained on")
 
     def test_it_is_part_of_all_where_it_suits(self, ship):
         ship("agent_one")
@@ -373,28 +405,30 @@ class TestShipped:
             baselines.make("agent_one", FAST)
 
     def test_a_damaged_one_is_found_when_it_is_made(self, ship, tmp_path):
+        ship("agent_one", "damaged")
         (tmp_path / "damaged.safetensors").write_bytes(b"x")
-        classes = ship("agent_one")
-        assert classes["damaged"].__doc__.startswith("An agent that cannot be read: Agent damaged is cut off")
         assert baselines.make("agent_one", FAST)
         with pytest.raises(ResultsError, match="Agent damaged is cut off"):
             baselines.make("damaged", FAST)
 
     def test_those_of_the_package(self):
         files = sorted(shipped.FOLDER.glob("*.safetensors"))
-        assert list(shipped.SHIPPED) == [file.stem for file in files]
-        for kind in shipped.SHIPPED.values():
+        kinds = {name: registry.get(name) for name in baselines.names()}
+        ours = {name: kind for name, kind in kinds.items() if issubclass(kind, shipped.ShippedAgent)}
+        assert list(ours) == [file.stem for file in files]
+        for name, kind in ours.items():
             assert pickle.loads(pickle.dumps(kind)) is kind
-            assert kind.name in baselines.names()
-
-    def test_there_are_none_without_a_folder(self, tmp_path):
-        assert shipped.shipped_agents(tmp_path / "nowhere") == {}
+            assert kind.name == name
+            about = baselines.make(name, "varga7-random").file.about
+            base_policy = about["processing"]["base_policy"]
+            role = "that stands alone" if base_policy is None else f"of `{base_policy}`"
+            assert f"{role}, trained on `{about['scenario']['name']}` by {about['training']['method']}." in kind.__doc__
 
 
 def test_the_problem_is_all_that_an_agent_is_told(tmp_path):
     exact = ikgym.scenarios.get("khan8-q1").replace(steps=STEPS)
     other = exact.replace(arm=exact.arm.replace(name="other", offsets=-2.0 * exact.arm.offsets), model=exact.model)
     policies = [agent_for(tmp_path, scenario, "dls") for scenario in (exact, other)]
-    assert all(isinstance(p.problem, Problem) and p.base.problem is p.problem for p in policies)
+    assert all(isinstance(p.problem, Problem) and p.inner.problem is p.problem for p in policies)
     for observation in observations(exact, OFFSETS, 2):
         assert identical(*(p.predict(observation)[0] for p in policies))

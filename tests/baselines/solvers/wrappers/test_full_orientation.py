@@ -1,4 +1,4 @@
-"""What skew coordinates fold away is told from how they came about: policies then track whole poses."""
+"""The 90° ambiguity of skew coordinates is resolved by how they came about: policies then track whole poses."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import baselines
 from baselines.evaluation.rollout import rollout, rollouts
 from baselines.policy import Batch, Problem
 from baselines.solvers.wrappers import orientation
-from baselines.solvers.wrappers.orientation import unfold_one
+from baselines.solvers.wrappers.orientation import resolve_one
 from ikgym import scenarios, tasks
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 from ikgym.rotations import rodrigues
@@ -22,7 +22,7 @@ def cosine(frames):
     return 0.5 * (frames[..., 0] + frames[..., 4] + frames[..., 8] - 1.0)
 
 
-def whole(scenario):
+def with_poses(scenario):
     return scenario.replace(task=tasks.get("pose"))
 
 
@@ -31,29 +31,29 @@ def costs(scenario, policy, seeds):
 
 
 @pytest.mark.parametrize("degrees", [0.0, 1e-6, 30.0, 89.0, 91.0, 150.0, 179.9])
-def test_orientation_is_told_from_its_shadow_and_its_side(degrees):
+def test_orientation_is_told_from_its_skew_part_and_its_side(degrees):
     rng = np.random.default_rng(round(degrees))
     axis = rng.normal(size=3)
     rotation = np.array(rodrigues(axis / np.linalg.norm(axis), np.radians(degrees)))
     position = rng.normal(size=3)
     out = np.empty(12)
-    unfold_one(tasks.get("skew").coordinates(rotation, position), cosine(rotation.ravel()), out)
+    resolve_one(tasks.get("skew").coordinates(rotation, position), cosine(rotation.ravel()), out)
     # Close to 180° the axis is known as well as its sine is.
     np.testing.assert_allclose(out, [*rotation.ravel(), *position], atol=1e-14 if degrees < 150.0 else 1e-11)
 
 
-def test_nominal_orientations_are_followed_through_the_fold():
+def test_nominal_orientations_are_followed_through_90_degrees():
     scenario, ahead = scenarios.get("varga7-random"), 40
     problem, seeds = Problem.of(scenario), range(30)
-    frames = np.stack([whole(scenario).nominal(seed, ahead) for seed in seeds])
-    shadows = np.stack([scenario.nominal(seed, ahead) for seed in seeds])
+    frames = np.stack([with_poses(scenario).nominal(seed, ahead) for seed in seeds])
+    skews = np.stack([scenario.nominal(seed, ahead) for seed in seeds])
     q = np.stack([scenario.nominal_joint_path(seed)[0] for seed in seeds])
-    kept = orientation.memory(len(seeds))
+    kept = orientation.start_memory(len(seeds))
     for k in range(scenario.steps):
-        shown = np.ascontiguousarray(shadows[:, k + 1 : k + 1 + ahead])
-        batch = Batch(q, 0.0 * q, shadows[:, 0], shown, np.full((len(seeds), 1), 9.0))
-        seen, kept = orientation.unfold(problem, batch, kept)
-        # At the fold itself the cosine is the root of what rounding leaves.
+        shown = np.ascontiguousarray(skews[:, k + 1 : k + 1 + ahead])
+        batch = Batch(q, 0.0 * q, skews[:, 0], shown, np.full((len(seeds), 1), 9.0))
+        seen, kept = orientation.resolve_orientation(problem, batch, kept)
+        # At 90° itself the cosine is the root of what rounding leaves.
         np.testing.assert_allclose(seen.nominal, frames[:, k + 1 : k + 1 + ahead], atol=1e-3, err_msg=f"step {k}")
         np.testing.assert_allclose(seen.pose, frames[:, 0], atol=1e-7)
     crossings = (np.diff(np.sign(cosine(frames)), axis=1) != 0.0).sum()
@@ -61,21 +61,21 @@ def test_nominal_orientations_are_followed_through_the_fold():
 
 
 @pytest.mark.parametrize(("policy", "options"), [("dls", DLS), ("rhc", {"horizon": 12, "iterations": 1})])
-def test_policy_inside_plays_as_if_it_were_shown_whole_poses(policy, options):
-    folded = scenarios.get("varga7-random").replace(steps=200)
+def test_inner_policy_plays_as_if_it_were_shown_whole_poses(policy, options):
+    skew = scenarios.get("varga7-random").replace(steps=200)
     seeds = scenarios.seeds("train", 6)
-    mine = rollouts(folded, baselines.make("full_orientation", folded, policy=policy, options=options), seeds)
-    theirs = rollouts(whole(folded), baselines.make(policy, whole(folded), **options), seeds)
+    mine = rollouts(skew, baselines.make("full_orientation", skew, policy=policy, options=options), seeds)
+    theirs = rollouts(with_poses(skew), baselines.make(policy, with_poses(skew), **options), seeds)
     for a, b in zip(mine, theirs, strict=True):
         np.testing.assert_allclose(a.q, b.q, atol=1e-5)
 
 
-def test_arms_that_turn_back_at_the_fold_go_on():
+def test_arms_that_turn_back_at_90_degrees_go_on():
     scenario = scenarios.get("varga7-random")
     seeds = [scenarios.SPLITS["validation"][i] for i in (11, 33, 34)]
-    folded = costs(scenario, baselines.make("dls", scenario, damping=1e-2), seeds)
-    unfolded = costs(scenario, baselines.make("full_orientation", scenario, options={"damping": 1e-2}), seeds)
-    assert (folded > 30.0 * unfolded).all()
+    skew = costs(scenario, baselines.make("dls", scenario, damping=1e-2), seeds)
+    resolved = costs(scenario, baselines.make("full_orientation", scenario, options={"damping": 1e-2}), seeds)
+    assert (skew > 30.0 * resolved).all()
 
 
 @pytest.mark.parametrize(
@@ -88,7 +88,7 @@ def test_arms_that_turn_back_at_the_fold_go_on():
 )
 def test_agents_that_know_whole_poses_play_skew_coordinates(tmp_path, over, policy, options):
     scenario = scenarios.get("varga7-random").replace(steps=150)
-    file = write_agent(tmp_path / "a.safetensors", whole(scenario), over, zero=True, null_space=1e-2)
+    file = write_agent(tmp_path / "a.safetensors", with_poses(scenario), over, zero=True, null_space=1e-2)
     seeds = scenarios.seeds("train", 4)
     agent = rollouts(scenario, baselines.make("agent", scenario, path=file), seeds)
     alone = rollouts(scenario, baselines.make("full_orientation", scenario, policy=policy, options=options), seeds)
@@ -99,7 +99,7 @@ def test_agents_that_know_whole_poses_play_skew_coordinates(tmp_path, over, poli
 
 def test_batches_of_such_agents_are_single_calls(tmp_path):
     scenario = scenarios.get("varga7-random").replace(steps=40)
-    file = write_agent(tmp_path / "a.safetensors", whole(scenario), "dls", null_space=1e-2)
+    file = write_agent(tmp_path / "a.safetensors", with_poses(scenario), "dls", null_space=1e-2)
     policy, seeds = baselines.make("agent", scenario, path=file), scenarios.seeds("train", 3)
     for seed, together in zip(seeds, rollouts(scenario, policy, seeds), strict=True):
         np.testing.assert_array_equal(rollout(scenario, policy, seed).q, together.q)
@@ -125,6 +125,6 @@ def test_what_cannot_be_inside(parameters, message):
         baselines.make("full_orientation", "varga7-fast", **parameters)
 
 
-def test_parameters_of_the_policy_inside_are_checked():
+def test_parameters_of_the_inner_policy_are_checked():
     with pytest.raises(UnknownNameError, match="damping"):
         baselines.make("full_orientation", "varga7-fast", options={"dampin": 1.0})

@@ -1,4 +1,4 @@
-"""Second-order smoothing: the filter, what the policy inside sees, and what is refused."""
+"""Second-order smoothing: the filter, what the inner policy sees, and what is refused."""
 
 from __future__ import annotations
 
@@ -25,6 +25,12 @@ def smoothed(scenario, **parameters):
     return baselines.make("smoothed", scenario, **parameters)
 
 
+def calculated(policy, state):
+    """The joint coordinates that the inner policy has brought the model to. Shape (n,)."""
+    own, _ = policy.split(policy.memory_of(state))
+    return own.q[0]
+
+
 def printed(path, dt, lambda_):
     """Eq. 16 (with its dot) and 17 over a whole calculated path, afterwards."""
     q, qdot, out = path[0].copy(), np.zeros_like(path[0]), []
@@ -38,7 +44,7 @@ def printed(path, dt, lambda_):
 @pytest.mark.parametrize("policy", ["rhc_gradient", "dls", "mfac"])
 @pytest.mark.parametrize("lambda_", [300.0, 30.0, 1500.0])
 def test_is_the_papers_filter_on_the_path_of_the_policy_alone(policy, lambda_):
-    """The policy inside runs as if alone, and what the arm is sent is the smoothed path, as computed afterwards."""
+    """The inner policy runs as if alone, and what the arm is sent is the smoothed path, as computed afterwards."""
     scenario = short()
     alone = rollout(scenario, baselines.make(policy, scenario), 0)
     episode = rollout(scenario, smoothed(scenario, policy=policy, relaxation=lambda_), 0)
@@ -59,7 +65,7 @@ def test_the_calculated_path_is_that_of_the_policy_alone_bit_for_bit():
     for k in range(STEPS):
         action, state = policy.predict(observation, state)
         observation, *_ = env.step(action)
-        np.testing.assert_array_equal(state[3][0], alone.q[k])
+        np.testing.assert_array_equal(calculated(policy, state), alone.q[k])
 
 
 def test_smooths_and_lags():
@@ -83,18 +89,18 @@ def test_a_constant_velocity_is_followed_2_over_lambda_late():
 
 
 @pytest.mark.parametrize("feedback", ["calculated", "measured"])
-def test_what_the_policy_inside_sees(feedback, monkeypatch):
+def test_what_the_inner_policy_sees(feedback, monkeypatch):
     scenario = short("khan8-q1")
     policy = smoothed(scenario, policy="dls", options={"gain": 0.1}, feedback=feedback)
     seen = []
-    predict = type(policy.inner).predict
+    act = type(policy.inner).act
 
-    def listening(self, observation, *args, **kwargs):
+    def listening(self, batch, memory):
         if self is policy.inner:
-            seen.append({key: value.copy() for key, value in observation.items()})
-        return predict(self, observation, *args, **kwargs)
+            seen.append({key: value.copy() for key, value in batch._asdict().items()})
+        return act(self, batch, memory)
 
-    monkeypatch.setattr(type(policy.inner), "predict", listening)
+    monkeypatch.setattr(type(policy.inner), "act", listening)
     env = gym.make("RedundantIK-v0", scenario=scenario, preview=1)
     observation, _ = env.reset()
     state = None
@@ -165,11 +171,11 @@ def test_a_saturated_velocity_is_remembered_as_it_was_sent():
         bend = 1500.0**2 * (path[-1] - observation["q"]) - 2 * 1500.0 * sent
         np.testing.assert_allclose(action * 2.0, np.clip(sent, -2, 2), atol=1e-6)
         sent = np.clip(sent + scenario.dt * bend, -2.0, 2.0)
-        path.append(state[3][0])
+        path.append(calculated(policy, state))
         observation, *_ = env.step(action)
 
 
-def test_status_and_cost_are_those_of_the_policy_inside():
+def test_status_and_cost_are_those_of_the_inner_policy():
     scenario = short()
     observation, _ = gym.make("RedundantIK-v0", preview=4).reset()
     for feedback, forwards in (("calculated", 1), ("measured", 0)):
@@ -185,7 +191,7 @@ def test_status_and_cost_are_those_of_the_policy_inside():
     assert policy.operations(state).factorisations[0] == inner.operations(alone).factorisations[0]
 
 
-def test_shows_what_the_policy_inside_shows():
+def test_shows_what_the_inner_policy_shows():
     scenario = short()
     alone, episode = (rollout(scenario, baselines.make(n, scenario), 0) for n in ("rhc_gradient", "smoothed"))
     assert alone.diagnostics.keys() == episode.diagnostics.keys()
@@ -193,7 +199,7 @@ def test_shows_what_the_policy_inside_shows():
         np.testing.assert_array_equal(episode.diagnostics[name], values)
 
 
-def test_options_reach_the_policy_inside():
+def test_options_reach_the_inner_policy():
     policy = smoothed("varga7-fast", options={"horizon": 6})
     assert policy.inner.horizon == 6
     assert policy.preview == 5

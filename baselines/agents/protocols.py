@@ -1,4 +1,4 @@
-"""What an agent is put together from: something that sees, and something that answers."""
+"""What an agent is made of: a transform of observations and actions, and an actor between them."""
 
 from __future__ import annotations
 
@@ -14,8 +14,11 @@ from baselines.policy import Batch, Problem
 from ikgym.validation import FloatArray
 
 
-class Sees(Protocol):
-    """From observations to features, and from answers to actions: :class:`baselines.agents.features.Processing`."""
+class Transform(Protocol):
+    """From observations to features, and from network outputs to actions.
+
+    :class:`baselines.agents.features.Processing` is one, :class:`baselines.agents.raw.RawObservation` another.
+    """
 
     @property
     def offsets(self) -> tuple[int, ...]:
@@ -23,11 +26,11 @@ class Sees(Protocol):
 
     @property
     def base_policy(self) -> str | None:
-        """The policy under the agent."""
+        """The policy that the agent corrects, as text; None for an agent that stands alone."""
 
     @property
     def null_space(self) -> float | None:
-        """λ of the projector that answers go through; None where there is none."""
+        """λ of the projector that network outputs go through; None where there is none."""
 
     def size(self, problem: Problem) -> int:
         """The number of features."""
@@ -36,13 +39,13 @@ class Sees(Protocol):
         """The features of a batch. Shape (B, f)."""
 
     def action(
-        self, problem: Problem, batch: Batch, answer: npt.NDArray[Any], base: FloatArray | None = None
+        self, problem: Problem, batch: Batch, output: npt.NDArray[Any], base: FloatArray | None = None
     ) -> FloatArray:
-        """What answers mean, as fractions of the velocity limit. Shape (B, n)."""
+        """What network outputs mean, as fractions of the velocity limit. Shape (B, n)."""
 
 
-class Answers(Protocol):
-    """From features to answers, see :class:`baselines.agents.network.Network`."""
+class Actor(Protocol):
+    """From features to network outputs, see :class:`baselines.agents.network.Network`."""
 
     @property
     def inputs(self) -> int:
@@ -50,9 +53,9 @@ class Answers(Protocol):
 
     @property
     def outputs(self) -> int:
-        """The number of answers."""
+        """The number of joints that are moved."""
 
-    def answer(self, features: Features) -> npt.NDArray[np.float32]:
+    def forward(self, features: Features) -> npt.NDArray[np.float32]:
         """Numbers in [-1, 1], row by row. Shape (B, n)."""
 
 
@@ -62,15 +65,15 @@ class AgentFile:
 
     Args:
         source: The file, as messages name it.
-        network: What answers.
-        processing: What it sees, and what its answers mean.
+        network: The actor.
+        processing: What it sees, and what its outputs mean.
         about: What the file says of the agent: where it was trained, and how.
         hash: SHA-256 of what it is made of, in 64 hexadecimal digits.
     """
 
     source: str
-    network: Answers
-    processing: Sees
+    network: Actor
+    processing: Transform
     about: Mapping[str, Any]
     hash: str
 

@@ -1,0 +1,85 @@
+"""From observations to features, and from network outputs to actions: the one path of training and evaluation."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from baselines.agents.base_policy import SharedPreview, make_base_policy
+from baselines.agents.features import Features
+from baselines.agents.protocols import Transform
+from baselines.policy import Batch, Memory, Problem, SolverPolicy
+from baselines.wrapper import InnerStep
+from ikgym.validation import FloatArray
+
+
+class Seen(NamedTuple):
+    """What an agent sees at a step, and what its network output adds to.
+
+    Attributes:
+        features: Shape (B, f).
+        batch: The observations, `nominal` at the offsets of the agent.
+        base: Actions of the base policy, in float64; None where there is none. Shape (B, n).
+        step: What else the base policy did; None where there is none.
+    """
+
+    features: Features
+    batch: Batch
+    base: FloatArray | None
+    step: InnerStep | None
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class AgentView:
+    """An agent's processing for one scenario, with the base policy in between.
+
+    Args:
+        processing: Of the agent.
+        problem: What the agent and the base policy are told of the scenario.
+        base: The base policy; None for an agent that stands alone.
+        preview: What both are shown.
+    """
+
+    processing: Transform
+    problem: Problem
+    base: SolverPolicy | None
+    preview: SharedPreview
+
+    @classmethod
+    def of(cls, processing: Transform, problem: Problem) -> Self:
+        """That of an agent.
+
+        Raises:
+            UnknownNameError: There is no such base policy, or parameter of it.
+            InvalidInputError: The base policy is refused, see :func:`make_base_policy`.
+        """
+        base = make_base_policy(processing, problem)
+        return cls(processing, problem, base, SharedPreview.of(processing, base))
+
+    def see(self, batch: Batch, memory: Memory) -> Seen:
+        """What the agent sees; the base policy acts once.
+
+        Args:
+            batch: The observations, as :attr:`preview` asks for them; C-contiguous.
+            memory: Of the base policy.
+        """
+        step: InnerStep | None = None
+        base: FloatArray | None = None
+        if self.base is not None:
+            shown = batch._replace(nominal=self.preview.for_base(batch.nominal))
+            step = InnerStep.of(self.base, shown, memory)
+            base = step.action.astype(np.float64)
+        own = batch._replace(nominal=self.preview.for_agent(batch.nominal))
+        return Seen(self.processing.features(self.problem, own, base), own, base, step)
+
+    def action(self, seen: Seen, output: npt.NDArray[Any]) -> FloatArray:
+        """What network outputs mean, as fractions of the velocity limit.
+
+        Args:
+            seen: What the outputs are for.
+            output: Shape (B, n).
+        """
+        return self.processing.action(self.problem, seen.batch, output, seen.base)

@@ -1,0 +1,96 @@
+"""What a policy is told of a scenario, what it sees, and what it returns."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from ikgym.arms import Arm
+from ikgym.cost import TrackingCost
+from ikgym.scenarios import Scenario
+from ikgym.tasks import Task
+from ikgym.validation import FloatArray, Frozen, frozen_array
+
+#: Arrays with a leading axis of B: what a policy remembers, or a whole state, see :mod:`baselines.state`.
+Memory = tuple[npt.NDArray[Any], ...]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Problem(Frozen):
+    """What a policy is told of a scenario: its model of the arm, which may differ from the arm that moves.
+
+    Args:
+        model: The arm as the solver knows it.
+        task: The task coordinates.
+        cost: The stage cost.
+        dt: Δt in [s].
+        velocity_limit: What an action of 1 means, in [rad/s] or [m/s]. Shape (n,).
+    """
+
+    model: Arm
+    task: Task
+    cost: TrackingCost
+    dt: float
+    velocity_limit: FloatArray
+
+    def __post_init__(self) -> None:
+        limit = frozen_array("velocity_limit", self.velocity_limit, (self.model.joints,))
+        object.__setattr__(self, "velocity_limit", limit)
+
+    @classmethod
+    def of(cls, scenario: Scenario) -> Self:
+        """What a scenario tells."""
+        return cls(scenario.model, scenario.task, scenario.cost, scenario.dt, scenario.velocity_limit)
+
+
+class Batch(NamedTuple):
+    """Observations of B arms, as float64.
+
+    Attributes:
+        q: Joint coordinates in [rad] or [m]. Shape (B, n).
+        qdot: Joint velocities last applied, in [rad/s] or [m/s]. Shape (B, n).
+        pose: Measured task coordinates. Shape (B, m).
+        nominal: Nominal task coordinates ahead, X^N(k+1) first. Shape (B, p, m).
+        remaining: Steps left. Shape (B, 1).
+    """
+
+    q: FloatArray
+    qdot: FloatArray
+    pose: FloatArray
+    nominal: FloatArray
+    remaining: FloatArray
+
+
+class Solution(NamedTuple):
+    """What a solver returns.
+
+    Attributes:
+        qdot: Joint velocities in [rad/s] or [m/s]. Shape (B, n).
+        memory: What the solver wants back at the next step, each array with a leading axis of B.
+        status: Values of :class:`Status`. Shape (B,).
+        iterations: Iterations made. Shape (B,).
+    """
+
+    qdot: FloatArray
+    memory: Memory
+    status: npt.NDArray[np.int64]
+    iterations: npt.NDArray[np.int64]
+
+
+class Operations(NamedTuple):
+    """What one step has cost, counted in what is costly on a real arm.
+
+    Attributes:
+        forward_kinematics: Evaluations of the model's forward kinematics alone. Shape (B,).
+        jacobians: Evaluations of the model's Jacobian, with the forward kinematics that come with it. Shape (B,).
+        factorisations: Matrices factorised, decomposed or inverted. Shape (B,).
+        measurements: Poses measured. Shape (B,).
+    """
+
+    forward_kinematics: npt.NDArray[np.int64]
+    jacobians: npt.NDArray[np.int64]
+    factorisations: npt.NDArray[np.int64]
+    measurements: npt.NDArray[np.int64]

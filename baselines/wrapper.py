@@ -1,0 +1,195 @@
+"""Policies around another policy: its memory, its counts and its diagnostics are handled here, once."""
+
+from __future__ import annotations
+
+import abc
+import dataclasses
+import functools
+from collections.abc import Iterator, Mapping
+from typing import Any, ClassVar, NamedTuple, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from baselines import registry
+from baselines.policy import Batch, Memory, Operations, Problem, Solution, SolverPolicy
+from baselines.spec import PolicySpec, parse_policy
+from baselines.state import pack, remembered
+from ikgym.exceptions import InvalidInputError
+from ikgym.scenarios import Preview
+from ikgym.validation import FloatArray, known_names
+
+
+class InnerStep(NamedTuple):
+    """What the inner policy did in a step.
+
+    Attributes:
+        action: Its actions, as `predict` returns them. Shape (B, n).
+        memory: What it remembers, without names.
+        status: Values of :class:`baselines.status.Status`. Shape (B,).
+        iterations: Iterations made. Shape (B,).
+    """
+
+    action: npt.NDArray[np.float32]
+    memory: Memory
+    status: npt.NDArray[np.int64]
+    iterations: npt.NDArray[np.int64]
+
+    @classmethod
+    def of(cls, policy: SolverPolicy, batch: Batch, memory: Memory) -> Self:
+        """A policy's step, see :meth:`SolverPolicy.act`."""
+        action, state = policy.act(batch, memory)
+        return cls(action, remembered(state), *policy.report(state))
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Wrapper(SolverPolicy, abc.ABC):
+    """Base of all policies around another one.
+
+    `solve` of a wrapper splits its memory, asks the inner policy, and returns what becomes of its action:
+
+        own, inside = self.split(memory)
+        step = self.ask(batch, inside)
+        return self.solution(step.action * self.problem.velocity_limit, own, step)
+
+    The inner policy acts as if it were alone: what is not finite or beyond the velocity limit is dealt with as its own
+    `predict` does. Its memory stands behind the wrapper's own.
+
+    Args:
+        problem: What the policy is told of the scenario.
+    """
+
+    #: The inner policy; None for an agent without a base policy.
+    inner: SolverPolicy | None = dataclasses.field(init=False, repr=False)
+
+    def own_memory(self, rows: int) -> Memory:
+        """The wrapper's own memory at the start of an episode, preferably a NamedTuple.
+
+        Args:
+            rows: B, the leading axis of each array.
+        """
+        del rows
+        return ()
+
+    def counted(self, inside: Operations) -> Operations:
+        """The operations of a step, from those of the inner policy; the same, unless a wrapper says otherwise."""
+        return inside
+
+    def memory(self, rows: int) -> Memory:
+        """The wrapper's own memory, then that of the inner policy."""
+        return *self.own_memory(rows), *(() if self.inner is None else self.inner.memory(rows))
+
+    def split(self, memory: Memory) -> tuple[Any, Memory]:
+        """The wrapper's own part of its memory, of the type of :meth:`own_memory`, and that of the inner policy."""
+        size, kind = self._own
+        own = memory[:size]
+        return own if kind is tuple else kind._make(own), memory[size:]
+
+    @functools.cached_property
+    def _own(self) -> tuple[int, Any]:
+        """How many arrays the wrapper's own memory has, and its type."""
+        own = self.own_memory(1)
+        return len(own), type(own)
+
+    def ask(self, batch: Batch, memory: Memory) -> InnerStep:
+        """The inner policy's step.
+
+        Args:
+            batch: What it is shown, see :meth:`SolverPolicy.act`.
+            memory: Its part of the memory.
+        """
+        assert self.inner is not None
+        return InnerStep.of(self.inner, batch, memory)
+
+    def solution(self, qdot: FloatArray, own: Memory, step: InnerStep) -> Solution:
+        """What `solve` returns: status and iterations are those of the inner policy.
+
+        Args:
+            qdot: Joint velocities in [rad/s] or [m/s]. Shape (B, n).
+            own: The wrapper's own memory after the step.
+            step: The inner policy's.
+        """
+        return Solution(qdot, (*own, *step.memory), step.status, step.iterations)
+
+    def inner_state(self, state: Memory) -> Memory:
+        """The state of the inner policy, as its own `predict` would have returned it, in that of the wrapper."""
+        size, _ = self._own
+        return pack(*self.report(state), remembered(state)[size:])
+
+    def operations(self, state: Memory) -> Operations:
+        """Those of the inner policy, which may keep count in its memory, and the wrapper's own."""
+        if self.inner is None:
+            return super().operations(state)
+        return self.counted(self.inner.operations(self.inner_state(state)))
+
+    def diagnostics(self, state: Memory) -> dict[str, FloatArray]:
+        """What the inner policy shows of itself."""
+        return {} if self.inner is None else self.inner.diagnostics(self.inner_state(state))
+
+    def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
+        """Those of the inner policy, and the wrapper's own."""
+        assert self.inner is not None
+        return self.counted(Operations(*map(np.asarray, self.inner.count(iterations))))
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class NamedWrapper(Wrapper, abc.ABC):
+    """A wrapper that is told by a parameter which policy it wraps.
+
+    Args:
+        problem: What the policy is told of the scenario.
+        policy: The name of the inner policy.
+        options: Its parameters; those left out have its defaults.
+
+    Raises:
+        UnknownNameError: There is no such policy, or parameter of it.
+        InvalidInputError: The inner policy is a reference, or a wrapper where none is taken, or it refuses its
+            parameters.
+    """
+
+    policy: str = "dls"
+    options: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+    inner: SolverPolicy = dataclasses.field(init=False, repr=False)
+
+    #: Whether the inner policy may be a wrapper itself.
+    nests: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        kind = registry.get(self.policy)
+        wrapped = issubclass(kind, Wrapper) and not self.nests
+        if kind.reference or wrapped:
+            what = "reference" if kind.reference else "policy that is made from others"
+            raise InvalidInputError(f"policy: expected one that acts on what it sees, got the {what} {kind.name!r}.")
+        if not isinstance(self.options, Mapping):
+            raise InvalidInputError(f"options: expected the parameters of {kind.name} by name, got {self.options!r}.")
+        known_names(f"parameter of {kind.name}", self.options, kind.parameter_names())
+        inner = kind(self.inner_problem(), **self.options)
+        object.__setattr__(self, "inner", inner)
+        object.__setattr__(self, "options", inner.parameters)
+
+    def inner_problem(self) -> Problem:
+        """What the inner policy is told of the scenario."""
+        return self.problem
+
+    @property
+    def preview(self) -> Preview:
+        """That of the inner policy."""
+        return self.inner.preview
+
+
+def policies_in(spec: PolicySpec) -> Iterator[type[SolverPolicy]]:
+    """The classes of all policies that a spec names: its own, and those of inner policies.
+
+    Args:
+        spec: Such as ``"smoothed:policy=dls"``.
+
+    Raises:
+        UnknownNameError: There is no such policy or parameter.
+        InvalidInputError: The text has another form.
+    """
+    name, parameters = parse_policy(spec)
+    kind = registry.get(name)
+    yield kind
+    if issubclass(kind, NamedWrapper):
+        options = parameters.get("options", {})
+        yield from policies_in((parameters.get("policy", kind.policy), options if isinstance(options, Mapping) else {}))

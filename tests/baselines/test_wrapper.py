@@ -1,0 +1,104 @@
+"""The base of policies around another one: what a wrapper of a few lines gets from it."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import ClassVar, NamedTuple
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+import baselines
+from baselines.policy import Problem
+from baselines.wrapper import NamedWrapper, policies_in
+from ikgym import scenarios
+from ikgym.exceptions import InvalidInputError, UnknownNameError
+from tests.comparison import identical
+
+PROBLEM = Problem.of(scenarios.get("varga7-fast"))
+
+
+class Steps(NamedTuple):
+    made: np.ndarray
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Halved(NamedWrapper):
+    """Half the velocities of another policy; counts its steps."""
+
+    name: ClassVar[str] = "halved"
+    nests: ClassVar[bool] = False
+
+    def own_memory(self, rows):
+        return Steps(np.zeros(rows, dtype=np.int64))
+
+    def solve(self, batch, memory):
+        own, inside = self.split(memory)
+        step = self.ask(batch, inside)
+        return self.solution(0.5 * step.action * self.problem.velocity_limit, Steps(own.made + 1), step)
+
+    def counted(self, inside):
+        return inside._replace(measurements=inside.measurements + 1)
+
+
+def observation(preview, rows=2):
+    single, _ = gym.make("RedundantIK-v0", scenario="varga7-fast", preview=preview).reset(seed=0)
+    return {name: np.stack([array] * rows) for name, array in single.items()}
+
+
+@pytest.mark.parametrize("name", ["dls", "rhc_gradient", "mfac"])
+def test_a_wrapper_of_a_few_lines(name):
+    alone, policy = baselines.make(name, "varga7-fast"), Halved(PROBLEM, policy=name)
+    assert policy.preview == alone.preview
+    shown, state, inner = observation(alone.preview), None, None
+    for k in range(3):
+        start = np.array([False, k == 2])
+        action, state = policy.predict(shown, state, start)
+        expected, inner = alone.predict(shown, inner, start)
+        np.testing.assert_allclose(action, 0.5 * expected, rtol=1e-6)
+        assert identical(policy.inner_state(state), inner)
+        assert identical(policy.diagnostics(state), alone.diagnostics(inner))
+        assert identical(policy.report(state), alone.report(inner))
+        ours, theirs = policy.operations(state), alone.operations(inner)
+        assert identical(ours, theirs._replace(measurements=theirs.measurements + 1))
+    own, _ = policy.split(policy.memory_of(state))
+    assert own.made.tolist() == [3, 1]
+
+
+@pytest.mark.parametrize(
+    ("parameters", "message"),
+    [
+        ({"policy": "oracle"}, "got the reference 'oracle'"),
+        ({"policy": "smoothed"}, "made from others 'smoothed'"),
+        ({"policy": "agent_alone"}, "made from others 'agent_alone'"),
+        ({"options": 3}, "parameters of dls by name, got 3"),
+        ({"options": {"damping": -1.0}}, "damping: expected"),
+    ],
+)
+def test_what_cannot_be_inside(parameters, message):
+    with pytest.raises(InvalidInputError, match=message):
+        Halved(PROBLEM, **parameters)
+
+
+def test_unknown_names_inside():
+    with pytest.raises(UnknownNameError, match="no policy 'dlss'"):
+        Halved(PROBLEM, policy="dlss")
+    with pytest.raises(UnknownNameError, match="no parameter of dls 'dampng'"):
+        Halved(PROBLEM, options={"dampng": 1.0})
+
+
+def test_policies_that_a_spec_names():
+    def names(spec):
+        return [kind.name for kind in policies_in(spec)]
+
+    assert names("dls:damping=1e-2") == ["dls"]
+    assert names("smoothed") == ["smoothed", "rhc_gradient"]
+    assert names("full_orientation:policy=rhc") == ["full_orientation", "rhc"]
+    assert names("smoothed:policy=full_orientation,options={'policy': 'mfac'}") == [
+        "smoothed",
+        "full_orientation",
+        "mfac",
+    ]
+    with pytest.raises(UnknownNameError, match="no parameter of dls 'dampng'"):
+        names("smoothed:policy=dls,options={'dampng': 1}")
