@@ -9,7 +9,7 @@ import pathlib
 import tomllib
 from typing import Any
 
-from baselines.training.config.common import Config
+from baselines.training.config.base import Config
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 
 FOLDER = pathlib.Path(__file__).parent
