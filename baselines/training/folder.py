@@ -10,6 +10,7 @@ from typing import Any
 from baselines.files import write
 from baselines.training.config.base import differences
 from baselines.training.errors import TrainingError
+from ikgym.validation import whole_number
 
 #: The version of `run.json`. Its configuration had other names before 2.
 FORMAT = 2
@@ -106,6 +107,7 @@ def read_run(file: pathlib.Path) -> dict[str, Any]:
 
     Raises:
         TrainingError: It cannot be read, is none, or is of another version.
+        InvalidInputError: Its seed is none.
     """
     try:
         content = json.loads(file.read_text(encoding="utf-8"))
@@ -122,6 +124,7 @@ def read_run(file: pathlib.Path) -> dict[str, Any]:
             f"{file} was written by ikgym {version or 'of another version'}, whose options have other names: go on "
             f'with it by that version, pip install "ikgym=={version or "0.1.0"}", or train anew.'
         )
-    if not isinstance(content["config"], dict) or not isinstance(content["seed"], int):
-        raise TrainingError(f"{file} is damaged: expected a config by name and a whole seed.")
+    if not isinstance(content["config"], dict) or not isinstance(content["method"], str):
+        raise TrainingError(f"{file} is damaged: expected a method, and its config by name.")
+    whole_number("seed", content["seed"], at_least=0)
     return content

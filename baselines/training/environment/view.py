@@ -18,9 +18,9 @@ from ikgym.validation import FloatArray
 
 
 class View:
-    """From observations to features, and from network outputs to actions, with the base policy in between.
+    """From observations to features, and from answers to actions, with the policy under the agent in between.
 
-    The base policy acts once on each observation, and has its own memory, which is cleared where an episode begins.
+    That policy is asked once for each observation, and has its own memory, which is cleared where an episode begins.
 
     Args:
         processing: Of the agent.
@@ -28,13 +28,13 @@ class View:
 
     Raises:
         UnknownNameError: There is no such policy, or parameter of it.
-        InvalidInputError: The policy cannot be a base policy, see :func:`baselines.agents.base_policy.policy_under`.
+        InvalidInputError: The policy cannot be under the agent, see :func:`baselines.agents.base_policy.policy_under`.
     """
 
     def __init__(self, processing: Processing, scenario: Scenario) -> None:
         self.processing, self.problem = processing, Problem.of(scenario)
-        self._base_policy = policy_under(processing, self.problem)
-        self._outlook = Outlook.of(processing, self._base_policy)
+        self._under = policy_under(processing, self.problem)
+        self._outlook = Outlook.of(processing, self._under)
         self._memory: Memory | None = None
         self._base: FloatArray | None = None
         self._batch: Batch | None = None
@@ -51,7 +51,7 @@ class View:
 
     @property
     def base(self) -> FloatArray | None:
-        """Actions of the base policy for what was last seen, None where there is none. Shape (N, n)."""
+        """Actions of the policy under the agent for what was last seen, None where there is none. Shape (N, n)."""
         return self._base
 
     def see(self, observation: Observation, starting: npt.NDArray[np.bool_]) -> Features:
@@ -64,14 +64,14 @@ class View:
         Returns:
             Shape (N, f).
         """
-        if self._base_policy is not None:
-            action, self._memory = self._base_policy.predict(self._shown(observation), self._memory, starting)
+        if self._under is not None:
+            action, self._memory = self._under.predict(self._shown(observation), self._memory, starting)
             self._base = action.astype(np.float64)
         self._batch = self._seen(observation)
         return self._features(self._batch, self._base)
 
     def glance(self, observation: Observation, rows: npt.NDArray[np.int64]) -> Features:
-        """The features of what some arms show at the end of their episode, where no action follows.
+        """The features of what some arms show at the end of their episode, where no answer follows.
 
         Args:
             observation: With a leading axis of R.
@@ -81,24 +81,24 @@ class View:
             Shape (R, f).
         """
         base = None
-        if self._base_policy is not None and self._memory is not None:
+        if self._under is not None and self._memory is not None:
             memory = tuple(array[rows] for array in self._memory)
-            action, _ = self._base_policy.predict(self._shown(observation), memory)
+            action, _ = self._under.predict(self._shown(observation), memory)
             base = action.astype(np.float64)
         return self._features(self._seen(observation), base)
 
-    def act(self, output: npt.NDArray[Any]) -> FloatArray:
-        """What network outputs for the features last seen mean, as fractions of the velocity limit.
+    def act(self, answer: npt.NDArray[Any]) -> FloatArray:
+        """What answers to the features last seen mean, as fractions of the velocity limit.
 
         Args:
-            output: Shape (N, n).
+            answer: Shape (N, n).
 
         Raises:
             ResetNeededError: Nothing has been seen yet.
         """
         if self._batch is None:
-            raise ResetNeededError("Actions need something that was seen: call reset() first.")
-        return self.processing.action(self.problem, self._batch, output, self._base)
+            raise ResetNeededError("Answers need something that was seen: call reset() first.")
+        return self.processing.action(self.problem, self._batch, answer, self._base)
 
     def _features(self, batch: Batch, base: FloatArray | None) -> Features:
         features = self.processing.features(self.problem, batch, base)
@@ -114,5 +114,5 @@ class View:
         return batch._replace(nominal=self._outlook.of_agent(batch.nominal))
 
     def _shown(self, observation: Observation) -> Observation:
-        """What the base policy sees."""
+        """What the policy under it sees."""
         return {**observation, "nominal": self._outlook.of_policy(observation["nominal"])}
