@@ -220,7 +220,8 @@ def _trusted(source: str, content: bytes) -> TrustedModel:
             data, parameters, _ = load_from_zip_file(io.BytesIO(content), device="cpu")
             if data is None or "policy" not in parameters:
                 raise ValueError("it holds no policy")
-            arguments = {"use_sde": bool(data.get("use_sde")), **data["policy_kwargs"]}
+            # Policies of TD3 and DDPG know no `use_sde`, and it is never true for them.
+            arguments = ({"use_sde": True} if data.get("use_sde") else {}) | data["policy_kwargs"]
             spaces = data["observation_space"], data["action_space"]
             policy = data["policy_class"](*spaces, lambda _: 0.0, **arguments)
             policy.load_state_dict(parameters["policy"])

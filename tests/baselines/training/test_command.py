@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import pathlib
 import subprocess
@@ -185,7 +186,8 @@ def test_out_of_memory_is_named(error, tmp_path, monkeypatch, capsys):
 
 @pytest.mark.parametrize("package", ["torch", "stable_baselines3", "tensorboard"])
 def test_a_missing_extra_is_named(package, tmp_path, monkeypatch, capsys):
-    monkeypatch.setitem(sys.modules, package, None)
+    find = importlib.util.find_spec
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == package else find(name))
     assert main(["ppo", *TINY, "--out", str(tmp_path)]) == 2
     assert capsys.readouterr().err == f'error: Training needs {package}: pip install "ikgym[train]"\n'
 
@@ -193,7 +195,10 @@ def test_a_missing_extra_is_named(package, tmp_path, monkeypatch, capsys):
 def test_the_command_line_is_read_without_torch():
     """Which takes seconds to load, and is an extra."""
     code = (
-        "import sys; sys.modules['torch'] = sys.modules['stable_baselines3'] = None\n"
+        "import sys; from importlib.machinery import PathFinder\n"
+        "def find(name, *others, found=PathFinder.find_spec):\n"
+        "    return None if name.partition('.')[0] in ('torch', 'stable_baselines3') else found(name, *others)\n"
+        "PathFinder.find_spec = find\n"
         "from baselines.training.command import main, parse\n"
         "parse(['sac', '--preset', 'sac', '--out', 'x']); sys.exit(main(['ppo', '--preset', 'smoke', '--out', 'x']))"
     )

@@ -66,13 +66,20 @@ def test_a_run_that_was_stopped_ends_like_one_that_was_not(finished, tmp_path):
     assert_same_run(folder, tmp_path)
 
 
-def test_rare_checkpoints_change_nothing(finished, tmp_path):
-    config, folder, _ = finished
+@pytest.fixture(scope="module")
+def gone_on_with(finished, tmp_path_factory):
+    """The same run with rare checkpoints, stopped after more than its last one, and gone on with."""
+    config, _, _ = finished
+    folder = tmp_path_factory.mktemp("gone-on-with")
     with pytest.raises(StoppedError):
-        train(config, 3, tmp_path, checkpoint_every=1e9, on_segment=stop_after(2))
-    assert about(tmp_path)["training"]["segments"] == 1  # the first one is written at once
-    train(config, 3, tmp_path, resume=True, checkpoint_every=1e9)
-    assert_same_run(folder, tmp_path)
+        train(config, 3, folder, checkpoint_every=1e9, on_segment=stop_after(2))
+    assert about(folder)["training"]["segments"] == 1  # the first one is written at once
+    train(config, 3, folder, resume=True, checkpoint_every=1e9)
+    return folder
+
+
+def test_rare_checkpoints_change_nothing(finished, gone_on_with):
+    assert_same_run(finished[1], gone_on_with)
 
 
 def test_seeds_differ(finished, tmp_path):
@@ -137,13 +144,9 @@ def test_agents_with_state_dependent_exploration_are_exported(tmp_path):
     assert np.exp(np.mean(np.log(costs))) == pytest.approx(cost, rel=1e-3)
 
 
-def test_tensorboard_holds_each_step_once(finished, tmp_path):
+def test_tensorboard_holds_each_step_once(finished, gone_on_with):
     """Also where a run was stopped after it had written more than its checkpoint knows of."""
-    config, folder, _ = finished
-    with pytest.raises(StoppedError):
-        train(config, 3, tmp_path, checkpoint_every=1e9, on_segment=stop_after(2))
-    train(config, 3, tmp_path, resume=True)
-    for each in (folder, tmp_path):
+    for each in (finished[1], gone_on_with):
         events = EventAccumulator(str(each / "tensorboard")).Reload()
         assert [event.step for event in events.Scalars("train/cost")] == [80, 160, 240]
         assert [event.step for event in events.Scalars("validation/cost")] == [0, 160, 240]
@@ -171,9 +174,10 @@ def test_folders_are_not_written_over(finished, tmp_path):
     with pytest.raises(TrainingError, match="choose one"):
         train(config, 3, folder, resume=True, overwrite=True)
     (tmp_path / "mine.txt").write_text("stays")
-    train(config, 3, tmp_path)
+    short = config.replace(segments=1)
+    train(short, 3, tmp_path)
     first = about(tmp_path)
-    train(config, 4, tmp_path, overwrite=True)
+    train(short, 4, tmp_path, overwrite=True)
     assert about(tmp_path)["seed"] == 4
     assert about(tmp_path)["weights_sha256"] != first["weights_sha256"]
     assert (tmp_path / "mine.txt").exists()
@@ -270,7 +274,7 @@ def test_errors_of_the_method_are_passed_on(tmp_path):
 
 
 def test_drafts_of_killed_runs_are_removed(tmp_path):
-    config = tiny("ppo")
+    config = tiny("ppo", segments=1)
     (tmp_path / ".checkpoint.pt.123.tmp").write_text("half")
     train(config, 3, tmp_path)
     assert not list(tmp_path.glob(".*"))
