@@ -1,4 +1,4 @@
-"""The folder of a run: its files, each replaced in one go, and who may go on with them."""
+"""The folder of a run: its files, each replaced in one go, and who may resume them."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Folder:
         """Makes sure that a run may write here.
 
         Args:
-            identity: What must be the same in the `run.json` of a run that is gone on with, part by part.
+            identity: What must be the same in the `run.json` of a run that is resumed, part by part.
             resume: Goes on with what is there.
             overwrite: Replaces what is there.
 

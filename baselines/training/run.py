@@ -1,4 +1,4 @@
-"""One run: the training of one agent with one seed, in one folder, which can be killed at any moment and gone on with.
+"""One run: the training of one agent with one seed, in one folder, which can be killed at any moment and resumed.
 
 | file | what it holds |
 |---|---|

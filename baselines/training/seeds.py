@@ -180,7 +180,7 @@ def _in_processes(runs: SeedRuns, seeds: Sequence[int], workers: int, bar: Bar) 
                 else:
                     bar.advance(seed, *message)
     finally:
-        for _, process in running.values():  # nobody waits for them any more; their folders can be gone on with
+        for _, process in running.values():  # nobody waits for them any more; their folders can be resumed
             process.terminate()
         for _, process in running.values():
             process.join()

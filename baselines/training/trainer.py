@@ -1,4 +1,4 @@
-"""What a method of training has to offer, so that a run of it can be evaluated, taken up again and repeated."""
+"""What a method of training has to offer, so that a run of it can be evaluated, resumed and repeated."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Trainer(Protocol):
 
     Before it is made and before each segment, :func:`randomness.reseed` has seeded the generators of Python,
     NumPy and PyTorch; what else is random comes from :func:`randomness.sequence`. A segment depends on
-    nothing but :meth:`state` and its number: then a run that was killed at any moment, and is taken up from any
+    nothing but :meth:`state` and its number: then a run that was killed at any moment, and is resumed from any
     earlier state, ends with the very weights of one that was not.
 
     Attributes:

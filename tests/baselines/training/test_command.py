@@ -14,8 +14,8 @@ from baselines.training import command, methods, run, seeds
 from baselines.training.command import main, parse
 from baselines.training.config.reinforcement import PPO
 from baselines.training.errors import TrainingError
-from baselines.training.seeds import SeedRuns, train_seeds
-from tests.baselines.training.small import about, timeless, tiny
+from baselines.training.seeds import SeedRuns
+from tests.baselines.training.small import about, timeless
 
 ROOT = pathlib.Path(__file__).parents[3]
 TINY = [
@@ -46,17 +46,20 @@ def test_several_seeds(several, tmp_path, capsys):
     assert printed[1].split()[:2] == ["5", "–"]
 
 
-def test_a_failing_seed_takes_no_other_with_it(several, tmp_path, capfd):
+def test_a_seed_that_fails_or_dies_takes_no_other_with_it(several, tmp_path, monkeypatch, capfd):
     for seed in (0, 1):
         (tmp_path / f"seed-{seed}").mkdir()
     (tmp_path / "seed-0" / "run.json").write_text("{")
-    code = main(["ppo", *TINY, "--seeds", "0", "1", "--workers", "2", "--resume", "--out", str(tmp_path)])
+    monkeypatch.setattr(seeds, "_child", _dies_with_seed_7)
+    code = main(["ppo", *TINY, "--seeds", "7", "0", "1", "--workers", "2", "--resume", "--out", str(tmp_path)])
     assert code == 2
     assert about(tmp_path / "seed-1")["weights_sha256"] == about(several[0] / "seed-1")["weights_sha256"]
     printed = capfd.readouterr()
     assert "   0  failed" in printed.out
+    assert "   7  failed" in printed.out
     assert "error: seed 0: " in printed.err
     assert "run.json is damaged" in printed.err
+    assert "error: seed 7: its process has died (signal SIGKILL); go on with --resume" in printed.err
 
 
 def test_repeat(several, tmp_path, capsys):
@@ -234,16 +237,6 @@ def test_ctrl_c(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(command, "train_seeds", interrupted)
     assert main(["ppo", *TINY, "--out", str(tmp_path)]) == 130
     assert f"is in {tmp_path}; go on with --resume" in capsys.readouterr().err
-
-
-def test_a_process_that_dies_is_named(tmp_path, monkeypatch):
-    """Another seed's process is not disturbed."""
-    config = tiny("ppo")
-    monkeypatch.setattr(seeds, "_child", _dies_with_seed_7)
-    seven, eight = train_seeds(SeedRuns(config, tmp_path), [7, 8], workers=1, progress=False)
-    assert "its process has died (signal SIGKILL)" in seven.error
-    assert not eight.error
-    assert about(tmp_path / "seed-8")["weights_sha256"] == eight.weights_sha256
 
 
 def _dies_with_seed_7(job, seed, connection, child=seeds._child):
