@@ -10,7 +10,15 @@ from typing import Annotated, Any, ClassVar, Literal, Self, get_args
 import tyro
 
 from baselines.agents.features import Processing
-from baselines.training.config.limits import MOST_ARMS, MOST_LAYERS, MOST_NEURONS, MOST_STEPS_AHEAD, count
+from baselines.training.config.limits import (
+    MOST_ARMS,
+    MOST_LAYERS,
+    MOST_NEURONS,
+    MOST_RATE,
+    MOST_STEPS_AHEAD,
+    between,
+    count,
+)
 from ikgym import scenarios, tasks
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
@@ -155,6 +163,7 @@ class Annealed(Config):
         super().__post_init__()
         for name in ("learning_rate", "learning_rate_end"):
             self._set(name, number(name, getattr(self, name), above=0.0))
+            between(name, getattr(self, name), 0.0, MOST_RATE)
 
     def learning_rate_of(self, segment: int) -> float:
         """The learning rate of a segment, counted from 0."""

@@ -11,6 +11,7 @@ MOST_LAYERS, MOST_NEURONS = 10, 2048
 MOST_STEPS_AHEAD = 100_000
 MOST_TRANSITIONS = 10_000_000
 MOST_BATCH = 1_000_000
+MOST_RATE = 1e30  # weights are float32
 
 
 def count(name: str, value: int, *, at_most: int, at_least: int = 1) -> int:

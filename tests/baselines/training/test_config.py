@@ -40,6 +40,7 @@ def test_json_holds_all_of_it(kind):
         (PPO, {"keep_best": "yes"}, InvalidInputError, "keep_best: expected true or false"),
         (PPO, {"gamma": 1.5}, InvalidInputError, "gamma: expected a number above 0, at most 1"),
         (PPO, {"learning_rate": -1}, InvalidInputError, "learning_rate: expected a finite number above 0"),
+        (PPO, {"learning_rate": 1e300}, InvalidInputError, r"learning_rate: expected a number from 0 to 1e\+30"),
         (PPO, {"target_kl": 0}, InvalidInputError, "target_kl"),
         (SAC, {"ent_coef": "auto_0"}, InvalidInputError, "ent_coef: expected auto, auto_X or a number"),
         (
