@@ -13,7 +13,7 @@ import torch
 from baselines.files import write
 from baselines.training.errors import TrainingError
 
-#: Changes when files of before can no longer be gone on with.
+#: Changes when earlier files can no longer be resumed.
 FORMAT = 1
 
 

@@ -1,8 +1,11 @@
-"""The command line of `train.py`."""
+"""The command line of `train.py` and `ikgym train`."""
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
+import importlib.util
+import itertools
 import pathlib
 import shlex
 import sys
@@ -12,13 +15,14 @@ from typing import Annotated, Any, Generic, TypeVar, Union
 
 import tyro
 
+from baselines import command as shared
 from baselines import registry
 from baselines.training import methods, presets
-from baselines.training.config.common import SHAPE, Config
+from baselines.training.config.base import SHAPE, Config
 from baselines.training.errors import TrainingError
-from baselines.training.seeds import Job, Outcome, train_seeds
+from baselines.training.seeds import SeedResult, SeedRuns, train_seeds
 from ikgym import scenarios
-from ikgym.exceptions import IkgymError
+from ikgym.exceptions import InvalidInputError, MissingDependencyError
 from ikgym.validation import whole_number
 
 PROGRAM = "train.py"
@@ -35,11 +39,11 @@ class Options:
     workers: Annotated[int, tyro.conf.arg(metavar="N")] = 1
     """Processes that train at the same time, one seed each."""
     preset: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
-    """Options of a preset, or of a file that ends in .toml; those on the command line go first."""
+    """Options of a preset, or of a file that ends in .toml; those on the command line take precedence."""
     resume: bool = False
-    """Go on with the runs in the folder, to the same end as if they had never been stopped."""
+    """Go on with the runs in the folder; they end with the same weights as if they had never been stopped."""
     overwrite: bool = False
-    """Throw away the runs in the folder."""
+    """Replace the runs in the folder."""
     checkpoint_every: Annotated[float, tyro.conf.arg(metavar="SECONDS")] = 15.0
     """Shortest time between two checkpoints; there are none within a segment."""
     progress: bool = True
@@ -68,7 +72,7 @@ class Repeat:
     resume: bool = False
     """Go on with the repetition in the folder."""
     overwrite: bool = False
-    """Throw away the run in the folder."""
+    """Replace the run in the folder."""
     checkpoint_every: Annotated[float, tyro.conf.arg(metavar="SECONDS")] = 15.0
     """Shortest time between two checkpoints."""
     progress: bool = True
@@ -77,9 +81,10 @@ class Repeat:
 
 def manual() -> str:
     """The text of ``--help`` above the options."""
+    prog = _program()
     return f"""\
-Trains agents: networks that answer an observation with joint velocities, alone or as a correction of another policy.
-Each method has options of its own: {PROGRAM} METHOD --help
+Trains agents: networks from observations to joint velocities, alone or as residual policies on a base policy.
+Each method has options of its own: {prog} METHOD --help
 
 {_listing("Methods", methods.METHODS)}
 
@@ -90,23 +95,24 @@ Each method has options of its own: {PROGRAM} METHOD --help
 {_listing("Policies for --base-policy", (name for name in registry.names() if not registry.get(name).reference))}
 
 Examples:
-  python {PROGRAM} ppo --preset smoke --out runs/smoke
-  python {PROGRAM} ppo --base-policy dls:damping=1e-2 --action-scale 0.5 --seeds 0 1 2 3 4 --workers 2 --out runs/over-dls
-  python {PROGRAM} imitate --preset residual --seeds 0 1 2 3 4 --workers 2 --out runs/residual
-  python {PROGRAM} ppo --preset finetune --init runs/apg/seed-0/model.zip --out runs/finer
-  python {PROGRAM} ppo --preset smoke --out runs/smoke --resume
-  python {PROGRAM} repeat runs/smoke/seed-0/run.json --out runs/again
+  {prog} ppo --preset smoke --out runs/smoke
+  {prog} ppo --base-policy dls:damping=1e-2 --action-scale 0.5 --seeds 0 1 2 3 4 --workers 2 --out runs/residual-dls
+  {prog} imitate --preset residual --seeds 0 1 2 3 4 --workers 2 --out runs/residual
+  {prog} ppo --preset finetune --init runs/apg/seed-0/model.safetensors --out runs/finer
+  {prog} ppo --preset smoke --out runs/smoke --resume
+  {prog} repeat runs/smoke/seed-0/run.json --out runs/again
 
 Files in the folder of a run, each replaced in one go, so that it may be stopped or killed at any time:
   run.json           all that is needed to repeat it, its validation, what it has cost, the hash of its final weights
   history.json       a row a segment
   tensorboard/       the same, for: tensorboard --logdir DIR
   checkpoint.pt      where it stands, for --resume
-  model.zip          at the end, the kept model, for Stable-Baselines3 and for --init
-  agent.safetensors  at the end, the same agent, for: python -m baselines.evaluate --policies agent:FILE
+  model.safetensors  at the end, the kept model with its critics, for --init
+  model.zip          at the end, the same model, for Stable-Baselines3
+  agent.safetensors  at the end, its actor, for --init and for: python -m baselines.evaluate --policies agent:FILE
 
-Agents are trained on the seeds of the split "train" and judged on those of "validation"; those of "test" are not
-touched. Where there is a reference, the cost ratio is the geometric mean of the costs over those of rhc_foresight."""
+Agents are trained on the seeds of the split "train" and validated on those of "validation"; those of "test" are not
+used. Where there is a reference, the cost ratio is the geometric mean of the costs over those of rhc_foresight."""
 
 
 def _listing(title: str, names: Iterable[str]) -> str:
@@ -125,20 +131,37 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     arguments = sys.argv[1:] if arguments is None else list(arguments)
     out: pathlib.Path | None = None
-    try:
+
+    def work() -> int:
+        nonlocal out
         command, given = parse(arguments)
+        _require_extra()
         if isinstance(command, Repeat):
             out = command.out
             return _repeat(command)
         out = command.options.out
-        return _train(command, given, shlex.join(["python", PROGRAM, *arguments]))
-    except IkgymError as e:
-        print(f"error: {' '.join(str(e).split())}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
+        return _train(command, given, shlex.join([*_program().split(), *arguments]))
+
+    def stopped() -> str:
         kept = "" if out is None else f" What was done up to the last checkpoint is in {out}; go on with --resume."
-        print(f"\nStopped.{kept}", file=sys.stderr)
-        return 130
+        return f"Stopped.{kept}"
+
+    return shared.run(work, stopped)
+
+
+def _program() -> str:
+    return shared.program("train", f"python {PROGRAM}")
+
+
+def _require_extra() -> None:
+    """Insists on the packages that only the training needs.
+
+    Raises:
+        MissingDependencyError: One is missing.
+    """
+    missing = [name for name in ("torch", "stable_baselines3", "tensorboard") if importlib.util.find_spec(name) is None]
+    if missing:
+        raise MissingDependencyError(f'Training needs {", ".join(missing)}: pip install "ikgym[train]"')
 
 
 def parse(arguments: Sequence[str]) -> tuple[Command[Any] | Repeat, frozenset[str]]:
@@ -149,8 +172,13 @@ def parse(arguments: Sequence[str]) -> tuple[Command[Any] | Repeat, frozenset[st
 
     Raises:
         UnknownNameError: There is no such preset, or the method has no option that the preset gives.
-        InvalidInputError: A value is refused.
+        InvalidInputError: A value is refused, or there is no method.
+        SystemExit: With 0 after ``--help``, with 2 where the options are none.
     """
+    if not arguments:
+        with contextlib.suppress(SystemExit):
+            parse(["--help"])
+        raise InvalidInputError(f"expected a method, one of {', '.join(methods.METHODS)}, or repeat; got none.")
     chosen = next((argument for argument in arguments if argument in methods.METHODS), None)
     preset = _value_of("--preset", arguments)
     given = {name for name in SHAPE if _value_of(f"--{name.replace('_', '-')}", arguments) is not None}
@@ -166,18 +194,13 @@ def parse(arguments: Sequence[str]) -> tuple[Command[Any] | Repeat, frozenset[st
         given |= of_preset
     kinds.append(Annotated[Repeat, tyro.conf.subcommand("repeat")])
     any_of_them: Any = Union[tuple(kinds)]  # noqa: UP007  # made at run time
-    command: Command[Any] | Repeat = tyro.cli(
-        any_of_them,
-        prog=f"python {PROGRAM}",
-        description=manual(),
-        args=arguments,
-    )
+    command: Command[Any] | Repeat = shared.parse(any_of_them, arguments, prog=_program(), description=manual())
     return command, frozenset(given)
 
 
 def _value_of(option: str, arguments: Sequence[str]) -> str | None:
     """The value of an option that is needed before the others can be read."""
-    for argument, following in zip(arguments, [*arguments[1:], ""], strict=True):
+    for argument, following in itertools.zip_longest(arguments, arguments[1:], fillvalue=""):
         name, equals, value = argument.partition("=")
         if name.replace("_", "-") == option:
             return value if equals else following
@@ -186,14 +209,14 @@ def _value_of(option: str, arguments: Sequence[str]) -> str | None:
 
 def _train(command: Command[Any], given: frozenset[str], text: str) -> int:
     # PyTorch takes seconds to load, and --help needs none.
-    from baselines.training.trainers.initial import settle
+    from baselines.training.trainers.initial_weights import inherit
 
     options = command.options
     seeds = tuple(dict.fromkeys(whole_number("seeds", seed, at_least=0) for seed in options.seeds))
     if not seeds:
         raise TrainingError("seeds: expected at least one.")
-    job = Job(
-        settle(command.config, given),
+    runs = SeedRuns(
+        inherit(command.config, given),
         options.out,
         resume=options.resume,
         overwrite=options.overwrite,
@@ -201,13 +224,13 @@ def _train(command: Command[Any], given: frozenset[str], text: str) -> int:
         command=text,
     )
     workers = whole_number("workers", options.workers, at_least=1)
-    outcomes = train_seeds(job, seeds, workers=workers, progress=options.progress)
-    print(table(outcomes))
-    for outcome in outcomes:
-        if outcome.error:
-            print(f"error: seed {outcome.seed}: {outcome.error}", file=sys.stderr)
+    results = train_seeds(runs, seeds, workers=workers, progress=options.progress)
+    print(table(results))
+    for result in results:
+        if result.error:
+            print(f"error: seed {result.seed}: {result.error}", file=sys.stderr)
     print(f"\nwritten to {options.out}")
-    return 2 if any(outcome.error for outcome in outcomes) else 0
+    return 2 if any(result.error for result in results) else 0
 
 
 def _repeat(command: Repeat) -> int:
@@ -218,22 +241,22 @@ def _repeat(command: Repeat) -> int:
     if not wanted:
         raise TrainingError(f"{command.run} is of a run that has not ended: finish it with --resume.")
     config = methods.get(about["method"]).config.from_json(about["config"])
-    job = Job(
+    runs = SeedRuns(
         config,
         command.out,
         resume=command.resume,
         overwrite=command.overwrite,
         checkpoint_every=command.checkpoint_every,
-        command=shlex.join(["python", PROGRAM, "repeat", str(command.run)]),
+        command=shlex.join([*_program().split(), "repeat", str(command.run)]),
     )
-    (outcome,) = train_seeds(job, [about["seed"]], workers=1, progress=command.progress)
-    if outcome.error:
-        raise TrainingError(outcome.error)
-    if outcome.weights_sha256 == wanted:
+    (result,) = train_seeds(runs, [about["seed"]], workers=1, progress=command.progress)
+    if result.error:
+        raise TrainingError(result.error)
+    if result.weights_sha256 == wanted:
         print(f"The same final weights, bit for bit: {wanted}")
         return 0
-    print(f"Other final weights: expected {wanted}, got {outcome.weights_sha256}.")
-    for line in _reasons(about, read_run(job.folder(about["seed"]) / "run.json")):
+    print(f"Other final weights: expected {wanted}, got {result.weights_sha256}.")
+    for line in _reasons(about, read_run(runs.folder(about["seed"]) / "run.json")):
         print(line)
     return 1
 
@@ -245,16 +268,14 @@ def _reasons(there: dict[str, Any], here: dict[str, Any]) -> Iterable[str]:
             yield f"  {part}: {there.get(part)} there, {here.get(part)} here"
 
 
-def table(outcomes: Sequence[Outcome]) -> str:
+def table(results: Sequence[SeedResult]) -> str:
     """Seeds and their scores, as text."""
     lines = [f"{'seed':>4}  {'cost ratio':>8}  {'cost':>10}  {'worst':>8}  {'lost':>6}"]
-    for outcome in outcomes:
-        if outcome.score is None:
-            lines.append(f"{outcome.seed:>4}  failed")
+    for result in results:
+        if result.score is None:
+            lines.append(f"{result.seed:>4}  failed")
             continue
-        score = outcome.score
+        score = result.score
         cost_ratio = "–" if score.cost_ratio is None else f"{score.cost_ratio:.4f}"
-        lines.append(
-            f"{outcome.seed:>4}  {cost_ratio:>8}  {score.cost:>10.5g}  {score.worst:>8.4g}  {score.lost:>6.1%}"
-        )
+        lines.append(f"{result.seed:>4}  {cost_ratio:>8}  {score.cost:>10.5g}  {score.worst:>8.4g}  {score.lost:>6.1%}")
     return "\n".join(lines)

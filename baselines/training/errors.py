@@ -6,4 +6,4 @@ from ikgym.exceptions import IkgymError
 
 
 class TrainingError(IkgymError):
-    """A run cannot be begun, gone on with or repeated, or its numbers are no longer finite."""
+    """A run cannot be begun, resumed or repeated, or its numbers are no longer finite."""

@@ -1,4 +1,4 @@
-"""The folder of a run: its files, each replaced in one go, and who may go on with them."""
+"""The folder of a run: its files, each replaced in one go, and who may resume them."""
 
 from __future__ import annotations
 
@@ -8,8 +8,12 @@ from collections.abc import Mapping
 from typing import Any
 
 from baselines.files import write
-from baselines.training.config.common import differences
+from baselines.training.config.base import differences
 from baselines.training.errors import TrainingError
+from ikgym.validation import whole_number
+
+#: The version of `run.json`. Its configuration had other names before 2.
+FORMAT = 2
 
 
 class Folder:
@@ -24,7 +28,8 @@ class Folder:
         self.run = path / "run.json"
         self.history = path / "history.json"
         self.checkpoint = path / "checkpoint.pt"
-        self.model = path / "model.zip"
+        self.zip = path / "model.zip"
+        self.model = path / "model.safetensors"
         self.agent = path / "agent.safetensors"
         self.tensorboard = path / "tensorboard"
 
@@ -32,9 +37,9 @@ class Folder:
         """Makes sure that a run may write here.
 
         Args:
-            identity: What must be the same in the `run.json` of a run that is gone on with, part by part.
+            identity: What must be the same in the `run.json` of a run that is resumed, part by part.
             resume: Goes on with what is there.
-            overwrite: Throws away what is there.
+            overwrite: Replaces what is there.
 
         Returns:
             The `run.json` of the run to go on with, None where there is none.
@@ -44,11 +49,11 @@ class Folder:
                 folder cannot be written to.
         """
         if resume and overwrite:
-            raise TrainingError("--resume keeps the run that is there, --overwrite throws it away: choose one.")
+            raise TrainingError("--resume keeps the run that is there, --overwrite replaces it: choose one.")
         there = self.read() if self.run.exists() and not overwrite else None
         if there is not None and not resume:
             raise TrainingError(
-                f"{self.run} is there already: go on with it by --resume, throw it away by --overwrite, or choose "
+                f"{self.run} is there already: go on with it by --resume, replace it by --overwrite, or choose "
                 "another directory."
             )
         if there is not None:
@@ -91,7 +96,7 @@ class Folder:
     def _clear(self) -> None:
         """Removes what a run writes, and nothing else that may lie in the folder."""
         # First what says that there is a run: whoever is killed on the way leaves no run that is half there.
-        for file in (self.run, self.checkpoint, self.history, self.model, self.agent):
+        for file in (self.run, self.checkpoint, self.history, self.zip, self.model, self.agent):
             file.unlink(missing_ok=True)
         for file in self.tensorboard.glob("events.out.tfevents.*"):
             file.unlink(missing_ok=True)
@@ -101,7 +106,8 @@ def read_run(file: pathlib.Path) -> dict[str, Any]:
     """The content of a `run.json`.
 
     Raises:
-        TrainingError: It cannot be read, or is none.
+        TrainingError: It cannot be read, is none, or is of another version.
+        InvalidInputError: Its seed is none.
     """
     try:
         content = json.loads(file.read_text(encoding="utf-8"))
@@ -111,4 +117,14 @@ def read_run(file: pathlib.Path) -> dict[str, Any]:
         raise TrainingError(f"{file} is damaged: {e}.") from None
     if not isinstance(content, dict) or not {"method", "seed", "config"} <= content.keys():
         raise TrainingError(f"{file} is no run.json of a training.")
+    if content.get("format") != FORMAT:
+        versions = content.get("versions")
+        version = versions.get("ikgym") if isinstance(versions, dict) else None
+        raise TrainingError(
+            f"{file} was written by ikgym {version or 'of another version'}, whose options have other names: go on "
+            f'with it by that version, pip install "ikgym=={version or "0.1.0"}", or train anew.'
+        )
+    if not isinstance(content["config"], dict) or not isinstance(content["method"], str):
+        raise TrainingError(f"{file} is damaged: expected a method, and its config by name.")
+    whole_number("seed", content["seed"], at_least=0)
     return content

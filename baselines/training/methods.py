@@ -6,8 +6,9 @@ import importlib
 from collections.abc import Callable
 from typing import NamedTuple
 
-from baselines.training.config.common import PPO, SAC, TD3, Config
-from baselines.training.config.direct import APG, Imitate
+from baselines.training.config.actor_only import APG, Imitate
+from baselines.training.config.base import Config
+from baselines.training.config.reinforcement import PPO, SAC, TD3
 from baselines.training.trainer import Trainer
 from ikgym.exceptions import UnknownNameError
 from ikgym.scenarios import Scenario
@@ -35,9 +36,9 @@ class Method(NamedTuple):
 
 
 METHODS: dict[str, Method] = {
-    "ppo": Method(PPO, ("baselines.training.trainers.sb3", "PPOTrainer")),
-    "sac": Method(SAC, ("baselines.training.trainers.sb3", "SACTrainer")),
-    "td3": Method(TD3, ("baselines.training.trainers.sb3", "TD3Trainer")),
+    "ppo": Method(PPO, ("baselines.training.trainers.ppo", "PPOTrainer")),
+    "sac": Method(SAC, ("baselines.training.trainers.off_policy", "SACTrainer")),
+    "td3": Method(TD3, ("baselines.training.trainers.off_policy", "TD3Trainer")),
     "imitate": Method(Imitate, ("baselines.training.trainers.imitate", "ImitateTrainer")),
     "apg": Method(APG, ("baselines.training.trainers.apg", "APGTrainer")),
 }

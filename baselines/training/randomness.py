@@ -53,13 +53,13 @@ def episode_seed(seed: int, segment: int, rows: int) -> int:
     """
     split = scenarios.SPLITS["train"]
     if rows > len(split):
-        raise InvalidInputError(f"envs: expected at most {len(split)}, got {rows}.")
+        raise InvalidInputError(f"n_envs: expected at most {len(split)}, got {rows}.")
     generator = np.random.default_rng(sequence(seed, segment).spawn(1)[0])
     return int(generator.integers(split.start, split.stop - rows, endpoint=True))
 
 
 @contextlib.contextmanager
-def settled() -> Iterator[None]:
+def deterministic_torch() -> Iterator[None]:
     """One thread of PyTorch, and only algorithms that give the same each time; as before at the end.
 
     Networks this small are computed faster by one thread, and several seeds have a core each.

@@ -1,4 +1,4 @@
-"""One run: the training of one agent with one seed, in one folder, which can be killed at any moment and gone on with.
+"""One run: the training of one agent with one seed, in one folder, which can be killed at any moment and resumed.
 
 | file | what it holds |
 |---|---|
@@ -7,6 +7,7 @@
 | `checkpoint.pt` | where the run stands, to go on from |
 | `tensorboard/` | the history, for TensorBoard |
 | `model.zip` | at the end: the kept model, for Stable-Baselines3 |
+| `model.safetensors` | at the end: all its weights, for ``--init``; cannot run code |
 | `agent.safetensors` | at the end: the same agent, for :mod:`baselines` |
 """
 
@@ -35,21 +36,22 @@ from baselines.evaluation.machine import describe
 from baselines.fingerprints import fingerprint
 from baselines.training import checkpoint, methods
 from baselines.training.checkpoint import Checkpoint
-from baselines.training.config.common import Config
+from baselines.training.config.base import Config
 from baselines.training.errors import TrainingError
-from baselines.training.folder import Folder
-from baselines.training.randomness import reseed, settled
-from baselines.training.trainer import Metrics, Trainer
+from baselines.training.folder import FORMAT, Folder
+from baselines.training.randomness import deterministic_torch, reseed
+from baselines.training.score import Score
+from baselines.training.trainer import SegmentMetrics, Trainer
 from baselines.training.trainers.export import export
-from baselines.training.trainers.models import answers, weights_hash
-from baselines.training.validation import Score, validate
+from baselines.training.trainers.models import network_outputs, weights_hash
+from baselines.training.validation import validate
 from ikgym.scenarios import Scenario
 
 #: No weight of a network that has learned anything is this large.
 LARGEST = 1e9
 
 #: Called after each segment with how many are done, and the last score.
-Tick = Callable[[int, Score | None], object]
+OnSegment = Callable[[int, Score | None], object]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -76,7 +78,7 @@ def train(
     overwrite: bool = False,
     checkpoint_every: float = 0.0,
     command: str = "baselines.training.run.train(…)",
-    tick: Tick | None = None,
+    on_segment: OnSegment | None = None,
 ) -> Result:
     """Trains an agent.
 
@@ -85,19 +87,19 @@ def train(
         seed: From which all that is random follows.
         path: The folder of the run.
         resume: Goes on with what is in the folder, if there is something.
-        overwrite: Throws away what is in the folder.
+        overwrite: Replaces what is in the folder.
         checkpoint_every: Shortest time between two checkpoints, in [s]; they change nothing but what is lost when the
             run is killed.
         command: What to say in `run.json` that the run was begun by.
-        tick: See :data:`Tick`.
+        on_segment: See :data:`OnSegment`.
 
     Raises:
         IkgymError: What training, validation or files can go wrong with.
     """
-    with settled():
+    with deterministic_torch():
         run = _Run(config, seed, Folder(path), command)
         run.begin(resume=resume, overwrite=overwrite)
-        return run.go(checkpoint_every, tick)
+        return run.go(checkpoint_every, on_segment)
 
 
 class _Run:
@@ -107,6 +109,7 @@ class _Run:
         self._at = Checkpoint()
         self._clock, self._core = time.monotonic(), time.process_time()
         self._about: dict[str, Any] = {
+            "format": FORMAT,
             "method": config.method,
             "seed": seed,
             "status": "running",
@@ -132,7 +135,7 @@ class _Run:
                     self._trainer.restore(self._at.trainer)
         self._write_about()
 
-    def go(self, checkpoint_every: float, tick: Tick | None) -> Result:
+    def go(self, checkpoint_every: float, on_segment: OnSegment | None) -> Result:
         with self._board() as board:
             if not self._at.history:
                 self._note(0, {}, board)
@@ -148,12 +151,12 @@ class _Run:
                 if self._at.segments == self._trainer.segments or time.monotonic() - saved >= checkpoint_every:
                     self._save()
                     saved = time.monotonic()
-                if tick is not None:
-                    tick(self._at.segments, score)
+                if on_segment is not None:
+                    on_segment(self._at.segments, score)
         return self._finish()
 
-    def _segment(self, number: int) -> Metrics:
-        """A segment of the trainer, and a clear word where its numbers run away."""
+    def _segment(self, number: int) -> SegmentMetrics:
+        """A segment of the trainer, and a clear message where its weights diverge."""
         try:
             metrics = self._trainer.segment(number)
         except (ValueError, RuntimeError):
@@ -166,7 +169,7 @@ class _Run:
             f"The weights were no longer finite in segment {number + 1}: try a lower learning rate, or another seed."
         )
 
-    def _note(self, done: int, metrics: Metrics, board: SummaryWriter) -> Score | None:
+    def _note(self, done: int, metrics: SegmentMetrics, board: SummaryWriter) -> Score | None:
         """Adds a row to the history, with a score where one is due."""
         config, trainer = self._config, self._trainer
         row: dict[str, Any] = {"segment": done, "steps": trainer.steps}
@@ -175,7 +178,7 @@ class _Run:
         if done % config.evaluate_every == 0 or done == trainer.segments:
             model = trainer.model
             score = validate(
-                lambda features: answers(model, features),
+                lambda features: network_outputs(model, features),
                 trainer.processing,
                 self._scenario,
                 config.validation_episodes,
@@ -204,7 +207,7 @@ class _Run:
         self._about["weights_sha256"] = final
         self._about["kept"] = {**kept, "weights_sha256": weights_hash(model), "validation": last}
         content = self._content()
-        export(model, self._folder, self._trainer.processing, self._scenario, content)
+        export(self._trainer, config.activation, self._folder, self._scenario, content)
         self._folder.write_json(self._folder.run, content)
         return Result(self._folder.path, final, Score(**last))
 

@@ -14,13 +14,13 @@ from multiprocessing.context import SpawnProcess
 
 from tqdm import tqdm
 
-from baselines.training.config.common import Config
-from baselines.training.validation import Score
+from baselines.training.config.base import Config
+from baselines.training.score import Score
 from ikgym.exceptions import IkgymError
 
 
 @dataclasses.dataclass(frozen=True)
-class Job:
+class SeedRuns:
     """What all seeds have in common.
 
     Args:
@@ -45,7 +45,7 @@ class Job:
 
 
 @dataclasses.dataclass(frozen=True)
-class Outcome:
+class SeedResult:
     """What came of a seed.
 
     Args:
@@ -59,6 +59,10 @@ class Outcome:
     score: Score | None = None
     weights_sha256: str = ""
     error: str = ""
+
+
+#: What takes memory.
+LESS_MEMORY = "Choose fewer arms (--n-envs), a smaller --buffer-size, --batch-size or network (--hidden)."
 
 
 class Bar:
@@ -77,7 +81,7 @@ class Bar:
         self._done: dict[int, int] = {}
         self._scores: dict[int, str] = {}
 
-    def tick(self, seed: int, done: int, score: Score | None) -> None:
+    def advance(self, seed: int, done: int, score: Score | None) -> None:
         """Segments that a seed has done, and its last score."""
         if score is not None:
             number = score.cost if score.cost_ratio is None else score.cost_ratio
@@ -93,14 +97,14 @@ class Bar:
         self._bar.close()
 
 
-def train_seeds(job: Job, seeds: Sequence[int], *, workers: int, progress: bool) -> list[Outcome]:
+def train_seeds(runs: SeedRuns, seeds: Sequence[int], *, workers: int, progress: bool) -> list[SeedResult]:
     """Trains one agent a seed.
 
     One seed is trained in this process; several in processes of their own, so that a seed that fails or dies takes no
     other with it.
 
     Args:
-        job: What they have in common.
+        runs: What they have in common.
         seeds: One run each.
         workers: Processes at a time.
         progress: Whether to show a bar on stderr.
@@ -108,52 +112,56 @@ def train_seeds(job: Job, seeds: Sequence[int], *, workers: int, progress: bool)
     Returns:
         What came of each, in the order of the seeds.
     """
-    bar = Bar(job.config.segments, len(seeds), show=progress)
+    bar = Bar(runs.config.segments, len(seeds), show=progress)
     try:
         if len(seeds) == 1:
-            return [_train(job, seeds[0], bar)]
-        return _in_processes(job, seeds, workers, bar)
+            return [_train(runs, seeds[0], bar)]
+        return _in_processes(runs, seeds, workers, bar)
     finally:
         bar.close()
 
 
-def _train(job: Job, seed: int, to: Bar | Connection) -> Outcome:
+def _train(runs: SeedRuns, seed: int, to: Bar | Connection) -> SeedResult:
     # PyTorch takes seconds to load, which the parent of processes has no need to do.
     from baselines.training.run import train
 
-    def tick(done: int, score: Score | None) -> None:
+    def on_segment(done: int, score: Score | None) -> None:
         if isinstance(to, Bar):
-            to.tick(seed, done, score)
+            to.advance(seed, done, score)
         else:
             to.send((done, score))
 
     try:
         result = train(
-            job.config,
+            runs.config,
             seed,
-            job.folder(seed),
-            resume=job.resume,
-            overwrite=job.overwrite,
-            checkpoint_every=job.checkpoint_every,
-            command=job.command,
-            tick=tick,
+            runs.folder(seed),
+            resume=runs.resume,
+            overwrite=runs.overwrite,
+            checkpoint_every=runs.checkpoint_every,
+            command=runs.command,
+            on_segment=on_segment,
         )
     except IkgymError as e:
-        return Outcome(seed, error=" ".join(str(e).split()))
-    return Outcome(seed, result.score, result.weights_sha256)
+        return SeedResult(seed, error=" ".join(str(e).split()))
+    except (MemoryError, RuntimeError) as e:
+        if isinstance(e, RuntimeError) and "allocate memory" not in str(e):  # PyTorch's words
+            raise
+        return SeedResult(seed, error=f"Out of memory: {' '.join(str(e).split())[:200]}. {LESS_MEMORY}")
+    return SeedResult(seed, result.score, result.weights_sha256)
 
 
-def _in_processes(job: Job, seeds: Sequence[int], workers: int, bar: Bar) -> list[Outcome]:
+def _in_processes(runs: SeedRuns, seeds: Sequence[int], workers: int, bar: Bar) -> list[SeedResult]:
     # Spawned, not forked: a fork would inherit numba's and the BLAS's threads without their locks' owners.
     context = multiprocessing.get_context("spawn")
-    waiting, outcomes = list(seeds), dict[int, Outcome]()
+    waiting, results = list(seeds), dict[int, SeedResult]()
     running: dict[Connection, tuple[int, SpawnProcess]] = {}
     try:
         while waiting or running:
             while waiting and len(running) < workers:
                 seed = waiting.pop(0)
                 here, there = context.Pipe(duplex=False)
-                process = context.Process(target=_child, args=(job, seed, there), daemon=True)
+                process = context.Process(target=_child, args=(runs, seed, there), daemon=True)
                 process.start()
                 there.close()
                 running[here] = seed, process
@@ -164,30 +172,30 @@ def _in_processes(job: Job, seeds: Sequence[int], workers: int, bar: Bar) -> lis
                 except EOFError:
                     process.join()
                     died = f"its process has died ({_ending(process.exitcode)}); go on with --resume"
-                    outcomes.setdefault(seed, Outcome(seed, error=died))
+                    results.setdefault(seed, SeedResult(seed, error=died))
                     del running[connection]
                     continue
-                if isinstance(message, Outcome):
-                    outcomes[seed] = message
+                if isinstance(message, SeedResult):
+                    results[seed] = message
                 else:
-                    bar.tick(seed, *message)
+                    bar.advance(seed, *message)
     finally:
-        for _, process in running.values():  # nobody waits for them any more; their folders can be gone on with
+        for _, process in running.values():  # nobody waits for them any more; their folders can be resumed
             process.terminate()
         for _, process in running.values():
             process.join()
-    return [outcomes[seed] for seed in seeds]
+    return [results[seed] for seed in seeds]
 
 
-def _child(job: Job, seed: int, connection: Connection) -> None:
+def _child(runs: SeedRuns, seed: int, connection: Connection) -> None:
     """The life of a process."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C ends it without a traceback
     try:
-        outcome = _train(job, seed, connection)
+        result = _train(runs, seed, connection)
     except Exception as e:
         traceback.print_exc()
-        outcome = Outcome(seed, error=f"{type(e).__name__}: {' '.join(str(e).split())}")
-    connection.send(outcome)
+        result = SeedResult(seed, error=f"{type(e).__name__}: {' '.join(str(e).split())}")
+    connection.send(result)
 
 
 def _ending(code: int | None) -> str:

@@ -1,30 +1,31 @@
-"""What a method of training has to offer, so that a run of it can be evaluated, taken up again and repeated."""
+"""What a method of training has to offer, so that a run of it can be evaluated, resumed and repeated."""
 
 from __future__ import annotations
 
-from typing import Any, Protocol
-
-from stable_baselines3.common.base_class import BaseAlgorithm
+from typing import TYPE_CHECKING, Any, Protocol
 
 from baselines.agents.features import Processing
 
+if TYPE_CHECKING:  # the command line is read without it
+    from stable_baselines3.common.base_class import BaseAlgorithm
+
 #: What a trainer says of a segment, by name.
-Metrics = dict[str, float]
+SegmentMetrics = dict[str, float]
 
 
 class Trainer(Protocol):
-    """A run in the making.
+    """A run that goes on segment by segment.
 
     Before it is made and before each segment, :func:`randomness.reseed` has seeded the generators of Python,
     NumPy and PyTorch; what else is random comes from :func:`randomness.sequence`. A segment depends on
-    nothing but :meth:`state` and its number: then a run that was killed at any moment, and is taken up from any
+    nothing but :meth:`state` and its number: then a run that was killed at any moment, and is resumed from any
     earlier state, ends with the very weights of one that was not.
 
     Attributes:
         model: An ordinary model of Stable-Baselines3; its observations are the features of `processing`.
-        processing: What the agent sees, and what its answers mean.
+        processing: What the agent sees, and what the outputs of its network mean.
         segments: The number of segments.
-        steps: Steps that arms have been moved by so far, those of all arms together.
+        steps: Steps of the environment so far, those of all arms together.
     """
 
     model: BaseAlgorithm
@@ -33,9 +34,9 @@ class Trainer(Protocol):
 
     @property
     def steps(self) -> int:
-        """Steps that arms have been moved by so far."""
+        """Steps of the environment so far, those of all arms together."""
 
-    def segment(self, number: int) -> Metrics:
+    def segment(self, number: int) -> SegmentMetrics:
         """Trains for one segment.
 
         Args:

@@ -1,6 +1,6 @@
-"""How good an agent is on episodes that it was not trained on, and that no published score is about.
+"""How good an agent is on episodes of the validation split, on which it is not trained, and no score is published.
 
-``python -m baselines.training.validation --update`` computes the costs anew that the agents' ones are divided by.
+``python -m baselines.training.validation --update`` computes the reference costs anew.
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ from baselines.files import write
 from baselines.fingerprints import fingerprint
 from baselines.policy import Batch
 from baselines.training.environment.view import View
+from baselines.training.score import Score
 from ikgym import scenarios, tasks
 from ikgym.scenarios import Scenario
 from ikgym.simulation import Outcome
@@ -42,50 +43,27 @@ DIGITS = 7
 #: An arm that was further from its path than this, in [m], was lost.
 LOST = 0.05
 
-#: From features of shape (N, f) to answers of shape (N, n).
-Answers = Callable[[Features], npt.NDArray[np.float32]]
-
-
-@dataclasses.dataclass(frozen=True)
-class Score:
-    """How an agent did on the validation split.
-
-    Args:
-        episodes: How many were played.
-        cost: Geometric mean of their costs.
-        cost_ratio: Geometric mean of their costs over those of the reference; None where there is none.
-        worst: Largest of these ratios; of the costs where there is no reference.
-        lost: Share of the episodes in which the arm was more than 50 mm away from its path at some time.
-    """
-
-    episodes: int
-    cost: float
-    cost_ratio: float | None
-    worst: float
-    lost: float
-
-    def to_json(self) -> dict[str, Any]:
-        """The fields by name."""
-        return dataclasses.asdict(self)
+#: From features of shape (N, f) to the deterministic outputs of an agent's network, of shape (N, n).
+Actor = Callable[[Features], npt.NDArray[np.float32]]
 
 
 def validation_seeds(scenario: Scenario, episodes: int) -> tuple[int, ...]:
-    """The first seeds of the validation split; one where the scenario knows no chance."""
-    chance = scenario.random or bool(np.any(scenario.disturbance.noise))
-    return scenarios.seeds("validation", episodes if chance else 1)
+    """The first seeds of the validation split; one where the scenario is deterministic."""
+    random = scenario.random or bool(np.any(scenario.disturbance.noise))
+    return scenarios.seeds("validation", episodes if random else 1)
 
 
-def validate(answers: Answers, processing: Processing, scenario: Scenario, episodes: int) -> Score:
+def validate(actor: Actor, processing: Processing, scenario: Scenario, episodes: int) -> Score:
     """Plays episodes of the validation split with an agent.
 
     Args:
-        answers: The agent's, without chance.
-        processing: What the agent sees, and what its answers mean.
+        actor: The agent's.
+        processing: What the agent sees, and what the outputs of its network mean.
         scenario: What is to be tracked.
-        episodes: How many; a scenario without chance has one.
+        episodes: How many; a deterministic scenario has one.
     """
     seeds = validation_seeds(scenario, episodes)
-    costs, errors = play(answers, processing, scenario, seeds)
+    costs, errors = play(actor, processing, scenario, seeds)
     reference = reference_costs(fingerprint(scenario), seeds)
     ratios = costs if reference is None else costs / reference
     return Score(
@@ -98,13 +76,13 @@ def validate(answers: Answers, processing: Processing, scenario: Scenario, episo
 
 
 def play(
-    answers: Answers, processing: Processing, scenario: Scenario, seeds: Sequence[int]
+    actor: Actor, processing: Processing, scenario: Scenario, seeds: Sequence[int]
 ) -> tuple[FloatArray, FloatArray]:
     """Plays episodes in step, as :func:`baselines.evaluation.rollout.rollouts` does.
 
     Args:
-        answers: The agent's, without chance.
-        processing: What the agent sees, and what its answers mean.
+        actor: The agent's.
+        processing: What the agent sees, and what the outputs of its network mean.
         scenario: What is to be tracked.
         seeds: The reset seeds.
 
@@ -117,7 +95,7 @@ def play(
     def act(out: Outcome) -> npt.NDArray[Any]:
         features = view.see({name: getattr(out, name) for name in Batch._fields}, starting)
         starting[:] = False
-        return view.act(answers(features))
+        return view.act(actor(features))
 
     costs, errors = np.empty((rows, scenario.steps)), np.zeros(rows)
     for k, out in enumerate(play_episodes(scenario, seeds, act, preview=view.preview)):

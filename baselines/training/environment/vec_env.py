@@ -26,7 +26,7 @@ def minus_cost(rewards: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
 
 
 def minus_log(rewards: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
-    """−log(1 + stage cost): stage costs span ten decades, and a critic that is to tell 1 from 2 must not see 1e9."""
+    """−log(1 + stage cost): stage costs span ten decades, and a critic that has to tell 1 from 2 must not see 1e9."""
     return -np.log1p(np.maximum(-rewards, np.float32(0.0)))
 
 
@@ -43,7 +43,7 @@ class ProcessedVecEnv(VecEnvWrapper):
     | | |
     |---|---|
     | observation | `Box(-12, 12, (f,), float32)`: the features of `Processing`, which says what they are |
-    | action | `Box(-1, 1, (n,), float32)`: the answer; `Processing` says which joint velocity it means, or adds to that of the policy under the agent |
+    | action | `Box(-1, 1, (n,), float32)`: the network output; `Processing` says which joint velocity it means, or adds to that of the base policy |
     | reward | `cost`: −stage cost; `log`: −log(1 + stage cost); times `scale` |
     | `info["terminal_observation"]` | the features at the end of the episode, so that a critic can value it |
     | `info["episode"]["r"]` | the true return, −cost of the episode, whatever the reward |
@@ -55,15 +55,15 @@ class ProcessedVecEnv(VecEnvWrapper):
     Args:
         num_envs: N.
         scenario: What is to be tracked.
-        processing: What the agent sees, and what its answers mean.
+        processing: What the agent sees, and what the outputs of its network mean.
         reward: A name in :data:`REWARDS`.
         scale: What rewards are multiplied by, above 0.
-        cut: Steps after which an episode is broken off, which the agent does not foresee: it sees as many steps left
-            as there would be. Whole episodes if left out.
+        episode_steps: Steps after which an episode is truncated, which the agent does not foresee: it sees as many
+            steps left as there would be in a whole one. Whole episodes if left out.
 
     Raises:
         UnknownNameError: There is no such reward, policy, or parameter of it.
-        InvalidInputError: N, the scale or the cut is not valid, or the policy cannot be under the agent.
+        InvalidInputError: N, the scale or the length is not valid, or the policy cannot be a base policy.
     """  # noqa: E501  # a table
 
     def __init__(
@@ -73,13 +73,15 @@ class ProcessedVecEnv(VecEnvWrapper):
         processing: Processing,
         reward: str = "cost",
         scale: float = 1.0,
-        cut: int | None = None,
+        episode_steps: int | None = None,
     ) -> None:
         known_names("reward", [reward], REWARDS)
         self._view = View(processing, scenario)
         self._reward, self._scale = REWARDS[reward], np.float32(number("scale", scale, above=0.0))
-        steps = scenario.steps if cut is None else min(whole_number("cut", cut, at_least=1), scenario.steps)
-        self._hidden = scenario.steps - steps
+        steps = scenario.steps
+        if episode_steps is not None:
+            steps = min(whole_number("episode_steps", episode_steps, at_least=1), steps)
+        self._left_out = scenario.steps - steps
         super().__init__(
             RedundantIKVecEnv(num_envs, scenario.replace(steps=steps), self._view.preview),
             observation_space=spaces.Box(-LARGEST, LARGEST, (self._view.size,), np.float32),
@@ -88,7 +90,7 @@ class ProcessedVecEnv(VecEnvWrapper):
 
     @property
     def processing(self) -> Processing:
-        """What the agent sees, and what its answers mean."""
+        """What the agent sees, and what the outputs of its network mean."""
         return self._view.processing
 
     def reset(self) -> Features:
@@ -98,10 +100,10 @@ class ProcessedVecEnv(VecEnvWrapper):
             Shape (N, f).
         """
         observation: Any = self.venv.reset()
-        return self._view.see(self._uncut(observation), np.ones(self.num_envs, dtype=np.bool_))
+        return self._view.see(self._in_whole(observation), np.ones(self.num_envs, dtype=np.bool_))
 
     def step_async(self, actions: npt.NDArray[Any]) -> None:
-        """Takes answers for the step to come. Shape (N, n)."""
+        """Takes network outputs for the step to come. Shape (N, n)."""
         self.venv.step_async(self._view.act(np.asarray(actions)))
 
     def step_wait(self) -> StepReturn:
@@ -115,11 +117,13 @@ class ProcessedVecEnv(VecEnvWrapper):
         rows = np.flatnonzero(ended)
         if len(rows):
             last = [infos[row]["terminal_observation"] for row in rows]
-            final = self._view.glance(self._uncut({key: np.stack([o[key] for o in last]) for key in last[0]}), rows)
+            final = self._view.glance(self._in_whole({key: np.stack([o[key] for o in last]) for key in last[0]}), rows)
             for row, features in zip(rows.tolist(), final, strict=True):
                 infos[row]["terminal_observation"] = features
-        return self._view.see(self._uncut(observation), ended), self._scale * self._reward(rewards), ended, infos
+        return self._view.see(self._in_whole(observation), ended), self._scale * self._reward(rewards), ended, infos
 
-    def _uncut(self, observation: Observation) -> Observation:
+    def _in_whole(self, observation: Observation) -> Observation:
         """An observation, with the steps that would be left."""
-        return {**observation, "remaining": observation["remaining"] + self._hidden} if self._hidden else observation
+        return (
+            {**observation, "remaining": observation["remaining"] + self._left_out} if self._left_out else observation
+        )

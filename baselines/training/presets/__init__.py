@@ -10,7 +10,7 @@ import tomllib
 from typing import Any
 
 from baselines.spec import refuse_trust
-from baselines.training.config.common import Config
+from baselines.training.config.base import Config
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 
 FOLDER = pathlib.Path(__file__).parent

@@ -12,11 +12,12 @@ from torch import Tensor
 
 from baselines.agents.base_policy import SharedPreview, make_base_policy
 from baselines.policy import Memory, Problem
-from baselines.training.config.direct import APG
+from baselines.training.config.actor_only import APG
 from baselines.training.randomness import sequence
-from baselines.training.trainer import Metrics
-from baselines.training.trainers.differentiable import DifferentiableArm, PolicyUnder
-from baselines.training.trainers.direct import DirectTrainer
+from baselines.training.trainer import SegmentMetrics
+from baselines.training.trainers.actor_only import ActorTrainer
+from baselines.training.trainers.differentiable_arm import DifferentiableArm
+from baselines.training.trainers.differentiable_policy import DifferentiablePolicy
 from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
@@ -24,13 +25,13 @@ from ikgym.validation import FloatArray
 
 
 class _Arms:
-    """N arms on their way, each in an episode of its own, and all that they are told.
+    """N arms, each in an episode of its own, and the reference trajectories of these.
 
     Args:
         scenario: What is to be tracked.
         rows: N.
         ahead: The furthest step that is shown.
-        memory: Of the policy under the agent, at the start of episodes.
+        memory: Of the base policy, at the start of episodes.
     """
 
     def __init__(self, scenario: Scenario, rows: int, ahead: int, memory: Memory) -> None:
@@ -75,7 +76,7 @@ class _Arms:
             setattr(self, name, state[name].numpy().copy())
 
     def _enter(self, row: int, seed: int, k: int) -> FloatArray:
-        """Tells an arm its episode, and where it is to begin."""
+        """The reference trajectory of an arm's episode, and the joint coordinates to begin at."""
         scenario = self._scenario
         self.nominal[row] = scenario.nominal(seed, self._ahead)
         path = scenario.nominal_joint_path(seed)
@@ -92,7 +93,7 @@ class _Arms:
         return at
 
 
-class APGTrainer(DirectTrainer):
+class APGTrainer(ActorTrainer):
     """See :class:`APG`."""
 
     _config: APG
@@ -101,10 +102,10 @@ class APGTrainer(DirectTrainer):
         super().__init__(config, scenario, seed)
         self._arm = DifferentiableArm(scenario)
         policy = make_base_policy(config.processing, Problem.of(scenario))
-        self._under = None if policy is None else PolicyUnder(policy, scenario.arm)
+        self._base_policy = None if policy is None else DifferentiablePolicy(policy, scenario.arm)
         self._outlook = SharedPreview.of(config.processing, policy)
         self._counted = scenario.counted()
-        rows, steps = config.envs, scenario.steps
+        rows, steps = config.n_envs, scenario.steps
         memory = () if policy is None else policy.memory(rows)
         self._arms = _Arms(scenario, rows, self._outlook.furthest, memory)
         # Spread over the episode, so that each step of Adam sees all parts of it.
@@ -112,7 +113,7 @@ class APGTrainer(DirectTrainer):
         first = np.arange(rows) * steps // rows if follows else np.zeros(rows, dtype=np.int64)
         self._arms.begin(np.arange(rows), self._seeds(np.random.default_rng(sequence(seed, None)), rows), first)
 
-    def segment(self, number: int) -> Metrics:
+    def segment(self, number: int) -> SegmentMetrics:
         """See :meth:`baselines.training.trainer.Trainer.segment`."""
         generator = np.random.default_rng(sequence(self._seed, number))
         self._set_learning_rate(number)
@@ -123,8 +124,8 @@ class APGTrainer(DirectTrainer):
             losses.append(loss.item())
             arms = self._arms
             arms.q, arms.qdot = arms.q.detach(), arms.qdot.detach()
-            self._renew(np.flatnonzero(far > self._config.give_up), generator)
-            self.model.num_timesteps += self._config.envs * self._config.window
+            self._renew(np.flatnonzero(far > self._config.reset_distance), generator)
+            self.model.num_timesteps += self._config.n_envs * self._config.window
         self._finished()
         return {"train/loss": float(np.median(losses)), "train/refused": float(refused)}
 
@@ -143,36 +144,37 @@ class APGTrainer(DirectTrainer):
         Returns:
             The loss, and the distance of each arm from its nominal position at the end, in [m], of shape (N,).
         """
-        config, arms, every = self._config, self._arms, np.arange(self._config.envs)
+        config, arms, every = self._config, self._arms, np.arange(self._config.n_envs)
         costs, weights = [], []
         for step in range(config.window):
             self._renew(np.flatnonzero(arms.made == self._scenario.steps), generator)
-            arms.q, arms.qdot = self._move(arms.q, arms.qdot, slopes=step > 0)
+            arms.q, arms.qdot = self._move(arms.q, arms.qdot, with_gradient=step > 0)
             arms.made += 1
             error = self._arm.error(arms.q, arms.nominal[every, arms.made])
             cost = self._arm.stage_cost(error, arms.qdot) * torch.from_numpy(self._counted[arms.made].astype(float))
             arms.spent += cost.detach().numpy()
             arms.played += 1.0
             costs.append(cost)
-            weights.append((arms.played + config.credit) / (arms.spent + config.credit * arms.usual))
+            prior = config.cost_prior_steps
+            weights.append((arms.played + prior) / (arms.spent + prior * arms.usual))
         weighed = torch.stack(costs) * torch.from_numpy(np.stack(weights))
         _, position = self._scenario.arm.forward(arms.q.detach().numpy())
         return weighed.mean(), np.linalg.norm(arms.nominal[every, arms.made, -3:] - position, axis=1)
 
-    def _move(self, q: Tensor, qdot: Tensor, *, slopes: bool) -> tuple[Tensor, Tensor]:
-        """One step of all arms; `slopes` says whether there is something before it that has a gradient."""
+    def _move(self, q: Tensor, qdot: Tensor, *, with_gradient: bool) -> tuple[Tensor, Tensor]:
+        """One step of all arms; `with_gradient` says whether something before it has one."""
         config, arms = self._config, self._arms
-        most = config.largest_share / (config.envs * config.window)
+        most = config.max_gradient_share / (config.n_envs * config.window)
         nominal = self._nominal(config.offsets)
         remaining = (self._scenario.steps - arms.made)[:, None].astype(np.float64)
         base = None
-        if self._under is not None:
+        if self._base_policy is not None:
             shown = self._nominal(range(1, self._outlook.base + 1))
-            base, arms.memory = self._under(q, qdot, shown, remaining, arms.memory, slopes=slopes)
+            base, arms.memory = self._base_policy(q, qdot, shown, remaining, arms.memory, with_gradient=with_gradient)
         features, speed = self._arm.features(config.processing, q, qdot, nominal, remaining, base)
-        answer = self._answers(features.float())
-        answer.register_hook(lambda gradient: _cut(gradient, most))  # type: ignore[no-untyped-call]
-        return self._arm.step(q, self._arm.action(config.processing, q, speed, answer, base))
+        output = self._outputs(features.float())
+        output.register_hook(lambda gradient: _clipped(gradient, most))  # type: ignore[no-untyped-call]
+        return self._arm.step(q, self._arm.action(config.processing, q, speed, output, base))
 
     def _nominal(self, ahead: Sequence[int]) -> FloatArray:
         """Nominal coordinates some steps ahead. Shape (N, p, m)."""
@@ -190,7 +192,7 @@ class APGTrainer(DirectTrainer):
         return generator.integers(train.start, train.stop, count)
 
 
-def _cut(gradient: Tensor, most: float) -> Tensor:
-    """Gradients of answers, row by row no longer than a limit. Shapes (N, n)."""
+def _clipped(gradient: Tensor, most: float) -> Tensor:
+    """Gradients of network outputs, row by row no longer than a limit. Shapes (N, n)."""
     size: Tensor = gradient.norm(dim=1, keepdim=True)
     return gradient * (most / size.clamp(min=1e-30)).clamp(max=1.0)

@@ -1,4 +1,4 @@
-"""The agent that a run leaves: a model for Stable-Baselines3, and the same network for :mod:`baselines`."""
+"""What a run leaves: a model for Stable-Baselines3 and for `--init`, and the same agent for :mod:`baselines`."""
 
 from __future__ import annotations
 
@@ -6,27 +6,30 @@ from typing import Any
 
 from stable_baselines3.common.base_class import BaseAlgorithm
 
-from baselines.agents.features import Processing
-from baselines.agents.sb3_zip import export_model, save_zip
+from baselines.agents.files import save_agent
+from baselines.agents.sb3_zip import save_zip
+from baselines.training.config.base import Activation
 from baselines.training.folder import Folder
+from baselines.training.trainer import Trainer
+from baselines.training.trainers.model_file import actor_network, save_model
 from ikgym.scenarios import Scenario
 
 
-def export(
-    model: BaseAlgorithm, folder: Folder, processing: Processing, scenario: Scenario, about: dict[str, Any]
-) -> None:
-    """Writes `model.zip` and `agent.safetensors`.
+def export(trainer: Trainer, activation: Activation, folder: Folder, scenario: Scenario, about: dict[str, Any]) -> None:
+    """Writes `model.zip`, `model.safetensors` and `agent.safetensors`.
 
     Args:
-        model: Whose actor the agent is.
+        trainer: Whose model is written.
+        activation: Of the hidden layers.
         folder: Of the run.
-        processing: What the agent sees, and what its answers mean.
-        scenario: What it was trained on.
+        scenario: What the agent was trained on.
         about: The `run.json` of the run, of which the agent keeps how it was trained.
 
     Raises:
         ResultsError: A file cannot be written.
     """
+    model: BaseAlgorithm = trainer.model
     training = {name: about[name] for name in ("method", "seed", "training", "kept", "versions")}
-    save_zip(model, folder.model, processing, scenario)
-    export_model(model, folder.agent, processing, scenario, training)
+    save_zip(model, folder.zip, trainer.processing, scenario)
+    save_model(model, folder.model, activation, trainer.processing, scenario)
+    save_agent(folder.agent, actor_network(model, activation), trainer.processing, scenario, training)

@@ -1,4 +1,4 @@
-"""Models of Stable-Baselines3, and what is the same in all kinds of them: a network whose answers are squashed."""
+"""Models of Stable-Baselines3, and what is the same in all kinds of them: a network whose outputs are squashed."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from stable_baselines3.common.logger import Logger
 from torch import nn
 
 from baselines.agents.features import Features
-from baselines.training.config.common import Activation, Algorithm
+from baselines.training.config.base import Activation, Algorithm
 from baselines.training.environment.vec_env import ProcessedVecEnv
 
 ACTIVATIONS: dict[Activation, type[nn.Module]] = {
@@ -25,10 +25,10 @@ ACTIVATIONS: dict[Activation, type[nn.Module]] = {
 }
 ALGORITHMS: dict[Algorithm, type[BaseAlgorithm]] = {"ppo": PPO, "sac": SAC, "td3": TD3}
 
-#: The last layer's first weights are made this much smaller: an agent begins near the policy under it, or near rest.
+#: The last layer's first weights are made this much smaller: an agent begins near its base policy, or near rest.
 QUIET = 0.01
 
-#: How answers are kept within ±1.
+#: How network outputs are kept within ±1.
 Squash = Literal["clip", "tanh"]
 
 
@@ -38,10 +38,10 @@ def new_model(
     hidden: Sequence[int],
     activation: Activation,
     log_std_init: float = -2.0,
-    noise_steps: int = 1,
+    use_sde: bool = False,
     **parameters: Any,
 ) -> BaseAlgorithm:
-    """An untrained model, whose first answers are almost 0.
+    """An untrained model, whose first outputs are almost 0.
 
     Its first weights are drawn from the generator of PyTorch that all share.
 
@@ -50,9 +50,8 @@ def new_model(
         env: What it is trained in.
         hidden: Neurons of the hidden layers, of actor and critics alike.
         activation: Of the hidden layers.
-        log_std_init: Logarithm of the standard deviation of its answers, before tanh where there is one; TD3 has none.
-        noise_steps: Steps after which noise is drawn anew; noise is a function of what is seen where they are more
-            than 1 (gSDE). Not for TD3.
+        log_std_init: Logarithm of the standard deviation of its outputs, before tanh where there is one; TD3 has none.
+        use_sde: Whether noise is a function of what is seen (gSDE). Not for TD3.
         **parameters: Of the class of Stable-Baselines3.
     """
     critic = "vf" if algorithm == "ppo" else "qf"
@@ -62,8 +61,8 @@ def new_model(
     }
     if algorithm != "td3":
         policy["log_std_init"] = log_std_init
-    if noise_steps > 1:
-        parameters |= {"use_sde": True, "sde_sample_freq": noise_steps}
+    if use_sde:
+        parameters |= {"use_sde": True}
         if algorithm == "sac":
             policy["clip_mean"] = 0.0  # or there would be more to the actor than layers
     kind = ALGORITHMS[algorithm]
@@ -74,7 +73,7 @@ def new_model(
         if algorithm != "ppo":  # whose policy sees to it by itself
             last.weight.mul_(QUIET)
             last.bias.zero_()
-        if algorithm == "sac" and noise_steps == 1:
+        if algorithm == "sac" and not use_sde:
             model.policy.actor.log_std.weight.mul_(QUIET)
             model.policy.actor.log_std.bias.fill_(log_std_init)
         if algorithm == "td3":
@@ -96,12 +95,12 @@ def algorithm_of(model: BaseAlgorithm) -> Algorithm:
 
 
 def squash_of(algorithm: Algorithm) -> Squash:
-    """How a kind of models keeps its answers within ±1."""
+    """How a kind of models keeps its outputs within ±1."""
     return "clip" if algorithm == "ppo" else "tanh"
 
 
 def mean_network(model: BaseAlgorithm) -> nn.Sequential:
-    """From features to the mean of the answers, before they are squashed; it shares the model's weights.
+    """From features to the mean of the outputs, before they are squashed; it shares the model's weights.
 
     Returns:
         Linear layers with activations in between, the last one without.
@@ -115,8 +114,8 @@ def mean_network(model: BaseAlgorithm) -> nn.Sequential:
     return nn.Sequential(*list(policy.actor.mu)[:-1])  # without the tanh
 
 
-def answers(model: BaseAlgorithm, features: Features) -> Features:
-    """The deterministic answers of a model.
+def network_outputs(model: BaseAlgorithm, features: Features) -> Features:
+    """The deterministic outputs of a model's actor.
 
     Args:
         model: Of any kind.

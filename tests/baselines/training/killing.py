@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from baselines.training.config.common import Config
+from baselines.training.config.base import Config
 from baselines.training.run import train
 
 #: Its server has loaded all that a run needs, so that a process begins at once.

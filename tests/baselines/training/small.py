@@ -8,7 +8,7 @@ import pathlib
 from typing import Any
 
 from baselines.training import methods
-from baselines.training.config.common import Config
+from baselines.training.config.base import Config
 
 #: Options of a run on an arm of three joints, 20 steps an episode.
 TINY: dict[str, Any] = {
@@ -19,7 +19,7 @@ TINY: dict[str, Any] = {
     "segments": 3,
     "evaluate_every": 2,
     "validation_episodes": 2,
-    "envs": 4,
+    "n_envs": 4,
     "batch_size": 20,
 }
 #: Random episodes of seven joints, over a policy with a memory.
@@ -29,8 +29,8 @@ OVER: dict[str, Any] = {**TINY, "scenario": "varga7-random", "base_policy": "mfa
 #: What else makes a run of a method short.
 FEW: dict[str, dict[str, Any]] = {
     "ppo": {},
-    "sac": {"buffer": 200, "train_every": 5, "gradient_steps": 2},
-    "td3": {"buffer": 200, "train_every": 5, "gradient_steps": 2},
+    "sac": {"buffer_size": 200, "train_freq": 5, "gradient_steps": 2},
+    "td3": {"buffer_size": 200, "train_freq": 5, "gradient_steps": 2},
     "imitate": {"expert": "dls", "gradient_steps": 3},
     "apg": {"window": 8, "windows": 2},
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import pathlib
 import subprocess
@@ -9,17 +10,17 @@ import sys
 
 import pytest
 
-from baselines.training import command, methods, seeds
+from baselines.training import command, methods, run, seeds
 from baselines.training.command import main, parse
-from baselines.training.config.common import PPO
+from baselines.training.config.reinforcement import PPO
 from baselines.training.errors import TrainingError
-from baselines.training.seeds import Job, train_seeds
-from tests.baselines.training.small import about, timeless, tiny
+from baselines.training.seeds import SeedRuns
+from tests.baselines.training.small import about, timeless
 
 ROOT = pathlib.Path(__file__).parents[3]
 TINY = [
     "--scenario", "faitli3-regular", "--steps", "20", "--hidden", "8", "--offsets", "1", "2", "10",
-    "--segments", "2", "--envs", "4", "--batch-size", "20", "--validation-episodes", "1", "--no-progress",
+    "--segments", "2", "--n-envs", "4", "--batch-size", "20", "--validation-episodes", "1", "--no-progress",
 ]  # fmt: skip
 
 
@@ -41,21 +42,24 @@ def test_several_seeds(several, tmp_path, capsys):
     assert about(tmp_path / "seed-5")["weights_sha256"] == about(folder / "seed-5")["weights_sha256"]
     assert timeless(tmp_path / "seed-5") == timeless(folder / "seed-5")
     printed = capsys.readouterr().out.splitlines()
-    assert printed[0].split() == ["seed", "cost ratio", "cost", "worst", "lost"]
+    assert printed[0].split() == ["seed", "cost", "ratio", "cost", "worst", "lost"]
     assert printed[1].split()[:2] == ["5", "–"]
 
 
-def test_a_failing_seed_takes_no_other_with_it(several, tmp_path, capfd):
+def test_a_seed_that_fails_or_dies_takes_no_other_with_it(several, tmp_path, monkeypatch, capfd):
     for seed in (0, 1):
         (tmp_path / f"seed-{seed}").mkdir()
     (tmp_path / "seed-0" / "run.json").write_text("{")
-    code = main(["ppo", *TINY, "--seeds", "0", "1", "--workers", "2", "--resume", "--out", str(tmp_path)])
+    monkeypatch.setattr(seeds, "_child", _dies_with_seed_7)
+    code = main(["ppo", *TINY, "--seeds", "7", "0", "1", "--workers", "2", "--resume", "--out", str(tmp_path)])
     assert code == 2
     assert about(tmp_path / "seed-1")["weights_sha256"] == about(several[0] / "seed-1")["weights_sha256"]
     printed = capfd.readouterr()
     assert "   0  failed" in printed.out
+    assert "   7  failed" in printed.out
     assert "error: seed 0: " in printed.err
     assert "run.json is damaged" in printed.err
+    assert "error: seed 7: its process has died (signal SIGKILL); go on with --resume" in printed.err
 
 
 def test_repeat(several, tmp_path, capsys):
@@ -92,9 +96,19 @@ def test_repeat(several, tmp_path, capsys):
         (["ppo", *TINY, "--scenario", "varga"], "There is no scenario 'varga'"),
         (["ppo", *TINY, "--workers", "0"], "workers: expected a whole number of at least 1, got 0"),
         (["ppo", *TINY, "--seeds", "-1"], "seeds: expected a whole number of at least 0, got -1"),
-        (["ppo", *TINY, "--rollout", "7"], "rollout: expected a divisor"),
-        (["ppo", *TINY, "--init", "nowhere.zip"], "nowhere.zip does not exist"),
+        (["ppo", *TINY, "--n-steps", "7"], "n_steps: expected a divisor"),
+        (["ppo", *TINY, "--init", "nowhere.safetensors"], "nowhere.safetensors does not exist"),
         (["repeat", "nowhere.json"], "Cannot read nowhere.json"),
+        (["ppo", *TINY, "--batch-size", "1"], "batch_size: expected a whole number of at least 2, got 1"),
+        (["ppo", *TINY, "--log-std-init", "-1000"], "log_std_init: expected a number from -20 to 2, got -1000"),
+        (["sac", *TINY, "--buffer-size", "10000000000000"], "buffer_size: expected a whole number from 1 to 10000000"),
+        (["ppo", *TINY, "--hidden", "1000000", "1000000"], "hidden: expected a whole number from 1 to 2048"),
+        (["ppo", *TINY, "--hidden", *["9"] * 11], "hidden: expected at least one hidden layer, at most 10, got 11"),
+        (["ppo", *TINY, "--n-envs", "10000000"], "n_envs: expected a whole number from 1 to 10000, got 10000000"),
+        (["ppo", *TINY, "--offsets", "1", "1000000000"], "offsets: expected a whole number from 1 to 100000"),
+        (["ppo", *TINY, "--sde-sample-freq", "4"], "sde_sample_freq: expected use_sde beside it, got 4"),
+        (["sac", *TINY, "--ent-coef", "auto_x"], "ent_coef: expected auto, auto_X or a number"),
+        (["ppo", *TINY, "--init", "model.zip"], "model.zip: a .zip of Stable-Baselines3 can run code"),
     ],
 )
 def test_errors_have_words_and_exit_code_2(arguments, message, tmp_path, capsys):
@@ -106,7 +120,7 @@ def test_errors_have_words_and_exit_code_2(arguments, message, tmp_path, capsys)
 
 
 @pytest.mark.parametrize(
-    "arguments", [["ppo", "--epoch", "3"], ["pp"], ["sac", "--epochs", "3"], ["ppo", "--gamma", "no"]]
+    "arguments", [["ppo", "--n-epoch", "3"], ["pp"], ["sac", "--n-epochs", "3"], ["ppo", "--gamma", "no"]]
 )
 def test_unknown_options_are_errors(arguments, tmp_path, capsys):
     with pytest.raises(SystemExit) as ended:
@@ -124,6 +138,78 @@ def test_values_out_of_range_on_the_command_line(tmp_path, capsys):
     assert "gamma" in capsys.readouterr().err
 
 
+def test_no_method(capsys):
+    """The help, and one line that says what is missing."""
+    assert main([]) == 2
+    printed = capsys.readouterr()
+    assert "Methods: ppo, sac, td3, imitate, apg." in printed.out
+    assert printed.err.splitlines() == [
+        "error: expected a method, one of ppo, sac, td3, imitate, apg, or repeat; got none."
+    ]
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ({"method": []}, "expected a method"),
+        ({"method": "pp"}, "There is no method 'pp'"),
+        ({"config": []}, "its config by name"),
+        ({"config": {"hidden": 3}}, "hidden: expected whole numbers, got 3"),
+        ({"seed": -1}, "seed: expected a whole number of at least 0, got -1"),
+        ({"format": 1, "versions": {"ikgym": "0.1.0"}}, 'pip install "ikgym==0.1.0"'),
+    ],
+)
+def test_files_that_cannot_be_repeated(content, message, tmp_path, capsys):
+    usual = {"format": 2, "method": "ppo", "seed": 0, "config": {}, "weights_sha256": "0"}
+    (tmp_path / "run.json").write_text(json.dumps(usual | content))
+    assert main(["repeat", str(tmp_path / "run.json"), "--out", str(tmp_path / "out")]) == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert len(error.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        MemoryError("Unable to allocate 9 TiB"),
+        RuntimeError("[enforce fail] DefaultCPUAllocator: can't allocate memory: you tried to allocate 9 bytes."),
+    ],
+)
+def test_out_of_memory_is_named(error, tmp_path, monkeypatch, capsys):
+    def fails(*_, **__):
+        raise error
+
+    monkeypatch.setattr(run, "train", fails)
+    assert main(["ppo", *TINY, "--out", str(tmp_path)]) == 2
+    printed = capsys.readouterr().err
+    assert printed.startswith("error: seed 0: Out of memory: ")
+    assert "fewer arms (--n-envs)" in printed
+    assert len(printed.splitlines()) == 1
+
+
+@pytest.mark.parametrize("package", ["torch", "stable_baselines3", "tensorboard"])
+def test_a_missing_extra_is_named(package, tmp_path, monkeypatch, capsys):
+    find = importlib.util.find_spec
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == package else find(name))
+    assert main(["ppo", *TINY, "--out", str(tmp_path)]) == 2
+    assert capsys.readouterr().err == f'error: Training needs {package}: pip install "ikgym[train]"\n'
+
+
+def test_the_command_line_is_read_without_torch():
+    """Which takes seconds to load, and is an extra."""
+    code = (
+        "import sys; from importlib.machinery import PathFinder\n"
+        "def find(name, *others, found=PathFinder.find_spec):\n"
+        "    return None if name.partition('.')[0] in ('torch', 'stable_baselines3') else found(name, *others)\n"
+        "PathFinder.find_spec = find\n"
+        "from baselines.training.command import main, parse\n"
+        "parse(['sac', '--preset', 'sac', '--out', 'x']); sys.exit(main(['ppo', '--preset', 'smoke', '--out', 'x']))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd=ROOT)
+    assert done.returncode == 2, done.stderr
+    assert "Training needs torch, stable_baselines3: pip install" in done.stderr
+
+
 @pytest.mark.parametrize("arguments", [[], *([name] for name in methods.METHODS), ["repeat"]])
 def test_help(arguments, capsys):
     with pytest.raises(SystemExit) as ended:
@@ -134,9 +220,9 @@ def test_help(arguments, capsys):
         assert word in text
 
 
-def test_the_command_line_goes_before_the_preset(tmp_path):
+def test_the_command_line_takes_precedence_over_the_preset(tmp_path):
     file = tmp_path / "mine.toml"
-    file.write_text("reach = 0.25\nsegments = 7\n")
+    file.write_text("action_scale = 0.25\nsegments = 7\n")
     asked, given = parse(["ppo", "--preset", str(file), "--segments", "9", "--null-space", "0.1", "--out", "x"])
     assert asked.config == PPO(action_scale=0.25, segments=9, null_space=0.1)
     assert given == {"action_scale", "segments", "null_space"}
@@ -151,16 +237,6 @@ def test_ctrl_c(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(command, "train_seeds", interrupted)
     assert main(["ppo", *TINY, "--out", str(tmp_path)]) == 130
     assert f"is in {tmp_path}; go on with --resume" in capsys.readouterr().err
-
-
-def test_a_process_that_dies_is_named(tmp_path, monkeypatch):
-    """Another seed's process is not disturbed."""
-    config = tiny("ppo")
-    monkeypatch.setattr(seeds, "_child", _dies_with_seed_7)
-    seven, eight = train_seeds(Job(config, tmp_path), [7, 8], workers=1, progress=False)
-    assert "its process has died (signal SIGKILL)" in seven.error
-    assert not eight.error
-    assert about(tmp_path / "seed-8")["weights_sha256"] == eight.weights_sha256
 
 
 def _dies_with_seed_7(job, seed, connection, child=seeds._child):
@@ -182,7 +258,7 @@ def test_unexpected_errors_of_a_child_are_told(tmp_path, monkeypatch, capfd):
             self.sent = message
 
     pipe = Pipe()
-    seeds._child(Job(PPO(), tmp_path), 3, pipe)
+    seeds._child(SeedRuns(PPO(), tmp_path), 3, pipe)
     assert pipe.sent.error == "ZeroDivisionError: division by zero"
     assert "Traceback" in capfd.readouterr().err
 
@@ -191,7 +267,7 @@ def test_from_the_shell(tmp_path):
     """As a program of its own, with warnings as errors."""
     arguments = [*TINY, "--out", str(tmp_path)]
     done = subprocess.run(
-        [sys.executable, "-W", "error", ROOT / "train.py", "td3", *arguments, "--collect", "1"],
+        [sys.executable, "-W", "error", ROOT / "train.py", "td3", *arguments, "--learning-starts", "80"],
         capture_output=True,
         text=True,
         check=False,

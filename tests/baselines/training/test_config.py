@@ -7,7 +7,8 @@ import json
 import pytest
 
 from baselines.training import presets
-from baselines.training.config.common import PPO, SAC, TD3, Config, differences
+from baselines.training.config.base import Config, differences
+from baselines.training.config.reinforcement import PPO, SAC, TD3
 from baselines.training.methods import METHODS, get
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 
@@ -25,8 +26,8 @@ def test_json_holds_all_of_it(kind):
 @pytest.mark.parametrize(
     ("kind", "values", "error", "message"),
     [
-        (PPO, {"epoch": 3}, UnknownNameError, "no option of ppo 'epoch'. Did you mean 'epochs'"),
-        (SAC, {"epochs": 3}, UnknownNameError, "no option of sac 'epochs'"),
+        (PPO, {"n_epoch": 3}, UnknownNameError, "no option of ppo 'n_epoch'. Did you mean 'n_epochs'"),
+        (SAC, {"n_epochs": 3}, UnknownNameError, "no option of sac 'n_epochs'"),
         (PPO, {"activation": "sili"}, UnknownNameError, "Did you mean 'silu'"),
         (TD3, {"reward": "lg"}, UnknownNameError, "no reward 'lg'"),
         (PPO, {"hidden": []}, InvalidInputError, "hidden: expected at least one"),
@@ -39,10 +40,16 @@ def test_json_holds_all_of_it(kind):
         (PPO, {"keep_best": "yes"}, InvalidInputError, "keep_best: expected true or false"),
         (PPO, {"gamma": 1.5}, InvalidInputError, "gamma: expected a number above 0, at most 1"),
         (PPO, {"learning_rate": -1}, InvalidInputError, "learning_rate: expected a finite number above 0"),
+        (PPO, {"learning_rate": 1e300}, InvalidInputError, r"learning_rate: expected a number from 0 to 1e\+30"),
         (PPO, {"target_kl": 0}, InvalidInputError, "target_kl"),
-        (SAC, {"temperature": 0}, InvalidInputError, "temperature"),
-        (SAC, {"buffer": 3}, InvalidInputError, "buffer: expected at least one transition of each arm, got 3"),
-        (TD3, {"noise": -0.1}, InvalidInputError, "noise"),
+        (SAC, {"ent_coef": "auto_0"}, InvalidInputError, "ent_coef: expected auto, auto_X or a number"),
+        (
+            SAC,
+            {"buffer_size": 3},
+            InvalidInputError,
+            "buffer_size: expected at least one .* of each arm, got 3",
+        ),
+        (TD3, {"action_noise": -0.1}, InvalidInputError, "action_noise"),
     ],
 )
 def test_refused(kind, values, error, message):
@@ -88,15 +95,15 @@ def test_presets_that_come_along(name):
 
 def test_preset_files(tmp_path):
     file = tmp_path / "mine.toml"
-    file.write_text('method = "ppo"\nhidden = [5]\nepochs = 2\n')
+    file.write_text('method = "ppo"\nhidden = [5]\nn_epochs = 2\n')
     config, given = presets.configure(PPO, str(file))
-    assert (config, given) == (PPO(hidden=(5,), epochs=2), {"hidden", "epochs"})
+    assert (config, given) == (PPO(hidden=(5,), n_epochs=2), {"hidden", "n_epochs"})
     with pytest.raises(InvalidInputError, match="is for ppo, not for sac"):
         presets.configure(SAC, str(file))
-    file.write_text("epoch = 2\n")
-    with pytest.raises(UnknownNameError, match=r"no option of ppo 'epoch'\. Did you mean 'epochs'"):
+    file.write_text("n_epoch = 2\n")
+    with pytest.raises(UnknownNameError, match=r"no option of ppo 'n_epoch'\. Did you mean 'n_epochs'"):
         presets.configure(PPO, str(file))
-    file.write_text("epochs = \n")
+    file.write_text("n_epochs = \n")
     with pytest.raises(InvalidInputError, match="is no TOML"):
         presets.configure(PPO, str(file))
     with pytest.raises(InvalidInputError, match="Cannot read the preset"):

@@ -5,11 +5,12 @@ from __future__ import annotations
 import json
 
 from baselines.training.curves import curves, main
+from baselines.training.folder import FORMAT
 
 
 def run(folder, seed, cost_ratios):
-    scores = [{"core_minutes": 0.5 * i, "cost ratio": cost_ratio} for i, cost_ratio in enumerate(cost_ratios)]
-    about = {"method": "ppo", "seed": seed, "config": {}, "validation": scores}
+    scores = [{"core_minutes": 0.5 * i, "cost_ratio": cost_ratio} for i, cost_ratio in enumerate(cost_ratios)]
+    about = {"format": FORMAT, "method": "ppo", "seed": seed, "config": {}, "validation": scores}
     (folder / f"seed-{seed}").mkdir(parents=True)
     (folder / f"seed-{seed}" / "run.json").write_text(json.dumps(about), encoding="utf-8")
 

@@ -9,7 +9,8 @@ import torch
 import baselines
 from baselines.agents.features import Processing
 from baselines.policy import Batch, Problem
-from baselines.training.trainers.differentiable import DifferentiableArm, PolicyUnder
+from baselines.training.trainers.differentiable_arm import DifferentiableArm
+from baselines.training.trainers.differentiable_policy import DifferentiablePolicy
 from ikgym import scenarios, tasks
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Disturbance
@@ -84,7 +85,7 @@ def test_steps_and_costs_are_those_of_the_environment(name):
 
 
 @pytest.mark.parametrize("exponents", [(3.0, 4.0, 4.0), (2.0, 3.0, 1.5), (1.0, 2.0, 1.0)])
-def test_slopes_of_costs(exponents):
+def test_gradients_of_costs(exponents):
     p_x, p_out, p_in = exponents
     scenario = scenarios.get("varga7-random")
     cost = scenario.cost.replace(p_x=p_x, p_out=p_out, p_in=p_in)
@@ -142,7 +143,7 @@ def test_gradients_of_features_and_actions(name):
 
 
 @pytest.mark.parametrize("policy", ["dls", "full_orientation", "null_space", "mfac"])
-def test_slopes_of_the_policy_under_the_agent(policy):
+def test_gradients_of_base_policies(policy):
     scenario = scenarios.get("varga7-random")
     _, qdot, _, rng = place(scenario)
     made = baselines.make(policy, scenario)
@@ -152,9 +153,9 @@ def test_slopes_of_the_policy_under_the_agent(policy):
         np.full((ROWS, 1), 9.0),
     )
     start = torch.from_numpy(np.stack([scenario.nominal_joint_path(i)[0] for i in range(ROWS)]) + 1e-3).requires_grad_()
-    under, memory = PolicyUnder(made, scenario.arm), made.memory(ROWS)
-    action, after = under(start, qdot, nominal, remaining, memory, slopes=True)
-    alone, kept = under(start, qdot, nominal, remaining, memory, slopes=False)
+    under, memory = DifferentiablePolicy(made, scenario.arm), made.memory(ROWS)
+    action, after = under(start, qdot, nominal, remaining, memory, with_gradient=True)
+    alone, kept = under(start, qdot, nominal, remaining, memory, with_gradient=False)
     np.testing.assert_array_equal(action.detach(), alone)
     for one, other in zip(after, kept, strict=True):
         np.testing.assert_array_equal(one, other)
@@ -162,7 +163,7 @@ def test_slopes_of_the_policy_under_the_agent(policy):
     (action * weights).sum().backward()
 
     def number(q):
-        return (under(q, qdot, nominal, remaining, memory, slopes=False)[0] * weights).sum()
+        return (under(q, qdot, nominal, remaining, memory, with_gradient=False)[0] * weights).sum()
 
     wanted = differences(number, start, step=1e-4)
     np.testing.assert_allclose(start.grad, wanted, rtol=0.02, atol=0.02 * np.abs(wanted).max())

@@ -15,6 +15,7 @@ from baselines.evaluation.rollout import rollouts
 from baselines.files import ResultsError
 from baselines.training import run as run_module
 from baselines.training.errors import TrainingError
+from baselines.training.folder import read_run
 from baselines.training.run import train
 from baselines.training.trainers.models import weights_hash
 from baselines.training.validation import validation_seeds
@@ -32,11 +33,11 @@ class StoppedError(Exception):
 
 
 def stop_after(segments):
-    def tick(done, score):
+    def on_segment(done, score):
         if done == segments:
             raise StoppedError
 
-    return tick
+    return on_segment
 
 
 @pytest.fixture(scope="module", params=METHODS)
@@ -57,7 +58,7 @@ def test_a_run_that_was_stopped_ends_like_one_that_was_not(finished, tmp_path):
     config, folder, result = finished
     for segments in (1, 2):
         with pytest.raises(StoppedError):
-            train(config, 3, tmp_path, resume=True, tick=stop_after(segments))
+            train(config, 3, tmp_path, resume=True, on_segment=stop_after(segments))
         assert about(tmp_path)["status"] == "running"
         assert about(tmp_path)["training"]["segments"] == segments
         assert not (tmp_path / "model.zip").exists()
@@ -65,13 +66,20 @@ def test_a_run_that_was_stopped_ends_like_one_that_was_not(finished, tmp_path):
     assert_same_run(folder, tmp_path)
 
 
-def test_rare_checkpoints_change_nothing(finished, tmp_path):
-    config, folder, _ = finished
+@pytest.fixture(scope="module")
+def gone_on_with(finished, tmp_path_factory):
+    """The same run with rare checkpoints, stopped after more than its last one, and gone on with."""
+    config, _, _ = finished
+    folder = tmp_path_factory.mktemp("gone-on-with")
     with pytest.raises(StoppedError):
-        train(config, 3, tmp_path, checkpoint_every=1e9, tick=stop_after(2))
-    assert about(tmp_path)["training"]["segments"] == 1  # the first one is written at once
-    train(config, 3, tmp_path, resume=True, checkpoint_every=1e9)
-    assert_same_run(folder, tmp_path)
+        train(config, 3, folder, checkpoint_every=1e9, on_segment=stop_after(2))
+    assert about(folder)["training"]["segments"] == 1  # the first one is written at once
+    train(config, 3, folder, resume=True, checkpoint_every=1e9)
+    return folder
+
+
+def test_rare_checkpoints_change_nothing(finished, gone_on_with):
+    assert_same_run(finished[1], gone_on_with)
 
 
 def test_seeds_differ(finished, tmp_path):
@@ -116,8 +124,8 @@ def test_files_hold_the_kept_agent(finished):
     config, folder, result = finished
     scenario = config.make_scenario()
     seeds = validation_seeds(scenario, config.validation_episodes)
-    for file in ("agent.safetensors", "model.zip"):
-        policy = baselines.make("agent", scenario, path=str(folder / file))
+    for file, trust in (("agent.safetensors", False), ("model.zip", True)):
+        policy = baselines.make("agent", scenario, path=str(folder / file), trust=trust)
         costs = [float(np.sum(e.tracking_cost + e.velocity_cost)) for e in rollouts(scenario, policy, seeds)]
         # Networks in torch and in numba round differently.
         assert np.exp(np.mean(np.log(costs))) == pytest.approx(result.score.cost, rel=1e-3)
@@ -126,13 +134,19 @@ def test_files_hold_the_kept_agent(finished):
     assert weights_hash(loaded) == about(folder)["kept"]["weights_sha256"]
 
 
-def test_tensorboard_holds_each_step_once(finished, tmp_path):
+def test_agents_with_state_dependent_exploration_are_exported(tmp_path):
+    config = tiny("sac", use_sde=True, segments=1, evaluate_every=1)
+    cost = train(config, 3, tmp_path).score.cost
+    scenario = config.make_scenario()
+    policy = baselines.make("agent", scenario, path=str(tmp_path / "agent.safetensors"))
+    episodes = rollouts(scenario, policy, validation_seeds(scenario, config.validation_episodes))
+    costs = [float(np.sum(e.tracking_cost + e.velocity_cost)) for e in episodes]
+    assert np.exp(np.mean(np.log(costs))) == pytest.approx(cost, rel=1e-3)
+
+
+def test_tensorboard_holds_each_step_once(finished, gone_on_with):
     """Also where a run was stopped after it had written more than its checkpoint knows of."""
-    config, folder, _ = finished
-    with pytest.raises(StoppedError):
-        train(config, 3, tmp_path, checkpoint_every=1e9, tick=stop_after(2))
-    train(config, 3, tmp_path, resume=True)
-    for each in (folder, tmp_path):
+    for each in (finished[1], gone_on_with):
         events = EventAccumulator(str(each / "tensorboard")).Reload()
         assert [event.step for event in events.Scalars("train/cost")] == [80, 160, 240]
         assert [event.step for event in events.Scalars("validation/cost")] == [0, 160, 240]
@@ -160,9 +174,10 @@ def test_folders_are_not_written_over(finished, tmp_path):
     with pytest.raises(TrainingError, match="choose one"):
         train(config, 3, folder, resume=True, overwrite=True)
     (tmp_path / "mine.txt").write_text("stays")
-    train(config, 3, tmp_path)
+    short = config.replace(segments=1)
+    train(short, 3, tmp_path)
     first = about(tmp_path)
-    train(config, 4, tmp_path, overwrite=True)
+    train(short, 4, tmp_path, overwrite=True)
     assert about(tmp_path)["seed"] == 4
     assert about(tmp_path)["weights_sha256"] != first["weights_sha256"]
     assert (tmp_path / "mine.txt").exists()
@@ -200,6 +215,7 @@ def test_damaged_files(finished, tmp_path):
         ("checkpoint.pt", b"nothing", "Cannot go on from .*checkpoint.pt"),
         ("run.json", b"{", "run.json is damaged"),
         ("run.json", b"[]", "is no run.json of a training"),
+        ("run.json", b'{"format": 2, "method": "ppo", "seed": 3, "config": []}', "run.json is damaged"),
     ]:
         for file in ("run.json", "checkpoint.pt"):
             (tmp_path / file).write_bytes((folder / file).read_bytes())
@@ -210,6 +226,21 @@ def test_damaged_files(finished, tmp_path):
     (tmp_path / "run.json").write_bytes((folder / "run.json").read_bytes())
     with pytest.raises(TrainingError, match="written by another version"):
         train(config, 3, tmp_path, resume=True)
+
+
+def test_runs_of_the_first_version_are_refused(finished, tmp_path):
+    """Its options have other names."""
+    config, folder, _ = finished
+    old = {name: value for name, value in about(folder).items() if name != "format"}
+    old["versions"]["ikgym"] = "0.1.0"
+    (tmp_path / "run.json").write_text(json.dumps(old))
+    wanted = r'written by ikgym 0.1.0, whose options have other names: .* pip install "ikgym==0.1.0", or train anew'
+    with pytest.raises(TrainingError, match=wanted):
+        train(config, 3, tmp_path, resume=True)
+    with pytest.raises(TrainingError, match=wanted):
+        read_run(tmp_path / "run.json")
+    train(config.replace(segments=1), 3, tmp_path, overwrite=True)
+    assert read_run(tmp_path / "run.json")["status"] == "finished"
 
 
 def test_checkpoints_run_nothing(finished, tmp_path):
@@ -238,12 +269,12 @@ def test_weights_that_run_away_are_named(tmp_path):
 
 
 def test_errors_of_the_method_are_passed_on(tmp_path):
-    with pytest.raises(InvalidInputError, match="rollout: expected a divisor"):
-        train(tiny("ppo", rollout=7), 3, tmp_path)
+    with pytest.raises(InvalidInputError, match="n_steps: expected a divisor"):
+        train(tiny("ppo", n_steps=7), 3, tmp_path)
 
 
 def test_drafts_of_killed_runs_are_removed(tmp_path):
-    config = tiny("ppo")
+    config = tiny("ppo", segments=1)
     (tmp_path / ".checkpoint.pt.123.tmp").write_text("half")
     train(config, 3, tmp_path)
     assert not list(tmp_path.glob(".*"))

@@ -9,8 +9,8 @@ import pytest
 import torch
 
 from baselines.training import methods
-from baselines.training.randomness import episode_seed, reseed, settled
-from baselines.training.trainers.models import algorithm_of, answers, mean_network, weights_hash
+from baselines.training.randomness import deterministic_torch, episode_seed, reseed
+from baselines.training.trainers.models import algorithm_of, mean_network, network_outputs, weights_hash
 from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError
 from tests.baselines.training.small import OVER, TINY, tiny
@@ -19,18 +19,18 @@ from tests.comparison import identical
 METHODS = ["ppo", "sac", "td3"]
 NOISY = [
     ("ppo", {}),
-    ("ppo", {"noise_steps": 4, "rollout": 10, "episodes": 2, "target_kl": 0.5}),
-    ("ppo", {"cut": 5, "segments": 5}),
-    ("sac", {"collect": 0}),
-    ("sac", {"noise_steps": 4}),
-    ("td3", {"buffer": 64}),
-    ("td3", {"noise_steps": 4, "policy_delay": 3}),
+    ("ppo", {"use_sde": True, "sde_sample_freq": 4, "n_steps": 10, "episodes": 2, "target_kl": 0.5}),
+    ("ppo", {"initial_episode_steps": 5, "segments": 5}),
+    ("sac", {"learning_starts": 0}),
+    ("sac", {"use_sde": True, "sde_sample_freq": 4}),
+    ("td3", {"buffer_size": 64}),
+    ("td3", {"action_noise_correlation": 4, "policy_delay": 3}),
 ]
 
 
 @pytest.fixture(autouse=True)
-def settle():
-    with settled():
+def one_thread():
+    with deterministic_torch():
         yield
 
 
@@ -62,7 +62,7 @@ def test_a_segment_follows_from_state_and_number(method, changes, tmp_path):
     other = made(config)
     other.restore(torch.load(tmp_path / "state.pt", weights_only=True))
     assert weights_hash(other.model) == at_two
-    assert other.steps == 2 * config.envs * config.episodes * config.steps
+    assert other.steps == 2 * config.n_envs * config.episodes * config.steps
     assert play(other, [2, 3]) == wanted
     assert weights_hash(other.model) == weights_hash(undisturbed.model) != at_two
     assert same(other.state(), undisturbed.state())
@@ -129,7 +129,7 @@ def test_all_episodes_are_played_to_their_end(method):
 
 def test_episodes_grow():
     """Over the first half of the segments, through what divides a segment; costs are those of whole episodes."""
-    trainer = made(tiny("ppo", cut=5, segments=8, batch_size=80))
+    trainer = made(tiny("ppo", initial_episode_steps=5, segments=8, batch_size=80))
     lengths, costs = [], []
     for number in range(8):
         costs.append(play(trainer, [number])[0]["train/cost"])
@@ -138,34 +138,36 @@ def test_episodes_grow():
     assert lengths == [{5}, {5}, {10}, {20}, {20}, {20}, {20}, {20}]
     returns = [-episode["r"] for episode in trainer.model.ep_info_buffer]
     assert costs[-1] == pytest.approx(np.exp(np.mean(np.log(returns))))
-    with pytest.raises(InvalidInputError, match="cut: expected a divisor of the 20 steps of an episode, got 7"):
-        made(tiny("ppo", cut=7))
+    with pytest.raises(
+        InvalidInputError, match="initial_episode_steps: expected a divisor of the 20 steps of an episode, got 7"
+    ):
+        made(tiny("ppo", initial_episode_steps=7))
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_first_answers_are_almost_zero(method):
+def test_first_outputs_are_almost_zero(method):
     trainer = made(tiny(method, **{**OVER, "hidden": (64, 64)}))
     trainer._env.seed(0)
-    given = answers(trainer.model, trainer._env.reset())
+    given = network_outputs(trainer.model, trainer._env.reset())
     assert 0.0 < np.abs(given).max() < 0.05
 
 
 @pytest.mark.parametrize(("method", "changes"), NOISY, ids=str)
-def test_answers_are_those_of_the_model(method, changes):
+def test_network_outputs_are_those_of_the_model(method, changes):
     model = made(tiny(method, **changes)).model
     assert algorithm_of(model) == method
     features = np.random.default_rng(0).normal(0.0, 3.0, (50, model.observation_space.shape[0])).astype(np.float32)
     with torch.no_grad():
         mean_network(model)[-1].weight.mul_(300.0)
     wanted = model.predict(features, deterministic=True)[0]
-    given = answers(model, features)
+    given = network_outputs(model, features)
     assert np.abs(given).max() > 0.9
     np.testing.assert_allclose(given, wanted, atol=1e-6)
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_critics_warm_up_while_the_actor_rests(method):
-    trainer = made(tiny(method, critic_warmup=2, **({} if method == "ppo" else {"collect": 1})))
+    trainer = made(tiny(method, critic_warmup=2, **({} if method == "ppo" else {"learning_starts": 80})))
     parts = trainer.state()["parameters"]["policy"]
     rest = {name: tensor for name, tensor in parts.items() if resting(name)}
     assert rest
@@ -188,13 +190,44 @@ def resting(name):
 
 
 def test_nothing_is_learned_while_memory_is_filled():
-    trainer = made(tiny("td3", collect=2))
+    trainer = made(tiny("td3", learning_starts=160))
     before = weights_hash(trainer.model)
     play(trainer, [0, 1])
     assert weights_hash(trainer.model) == before
     assert trainer.model.replay_buffer.size() == 40
     play(trainer, [2])
     assert weights_hash(trainer.model) != before
+
+
+@pytest.mark.parametrize(("learning_starts", "updates"), [(None, 0), (0, 4), (20, 3), (79, 1), (80, 0)])
+def test_learning_starts_after_steps_of_all_arms(learning_starts, updates):
+    """As in Stable-Baselines3: an update, here each 5 steps of 4 arms, needs more steps than that before it. Until
+    then the agent acts as it is; at random, its actions would fill the box."""
+    trainer = made(tiny("td3", learning_starts=learning_starts, gradient_steps=1, action_noise=0.01))
+    play(trainer, [0])
+    assert trainer.model._n_updates == updates
+    assert np.abs(trainer.model.replay_buffer.actions[:20]).max() < 0.2
+    play(trainer, [1])
+    assert trainer.model._n_updates == updates + 4
+
+
+@pytest.mark.parametrize(
+    ("changes", "wanted"),
+    [
+        ({}, ("auto_0.01", -9.0)),  # three joints
+        ({"target_entropy": -2.0, "ent_coef": "auto_0.5"}, ("auto_0.5", -2.0)),
+    ],
+)
+def test_entropy_of_sac_is_that_of_all_joints(changes, wanted):
+    model = made(tiny("sac", **changes)).model
+    assert (model.ent_coef, model.target_entropy) == wanted
+    assert model.log_ent_coef.exp().item() == pytest.approx(float(wanted[0].split("_")[1]))
+
+
+def test_a_fixed_weight_of_the_entropy():
+    trainer = made(tiny("sac", ent_coef=0.25, critic_warmup=2, learning_starts=0))
+    play(trainer, [0, 1, 2])
+    assert trainer.state()["others"]["ent_coef_tensor"].item() == 0.25
 
 
 def test_learning_rate_of_a_segment():
@@ -209,7 +242,7 @@ def test_learning_rate_of_a_segment():
 def test_training_noise_of_td3():
     """Both kinds have the standard deviation asked for; one forgets itself at once, the other as slowly as asked."""
     for steps in (1, 20):
-        noise = made(tiny("td3", noise=0.3, noise_steps=steps)).model.action_noise
+        noise = made(tiny("td3", action_noise=0.3, action_noise_correlation=steps)).model.action_noise
         reseed(0, 0)
         noise.reset()
         drawn = np.array([noise() for _ in range(20_000)])[100:]
@@ -221,9 +254,9 @@ def test_training_noise_of_td3():
 @pytest.mark.parametrize(
     ("method", "changes", "message"),
     [
-        ("ppo", {"rollout": 15}, "rollout: expected a divisor of the 20 steps of a segment, got 15"),
+        ("ppo", {"n_steps": 15}, "n_steps: expected a divisor of the 20 steps of a segment, got 15"),
         ("ppo", {"batch_size": 33}, "batch_size: expected a divisor of the 80 transitions"),
-        ("td3", {"train_every": 3}, "train_every: expected a divisor of the 20 steps"),
+        ("td3", {"train_freq": 3}, "train_freq: expected a divisor of the 20 steps"),
         ("ppo", {"base_policy": "oracle"}, "reference 'oracle'"),
     ],
 )
@@ -240,7 +273,7 @@ def test_episodes_are_of_the_split_for_training():
     assert max(drawn) + 100 <= split.stop
     assert max(drawn) - min(drawn) > len(split) / 2
     assert episode_seed(3, 4, len(split)) == split.start
-    with pytest.raises(InvalidInputError, match="envs: expected at most"):
+    with pytest.raises(InvalidInputError, match="n_envs: expected at most"):
         episode_seed(3, 4, len(split) + 1)
 
 
@@ -256,12 +289,12 @@ def test_seeding_is_all_there_is():
     assert all(a != b for i, a in enumerate(several) for b in several[:i])
 
 
-def test_settled_leaves_torch_as_it_was():
+def test_torch_is_left_as_it_was():
     threads = torch.get_num_threads()
     assert threads == 1
     assert torch.are_deterministic_algorithms_enabled()
     torch.set_num_threads(2)
-    with settled():
+    with deterministic_torch():
         assert torch.get_num_threads() == 1
     assert torch.get_num_threads() == 2
     torch.set_num_threads(1)
@@ -277,7 +310,7 @@ def test_ppo_learns():
             "steps": 100,
             "hidden": (32, 32),
             "segments": 30,
-            "envs": 16,
+            "n_envs": 16,
             "batch_size": 200,
             "learning_rate": 3e-3,
             "learning_rate_end": 3e-4,

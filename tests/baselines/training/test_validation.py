@@ -23,7 +23,7 @@ def zero(features):
 
 
 @pytest.mark.parametrize("base_policy", ["dls", "mfac", "rhc_gradient:horizon=3"])
-def test_answers_of_zero_score_like_the_policy_under_them(base_policy):
+def test_outputs_of_zero_score_like_the_base_policy(base_policy):
     scenario = scenarios.get("varga7-random").replace(steps=40)
     seeds = validation_seeds(scenario, 3)
     name, parameters = parse_policy(base_policy)

@@ -1,4 +1,4 @@
-"""The environment of agents: features and actions of `Processing`, and answers of 0 are the policy under the agent."""
+"""The environment of agents: features and actions of `Processing`, and network outputs of 0 are the base policy."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def played(env, answers):
 
 @pytest.mark.parametrize("base_policy", [None, *UNDER])
 def test_features_are_those_of_processing(base_policy):
-    """Those at the end of an episode included; the policy under the agent is asked by itself, observation by
+    """Those at the end of an episode included; the base policy acts by itself, observation by
     observation, and its memory is cleared where an episode begins."""
     processing, problem = Processing(base_policy=base_policy), Problem.of(scenario())
     env, plain = ProcessedVecEnv(N, scenario(), processing), RedundantIKVecEnv(N, scenario(), processing.offsets)
@@ -80,7 +80,7 @@ def test_features_are_those_of_processing(base_policy):
 
 
 @pytest.mark.parametrize("base_policy", UNDER)
-def test_answers_of_zero_are_the_policy_under_it(base_policy):
+def test_outputs_of_zero_are_the_base_policy(base_policy):
     """Bit for bit what an evaluation of that policy plays."""
     name, parameters = parse_policy(base_policy)
     env = ProcessedVecEnv(N, scenario(), Processing(base_policy=base_policy))
@@ -155,14 +155,16 @@ def test_bad_arguments():
         ProcessedVecEnv(0, scenario(), Processing())
 
 
-def test_answers_need_something_seen():
+def test_actions_need_something_seen():
     with pytest.raises(ResetNeededError, match="call reset"):
         View(Processing(), scenario()).act(np.zeros((1, 7)))
 
 
-def test_cut_episodes_look_like_whole_ones():
-    """An agent is not told that they are broken off; the return is that of the steps that were played."""
-    whole, cut = (ProcessedVecEnv(N, scenario(steps=30), Processing(base_policy="mfac"), cut=c) for c in (None, 5))
+def test_truncated_episodes_look_like_whole_ones():
+    """An agent is not told that they are truncated; the return is that of the steps that were played."""
+    whole, cut = (
+        ProcessedVecEnv(N, scenario(steps=30), Processing(base_policy="mfac"), episode_steps=c) for c in (None, 5)
+    )
     answers = np.random.default_rng(3).uniform(-1.0, 1.0, (6, N, 7)).astype(np.float32)
     courses = []
     for env in (whole, cut):
@@ -177,6 +179,6 @@ def test_cut_episodes_look_like_whole_ones():
                 assert info["TimeLimit.truncated"]
                 assert info["episode"]["l"] == 5
             assert not np.array_equal(got[0], wanted[0])
-    assert ProcessedVecEnv(N, scenario(steps=30), Processing(), cut=99).get_attr("scenario")[0].steps == 30
-    with pytest.raises(InvalidInputError, match="cut"):
-        ProcessedVecEnv(N, scenario(), Processing(), cut=0)
+    assert ProcessedVecEnv(N, scenario(steps=30), Processing(), episode_steps=99).get_attr("scenario")[0].steps == 30
+    with pytest.raises(InvalidInputError, match="episode_steps"):
+        ProcessedVecEnv(N, scenario(), Processing(), episode_steps=0)

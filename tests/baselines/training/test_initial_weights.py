@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+import base64
+import json
+import pathlib
+import pickle
+import zipfile
+
 import numpy as np
 import pytest
 import torch
-from stable_baselines3 import PPO
+from safetensors.numpy import load, save
 
 from baselines.files import ResultsError
 from baselines.training import methods
 from baselines.training.errors import TrainingError
 from baselines.training.randomness import reseed
 from baselines.training.run import train
-from baselines.training.trainers.initial import settle
-from baselines.training.trainers.models import answers
-from ikgym.sb3 import RedundantIKVecEnv
+from baselines.training.trainers import model_file
+from baselines.training.trainers.initial_weights import inherit
+from baselines.training.trainers.models import network_outputs
 from tests.baselines.training.small import OVER, about, tiny
 
 SHAPE = {
@@ -38,12 +44,12 @@ def sources(tmp_path_factory):
 
 
 def begun(method, file, **changes):
-    config = settle(tiny(method, init=file, scenario="varga7-random", **changes), ())
+    config = inherit(tiny(method, init=file, scenario="varga7-random", **changes), ())
     reseed(0, None)
     return methods.get(method).make(config, config.make_scenario(), 0)
 
 
-@pytest.mark.parametrize("suffix", ["model.zip", "agent.safetensors"])
+@pytest.mark.parametrize("suffix", ["model.safetensors", "agent.safetensors"])
 @pytest.mark.parametrize(
     ("source", "method"), [("ppo", "ppo"), ("sac", "sac"), ("td3", "td3"), ("sac", "td3"), ("td3", "sac")]
 )
@@ -54,12 +60,12 @@ def test_actors_are_the_same(sources, source, method, suffix):
     original = begun(source, file).model
     features = np.random.default_rng(0).normal(0.0, 3.0, (20, original.observation_space.shape[0])).astype(np.float32)
     wanted = original.predict(features, deterministic=True)[0]
-    np.testing.assert_allclose(answers(trainer.model, features), wanted, atol=1e-6)
+    np.testing.assert_allclose(network_outputs(trainer.model, features), wanted, atol=1e-6)
     assert np.abs(wanted).max() > 1e-3
     fresh = tiny(method, scenario="varga7-random", **SHAPE)
     untrained = methods.get(method).make(fresh, fresh.make_scenario(), 0).model
-    assert not np.allclose(answers(untrained, features), wanted, atol=1e-4)
-    if method == "td3" and (source, suffix) != ("td3", "model.zip"):  # which has its own, that lags behind
+    assert not np.allclose(network_outputs(untrained, features), wanted, atol=1e-4)
+    if method == "td3" and (source, suffix) != ("td3", "model.safetensors"):  # which has its own, that lags behind
         target = trainer.model.policy.actor_target(torch.from_numpy(features)).detach().numpy()
         np.testing.assert_allclose(target, wanted, atol=1e-6)
 
@@ -67,7 +73,7 @@ def test_actors_are_the_same(sources, source, method, suffix):
 @pytest.mark.parametrize("method", ["ppo", "sac", "td3"])
 def test_critics_come_with_models_of_the_same_kind(sources, method):
     final = torch.load(sources[method] / "checkpoint.pt", weights_only=True)["trainer"]["parameters"]["policy"]
-    given = begun(method, sources[method] / "model.zip").state()["parameters"]["policy"]
+    given = begun(method, sources[method] / "model.safetensors").state()["parameters"]["policy"]
     assert [name for name, tensor in final.items() if not given[name].equal(tensor)] == (
         ["log_std"] if method == "ppo" else []
     )
@@ -78,57 +84,94 @@ def test_critics_come_with_models_of_the_same_kind(sources, method):
 
 
 def test_first_deviation_is_asked_for(sources):
-    model = begun("ppo", sources["ppo"] / "model.zip", log_std_init=-4.5).model
+    model = begun("ppo", sources["ppo"] / "model.safetensors", log_std_init=-4.5).model
     np.testing.assert_array_equal(model.policy.log_std.detach().numpy(), -4.5)
 
 
 def test_what_is_seen_comes_with_the_file(sources):
-    config = tiny("ppo", init=sources["ppo"] / "model.zip", scenario="varga7-random")
-    settled = settle(config, ())
+    config = tiny("ppo", init=sources["ppo"] / "model.safetensors", scenario="varga7-random")
+    settled = inherit(config, ())
     assert {name: getattr(settled, name) for name in SHAPE} == SHAPE
-    assert settle(config.replace(action_scale=0.3), ("action_scale",)) == settled
+    assert inherit(config.replace(action_scale=0.3), ("action_scale",)) == settled
     for name, value in {"action_scale": 0.5, "hidden": (9, 9), "base_policy": "mfac", "null_space": 0.2}.items():
-        with pytest.raises(TrainingError, match=f"{name}: .*model.zip has .*, got .*: leave it out"):
-            settle(config.replace(**{name: value}), (name,))
-    assert settle(config.replace(init=None), ("action_scale",)).action_scale == config.action_scale
+        with pytest.raises(TrainingError, match=f"{name}: .*model.safetensors has .*, got .*: leave it out"):
+            inherit(config.replace(**{name: value}), (name,))
+    assert inherit(config.replace(init=None), ("action_scale",)).action_scale == config.action_scale
 
 
 @pytest.mark.parametrize(("source", "method", "fitting"), [("ppo", "sac", "ppo"), ("sac", "ppo", "sac or td3")])
 def test_another_squashing_is_another_agent(sources, source, method, fitting):
     with pytest.raises(TrainingError, match=rf"Go on with {fitting}, or imitate .* --algorithm {method}"):
-        begun(method, sources[source] / "model.zip")
+        begun(method, sources[source] / "model.safetensors")
 
 
 def test_files_that_do_not_do(sources, tmp_path):
     with pytest.raises(ResultsError, match="does not exist"):
-        begun("ppo", tmp_path / "none.zip")
-    (tmp_path / "damaged.zip").write_bytes(b"PK")
-    with pytest.raises(ResultsError, match="damaged"):
-        begun("ppo", tmp_path / "damaged.zip")
-    env = RedundantIKVecEnv(2, "varga7-random")
-    PPO("MultiInputPolicy", env, n_steps=4, batch_size=8, device="cpu").save(tmp_path / "raw.zip")
-    with pytest.raises(TrainingError, match="no model that was trained here"):
-        begun("ppo", tmp_path / "raw.zip")
-    other = tiny("ppo", init=sources["ppo"] / "model.zip", **OVER)
+        begun("ppo", tmp_path / "none.safetensors")
+    whole = (sources["ppo"] / "model.safetensors").read_bytes()
+    for name, content in {"short": whole[:40], "cut": whole[:-4], "other": b"PK" + whole}.items():
+        (tmp_path / f"{name}.safetensors").write_bytes(content)
+        with pytest.raises((ResultsError, TrainingError), match=f"{name}.safetensors"):
+            begun("ppo", tmp_path / f"{name}.safetensors")
+    other = tiny("ppo", init=sources["ppo"] / "model.safetensors", **OVER)
     with pytest.raises(TrainingError, match="which is not that of this run"):
         train(other, 0, tmp_path / "run")
 
 
+def test_weights_that_are_not_finite_or_of_another_shape_are_refused(sources, tmp_path):
+    content = (sources["ppo"] / "model.safetensors").read_bytes()
+    length = int.from_bytes(content[:8], "little")
+    header = json.loads(content[8 : 8 + length])
+    text = header["__metadata__"][model_file.KEY]
+    tensors = load(content)
+    for name, value, message in [
+        ("policy.log_std", np.full_like(tensors["policy.log_std"], np.nan), "expected finite weights"),
+        ("policy.log_std", np.zeros(3, np.float32), "size mismatch for log_std"),
+        ("policy.more", np.zeros(3, np.float32), "Unexpected key"),
+    ]:
+        file = tmp_path / "model.safetensors"
+        file.write_bytes(save({**tensors, name: value}, {model_file.KEY: text}))
+        with pytest.raises(TrainingError, match=f"Cannot begin from .*{message}"):
+            begun("ppo", file)
+
+
+def test_zips_are_never_loaded(sources, tmp_path):
+    """Stable-Baselines3 unpickles what is in them, and a file from elsewhere could run code."""
+
+    class Evil:
+        def __reduce__(self):
+            return pathlib.Path.touch, (tmp_path / "ran",)
+
+    with zipfile.ZipFile(tmp_path / "model.zip", "w") as archive:
+        archive.writestr(
+            "data", json.dumps({"policy_class": {":serialized:": base64.b64encode(pickle.dumps(Evil())).decode()}})
+        )
+        archive.writestr("policy.pth", pickle.dumps(Evil()))
+    for file in (tmp_path / "model.zip", sources["ppo"] / "model.zip"):
+        with pytest.raises(TrainingError, match=r"can run code .* Begin from the model\.safetensors"):
+            begun("ppo", file)
+    # Whatever a file is called.
+    (tmp_path / "model.safetensors").write_bytes((tmp_path / "model.zip").read_bytes())
+    with pytest.raises(ResultsError, match=r"no safetensors file|damaged"):
+        begun("ppo", tmp_path / "model.safetensors")
+    assert not (tmp_path / "ran").exists()
+
+
 def test_a_changed_file_is_not_gone_on_with(sources, tmp_path):
-    file = tmp_path / "model.zip"
-    file.write_bytes((sources["ppo"] / "model.zip").read_bytes())
-    config = settle(tiny("ppo", init=file, scenario="varga7-random"), ())
+    file = tmp_path / "model.safetensors"
+    file.write_bytes((sources["ppo"] / "model.safetensors").read_bytes())
+    config = inherit(tiny("ppo", init=file, scenario="varga7-random"), ())
     train(config, 0, tmp_path / "run")
     assert about(tmp_path / "run")["init"]["file"] == str(file)
     train(tiny("ppo", **{**OVER, **SHAPE}), 5, tmp_path / "other")
-    file.write_bytes((tmp_path / "other" / "model.zip").read_bytes())
+    file.write_bytes((tmp_path / "other" / "model.safetensors").read_bytes())
     with pytest.raises(TrainingError, match="another init: sha256"):
         train(config, 0, tmp_path / "run", resume=True)
 
 
 def test_fine_tuning_begins_where_the_file_ends(sources, tmp_path):
     """With little noise and critics that warm up first, the validation does not explode."""
-    config = settle(
+    config = inherit(
         tiny(
             "ppo",
             init=sources["ppo"] / "agent.safetensors",  # without critics

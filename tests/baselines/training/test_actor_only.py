@@ -7,29 +7,29 @@ import pytest
 import torch
 
 from baselines.training import methods
-from baselines.training.config.direct import APG, Imitate
-from baselines.training.randomness import reseed, settled
+from baselines.training.config.actor_only import APG, Imitate
+from baselines.training.randomness import deterministic_torch, reseed
 from baselines.training.trainers.apg import APGTrainer
-from baselines.training.trainers.models import ALGORITHMS, answers, weights_hash
+from baselines.training.trainers.models import ALGORITHMS, network_outputs, weights_hash
 from baselines.training.validation import play, validation_seeds
 from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 from tests.baselines.training.small import TINY
 
-SMALL = {name: TINY[name] for name in ("scenario", "steps", "hidden", "offsets", "segments", "envs")}
+SMALL = {name: TINY[name] for name in ("scenario", "steps", "hidden", "offsets", "segments", "n_envs")}
 OVER = {**SMALL, "scenario": "varga7-random", "base_policy": "dls", "null_space": 1e-2}
 CONFIGS = {
     "apg": APG(**SMALL, window=7, windows=4),
     "apg over dls": APG(**OVER, window=7, windows=4, algorithm="td3"),
     "apg, whole poses": APG(**{**OVER, "base_policy": None}, task="pose", window=30, windows=1, algorithm="sac"),
-    "imitate": Imitate(**SMALL, expert="dls", gradient_steps=5, batch_size=16, every=2, memory=70),
+    "imitate": Imitate(**SMALL, expert="dls", gradient_steps=5, batch_size=16, example_every=2, buffer_size=70),
     "imitate over dls": Imitate(**OVER, expert="rhc:horizon=5", gradient_steps=5, batch_size=16, algorithm="sac"),
 }
 
 
 @pytest.fixture(autouse=True)
-def settle():
-    with settled():
+def one_thread():
+    with deterministic_torch():
         yield
 
 
@@ -50,7 +50,7 @@ def cost(trainer, config, episodes=8):
     """Geometric mean over validation episodes."""
     scenario = config.make_scenario()
     seeds = validation_seeds(scenario, episodes)
-    costs, _ = play(lambda features: answers(trainer.model, features), config.processing, scenario, seeds)
+    costs, _ = play(lambda features: network_outputs(trainer.model, features), config.processing, scenario, seeds)
     return np.exp(np.log(costs).mean())
 
 
@@ -78,14 +78,17 @@ def test_ordinary_models_come_out(config):
     assert type(trainer.model) is ALGORITHMS[config.algorithm]
     assert weights_hash(trainer.model) != before
     played = config.window * config.windows if isinstance(config, APG) else config.steps
-    assert trainer.steps == config.envs * played
+    assert trainer.steps == config.n_envs * played
 
 
 def test_gradient_of_a_window_is_that_of_its_loss():
     """Along a direction in the space of weights, against central differences: through arm, policy under it and all."""
-    # So much credit makes the weights of the costs constant; they are not differentiated.
+    # So long a prior makes the weights of the costs constant; they are not differentiated.
     config = APG(
-        **{**OVER, "hidden": (16,), "envs": 6, "activation": "tanh"}, window=15, largest_share=1e9, credit=1e12
+        **{**OVER, "hidden": (16,), "n_envs": 6, "activation": "tanh"},
+        window=15,
+        max_gradient_share=1e9,
+        cost_prior_steps=1e12,
     )
     losses, slope = {}, 0.0
     for along in (0.0, 0.002, -0.002):
@@ -112,7 +115,7 @@ def test_analytic_policy_gradient_learns():
         hidden=(32, 32),
         offsets=(1, 2, 10, 30),
         action_scale=5.0,
-        envs=32,
+        n_envs=32,
         window=10,
         windows=40,
         segments=3,
@@ -133,8 +136,8 @@ def test_imitation_learns():
         hidden=(32, 32),
         offsets=(1, 2, 10, 30),
         expert="dls:gain=0.3,damping=1e-2",
-        envs=32,
-        every=1,
+        n_envs=32,
+        example_every=1,
         segments=3,
         gradient_steps=300,
         batch_size=256,
@@ -143,8 +146,8 @@ def test_imitation_learns():
     trainer = made(config)
     play_segments(trainer, range(3))
     features, wanted = trainer._examples
-    missed = answers(trainer.model, features.numpy()) - wanted.numpy()
-    # To answer nothing would miss as much as there is to answer, and a wrong gradient more.
+    missed = network_outputs(trainer.model, features.numpy()) - wanted.numpy()
+    # Outputs of 0 would miss as much as the targets are, and a wrong gradient more.
     assert np.median(np.abs(missed)) < 0.7 * np.median(np.abs(wanted.numpy()))
 
 
@@ -158,9 +161,9 @@ def test_episodes_are_of_the_split_for_training():
     ("kind", "changes", "error", "message"),
     [
         (APG, {"window": 0}, InvalidInputError, "window"),
-        (APG, {"give_up": -1.0}, InvalidInputError, "give_up"),
+        (APG, {"reset_distance": -1.0}, InvalidInputError, "reset_distance"),
         (APG, {"algorithm": "ddpg"}, UnknownNameError, "algorithm"),
-        (Imitate, {"led": 1.5}, InvalidInputError, "led: expected a share between 0 and 1"),
+        (Imitate, {"beta": 1.5}, InvalidInputError, "beta: expected a number from 0 to 1, got 1.5"),
         (Imitate, {"tolerance": 0.0}, InvalidInputError, "tolerance"),
         (Imitate, {"gradient_steps": 0}, InvalidInputError, "gradient_steps"),
     ],

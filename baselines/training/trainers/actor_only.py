@@ -1,4 +1,4 @@
-"""What methods have in common that know the gradient themselves, and need neither rewards nor critics."""
+"""What methods have in common that train an actor without rewards and critics."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
-from baselines.training.config.direct import Direct
+from baselines.training.config.actor_only import ActorOnly
 from baselines.training.environment.vec_env import ProcessedVecEnv
-from baselines.training.trainer import Metrics
-from baselines.training.trainers.initial import begin_from
+from baselines.training.trainer import SegmentMetrics
+from baselines.training.trainers.initial_weights import begin_from
 from baselines.training.trainers.models import mean_network, new_model, squash_of
 from ikgym.scenarios import Scenario
 
 
-class DirectTrainer(abc.ABC):
+class ActorTrainer(abc.ABC):
     """Trains the actor of a model of Stable-Baselines3 by Adam, see :class:`baselines.training.trainer.Trainer`.
 
     Args:
@@ -26,11 +26,11 @@ class DirectTrainer(abc.ABC):
         seed: Of the run.
 
     Raises:
-        UnknownNameError: There is no such policy under the agent.
+        UnknownNameError: There is no such base policy.
         InvalidInputError: `init` does not suit.
     """
 
-    def __init__(self, config: Direct, scenario: Scenario, seed: int) -> None:
+    def __init__(self, config: ActorOnly, scenario: Scenario, seed: int) -> None:
         self.processing, self.segments = config.processing, config.segments
         self._config, self._scenario, self._seed = config, scenario, seed
         env = ProcessedVecEnv(1, scenario, config.processing)
@@ -43,11 +43,11 @@ class DirectTrainer(abc.ABC):
 
     @property
     def steps(self) -> int:
-        """Steps that arms have been moved by so far."""
+        """Steps of the environment so far, those of all arms together."""
         return int(self.model.num_timesteps)
 
     @abc.abstractmethod
-    def segment(self, number: int) -> Metrics:
+    def segment(self, number: int) -> SegmentMetrics:
         """See :meth:`baselines.training.trainer.Trainer.segment`."""
 
     def state(self) -> dict[str, Any]:
@@ -64,8 +64,8 @@ class DirectTrainer(abc.ABC):
         self._adam.load_state_dict(copy.deepcopy(state["adam"]))
         self.model.num_timesteps = state["steps"]
 
-    def _answers(self, features: Tensor) -> Tensor:
-        """The actor's answers, with gradients. Shapes (N, f) and (N, n), float32."""
+    def _outputs(self, features: Tensor) -> Tensor:
+        """The actor's outputs, with gradients. Shapes (N, f) and (N, n), float32."""
         mean: Tensor = self._actor(features)
         return mean.tanh() if self._squashed == "tanh" else mean
 
@@ -73,7 +73,7 @@ class DirectTrainer(abc.ABC):
         """One step of Adam; False where the gradient is not finite, and nothing was done."""
         self._adam.zero_grad()
         loss.backward()  # type: ignore[no-untyped-call]
-        size = nn.utils.clip_grad_norm_(self._actor.parameters(), self._config.largest_gradient)
+        size = nn.utils.clip_grad_norm_(self._actor.parameters(), self._config.max_grad_norm)
         finite = bool(torch.isfinite(size))
         if finite:
             self._adam.step()

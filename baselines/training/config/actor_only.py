@@ -1,0 +1,99 @@
+"""What runs of the methods are that train an actor without rewards and critics: imitation, analytic policy gradient."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Annotated, ClassVar, get_args
+
+import tyro
+
+from baselines.training.config.base import Algorithm, Annealed
+from baselines.training.config.limits import MOST_BATCH, MOST_TRANSITIONS, between, count
+from ikgym.validation import known_names, number, whole_number
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class ActorOnly(Annealed):
+    """What the configurations of these methods have in common."""
+
+    algorithm: Algorithm = "ppo"
+    """The kind of model that comes out, which the same algorithm can go on with."""
+    n_envs: Annotated[int, tyro.conf.arg(metavar="N")] = 64
+    """Arms that are stepped together, at most 10000."""
+    learning_rate: Annotated[float, tyro.conf.arg(metavar="RATE")] = 1e-3
+    """Of Adam, in the first segment."""
+    learning_rate_end: Annotated[float, tyro.conf.arg(metavar="RATE")] = 2e-5
+    """In the last segment; in between it falls by equal factors."""
+    max_grad_norm: Annotated[float, tyro.conf.arg(metavar="X")] = 1.0
+    """Norm at which gradients are clipped."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        known_names("algorithm", [self.algorithm], get_args(Algorithm))
+        self._set("max_grad_norm", number("max_grad_norm", self.max_grad_norm, above=0.0))
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Imitate(ActorOnly):
+    """Supervised learning of another policy, with data aggregation (DAgger, Ross et al. 2011)."""
+
+    method: ClassVar[str] = "imitate"
+
+    expert: Annotated[str, tyro.conf.arg(metavar="POLICY")] = "rhc_foresight"
+    """Who is imitated, as NAME or NAME:PARAMETER=VALUE,…"""
+    beta: Annotated[float, tyro.conf.arg(metavar="β")] = 0.2
+    """DAgger's mixing β: share of the arms that the expert moves, after the first segment, where β is 1."""
+    intervention_distance: Annotated[float, tyro.conf.arg(metavar="M")] = 0.05
+    """The expert takes over arms that are farther from their reference position than this, in [m]."""
+    expert_noise: Annotated[float, tyro.conf.arg(metavar="SHARE")] = 0.3
+    """Largest disturbance of the arms that the expert moves, as a multiple of their joint velocity, so that examples
+    show how to come back. Projected into the null space where network outputs are."""
+    tolerance: Annotated[float, tyro.conf.arg(metavar="X")] = 0.02
+    """Scale c of the Cauchy loss ln(1 + |error|²/c²) of network outputs, in which larger errors matter little."""
+    example_every: Annotated[int, tyro.conf.arg(metavar="N")] = 4
+    """Steps from one example to the next: those in between are much like it."""
+    buffer_size: Annotated[int, tyro.conf.arg(metavar="N")] = 400_000
+    """Examples that are kept, at most 10000000; the newest replace the oldest."""
+    gradient_steps: Annotated[int, tyro.conf.arg(metavar="N")] = 500
+    """Gradient steps of a segment."""
+    batch_size: Annotated[int, tyro.conf.arg(metavar="N")] = 1024
+    """Examples of one gradient step."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self._set("beta", between("beta", self.beta, 0.0, 1.0))
+        for name in ("intervention_distance", "tolerance"):
+            self._set(name, number(name, getattr(self, name), above=0.0))
+        self._set("expert_noise", number("expert_noise", self.expert_noise, at_least=0.0))
+        for name in ("example_every", "gradient_steps"):
+            self._set(name, whole_number(name, getattr(self, name), at_least=1))
+        self._set("buffer_size", count("buffer_size", self.buffer_size, at_most=MOST_TRANSITIONS))
+        self._set("batch_size", count("batch_size", self.batch_size, at_most=MOST_BATCH))
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class APG(ActorOnly):
+    """Analytic policy gradient: back-propagation of the cost through the arm, over windows of some steps."""
+
+    method: ClassVar[str] = "apg"
+
+    window: Annotated[int, tyro.conf.arg(metavar="N")] = 100
+    """Steps through which gradients are back-propagated, from one step of Adam to the next. The way through a
+    singularity is decided some hundred steps before it; of what lies beyond the window, the agent learns nothing."""
+    windows: Annotated[int, tyro.conf.arg(metavar="N")] = 20
+    """Windows of a segment."""
+    max_gradient_share: Annotated[float, tyro.conf.arg(metavar="X")] = 10.0
+    """The gradient of the network output of one arm at one step is clipped at this many times an equal share: near
+    singularities it would otherwise exceed that of all others together."""
+    cost_prior_steps: Annotated[float, tyro.conf.arg(metavar="N")] = 100.0
+    """Stage costs are divided by the mean of their episode so far, in which the mean cost of the reference joint path
+    counts as much as this many steps: what is minimised is the logarithm of the costs of whole episodes."""
+    reset_distance: Annotated[float, tyro.conf.arg(metavar="M")] = 0.5
+    """Arms that are farther from their reference position than this, in [m], begin a new episode."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in ("window", "windows"):
+            self._set(name, whole_number(name, getattr(self, name), at_least=1))
+        for name in ("max_gradient_share", "cost_prior_steps", "reset_distance"):
+            self._set(name, number(name, getattr(self, name), above=0.0))

@@ -1,0 +1,29 @@
+"""How an agent did on the validation split."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+
+@dataclasses.dataclass(frozen=True)
+class Score:
+    """How an agent did on the validation split.
+
+    Args:
+        episodes: How many were played.
+        cost: Geometric mean of their costs.
+        cost_ratio: Geometric mean of their costs over those of the reference; None where there is none.
+        worst: Largest of these ratios; of the costs where there is no reference.
+        lost: Share of the episodes in which the arm was more than 50 mm away from its path at some time.
+    """
+
+    episodes: int
+    cost: float
+    cost_ratio: float | None
+    worst: float
+    lost: float
+
+    def to_json(self) -> dict[str, Any]:
+        """The fields by name."""
+        return dataclasses.asdict(self)

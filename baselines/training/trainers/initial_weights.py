@@ -1,0 +1,98 @@
+"""Models that begin from a trained one."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from typing import Any
+
+import torch
+from stable_baselines3.common.base_class import BaseAlgorithm
+from torch import nn
+
+from baselines.training.config.base import SHAPE, Config
+from baselines.training.errors import TrainingError
+from baselines.training.trainers.model_file import InitialWeights, load_weights
+from baselines.training.trainers.models import algorithm_of, mean_network, squash_of
+
+
+def inherit(config: Config, given: Collection[str]) -> Config:
+    """A configuration with what comes with the file of its `init`.
+
+    Args:
+        config: Of any method; as it is where it has no `init`.
+        given: Names of the fields that were asked for, and must not be contradicted.
+
+    Raises:
+        ResultsError: The file cannot be read.
+        TrainingError: The file says something else than what was asked for.
+    """
+    if config.init is None:
+        return config
+    file = load_weights(config.init)
+    inherited: dict[str, Any] = {
+        "base_policy": file.processing.base_policy,
+        "offsets": file.processing.offsets,
+        "action_scale": file.processing.action_scale,
+        "null_space": file.processing.null_space,
+        "hidden": tuple(file.network.sizes[1:-1]),
+        "activation": file.network.activation,
+    }
+    for name in SHAPE:
+        asked = getattr(config, name)
+        if name in given and asked != inherited[name]:
+            raise TrainingError(
+                f"{name}: {file.source} has {inherited[name]!r}, got {asked!r}: leave it out, or begin without --init."
+            )
+    return config.replace(**inherited)
+
+
+def begin_from(model: BaseAlgorithm, config: Config) -> None:
+    """Gives a model the weights of a trained one: the actor's, and the critics' where they are of the same kind.
+
+    Args:
+        model: An untrained one, made as `config` says.
+        config: With an `init`.
+
+    Raises:
+        ResultsError: The file cannot be read.
+        TrainingError: It has another shape, or keeps its outputs within ±1 in another way.
+    """
+    assert config.init is not None
+    file, algorithm = load_weights(config.init), algorithm_of(model)
+    if file.processing != config.processing:
+        raise TrainingError(f"{file.source} was trained with {file.processing}, which is not that of this run.")
+    if file.network.squash != squash_of(algorithm):
+        fitting = "ppo" if file.network.squash == "clip" else "sac or td3"
+        raise TrainingError(
+            f"{algorithm} keeps network outputs within ±1 by {squash_of(algorithm)}, the agent of {file.source} by "
+            f"{file.network.squash}: the same weights would be another agent. Go on with {fitting}, or imitate it by a "
+            f"model that {algorithm} can go on with: imitate --expert agent:FILE --algorithm {algorithm}, with FILE "
+            "its agent.safetensors."
+        )
+    if file.algorithm == algorithm:
+        _load_policy(model, file)
+    else:
+        _load_actor(model, file)
+
+
+def _load_policy(model: BaseAlgorithm, file: InitialWeights) -> None:
+    """Actor and critics."""
+    try:
+        model.policy.load_state_dict(file.policy)
+    except RuntimeError as e:
+        raise TrainingError(f"Cannot begin from {file.source}: {' '.join(str(e).split())[:300]}") from None
+
+
+def _load_actor(model: BaseAlgorithm, file: InitialWeights) -> None:
+    layers = [module for module in mean_network(model) if isinstance(module, nn.Linear)]
+    shapes = [tuple(layer.weight.shape) for layer in layers]
+    if shapes != [weights.shape for weights in file.network.weights]:
+        raise TrainingError(f"{file.source} has layers of {file.network.sizes}, which are not those of this run.")
+    with torch.no_grad():
+        for layer, weights, bias in zip(layers, file.network.weights, file.network.biases, strict=True):
+            layer.weight.copy_(torch.tensor(weights))
+            layer.bias.copy_(torch.tensor(bias))
+        target: Any = getattr(model.policy, "actor_target", None)
+        if target is not None:
+            actor: Any = model.policy.actor
+            target.load_state_dict(actor.state_dict())
