@@ -13,12 +13,12 @@ import pathlib
 import shlex
 import sys
 import textwrap
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Annotated, Literal
 
 import tyro
 
-from baselines import registry
+from baselines import command, registry
 from baselines.evaluation import report
 from baselines.evaluation import test_sets as known_sets
 from baselines.evaluation.machine import describe
@@ -29,7 +29,6 @@ from baselines.evaluation.runner import run
 from baselines.files import write
 from baselines.spec import PolicySpec
 from ikgym import scenarios as scenario_registry
-from ikgym.exceptions import IkgymError
 from ikgym.scenarios import Scenario
 from ikgym.validation import whole_number
 
@@ -125,6 +124,7 @@ def _carry_out(
     plots: bool,
     progress: bool,
     command: str,
+    show: Callable[[list[Row]], None] | None = None,
 ) -> list[Row]:
     whole_number("workers", workers, at_least=1)
     results = None if out is None else Results(out, plan, describe(), resume=resume, overwrite=overwrite)
@@ -135,9 +135,12 @@ def _carry_out(
             rows.update({job.key: row for job, row, _ in outcomes})
             if results is not None:
                 results.add(outcomes)
+    played = [rows[job.key] for job in plan.jobs]
+    if show is not None:  # before the plots, which take a while
+        show(played)
     if results is not None:
         _finish(results, plan, plots=plots, progress=progress, command=command)
-    return [rows[job.key] for job in plan.jobs]
+    return played
 
 
 def _finish(results: Results, plan: Plan, *, plots: bool, progress: bool, command: str) -> None:
@@ -196,6 +199,7 @@ class Options:
 
 def manual() -> str:
     """The text of ``--help`` above the options."""
+    prog = _program()
     policies = (name + (" (reference)" if report.is_reference(name) else "") for name in registry.names())
     return f"""\
 Plays every policy on every scenario, and measures costs, errors, joint velocities and the time per step.
@@ -207,12 +211,12 @@ Plays every policy on every scenario, and measures costs, errors, joint velociti
 {_listing("Policies", (*policies, "agent:PATH (an agent in a file)"))}
 
 Examples:
-  python -m baselines.evaluate
-  python -m baselines.evaluate --policies dls dls:damping=1e-2 rhc_gradient:alpha_max=5e-4,horizon=5
-  python -m baselines.evaluate --scenarios varga7-random --episodes 20 --workers 4 --out results/random
-  python -m baselines.evaluate --scenarios varga7-random --episodes 50 --out results/random --resume
-  python -m baselines.evaluate --test-sets varga7-random --policies rhc_gradient --out results/test
-  python -m baselines.evaluate --scenarios varga7-random --policies agent:runs/mine.safetensors dls
+  {prog}
+  {prog} --policies dls dls:damping=1e-2 rhc_gradient:alpha_max=5e-4,horizon=5
+  {prog} --scenarios varga7-random --episodes 20 --workers 4 --out results/random
+  {prog} --scenarios varga7-random --episodes 50 --out results/random --resume
+  {prog} --test-sets varga7-random --policies rhc_gradient --out results/test
+  {prog} --scenarios varga7-random --policies agent:runs/mine.safetensors dls
 
 Files in the folder of --out, each replaced in one go, so that a run may be stopped at any time:
   results.json  a list of rows, one an episode, written anew after each batch
@@ -256,13 +260,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         The exit code: 0, 2 where something expected went wrong, 130 after Ctrl-C.
     """
     arguments = sys.argv[1:] if arguments is None else list(arguments)
-    options = tyro.cli(
-        Options,
-        prog="python -m baselines.evaluate",
-        description=manual(),
-        args=arguments,
-    )
-    try:
+    out: pathlib.Path | None = None
+
+    def work() -> int:
+        nonlocal out
+        options = command.parse(Options, arguments, prog=_program(), description=manual())
+        out = options.out
         plan = make_plan(
             options.scenarios or (() if options.test_sets else ("varga7-fast",)),
             options.policies,
@@ -274,7 +277,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             timed=options.timed,
             trust=options.trust,
         )
-        rows = _carry_out(
+        _carry_out(
             plan,
             workers=options.workers,
             out=options.out,
@@ -282,19 +285,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
             overwrite=options.overwrite,
             plots=options.plots,
             progress=True,
-            command=shlex.join(["python", "-m", "baselines.evaluate", *arguments]),
+            command=shlex.join([*_program().split(), *arguments]),
+            show=lambda rows: print(
+                report.table(rows, plan.skipped, operations=options.operations, width=command.width()), flush=True
+            ),
         )
-    except IkgymError as e:
-        print(f"error: {' '.join(str(e).split())}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        kept = "" if options.out is None else f" What was finished is in {options.out}; go on with --resume."
-        print(f"\nStopped.{kept}", file=sys.stderr)
-        return 130
-    print(report.table(rows, plan.skipped, operations=options.operations))
-    if options.out is not None:
-        print(f"\nwritten to {options.out}")
-    return 0
+        if out is not None:
+            print(f"\nwritten to {out}")
+        return 0
+
+    return command.run(
+        work, lambda: "Stopped." if out is None else f"Stopped. What was finished is in {out}; go on with --resume."
+    )
+
+
+def _program() -> str:
+    return command.program("evaluate", "python -m baselines.evaluate")
 
 
 if __name__ == "__main__":

@@ -9,6 +9,9 @@ from collections.abc import Iterator
 
 logger = logging.getLogger("ikgym")
 
+#: The attribute of a log record that says what is being compiled.
+COMPILING = "compiling"
+
 
 @contextlib.contextmanager
 def announced(what: str, patience: float = 2.0) -> Iterator[None]:
@@ -19,7 +22,10 @@ def announced(what: str, patience: float = 2.0) -> Iterator[None]:
         patience: Time after which the user is told, in [s].
     """
     timer = threading.Timer(
-        patience, logger.warning, [f"Compiling {what}; this happens once, the result is cached on disk."]
+        patience,
+        logger.warning,
+        ["Compiling %s; this happens once, the result is cached on disk.", what],
+        {"extra": {COMPILING: what}},
     )
     timer.daemon = True
     timer.start()

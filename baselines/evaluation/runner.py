@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
+import logging
 import multiprocessing
 import signal
 import sys
@@ -22,6 +24,7 @@ from baselines.evaluation.metrics import Row, measure
 from baselines.evaluation.plan import Job
 from baselines.evaluation.rollout import Episode, Tick, rollout, rollouts
 from baselines.oracle import best_known
+from ikgym.compilation import COMPILING, logger
 from ikgym.exceptions import IkgymError
 from ikgym.scenarios.scenario import furthest
 
@@ -64,22 +67,69 @@ def run(jobs: Sequence[Job], *, workers: int, progress: bool) -> Generator[list[
         # A log file has no cursor to go back with.
         mininterval=0.1 if sys.stderr.isatty() else 10.0,
     ) as bar:
+        line = _Line(bar)
 
         def announce(batch: Sequence[Job]) -> None:
             nonlocal done
             done += len(batch)
             job = batch[0]
-            bar.set_description(f"{job.scenario.name} · {job.policy} ({done}/{len(jobs)})", refresh=False)
+            line.describe(f"{job.scenario.name} · {job.policy} ({done}/{len(jobs)})")
 
         if workers == 1 or len(parts) < 2:
             for batch in parts:
                 announce(batch)
-                yield play(batch, bar.update)
+                with line.watching():
+                    outcomes = play(batch, line.tick)
+                yield outcomes
         else:
             for batch, outcomes in _in_processes(parts, workers):
                 announce(batch)
                 bar.update(sum(job.scenario.steps for job in batch))
                 yield outcomes
+
+
+class _Line(logging.Handler):
+    """The line of progress, which says so while kernels are compiled.
+
+    Args:
+        bar: What draws it.
+    """
+
+    def __init__(self, bar: Any) -> None:
+        super().__init__()
+        self._bar, self._description, self._compiling = bar, "", False
+
+    def describe(self, text: str) -> None:
+        """Says what is played."""
+        self._description = text
+        self._bar.set_description(text, refresh=False)
+
+    def tick(self, steps: int) -> None:
+        """Moves the bar on."""
+        if self._compiling:
+            self._compiling = False
+            self._bar.set_description(self._description, refresh=False)
+        self._bar.update(steps)
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Shows what is compiled in the line itself; other messages above it."""
+        if not hasattr(record, COMPILING):
+            self._bar.write(record.getMessage(), file=sys.stderr)
+            return
+        self._compiling = True
+        self._bar.set_description(f"compiling {getattr(record, COMPILING)}, which happens once", refresh=True)
+
+    @contextlib.contextmanager
+    def watching(self) -> Iterator[None]:
+        """Listens to messages while something is played, where the line is shown."""
+        if self._bar.disable:
+            yield
+            return
+        logger.addHandler(self)
+        try:
+            yield
+        finally:
+            logger.removeHandler(self)
 
 
 def batches(jobs: Iterable[Job]) -> list[list[Job]]:

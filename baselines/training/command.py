@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import pathlib
 import shlex
 import sys
@@ -12,13 +13,13 @@ from typing import Annotated, Any, Generic, TypeVar, Union
 
 import tyro
 
+from baselines import command as shared
 from baselines import registry
 from baselines.training import methods, presets
 from baselines.training.config.common import SHAPE, Config
 from baselines.training.errors import TrainingError
 from baselines.training.seeds import Job, Outcome, train_seeds
 from ikgym import scenarios
-from ikgym.exceptions import IkgymError
 from ikgym.validation import whole_number
 
 PROGRAM = "train.py"
@@ -77,9 +78,10 @@ class Repeat:
 
 def manual() -> str:
     """The text of ``--help`` above the options."""
+    prog = _program()
     return f"""\
 Trains agents: networks that answer an observation with joint velocities, alone or as a correction of another policy.
-Each method has options of its own: {PROGRAM} METHOD --help
+Each method has options of its own: {prog} METHOD --help
 
 {_listing("Methods", methods.METHODS)}
 
@@ -90,12 +92,12 @@ Each method has options of its own: {PROGRAM} METHOD --help
 {_listing("Policies for --base-policy", (name for name in registry.names() if not registry.get(name).reference))}
 
 Examples:
-  python {PROGRAM} ppo --preset smoke --out runs/smoke
-  python {PROGRAM} ppo --base-policy dls:damping=1e-2 --action-scale 0.5 --seeds 0 1 2 3 4 --workers 2 --out runs/over-dls
-  python {PROGRAM} imitate --preset residual --seeds 0 1 2 3 4 --workers 2 --out runs/residual
-  python {PROGRAM} ppo --preset finetune --init runs/apg/seed-0/model.zip --out runs/finer
-  python {PROGRAM} ppo --preset smoke --out runs/smoke --resume
-  python {PROGRAM} repeat runs/smoke/seed-0/run.json --out runs/again
+  {prog} ppo --preset smoke --out runs/smoke
+  {prog} ppo --base-policy dls:damping=1e-2 --action-scale 0.5 --seeds 0 1 2 3 4 --workers 2 --out runs/over-dls
+  {prog} imitate --preset residual --seeds 0 1 2 3 4 --workers 2 --out runs/residual
+  {prog} ppo --preset finetune --init runs/apg/seed-0/model.zip --out runs/finer
+  {prog} ppo --preset smoke --out runs/smoke --resume
+  {prog} repeat runs/smoke/seed-0/run.json --out runs/again
 
 Files in the folder of a run, each replaced in one go, so that it may be stopped or killed at any time:
   run.json           all that is needed to repeat it, its validation, what it has cost, the hash of its final weights
@@ -125,20 +127,25 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     arguments = sys.argv[1:] if arguments is None else list(arguments)
     out: pathlib.Path | None = None
-    try:
+
+    def work() -> int:
+        nonlocal out
         command, given = parse(arguments)
         if isinstance(command, Repeat):
             out = command.out
             return _repeat(command)
         out = command.options.out
-        return _train(command, given, shlex.join(["python", PROGRAM, *arguments]))
-    except IkgymError as e:
-        print(f"error: {' '.join(str(e).split())}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
+        return _train(command, given, shlex.join([*_program().split(), *arguments]))
+
+    def stopped() -> str:
         kept = "" if out is None else f" What was done up to the last checkpoint is in {out}; go on with --resume."
-        print(f"\nStopped.{kept}", file=sys.stderr)
-        return 130
+        return f"Stopped.{kept}"
+
+    return shared.run(work, stopped)
+
+
+def _program() -> str:
+    return shared.program("train", f"python {PROGRAM}")
 
 
 def parse(arguments: Sequence[str]) -> tuple[Command[Any] | Repeat, frozenset[str]]:
@@ -166,18 +173,13 @@ def parse(arguments: Sequence[str]) -> tuple[Command[Any] | Repeat, frozenset[st
         given |= of_preset
     kinds.append(Annotated[Repeat, tyro.conf.subcommand("repeat")])
     any_of_them: Any = Union[tuple(kinds)]  # noqa: UP007  # made at run time
-    command: Command[Any] | Repeat = tyro.cli(
-        any_of_them,
-        prog=f"python {PROGRAM}",
-        description=manual(),
-        args=arguments,
-    )
+    command: Command[Any] | Repeat = shared.parse(any_of_them, arguments, prog=_program(), description=manual())
     return command, frozenset(given)
 
 
 def _value_of(option: str, arguments: Sequence[str]) -> str | None:
     """The value of an option that is needed before the others can be read."""
-    for argument, following in zip(arguments, [*arguments[1:], ""], strict=True):
+    for argument, following in itertools.zip_longest(arguments, arguments[1:], fillvalue=""):
         name, equals, value = argument.partition("=")
         if name.replace("_", "-") == option:
             return value if equals else following
@@ -224,7 +226,7 @@ def _repeat(command: Repeat) -> int:
         resume=command.resume,
         overwrite=command.overwrite,
         checkpoint_every=command.checkpoint_every,
-        command=shlex.join(["python", PROGRAM, "repeat", str(command.run)]),
+        command=shlex.join([*_program().split(), "repeat", str(command.run)]),
     )
     (outcome,) = train_seeds(job, [about["seed"]], workers=1, progress=command.progress)
     if outcome.error:
