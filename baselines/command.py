@@ -121,9 +121,16 @@ def width() -> int:
 
 def _in_one_line(box: str) -> str:
     """The message in a box of tyro's: what is wrong, and what there is instead."""
-    rows = [row.strip("│ ").strip() for row in re.sub(r"\x1b\[[0-9;]*m", "", box).splitlines() if row.startswith("│")]
-    rule = next((place for place, row in enumerate(rows) if set(row) == {"─"}), len(rows))
-    message, more = " ".join(rows[:rule]), " ".join(rows[rule:]).strip("─ ")
+    sections: list[list[str]] = [[]]
+    for line in re.sub(r"\x1b\[[0-9;]*m", "", box).splitlines():
+        row = line.strip("│ ")
+        if not row.strip("─-"):
+            sections.append([])
+        elif not row.startswith(("╭", "╰")):
+            sections[-1].append(row)
+    # Where nothing but ASCII can be printed there is no frame that holds the title: it is a section.
+    texts = [" ".join(section) for section in sections if section][0 if "╭" in box else 1 :]
+    message, more = (*texts, "", "")[:2]
     for pattern, plain in PLAINER:
         message = re.sub(pattern, plain, message)
     if listed := re.match(r"Available subcommands: ([\w, -]+)", more):

@@ -228,7 +228,7 @@ Files in the folder of --out, each replaced in one go, so that a run may be stop
 Columns:
   scenario, policy, parameters, seed, steps      which episode it is
   total_cost = tracking_cost + velocity_cost     sum of -reward
-  cost ratio                                         total_cost / best known cost, null where there is none above 1e-9
+  cost_ratio                                     total_cost / best known cost, null where there is none above 1e-9
   position_error_max, position_error_rms         distance from the nominal position in [m]
   orientation_error_max, orientation_error_rms   geodesic angle in [rad], null where the task has none
   qdot_peak, qdot_rms, qdot_total_variation      of the joint velocities, in [rad/s] or [m/s]

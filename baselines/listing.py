@@ -152,11 +152,9 @@ def _plain(text: str) -> str:
 
 def _refilled(text: str, width: int) -> str:
     """A text whose paragraphs, and items of the form ``name: what it is``, are filled anew where a line is too long."""
-    if max(map(len, text.splitlines()), default=0) <= width:
-        return text
     parts: list[str] = []
     for line in text.splitlines():
-        item = re.match(r" *- | {0,4}\w+:( |$)| +\w.*?  ", line)
+        item = re.match(r" *- | {0,4}\w+:( |$)| *\w.*?  |  \w+ = ", line)
         if not line.strip() or item or not (parts and parts[-1]):
             parts.append(line.rstrip())
         else:

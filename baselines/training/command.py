@@ -78,7 +78,7 @@ class Repeat:
 
 def manual() -> str:
     """The text of ``--help`` above the options."""
-    prog = _program()
+    prog, evaluate = _program(), shared.program("evaluate", "python -m baselines.evaluate")
     return f"""\
 Trains agents: networks that answer an observation with joint velocities, alone or as a correction of another policy.
 Each method has options of its own: {prog} METHOD --help
@@ -105,7 +105,7 @@ Files in the folder of a run, each replaced in one go, so that it may be stopped
   tensorboard/       the same, for: tensorboard --logdir DIR
   checkpoint.pt      where it stands, for --resume
   model.zip          at the end, the kept model, for Stable-Baselines3 and for --init
-  agent.safetensors  at the end, the same agent, for: python -m baselines.evaluate --policies agent:FILE
+  agent.safetensors  at the end, the same agent, for: {evaluate} --policies agent:FILE
 
 Agents are trained on the seeds of the split "train" and judged on those of "validation"; those of "test" are not
 touched. Where there is a reference, the cost ratio is the geometric mean of the costs over those of rhc_foresight."""
