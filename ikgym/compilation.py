@@ -9,9 +9,6 @@ from collections.abc import Iterator
 
 logger = logging.getLogger("ikgym")
 
-#: The attribute of a log record that says what is being compiled.
-COMPILING = "compiling"
-
 
 @contextlib.contextmanager
 def announced(what: str, patience: float = 2.0) -> Iterator[None]:
@@ -22,10 +19,7 @@ def announced(what: str, patience: float = 2.0) -> Iterator[None]:
         patience: Time after which the user is told, in [s].
     """
     timer = threading.Timer(
-        patience,
-        logger.warning,
-        ["Compiling %s; this happens once, the result is cached on disk.", what],
-        {"extra": {COMPILING: what}},
+        patience, logger.warning, [f"Compiling {what}; this happens once, the result is cached on disk."]
     )
     timer.daemon = True
     timer.start()

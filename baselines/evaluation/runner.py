@@ -24,7 +24,7 @@ from baselines.evaluation.metrics import Row, measure
 from baselines.evaluation.plan import Job
 from baselines.evaluation.rollout import Episode, Tick, rollout, rollouts
 from baselines.oracle import best_known
-from ikgym.compilation import COMPILING, logger
+from ikgym.compilation import logger
 from ikgym.exceptions import IkgymError
 from ikgym.scenarios.scenario import furthest
 
@@ -113,11 +113,12 @@ class _Line(logging.Handler):
 
     def emit(self, record: logging.LogRecord) -> None:
         """Shows what is compiled in the line itself; other messages above it."""
-        if not hasattr(record, COMPILING):
-            self._bar.write(record.getMessage(), file=sys.stderr)
+        text = record.getMessage()
+        if not text.startswith("Compiling "):
+            self._bar.write(text, file=sys.stderr)
             return
         self._compiling = True
-        self._bar.set_description(f"compiling {getattr(record, COMPILING)}, which happens once", refresh=True)
+        self._bar.set_description(text.partition(",")[0], refresh=True)  # what, and that it happens once
 
     @contextlib.contextmanager
     def watching(self) -> Iterator[None]:
