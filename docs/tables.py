@@ -24,7 +24,7 @@ PAGES = Path(__file__).parent
 
 def arms() -> list[tuple[str, ...]]:
     """One line an arm."""
-    rows = [("arm", "joints", "prismatic", "tool at home [m]")]
+    rows = [("arm", "joints", "of which prismatic", "tool at home [m]")]
     for name in ikgym.arms.names():
         arm = ikgym.arms.get(name)
         home = ", ".join(f"{x:.4g}" for x in arm.forward(np.zeros(arm.joints))[1] + 0.0)
