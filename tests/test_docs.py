@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
+import subprocess
 import sys
 from pathlib import Path
 
@@ -183,6 +184,38 @@ def test_make_help_lists_every_target():
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
     phony = re.search(r"^\.PHONY: (.*)$", makefile, re.MULTILINE)[1].split()
     assert set(re.findall(r"^(\w+):.*##", makefile, re.MULTILINE)) == set(phony)
+
+
+def planned(target: str) -> list[str]:
+    """The commands of a target of the Makefile, and of those that it calls."""
+    done = subprocess.run(
+        ["make", "--dry-run", "--always-make", target], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    return done.stdout.splitlines()
+
+
+def test_check_does_everything_in_order():
+    lines = planned("check")
+    wanted = ["ruff format --check", "ruff check", "mypy", "lint-imports", '-m "not slow"', "-m slow"]
+    places = [next(i for i, line in enumerate(lines) if words in line) for words in wanted]
+    assert places == sorted(places)
+    assert (ROOT / ".ci" / "run").read_text(encoding="utf-8").rstrip().endswith("make check")
+
+
+def test_test_leaves_out_the_slow_ones():
+    (line,) = [line for line in planned("test") if "pytest" in line]
+    assert line.endswith('-m "not slow"')
+    (line,) = [line for line in planned("slow") if "pytest" in line]
+    assert line.endswith("-m slow")
+
+
+def test_demo_tells_the_story_and_can_play_all():
+    (line,) = [line for line in planned("demo") if "ikgym evaluate" in line]
+    assert 9 <= len(line.partition("--policies ")[2].partition(" --")[0].split()) <= 11
+    done = subprocess.run(
+        ["make", "--dry-run", "demo", "DEMO=all"], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    assert "--policies all " in done.stdout
 
 
 def test_changelog_counts_right():
