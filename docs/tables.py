@@ -15,7 +15,7 @@ import numpy as np
 
 import baselines
 import ikgym
-from baselines.listing import summary
+from baselines.console.listing import summary
 from baselines.registry import get
 from baselines.status import Status
 

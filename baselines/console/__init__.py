@@ -11,7 +11,8 @@ from typing import Annotated
 import tyro
 
 import ikgym
-from baselines import command, listing
+from baselines import command
+from baselines.console import listing
 from ikgym.exceptions import UnknownNameError
 
 #: What each command does, and where it is, imported when it is asked for.
@@ -92,7 +93,3 @@ def _list(word: str, arguments: Sequence[str]) -> int:
 def _say(text: str) -> int:
     print(text)
     return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
