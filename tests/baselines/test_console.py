@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import subprocess
 import sys
@@ -161,3 +162,18 @@ def test_the_table_stands_before_the_plots_and_the_readme_has_the_command(tmp_pa
 def test_no_list_loads_a_learning_library():
     code = "import sys; from baselines.console import main; main(['policies']); sys.exit('torch' in sys.modules)"
     subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
+
+
+def test_training_without_its_extra_says_which(tmp_path):
+    """Also by `train.py`, which is the same command."""
+    (tmp_path / "torch.py").write_text("raise ModuleNotFoundError('no', name='torch')\n")
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), str(ROOT)])}
+    done = subprocess.run(
+        [sys.executable, str(ROOT / "train.py"), "ppo", "--out", str(tmp_path)],
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 2
+    assert done.stderr == 'error: This needs torch: pip install "ikgym[train]"\n'
