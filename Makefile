@@ -3,9 +3,11 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
-DEMO := all
+# What tells the story; DEMO=all plays all policies.
+DEMO := moore_penrose truncated_svd dls null_space full_orientation mfac rhc_gradient rhc rhc_foresight follow_nominal
+PYTEST := $(BIN)/python -m pytest -n auto --dist worksteal
 
-.PHONY: help setup demo test check format lint types layers bench rivals clean
+.PHONY: help setup demo test slow check format lint types layers bench rivals clean
 
 help: ## Show this list
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /  make \1\t/' | expand -t 18
@@ -17,11 +19,14 @@ $(STAMP): pyproject.toml constraints.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable ".[dev]"
 	@touch $@
 
-demo: $(STAMP) ## Evaluate the baselines on the default scenario: table and plots in results/demo
-	$(BIN)/python -m baselines.evaluate --scenarios varga7-fast --policies $(DEMO) --out results/demo --overwrite
+demo: $(STAMP) ## Evaluate ten policies (DEMO=all: all) on the default scenario: table and plots in results/demo
+	$(BIN)/ikgym evaluate --scenarios varga7-fast --policies $(DEMO) --out results/demo --overwrite
 
-test: $(STAMP) ## Run the whole test suite
-	$(BIN)/python -m pytest -n auto --dist worksteal
+test: $(STAMP) ## Run the tests that are not marked slow
+	$(PYTEST) -m "not slow"
+
+slow: $(STAMP) ## Run the tests that are marked slow
+	$(PYTEST) -m slow
 
 format: $(STAMP) ## Format the code and sort its imports
 	$(BIN)/ruff format .
@@ -37,7 +42,12 @@ types: $(STAMP) ## Check types
 layers: $(STAMP) ## Check the imports between layers
 	$(BIN)/lint-imports
 
-check: lint types layers test ## All that CI runs: lint, types, layers, tests
+check: ## All that CI runs: format, lint, types, layers, tests, slow tests
+	$(MAKE) --no-print-directory lint
+	$(MAKE) --no-print-directory types
+	$(MAKE) --no-print-directory layers
+	$(MAKE) --no-print-directory test
+	$(MAKE) --no-print-directory slow
 
 bench: $(STAMP) ## Measure speed beside other environments, libraries and solvers: report in results/bench
 	$(BIN)/python -m benchmarks

@@ -1,8 +1,8 @@
-"""Trains agents: ``python train.py --help``."""
+"""Trains agents: ``python train.py --help``, the same as ``ikgym train --help``."""
 
 import sys
 
-from baselines.training.command import main
+from baselines.console import main
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main(["train", *sys.argv[1:]]))

@@ -14,11 +14,12 @@ import datetime
 import pathlib
 import shlex
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Annotated, Literal
 
 import tyro
 
+from baselines import command
 from baselines.evaluation import report
 from baselines.evaluation.entrants import ALL, AnyPolicy, Wrap
 from baselines.evaluation.machine import describe
@@ -27,7 +28,6 @@ from baselines.evaluation.plan import Plan, make_plan
 from baselines.evaluation.results import Results, Rows
 from baselines.evaluation.runner import run
 from baselines.files import write
-from ikgym.exceptions import IkgymError
 from ikgym.scenarios import Preview, Scenario
 from ikgym.validation import whole_number
 
@@ -135,6 +135,7 @@ def _carry_out(
     plots: bool,
     progress: bool,
     command: str,
+    show: Callable[[Rows], None] | None = None,
 ) -> Rows:
     whole_number("workers", workers, at_least=1)
     results = None if out is None else Results(out, plan, describe(), resume=resume, overwrite=overwrite)
@@ -145,9 +146,12 @@ def _carry_out(
             rows.update({one.job.key: one.row for one in played})
             if results is not None:
                 results.add(played)
+    of_all = Rows([rows[job.key] for job in plan.jobs], plan.skipped)
+    if show is not None:  # before the plots, which take a while
+        show(of_all)
     if results is not None:
         _finish(results, plan, plots=plots, progress=progress, command=command)
-    return Rows([rows[job.key] for job in plan.jobs], plan.skipped)
+    return of_all
 
 
 def _finish(results: Results, plan: Plan, *, plots: bool, progress: bool, command: str) -> None:
@@ -216,15 +220,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         The exit code: 0, 2 where something expected went wrong, 130 after Ctrl-C.
     """
     arguments = sys.argv[1:] if arguments is None else list(arguments)
-    options = tyro.cli(
-        Options,
-        prog="python -m baselines.evaluate",
-        description=manual(),
-        args=arguments,
-    )
-    if (here := str(pathlib.Path.cwd())) not in sys.path:
-        sys.path.append(here)  # for modules of the user, where a console command does not look
-    try:
+    out: pathlib.Path | None = None
+
+    def work() -> int:
+        nonlocal out
+        options = command.parse(Options, arguments, prog=_program(), description=manual())
+        out = options.out
+        if (here := str(pathlib.Path.cwd())) not in sys.path:
+            sys.path.append(here)  # for modules of the user, where a console command does not look
         plan = make_plan(
             options.scenarios or (() if options.test_sets else ("varga7-fast",)),
             options.policies,
@@ -236,7 +239,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             timed=options.timed,
             trust=options.trust,
         )
-        rows = _carry_out(
+        _carry_out(
             plan,
             workers=options.workers,
             out=options.out,
@@ -244,19 +247,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
             overwrite=options.overwrite,
             plots=options.plots,
             progress=True,
-            command=shlex.join(["python", "-m", "baselines.evaluate", *arguments]),
+            command=shlex.join([*_program().split(), *arguments]),
+            show=lambda rows: print(
+                report.table(rows, plan.skipped, operations=options.operations, width=command.width()), flush=True
+            ),
         )
-    except IkgymError as e:
-        print(f"error: {' '.join(str(e).split())}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        kept = "" if options.out is None else f" What was finished is in {options.out}; go on with --resume."
-        print(f"\nStopped.{kept}", file=sys.stderr)
-        return 130
-    print(report.table(rows, plan.skipped, operations=options.operations))
-    if options.out is not None:
-        print(f"\nwritten to {options.out}")
-    return 0
+        if out is not None:
+            print(f"\nwritten to {out}")
+        return 0
+
+    return command.run(
+        work, lambda: "Stopped." if out is None else f"Stopped. What was finished is in {out}; go on with --resume."
+    )
+
+
+def _program() -> str:
+    return command.program("evaluate", "python -m baselines.evaluate")
 
 
 if __name__ == "__main__":

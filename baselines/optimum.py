@@ -12,7 +12,7 @@ import numpy as np
 import tyro
 from tqdm import tqdm
 
-from baselines import registry
+from baselines import command, registry
 from baselines.evaluation import test_sets as known_sets
 from baselines.oracle import best_known
 from baselines.oracle.best_known import MARGIN, MEANINGLESS
@@ -21,7 +21,7 @@ from baselines.oracle.episode import Whole, path_of
 from baselines.oracle.optimum import Optimum, Search
 from baselines.spec import parse_policy
 from ikgym import scenarios as scenario_registry
-from ikgym.exceptions import IkgymError, InvalidInputError
+from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray, whole_number
 
@@ -54,7 +54,7 @@ class Options:
 
 def manual() -> str:
     """The text of ``--help`` above the options."""
-    names = ", ".join(scenario_registry.names())
+    names, prog = ", ".join(scenario_registry.names()), _program()
     return f"""\
 Finds the cheapest joint paths of whole episodes that are known, from many starts, and keeps their costs as records:
 cost ratio = cost / best known cost. Nobody certifies that there is no cheaper path.
@@ -64,11 +64,11 @@ cost ratio = cost / best known cost. Nobody certifies that there is no cheaper p
 Test sets: {", ".join(known_sets.names())}.
 
 Examples:
-  python -m baselines.optimum --scenarios varga7-fast
-  python -m baselines.optimum --scenarios varga7-random --seeds 1000000 1000001 --starts 1000
-  python -m baselines.optimum --update
-  python -m baselines.optimum --scenarios varga7-fast --policies rhc_foresight --update
-  python -m baselines.optimum --test-sets varga7-random --check
+  {prog} --scenarios varga7-fast
+  {prog} --scenarios varga7-random --seeds 1000000 1000001 --starts 1000
+  {prog} --update
+  {prog} --scenarios varga7-fast --policies rhc_foresight --update
+  {prog} --test-sets varga7-random --check
 
 Of each episode is printed: its cost; how many paths at full resolution came within a millionth of it; how many random
 starts came within 1 % of the best before the local search, their median and their worst cost; the norm of the gradient
@@ -190,26 +190,29 @@ def main(arguments: Sequence[str] | None = None) -> int:
         The exit code: 0, 1 where a record does not stand the check, 2 where something expected went wrong, 130 after
         Ctrl-C.
     """
-    options = tyro.cli(Options, prog="python -m baselines.optimum", description=manual(), args=arguments)
+    given = sys.argv[1:] if arguments is None else list(arguments)
+    return command.run(lambda: _carry_out(given), lambda: "Stopped; what was found is kept.")
+
+
+def _carry_out(arguments: Sequence[str]) -> int:
+    # The numbers of a search are checked as soon as they are read.
+    options = command.parse(Options, arguments, prog=_program(), description=manual())
     kept, wrong = 0, 0
-    try:
-        todo = episodes(options.scenarios, options.test_sets, options.seeds)
-        for scenario, optimum in optima(todo, options.search, options.policies, cache=options.cache):
-            print(line(optimum), flush=True)
-            if options.check and (reason := verdict(scenario, optimum)):
-                print(f"  {reason}", flush=True)
-                wrong += 1
-            if options.update:
-                kept += len(best_known.record([optimum.record()]))
-    except IkgymError as e:
-        print(f"error: {' '.join(str(e).split())}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print("\nStopped; what was found is kept.", file=sys.stderr)
-        return 130
+    todo = episodes(options.scenarios, options.test_sets, options.seeds)
+    for scenario, optimum in optima(todo, options.search, options.policies, cache=options.cache):
+        print(line(optimum), flush=True)
+        if options.check and (reason := verdict(scenario, optimum)):
+            print(f"  {reason}", flush=True)
+            wrong += 1
+        if options.update:
+            kept += len(best_known.record([optimum.record()]))
     if options.update:
         print(f"{kept} of {len(todo)} records are new or better: {best_known.DATA.name}")
     return 1 if wrong else 0
+
+
+def _program() -> str:
+    return command.program("oracle", "python -m baselines.optimum")
 
 
 if __name__ == "__main__":

@@ -15,6 +15,7 @@ from typing import Annotated, Any
 
 import tyro
 
+from baselines import command
 from baselines.canonical import jsonable
 from baselines.evaluation.machine import describe
 from baselines.evaluation.plots.style import png
@@ -23,7 +24,7 @@ from baselines.papers import PAPERS, get
 from baselines.papers.ledger import ledger
 from baselines.papers.paper import Finding, Paper
 from baselines.papers.runs import Runs
-from ikgym.exceptions import IkgymError, InvalidInputError
+from ikgym.exceptions import InvalidInputError
 from ikgym.validation import whole_number
 
 #: What the claims of each paper came to, by paper and claim.
@@ -124,18 +125,25 @@ class Options:
     """Most steps of an episode, for trials, whose findings mean nothing."""
 
 
-MANUAL = """\
+def manual() -> str:
+    """The text of ``--help`` above the options."""
+    prog = _program()
+    return f"""\
 Regenerates the experiments of the papers: every figure drawn again from episodes played here, every claim tested.
 
 Examples:
-  python -m baselines.reproduce
-  python -m baselines.reproduce --paper khan --figure 3 4
-  python -m baselines.reproduce --ledger docs/papers.md
+  {prog}
+  {prog} --paper khan --figure 3 4
+  {prog} --ledger docs/papers.md
 
 Files in the folder of --out:
   PAPER/figure-NN.png  a figure of the paper, with its number there
   PAPER/numbers.json   the numbers behind the figures and the claims
   papers.md            the ledger: claim by claim, how it was tested, what came out"""
+
+
+def _program() -> str:
+    return command.program("reproduce", "python -m baselines.reproduce")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -145,24 +153,25 @@ def main(arguments: Sequence[str] | None = None) -> int:
         arguments: What stands behind the command; taken from the process if left out.
 
     Returns:
-        The exit code: 0, or 2 where something expected went wrong.
+        The exit code: 0, 2 where something expected went wrong, 130 after Ctrl-C.
     """
-    options = tyro.cli(Options, prog="python -m baselines.reproduce", description=MANUAL, args=arguments)
-    try:
-        if options.ledger is not None and (set(options.paper) != set(PAPERS) or options.figure or options.steps):
-            raise InvalidInputError("ledger: needs all papers, all figures and whole episodes.")
-        findings = reproduce(
-            options.paper,
-            figures=options.figure or None,
-            out=options.out,
-            steps=options.steps,
-            progress=True,
-        )
-        if options.ledger is not None:
-            write(options.ledger, ledger([get(name) for name in PAPERS], findings).encode())
-    except IkgymError as e:
-        print(f"error: {' '.join(str(e).split())}", file=sys.stderr)
-        return 2
+    given = sys.argv[1:] if arguments is None else list(arguments)
+    return command.run(lambda: _carry_out(given))
+
+
+def _carry_out(arguments: Sequence[str]) -> int:
+    options = command.parse(Options, arguments, prog=_program(), description=manual())
+    if options.ledger is not None and (set(options.paper) != set(PAPERS) or options.figure or options.steps):
+        raise InvalidInputError("ledger: needs all papers, all figures and whole episodes.")
+    findings = reproduce(
+        options.paper,
+        figures=options.figure or None,
+        out=options.out,
+        steps=options.steps,
+        progress=True,
+    )
+    if options.ledger is not None:
+        write(options.ledger, ledger([get(name) for name in PAPERS], findings).encode())
     for paper, of_paper in findings.items():
         for name, finding in of_paper.items():
             print(f"{paper:8} {finding.verdict:13} {name}: {finding.evidence}")

@@ -15,6 +15,7 @@ import numpy as np
 
 import baselines
 import ikgym
+from baselines.console.listing import summary
 from baselines.registry import get
 from baselines.status import Status
 
@@ -63,15 +64,9 @@ def policies() -> list[tuple[str, ...]]:
     rows = [("policy", "what it does", "parameters and defaults")]
     for name in baselines.names():
         policy = get(name)
-        summary = " ".join((policy.__doc__ or "").split("\n\n")[0].split())
-        summary = re.sub(r":class:`(\w+)`", lambda m: f"`{_policy_of(m[1])}`", summary)
         parameters = ", ".join(_parameter(policy.__dataclass_fields__[p]) for p in policy.parameter_names())
-        rows.append((f"`{name}`" + (" (reference)" if policy.reference else ""), summary, parameters))
+        rows.append((f"`{name}`" + (" (reference)" if policy.reference else ""), summary(name), parameters))
     return rows
-
-
-def _policy_of(class_name: str) -> str:
-    return next((name for name in baselines.names() if get(name).__name__ == class_name), class_name)
 
 
 def _parameter(field: dataclasses.Field[object]) -> str:

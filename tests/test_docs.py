@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import re
+import shlex
+import subprocess
+import sys
 from pathlib import Path
 
+import gymnasium as gym
+import numpy as np
 import pytest
 
 import baselines
 import ikgym
-from baselines import registry
+from baselines import console, registry
+from baselines.console import main
 from baselines.evaluate import evaluate
 from docs.tables import PAGES, filled
 
@@ -24,17 +30,100 @@ def test_tables_are_up_to_date(page):
     assert filled(text) == text, "write the tables anew with: python -m docs.tables"
 
 
+def files() -> dict[str, str]:
+    """What the README says stands in files of one's own, by their names."""
+    return dict(re.findall(r"<!-- file: (\S+) -->\n```\w+\n(.*?)```", README, re.DOTALL))
+
+
+def commands() -> list[list[str]]:
+    """The command lines of the README that begin with ``ikgym``, each as its words."""
+    blocks = "".join(re.findall(r"```sh\n(.*?)```", README, re.DOTALL))
+    return [shlex.split(line, comments=True)[1:] for line in blocks.splitlines() if line.startswith("ikgym ")]
+
+
+def statements(snippet: str) -> list[str]:
+    """Its lines without imports and without empty ones."""
+    return [line for line in snippet.splitlines() if line.strip() and not line.startswith(("import", "from"))]
+
+
 def test_readme_snippets_run(capsys):
-    snippets = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+    snippets = [snippet for snippet in re.findall(r"```python\n(.*?)```", README, re.DOTALL) if "class" not in snippet]
     assert len(snippets) == 2
     for snippet in snippets:
-        lines = [line for line in snippet.splitlines() if line.strip() and not line.startswith(("import", "from"))]
-        assert len(lines) <= 10
+        assert len(statements(snippet)) <= 10
         exec(snippet, {})
     printed = capsys.readouterr().out
+    assert "untrained agent " in printed
     assert "'nominal': (2, 6)" in printed
     cost = float(re.search(r"cost (\S+)", printed)[1])
     assert cost == pytest.approx(cells()["dls"]["total cost"], rel=1e-3)
+
+
+def test_the_policy_of_the_readme_follows_the_reference():
+    snippet = files()["mine.py"]
+    assert len(statements(snippet)) <= 15
+    own: dict = {}
+    exec(snippet, own)
+    scenario = ikgym.scenarios.get("varga7-slow").replace(steps=200)
+    policy = own["Proportional"](scenario)
+    env = gym.make("RedundantIK-v0", scenario=scenario, preview=policy.preview)
+    (observation, _), state, errors = env.reset(seed=0), None, []
+    for _ in range(scenario.steps):
+        action, state = policy.predict(observation, state)
+        observation, *_, info = env.step(action.astype(np.float32))
+        errors.append(info["position_error"])
+    assert max(errors) < 2e-3  # [m], on a path of meters
+
+
+ARM = """<robot name="arm"><link name="base_link"/><link name="upper"/><link name="lower"/><link name="tool0"/>
+<joint name="a" type="revolute"><parent link="base_link"/><child link="upper"/><axis xyz="0 0 1"/>
+<limit lower="-3" upper="3" velocity="3" effort="1"/></joint>
+<joint name="b" type="revolute"><parent link="upper"/><child link="lower"/><origin xyz="0.4 0 0"/><axis xyz="0 1 0"/>
+<limit lower="-3" upper="3" velocity="3" effort="1"/></joint>
+<joint name="c" type="revolute"><parent link="lower"/><child link="tool0"/><origin xyz="0.3 0 0"/><axis xyz="0 1 0"/>
+<limit lower="-3" upper="3" velocity="3" effort="1"/></joint></robot>"""
+
+
+@pytest.mark.skipif(not hasattr(ikgym.scenarios, "load"), reason="scenario files come with another change")
+def test_what_is_ones_own_is_evaluated_by_one_command_each(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    monkeypatch.delitem(sys.modules, "mine", raising=False)
+    own = files()
+    for name, text in own.items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    wanted = [words for words in commands() if words[0] == "evaluate" and "--help" not in words]
+    assert len(wanted) == 2
+    for words in wanted:
+        assert main([*words, "--steps", "20"]) == 0
+    printed = capsys.readouterr().out
+    assert "mine:Proportional" in printed
+    assert "mine: 20 steps" in printed
+    # A URDF file: the arm's name goes, and the amplitudes are as many as the joints.
+    text = own["mine.toml"].replace('arm = "puma560"\n', "").replace('task = "pose"', 'task = "position"')
+    text = re.sub(r"\[(0.4|2.0), .*\]", lambda match: f"[{match[1]}, {match[1]}]", text)
+    text = re.sub(r"= \[(\S+), (\S+)\]", r"= [\1, \2, \1]", text)
+    (tmp_path / "mine-urdf.toml").write_text(text + own["mine-urdf.toml"], encoding="utf-8")
+    (tmp_path / "arm.urdf").write_text(ARM, encoding="utf-8")
+    assert main(["evaluate", "--scenarios", "mine-urdf.toml", "--policies", "dls", "--steps", "20"]) == 0
+    assert "dls" in capsys.readouterr().out
+
+
+def test_readme_names_every_command():
+    words = {words[0] for words in commands()}
+    assert words <= {*console.COMMANDS, *console.LISTS}
+    section = README.split("## Two commands")[1].split("\n## ")[0]
+    assert all(re.search(rf"\b{word}\b", section) for word in [*console.COMMANDS, *console.LISTS])
+
+
+def test_commands_of_the_documentation_exist():
+    text = "\n".join(page.read_text(encoding="utf-8") for page in PROSE if page.name != "CHANGELOG.md")
+    for word in re.findall(r"^(?:\$ )?ikgym (\w+)|`ikgym (\w+)", text, re.MULTILINE):
+        assert max(word) in {*console.COMMANDS, *console.LISTS}
+
+
+def test_readme_says_what_is_out_of_scope():
+    assert re.search(r"\*\*Out of scope\*\*: collisions, dynamics and jerk", README)
 
 
 def cells() -> dict[str, dict[str, float]]:
@@ -95,6 +184,38 @@ def test_make_help_lists_every_target():
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
     phony = re.search(r"^\.PHONY: (.*)$", makefile, re.MULTILINE)[1].split()
     assert set(re.findall(r"^(\w+):.*##", makefile, re.MULTILINE)) == set(phony)
+
+
+def planned(target: str) -> list[str]:
+    """The commands of a target of the Makefile, and of those that it calls."""
+    done = subprocess.run(
+        ["make", "--dry-run", "--always-make", target], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    return done.stdout.splitlines()
+
+
+def test_check_does_everything_in_order():
+    lines = planned("check")
+    wanted = ["ruff format --check", "ruff check", "mypy", "lint-imports", '-m "not slow"', "-m slow"]
+    places = [next(i for i, line in enumerate(lines) if words in line) for words in wanted]
+    assert places == sorted(places)
+    assert (ROOT / ".ci" / "run").read_text(encoding="utf-8").rstrip().endswith("make check")
+
+
+def test_test_leaves_out_the_slow_ones():
+    (line,) = [line for line in planned("test") if "pytest" in line]
+    assert line.endswith('-m "not slow"')
+    (line,) = [line for line in planned("slow") if "pytest" in line]
+    assert line.endswith("-m slow")
+
+
+def test_demo_tells_the_story_and_can_play_all():
+    (line,) = [line for line in planned("demo") if "ikgym evaluate" in line]
+    assert 9 <= len(line.partition("--policies ")[2].partition(" --")[0].split()) <= 11
+    done = subprocess.run(
+        ["make", "--dry-run", "demo", "DEMO=all"], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    assert "--policies all " in done.stdout
 
 
 def test_changelog_counts_right():

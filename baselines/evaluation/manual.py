@@ -5,7 +5,7 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterable
 
-from baselines import registry
+from baselines import command, registry
 from baselines.evaluation import report, test_sets
 from ikgym import scenarios
 
@@ -13,6 +13,7 @@ from ikgym import scenarios
 def manual() -> str:
     """What is played, examples, files and columns."""
     policies = (name + (" (reference)" if report.is_reference(name) else "") for name in registry.names())
+    prog = command.program("evaluate", "python -m baselines.evaluate")
     return f"""\
 Plays every policy on every scenario, and measures costs, errors, joint velocities and the time per step.
 
@@ -23,13 +24,13 @@ Plays every policy on every scenario, and measures costs, errors, joint velociti
 {_listing("Policies", (*policies, "agent:PATH (an agent in a file)", "package.module:Class"))}
 
 Examples:
-  python -m baselines.evaluate
-  python -m baselines.evaluate --policies dls dls:damping=1e-2 rhc_gradient:alpha_max=5e-4,horizon=5
-  python -m baselines.evaluate --scenarios varga7-random --episodes 20 --workers 4 --out results/random
-  python -m baselines.evaluate --scenarios varga7-random --episodes 50 --out results/random --resume
-  python -m baselines.evaluate --test-sets varga7-random --policies rhc_gradient --out results/test
-  python -m baselines.evaluate --scenarios varga7-random --policies agent:runs/mine.safetensors dls
-  python -m baselines.evaluate --scenarios lab.toml my_module:scenario --policies my_module:MyPolicy dls
+  {prog}
+  {prog} --policies dls dls:damping=1e-2 rhc_gradient:alpha_max=5e-4,horizon=5
+  {prog} --scenarios varga7-random --episodes 20 --workers 4 --out results/random
+  {prog} --scenarios varga7-random --episodes 50 --out results/random --resume
+  {prog} --test-sets varga7-random --policies rhc_gradient --out results/test
+  {prog} --scenarios varga7-random --policies agent:runs/mine.safetensors dls
+  {prog} --scenarios lab.toml my_module:scenario --policies my_module:MyPolicy dls
 
 Files in the folder of --out, each replaced in one go, so that a run may be stopped at any time:
   results.json  a list of rows, one an episode, written anew after each batch

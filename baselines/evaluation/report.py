@@ -15,36 +15,18 @@ from urllib.parse import quote
 from baselines import registry
 from baselines.evaluation.metrics import Row, Spread, Summary, summarise
 from baselines.evaluation.plan import Skipped
+from baselines.evaluation.text_table import Column, fitting, plain
 from baselines.oracle import best_known
 from ikgym.exceptions import IkgymError
 
 #: Characters that a line of the printed tables may have.
 WIDTH = 120
-# Of a name that stands in its line; longer ones stand above it.
-LONGEST = 20
 NOTHING = "–"
 #: The plots of a scenario: captions and files, relative to the folder, by the group they are shown in.
 Pictures = Mapping[str, Sequence[tuple[str, pathlib.PurePath]]]
 #: The group of plots that show all policies.
 OVERVIEW = "overview"
 REFERENCE_NOTE = "* reference: has privileged information"
-
-
-@dataclasses.dataclass(frozen=True)
-class Column:
-    """A column of a table.
-
-    Args:
-        title: Its head.
-        unit: Stands below the head, empty for pure numbers.
-        cell: The text of a summary's cell.
-        left: Whether it is set to the left.
-    """
-
-    title: str
-    unit: str
-    cell: Callable[[Summary], str]
-    left: bool = False
 
 
 def number(value: float | None, scale: float = 1.0) -> str:
@@ -58,25 +40,31 @@ def number(value: float | None, scale: float = 1.0) -> str:
     return f"{mantissa}e{int(exponent)}" if exponent else mantissa.removesuffix(".")
 
 
-def table(rows: Sequence[Row], skipped: Sequence[Skipped] = (), *, operations: bool = False) -> str:
-    """The tables of all scenarios as plain text, at most 120 characters wide.
+def table(rows: Sequence[Row], skipped: Sequence[Skipped] = (), *, operations: bool = False, width: int = WIDTH) -> str:
+    """The tables of all scenarios as plain text.
 
     Args:
         rows: The results.
         skipped: What was left out, to be said below.
         operations: Whether to show what a step costs in kinematics, factorisations and measurements.
+        width: Characters that a line may have. Columns that do not fit are left out, and named below.
     """
-    parts = []
+    parts: list[str] = []
+    absent: dict[str, None] = {}
     for scenario, summaries in by_scenario(rows).items():
         names = labels(summaries)
-        parts.append(f"{heading(scenario, summaries)}\n{_plain(_columns(names), summaries)}")
+        columns, left_out = fitting(_columns(names), summaries, width)
+        absent.update(dict.fromkeys(column.title for column in left_out))
+        parts.append(f"{heading(scenario, summaries)}\n{plain(columns, summaries, width)}")
         if spread := _spread(names, summaries):
-            parts.append(f"{_judged_by(summaries)} over the episodes of {scenario}\n{_plain(spread, summaries)}")
+            parts.append(f"{_judged_by(summaries)} over the episodes of {scenario}\n{plain(spread, summaries, width)}")
         if operations:
-            parts.append(f"operations in one step of {scenario}, mean\n{_plain(_operations(names), summaries)}")
+            parts.append(f"operations in one step of {scenario}, mean\n{plain(_operations(names), summaries, width)}")
     notes = _notes(rows)
+    if absent:
+        notes.append(f"left out at {width} characters a line: {', '.join(absent)}")
     notes += [f"skipped: {s.policy} in {s.scenario}: {s.reason}" for s in skipped]
-    wrapped = (textwrap.fill(note, WIDTH, subsequent_indent="  ", break_on_hyphens=False) for note in notes)
+    wrapped = (textwrap.fill(note, width, subsequent_indent="  ", break_on_hyphens=False) for note in notes)
     return "\n\n".join([*parts, "\n".join(wrapped)]).rstrip()
 
 
@@ -189,15 +177,15 @@ def _columns(names: Mapping[int, str]) -> list[Column]:
     return [
         _policy(names),
         Column("total", "cost", lambda s: number(s.total_cost.mean)),
-        Column("tracking", "cost", lambda s: number(s.tracking_cost)),
-        Column("velocity", "cost", lambda s: number(s.velocity_cost)),
+        Column("tracking", "cost", lambda s: number(s.tracking_cost), drop=3),
+        Column("velocity", "cost", lambda s: number(s.velocity_cost), drop=4),
         Column("cost", "ratio", lambda s: number(None if s.cost_ratio is None else s.cost_ratio.mean)),
         Column("pos max", "[mm]", lambda s: number(s.position_error_max, 1e3)),
-        Column("ori max", "[mrad]", lambda s: number(s.orientation_error_max, 1e3)),
-        Column("q̇ peak", "", lambda s: number(s.qdot_peak)),
+        Column("ori max", "[mrad]", lambda s: number(s.orientation_error_max, 1e3), drop=1),
+        Column("q̇ peak", "", lambda s: number(s.qdot_peak), drop=2),
         Column("p50", "[µs]", lambda s: number(s.time_p50_us)),
-        Column("p99", "[µs]", lambda s: number(s.time_p99_us)),
-        Column("misses", "", lambda s: NOTHING if s.deadline_misses is None else str(s.deadline_misses)),
+        Column("p99", "[µs]", lambda s: number(s.time_p99_us), drop=5),
+        Column("misses", "", lambda s: NOTHING if s.deadline_misses is None else str(s.deadline_misses), drop=6),
         Column("status", "", lambda s: s.status, left=True),
     ]
 
@@ -247,26 +235,6 @@ def _policy(names: Mapping[int, str]) -> Column:
         return names[id(summary)] + (" *" if is_reference(summary.policy) else "")
 
     return Column("policy", "", cell, left=True)
-
-
-def _plain(columns: Sequence[Column], summaries: Sequence[Summary]) -> str:
-    heads = [[column.title for column in columns], [column.unit for column in columns]]
-    cells = heads[: 1 + any(heads[1])] + [[column.cell(summary) for column in columns] for summary in summaries]
-    widths = [max(_width(line[i]) for line in cells) for i in range(len(columns))]
-    widths[0] = max(_width(line[0]) for line in cells if _width(line[0]) <= LONGEST)
-    gap = "  " if sum(widths) + 2 * (len(columns) - 1) <= WIDTH else " "
-    lines = []
-    for line in cells:
-        padded = [
-            text + " " * (width - _width(text)) if column.left else " " * (width - _width(text)) + text
-            for text, width, column in zip(line, widths, columns, strict=True)
-        ]
-        if _width(line[0]) > LONGEST:  # a name with many parameters gets a line of its own
-            lines.append(line[0])
-            padded[0] = " " * widths[0]
-        lines.append(gap.join(padded).rstrip())
-    rule = "-" * (sum(widths) + len(gap) * (len(columns) - 1))
-    return "\n".join([*lines[: len(cells) - len(summaries)], rule, *lines[len(cells) - len(summaries) :]])
 
 
 def _markdown(columns: Sequence[Column], summaries: Sequence[Summary]) -> list[str]:
@@ -323,11 +291,6 @@ def _defaults(policy: str) -> dict[str, Any]:
 
 def _short(value: Any) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value).replace(" ", "")
-
-
-def _width(text: str) -> int:
-    """Columns that a text takes on a terminal: the dot of q̇ has none of its own."""
-    return len(text) - text.count("\u0307")
 
 
 def _escaped(text: str) -> str:

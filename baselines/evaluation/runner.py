@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
+import logging
 import multiprocessing
 import signal
 import sys
 from collections.abc import Generator, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from threadpoolctl import threadpool_limits
 from tqdm import tqdm
@@ -22,6 +24,7 @@ from baselines.evaluation.plan import Job
 from baselines.evaluation.rollout import Episode, Player, Tick, rollout, rollouts
 from baselines.evaluation.trajectory_log import TrajectoryLog, trajectory_log
 from baselines.oracle import best_known
+from ikgym.compilation import logger
 from ikgym.exceptions import IkgymError
 from ikgym.scenarios import Preview, Scenario
 from ikgym.scenarios.scenario import furthest
@@ -77,22 +80,70 @@ def run(jobs: Sequence[Job], *, workers: int, progress: bool) -> Generator[list[
         # A log file has no cursor to go back with.
         mininterval=0.1 if sys.stderr.isatty() else 10.0,
     ) as bar:
+        line = _Line(bar)
 
         def announce(batch: Sequence[Job]) -> None:
             nonlocal done
             done += len(batch)
             job = batch[0]
-            bar.set_description(f"{job.scenario.name} · {job.policy} ({done}/{len(jobs)})", refresh=False)
+            line.describe(f"{job.scenario.name} · {job.policy} ({done}/{len(jobs)})")
 
         if not elsewhere:
             for batch in parts:
                 announce(batch)
-                yield play(batch, bar.update)
+                with line.watching():
+                    outcomes = play(batch, line.tick)
+                yield outcomes
         else:
             for batch, played in _in_processes(parts, workers):
                 announce(batch)
                 bar.update(sum(job.scenario.steps for job in batch))
                 yield played
+
+
+class _Line(logging.Handler):
+    """The line of progress, which says so while kernels are compiled.
+
+    Args:
+        bar: What draws it.
+    """
+
+    def __init__(self, bar: Any) -> None:
+        super().__init__()
+        self._bar, self._description, self._compiling = bar, "", False
+
+    def describe(self, text: str) -> None:
+        """Says what is played."""
+        self._description = text
+        self._bar.set_description(text, refresh=False)
+
+    def tick(self, steps: int) -> None:
+        """Moves the bar on."""
+        if self._compiling:
+            self._compiling = False
+            self._bar.set_description(self._description, refresh=False)
+        self._bar.update(steps)
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Shows what is compiled in the line itself; other messages above it."""
+        text = record.getMessage()
+        if not text.startswith("Compiling "):
+            self._bar.write(text, file=sys.stderr)
+            return
+        self._compiling = True
+        self._bar.set_description(text.partition(",")[0], refresh=True)  # what, and that it happens once
+
+    @contextlib.contextmanager
+    def watching(self) -> Iterator[None]:
+        """Listens to messages while something is played, where the line is shown."""
+        if self._bar.disable:
+            yield
+            return
+        logger.addHandler(self)
+        try:
+            yield
+        finally:
+            logger.removeHandler(self)
 
 
 def batches(jobs: Iterable[Job]) -> list[list[Job]]:

@@ -81,7 +81,7 @@ class Repeat:
 
 def manual() -> str:
     """The text of ``--help`` above the options."""
-    prog = _program()
+    prog, evaluate = _program(), shared.program("evaluate", "python -m baselines.evaluate")
     return f"""\
 Trains agents: networks from observations to joint velocities, alone or as residual policies on a base policy.
 Each method has options of its own: {prog} METHOD --help
@@ -109,7 +109,7 @@ Files in the folder of a run, each replaced in one go, so that it may be stopped
   checkpoint.pt      where it stands, for --resume
   model.safetensors  at the end, the kept model with its critics, for --init
   model.zip          at the end, the same model, for Stable-Baselines3
-  agent.safetensors  at the end, its actor, for --init and for: python -m baselines.evaluate --policies agent:FILE
+  agent.safetensors  at the end, its actor, for --init and for: {evaluate} --policies agent:FILE
 
 Agents are trained on the seeds of the split "train" and validated on those of "validation"; those of "test" are not
 used. Where there is a reference, the cost ratio is the geometric mean of the costs over those of rhc_foresight."""

@@ -40,8 +40,12 @@ def figure(height: float, width: float = WIDTH) -> Figure:
 
 def png(drawn: Figure) -> bytes:
     """The picture; always the same bytes for the same figure."""
+    # `savefig` would draw a figure with a layout engine twice, the first time to have it laid out, which one drawing
+    # does as well.
+    canvas: Any = drawn.canvas
+    canvas.draw()
     out = io.BytesIO()
-    drawn.savefig(out, format="png", metadata={"Software": None})
+    PIL.Image.fromarray(np.asarray(canvas.buffer_rgba())).save(out, format="png", dpi=(DPI, DPI))
     return out.getvalue()
 
 

@@ -1,0 +1,179 @@
+"""Arms, scenarios and policies as text: all in a table, or one in full."""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+import re
+import textwrap
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from baselines import registry
+from ikgym import arms, scenarios
+from ikgym.arms import Arm
+from ikgym.exceptions import UnknownNameError
+from ikgym.scenarios import Scenario
+from ikgym.validation import FloatArray
+
+
+@dataclasses.dataclass(frozen=True)
+class Catalogue:
+    """One of the registries, as it is printed.
+
+    Args:
+        kind: What its members are.
+        names: Of all of them.
+        head: Of the columns; the last one takes what is left of a line.
+        row: The cells behind the name of a member.
+        full: All about a member.
+    """
+
+    kind: str
+    names: Callable[[], Sequence[str]]
+    head: tuple[str, ...]
+    row: Callable[[str], tuple[str, ...]]
+    full: Callable[[str], str]
+
+
+def shown(catalogue: Catalogue, names: Sequence[str], width: int) -> str:
+    """The table of a catalogue, or some of its members in full.
+
+    Args:
+        catalogue: What is listed.
+        names: Of those that are shown in full; none for the table.
+        width: Characters that a line may have.
+
+    Raises:
+        UnknownNameError: There is no such member; the message has the nearest name.
+    """
+    known = catalogue.names()
+    for name in names:
+        if name not in known:
+            raise UnknownNameError(catalogue.kind, name, known)
+    if names:
+        return "\n\n".join(_refilled(catalogue.full(name), width) for name in names)
+    return aligned([catalogue.head, *((name, *catalogue.row(name)) for name in known)], width)
+
+
+def aligned(rows: Sequence[Sequence[str]], width: int) -> str:
+    """A table whose first row is the head, its last column wrapped to fit.
+
+    Args:
+        rows: Cells, as many in each.
+        width: Characters that a line may have.
+    """
+    sizes = [max(len(row[i]) for row in rows) for i in range(len(rows[0]) - 1)]
+    start = sum(sizes) + 2 * len(sizes)
+    lines = []
+    for row in rows:
+        wrapped = textwrap.wrap(row[-1], max(width - start, 20), break_on_hyphens=False) or [""]
+        cells = "  ".join(f"{cell:{size}}" for cell, size in zip(row[:-1], sizes, strict=True))
+        lines += [f"{cells}  {wrapped[0]}".rstrip(), *(" " * start + line for line in wrapped[1:])]
+    return "\n".join([*lines[:1], "-" * min(max(map(len, lines)), width), *lines[1:]])
+
+
+def _arm_row(name: str) -> tuple[str, ...]:
+    arm = arms.get(name)
+    return str(arm.joints), str(sum(arm.prismatic)), ", ".join(_limits(arm)) or "none"
+
+
+def _limits(arm: Arm) -> list[str]:
+    """Which kinds of limits an arm has."""
+    ends = np.concatenate([arm.lower, arm.upper])
+    speeds: FloatArray = np.asarray(arm.velocity_limit)
+    kinds = {"joints": ends, "velocity": speeds}
+    return [kind for kind, values in kinds.items() if np.isfinite(values).any()]
+
+
+def _arm(name: str) -> str:
+    arm = arms.get(name)
+    rows: list[tuple[str, ...]] = [("joint", "kind", "lower", "upper", "velocity limit")]
+    numbers = zip(arm.prismatic, arm.lower, arm.upper, arm.velocity_limit, strict=True)  # type: ignore[arg-type]
+    for joint, (slides, *limits) in enumerate(numbers, 1):
+        unit = "m" if slides else "rad"
+        cells = [f"{value:.4g} {ending}" for value, ending in zip(limits, (unit, unit, f"{unit}/s"), strict=True)]
+        rows.append((str(joint), "prismatic" if slides else "revolute", *cells))
+    home = ", ".join(f"{x:.4g}" for x in arm.forward(np.zeros(arm.joints))[1] + 0.0)
+    return f"{name}: {arm.joints} joints, tool at home ({home}) m\n\n{aligned(rows, 80)}"
+
+
+def _scenario_row(name: str) -> tuple[str, ...]:
+    scenario = scenarios.get(name)
+    return scenario.arm.name, scenario.task.name, f"{scenario.steps}", scenario.source
+
+
+def _scenario(name: str) -> str:
+    scenario = scenarios.get(name)
+    lines = [f"{name}: {scenario.steps} steps of {scenario.dt:g} s", "", scenario.source, ""]
+    return "\n".join([*lines, *(f"  {key:16} {value}" for key, value in _parts(scenario).items())])
+
+
+def _parts(scenario: Scenario) -> dict[str, object]:
+    limit = np.unique(scenario.velocity_limit)
+    return {
+        "arm": scenario.arm.name,
+        "solvers know": scenario.model.name,
+        "task": scenario.task.name,
+        "trajectory": type(scenario.trajectory).__name__,
+        "random": "yes, by the seed" if scenario.random else "no",
+        "velocity limit": f"{', '.join(f'{x:g}' for x in limit)} rad/s or m/s",
+        "cost": scenario.cost,
+    }
+
+
+def _policy_row(name: str) -> tuple[str, ...]:
+    return (summary(name) + (" Reference." if registry.get(name).reference else ""),)
+
+
+def summary(name: str) -> str:
+    """What a policy does, in one sentence."""
+    return " ".join(_plain(registry.get(name).__doc__ or "").split("\n\n")[0].split())
+
+
+def _policy(name: str) -> str:
+    policy = registry.get(name)
+    fields = policy.__dataclass_fields__
+    given = [(p, fields[p].default, fields[p].default_factory) for p in policy.parameter_names()]
+    parameters = [
+        f"  {p} = {default!r}" if made is dataclasses.MISSING else f"  {p} = {made()!r}" for p, default, made in given
+    ]
+    title = f"{name}{' (reference)' if policy.reference else ''}: {policy.__module__}.{policy.__qualname__}"
+    return "\n".join([title, "", _plain(inspect.getdoc(policy) or ""), "", "Defaults:", *(parameters or ["  none"])])
+
+
+def _plain(text: str) -> str:
+    """A docstring without the roles of Sphinx, policies by their names."""
+    known = {registry.get(name).__name__: name for name in registry.names()}
+    text = re.sub(r":\w+:`~?(?:[\w.]*\.)?(\w+)`", lambda m: f"`{known.get(m[1], m[1])}`", text)
+    return text.replace("``", "`")
+
+
+def _refilled(text: str, width: int) -> str:
+    """A text whose paragraphs, and items of the form ``name: what it is``, are filled anew where a line is too long."""
+    parts: list[str] = []
+    for line in text.splitlines():
+        item = re.match(r" *- | {0,4}\w+:( |$)| *\w.*?  |  \w+ = ", line)
+        if not line.strip() or item or not (parts and parts[-1]):
+            parts.append(line.rstrip())
+        else:
+            parts[-1] += f" {line.strip()}"
+    return "\n".join(_filled(part, width) for part in parts)
+
+
+def _filled(part: str, width: int) -> str:
+    indent = len(part) - len(part.lstrip())
+    hanging = indent + 2 if part.lstrip().startswith("- ") else indent + 4 if indent else 0
+    return textwrap.fill(part, width, subsequent_indent=" " * hanging, break_on_hyphens=False)
+
+
+ARMS = Catalogue("arm", arms.names, ("arm", "joints", "prismatic", "limits"), _arm_row, _arm)
+SCENARIOS = Catalogue(
+    "scenario",
+    scenarios.names,
+    ("scenario", "arm", "task", "steps", "source"),
+    _scenario_row,
+    _scenario,
+)
+POLICIES = Catalogue("policy", registry.names, ("policy", "what it does"), _policy_row, _policy)

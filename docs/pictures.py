@@ -1,0 +1,135 @@
+"""Draws the picture of the README: ``python -m docs.pictures``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+import baselines
+import ikgym
+from baselines.evaluation.plots import style
+from baselines.evaluation.rollout import rollout
+from baselines.files import write
+from ikgym.scenarios import Scenario
+from ikgym.validation import FloatArray
+
+FILE = Path(__file__).parent / "images" / "environment.png"
+SCENARIO = "varga7-fast"
+#: Policies whose paths are drawn, the first one in space, too.
+POLICIES = ("rhc_gradient", "rhc", "rhc_foresight")
+#: Half the length of the path that is drawn closer, in [m], and the time around it that is looked at, in steps.
+CLOSE, AROUND = 0.3, 100
+REFERENCE = {"color": style.INK, "ls": (0, (3, 2))}
+
+
+class Track(NamedTuple):
+    """What is drawn of an episode.
+
+    Args:
+        q: Joint coordinates in [rad] or [m]. Shape (steps, n).
+        points: Where the tool was, in [m]. Shape (steps, 3).
+        error: The position error in [m]. Shape (steps,).
+    """
+
+    q: FloatArray
+    points: FloatArray
+    error: FloatArray
+
+
+def play(scenario: Scenario, name: str) -> Track:
+    """An episode of a policy."""
+    policy = baselines.make(name, scenario)
+    episode = rollout(scenario, policy, 0, preview=policy.preview)
+    return Track(episode.q, scenario.arm.forward(episode.q)[1], episode.position_error)
+
+
+def draw() -> Figure:
+    """The arm on its way, the place where its path leaves the reference furthest, and the errors."""
+    scenario = ikgym.scenarios.get(SCENARIO)
+    # The task coordinates end with the position.
+    reference = scenario.nominal(0)[1 : scenario.steps + 1, -3:]
+    tracks = {name: play(scenario, name) for name in POLICIES}
+    first = tracks[POLICIES[0]]
+    step = _furthest(first.points, reference)
+    figure = style.figure(3.6, width=9.6)
+    grid = figure.add_gridspec(2, 2, width_ratios=[1.0, 1.15], height_ratios=[1.25, 1.0])
+    _space(figure.add_subplot(grid[:, 0], projection="3d", proj_type="ortho"), scenario, first, reference, step)
+    close, errors = figure.add_subplot(grid[0, 1]), figure.add_subplot(grid[1, 1])
+    _close(close, {name: track.points for name, track in tracks.items()}, reference, step)
+    times = scenario.dt * np.arange(1, scenario.steps + 1)
+    for number, track in enumerate(tracks.values()):
+        errors.plot(times, 1e3 * track.error, lw=1.1, **style.looks(number))
+    errors.set_yscale("log")
+    errors.set_ylim(1e-2, 1e2)
+    style.dress(errors, ylabel="position error [mm]", xlabel="time [s]")
+    errors.margins(x=0.01)
+    style.legend(figure, f"{SCENARIO}", close.get_lines(), ["reference", *(f"actual: {name}" for name in tracks)])
+    return figure
+
+
+def _furthest(points: FloatArray, reference: FloatArray) -> int:
+    """The step at which a path is furthest from the whole of the reference."""
+    distances = [float(np.linalg.norm(reference - point, axis=1).min()) for point in points]
+    return int(np.argmax(distances))
+
+
+def _space(axes: Any, scenario: Scenario, track: Track, reference: FloatArray, step: int) -> None:
+    """The arm in space where it is furthest from the reference, and its path so far."""
+    joints = scenario.arm.joint_points(track.q[step])
+    links = [np.zeros(3), *(end for _, end in joints), track.points[step]]
+    axes.plot(*track.points.T, lw=4.5, alpha=0.45, **style.looks(0))
+    # The way there alone: it comes back the same way, and dashes would fill the gaps between dashes.
+    once = slice(*sorted((int(reference[:, 2].argmin()), int(reference[:, 2].argmax()))))
+    axes.plot(*reference[once].T, lw=1.3, zorder=5, **REFERENCE)
+    axes.plot(*np.array(links).T, color=style.STEEL, lw=3.5, marker="o", ms=4, mfc="white", mec=style.INK)
+    axes.plot(*track.points[step], ls="", marker="s", ms=13, mfc="none", mec=style.COLOURS[1], mew=1.6)
+    axes.text(*track.points[step], "    closer:", fontsize=style.SMALL, color=style.COLOURS[1])
+    axes.view_init(elev=24, azim=-58)
+    axes.set_aspect("equal")
+    axes.set_box_aspect(axes._box_aspect, zoom=0.9)
+    axes.tick_params(labelsize=style.SMALL - 1, pad=-2)
+    for axis, name in zip((axes.xaxis, axes.yaxis, axes.zaxis), "xyz", strict=True):
+        axis.set_label_text(f"{name} [m]", size=style.SMALL)
+        axis.set_major_locator(MaxNLocator(3, steps=[1, 2, 5]))
+        axis.pane.set(facecolor="white", edgecolor=style.MIST)
+        axis._axinfo["grid"].update(color=style.MIST, linewidth=0.5)
+
+
+def _close(axes: Any, paths: dict[str, FloatArray], reference: FloatArray, step: int) -> None:
+    """The paths near a step: along the reference to the right, across it upwards."""
+    # The reference comes by more than once: only what is near in time is shown.
+    part = slice(max(step - AROUND, 0), step + AROUND)
+    centre = min(reference[part], key=lambda point: float(np.linalg.norm(point - paths[POLICIES[0]][step])))
+    along = reference[step + 1] - reference[step]
+    along /= np.linalg.norm(along)
+    across = paths[POLICIES[0]][step] - centre
+    across -= (across @ along) * along
+    across /= np.linalg.norm(across)
+
+    def put(path: FloatArray, **look: Any) -> None:
+        path = path[part]
+        inside = np.where(np.linalg.norm(path - centre, axis=1, keepdims=True) < CLOSE, path - centre, np.nan)
+        axes.plot(1e3 * inside @ along, 1e3 * inside @ across, **look)
+
+    put(reference, lw=2.0, zorder=3, **REFERENCE)
+    for number, path in enumerate(paths.values()):
+        put(path, lw=1.4, **style.looks(number))
+    style.dress(
+        axes,
+        ylabel="across [mm]",
+        xlabel="along the reference [mm]",
+        title="closer: where rhc_gradient is furthest from the reference",
+    )
+
+
+def main() -> None:
+    """Writes the picture."""
+    write(FILE, style.small_png(draw()))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,114 @@
+"""What all commands share: one line for a mistake, and how they end."""
+
+from __future__ import annotations
+
+import dataclasses
+import subprocess
+import sys
+
+import pytest
+
+from baselines import command
+from ikgym.exceptions import InvalidInputError
+
+
+@dataclasses.dataclass(frozen=True)
+class Options:
+    """What a command takes."""
+
+    number: int = 1
+    share: float | None = None
+    name: str = ""
+
+
+@dataclasses.dataclass(frozen=True)
+class Needy:
+    """What a command takes that needs something."""
+
+    out: str
+    """A folder."""
+
+
+def failing(error):
+    def work():
+        raise error
+
+    return work
+
+
+@pytest.mark.parametrize(
+    ("kind", "arguments", "message"),
+    [
+        (Options, ["--numbr", "2"], "error: Unrecognized options: --numbr, 2. Did you mean '--number'? See it --help."),
+        (Options, ["--number", "x"], "error: Error parsing --number: expected a whole number, got 'x'. See it --help."),
+        (Options, ["--share", "x"], "error: Error parsing --share: expected FLOAT, got 'x'. See it --help."),
+        (Options, ["--name"], "error: Missing value for argument '--name'. Expected one. See it --help."),
+        (Options, ["all"], "error: Unrecognized options: all. See it --help."),
+        (Needy, [], "error: Missing from it: --out. See it --help."),
+    ],
+)
+@pytest.mark.parametrize("columns", ["40", "200"])
+def test_a_mistake_is_one_line(kind, arguments, message, columns, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", columns)
+    with pytest.raises(SystemExit) as ended:
+        command.parse(kind, arguments, prog="it", description="Does something.")
+    assert ended.value.code == 2
+    assert capsys.readouterr().err == f"{message}\n"
+
+
+def test_help_and_good_arguments(capsys):
+    assert command.parse(Options, ["--number", "3"], prog="it", description="") == Options(3)
+    with pytest.raises(SystemExit) as ended:
+        command.parse(Options, ["--help"], prog="it", description="Does something.")
+    assert ended.value.code == 0
+    assert "Does something." in capsys.readouterr().out
+
+
+def test_exit_codes(capsys):
+    assert command.run(lambda: 0) == 0
+    assert command.run(lambda: 1) == 1
+    assert command.run(failing(InvalidInputError("Nothing\n  fits."))) == 2
+    assert capsys.readouterr().err == "error: Nothing fits.\n"
+    assert command.run(failing(KeyboardInterrupt()), lambda: "Stopped; all is kept.") == 130
+    assert capsys.readouterr().err == "\nStopped; all is kept.\n"
+
+
+def test_a_missing_extra_is_named(capsys):
+    assert command.run(failing(ModuleNotFoundError("no", name="torch.nn"))) == 2
+    assert capsys.readouterr().err == 'error: This needs torch: pip install "ikgym[train]"\n'
+    with pytest.raises(ModuleNotFoundError):  # a module of ours that is missing is a defect, not a mistake
+        command.run(failing(ModuleNotFoundError("no", name="baselines.nowhere")))
+
+
+def test_extras_exist():
+    import tomllib
+    from pathlib import Path
+
+    project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text())["project"]
+    assert set(command.EXTRAS.values()) <= set(project["optional-dependencies"])
+
+
+def test_a_closed_pipe_is_silent():
+    code = (
+        "import sys\nfrom baselines import command\n"
+        "def work():\n    for _ in range(100000): print('a line')\n    return 0\n"
+        "sys.exit(command.run(work))"
+    )
+    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        assert process.stdout.readline() == b"a line\n"
+        process.stdout.close()
+        assert process.stderr.read() == b""
+    assert process.returncode == 0
+
+
+def test_names_of_programs(monkeypatch):
+    monkeypatch.setattr(sys, "argv", ["/somewhere/bin/ikgym", "evaluate"])
+    assert command.program("evaluate", "python -m baselines.evaluate") == "ikgym evaluate"
+    monkeypatch.setattr(sys, "argv", ["/somewhere/baselines/evaluate.py"])
+    assert command.program("evaluate", "python -m baselines.evaluate") == "python -m baselines.evaluate"
+
+
+def test_width(monkeypatch):
+    for columns, width in {"60": 80, "80": 80, "101": 101}.items():
+        monkeypatch.setenv("COLUMNS", columns)
+        assert command.width() == width

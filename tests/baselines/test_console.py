@@ -1,0 +1,179 @@
+"""The console command: every other command behind one word, lists, and mistakes."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+import baselines
+import ikgym
+from baselines import console
+from baselines.console import main
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(autouse=True)
+def called_by_its_name(monkeypatch):
+    monkeypatch.setattr(sys, "argv", ["ikgym"])
+    monkeypatch.setenv("COLUMNS", "80")
+
+
+def test_it_is_installed():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert project["scripts"] == {"ikgym": "baselines.console:main"}
+
+
+@pytest.mark.parametrize("arguments", [[], ["--help"], ["-h"]])
+def test_help_lists_the_commands(arguments, capsys):
+    assert main(arguments) == 0
+    text = capsys.readouterr().out
+    words = ["evaluate", "train", "reproduce", "leaderboard", "oracle", "arms", "scenarios", "policies"]
+    assert re.findall(r"^  (\w+)  ", text, re.MULTILINE) == words
+    assert max(map(len, text.splitlines())) <= 80
+
+
+def test_version(capsys):
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out.strip() == ikgym.__version__
+
+
+@pytest.mark.parametrize("word", [*console.COMMANDS, *console.LISTS])
+def test_help_of_each_command(word, capsys):
+    with pytest.raises(SystemExit) as ended:
+        main([word, "--help"])
+    assert ended.value.code == 0
+    text = capsys.readouterr().out
+    if word != "leaderboard":
+        assert f"usage: ikgym {word}" in text
+        assert "python -m" not in text.replace("python -m pip", "")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["evalute"], "There is no command 'evalute'. Did you mean 'evaluate'?"),
+        (["policies", "dlss"], "There is no policy 'dlss'. Did you mean 'dls'?"),
+        (["arms", "varga"], "There is no arm 'varga'. Did you mean 'varga7'?"),
+        (["scenarios", "varga7-fats"], "There is no scenario 'varga7-fats'. Did you mean 'varga7-fast'?"),
+        (["evaluate", "--policies", "dlss"], "There is no policy 'dlss'. Did you mean 'dls'?"),
+        (["evaluate", "--steps", "0"], "steps: expected a whole number of at least 1, got 0."),
+        (["evaluate", "--workers", "0"], "workers: expected a whole number of at least 1, got 0."),
+        (["oracle", "--scenarios", "varga7-fats"], "There is no scenario 'varga7-fats'. Did you mean 'varga7-fast'?"),
+        (["oracle", "--knots", "0"], "knots: expected a whole number of at least 1, got 0."),
+        (["oracle", "--starts", "-1"], "starts: expected a whole number of at least 0, got -1."),
+        (["oracle", "--generations", "-1"], "generations: expected a whole number of at least 0, got -1."),
+        (["oracle", "--scenarios", "varga7-random", "--seeds", "-1"], "seeds: expected a whole number of at least 0"),
+        (["reproduce", "--paper", "vagra"], "There is no paper 'vagra'. Did you mean 'varga'?"),
+        (["reproduce", "--figure", "-1"], "paper 'varga' has no figure -1"),
+        (["reproduce", "--steps", "0"], "steps: expected a whole number of at least 1, got 0."),
+        (["reproduce", "--paper", "khan", "--ledger", "x.md"], "ledger: needs all papers"),
+        (["train", "ppo", "--preset", "smok", "--out", "x"], "There is no preset 'smok'. Did you mean 'smoke'?"),
+    ],
+)
+def test_a_mistake_is_one_line_and_ends_with_2(arguments, message, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(arguments) == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert error.startswith("error: ")
+    assert error.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["evaluate", "--polices", "dls"], "Did you mean '--policies'? See ikgym evaluate --help."),
+        (["evaluate", "--steps", "few"], "Error parsing --steps: expected INT, got 'few'. See ikgym evaluate --help."),
+        (["oracle", "--knots", "few"], "Error parsing --knots: expected a whole number, got 'few'."),
+        (["reproduce", "--papers", "khan"], "Did you mean '--paper'? See ikgym reproduce --help."),
+        (["train"], "Expected one of {ppo, sac, td3, imitate, apg, repeat}"),
+        (["train", "pp"], "Available: ppo, sac, td3, imitate, apg, repeat. See ikgym train --help."),
+        (["train", "ppo"], "Missing from ikgym train ppo: --out."),
+        (["arms", "--name", "varga7"], "See ikgym arms --help."),
+    ],
+)
+def test_options_that_cannot_be_read(arguments, message, capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(arguments)
+    assert ended.value.code == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert error.startswith("error: ")
+    assert error.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("word", "names"),
+    [("arms", ikgym.arms.names()), ("scenarios", ikgym.scenarios.names()), ("policies", baselines.names())],
+)
+def test_lists_are_complete_and_fit(word, names, capsys):
+    assert main([word]) == 0
+    head, rule, *lines = capsys.readouterr().out.splitlines()
+    assert head.startswith(word.replace("policies", "policy").removesuffix("s"))
+    assert set(rule) == {"-"}
+    assert [line.split()[0] for line in lines if not line.startswith(" ")] == list(names)
+    # The letters of the terminal: what is set above another letter takes no place.
+    assert max(len(re.sub("[\u0300-\u036f]", "", line)) for line in lines) <= 80
+
+
+@pytest.mark.parametrize("word", ["arms", "scenarios", "policies"])
+def test_every_member_is_shown_in_full(word, capsys):
+    known = {"arms": ikgym.arms.names(), "scenarios": ikgym.scenarios.names(), "policies": baselines.names()}[word]
+    assert main([word, *known]) == 0
+    text = capsys.readouterr().out
+    assert all(re.search(rf"^{name}\b.*:", text, re.MULTILINE) for name in known)
+    assert ":class:" not in text
+    assert max(map(len, text.splitlines())) <= 82
+
+
+def test_a_policy_is_shown_with_its_parameters(capsys):
+    assert main(["policies", "dls"]) == 0
+    text = capsys.readouterr().out
+    assert "Minimises" in text
+    assert "    damping: λ, added to J Jᵀ as it is" in text
+    assert text.endswith("Defaults:\n  gain = 1.0\n  damping = 0.001\n")
+
+
+def test_an_arm_and_a_scenario_are_shown(capsys):
+    assert main(["arms", "varga7"]) == 0
+    text = capsys.readouterr().out
+    assert "varga7: 7 joints, tool at home (5.5, 0, 2) m" in text
+    assert re.search(r"^3 +prismatic +-inf m +inf m +inf m/s$", text, re.MULTILINE)
+    assert main(["scenarios", "varga7-fast"]) == 0
+    assert "varga7-fast: 3000 steps of 0.001 s" in capsys.readouterr().out
+
+
+def test_the_table_stands_before_the_plots_and_the_readme_has_the_command(tmp_path, capsys):
+    arguments = ["evaluate", "--policies", "dls", "--steps", "5", "--out", str(tmp_path / "out")]
+    assert main(arguments) == 0
+    printed = capsys.readouterr()
+    assert "left out at 80 characters a line: velocity, p99, misses" in printed.out
+    assert max(map(len, printed.out.split("\n\nwritten to")[0].splitlines())) <= 80
+    assert "ikgym evaluate --policies dls --steps 5" in (tmp_path / "out" / "README.md").read_text(encoding="utf-8")
+
+
+def test_no_list_loads_a_learning_library():
+    code = "import sys; from baselines.console import main; main(['policies']); sys.exit('torch' in sys.modules)"
+    subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
+
+
+def test_training_without_its_extra_says_which(tmp_path):
+    """Also by `train.py`, which is the same command."""
+    (tmp_path / "torch.py").write_text("raise ModuleNotFoundError('no', name='torch')\n")
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), str(ROOT)])}
+    done = subprocess.run(
+        [sys.executable, str(ROOT / "train.py"), "ppo", "--out", str(tmp_path)],
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 2
+    assert done.stderr == 'error: This needs torch: pip install "ikgym[train]"\n'

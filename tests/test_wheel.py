@@ -1,0 +1,148 @@
+"""The wheel is complete: what is documented works where there is nothing but what it holds."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import os
+import re
+import subprocess
+import sys
+import sysconfig
+import venv
+from pathlib import Path
+
+import pytest
+from hatchling.builders.wheel import WheelBuilder
+
+ROOT = Path(__file__).parents[1]
+PACKAGES = ("ikgym", "baselines")
+#: What commands read: data, and the files that say how agents are trained.
+DATA = (".json", ".toml", ".safetensors", ".typed")
+
+
+@pytest.fixture(scope="module")
+def content() -> set[str]:
+    """The files that the wheel would hold."""
+    return {file.distribution_path for file in WheelBuilder(str(ROOT)).recurse_included_files()}
+
+
+def test_it_holds_every_module_and_all_data(content):
+    for package in PACKAGES:
+        files = {path.relative_to(ROOT).as_posix() for path in (ROOT / package).rglob("*") if path.is_file()}
+        assert {file for file in files if file.endswith((".py", *DATA))} <= content
+    assert {file for file in content if not file.endswith(".py")} <= {file for file in content if file.endswith(DATA)}
+    for file in (
+        "best_known.json",
+        "tuned.json",
+        "agents/agent_alone.safetensors",
+        "agents/agent_residual.safetensors",
+    ):
+        assert f"baselines/data/{file}" in content
+    assert "baselines/training/presets/smoke.toml" in content
+
+
+def test_it_holds_nothing_else(content):
+    assert {file.partition("/")[0] for file in content} == set(PACKAGES)
+
+
+def test_every_documented_module_can_be_imported(content):
+    pages = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").glob("*.md")]
+    text = "\n".join(page.read_text(encoding="utf-8") for page in pages)
+    named = set(re.findall(r"python -m ([\w.]+)", text)) | set(re.findall(r"(?:from|import) ([\w.]+)", text))
+    named = {name.rstrip(".") for name in named if name.partition(".")[0] in PACKAGES}
+    assert {"ikgym", "baselines"} <= named
+    for name in named:
+        found = importlib.util.find_spec(name)
+        assert found is not None, name
+        assert Path(found.origin).relative_to(ROOT).as_posix() in content
+
+
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory):
+    """An environment that holds the wheel, and sees the dependencies of this one, but not this tree."""
+    folder = tmp_path_factory.mktemp("wheel")
+    quiet = [sys.executable, "-m", "pip", "--quiet", "--disable-pip-version-check"]
+    subprocess.run([*quiet, "wheel", "--no-build-isolation", "--no-deps", "-w", str(folder), str(ROOT)], check=True)
+    (wheel,) = folder.glob("*.whl")
+    venv.create(folder / "venv", with_pip=False, symlinks=True)
+    binaries = folder / "venv" / "bin"
+    own = Path(
+        subprocess.run(
+            [binaries / "python", "-c", "import sysconfig; print(sysconfig.get_path('purelib'))"],
+            check=True,
+            capture_output=True,
+            text=True,
+        ).stdout.strip()
+    )
+    # The path alone: what lies there as .pth files, such as that of an editable installation, is not heeded.
+    (own / "dependencies.pth").write_text(sysconfig.get_path("purelib") + "\n")
+    target = [*quiet, "--python", str(binaries / "python"), "install", "--no-deps", "--no-index", "--force-reinstall"]
+    subprocess.run([*target, "--ignore-installed", str(wheel)], check=True)
+    elsewhere = folder / "elsewhere"
+    elsewhere.mkdir()
+
+    def run(*command: str) -> subprocess.CompletedProcess[str]:
+        kept = {name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "NUMBA_CACHE_DIR")}
+        done = subprocess.run(
+            [str(binaries / command[0]), *command[1:]],
+            cwd=elsewhere,
+            env={**kept, "COLUMNS": "80"},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.returncode == 0, done.stderr
+        return done
+
+    return run, own, elsewhere
+
+
+@pytest.mark.slow
+def test_the_environment_runs_from_the_wheel(installed):
+    run, own, _ = installed
+    code = (
+        "import gymnasium, baselines\n"
+        "env = gymnasium.make('ikgym:RedundantIK-v0', scenario='varga7-fast', preview=1)\n"
+        "observation, _ = env.reset(seed=0)\n"
+        "policy = baselines.make('dls', 'varga7-fast')\n"
+        "action, state = policy.predict(observation)\n"
+        "print(env.step(action)[1] < 0)\n"
+        "import ikgym; print(ikgym.__file__, baselines.__file__)"
+    )
+    answer, places = run("python", "-c", code).stdout.splitlines()
+    assert answer == "True"
+    assert all(Path(place).is_relative_to(own) for place in places.split())
+
+
+@pytest.mark.slow
+def test_agents_are_evaluated_from_the_wheel(installed):
+    run, _, folder = installed
+    policies = ("dls", "agent_alone", "agent_residual")
+    done = run("ikgym", "evaluate", "--scenarios", "varga7-random", "--policies", *policies, "--out", "out")
+    assert "varga7-random" in done.stdout
+    rows = json.loads((folder / "out" / "results.json").read_text())
+    rows = rows["rows"] if isinstance(rows, dict) else rows
+    assert [row["policy"] for row in rows] == list(policies)
+    assert all(row["cost_ratio"] > 0.9 for row in rows)
+    assert len(list((folder / "out" / "plots").rglob("*.png"))) >= 5
+
+
+@pytest.mark.slow
+def test_an_agent_is_trained_from_the_wheel(installed):
+    run, _, folder = installed
+    tiny = "--scenario faitli3-regular --steps 20 --hidden 8 --offsets 1 2 10 --segments 2 --envs 4 --batch-size 20"
+    few = "--validation-episodes 1 --no-progress --out runs"
+    run("ikgym", "train", "ppo", *tiny.split(), *few.split())
+    agent = folder / "runs" / "seed-0" / "agent.safetensors"
+    assert agent.is_file()
+    done = run("ikgym", "evaluate", "--scenarios", "faitli3-regular", "--policies", f"agent:{agent}", "--steps", "5")
+    assert "agent" in done.stdout
+
+
+@pytest.mark.slow
+def test_lists_come_from_the_wheel(installed):
+    run, _, _ = installed
+    for word in ("arms", "scenarios", "policies"):
+        assert run("ikgym", word).stdout
+    assert "usage: ikgym train" in run("ikgym", "train", "--help").stdout
