@@ -13,8 +13,8 @@ import numpy.typing as npt
 
 from baselines import registry
 from baselines.policy import Batch, Memory, Operations, Problem, Solution, SolverPolicy
+from baselines.policy.state import pack, remembered
 from baselines.spec import PolicySpec, parse_policy
-from baselines.state import pack, remembered
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Preview
 from ikgym.validation import FloatArray, known_names

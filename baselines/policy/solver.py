@@ -12,10 +12,10 @@ from typing import Any, ClassVar, Self
 import numpy as np
 import numpy.typing as npt
 
-from baselines.observations import as_batch
-from baselines.problem import Batch, Memory, Operations, Problem, Solution
-from baselines.state import REPORTED, Report, joined, pack, remembered, replace_rows
-from baselines.status import Status, statuses
+from baselines.policy.observations import as_batch
+from baselines.policy.problem import Batch, Memory, Operations, Problem, Solution
+from baselines.policy.state import REPORTED, Report, joined, pack, remembered, replace_rows
+from baselines.status import Status
 from ikgym.compilation import announced
 from ikgym.exceptions import InvalidInputError
 from ikgym.jit import kernel
@@ -23,9 +23,6 @@ from ikgym.parallel import in_chunks
 from ikgym.scenarios import Preview, Scenario
 from ikgym.simulator import Observation
 from ikgym.validation import FloatArray, Frozen
-
-# What policies are written with, all in one place.
-__all__ = ("Batch", "Memory", "Observation", "Operations", "Problem", "Report", "Solution", "SolverPolicy", "statuses")
 
 _SATURATED, _DIVERGED = int(Status.SATURATED), int(Status.DIVERGED)
 

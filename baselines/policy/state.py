@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from baselines.problem import Memory, Solution
+from baselines.policy.problem import Memory, Solution
 
 
 class Report(NamedTuple):

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from baselines.problem import Batch, Problem
+from baselines.policy.problem import Batch, Problem
 from ikgym.exceptions import InvalidInputError
 from ikgym.jit import kernel
 from ikgym.scenarios import Preview

@@ -1,0 +1,22 @@
+"""What policies are written with: their base, what they are told, see and remember, and what they answer."""
+
+from __future__ import annotations
+
+from baselines.policy.problem import Batch, Memory, Operations, Problem, Solution
+from baselines.policy.solver import SolverPolicy
+from baselines.policy.state import Report
+from baselines.status import Status, statuses
+from ikgym.simulator import Observation
+
+__all__ = (
+    "Batch",
+    "Memory",
+    "Observation",
+    "Operations",
+    "Problem",
+    "Report",
+    "Solution",
+    "SolverPolicy",
+    "Status",
+    "statuses",
+)
