@@ -81,11 +81,11 @@ def improve(problem, settings, paths, improved, first, last):
     for s in range(first, last):
         path = paths[s]
         before[:] = path
-        worst = true_cost(problem, path, workspace.knot)
+        worst = true_cost(problem, path, workspace)
         multipliers[:] = 0.0
         minimum = minimise(problem, path, multipliers, settings, workspace)
         improved.steps[s], improved.gradients[s] = minimum.steps, minimum.gradient_norm
-        costs[s] = true_cost(problem, path, workspace.knot)
+        costs[s] = true_cost(problem, path, workspace)
         if not costs[s] <= worst:
             path[:] = before
             costs[s] = worst
@@ -117,7 +117,7 @@ def iterated_local_search(problem, seed, rounds, partners, paths, costs, first, 
             branch_off(problem, (seed + s, r), path, partners, drift, branch, workspace.knot)
             multipliers[:] = 0.0
             minimise(problem, branch, multipliers, settings, workspace)
-            cost = true_cost(problem, branch, workspace.knot)
+            cost = true_cost(problem, branch, workspace)
             if cost < (1.0 - GAIN) * costs[s]:
                 path[:] = branch
                 costs[s] = cost

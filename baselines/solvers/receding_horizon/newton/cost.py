@@ -11,16 +11,14 @@ from typing import NamedTuple
 from baselines.solvers.receding_horizon.newton.second_order import second_order
 from baselines.solvers.receding_horizon.newton.terms import (
     joint_limit_term,
-    tracking_error,
     tracking_term,
     velocity_cost,
-    velocity_curvature,
-    velocity_gradient,
+    velocity_derivatives,
     velocity_limit_term,
 )
 from ikgym import cost_kernels, task_kernels
 from ikgym.cost_kernels import P_X_INSIDE
-from ikgym.jit import inlined, kernel
+from ikgym.jit import kernel
 from ikgym.kinematics import forward, forward_and_jacobian
 
 # All loops take their arrays out of the tuples first: numba counts references at each access, which costs more than the
@@ -43,25 +41,46 @@ class Values(NamedTuple):
 
 
 @kernel
+def tracking_errors(problem, path, workspace):
+    """The tracking errors at the knots that count.
+
+    Args:
+        problem: A :class:`workspace.PathProblem` of K knots.
+        path: Joint coordinates at the knots in [rad] or [m]. Shape (K, n).
+        workspace: A :class:`workspace.NewtonWorkspace`, whose ``errors`` are set.
+
+    Returns:
+        The errors. Shape (at least K, e).
+    """
+    chain, kind, nominal = problem.data.chain, problem.data.kind, problem.nominal
+    at, tracking = problem.grid.at, problem.grid.tracking
+    rotation, position, pose = workspace.knot.rotation, workspace.knot.position, workspace.knot.pose
+    errors = workspace.errors
+    for k in range(path.shape[0]):
+        if tracking[k] != 0.0:
+            forward(chain, path[k], rotation, position)
+            task_kernels.coordinates(kind, rotation, position, pose)
+            task_kernels.error(kind, nominal[at[k] - 1], pose, errors[k])
+    return errors
+
+
+@kernel
 def true_cost(problem, path, workspace):
     """The cost of a path, from the same kernels as the environment's; limits apart.
 
     Args:
         problem: A :class:`workspace.PathProblem` of K knots.
         path: Joint coordinates at the knots in [rad] or [m]. Shape (K, n).
-        workspace: A :class:`workspace.KnotWorkspace`.
+        workspace: A :class:`workspace.NewtonWorkspace`.
     """
-    data, grid, start, nominal = problem.data, problem.grid, problem.start, problem.nominal
-    cost, kind, chain, dt = data.cost, data.kind, data.chain, data.dt
-    at, lengths, tracking, velocities = grid.at, grid.length, grid.tracking, grid.velocity
-    rotation, position, error = workspace.rotation, workspace.position, workspace.error
+    data, grid, start = problem.data, problem.grid, problem.start
+    cost, lengths, tracking, velocities = data.cost, grid.length, grid.tracking, grid.velocity
+    errors = tracking_errors(problem, path, workspace)
     total = 0.0
     for k in range(path.shape[0]):
         if tracking[k] != 0.0:
-            forward(chain, path[k], rotation, position)
-            tracking_error(kind, nominal[at[k] - 1], workspace)
-            total += tracking[k] * cost_kernels.tracking(cost, error)
-        rate = 1.0 / (lengths[k] * dt)
+            total += tracking[k] * cost_kernels.tracking(cost, errors[k])
+        rate = 1.0 / (lengths[k] * data.dt)
         for j in range(path.shape[1]):
             velocity = (path[k, j] - (path[k - 1, j] if k > 0 else start[j])) * rate
             total += velocities[k] * velocity_cost(cost, velocity)
@@ -77,25 +96,22 @@ def merit(problem, path, multipliers, workspace):
         path: Joint coordinates at the knots in [rad] or [m]. Shape (K, n).
         multipliers: λ₀ of each knot: of its e errors, its n velocities and its n joint coordinates.
             Shape (K, e + 2 n).
-        workspace: A :class:`workspace.KnotWorkspace`.
+        workspace: A :class:`workspace.NewtonWorkspace`.
     """
-    data, grid, start, nominal = problem.data, problem.grid, problem.start, problem.nominal
-    cost, kind, chain, dt = data.cost, data.kind, data.chain, data.dt
-    at, lengths, tracking, velocities = grid.at, grid.length, grid.tracking, grid.velocity
-    rotation, position, error = workspace.rotation, workspace.position, workspace.error
+    data, grid, start = problem.data, problem.grid, problem.start
+    cost, lengths, tracking, velocities = data.cost, grid.length, grid.tracking, grid.velocity
     limits, lower, upper = data.velocity_limit, data.lower, data.upper
-    factor = workspace.penalty_factor[0]
-    e, n = error.shape[0], path.shape[1]
+    factor = workspace.knot.penalty_factor[0]
+    errors = tracking_errors(problem, path, workspace)
+    e, n = errors.shape[1], path.shape[1]
     total = 0.0
     for k in range(path.shape[0]):
         if tracking[k] != 0.0:
-            forward(chain, path[k], rotation, position)
-            tracking_error(kind, nominal[at[k] - 1], workspace)
             part = 0.0
             for i in range(e):
-                part += tracking_term(cost, error[i], multipliers[k, i]).value
+                part += tracking_term(cost, errors[k, i], multipliers[k, i]).value
             total += tracking[k] * part
-        rate = 1.0 / (lengths[k] * dt)
+        rate = 1.0 / (lengths[k] * data.dt)
         for j in range(n):
             velocity = (path[k, j] - (path[k - 1, j] if k > 0 else start[j])) * rate
             if velocities[k] != 0.0:
@@ -108,7 +124,7 @@ def merit(problem, path, multipliers, workspace):
 
 
 @kernel
-def linearise(problem, path, multipliers, advance, exact, workspace, model):
+def linearise(problem, path, multipliers, advance, exact, workspace):
     """:func:`merit`, its gradient and its Hessian.
 
     Args:
@@ -117,8 +133,7 @@ def linearise(problem, path, multipliers, advance, exact, workspace, model):
         multipliers: λ₀, see :func:`merit`. Shape (K, e + 2 n).
         advance: Whether to replace λ₀ by the λ of the path first.
         exact: Whether the second derivatives of the error are wanted, too.
-        workspace: A :class:`workspace.KnotWorkspace`.
-        model: A :class:`workspace.QuadraticModel`, which receives gradient and Hessian.
+        workspace: A :class:`workspace.NewtonWorkspace`, whose ``model`` receives gradient and Hessian.
 
     Returns:
         The :class:`Values` of the path.
@@ -126,35 +141,44 @@ def linearise(problem, path, multipliers, advance, exact, workspace, model):
     data, grid, start, nominal = problem.data, problem.grid, problem.start, problem.nominal
     cost, kind, chain, dt = data.cost, data.kind, data.chain, data.dt
     at, lengths, tracking, velocities = grid.at, grid.length, grid.tracking, grid.velocity
-    rotation, position, geometric = workspace.rotation, workspace.position, workspace.geometric
-    error, jacobian, error_jacobian = workspace.error, workspace.jacobian, workspace.error_jacobian
+    knot, model = workspace.knot, workspace.model
+    rotation, position, geometric, pose = knot.rotation, knot.position, knot.geometric, knot.pose
+    error, jacobian, error_jacobian, by_error = knot.error, knot.jacobian, knot.error_jacobian, knot.gradient
     limits, lower, upper = data.velocity_limit, data.lower, data.upper
     gradient, diagonal, second, coupling = model.gradient, model.diagonal, model.second, model.coupling
-    by_error, by_error_twice = workspace.gradient, workspace.curvature
-    factor = workspace.penalty_factor[0]
+    factor = knot.penalty_factor[0]
     e, n = error.shape[0], path.shape[1]
-    values = Values(0.0, 0.0, 0.0)
+    total = true = gap = 0.0
     for k in range(path.shape[0]):
         for a in range(n):
             gradient[k, a] = 0.0
             for b in range(a + 1):
                 diagonal[k, a, b] = 0.0
-        if tracking[k] != 0.0:
+        weight = tracking[k]
+        if weight != 0.0:
             forward_and_jacobian(chain, path[k], rotation, position, geometric)
-            tracking_error(kind, nominal[at[k] - 1], workspace)
+            task_kernels.coordinates(kind, rotation, position, pose)
+            task_kernels.error(kind, nominal[at[k] - 1], pose, error)
             task_kernels.jacobian(kind, rotation, geometric, jacobian)
             task_kernels.error_jacobian(kind, error, jacobian, error_jacobian)
-            if advance:
-                for i in range(e):
+            for i in range(e):
+                if advance:
                     multipliers[k, i] = tracking_term(cost, error[i], multipliers[k, i]).multiplier
-            values = add_tracking(cost, tracking[k], error, multipliers[k], by_error, by_error_twice, values)
-            add_gauss_newton(by_error, by_error_twice, error_jacobian, gradient[k], diagonal[k])
+                term = tracking_term(cost, error[i], multipliers[k, i])
+                total += weight * term.value
+                true += weight * cost_kernels.value(error[i], cost.delta_x, P_X_INSIDE, cost.p_x)
+                gap += weight * term.gap
+                by_error[i] = weight * term.gradient
+                for a in range(n):
+                    gradient[k, a] += by_error[i] * error_jacobian[i, a]
+                    curved = weight * term.curvature * error_jacobian[i, a]
+                    for b in range(a + 1):
+                        diagonal[k, a, b] += curved * error_jacobian[i, b]
         if exact:
-            if tracking[k] != 0.0:
-                second_order(kind, workspace, second[k])
+            if weight != 0.0:
+                second_order(kind, knot, second[k])
             else:
                 second[k] = 0.0
-        total, true, gap = values
         rate = 1.0 / (lengths[k] * dt)
         for j in range(n):
             velocity = (path[k, j] - (path[k - 1, j] if k > 0 else start[j])) * rate
@@ -163,8 +187,8 @@ def linearise(problem, path, multipliers, advance, exact, workspace, model):
                 value = velocities[k] * velocity_cost(cost, velocity)
                 total += value
                 true += value
-                by_velocity = velocities[k] * velocity_gradient(cost, velocity)
-                by_velocity_twice = velocities[k] * velocity_curvature(cost, velocity)
+                first, twice = velocity_derivatives(cost, velocity)
+                by_velocity, by_velocity_twice = velocities[k] * first, velocities[k] * twice
             held = e + j
             if multipliers[k, held] != 0.0 or abs(velocity) > limits[j]:
                 if advance:
@@ -195,51 +219,4 @@ def linearise(problem, path, multipliers, advance, exact, workspace, model):
                 gap += abs(term.linear)
                 gradient[k, j] += term.multiplier
                 diagonal[k, j, j] += term.curvature
-        values = Values(total, true, gap)
-    return values
-
-
-@inlined
-def add_tracking(cost, weight, error, multipliers, gradient, curvature, values):
-    """Adds the tracking cost of a knot.
-
-    Args:
-        cost: The cost's parameters.
-        weight: How many stage costs the knot stands for.
-        error: Its tracking error. Shape (e,).
-        multipliers: λ₀ of its errors. Shape (at least e,).
-        gradient: Receives the weighted derivatives by the error. Shape (e,).
-        curvature: Receives the weighted second derivatives by the error. Shape (e,).
-        values: The :class:`Values` so far.
-
-    Returns:
-        The :class:`Values` with this knot.
-    """
-    total, true, gap = values
-    for i in range(error.shape[0]):
-        term = tracking_term(cost, error[i], multipliers[i])
-        total += weight * term.value
-        true += weight * cost_kernels.value(error[i], cost.delta_x, P_X_INSIDE, cost.p_x)
-        gap += weight * term.gap
-        gradient[i] = weight * term.gradient
-        curvature[i] = weight * term.curvature
     return Values(total, true, gap)
-
-
-@inlined
-def add_gauss_newton(by_error, by_error_twice, error_jacobian, gradient, diagonal):
-    """Adds the derivatives of a knot's tracking cost by its joint coordinates, Jᵀ g and the lower triangle of Jᵀ H J.
-
-    Args:
-        by_error: g. Shape (e,).
-        by_error_twice: The diagonal of H. Shape (e,).
-        error_jacobian: J. Shape (e, n).
-        gradient: Shape (n,).
-        diagonal: Shape (n, n).
-    """
-    for i in range(by_error.shape[0]):
-        for a in range(gradient.shape[0]):
-            gradient[a] += by_error[i] * error_jacobian[i, a]
-            curved = by_error_twice[i] * error_jacobian[i, a]
-            for b in range(a + 1):
-                diagonal[a, b] += curved * error_jacobian[i, b]

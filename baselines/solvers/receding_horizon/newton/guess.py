@@ -8,7 +8,6 @@ import numpy as np
 
 from baselines.solvers.damped_step import damped_step
 from baselines.solvers.linear_algebra import dot
-from baselines.solvers.receding_horizon.newton.terms import tracking_error
 from ikgym import task_kernels
 from ikgym.jit import inlined, kernel
 from ikgym.kinematics import forward_and_jacobian
@@ -37,6 +36,7 @@ def initial_guess(problem, first, drift, damping, path, workspace):
         workspace: A :class:`workspace.KnotWorkspace`.
     """
     data, start, nominal, grid = problem.data, problem.start, problem.nominal, problem.grid
+    rotation, position = workspace.rotation, workspace.position
     jacobian, error = workspace.jacobian, workspace.error
     n, e = path.shape[1], error.shape[0]
     move = np.empty(n)
@@ -45,9 +45,10 @@ def initial_guess(problem, first, drift, damping, path, workspace):
         for j in range(n):
             here[j] = path[k - 1, j] if k > 0 else start[j]
         for correction in range(CORRECTIONS):
-            forward_and_jacobian(data.chain, here, workspace.rotation, workspace.position, workspace.geometric)
-            tracking_error(data.kind, nominal[grid.at[k] - 1], workspace)
-            task_kernels.jacobian(data.kind, workspace.rotation, workspace.geometric, jacobian)
+            forward_and_jacobian(data.chain, here, rotation, position, workspace.geometric)
+            task_kernels.coordinates(data.kind, rotation, position, workspace.pose)
+            task_kernels.error(data.kind, nominal[grid.at[k] - 1], workspace.pose, error)
+            task_kernels.jacobian(data.kind, rotation, workspace.geometric, jacobian)
             if correction == 0:
                 # What the drift would do to the task is taken out of the error, and so out of the step.
                 span = grid.length[k] * data.dt

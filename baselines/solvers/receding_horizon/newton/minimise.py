@@ -92,12 +92,12 @@ def minimise(problem, path, multipliers, settings, workspace):
     """
     data, exact, tolerance = problem.data, settings.exact, settings.tolerance
     knots = path.shape[0]
-    knot, model = workspace.knot, workspace.model
+    model = workspace.model
     gradient, step, trial = model.gradient[:knots], workspace.step[:knots], workspace.trial[:knots]
     unit = 1.0 / (data.dt * data.cost.delta_qdot) ** 2
-    penalty_factor, left_open = knot.penalty_factor, np.inf
+    penalty_factor, left_open = workspace.knot.penalty_factor, np.inf
     penalty_factor[0] = 1.0
-    value, true, gap = linearise(problem, path, multipliers, True, exact, knot, model)
+    value, true, gap = linearise(problem, path, multipliers, True, exact, workspace)
     made, outcome, updated, damping = 0, RAN_OUT, True, 0.0
     while True:
         damping = damped_newton_step(model, exact, damping, unit, workspace, step)
@@ -117,9 +117,9 @@ def minimise(problem, path, multipliers, settings, workspace):
             left_open = gap
             if made >= settings.steps:
                 break
-            value, true, gap = linearise(problem, path, multipliers, True, exact, knot, model)
+            value, true, gap = linearise(problem, path, multipliers, True, exact, workspace)
             continue
-        search = line_search(problem, path, multipliers, value, derivative, step, trial, knot)
+        search = line_search(problem, path, multipliers, value, derivative, step, trial, workspace)
         made += 1
         if not search.accepted:
             if made >= settings.steps:
@@ -135,7 +135,7 @@ def minimise(problem, path, multipliers, settings, workspace):
         if made == settings.steps:
             break
         damping = _next_damping(damping, search.length)
-        value, true, gap = linearise(problem, path, multipliers, False, exact, knot, model)
+        value, true, gap = linearise(problem, path, multipliers, False, exact, workspace)
     return Minimum(outcome, made, true, np.sqrt(_dot(gradient, gradient)))
 
 
@@ -179,7 +179,7 @@ def line_search(problem, path, multipliers, value, derivative, step, trial, work
         derivative: Its derivative along the step.
         step: The step. Shape (K, n).
         trial: Receives the path at the last trial. Shape (K, n).
-        workspace: The :class:`workspace.KnotWorkspace`.
+        workspace: The :class:`workspace.NewtonWorkspace`.
 
     Returns:
         A :class:`LineSearch`.

@@ -138,7 +138,7 @@ def initial_plan(problem, settings, plan, workspace):
         coarse = NewtonSettings(False, STEPS_OF_A_START, TOLERANCE_OF_A_START)
         minimum = minimise(problem, plan.path, plan.multipliers, coarse, newton)
         made += minimum.steps
-        value = max(minimum.cost, true_cost(problem, plan.path, newton.knot))
+        value = max(minimum.cost, true_cost(problem, plan.path, newton))
         if value < best:
             best = value
             _copy(plan, kept)
@@ -190,7 +190,7 @@ def improve_candidate(problem, settings, plan, cost, candidate, age, workspace):
     age[0] += settings.restart_rate
     if age[0] >= settings.restart_steps:
         age[0] = 0
-        true = true_cost(problem, candidate.path, newton.knot)
+        true = true_cost(problem, candidate.path, newton)
         if max(minimum.cost, true) < (1.0 - GAIN) * cost:
             _copy(candidate, plan)
     elif age[0] >= TRIED and not minimum.cost < HOPELESS * cost:

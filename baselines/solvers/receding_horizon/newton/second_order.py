@@ -18,8 +18,8 @@ def second_order(kind, workspace, out):
         workspace: A :class:`workspace.KnotWorkspace` with ``rotation``, ``geometric`` and ``gradient`` of the knot.
         out: Receives the matrix. Shape (n, n).
     """
-    n, e = out.shape[0], workspace.gradient.shape[0]
-    g, gradient, moment = workspace.geometric, workspace.gradient, workspace.moment
+    g, rotation, gradient, moment = workspace.geometric, workspace.rotation, workspace.gradient, workspace.moment
+    n, e = out.shape[0], gradient.shape[0]
     # The error falls as the coordinates rise: forces are minus the gradient.
     where = 0 if kind == task_kernels.POSE else e - 3
     fx, fy, fz = -gradient[where], -gradient[where + 1], -gradient[where + 2]
@@ -28,7 +28,7 @@ def second_order(kind, workspace, out):
         tx, ty, tz = -0.5 * gradient[3], -0.5 * gradient[4], -0.5 * gradient[5]
     by_rotation = kind in (task_kernels.SKEW, task_kernels.MATRIX)
     if by_rotation:
-        set_moment(kind, gradient, workspace.rotation, moment)
+        set_moment(kind, gradient, rotation, moment)
     for a in range(n):
         vx, vy, vz = g[0, a], g[1, a], g[2, a]
         wx, wy, wz = g[3, a], g[4, a], g[5, a]

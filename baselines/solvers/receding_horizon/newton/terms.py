@@ -9,7 +9,7 @@ import math
 from typing import NamedTuple
 
 from baselines.solvers.receding_horizon.newton.augmented_lagrangian import augmented_term
-from ikgym import cost_kernels, task_kernels
+from ikgym import cost_kernels
 from ikgym.cost_kernels import P_X_INSIDE
 from ikgym.jit import inlined
 
@@ -40,13 +40,6 @@ class TrackingTerm(NamedTuple):
     curvature: float
     multiplier: float
     gap: float
-
-
-@inlined
-def tracking_error(kind, nominal, workspace):
-    """The tracking error of the pose in a :class:`workspace.KnotWorkspace`, for nominal coordinates (m,)."""
-    task_kernels.coordinates(kind, workspace.rotation, workspace.position, workspace.pose)
-    task_kernels.error(kind, nominal, workspace.pose, workspace.error)
 
 
 @inlined
@@ -81,16 +74,13 @@ def velocity_cost(cost, velocity):
 
 
 @inlined
-def velocity_gradient(cost, velocity):
-    """The derivative of :func:`velocity_cost`."""
-    return cost_kernels.slope(velocity, cost.delta_qdot, cost.p_in, cost.p_out)
-
-
-@inlined
-def velocity_curvature(cost, velocity):
-    """The second derivative of :func:`velocity_cost`, but not less than that at a small velocity."""
+def velocity_derivatives(cost, velocity):
+    """The first and second derivative of :func:`velocity_cost`; the second not less than at a small velocity."""
     speed = max(abs(velocity), LEAST_SPEED * cost.delta_qdot)
-    return cost_kernels.bend(speed, cost.delta_qdot, cost.p_in, cost.p_out)
+    return (
+        cost_kernels.slope(velocity, cost.delta_qdot, cost.p_in, cost.p_out),
+        cost_kernels.bend(speed, cost.delta_qdot, cost.p_in, cost.p_out),
+    )
 
 
 @inlined

@@ -43,7 +43,6 @@ class KnotWorkspace(NamedTuple):
         jacobian: Jacobian of the task coordinates. Shape (m or 6, n).
         error_jacobian: Jacobian of the error. Shape (e, n).
         gradient: Derivatives of the cost by the components of the error. Shape (e,).
-        curvature: Second derivatives of the cost by the components of the error. Shape (e,).
         moment: The gradient by the orientation, see :func:`second_order.set_moment`. Shape (3, 3).
         penalty_factor: Factor of the penalties of the limits. Shape (1,).
         gram: Of damped least squares. Shape (e, e).
@@ -58,7 +57,6 @@ class KnotWorkspace(NamedTuple):
     jacobian: Floats
     error_jacobian: Floats
     gradient: Floats
-    curvature: Floats
     moment: Floats
     penalty_factor: Floats
     gram: Floats
@@ -86,6 +84,7 @@ class NewtonWorkspace(NamedTuple):
 
     Attributes:
         knot: Arrays of one knot.
+        errors: Tracking errors of all knots. Shape (K, e).
         model: The quadratic model.
         inverse: Inverses of the pivots. Shape (K, n, n).
         factor: A pivot and its factor. Shape (n, n).
@@ -94,6 +93,7 @@ class NewtonWorkspace(NamedTuple):
     """
 
     knot: KnotWorkspace
+    errors: Floats
     model: QuadraticModel
     inverse: Floats
     factor: Floats
@@ -120,7 +120,6 @@ def knot_workspace(kind, m, n):
         np.empty((e, n)),
         np.empty((e, n)),
         np.empty(e),
-        np.empty(e),
         np.empty((3, 3)),
         np.ones(1),
         np.empty((e, e)),
@@ -139,6 +138,7 @@ def newton_workspace(kind, m, knots, n):
     """The workspace for paths of up to ``knots`` knots, task coordinates of ``m`` numbers and ``n`` joints."""
     return NewtonWorkspace(
         knot_workspace(kind, m, n),
+        np.empty((knots, error_size(kind, m))),
         quadratic_model(knots, n),
         np.empty((knots, n, n)),
         np.empty((n, n)),
