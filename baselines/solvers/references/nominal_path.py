@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 import numpy.typing as npt
 
-from baselines.policy import Batch, Memory, Problem, Solution, SolverPolicy, statuses
+from baselines.policy import Batch, Problem, SolverPolicy
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray, whole_number
@@ -47,13 +47,3 @@ class HandedPath(SolverPolicy, abc.ABC):
         last = len(self.path) - 1
         rows: npt.NDArray[np.int64] = np.clip(last + 1 - batch.remaining[:, 0].astype(np.int64), 0, last)
         return rows
-
-    def solve(self, batch: Batch, memory: Memory) -> Solution:
-        """See :meth:`SolverPolicy.solve`."""
-        qdot = (self.path[self.next_rows(batch)] - batch.q) / self.problem.dt
-        rows = len(qdot)
-        return Solution(qdot, memory, statuses(rows), np.zeros(rows, dtype=np.int64))
-
-    def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
-        """Nothing: all was known before."""
-        return 0, 0, 0, 0
