@@ -105,15 +105,9 @@ class RecedingHorizonGradient(SolverPolicy):
     def _constants(self) -> tuple[ProblemData, DescentSettings]:
         """The arguments of the kernel that never change."""
         problem, model = self.problem, self.problem.model
-        data = ProblemData(
-            model.chain,
-            problem.task.kind,
-            problem.cost.parameters,
-            problem.dt,
-            model.lower,
-            model.upper,
-            problem.velocity_limit,
-        )
+        kind, cost = problem.task.kind, problem.cost.parameters
+        limits: tuple[Any, ...] = (model.lower, model.upper, problem.velocity_limit)
+        data = ProblemData(model.chain, kind, cost, problem.dt, *limits)
         settings = DescentSettings(
             tolerance=float(self.tolerance),
             steps=int(self.iterations),

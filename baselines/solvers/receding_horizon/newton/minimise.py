@@ -130,7 +130,9 @@ def minimise(problem, path, multipliers, settings, workspace):
                 break
             damping = _more(damping)
             continue
-        path[:] = trial
+        for k in range(knots):
+            for a in range(path.shape[1]):
+                path[k, a] = trial[k, a]
         true, updated = search.reached, False
         if made == settings.steps:
             break
