@@ -18,7 +18,7 @@ from baselines.solvers.receding_horizon.newton.terms import (
 )
 from ikgym import cost_kernels, task_kernels
 from ikgym.cost_kernels import P_X_INSIDE
-from ikgym.jit import kernel
+from ikgym.jit import inlined, kernel
 from ikgym.kinematics import forward, forward_and_jacobian
 
 # All loops take their arrays out of the tuples first: numba counts references at each access, which costs more than the
@@ -40,7 +40,7 @@ class Values(NamedTuple):
     gap: float
 
 
-@kernel
+@inlined
 def tracking_errors(problem, path, workspace):
     """The tracking errors at the knots that count.
 
