@@ -17,7 +17,7 @@ from baselines.evaluation import test_sets as known_sets
 from baselines.oracle import best_known
 from baselines.oracle.best_known import MARGIN, MEANINGLESS
 from baselines.oracle.cache import VARIABLE, solve
-from baselines.oracle.episode import Whole, path_of
+from baselines.oracle.episode import EpisodeProblem, path_of
 from baselines.oracle.optimum import Optimum, Search
 from baselines.spec import parse_policy
 from ikgym import scenarios as scenario_registry
@@ -25,8 +25,8 @@ from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray, whole_number
 
-#: An episode: its scenario and its seed.
-Episode = tuple[Scenario, int]
+#: A scenario and the seed of one of its episodes.
+SeededScenario = tuple[Scenario, int]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -78,7 +78,7 @@ Optima are kept in the user's folder for such files, or where the environment va
 found before Ctrl-C is kept."""
 
 
-def episodes(scenarios: Sequence[str], test_sets: Sequence[str], seeds: Sequence[int]) -> list[Episode]:
+def episodes(scenarios: Sequence[str], test_sets: Sequence[str], seeds: Sequence[int]) -> list[SeededScenario]:
     """What is to be solved.
 
     Args:
@@ -110,7 +110,7 @@ def episodes(scenarios: Sequence[str], test_sets: Sequence[str], seeds: Sequence
 
 
 def optima(
-    todo: Sequence[Episode], how: Search, policies: Sequence[str] = (), *, cache: bool
+    todo: Sequence[SeededScenario], how: Search, policies: Sequence[str] = (), *, cache: bool
 ) -> Iterator[tuple[Scenario, Optimum]]:
     """Solves episodes one after the other, with a bar on stderr.
 
@@ -169,7 +169,7 @@ def verdict(scenario: Scenario, optimum: Optimum) -> str | None:
     known = best_known.lookup(scenario, optimum.seed)
     if known is None:
         return "no record of this content"
-    _, cost = Whole.of(scenario, optimum.seed).play(optimum.qdot)
+    _, cost = EpisodeProblem.of(scenario, optimum.seed).play(optimum.qdot)
     if max(known.cost, cost) <= MEANINGLESS:
         return None
     ratio = np.inf if known.cost == 0.0 else cost / known.cost

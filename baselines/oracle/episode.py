@@ -11,8 +11,9 @@ from gymnasium.utils import seeding
 
 from baselines.episode import added_up, play
 from baselines.policy import Batch, Memory, SolverPolicy
-from baselines.solvers.receding_horizon.newton.cost import Rules
 from baselines.solvers.receding_horizon.newton.grid import Grid
+from baselines.solvers.receding_horizon.newton.workspace import PathProblem
+from baselines.solvers.receding_horizon.problem_data import ProblemData
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
 from ikgym.simulation import Outcome
@@ -23,7 +24,7 @@ FIRST = 8
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Whole:
+class EpisodeProblem:
     """An episode from its start to its end, as the kernels of :mod:`baselines.solvers.receding_horizon.newton` see it.
 
     A knot stands at each step that counts. Where a nominal point is held for h > 1 steps the arm moves in h - 1 of
@@ -32,7 +33,7 @@ class Whole:
     Args:
         scenario: What is tracked.
         seed: The reset seed.
-        rules: The arm itself, not its model; no joint limits, since the environment has none; the velocity limit.
+        data: The arm itself, not its model; no joint limits, since the environment has none; the velocity limit.
         start: Joint coordinates at the start in [rad] or [m]. Shape (n,).
         nominal: Nominal task coordinates after the steps 1, 2, … Shape (steps, m).
         grid: K knots, one a step that counts.
@@ -40,7 +41,7 @@ class Whole:
 
     scenario: Scenario
     seed: int
-    rules: Rules
+    data: ProblemData
     start: FloatArray
     nominal: FloatArray
     grid: Grid
@@ -59,7 +60,7 @@ class Whole:
                 "The best cost of an episode is that of a joint path, which knows of no disturbance; scenario "
                 f"{scenario.name!r}: expected noise=0 and bias=0, got {disturbance}."
             )
-        rules = Rules(
+        data = ProblemData(
             scenario.arm.chain,
             scenario.task.kind,
             scenario.cost.parameters,
@@ -73,7 +74,11 @@ class Whole:
         grid = Grid(at, np.maximum(held - 1.0, 1.0), np.ones(len(at)), (held == 1).astype(np.float64))
         trajectory = scenario.trajectory.sample(seeding.np_random(seed)[0])
         start = np.array(scenario.first_q(trajectory), dtype=np.float64)
-        return cls(scenario, seed, rules, start, np.ascontiguousarray(scenario.nominal(seed)[1:]), grid)
+        return cls(scenario, seed, data, start, np.ascontiguousarray(scenario.nominal(seed)[1:]), grid)
+
+    def on(self, grid: Grid) -> PathProblem:
+        """The problem on a grid, as the kernels see it."""
+        return PathProblem(self.data, grid, self.start, self.nominal)
 
     @property
     def knots(self) -> int:

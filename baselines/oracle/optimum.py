@@ -9,8 +9,8 @@ import numpy as np
 from baselines.oracle.best_known import MARGIN, MEANINGLESS, Record
 from ikgym.validation import FloatArray, Frozen, read_only, whole_number
 
-#: What starts are called that were drawn, and paths that the local search has found.
-RANDOM, CLIMBED = "random start", "local search"
+#: What starts are called that were drawn, and paths that the iterated local search has found.
+RANDOM, LOCAL_SEARCH = "random start", "local search"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -117,7 +117,7 @@ class Optimum(Frozen):
             them came ``polished_within_1e-6`` of the best.
         """
         coarse = [one.coarse for one in self.starts if one.coarse is not None]
-        first = [one.coarse for one in self.starts if one.coarse is not None and one.kind != CLIMBED]
+        first = [one.coarse for one in self.starts if one.coarse is not None and one.kind != LOCAL_SEARCH]
         out: dict[str, float] = {
             "polished": sum(one.cost is not None for one in self.starts),
             "polished_within_1e-6": sum(map(self._reached, self.starts)),

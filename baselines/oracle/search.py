@@ -11,9 +11,10 @@ import numpy as np
 
 from baselines.fingerprints import episode_hash
 from baselines.oracle import local_search
-from baselines.oracle.episode import Whole, path_of
-from baselines.oracle.optimum import CLIMBED, RANDOM, Optimum, Search, Start
+from baselines.oracle.episode import EpisodeProblem, path_of
+from baselines.oracle.optimum import LOCAL_SEARCH, RANDOM, Optimum, Search, Start
 from baselines.solvers.receding_horizon.newton.grid import Grid
+from baselines.solvers.receding_horizon.newton.minimise import NewtonSettings
 from baselines.solvers.receding_horizon.rhc import RecedingHorizon
 from ikgym.parallel import in_chunks
 from ikgym.scenarios import Scenario
@@ -27,7 +28,7 @@ HORIZONS: tuple[Mapping[str, Any], ...] = (
     {"horizon": 101, "move_blocks": 24, "iterations": 1, "starts": 64, "restart_steps": 10, "stop_at_end": True},
 )
 # Newton steps of a path at full resolution, and the relative precision that ends them before.
-MOST, TOLERANCE = 300, 1e-12
+MOST_STEPS, TOLERANCE = 300, 1e-12
 # Costs closer than this share belong to the same path.
 APART = 1e-3
 # Random starts worth a thread.
@@ -57,20 +58,21 @@ def search(
     Raises:
         InvalidInputError: The seed is no whole number of at least 0, or the scenario has a disturbance.
     """
-    whole = Whole.of(scenario, seed)
+    episode = EpisodeProblem.of(scenario, seed)
     done = tick or (lambda share: None)
-    known = _known_paths(whole)
-    known |= {name: np.ascontiguousarray(q[whole.grid.at - 1]) for name, q in (paths or {}).items()}
+    known = _known_paths(episode)
+    known |= {name: np.ascontiguousarray(q[episode.grid.at - 1]) for name, q in (paths or {}).items()}
     starts, fine = [Start(kind) for kind in known], dict(enumerate(known.values()))
     done(0.1)
     # Where no velocity costs, as with held points, each knot is a problem of its own: nothing to search for.
-    if whole.grid.velocity.any():
-        starts, found = _coarse_search(whole, how, known, done)
+    if episode.grid.velocity.any():
+        starts, found = _coarse_search(episode, how, known, done)
         fine |= found
     polished = np.stack(list(fine.values()))
-    _, gradients, made, spent = _settle(whole, whole.grid, polished, exact=True, most=MOST, tolerance=TOLERANCE)
-    played = [_played(whole, path) for path in polished]
-    for number, (_, _, cost), gradient, steps in zip(fine, played, gradients * scenario.dt, made, strict=True):
+    improved, spent = _improve(episode, episode.grid, polished, NewtonSettings(True, MOST_STEPS, TOLERANCE))
+    played = [_played(episode, path) for path in polished]
+    gradients = improved.gradients * scenario.dt
+    for number, (_, _, cost), gradient, steps in zip(fine, played, gradients, improved.steps, strict=True):
         starts[number] = dataclasses.replace(
             starts[number], cost=cost, gradient_norm=float(gradient), newton_steps=int(steps)
         )
@@ -83,32 +85,32 @@ def search(
         q=q,
         qdot=qdot,
         cost=cost,
-        gradient_norm=float(gradients[best]) * scenario.dt,
+        gradient_norm=float(gradients[best]),
         starts=tuple(starts),
         seconds=spent / len(fine),
         hash=episode_hash(scenario, seed),
     )
 
 
-def _played(whole: Whole, path: FloatArray) -> tuple[FloatArray, FloatArray, float]:
+def _played(episode: EpisodeProblem, path: FloatArray) -> tuple[FloatArray, FloatArray, float]:
     """Joint coordinates and joint velocities of each step, and their cost in the environment."""
-    limit = whole.scenario.velocity_limit
-    qdot = np.clip(whole.commands(path), -limit, limit)
-    q, cost = whole.play(qdot)
+    limit = episode.scenario.velocity_limit
+    qdot = np.clip(episode.commands(path), -limit, limit)
+    q, cost = episode.play(qdot)
     return q, qdot, cost
 
 
-def _known_paths(whole: Whole) -> dict[str, FloatArray]:
+def _known_paths(episode: EpisodeProblem) -> dict[str, FloatArray]:
     """Paths at full resolution that need no search."""
-    scenario, seed, grid = whole.scenario, whole.seed, whole.grid
+    scenario, seed, grid = episode.scenario, episode.seed, episode.grid
     out = {}
     nominal = scenario.nominal_joint_path(seed)
     if nominal is not None:
         out["nominal joint path"] = np.ascontiguousarray(nominal[grid.at])
-    rolled = np.empty((1, whole.knots, scenario.joints))
-    local_search.roll_outs(whole.rules, grid, whole.start, whole.nominal, 0, rolled, 0, 1)
+    rolled = np.empty((1, episode.knots, scenario.joints))
+    local_search.random_paths(episode.on(grid), 0, rolled, 0, 1)
     out["roll-out"] = rolled[0]
-    if whole.knots == scenario.steps:
+    if episode.knots == scenario.steps:
         for given in HORIZONS:
             horizon = max(min(int(given["horizon"]), scenario.steps + 1), 2)
             fitting = {**given, "horizon": horizon, "move_blocks": min(int(given["move_blocks"]), horizon - 1)}
@@ -118,25 +120,25 @@ def _known_paths(whole: Whole) -> dict[str, FloatArray]:
 
 
 def _coarse_search(
-    whole: Whole, how: Search, known: Mapping[str, FloatArray], done: Callable[[float], object]
+    episode: EpisodeProblem, how: Search, known: Mapping[str, FloatArray], done: Callable[[float], object]
 ) -> tuple[list[Start], dict[int, FloatArray]]:
     """Starts and local search on a coarse grid.
 
     Returns:
         All starts, the known ones first; and by their numbers the best of the others at full resolution.
     """
-    grid = whole.coarse(max(-(-whole.knots // how.knots), 1))
-    ends = np.searchsorted(whole.grid.at, grid.at)
-    paths = np.empty((len(known) + how.starts, len(grid.at), whole.scenario.joints))
+    grid = episode.coarse(max(-(-episode.knots // how.knots), 1))
+    ends = np.searchsorted(episode.grid.at, grid.at)
+    paths = np.empty((len(known) + how.starts, len(grid.at), episode.scenario.joints))
     for path, fine in zip(paths, known.values(), strict=False):
         path[:] = fine[ends]
-    problem = whole.rules, grid, whole.start, whole.nominal
+    problem = episode.on(grid)
     # Start 0 of the kernel does not drift, and is known already.
     drawn = paths[len(known) - 1 :]
     in_chunks(
-        lambda first, last: local_search.roll_outs(*problem, how.seed, drawn, first + 1, last + 1), how.starts, GRAIN
+        lambda first, last: local_search.random_paths(problem, how.seed, drawn, first + 1, last + 1), how.starts, GRAIN
     )
-    costs, *_ = _settle(whole, grid, paths, exact=False, most=local_search.STEPS, tolerance=local_search.PRECISION)
+    (costs, _, _), _ = _improve(episode, grid, paths, NewtonSettings(False, local_search.STEPS, local_search.PRECISION))
     done(0.3)
 
     chosen = _distinct(costs, PARTNERS)
@@ -146,50 +148,36 @@ def _coarse_search(
         seed, pool = how.seed + generation * STRIDE, np.concatenate([chains, partners])
 
         def work(first: int, last: int, seed: int = seed, pool: FloatArray = pool) -> None:
-            local_search.climb(*problem, seed, how.rounds, pool, chains, reached, first, last)
+            local_search.iterated_local_search(problem, seed, how.rounds, pool, chains, reached, first, last)
 
         in_chunks(work, len(chains), 1)
         done(0.5 / how.generations)
     better = reached < costs[chosen[: how.chains]]
     paths, costs = np.concatenate([paths, chains[better]]), np.concatenate([costs, reached[better]])
 
-    kinds = [*known, *[RANDOM] * how.starts, *[CLIMBED] * int(better.sum())]
+    kinds = [*known, *[RANDOM] * how.starts, *[LOCAL_SEARCH] * int(better.sum())]
     starts = [
         Start(kind, number - len(known) + 1 if kind == RANDOM else None, cost)
         for number, (kind, cost) in enumerate(zip(kinds, costs.tolist(), strict=True))
     ]
     best = [number for number in _distinct(costs, how.polished) if number >= len(known)]
-    return starts, {number: whole.refined(grid, paths[number]) for number in best}
+    return starts, {number: episode.refined(grid, paths[number]) for number in best}
 
 
-def _settle(
-    whole: Whole, grid: Grid, paths: FloatArray, *, exact: bool, most: int, tolerance: float
-) -> tuple[FloatArray, FloatArray, FloatArray, float]:
-    """Improves paths in place: costs, norms of the gradient, Newton steps, all (S,), and the CPU time in [s]."""
-    costs, gradients, made = np.empty((3, len(paths)))
+def _improve(
+    episode: EpisodeProblem, grid: Grid, paths: FloatArray, settings: NewtonSettings
+) -> tuple[local_search.Improved, float]:
+    """Improves paths in place, in several threads; gives what became of them, and the CPU time in [s]."""
+    improved, problem = local_search.Improved(*np.empty((3, len(paths)))), episode.on(grid)
     spent: list[float] = []
 
     def work(first: int, last: int) -> None:
         begin = time.thread_time()
-        local_search.settle(
-            whole.rules,
-            grid,
-            whole.start,
-            whole.nominal,
-            exact,
-            most,
-            tolerance,
-            paths,
-            costs,
-            gradients,
-            made,
-            first,
-            last,
-        )
+        local_search.improve(problem, settings, paths, improved, first, last)
         spent.append(time.thread_time() - begin)
 
     in_chunks(work, len(paths), 1)
-    return costs, gradients, made, sum(spent)
+    return improved, sum(spent)
 
 
 def _distinct(costs: FloatArray, most: int) -> list[int]:

@@ -15,6 +15,7 @@ from benchmarks.rivals.numpy_horizon import Horizon, forward, plan_cost
 from ikgym import TrackingCost
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
+from tests.baselines.solvers.receding_horizon.data import data_of
 
 TASKS = ikgym.tasks.names()
 
@@ -49,9 +50,7 @@ def test_numpy_cost_is_that_of_the_kernels(arm, task):
     problem = problem_of(arm, task, p_x=3.5, p_in=2.0)
     horizon, plan = random_horizon(problem, 4)
     qdot = np.diff(np.vstack([horizon.q, plan]), axis=0) / problem.dt
-    kernels = horizon_cost(
-        arm.chain, problem.task.kind, problem.cost.parameters, problem.dt, horizon.q, horizon.nominal, qdot
-    )
+    kernels = horizon_cost(data_of(problem), horizon.q, horizon.nominal, qdot)
     assert plan_cost(problem, horizon, plan) == pytest.approx(kernels, rel=1e-9)
 
 

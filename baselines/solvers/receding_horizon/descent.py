@@ -2,77 +2,110 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
+import numpy.typing as npt
 
 from baselines.status import Status
 from ikgym.jit import kernel
 
-_CONVERGED, _LIMIT, _DIVERGED = int(Status.CONVERGED), int(Status.ITERATION_LIMIT), int(Status.DIVERGED)
+_CONVERGED, _LIMIT, DIVERGED = int(Status.CONVERGED), int(Status.ITERATION_LIMIT), int(Status.DIVERGED)
 GOES_ON = -1
 
 
+class DescentSettings(NamedTuple):
+    """The parameters of a descent.
+
+    Attributes:
+        tolerance: μ, the norm of the gradient at which the descent has converged.
+        steps: Most steps.
+        alpha_min: Smallest α.
+        alpha_max: Largest α.
+        alpha_factor: By what α grows or shrinks.
+        difference: The finite difference δ of the joint velocities; 0 for the analytic gradient.
+    """
+
+    tolerance: float
+    steps: int
+    alpha_min: float
+    alpha_max: float
+    alpha_factor: float
+    difference: float
+
+
+class DescentMemory(NamedTuple):
+    """What a descent remembers of each of B arms.
+
+    Attributes:
+        plan: The joint velocities of the horizon, in [rad/s] or [m/s]. Shape (B, HL - 1, n).
+        alpha: α. Shape (B,).
+    """
+
+    plan: npt.NDArray[np.float64]
+    alpha: npt.NDArray[np.float64]
+
+
 @kernel
-def stop_test(value, norm, tolerance, step, most):
+def stop_test(value, norm, settings, step):
     """Whether to stop before the next step.
 
     Args:
         value: The cost.
         norm: Norm of the gradient.
-        tolerance: μ, the norm at which the descent has converged.
+        settings: :class:`DescentSettings`.
         step: Steps made.
-        most: Most steps.
 
     Returns:
         A value of :class:`Status`, or GOES_ON.
     """
     if not (np.isfinite(value) and np.isfinite(norm)):
-        return _DIVERGED
-    if norm <= tolerance:
+        return DIVERGED
+    if norm <= settings.tolerance:
         return _CONVERGED
-    return _LIMIT if step == most else GOES_ON
+    return _LIMIT if step == settings.steps else GOES_ON
 
 
 @kernel
-def adapted(alpha, norm, last_norm, rule):
+def adapted(alpha, norm, last_norm, settings):
     """α for the next step: larger where the norm fell, smaller where it rose, within its bounds.
 
     Args:
         alpha: α.
         norm: Norm of the gradient.
         last_norm: Norm before the last step, 0 before the first.
-        rule: Smallest and largest α, and the factor between two.
+        settings: :class:`DescentSettings`.
     """
-    alpha_min, alpha_max, factor = rule
     if last_norm == 0.0:
         return alpha
     if norm < last_norm:
-        alpha *= factor
+        alpha *= settings.alpha_factor
     elif norm > last_norm:
-        alpha /= factor
-    return min(max(alpha, alpha_min), alpha_max)
+        alpha /= settings.alpha_factor
+    return min(max(alpha, settings.alpha_min), settings.alpha_max)
 
 
 @kernel
-def settle(status, value, first_value, limit, rule, row, qdot, alpha):
-    """Finds out a blow-up that looks like convergence, and stops the arm after any.
+def stop_if_diverged(status, value, first_value, limit, qdot):
+    """Finds out a blow-up that looks like convergence, and clears the plan after any.
 
     A gradient of 0 beyond all limits, at a cost that has risen, is no minimum: the finite differences have drowned.
 
     Args:
-        status: Values of :class:`Status`. Shape (B,).
+        status: What :func:`stop_test` said.
         value: The last cost.
         first_value: The cost at the start.
-        limit: Velocity limit. Shape (n,).
-        rule: As above.
-        row: Which row.
-        qdot: The row's plan, cleared after a blow-up. Shape (HL - 1, n).
-        alpha: α, set back after a blow-up. Shape (B,).
+        limit: Velocity limit in [rad/s] or [m/s]. Shape (n,).
+        qdot: The plan, cleared after a blow-up. Shape (HL - 1, n).
+
+    Returns:
+        A value of :class:`Status`.
     """
     if value > first_value:
         for i in range(qdot.shape[0]):
             for j in range(qdot.shape[1]):
                 if abs(qdot[i, j]) > limit[j]:
-                    status[row] = _DIVERGED
-    if status[row] == _DIVERGED:
+                    status = DIVERGED
+    if status == DIVERGED:
         qdot[:] = 0.0
-        alpha[row] = rule[0]
+    return status

@@ -12,9 +12,9 @@ from baselines.solvers.receding_horizon.rhc import RecedingHorizon
 class RecedingHorizonForesight(RecedingHorizon):
     """A preset of :class:`rhc.RecedingHorizon` for control periods of 1 ms, chosen on validation episodes.
 
-    One Newton step a period for the plan, and one for a challenger, which finds the way out of local minima that a
-    single plan would follow to the bitter end. 48 knots in 1,500 steps: fewer lose cost at the knots, a shorter horizon
-    runs into traps that nothing repairs later.
+    One Newton step a period for the plan, and one for a restart candidate, which finds the way out of local minima that
+    a single plan would keep. 48 knots in 1,500 steps: fewer cost more between the knots, a shorter horizon leads into
+    costly local minima that nothing repairs later.
     """
 
     horizon: int = 1501

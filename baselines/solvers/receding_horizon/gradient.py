@@ -3,14 +3,24 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
 from baselines.policy import Batch, Memory, Solution, SolverPolicy
-from baselines.solvers.receding_horizon.descent import GOES_ON, adapted, settle, stop_test
+from baselines.solvers.receding_horizon.descent import (
+    DIVERGED,
+    GOES_ON,
+    DescentMemory,
+    DescentSettings,
+    adapted,
+    stop_if_diverged,
+    stop_test,
+)
 from baselines.solvers.receding_horizon.horizon import analytic_gradient, difference_gradient
+from baselines.solvers.receding_horizon.problem_data import ProblemData
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 from ikgym.jit import kernel
 from ikgym.validation import FloatArray, number, whole_number
@@ -79,34 +89,34 @@ class RecedingHorizonGradient(SolverPolicy):
         """Grid points 2 … HL lie ahead."""
         return self.horizon - 1
 
-    def memory(self, rows: int) -> Memory:
-        """The joint velocities of the horizon, of shape (B, HL - 1, n), and α, of shape (B,)."""
-        return np.zeros((rows, self.horizon - 1, self.problem.model.joints)), np.full(rows, self.alpha_min)
+    def memory(self, rows: int) -> DescentMemory:
+        """A plan at rest, and the smallest α; see :class:`DescentMemory`."""
+        plan = np.zeros((rows, self.horizon - 1, self.problem.model.joints))
+        return DescentMemory(plan, np.full(rows, self.alpha_min))
 
     def solve(self, batch: Batch, memory: Memory) -> Solution:
         """See :meth:`SolverPolicy.solve`."""
-        problem = self.problem
-        plan, alpha = memory[0].copy(), memory[1].copy()
-        rows = len(plan)
-        status, iterations = np.empty(rows, dtype=np.int64), np.empty(rows, dtype=np.int64)
-        self._descend()(
-            problem.model.chain,
-            problem.task.kind,
-            problem.cost.parameters,
-            problem.dt,
-            problem.velocity_limit,
-            batch.q,
-            batch.nominal,
-            plan,
-            alpha,
-            self.tolerance,
-            self.iterations,
-            (self.alpha_min, self.alpha_max, self.alpha_factor),
-            self.difference if self.gradient == "finite_difference" else 0.0,
-            status,
-            iterations,
+        changed = DescentMemory(*[array.copy() for array in memory])
+        status, iterations = np.empty((2, len(batch.q)), dtype=np.int64)
+        self._descend()(*self._constants, batch.q, batch.nominal, changed, status, iterations)
+        return Solution(changed.plan[:, 0].copy(), changed, status, iterations)
+
+    @functools.cached_property
+    def _constants(self) -> tuple[ProblemData, DescentSettings]:
+        """The arguments of the kernel that never change."""
+        problem, model = self.problem, self.problem.model
+        kind, cost = problem.task.kind, problem.cost.parameters
+        limits: tuple[Any, ...] = (model.lower, model.upper, problem.velocity_limit)
+        data = ProblemData(model.chain, kind, cost, problem.dt, *limits)
+        settings = DescentSettings(
+            tolerance=float(self.tolerance),
+            steps=int(self.iterations),
+            alpha_min=float(self.alpha_min),
+            alpha_max=float(self.alpha_max),
+            alpha_factor=float(self.alpha_factor),
+            difference=float(self.difference) if self.gradient == "finite_difference" else 0.0,
         )
-        return Solution(plan[:, 0].copy(), (plan, alpha), status, iterations)
+        return data, settings
 
     def _descend(self) -> Any:
         """The kernel of the descent."""
@@ -114,7 +124,7 @@ class RecedingHorizonGradient(SolverPolicy):
 
     def diagnostics(self, state: Memory) -> dict[str, FloatArray]:
         """The step α that is kept for the next horizon, as ``alpha``, of shape (B,)."""
-        return {"alpha": state[3]}
+        return {"alpha": DescentMemory(*state[2:]).alpha}
 
     def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
         """A gradient before each step and one for the last test, over the HL - 1 stages of the horizon."""
@@ -126,44 +136,41 @@ class RecedingHorizonGradient(SolverPolicy):
 
 
 @kernel
-def descend_rows(
-    chain,
-    kind,
-    cost,
-    dt,
-    limit,
-    q,
-    nominal,
-    plan,
-    alpha,
-    tolerance,
-    most,
-    rule,
-    difference,
-    status,
-    iterations,
-):
-    """Gradient descent row by row; ``plan`` (B, HL - 1, n) and ``alpha`` (B,) are changed in place."""
+def descend_rows(data, settings, q, nominal, memory, status, iterations):
+    """Gradient descent row by row.
+
+    Args:
+        data: The :class:`ProblemData`.
+        settings: :class:`DescentSettings`.
+        q: Joint coordinates in [rad] or [m]. Shape (B, n).
+        nominal: Nominal task coordinates ahead. Shape (B, at least HL - 1, m).
+        memory: :class:`DescentMemory`, changed in place.
+        status: Receives values of :class:`Status`. Shape (B,).
+        iterations: Receives the steps made. Shape (B,).
+    """
+    plan, alpha, difference = memory.plan, memory.alpha, settings.difference
     gradient = np.empty(plan.shape[1:])
     for row in range(plan.shape[0]):
         qdot, step = plan[row], 0
         first_value = last_norm = 0.0
         while True:
             if difference > 0.0:
-                value = difference_gradient(chain, kind, cost, dt, q[row], nominal[row], qdot, difference, gradient)
+                value = difference_gradient(data, q[row], nominal[row], qdot, difference, gradient)
             else:
-                value = analytic_gradient(chain, kind, cost, dt, q[row], nominal[row], qdot, gradient)
+                value = analytic_gradient(data, q[row], nominal[row], qdot, gradient)
             norm = np.sqrt(np.sum(gradient * gradient))
             if step == 0:
                 first_value = value
-            status[row] = stop_test(value, norm, tolerance, step, most)
+            status[row] = stop_test(value, norm, settings, step)
             if status[row] != GOES_ON:
                 break
-            alpha[row] = adapted(alpha[row], norm, last_norm, rule)
+            alpha[row] = adapted(alpha[row], norm, last_norm, settings)
             last_norm = norm
             for i in range(qdot.shape[0]):
                 for j in range(qdot.shape[1]):
                     qdot[i, j] -= alpha[row] * gradient[i, j]
             step += 1
         iterations[row] = step
-        settle(status, value, first_value, limit, rule, row, qdot, alpha)
+        status[row] = stop_if_diverged(status[row], value, first_value, data.velocity_limit, qdot)
+        if status[row] == DIVERGED:
+            alpha[row] = settings.alpha_min

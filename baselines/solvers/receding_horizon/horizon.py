@@ -5,22 +5,24 @@ A horizon of HL grid points has point 1 at the present, and HL - 1 free joint ve
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
+import numpy.typing as npt
 
 from ikgym import cost_kernels, task_kernels
 from ikgym.jit import kernel
 from ikgym.kinematics import forward, forward_and_jacobian
 
+Floats = npt.NDArray[np.float64]
+
 
 @kernel
-def horizon_cost(chain, kind, cost, dt, q, nominal, qdot):
+def horizon_cost(data, q, nominal, qdot):
     """Φ, the sum of the stage costs over the horizon.
 
     Args:
-        chain: The model of the arm.
-        kind: The kind of task coordinates.
-        cost: The :class:`ikgym.cost_kernels.CostParameters`.
-        dt: Δt in [s].
+        data: The :class:`baselines.solvers.receding_horizon.problem_data.ProblemData`; limits do not count.
         q: Joint coordinates at the first grid point. Shape (n,).
         nominal: Nominal coordinates of the second and later grid points. Shape (at least HL - 1, m).
         qdot: Joint velocities. Shape (HL - 1, n).
@@ -29,18 +31,15 @@ def horizon_cost(chain, kind, cost, dt, q, nominal, qdot):
         The cost.
     """
     stages = np.empty(qdot.shape[0])
-    return _roll(chain, kind, cost, dt, q.copy(), nominal, qdot, 0, stages, _scratch(kind, nominal))
+    return _roll(data, q.copy(), nominal, qdot, 0, stages, _frame_workspace(data.kind, nominal))
 
 
 @kernel
-def difference_gradient(chain, kind, cost, dt, q, nominal, qdot, delta, gradient):
+def difference_gradient(data, q, nominal, qdot, delta, gradient):
     """∂Φ/∂q̇ by forward differences of ``delta`` (Varga 2021, section IV), and Φ; arguments as above.
 
     Args:
-        chain: The model of the arm.
-        kind: The kind of task coordinates.
-        cost: The cost's parameters.
-        dt: Δt in [s].
+        data: As above.
         q: Joint coordinates at the first grid point. Shape (n,).
         nominal: Nominal coordinates ahead. Shape (at least HL - 1, m).
         qdot: Joint velocities, put back as they were. Shape (HL - 1, n).
@@ -51,9 +50,9 @@ def difference_gradient(chain, kind, cost, dt, q, nominal, qdot, delta, gradient
         The cost.
     """
     steps, n = qdot.shape
-    scratch = _scratch(kind, nominal)
+    workspace = _frame_workspace(data.kind, nominal)
     stages, shifted = np.empty(steps), np.empty(steps)
-    total = _roll(chain, kind, cost, dt, q.copy(), nominal, qdot, 0, stages, scratch)
+    total = _roll(data, q.copy(), nominal, qdot, 0, stages, workspace)
     start, here = q.copy(), np.empty(n)
     before = 0.0
     for i in range(steps):
@@ -62,19 +61,20 @@ def difference_gradient(chain, kind, cost, dt, q, nominal, qdot, delta, gradient
             qdot[i, j] = kept + delta
             here[:] = start
             # The stages before the i-th are as they were.
-            moved = before + _roll(chain, kind, cost, dt, here, nominal, qdot, i, shifted, scratch)
+            moved = before + _roll(data, here, nominal, qdot, i, shifted, workspace)
             gradient[i, j] = (moved - total) / delta
             qdot[i, j] = kept
         for j in range(n):
-            start[j] += dt * qdot[i, j]
+            start[j] += data.dt * qdot[i, j]
         before += stages[i]
     return total
 
 
 @kernel
-def _roll(chain, kind, cost, dt, here, nominal, qdot, first, stages, scratch):
+def _roll(data, here, nominal, qdot, first, stages, workspace):
     """Goes from ``here`` through the stages from ``first`` on, and sums their costs, which ``stages`` receives."""
-    rotation, position, pose, error = scratch
+    chain, kind, cost, dt = data.chain, data.kind, data.cost, data.dt
+    rotation, position, pose, error = workspace
     total = 0.0
     for i in range(first, qdot.shape[0]):
         for j in range(here.shape[0]):
@@ -88,44 +88,44 @@ def _roll(chain, kind, cost, dt, here, nominal, qdot, first, stages, scratch):
 
 
 @kernel
-def _scratch(kind, nominal):
+def _frame_workspace(kind, nominal):
+    """Orientation (3, 3), position (3,), task coordinates (m,) and error (e,) of a grid point."""
     m = nominal.shape[1]
     return np.empty((3, 3)), np.empty(3), np.empty(m), np.empty(6 if kind == task_kernels.POSE else m)
 
 
 @kernel
-def analytic_gradient(chain, kind, cost, dt, q, nominal, qdot, gradient):
+def analytic_gradient(data, q, nominal, qdot, gradient):
     """∂Φ/∂q̇ by the chain rule, and Φ; arguments as in :func:`difference_gradient`."""
     steps, n = qdot.shape
-    rotation, position, geometric = np.empty((3, 3)), np.empty(3), np.empty((6, n))
-    scratch = _gradient_scratch(kind, nominal, n)
-    pull = np.empty((steps, n))
+    chain, cost, dt = data.chain, data.cost, data.dt
+    workspace = _gradient_workspace(data.kind, nominal, n)
+    rotation, position, geometric = workspace.rotation, workspace.position, workspace.geometric
+    by_q = np.empty((steps, n))
     here = q.copy()
     total = 0.0
     for i in range(steps):
         for j in range(n):
             here[j] += dt * qdot[i, j]
         forward_and_jacobian(chain, here, rotation, position, geometric)
-        tracking = _tracking_gradient(kind, cost, nominal[i], rotation, position, geometric, pull[i], scratch)
+        tracking = _tracking_gradient(data, nominal[i], workspace, by_q[i])
         total += tracking + cost_kernels.velocity(cost, qdot[i])
         cost_kernels.velocity_gradient(cost, qdot[i], gradient[i])
-    # A velocity moves all later grid points: sum their pulls from the end.
+    # A velocity moves all later grid points: sum their derivatives from the end.
     for j in range(n):
-        sum_of_pulls = 0.0
+        sum_from_end = 0.0
         for i in range(steps - 1, -1, -1):
-            sum_of_pulls += pull[i, j]
-            gradient[i, j] += dt * sum_of_pulls
+            sum_from_end += by_q[i, j]
+            gradient[i, j] += dt * sum_from_end
     return total
 
 
 @kernel
-def analytic_state_gradient(chain, kind, cost, nominal, q, qdot, by_q, by_qdot):
+def analytic_state_gradient(data, nominal, q, qdot, by_q, by_qdot):
     """∂Φ/∂q(2 … HL) and ∂Φ/∂q̇(1 … HL - 1) with states and velocities taken for independent, and Φ.
 
     Args:
-        chain: The model of the arm.
-        kind: The kind of task coordinates.
-        cost: The cost's parameters.
+        data: As above.
         nominal: Nominal coordinates of the second and later grid points. Shape (at least HL - 1, m).
         q: Joint coordinates at the second and later grid points. Shape (HL - 1, n).
         qdot: Joint velocities. Shape (HL - 1, n).
@@ -136,26 +136,28 @@ def analytic_state_gradient(chain, kind, cost, nominal, q, qdot, by_q, by_qdot):
         The cost.
     """
     steps, n = q.shape
-    rotation, position, geometric = np.empty((3, 3)), np.empty(3), np.empty((6, n))
-    scratch = _gradient_scratch(kind, nominal, n)
+    chain, cost = data.chain, data.cost
+    workspace = _gradient_workspace(data.kind, nominal, n)
+    rotation, position, geometric = workspace.rotation, workspace.position, workspace.geometric
     total = 0.0
     for i in range(steps):
         forward_and_jacobian(chain, q[i], rotation, position, geometric)
-        tracking = _tracking_gradient(kind, cost, nominal[i], rotation, position, geometric, by_q[i], scratch)
+        tracking = _tracking_gradient(data, nominal[i], workspace, by_q[i])
         total += tracking + cost_kernels.velocity(cost, qdot[i])
         cost_kernels.velocity_gradient(cost, qdot[i], by_qdot[i])
     return total
 
 
 @kernel
-def difference_state_gradient(chain, kind, cost, dt, nominal, q, qdot, delta, by_q, by_qdot):
+def difference_state_gradient(data, nominal, q, qdot, delta, by_q, by_qdot):
     """:func:`analytic_state_gradient` by forward differences: ``delta`` in q̇, Δt ``delta`` in q.
 
     With these two a difference by a velocity in :func:`difference_gradient` is the sum of the differences by that
     velocity and by the states that it moves, but for rounding.
     """
     steps, n = q.shape
-    rotation, position, pose, error = _scratch(kind, nominal)
+    chain, kind, cost, dt = data.chain, data.kind, data.cost, data.dt
+    rotation, position, pose, error = _frame_workspace(kind, nominal)
     total = 0.0
     for i in range(steps):
         forward(chain, q[i], rotation, position)
@@ -178,24 +180,40 @@ def difference_state_gradient(chain, kind, cost, dt, nominal, q, qdot, delta, by
     return total
 
 
+class _GradientWorkspace(NamedTuple):
+    """Arrays of one grid point."""
+
+    rotation: Floats
+    position: Floats
+    geometric: Floats
+    pose: Floats
+    error: Floats
+    gradient: Floats
+    jacobian: Floats
+    error_jacobian: Floats
+
+
 @kernel
-def _gradient_scratch(kind, nominal, n):
-    _, _, pose, error = _scratch(kind, nominal)
+def _gradient_workspace(kind, nominal, n):
+    rotation, position, pose, error = _frame_workspace(kind, nominal)
     e = error.shape[0]
-    return pose, error, np.empty(e), np.empty((e, n)), np.empty((e, n))
+    return _GradientWorkspace(
+        rotation, position, np.empty((6, n)), pose, error, np.empty(e), np.empty((e, n)), np.empty((e, n))
+    )
 
 
 @kernel
-def _tracking_gradient(kind, cost, nominal, rotation, position, geometric, gradient, scratch):
+def _tracking_gradient(data, nominal, workspace, gradient):
     """Φ^X of one grid point, and its derivative by the joint coordinates there, which ``gradient`` (n,) receives."""
-    pose, error, slope, jacobian, error_jacobian = scratch
-    task_kernels.coordinates(kind, rotation, position, pose)
+    kind, rotation, pose, error = data.kind, workspace.rotation, workspace.pose, workspace.error
+    by_error, jacobian, error_jacobian = workspace.gradient, workspace.jacobian, workspace.error_jacobian
+    task_kernels.coordinates(kind, rotation, workspace.position, pose)
     task_kernels.error(kind, nominal, pose, error)
-    task_kernels.jacobian(kind, rotation, geometric, jacobian)
+    task_kernels.jacobian(kind, rotation, workspace.geometric, jacobian)
     task_kernels.error_jacobian(kind, error, jacobian, error_jacobian)
-    cost_kernels.tracking_gradient(cost, error, slope)
+    cost_kernels.tracking_gradient(data.cost, error, by_error)
     for j in range(gradient.shape[0]):
         gradient[j] = 0.0
         for k in range(error.shape[0]):
-            gradient[j] += slope[k] * error_jacobian[k, j]
-    return cost_kernels.tracking(cost, error)
+            gradient[j] += by_error[k] * error_jacobian[k, j]
+    return cost_kernels.tracking(data.cost, error)

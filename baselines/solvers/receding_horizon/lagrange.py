@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from baselines.solvers.receding_horizon.descent import GOES_ON, adapted, settle, stop_test
+from baselines.solvers.receding_horizon.descent import DIVERGED, GOES_ON, adapted, stop_if_diverged, stop_test
 from baselines.solvers.receding_horizon.gradient import RecedingHorizonGradient
 from baselines.solvers.receding_horizon.horizon import analytic_state_gradient, difference_state_gradient
 from ikgym.jit import kernel
@@ -65,24 +65,19 @@ class RecedingHorizonLagrange(RecedingHorizonGradient):
 
 
 @kernel
-def reduce_rows(
-    chain,
-    kind,
-    cost,
-    dt,
-    limit,
-    q,
-    nominal,
-    plan,
-    alpha,
-    tolerance,
-    most,
-    rule,
-    difference,
-    status,
-    iterations,
-):
-    """Descent along the reduced gradient row by row; ``plan`` (B, HL - 1, n) and ``alpha`` (B,) change in place."""
+def reduce_rows(data, settings, q, nominal, memory, status, iterations):
+    """Descent along the reduced gradient row by row.
+
+    Args:
+        data: The :class:`ProblemData`.
+        settings: :class:`DescentSettings`.
+        q: Joint coordinates in [rad] or [m]. Shape (B, n).
+        nominal: Nominal task coordinates ahead. Shape (B, at least HL - 1, m).
+        memory: :class:`DescentMemory`, changed in place.
+        status: Receives values of :class:`Status`. Shape (B,).
+        iterations: Receives the steps made. Shape (B,).
+    """
+    plan, alpha, difference, dt = memory.plan, memory.alpha, settings.difference, data.dt
     steps, n = plan.shape[1:]
     states, by_q, by_qdot = np.empty((steps, n)), np.empty((steps, n)), np.empty((steps, n))
     diagonal, ratio, multipliers = np.empty(steps), np.empty(steps), np.empty((steps, n))
@@ -95,19 +90,17 @@ def reduce_rows(
         first_value = last_norm = 0.0
         while True:
             if difference > 0.0:
-                value = difference_state_gradient(
-                    chain, kind, cost, dt, nominal[row], states, qdot, difference, by_q, by_qdot
-                )
+                value = difference_state_gradient(data, nominal[row], states, qdot, difference, by_q, by_qdot)
             else:
-                value = analytic_state_gradient(chain, kind, cost, nominal[row], states, qdot, by_q, by_qdot)
+                value = analytic_state_gradient(data, nominal[row], states, qdot, by_q, by_qdot)
             reduce_gradient(dt, diagonal, ratio, multipliers, by_q, by_qdot)
             norm = np.sqrt(np.sum(by_q * by_q) + np.sum(by_qdot * by_qdot))
             if step == 0:
                 first_value = value
-            status[row] = stop_test(value, norm, tolerance, step, most)
+            status[row] = stop_test(value, norm, settings, step)
             if status[row] != GOES_ON:
                 break
-            alpha[row] = adapted(alpha[row], norm, last_norm, rule)
+            alpha[row] = adapted(alpha[row], norm, last_norm, settings)
             last_norm = norm
             for i in range(steps):
                 for j in range(n):
@@ -115,7 +108,9 @@ def reduce_rows(
                     qdot[i, j] -= alpha[row] * by_qdot[i, j]
             step += 1
         iterations[row] = step
-        settle(status, value, first_value, limit, rule, row, qdot, alpha)
+        status[row] = stop_if_diverged(status[row], value, first_value, data.velocity_limit, qdot)
+        if status[row] == DIVERGED:
+            alpha[row] = settings.alpha_min
 
 
 @kernel

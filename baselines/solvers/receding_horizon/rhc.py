@@ -10,7 +10,8 @@ import numpy.typing as npt
 
 from baselines.policy import Batch, Memory, Solution, SolverPolicy
 from baselines.solvers.receding_horizon.newton.grid import offsets
-from baselines.solvers.receding_horizon.newton.receding import Settings, plan_rows
+from baselines.solvers.receding_horizon.newton.plan import PlanSettings
+from baselines.solvers.receding_horizon.newton.receding import HorizonMemory, plan_rows
 from ikgym.exceptions import InvalidInputError
 from ikgym.simulator import FARTHEST
 from ikgym.validation import FloatArray, number, whole_number
@@ -25,13 +26,13 @@ class RecedingHorizon(SolverPolicy):
 
     The unknowns are the joint coordinates at the knots of the horizon. In them the Hessian is block-tridiagonal, so
     that a damped Newton step costs time linear in the number of knots. The kinks of the cost, on which minima often
-    lie, and the limits are held by multipliers, see :mod:`newton.multipliers`. The plan of one period, slid
-    by one step, is the start of the next.
+    lie, and the limits are held by multipliers, see :mod:`newton.augmented_lagrangian`. The plan of one period, shifted
+    by one step, is the warm start of the next.
 
     To convergence (``iterations=None``) the plan is a local minimum of the horizon's cost, found with the exact Hessian
     where that is positive definite; with a number of iterations it is so many Gauss–Newton steps away from the plan
     before, which at 1 kHz is close (the real-time iteration). A long horizon has many local minima, some
-    of them very dear: several ``starts`` and challengers are for that.
+    of them very costly: several ``starts`` and restart candidates are for that.
 
     The joint limits of the arm and the velocity limit of the scenario are constraints of the plan.
 
@@ -39,18 +40,18 @@ class RecedingHorizon(SolverPolicy):
         problem: What the policy is told of the scenario.
         horizon: HL, the number of grid points with the present one. At least 2; HL - 1 steps must be shown ahead.
         iterations: Newton steps in one control period, at least 30 in the first; None for as many as the optimum takes.
-        move_blocks: Knots of the horizon; None for one at each of its HL - 1 steps. Fewer are spaced out: two blocks of one
-            step, then lengths that grow geometrically. Within a block the joint velocity is constant, and its tracking
-            cost follows the trapezoidal rule.
+        move_blocks: Knots of the horizon (move blocking); None for one at each of its HL - 1 steps. Fewer are spaced
+            out: two blocks of one step, then lengths that grow geometrically. Within a block the joint velocity is
+            constant, and its tracking cost follows the trapezoidal rule.
         terminal_weight: Factor of the tracking cost at the last grid point, unless the episode ends before it; 1 is the
             paper's cost.
         stop_at_end: Whether the horizon ends where the episode does, which ``remaining`` tells. Else it looks on, where
             costs count no more.
-        starts: Guesses from which the first plan of an episode is chosen: damped least squares from knot to knot, and
-            with more than one the others with a random drift in the null space and random damping.
-        restart_steps: Newton steps of a challenger: a second plan, which branches off at a random knot into a random guess,
-            and takes over when it is cheaper after its last step. 0 for none.
-        restart_rate: Newton steps of the challenger in one control period.
+        starts: Initial guesses from which the first plan of an episode is chosen: damped least squares from knot to
+            knot, and with more than one the others with a random drift in the null space and random damping.
+        restart_steps: Newton steps of a restart candidate: a second plan, which branches off at a random knot into a
+            random guess, and replaces the plan when it is cheaper after its last step. 0 for none.
+        restart_rate: Newton steps of the restart candidate in one control period.
         seed: Of the random guesses, which are the same in all episodes.
         tolerance: Relative precision of the horizon's cost at which it counts as minimal.
 
@@ -84,7 +85,8 @@ class RecedingHorizon(SolverPolicy):
             whole_number("iterations", self.iterations, at_least=1)
         if self.move_blocks is not None and whole_number("move_blocks", self.move_blocks, at_least=1) >= self.horizon:
             raise InvalidInputError(
-                f"move_blocks: expected at most horizon - 1 = {self.horizon - 1}, a knot at each step, got {self.move_blocks}."
+                f"move_blocks: expected at most horizon - 1 = {self.horizon - 1}, a knot at each step, got "
+                f"{self.move_blocks}."
             )
         if not isinstance(self.stop_at_end, (bool, np.bool_)):
             raise InvalidInputError(f"stop_at_end: expected True or False, got {self.stop_at_end!r}.")
@@ -97,7 +99,7 @@ class RecedingHorizon(SolverPolicy):
         knots.flags.writeable = False
         object.__setattr__(self, "offsets", knots)
         problem, model = self.problem, self.problem.model
-        settings = Settings(
+        settings = PlanSettings(
             knots,
             terminal_weight,
             bool(self.stop_at_end),
@@ -108,27 +110,34 @@ class RecedingHorizon(SolverPolicy):
             self.restart_rate,
             self.seed,
         )
-        rules = (problem.task.kind, *problem.cost.parameters, problem.dt, model.lower, model.upper)
-        object.__setattr__(self, "_constants", (*model.chain, *rules, problem.velocity_limit, *settings))
+        data = (*model.chain, problem.task.kind, *problem.cost.parameters, problem.dt, model.lower, model.upper)
+        object.__setattr__(self, "_constants", (*data, problem.velocity_limit, *settings))
 
     @property
     def preview(self) -> int:
         """Grid points 2 … HL lie ahead."""
         return self.horizon - 1
 
-    def memory(self, rows: int) -> Memory:
-        """Plan and multipliers, of shapes (B, K, n) and (B, K, e + 2 n); those of the challenger; and two counters."""
+    def memory(self, rows: int) -> HorizonMemory:
+        """An empty plan and restart candidate; see :class:`HorizonMemory`."""
         knots, n = len(self.offsets), self.problem.model.joints
-        wide, rival = self.problem.task.error_size + 2 * n, knots if self.restart_steps else 0
-        plans = (np.zeros((rows, k, width)) for k in (knots, rival) for width in (n, wide))
-        return (*plans, np.zeros(rows, dtype=np.int64), np.zeros(rows, dtype=np.int64))
+        candidate, width = knots if self.restart_steps else 0, self.problem.task.error_size + 2 * n
+        return HorizonMemory(
+            plan=np.zeros((rows, knots, n)),
+            multipliers=np.zeros((rows, knots, width)),
+            candidate=np.zeros((rows, candidate, n)),
+            candidate_multipliers=np.zeros((rows, candidate, width)),
+            periods=np.zeros(rows, dtype=np.int64),
+            candidate_steps=np.zeros(rows, dtype=np.int64),
+        )
 
     def solve(self, batch: Batch, memory: Memory) -> Solution:
         """See :meth:`SolverPolicy.solve`."""
-        changed = tuple(array.copy() for array in memory)
+        changed = HorizonMemory(*[array.copy() for array in memory])
         qdot = np.empty_like(batch.q)
         status, iterations = np.empty((2, len(qdot)), dtype=np.int64)
         observed = (batch.q, batch.qdot, batch.nominal, batch.remaining)
+        # Taken apart, see the kernel.
         plan_rows(*self._constants, *observed, *changed, qdot, status, iterations)
         return Solution(qdot, changed, status, iterations)
 
@@ -140,7 +149,7 @@ class RecedingHorizon(SolverPolicy):
         Returns:
             Joint coordinates in [rad] or [m]. Shape (B, K, n).
         """
-        return state[2].copy()
+        return HorizonMemory(*state[2:]).plan.copy()
 
     def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
         """Jacobians and a factorisation a knot in each Newton step, and forward kinematics for one length tried."""

@@ -13,9 +13,10 @@ from baselines.evaluation import test_sets
 from baselines.evaluation.rollout import rollout
 from baselines.fingerprints import episode_hash
 from baselines.oracle import Optimum, Search, Start, best_known, cache, local_search, solve
-from baselines.oracle.episode import Whole
-from baselines.oracle.optimum import CLIMBED, RANDOM
+from baselines.oracle.episode import EpisodeProblem
+from baselines.oracle.optimum import LOCAL_SEARCH, RANDOM
 from baselines.policy import Problem
+from baselines.solvers.receding_horizon.newton.minimise import NewtonSettings
 from ikgym import parallel
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 from ikgym.scenarios import Disturbance
@@ -92,7 +93,7 @@ def test_nothing_that_was_tried_is_cheaper(scenario, seed):
 
 @cases
 def test_commands_lead_along_a_path(scenario, seed):
-    whole = Whole.of(scenario, seed)
+    whole = EpisodeProblem.of(scenario, seed)
     steps = np.random.default_rng(0).uniform(-1.0, 1.0, (whole.knots, scenario.joints))
     path = whole.start + scenario.dt * np.cumsum(steps * whole.grid.length[:, None], axis=0)
     qdot = whole.commands(path)
@@ -111,7 +112,7 @@ def test_the_gradient_vanishes(scenario, seed):
 def test_moving_along_the_path_anywhere_costs_more():
     scenario, seed = CASES["random"]
     optimum = solve(scenario, seed, QUICK)
-    whole, rng = Whole.of(scenario, seed), np.random.default_rng(0)
+    whole, rng = EpisodeProblem.of(scenario, seed), np.random.default_rng(0)
     for size in (1e-3, 1e-5):
         for _ in range(20):
             q = optimum.q + size * scenario.dt * rng.standard_normal(optimum.q.shape)
@@ -139,10 +140,10 @@ def test_kinds_of_starts():
     kinds = [one.kind for one in optimum.starts]
     known = ["nominal joint path", "roll-out", "rhc, horizon 1001", "rhc, horizon 101"]
     assert kinds[: 4 + QUICK.starts] == known + [RANDOM] * QUICK.starts
-    assert set(kinds[4 + QUICK.starts :]) <= {CLIMBED}
+    assert set(kinds[4 + QUICK.starts :]) <= {LOCAL_SEARCH}
     assert [one.number for one in optimum.starts[4 : 4 + QUICK.starts]] == list(range(1, QUICK.starts + 1))
     assert all(one.cost is not None for one in optimum.starts[:4])
-    assert set(optimum.found_by.split("; ")) <= {*known, RANDOM, CLIMBED}
+    assert set(optimum.found_by.split("; ")) <= {*known, RANDOM, LOCAL_SEARCH}
     json.dumps(dataclasses.asdict(optimum.record()))
     assert [one.kind for one in solve("zhang3-helix", 0, Search(starts=0, generations=0)).starts] == known[1:]
 
@@ -153,7 +154,7 @@ def test_what_is_said_of_the_starts():
         Start(RANDOM, 1, 10.2, 10.0),
         Start(RANDOM, 2, 10.06, 10.0 * (1.0 + 1e-5)),
         Start(RANDOM, 3, 900.0),
-        Start(CLIMBED, None, 10.05, 10.0),
+        Start(LOCAL_SEARCH, None, 10.05, 10.0),
     )
     optimum = solve(short(steps=2), 0, QUICK).replace(cost=10.0, starts=starts)
     assert optimum.found_by == "nominal joint path; random start; local search"
@@ -173,48 +174,48 @@ def test_what_is_said_of_the_starts():
 
 
 @pytest.fixture(scope="module")
-def dear():
-    """Two paths of which the first is a hundred times too dear, their costs, and what they are paths of."""
-    whole = Whole.of(ikgym.scenarios.get("varga7-random"), 1_000_011)
-    problem = whole.rules, whole.coarse(25), whole.start, whole.nominal
-    paths = np.empty((2, len(problem[1].at), 7))
-    local_search.roll_outs(*problem, 0, paths, 0, 2)
-    costs, gradients, made = np.empty((3, 2))
-    local_search.settle(*problem, False, 50, 1e-4, paths, costs, gradients, made, 0, 2)
-    return problem, paths, costs
+def costly():
+    """Two paths of which the first is a hundred times too costly, their costs, and what they are paths of."""
+    whole = EpisodeProblem.of(ikgym.scenarios.get("varga7-random"), 1_000_011)
+    problem = whole.on(whole.coarse(25))
+    paths = np.empty((2, len(problem.grid.at), 7))
+    local_search.random_paths(problem, 0, paths, 0, 2)
+    improved = local_search.Improved(*np.empty((3, 2)))
+    local_search.improve(problem, NewtonSettings(False, 50, 1e-4), paths, improved, 0, 2)
+    return problem, paths, improved.costs
 
 
-def test_a_path_gets_never_worse(dear):
-    problem, before, _ = dear
+def test_a_path_gets_never_worse(costly):
+    problem, before, _ = costly
     paths, last = before.copy(), np.full(2, np.inf)
     for _ in range(60):
-        costs, gradients, made = np.empty((3, 2))
-        local_search.settle(*problem, True, 1, 1e-12, paths, costs, gradients, made, 0, 2)
-        assert (costs <= last).all()
-        last = costs
+        improved = local_search.Improved(*np.empty((3, 2)))
+        local_search.improve(problem, NewtonSettings(True, 1, 1e-12), paths, improved, 0, 2)
+        assert (improved.costs <= last).all()
+        last = improved.costs
 
 
-def climbed(dear, rounds, *chunks):
-    problem, before, costs_before = dear
+def searched(costly, rounds, *chunks):
+    problem, before, costs_before = costly
     paths, costs = before.copy(), costs_before.copy()
     for first, last in chunks:
-        local_search.climb(*problem, 0, rounds, before, paths, costs, first, last)
+        local_search.iterated_local_search(problem, 0, rounds, before, paths, costs, first, last)
     return paths, costs
 
 
-def test_the_local_search_finds_what_a_start_does_not(dear):
-    _, before, costs_before = dear
-    paths, costs = climbed(dear, 40, (0, 1))
+def test_the_local_search_finds_what_a_start_does_not(costly):
+    _, before, costs_before = costly
+    paths, costs = searched(costly, 40, (0, 1))
     assert costs[0] < 0.1 * costs_before[0]
     assert costs[1] == costs_before[1]
     assert identical(paths[1], before[1])
 
 
-def test_the_local_search_of_a_path_depends_on_its_number_alone(dear):
-    _, before, _ = dear
-    together = climbed(dear, 20, (0, 2))
+def test_the_local_search_of_a_path_depends_on_its_number_alone(costly):
+    _, before, _ = costly
+    together = searched(costly, 20, (0, 2))
     assert not identical(together[0][1], before[1])
-    assert identical(together, climbed(dear, 20, (1, 2), (0, 1)))
+    assert identical(together, searched(costly, 20, (1, 2), (0, 1)))
 
 
 class TestGrid:
@@ -222,7 +223,7 @@ class TestGrid:
     @pytest.mark.parametrize("stride", [1, 2, 5, 50])
     def test_a_coarse_grid_counts_all_steps(self, steps, stride):
         for held in (1, (2, 1, 1, 3, 1)):
-            whole = Whole.of(short(steps=steps, iterations_per_point=held), 0)
+            whole = EpisodeProblem.of(short(steps=steps, iterations_per_point=held), 0)
             grid = whole.coarse(stride)
             assert grid.at[-1] == steps
             assert (np.diff(grid.at) > 0).all()
@@ -232,13 +233,13 @@ class TestGrid:
                 assert all(identical(a, b) for a, b in zip(grid, whole.grid, strict=True))
 
     def test_the_first_knots_stay(self):
-        whole = Whole.of(short(), 0)
+        whole = EpisodeProblem.of(short(), 0)
         assert whole.coarse(10).at.tolist() == [1, 2, 3, 4, 5, 6, 7, 8, 18, 28, 30]
         assert whole.coarse(10).length.tolist() == [1] * 8 + [10, 10, 2]
         assert whole.coarse(10).tracking.tolist() == [1] * 7 + [5.5, 10, 6, 1.5]
 
     def test_a_straight_path_stays_straight(self):
-        whole = Whole.of(short(iterations_per_point=(2, 1, 1, 3, 1), start=np.zeros(7)), 0)
+        whole = EpisodeProblem.of(short(iterations_per_point=(2, 1, 1, 3, 1), start=np.zeros(7)), 0)
         grid = whole.coarse(7)
         fine = np.cumsum(whole.grid.length)[:, None] * np.linspace(0.1, 0.7, 7)
         path = fine[np.searchsorted(whole.grid.at, grid.at)]
@@ -246,7 +247,7 @@ class TestGrid:
 
     def test_held_points_are_free_of_charge(self):
         scenario = short("khan8-q7q8", 130)
-        whole = Whole.of(scenario, 0)
+        whole = EpisodeProblem.of(scenario, 0)
         assert whole.grid.at.tolist() == [60, 120, 130]
         assert whole.grid.length.tolist() == [59, 59, 9]
         assert not whole.grid.velocity.any()
@@ -517,11 +518,11 @@ def test_agrees_with_ipopt_on_a_long_piece():
 
 
 def test_kernels_draw_what_they_drew():
-    whole = Whole.of(short(steps=5), 0)
+    whole = EpisodeProblem.of(short(steps=5), 0)
     paths = np.empty((3, 5, 7))
-    local_search.roll_outs(whole.rules, whole.grid, whole.start, whole.nominal, 0, paths, 0, 3)
+    local_search.random_paths(whole.on(whole.grid), 0, paths, 0, 3)
     assert np.abs(paths[1, -1] - paths[2, -1]).max() > 1e-6
     again = np.empty((3, 5, 7))
     for s in (2, 0, 1):
-        local_search.roll_outs(whole.rules, whole.grid, whole.start, whole.nominal, 0, again, s, s + 1)
+        local_search.random_paths(whole.on(whole.grid), 0, again, s, s + 1)
     assert identical(paths, again)

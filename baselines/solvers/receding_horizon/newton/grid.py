@@ -29,16 +29,17 @@ class Grid(NamedTuple):
     velocity: Floats
 
 
-def offsets(steps: int, blocks: int | None) -> Integers:
+def offsets(steps: int, move_blocks: int | None) -> Integers:
     """Steps from now to the knots of a horizon: two blocks of one step, then lengths that grow geometrically.
 
     Args:
         steps: Steps of the horizon.
-        blocks: K; None, or as many as there are steps, for a knot at each step.
+        move_blocks: K; None, or as many as there are steps, for a knot at each step.
 
     Returns:
         Whole numbers, rising by at least 1, the last one ``steps``. Shape (K,).
     """
+    blocks = move_blocks
     if blocks is None or blocks >= steps:
         return np.arange(1, steps + 1)
     if blocks <= 2:
@@ -105,7 +106,7 @@ def empty_grid(knots):
 
 
 @kernel
-def slide(old, path, qdot, new, out):
+def shift_path(old, path, qdot, new, out):
     """What is left of a path one step later, at the knots of a new grid; past its end it goes on as it ended.
 
     Args:
@@ -123,12 +124,12 @@ def slide(old, path, qdot, new, out):
             block += 1
         share = (time - old.at[block]) / old.length[block]  # from the end of the block, so 0 at its knot
         for j in range(path.shape[1]):
-            slope = path[block, j] - path[block - 1, j] if block > 0 else qdot[j] * old.length[0]
-            out[k, j] = path[block, j] + share * slope
+            moved = path[block, j] - path[block - 1, j] if block > 0 else qdot[j] * old.length[0]
+            out[k, j] = path[block, j] + share * moved
 
 
 @kernel
-def slide_multipliers(old, multipliers, new):
+def shift_multipliers(old, multipliers, new):
     """Multipliers one step later, in place: each knot takes over those of the old knot at its time or next after it.
 
     Args:

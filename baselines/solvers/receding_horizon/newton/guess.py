@@ -1,4 +1,4 @@
-"""Kernels: first guesses of a joint path, by damped least squares from knot to knot."""
+"""Kernels: initial guesses of a joint path, by damped least squares from knot to knot, and their random numbers."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ikgym.kinematics import forward_and_jacobian
 
 # Damped steps that bring the arm from one knot to the next.
 CORRECTIONS = 2
-# λ of a guess that does not draw, and the range of those that do; drifts in [rad/s] or [m/s].
+# λ of a guess without drift, and the range of λ of random ones; the range of drifts in [rad/s] or [m/s].
 DAMPING = 1e-3
 DAMPINGS = (0.03, 1.0)
 DRIFTS = (1.0, 10.0)
@@ -22,44 +22,42 @@ STREAM = 256
 
 
 @kernel
-def roll_out(rules, grid, start, nominal, first, drift, damping, path, scratch, gram, x):
+def initial_guess(problem, first, drift, damping, path, workspace):
     """Goes from knot to knot by damped least squares, drifting in the null space of the task.
 
     Args:
-        rules: A :class:`baselines.solvers.receding_horizon.newton.cost.Rules`.
-        grid: The grid, of K knots.
-        start: Joint coordinates now. Shape (n,).
-        nominal: Nominal task coordinates ahead. Shape (at least grid.at[-1], m).
+        problem: A :class:`workspace.PathProblem` of K knots.
         first: The first knot to be set; those before stay as they are.
         drift: Joint velocities of which the part that does not move the task is added, in [rad/s] or [m/s].
             Shape (n,).
         damping: λ of the damped least squares.
-        path: Receives the joint coordinates at the knots. Shape (K, n).
-        scratch: A :class:`baselines.solvers.receding_horizon.newton.cost.Scratch`.
-        gram: Scratch. Shape (e, e).
-        x: Scratch. Shape (e,).
+        path: Receives the joint coordinates at the knots in [rad] or [m]. Shape (K, n).
+        workspace: A :class:`workspace.KnotWorkspace`.
     """
-    n, e = path.shape[1], x.shape[0]
+    data, start, nominal, grid = problem.data, problem.start, problem.nominal, problem.grid
+    rotation, position = workspace.rotation, workspace.position
+    jacobian, error = workspace.jacobian, workspace.error
+    n, e = path.shape[1], error.shape[0]
     move = np.empty(n)
     for k in range(first, path.shape[0]):
         here = path[k]
         for j in range(n):
             here[j] = path[k - 1, j] if k > 0 else start[j]
         for correction in range(CORRECTIONS):
-            forward_and_jacobian(rules.chain, here, scratch.rotation, scratch.position, scratch.geometric)
-            task_kernels.coordinates(rules.kind, scratch.rotation, scratch.position, scratch.pose)
-            task_kernels.error(rules.kind, nominal[grid.at[k] - 1], scratch.pose, scratch.error)
-            task_kernels.jacobian(rules.kind, scratch.rotation, scratch.geometric, scratch.jacobian)
+            forward_and_jacobian(data.chain, here, rotation, position, workspace.geometric)
+            task_kernels.coordinates(data.kind, rotation, position, workspace.pose)
+            task_kernels.error(data.kind, nominal[grid.at[k] - 1], workspace.pose, error)
+            task_kernels.jacobian(data.kind, rotation, workspace.geometric, jacobian)
             if correction == 0:
                 # What the drift would do to the task is taken out of the error, and so out of the step.
-                span = grid.length[k] * rules.dt
+                span = grid.length[k] * data.dt
                 for i in range(e):
-                    scratch.error[i] -= span * dot(scratch.jacobian[i], drift)
-            if not damped_step(scratch.jacobian, scratch.error, damping, gram, x, move):
+                    error[i] -= span * dot(jacobian[i], drift)
+            if not damped_step(jacobian, error, damping, workspace.gram, workspace.solution, move):
                 break
             for j in range(n):
                 moved = here[j] + move[j] + (span * drift[j] if correction == 0 else 0.0)
-                here[j] = min(max(moved, rules.lower[j]), rules.upper[j])
+                here[j] = min(max(moved, data.lower[j]), data.upper[j])
 
 
 @inlined
@@ -76,7 +74,16 @@ def uniform(key, counter):
 
 @kernel
 def draw(seed, counter, drift):
-    """Draws the ``counter``-th guess of a seed: a drift, which ``drift`` (n,) receives; returns its damping."""
+    """Draws the ``counter``-th random guess of a seed.
+
+    Args:
+        seed: A whole number of at least 0.
+        counter: Which guess.
+        drift: Receives its drift, in [rad/s] or [m/s]. Shape (n,).
+
+    Returns:
+        Its damping λ.
+    """
     n = drift.shape[0]
     square = 0.0
     for j in range(n):

@@ -1,201 +1,228 @@
-"""Kernels: damped Newton steps on the block-tridiagonal system of a joint path, in time linear in its knots."""
+"""Kernel: Newton's method for a joint path, with line search, damping and updates of the multipliers."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from baselines.solvers.linear_algebra import cholesky, inverse_of_factor
-from baselines.solvers.receding_horizon.newton.cost import Blocks, Scratch, blocks_for, linearise, merit, scratch_for
-from ikgym.jit import kernel
+from baselines.solvers.receding_horizon.newton.cost import linearise, merit
+from baselines.solvers.receding_horizon.newton.newton_step import newton_step
+from ikgym.jit import inlined, kernel
 
 CONVERGED, RAN_OUT, STALLED = 0, 1, 2
-# A decrease counts if it is this share of what the slope promises (Armijo).
+# A decrease counts if it is this share of what the gradient promises (Armijo).
 SUFFICIENT = 1e-4
-# The multipliers are brought up to date where Newton's method promises less than this share of what they leave open.
-SETTLED = 0.1
-# Limits become so much firmer where a renewal leaves more than this share of what the one before left open; at most.
-FIRMER, SLOW, FIRMEST = 10.0, 0.3, 1e6
+# The multipliers are updated where Newton's method promises less than this share of what they leave open.
+UPDATE_BELOW = 0.1
+# The penalties of the limits grow by a factor where an update leaves more than this share of what the one before left
+# open, and up to a bound.
+PENALTY_GROWTH, SLOW, LARGEST_PENALTY = 10.0, 0.3, 1e6
 # Lengths of a step tried one after the other.
 SHORTENING = 0.3
 TRIALS = 6
-# Costs below this are no more than rounding.
-NEGLIGIBLE = 1e-12
+# Costs below this are no more than rounding, as are promised decreases below this share of the merit.
+NEGLIGIBLE, ROUNDING = 1e-12, 1e-13
+# With a larger damping a small promise is no sign of a minimum.
+CONVERGED_DAMPING = 1e-3
 # Damping added to the Hessian's diagonal, in units of (Δt / Δq̇)⁻²: least above 0, factors, and where to give up.
 LEAST_DAMPING, MORE, LESS, MOST_DAMPING = 1e-6, 10.0, 0.1, 1e12
 
 
-class Room(NamedTuple):
-    """Arrays that a solve works in, for paths of up to K knots."""
+class NewtonSettings(NamedTuple):
+    """How far a path is improved.
 
-    scratch: Scratch
-    blocks: Blocks
-    inverse: npt.NDArray[np.float64]
-    factor: npt.NDArray[np.float64]
-    step: npt.NDArray[np.float64]
-    trial: npt.NDArray[np.float64]
-
-
-@kernel
-def room_for(kind, m, knots, n):
-    """Room for paths of up to ``knots`` knots of ``n`` joints, and task coordinates of ``m`` numbers."""
-    return Room(
-        scratch_for(kind, m, n),
-        blocks_for(knots, n),
-        np.empty((knots, n, n)),
-        np.empty((n, n)),
-        np.empty((knots, n)),
-        np.empty((knots, n)),
-    )
-
-
-@kernel
-def newton_step(blocks, knots, exact, damping, inverse, factor, step):
-    """Solves (H + damping I) step = -gradient by blocks, from the first knot to the last and back.
-
-    Args:
-        blocks: The quadratic model.
-        knots: How many knots there are.
-        exact: Whether to take the Hessian itself instead of its Gauss–Newton part.
-        damping: Added to the diagonal.
-        inverse: Receives the inverses of the pivots. Shape (K, n, n).
-        factor: Scratch. Shape (n, n).
-        step: Receives the step. Shape (K, n).
-
-    Returns:
-        False where the matrix is not positive definite; the step is of no use then.
+    Attributes:
+        exact: Whether to try the Hessian itself where it is positive definite; its Gauss–Newton part otherwise.
+        steps: Newton steps at most.
+        tolerance: Relative precision of the cost.
     """
-    n = step.shape[1]
-    for k in range(knots):
-        diagonal, second = blocks.diagonal[k], blocks.second[k]
-        for a in range(n):
-            for b in range(a + 1):
-                factor[a, b] = diagonal[a, b] + second[a, b] if exact else diagonal[a, b]
-            factor[a, a] += damping
-            step[k, a] = -blocks.gradient[k, a]
-        if k > 0:
-            coupling, before = blocks.coupling[k], inverse[k - 1]
-            for a in range(n):
-                carried = 0.0
-                for b in range(n):
-                    carried += before[a, b] * step[k - 1, b]
-                step[k, a] += coupling[a] * carried
-                for b in range(a + 1):
-                    factor[a, b] -= coupling[a] * before[a, b] * coupling[b]
-        if not cholesky(factor):
-            return False
-        inverse_of_factor(factor, inverse[k])
-    for k in range(knots - 1, -1, -1):
-        if k + 1 < knots:
-            for a in range(n):
-                step[k, a] += blocks.coupling[k + 1, a] * step[k + 1, a]
-        # factor's first row holds the result while the right-hand side is still needed
-        for a in range(n):
-            total = 0.0
-            for b in range(n):
-                total += inverse[k, a, b] * step[k, b]
-            factor[0, a] = total
-        for a in range(n):
-            step[k, a] = factor[0, a]
-    return True
+
+    exact: bool
+    steps: int
+    tolerance: float
+
+
+class Minimum(NamedTuple):
+    """What came of a minimisation.
+
+    Attributes:
+        outcome: CONVERGED, RAN_OUT or STALLED.
+        steps: Newton steps made, updates of the multipliers among them.
+        cost: The cost (where the steps ran out the merit, which is not above it).
+        gradient_norm: Norm of the merit's gradient by q (where the steps ran out that before the last one).
+    """
+
+    outcome: int
+    steps: int
+    cost: float
+    gradient_norm: float
+
+
+class LineSearch(NamedTuple):
+    """What came of a line search.
+
+    Attributes:
+        accepted: Whether a trial decreased the merit enough.
+        length: Length of the step; of the next trial where none was accepted.
+        reached: The merit at the last trial.
+    """
+
+    accepted: bool
+    length: float
+    reached: float
 
 
 @kernel
-def minimise(rules, grid, start, nominal, path, multipliers, exact, most, tolerance, room):
+def minimise(problem, path, multipliers, settings, workspace):
     """Damped Newton steps from a path, until it is a minimum or they run out.
 
+    The method of multipliers: the merit function is minimised for fixed multipliers, and where little is left to gain
+    with these they are updated.
+
     Args:
-        rules: A :class:`baselines.solvers.receding_horizon.newton.cost.Rules`.
-        grid: The grid, of K knots.
-        start: Joint coordinates now. Shape (n,).
-        nominal: Nominal task coordinates 1, 2, … steps ahead. Shape (at least grid.at[-1], m).
-        path: Joint coordinates at the knots, changed in place. Shape (K, n).
+        problem: A :class:`workspace.PathProblem` of K knots.
+        path: Joint coordinates at the knots in [rad] or [m], changed in place. Shape (K, n).
         multipliers: λ of the kinks and limits, changed in place. Shape (K, e + 2 n).
-        exact: Whether to try the Hessian itself where it is positive definite; its Gauss–Newton part otherwise.
-        most: Newton steps at most.
-        tolerance: Relative precision of the cost.
-        room: A :class:`Room`.
+        settings: :class:`NewtonSettings`.
+        workspace: A :class:`workspace.NewtonWorkspace`.
 
     Returns:
-        CONVERGED, RAN_OUT or STALLED; the steps made; the cost (where they ran out the merit, which is not above it);
-        the norm of the merit's gradient by q (where they ran out that before the last step).
+        A :class:`Minimum`.
     """
-    knots, n = path.shape
-    blocks, step, trial = room.blocks, room.step[:knots], room.trial[:knots]
-    unit = 1.0 / (rules.dt * rules.cost.delta_qdot) ** 2
-    firmness, left_open = room.scratch.firmness, np.inf
-    firmness[0] = 1.0
-    value, true, gap = linearise(rules, grid, start, nominal, path, multipliers, True, exact, room.scratch, blocks)
-    made, outcome, renewed, damping = 0, RAN_OUT, True, 0.0
+    data, exact, tolerance = problem.data, settings.exact, settings.tolerance
+    knots = path.shape[0]
+    model = workspace.model
+    gradient, step, trial = model.gradient[:knots], workspace.step[:knots], workspace.trial[:knots]
+    unit = 1.0 / (data.dt * data.cost.delta_qdot) ** 2
+    penalty_factor, left_open = workspace.knot.penalty_factor, np.inf
+    penalty_factor[0] = 1.0
+    value, true, gap = linearise(problem, path, multipliers, True, exact, workspace)
+    made, outcome, updated, damping = 0, RAN_OUT, True, 0.0
     while True:
-        curved = exact
-        while not newton_step(blocks, knots, curved, damping * unit, room.inverse, room.factor, step):
-            if curved:
-                curved = False
-            else:
-                damping = max(MORE * damping, LEAST_DAMPING)
-                if damping > MOST_DAMPING:
-                    break
-        slope = 0.0
-        for k in range(knots):
-            for a in range(n):
-                slope += blocks.gradient[k, a] * step[k, a]
-        if not (np.isfinite(slope) and damping <= MOST_DAMPING):
+        damping = damped_newton_step(model, exact, damping, unit, workspace, step)
+        derivative = _dot(gradient, step)
+        if not (np.isfinite(derivative) and damping <= MOST_DAMPING):
             outcome = STALLED
             break
-        promised = -0.5 * slope
-        if promised + gap <= tolerance * true + NEGLIGIBLE and damping <= 1e-3:
+        promised = -0.5 * derivative
+        if promised + gap <= tolerance * true + NEGLIGIBLE and damping <= CONVERGED_DAMPING:
             outcome = CONVERGED
             break
-        if not renewed and promised <= SETTLED * min(gap, gap * gap):
-            # Near the bottom for these multipliers, which are not yet those of the minimum. Renewed once more at the
-            # same path they would overshoot, and those of limits, which have no bound, would swing for ever.
-            made += 1
-            renewed = True
-            if gap > SLOW * left_open:
-                firmness[0] = min(FIRMER * firmness[0], FIRMEST)
+        if not updated and promised <= UPDATE_BELOW * min(gap, gap * gap):
+            # Near the minimum for these multipliers, which are not yet its own. Updated once more at the same path
+            # they would overshoot, and those of limits, which have no bound, would oscillate without end.
+            made, updated = made + 1, True
+            penalty_factor[0] = _penalty_factor(penalty_factor[0], gap, left_open)
             left_open = gap
-            if made >= most:
+            if made >= settings.steps:
                 break
-            value, true, gap = linearise(
-                rules, grid, start, nominal, path, multipliers, True, exact, room.scratch, blocks
-            )
+            value, true, gap = linearise(problem, path, multipliers, True, exact, workspace)
             continue
-        length, accepted = 1.0, False
-        for _ in range(TRIALS):
-            for k in range(knots):
-                for a in range(n):
-                    trial[k, a] = path[k, a] + length * step[k, a]
-            reached = merit(rules, grid, start, nominal, trial, multipliers, room.scratch)
-            if reached <= value + SUFFICIENT * length * slope:
-                accepted = True
-                break
-            length *= SHORTENING
+        search = line_search(problem, path, multipliers, value, derivative, step, trial, workspace)
         made += 1
-        if not accepted and made < most:
-            if promised <= 1e-13 * abs(value):
+        if not search.accepted:
+            if made >= settings.steps:
+                break
+            if promised <= ROUNDING * abs(value):
                 # Rounding hides what is left to gain.
                 outcome = CONVERGED if gap <= 10.0 * tolerance * true else STALLED
                 break
-            damping = max(MORE * damping, LEAST_DAMPING)
+            damping = _more(damping)
             continue
-        if not accepted:
-            break
         for k in range(knots):
-            for a in range(n):
+            for a in range(path.shape[1]):
                 path[k, a] = trial[k, a]
-        true, renewed = reached, False
-        if made == most:
+        true, updated = search.reached, False
+        if made == settings.steps:
             break
-        if length == 1.0:
-            damping = damping * LESS if damping > LEAST_DAMPING else 0.0
-        elif length < SHORTENING:
-            damping = max(MORE * damping, LEAST_DAMPING)
-        value, true, gap = linearise(rules, grid, start, nominal, path, multipliers, False, exact, room.scratch, blocks)
-    square = 0.0
-    for k in range(knots):
-        for a in range(n):
-            square += blocks.gradient[k, a] * blocks.gradient[k, a]
-    return outcome, made, true, np.sqrt(square)
+        damping = _next_damping(damping, search.length)
+        value, true, gap = linearise(problem, path, multipliers, False, exact, workspace)
+    return Minimum(outcome, made, true, np.sqrt(_dot(gradient, gradient)))
+
+
+@inlined
+def damped_newton_step(model, exact, damping, unit, workspace, step):
+    """A Newton step with the least damping, from ``damping`` up, that makes the Hessian positive definite.
+
+    Where the exact Hessian is not positive definite its Gauss–Newton part is taken before any damping is added.
+
+    Args:
+        model: The :class:`workspace.QuadraticModel`.
+        exact: Whether to try the exact Hessian.
+        damping: Damping to begin with, in units of ``unit``.
+        unit: (Δt Δq̇)⁻².
+        workspace: The :class:`workspace.NewtonWorkspace`.
+        step: Receives the step. Shape (K, n).
+
+    Returns:
+        The damping of the step, above MOST_DAMPING where none was found.
+    """
+    second = exact
+    while not newton_step(model, second, damping * unit, workspace.inverse, workspace.factor, step):
+        if second:
+            second = False
+        else:
+            damping = _more(damping)
+            if damping > MOST_DAMPING:
+                break
+    return damping
+
+
+@inlined
+def line_search(problem, path, multipliers, value, derivative, step, trial, workspace):
+    """Shortens a step until the merit decreases enough (Armijo).
+
+    Args:
+        problem: The :class:`workspace.PathProblem`.
+        path: Where the step begins. Shape (K, n).
+        multipliers: λ₀. Shape (K, e + 2 n).
+        value: The merit there.
+        derivative: Its derivative along the step.
+        step: The step. Shape (K, n).
+        trial: Receives the path at the last trial. Shape (K, n).
+        workspace: The :class:`workspace.NewtonWorkspace`.
+
+    Returns:
+        A :class:`LineSearch`.
+    """
+    length, reached, accepted = 1.0, value, False
+    for _ in range(TRIALS):
+        for k in range(path.shape[0]):
+            for a in range(path.shape[1]):
+                trial[k, a] = path[k, a] + length * step[k, a]
+        reached = merit(problem, trial, multipliers, workspace)
+        if reached <= value + SUFFICIENT * length * derivative:
+            accepted = True
+            break
+        length *= SHORTENING
+    return LineSearch(accepted, length, reached)
+
+
+@inlined
+def _penalty_factor(factor, gap, left_open):
+    """The factor of the limits' penalties: larger where an update of the multipliers has closed too little."""
+    return min(PENALTY_GROWTH * factor, LARGEST_PENALTY) if gap > SLOW * left_open else factor
+
+
+@inlined
+def _next_damping(damping, length):
+    """The damping after an accepted step: less after a full one, more after one shortened more than once."""
+    if length == 1.0:
+        return damping * LESS if damping > LEAST_DAMPING else 0.0
+    return _more(damping) if length < SHORTENING else damping
+
+
+@inlined
+def _more(damping):
+    return max(MORE * damping, LEAST_DAMPING)
+
+
+@inlined
+def _dot(a, b):
+    """The scalar product of two matrices. Shapes (K, n)."""
+    total = 0.0
+    for k in range(a.shape[0]):
+        for j in range(a.shape[1]):
+            total += a[k, j] * b[k, j]
+    return total

@@ -12,6 +12,7 @@ from baselines.solvers.receding_horizon import horizon as horizon_module
 from baselines.solvers.receding_horizon.horizon import analytic_gradient, difference_gradient, horizon_cost
 from baselines.status import Status
 from ikgym.exceptions import InvalidInputError, UnknownNameError
+from tests.baselines.solvers.receding_horizon.data import data_of
 
 
 def phi(scenario, q, nominal, qdot):
@@ -69,7 +70,7 @@ def test_gradients_against_central_differences(name, steps):
     q = rng.uniform(-1, 1, scenario.joints)
     nominal = scenario.task.coordinates(*model.forward(q + rng.uniform(-5e-3, 5e-3, (steps, scenario.joints))))
     qdot = rng.uniform(-2, 2, (steps, scenario.joints))
-    common = (model.chain, scenario.task.kind, scenario.cost.parameters, scenario.dt, q, nominal)
+    common = (data_of(scenario), q, nominal)
     analytic, forward = np.empty_like(qdot), np.empty_like(qdot)
     value = analytic_gradient(*common, qdot, analytic)
     assert value == horizon_cost(*common, qdot) == difference_gradient(*common, qdot, 1e-7, forward)
@@ -174,10 +175,10 @@ def test_operations_are_what_is_called(gradient, horizon, monkeypatch):
             return kernel(*args)
 
         monkeypatch.setattr(horizon_module, name, counted)
-    for name in ("_roll", "_scratch"):
+    for name in ("_roll", "_frame_workspace"):
         monkeypatch.setattr(horizon_module, name, getattr(horizon_module, name).py_func)
     scenario = ikgym.scenarios.get("varga7-fast")
-    common = (scenario.model.chain, 1, scenario.cost.parameters, 1e-3, np.zeros(7), scenario.nominal()[1:horizon])
+    common = (data_of(scenario), np.zeros(7), scenario.nominal()[1:horizon])
     qdot, out = np.zeros((horizon - 1, 7)), np.empty((horizon - 1, 7))
     if gradient == "analytic":
         analytic_gradient.py_func(*common, qdot, out)

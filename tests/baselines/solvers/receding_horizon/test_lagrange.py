@@ -19,6 +19,7 @@ from baselines.solvers.receding_horizon.horizon import (
 from baselines.solvers.receding_horizon.lagrange import factorise, reduce_gradient
 from baselines.status import Status
 from ikgym.exceptions import InvalidInputError, UnknownNameError
+from tests.baselines.solvers.receding_horizon.data import data_of
 
 
 def constraints(dt, stages, n):
@@ -41,13 +42,13 @@ def gradients(kind, scenario, q, nominal, qdot):
     """By states and velocities, and along the constraints as the plain method has it."""
     states = q + scenario.dt * np.cumsum(qdot, axis=0)
     by_q, by_qdot, plain = np.empty_like(qdot), np.empty_like(qdot), np.empty_like(qdot)
-    first = (scenario.model.chain, scenario.task.kind, scenario.cost.parameters)
+    data = data_of(scenario)
     if kind == "analytic":
-        value = analytic_state_gradient(*first, nominal, states, qdot, by_q, by_qdot)
-        same = analytic_gradient(*first, scenario.dt, q, nominal, qdot, plain)
+        value = analytic_state_gradient(data, nominal, states, qdot, by_q, by_qdot)
+        same = analytic_gradient(data, q, nominal, qdot, plain)
     else:
-        value = difference_state_gradient(*first, scenario.dt, nominal, states, qdot, 1e-3, by_q, by_qdot)
-        same = difference_gradient(*first, scenario.dt, q, nominal, qdot, 1e-3, plain)
+        value = difference_state_gradient(data, nominal, states, qdot, 1e-3, by_q, by_qdot)
+        same = difference_gradient(data, q, nominal, qdot, 1e-3, plain)
     assert value == pytest.approx(same, rel=1e-9)
     return by_q, by_qdot, plain
 
@@ -169,11 +170,11 @@ def test_operations_are_what_is_called(kind, horizon, monkeypatch):
 
         monkeypatch.setattr(horizon_module, name, counted)
     scenario, _, nominal, qdot = problem("varga7-fast", horizon - 1)
-    first, out = (scenario.model.chain, scenario.task.kind, scenario.cost.parameters), np.empty((2, *qdot.shape))
+    data, out = data_of(scenario), np.empty((2, *qdot.shape))
     if kind == "analytic":
-        analytic_state_gradient.py_func(*first, nominal, qdot.copy(), qdot, out[0], out[1])
+        analytic_state_gradient.py_func(data, nominal, qdot.copy(), qdot, out[0], out[1])
     else:
-        difference_state_gradient.py_func(*first, 1e-3, nominal, qdot.copy(), qdot, 1e-3, out[0], out[1])
+        difference_state_gradient.py_func(data, nominal, qdot.copy(), qdot, 1e-3, out[0], out[1])
     forwards, jacobians, factorisations, measurements = policy.count(np.array([0]))
     assert np.all(forwards == calls["forward"])
     assert np.all(jacobians == calls["forward_and_jacobian"])

@@ -380,7 +380,7 @@ def test_newton_steps_do_not_grow_with_the_horizon():
     assert np.array_equal(np.multiply(policy.count(one)[:3], 10), longer.count(one)[:3])
 
 
-CHALLENGED = {"horizon": 40, "iterations": 1, "move_blocks": 12, "starts": 4, "restart_steps": 5}
+RESTARTED = {"horizon": 40, "iterations": 1, "move_blocks": 12, "starts": 4, "restart_steps": 5}
 
 
 def pushed(policy):
@@ -394,8 +394,8 @@ def pushed(policy):
 
 
 @pytest.mark.parametrize("more", [{}, {"stop_at_end": True}, {"iterations": None}])
-def test_rows_of_a_batch_are_single_calls_with_challengers_and_starts(more):
-    policy = baselines.make("rhc", "varga7-fast", **{**CHALLENGED, **more})
+def test_rows_of_a_batch_are_single_calls_with_restart_candidates_and_starts(more):
+    policy = baselines.make("rhc", "varga7-fast", **{**RESTARTED, **more})
     states, batched = [None] * 3, None
     for view, start in pushed(policy):
         action, batched = policy.predict(view, batched, start)
@@ -405,7 +405,7 @@ def test_rows_of_a_batch_are_single_calls_with_challengers_and_starts(more):
             single, states[i] = policy.predict(row, None if start[i] else states[i])
             assert identical(single, action[i])
             assert all(identical(a[0], b[i]) for a, b in zip(states[i], batched, strict=True))
-    assert (policy.report(batched).iterations > 1).all()  # challengers among them
+    assert (policy.report(batched).iterations > 1).all()  # restart candidates among them
 
 
 @pytest.mark.parametrize(("change", "same"), [({}, True), ({"seed": 1}, False)])
@@ -423,7 +423,7 @@ def test_without_random_guesses_the_seed_changes_nothing():
 
 def test_a_new_episode_clears_the_memory():
     scenario = ikgym.scenarios.get("varga7-fast")
-    policy = baselines.make("rhc", scenario, **CHALLENGED)
+    policy = baselines.make("rhc", scenario, **RESTARTED)
     q, nominal = states_near(scenario, policy.preview, 2, 1e-2)
     view, other = (observe(policy.problem, q + shift, nominal) for shift in (0.0, 0.05))
     fresh, first = policy.predict(view)
@@ -443,7 +443,7 @@ def test_the_last_steps_of_an_episode(name):
     assert statuses <= {Status.CONVERGED, Status.ITERATION_LIMIT}
 
 
-@pytest.mark.parametrize("parameters", [{}, {"iterations": 1}, CHALLENGED])
+@pytest.mark.parametrize("parameters", [{}, {"iterations": 1}, RESTARTED])
 def test_disturbed_drives_do_no_harm(parameters):
     disturbance = ikgym.scenarios.scenario.Disturbance(bias=0.5, noise=2.0)
     scenario = ikgym.scenarios.get("varga7-fast").replace(steps=80, disturbance=disturbance)
@@ -461,7 +461,7 @@ def test_disturbed_drives_do_no_harm(parameters):
 def test_nothing_finite_gives_a_nan():
     """From absurdly far away, with targets out of reach, and at the singular home."""
     scenario = ikgym.scenarios.get("varga7-fast")
-    for parameters in ({"horizon": 6}, {"horizon": 6, "iterations": 1}, {**CHALLENGED, "horizon": 30}):
+    for parameters in ({"horizon": 6}, {"horizon": 6, "iterations": 1}, {**RESTARTED, "horizon": 30}):
         policy = baselines.make("rhc", scenario, **parameters)
         nominal = np.tile(scenario.nominal(0)[0], (4, policy.preview, 1))
         nominal[1, :, 3:] = 1e3

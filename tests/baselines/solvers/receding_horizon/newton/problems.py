@@ -7,8 +7,10 @@ import dataclasses
 import numpy as np
 
 import ikgym
-from baselines.solvers.receding_horizon.newton.cost import Rules, blocks_for, linearise, merit, scratch_for
+from baselines.solvers.receding_horizon.newton.cost import linearise, merit
 from baselines.solvers.receding_horizon.newton.grid import Grid, cut, empty_grid, first_knots
+from baselines.solvers.receding_horizon.newton.workspace import PathProblem, newton_workspace
+from baselines.solvers.receding_horizon.problem_data import ProblemData
 from ikgym import TrackingCost
 
 
@@ -23,7 +25,7 @@ def grid_of(at, steps=None, terminal=1.0) -> Grid:
 class Place:
     """A path and everything around it that the kernels are handed."""
 
-    rules: Rules
+    data: ProblemData
     grid: Grid
     start: np.ndarray
     nominal: np.ndarray
@@ -33,29 +35,22 @@ class Place:
     size: int
 
     @property
-    def scratch(self):
-        return scratch_for(self.rules.kind, self.size, len(self.start))
+    def problem(self):
+        return PathProblem(self.data, self.grid, self.start, self.nominal)
+
+    @property
+    def workspace(self):
+        return newton_workspace(self.data.kind, self.size, *self.path.shape)
 
     def merit(self, path=None):
         path = self.path if path is None else path
-        return merit(self.rules, self.grid, self.start, self.nominal, path, self.multipliers, self.scratch)
+        return merit(self.problem, path, self.multipliers, self.workspace)
 
     def linearise(self, path=None, exact=True, advance=False):
         path = self.path if path is None else path
-        blocks = blocks_for(*path.shape)
-        answer = linearise(
-            self.rules,
-            self.grid,
-            self.start,
-            self.nominal,
-            path,
-            self.multipliers,
-            advance,
-            exact,
-            self.scratch,
-            blocks,
-        )
-        return answer, blocks
+        workspace = self.workspace
+        answer = linearise(self.problem, path, self.multipliers, advance, exact, workspace)
+        return answer, workspace.model
 
 
 def place(arm, task, *, seed=0, home=False, delta_x=1e-3, p_x=3.0, limits=True, at=(1, 2, 4, 7), terminal=2.5) -> Place:
@@ -79,5 +74,5 @@ def place(arm, task, *, seed=0, home=False, delta_x=1e-3, p_x=3.0, limits=True, 
         multipliers[:, e:] = rng.normal(size=(knots, 2 * n)) * (rng.random((knots, 2 * n)) < 0.5)
         multipliers[:, e : e + n] *= 100.0
         multipliers[:, e + n :] *= 100.0 / dt
-    rules = Rules(arm.chain, task.kind, TrackingCost(delta_x=delta_x, p_x=p_x).parameters, dt, lower, upper, speed)
-    return Place(rules, grid, start, nominal, path, multipliers, e, task.size)
+    data = ProblemData(arm.chain, task.kind, TrackingCost(delta_x=delta_x, p_x=p_x).parameters, dt, lower, upper, speed)
+    return Place(data, grid, start, nominal, path, multipliers, e, task.size)

@@ -7,8 +7,10 @@ import pytest
 
 import ikgym
 from baselines.solvers.receding_horizon.horizon import horizon_cost
-from baselines.solvers.receding_horizon.newton.cost import _second_order, scratch_for, true_cost
+from baselines.solvers.receding_horizon.newton.cost import true_cost
 from baselines.solvers.receding_horizon.newton.grid import Grid
+from baselines.solvers.receding_horizon.newton.second_order import second_order
+from baselines.solvers.receding_horizon.newton.workspace import PathProblem, knot_workspace
 from ikgym import task_kernels
 from ikgym.kinematics import forward, forward_and_jacobian
 from tests.baselines.solvers.receding_horizon.newton.problems import place
@@ -108,22 +110,22 @@ def test_second_order_where_errors_are_large(arm, task, home):
 def test_second_derivatives_of_the_error_alone(arm, task):
     """Of any weighted sum of its components; a pose has reached its orientation, and is anywhere else."""
     arm, task, rng = ikgym.arms.get(arm), ikgym.tasks.get(task), np.random.default_rng(0)
-    n, scratch = arm.joints, scratch_for(task.kind, task.size, arm.joints)
-    scratch.slope[:] = rng.normal(size=task.error_size)
+    n, workspace = arm.joints, knot_workspace(task.kind, task.size, arm.joints)
+    workspace.gradient[:] = rng.normal(size=task.error_size)
     for q in (np.zeros(n), *rng.uniform(-2.0, 2.0, (2, n))):
         nominal = task.coordinates(*arm.forward(q))
         nominal[-3:] += rng.normal(size=3)
 
         def weighted(here, nominal=nominal):
-            forward(arm.chain, here, scratch.rotation, scratch.position)
-            task_kernels.coordinates(task.kind, scratch.rotation, scratch.position, scratch.pose)
-            task_kernels.error(task.kind, nominal, scratch.pose, scratch.error)
-            return scratch.slope @ scratch.error
+            forward(arm.chain, here, workspace.rotation, workspace.position)
+            task_kernels.coordinates(task.kind, workspace.rotation, workspace.position, workspace.pose)
+            task_kernels.error(task.kind, nominal, workspace.pose, workspace.error)
+            return workspace.gradient @ workspace.error
 
         central = differences(lambda a, q=q: differences(weighted, a, 1e-3), q, 1e-3)
         out = np.empty((n, n))
-        forward_and_jacobian(arm.chain, q, scratch.rotation, scratch.position, scratch.geometric)
-        _second_order(task.kind, scratch, out)
+        forward_and_jacobian(arm.chain, q, workspace.rotation, workspace.position, workspace.geometric)
+        second_order(task.kind, workspace, out)
         np.testing.assert_allclose(symmetric(out), central, atol=2e-5 * max(abs(central).max(), 1.0))
 
 
@@ -155,10 +157,9 @@ def test_a_knot_whose_tracking_does_not_count():
 @pytest.mark.parametrize("arm", ikgym.arms.names())
 def test_true_cost_is_that_of_the_horizon(arm, task):
     at = place(arm, task, at=range(1, 7), terminal=1.0, limits=False)
-    qdot = np.diff(np.vstack([at.start, at.path]), axis=0) / at.rules.dt
-    rules = at.rules
-    kernels = horizon_cost(rules.chain, rules.kind, rules.cost, rules.dt, at.start, at.nominal, qdot)
-    mine = true_cost(rules, at.grid, at.start, at.nominal, at.path, at.scratch)
+    qdot = np.diff(np.vstack([at.start, at.path]), axis=0) / at.data.dt
+    kernels = horizon_cost(at.data, at.start, at.nominal, qdot)
+    mine = true_cost(at.problem, at.path, at.workspace)
     assert mine == pytest.approx(kernels, rel=1e-10)  # q is the sum of Δt q̇ but for rounding
     assert at.linearise()[0][1] == pytest.approx(mine, rel=1e-13)
 
@@ -166,17 +167,17 @@ def test_true_cost_is_that_of_the_horizon(arm, task):
 @pytest.mark.parametrize("task", TASKS)
 def test_true_cost_is_the_weighted_sum_over_knots_and_blocks(task):
     at = place("varga7", task, limits=False)
-    cost, grid, start = at.rules.cost, at.grid, at.start
+    cost, grid, start = at.data.cost, at.grid, at.start
     total = 0.0
     for k, here in enumerate(at.path):
         alone = Grid(np.ones(1, np.int64), np.ones(1), np.ones(1), np.ones(1))
-        velocity = (here - start) / (grid.length[k] * at.rules.dt)
+        velocity = (here - start) / (grid.length[k] * at.data.dt)
         # A single knot one step from the one before costs Φ^X + Φ^U; standing still, Φ^X alone.
         nominal = at.nominal[grid.at[k] - 1 : grid.at[k]]
-        tracking = true_cost(at.rules, alone, here, nominal, here[None], at.scratch)
+        tracking = true_cost(PathProblem(at.data, alone, here, nominal), here[None], at.workspace)
         total += grid.tracking[k] * tracking + grid.velocity[k] * float(np.sum((velocity / cost.delta_qdot) ** 4))
         start = here
-    assert true_cost(at.rules, grid, at.start, at.nominal, at.path, at.scratch) == pytest.approx(total, rel=1e-12)
+    assert true_cost(at.problem, at.path, at.workspace) == pytest.approx(total, rel=1e-12)
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -201,9 +202,9 @@ def test_limits_enter_the_gap():
     e = at.error_size
     assert at.linearise()[0][2] > 0.0
     at.multipliers[:, e:] = 0.0
-    for limit in (at.rules.velocity_limit, at.rules.upper):
+    for limit in (at.data.velocity_limit, at.data.upper):
         limit[:] = np.inf
-    at.rules.lower[:] = -np.inf
+    at.data.lower[:] = -np.inf
     for _ in range(3):
         at.linearise(advance=True)
     assert at.linearise()[0][2] == 0.0

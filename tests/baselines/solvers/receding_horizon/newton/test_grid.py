@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from baselines.solvers.receding_horizon.newton.grid import offsets, slide, slide_multipliers
+from baselines.solvers.receding_horizon.newton.grid import offsets, shift_multipliers, shift_path
 from tests.baselines.solvers.receding_horizon.newton.problems import grid_of
 
 horizons = st.integers(1, 3000).flatmap(lambda steps: st.tuples(st.just(steps), st.integers(1, steps)))
@@ -88,7 +88,7 @@ def test_blocks_of_one_step_weigh_one():
 
 def slid(old, path, new, passed=None):
     out = np.full((len(new.at), path.shape[1]), np.nan)
-    slide(old, path, np.zeros(path.shape[1]) if passed is None else passed, new, out)
+    shift_path(old, path, np.zeros(path.shape[1]) if passed is None else passed, new, out)
     return out
 
 
@@ -132,8 +132,8 @@ def test_a_single_knot_goes_on_with_the_velocity_that_passed(length):
 def test_multipliers_go_to_the_knot_that_takes_over():
     grid = grid_of([1, 2, 4, 8])
     multipliers = np.arange(8.0).reshape(4, 2)
-    slide_multipliers(grid, multipliers, grid)  # now 2, 3, 5 and 9 steps ahead of the old start
+    shift_multipliers(grid, multipliers, grid)  # now 2, 3, 5 and 9 steps ahead of the old start
     np.testing.assert_array_equal(multipliers[:, 0], [2.0, 4.0, 6.0, 6.0])
     uniform, shifted = grid_of(range(1, 5)), np.arange(4.0)[:, None]
-    slide_multipliers(uniform, shifted, grid_of(range(1, 5), 3))
+    shift_multipliers(uniform, shifted, grid_of(range(1, 5), 3))
     np.testing.assert_array_equal(shifted[:3, 0], [1.0, 2.0, 3.0])

@@ -9,8 +9,11 @@ import pytest
 
 import ikgym
 from baselines.solvers.linear_algebra import cholesky, inverse_of_factor
-from baselines.solvers.receding_horizon.newton.cost import Rules, blocks_for, scratch_for, true_cost
-from baselines.solvers.receding_horizon.newton.minimise import CONVERGED, RAN_OUT, minimise, newton_step, room_for
+from baselines.solvers.receding_horizon.newton.cost import true_cost
+from baselines.solvers.receding_horizon.newton.minimise import CONVERGED, RAN_OUT, NewtonSettings, minimise
+from baselines.solvers.receding_horizon.newton.newton_step import newton_step
+from baselines.solvers.receding_horizon.newton.workspace import PathProblem, newton_workspace, quadratic_model
+from baselines.solvers.receding_horizon.problem_data import ProblemData
 from ikgym import TrackingCost
 from ikgym.arms import Arm
 from tests.baselines.solvers.receding_horizon.newton.problems import grid_of, place
@@ -18,7 +21,7 @@ from tests.baselines.solvers.receding_horizon.newton.test_cost import dense
 
 
 def random_blocks(knots, n, rng, convex=True):
-    blocks = blocks_for(knots, n)
+    blocks = quadratic_model(knots, n)
     blocks.gradient[:] = rng.normal(size=(knots, n))
     half = rng.normal(size=(2, knots, n, n))
     blocks.diagonal[:] = half[0] @ half[0].swapaxes(1, 2)
@@ -35,7 +38,7 @@ def random_blocks(knots, n, rng, convex=True):
 def step_of(blocks, exact, damping):
     knots, n = blocks.gradient.shape
     inverse, factor, step = np.empty((knots, n, n)), np.empty((n, n)), np.empty((knots, n))
-    return newton_step(blocks, knots, exact, damping, inverse, factor, step), step
+    return newton_step(blocks, exact, damping, inverse, factor, step), step
 
 
 @pytest.mark.parametrize("damping", [0.0, 0.7])
@@ -90,7 +93,7 @@ def slider(goals, weight=1.0, upper=np.inf, speed=np.inf, most=50, tolerance=1e-
     arm = Arm("slider", np.zeros((1, 3)), [[1.0, 0.0, 0.0]], (True,))
     task = ikgym.tasks.get("position")
     cost = TrackingCost(delta_x=S, p_x=3.0, delta_qdot=1.0, p_out=2.0, p_in=2.0)
-    rules = Rules(
+    data = ProblemData(
         arm.chain, task.kind, cost.parameters, S, np.array([-np.inf]), np.array([upper * S]), np.array([speed])
     )
     goals = np.atleast_1d(goals)
@@ -98,10 +101,10 @@ def slider(goals, weight=1.0, upper=np.inf, speed=np.inf, most=50, tolerance=1e-
     nominal = np.zeros((len(goals), 3))
     nominal[:, 0] = goals * S
     path, multipliers = np.zeros((len(goals), 1)), np.zeros((len(goals), 5))
-    room = room_for(task.kind, task.size, len(goals), 1)
-    given = (rules, grid, np.zeros(1), nominal, path)
-    outcome, made, value, slope = minimise(*given, multipliers, True, most, tolerance, room)
-    true = true_cost(*given, scratch_for(task.kind, task.size, 1))
+    workspace = newton_workspace(task.kind, task.size, len(goals), 1)
+    problem, settings = PathProblem(data, grid, np.zeros(1), nominal), NewtonSettings(True, most, tolerance)
+    outcome, made, value, slope = minimise(problem, path, multipliers, settings, workspace)
+    true = true_cost(problem, path, workspace)
     return path[:, 0] / S, multipliers, outcome, made, value, slope, true
 
 
@@ -155,7 +158,7 @@ def test_iterations_run_out_and_are_counted():
 
 @pytest.mark.parametrize("goal", [3.0, 10.0, 30.0])
 def test_multipliers_are_not_renewed_twice_at_one_path(goal):
-    """Each time they would go one ρ further, past what holds the limit: they would swing, and never settle."""
+    """Each time they would go one ρ further, past what holds the limit: they would oscillate without end."""
     y, _, outcome, *_ = slider(goal, speed=5.0, most=100, tolerance=1e-7)
     assert outcome == CONVERGED
     assert y[0] <= 5.0 * (1.0 + 1e-6)

@@ -1,0 +1,71 @@
+"""Kernel: the Newton step of a block-tridiagonal quadratic model, in time linear in its knots."""
+
+from __future__ import annotations
+
+from baselines.solvers.linear_algebra import cholesky, inverse_of_factor
+from ikgym.jit import inlined, kernel
+
+
+@kernel
+def newton_step(model, exact, damping, inverse, factor, step):
+    """Solves (H + damping I) step = -gradient by blocks, from the first knot to the last and back.
+
+    Args:
+        model: The :class:`workspace.QuadraticModel`.
+        exact: Whether to take the Hessian itself instead of its Gauss–Newton part.
+        damping: Added to the diagonal.
+        inverse: Receives the inverses of the pivots. Shape (at least K, n, n).
+        factor: Scratch. Shape (n, n).
+        step: Receives the step. Shape (K, n).
+
+    Returns:
+        False where the matrix is not positive definite; the step is of no use then.
+    """
+    knots, n = step.shape
+    gradient, coupling = model.gradient, model.coupling
+    for k in range(knots):
+        diagonal, second = model.diagonal[k], model.second[k]
+        for a in range(n):
+            for b in range(a + 1):
+                factor[a, b] = diagonal[a, b] + second[a, b] if exact else diagonal[a, b]
+            factor[a, a] += damping
+            step[k, a] = -gradient[k, a]
+        if k > 0:
+            _eliminate(coupling[k], inverse[k - 1], step[k - 1], factor, step[k])
+        if not cholesky(factor):
+            return False
+        inverse_of_factor(factor, inverse[k])
+    for k in range(knots - 1, -1, -1):
+        if k + 1 < knots:
+            for a in range(n):
+                step[k, a] += coupling[k + 1, a] * step[k + 1, a]
+        # factor's first row holds the result while the right-hand side is still needed
+        for a in range(n):
+            total = 0.0
+            for b in range(n):
+                total += inverse[k, a, b] * step[k, b]
+            factor[0, a] = total
+        for a in range(n):
+            step[k, a] = factor[0, a]
+    return True
+
+
+@inlined
+def _eliminate(coupling, inverse, rhs_before, pivot, rhs):
+    """Eliminates the knot before: its Schur complement from the pivot, its share from the right-hand side.
+
+    Args:
+        coupling: The negative of the block's diagonal. Shape (n,).
+        inverse: Inverse of the pivot before. Shape (n, n).
+        rhs_before: The right-hand side before. Shape (n,).
+        pivot: Lower triangle, changed in place. Shape (n, n).
+        rhs: Changed in place. Shape (n,).
+    """
+    n = rhs.shape[0]
+    for a in range(n):
+        carried = 0.0
+        for b in range(n):
+            carried += inverse[a, b] * rhs_before[b]
+        rhs[a] += coupling[a] * carried
+        for b in range(a + 1):
+            pivot[a, b] -= coupling[a] * inverse[a, b] * coupling[b]

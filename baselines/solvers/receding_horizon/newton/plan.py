@@ -1,0 +1,204 @@
+"""Kernels: the initial plan of an episode, what is left of a plan one step later, and restart candidates."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from baselines.solvers.receding_horizon.newton.cost import true_cost
+from baselines.solvers.receding_horizon.newton.grid import shift_multipliers, shift_path
+from baselines.solvers.receding_horizon.newton.guess import DAMPING, STREAM, draw, initial_guess, uniform
+from baselines.solvers.receding_horizon.newton.minimise import NewtonSettings, minimise
+from baselines.solvers.receding_horizon.newton.workspace import NewtonWorkspace, newton_workspace
+from ikgym.jit import kernel
+
+Floats = npt.NDArray[np.float64]
+Integers = npt.NDArray[np.int64]
+
+# Newton steps of each of several initial guesses, and how exactly they are minimised before they are compared.
+STEPS_OF_A_START, TOLERANCE_OF_A_START = 30, 1e-4
+# A restart candidate that is still so many times more costly than the plan after so many Newton steps is given up.
+HOPELESS, TRIED = 10.0, 5
+# A restart candidate replaces the plan only for a gain that is worth the jump.
+GAIN = 1e-3
+
+
+class PlanSettings(NamedTuple):
+    """What the parameters of :class:`baselines.solvers.receding_horizon.rhc.RecedingHorizon` say to the kernels.
+
+    Attributes:
+        at: Steps from now to the knots. Shape (K,).
+        terminal_weight: Factor of the tracking cost of the last knot.
+        stop_at_end: Whether the horizon ends with the episode.
+        iterations: Newton steps in one period; -1 to the optimum.
+        tolerance: Relative precision of the optimum.
+        starts: Initial guesses to choose from.
+        restart_steps: Newton steps of a restart candidate, 0 for none.
+        restart_rate: Of them in one period.
+        seed: Of the random guesses.
+    """
+
+    at: Integers
+    terminal_weight: float
+    stop_at_end: bool
+    iterations: int
+    tolerance: float
+    starts: int
+    restart_steps: int
+    restart_rate: int
+    seed: int
+
+
+class Plan(NamedTuple):
+    """A joint path and the multipliers of its kinks and limits.
+
+    Attributes:
+        path: Joint coordinates at the knots in [rad] or [m]. Shape (K, n).
+        multipliers: λ. Shape (K, e + 2 n).
+    """
+
+    path: Floats
+    multipliers: Floats
+
+
+class PlanWorkspace(NamedTuple):
+    """Arrays that the rows of a call use one after the other.
+
+    Attributes:
+        newton: Arrays of Newton's method.
+        kept: The best plan so far.
+        drift: Drift of a random guess, in [rad/s] or [m/s]. Shape (n,).
+        passed: q̇ Δt of the step that has passed. Shape (n,).
+    """
+
+    newton: NewtonWorkspace
+    kept: Plan
+    drift: Floats
+    passed: Floats
+
+
+@kernel
+def plan_workspace(kind, m, knots, n, width):
+    """The workspace for plans of up to ``knots`` knots, ``n`` joints and ``width`` multipliers a knot."""
+    kept = Plan(np.empty((knots, n)), np.empty((knots, width)))
+    return PlanWorkspace(newton_workspace(kind, m, knots, n), kept, np.empty(n), np.empty(n))
+
+
+@kernel
+def first_part(plan, knots):
+    """The first so many knots of a plan, as views."""
+    return Plan(plan.path[:knots], plan.multipliers[:knots])
+
+
+@kernel
+def shift_plan(old_grid, plan, grid, workspace):
+    """Turns a plan into what is left of it one step later, in place.
+
+    Args:
+        old_grid: The grid of the plan.
+        plan: A :class:`Plan` of at least as many knots as either grid.
+        grid: The grid asked for, counted from one step later.
+        workspace: A :class:`PlanWorkspace` whose ``passed`` is set.
+    """
+    shifted = workspace.kept.path
+    shift_path(old_grid, plan.path, workspace.passed, grid, shifted)
+    shift_multipliers(old_grid, plan.multipliers, grid)
+    for k in range(grid.at.shape[0]):
+        for j in range(plan.path.shape[1]):
+            plan.path[k, j] = shifted[k, j]
+
+
+@kernel
+def initial_plan(problem, settings, plan, workspace):
+    """The initial plan of an episode: the cheapest of several initial guesses, each a few Newton steps on.
+
+    Args:
+        problem: A :class:`workspace.PathProblem` of K knots.
+        settings: :class:`PlanSettings`.
+        plan: Receives the :class:`Plan`.
+        workspace: A :class:`PlanWorkspace`.
+
+    Returns:
+        Newton steps made.
+    """
+    made, best = 0, np.inf
+    knots, newton = plan.path.shape[0], workspace.newton
+    kept = first_part(workspace.kept, knots)
+    for trial in range(settings.starts):
+        damping = DAMPING
+        workspace.drift[:] = 0.0
+        if trial > 0:
+            damping = draw(settings.seed, trial, workspace.drift)
+        initial_guess(problem, 0, workspace.drift, damping, plan.path, newton.knot)
+        plan.multipliers[:] = 0.0
+        if settings.starts == 1:
+            return 0
+        coarse = NewtonSettings(False, STEPS_OF_A_START, TOLERANCE_OF_A_START)
+        minimum = minimise(problem, plan.path, plan.multipliers, coarse, newton)
+        made += minimum.steps
+        value = max(minimum.cost, true_cost(problem, plan.path, newton))
+        if value < best:
+            best = value
+            _copy(plan, kept)
+    if best < np.inf:
+        _copy(kept, plan)
+    return made
+
+
+@kernel
+def branch_off(problem, settings, plan, number, candidate, workspace):
+    """Begins a restart candidate: the plan up to a random knot, and from there on a random guess.
+
+    Args:
+        problem: A :class:`workspace.PathProblem` of K knots.
+        settings: :class:`PlanSettings`.
+        plan: The :class:`Plan`.
+        number: Which random guess of the seed.
+        candidate: Receives the candidate, a :class:`Plan` of at least K knots.
+        workspace: A :class:`PlanWorkspace`.
+    """
+    knots = plan.path.shape[0]
+    branch = int(uniform(settings.seed, STREAM * number) * knots)
+    candidate.path[:branch] = plan.path[:branch]
+    candidate.multipliers[:branch] = plan.multipliers[:branch]
+    candidate.multipliers[branch:] = 0.0
+    damping = draw(settings.seed, number, workspace.drift)
+    initial_guess(problem, branch, workspace.drift, damping, candidate.path[:knots], workspace.newton.knot)
+
+
+@kernel
+def improve_candidate(problem, settings, plan, cost, candidate, age, workspace):
+    """Improves a restart candidate by some Newton steps, and lets it replace the plan where it is cheaper at its end.
+
+    Args:
+        problem: A :class:`workspace.PathProblem` of K knots.
+        settings: :class:`PlanSettings`.
+        plan: The :class:`Plan`.
+        cost: What the plan costs.
+        candidate: The candidate, a :class:`Plan` of K knots.
+        age: Newton steps that the candidate has had; 0 after its last. Shape (1,).
+        workspace: A :class:`PlanWorkspace`.
+
+    Returns:
+        Newton steps made.
+    """
+    newton = workspace.newton
+    few = NewtonSettings(False, settings.restart_rate, settings.tolerance)
+    minimum = minimise(problem, candidate.path, candidate.multipliers, few, newton)
+    age[0] += settings.restart_rate
+    if age[0] >= settings.restart_steps:
+        age[0] = 0
+        true = true_cost(problem, candidate.path, newton)
+        if max(minimum.cost, true) < (1.0 - GAIN) * cost:
+            _copy(candidate, plan)
+    elif age[0] >= TRIED and not minimum.cost < HOPELESS * cost:
+        age[0] = 0
+    return minimum.steps
+
+
+@kernel
+def _copy(plan, out):
+    out.path[:] = plan.path
+    out.multipliers[:] = plan.multipliers

@@ -1,0 +1,147 @@
+"""The problem of a joint path as its kernels see it, and the arrays that they work in."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from baselines.solvers.receding_horizon.newton.grid import Grid
+from baselines.solvers.receding_horizon.problem_data import ProblemData
+from ikgym import task_kernels
+from ikgym.jit import kernel
+
+Floats = npt.NDArray[np.float64]
+
+
+class PathProblem(NamedTuple):
+    """From where, along what and through which knots a joint path is sought.
+
+    Attributes:
+        data: Arm, task, cost and limits.
+        grid: The time grid, of K knots.
+        start: Joint coordinates now, in [rad] or [m]. Shape (n,).
+        nominal: Nominal task coordinates 1, 2, … steps ahead. Shape (at least grid.at[-1], m).
+    """
+
+    data: ProblemData
+    grid: Grid
+    start: Floats
+    nominal: Floats
+
+
+class KnotWorkspace(NamedTuple):
+    """Arrays that the knots of a path use one after the other.
+
+    Attributes:
+        rotation: Orientation of the tool. Shape (3, 3).
+        position: The tool point in [m]. Shape (3,).
+        geometric: The geometric Jacobian. Shape (6, n).
+        pose: Task coordinates. Shape (m,).
+        error: Tracking error. Shape (e,).
+        jacobian: Jacobian of the task coordinates. Shape (m or 6, n).
+        error_jacobian: Jacobian of the error. Shape (e, n).
+        gradient: Derivatives of the cost by the components of the error. Shape (e,).
+        moment: The gradient by the orientation, see :func:`second_order.set_moment`. Shape (3, 3).
+        penalty_factor: Factor of the penalties of the limits. Shape (1,).
+        gram: Of damped least squares. Shape (e, e).
+        solution: Of damped least squares. Shape (e,).
+    """
+
+    rotation: Floats
+    position: Floats
+    geometric: Floats
+    pose: Floats
+    error: Floats
+    jacobian: Floats
+    error_jacobian: Floats
+    gradient: Floats
+    moment: Floats
+    penalty_factor: Floats
+    gram: Floats
+    solution: Floats
+
+
+class QuadraticModel(NamedTuple):
+    """Gradient and Hessian of the merit function at a path; the Hessian is block-tridiagonal.
+
+    Attributes:
+        gradient: Shape (K, n).
+        diagonal: Gauss–Newton part of the diagonal blocks, lower triangles. Shape (K, n, n).
+        second: What is missing to the Hessian itself: Σ gradient_i ∂²error_i, lower triangles. Shape (K, n, n).
+        coupling: The block between a knot and the one before is diagonal: its negative. Shape (K, n).
+    """
+
+    gradient: Floats
+    diagonal: Floats
+    second: Floats
+    coupling: Floats
+
+
+class NewtonWorkspace(NamedTuple):
+    """Arrays of Newton's method, for paths of up to K knots.
+
+    Attributes:
+        knot: Arrays of one knot.
+        errors: Tracking errors of all knots. Shape (K, e).
+        model: The quadratic model.
+        inverse: Inverses of the pivots. Shape (K, n, n).
+        factor: A pivot and its factor. Shape (n, n).
+        step: The Newton step. Shape (K, n).
+        trial: The path at a trial step length. Shape (K, n).
+    """
+
+    knot: KnotWorkspace
+    errors: Floats
+    model: QuadraticModel
+    inverse: Floats
+    factor: Floats
+    step: Floats
+    trial: Floats
+
+
+@kernel
+def error_size(kind, m):
+    """e, the components of the tracking error, for a kind of task with ``m`` coordinates."""
+    return 6 if kind == task_kernels.POSE else m
+
+
+@kernel
+def knot_workspace(kind, m, n):
+    """The workspace of one knot, for task coordinates of ``m`` numbers and ``n`` joints."""
+    e = error_size(kind, m)
+    return KnotWorkspace(
+        np.empty((3, 3)),
+        np.empty(3),
+        np.empty((6, n)),
+        np.empty(m),
+        np.empty(e),
+        np.empty((e, n)),
+        np.empty((e, n)),
+        np.empty(e),
+        np.empty((3, 3)),
+        np.ones(1),
+        np.empty((e, e)),
+        np.empty(e),
+    )
+
+
+@kernel
+def quadratic_model(knots, n):
+    """Arrays for the quadratic model at a path of ``knots`` knots and ``n`` joints."""
+    return QuadraticModel(np.empty((knots, n)), np.empty((knots, n, n)), np.empty((knots, n, n)), np.empty((knots, n)))
+
+
+@kernel
+def newton_workspace(kind, m, knots, n):
+    """The workspace for paths of up to ``knots`` knots, task coordinates of ``m`` numbers and ``n`` joints."""
+    return NewtonWorkspace(
+        knot_workspace(kind, m, n),
+        np.empty((knots, error_size(kind, m))),
+        quadratic_model(knots, n),
+        np.empty((knots, n, n)),
+        np.empty((n, n)),
+        np.empty((knots, n)),
+        np.empty((knots, n)),
+    )
