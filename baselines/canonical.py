@@ -1,13 +1,16 @@
-"""Parameters and results as JSON, and equal texts for equal values."""
+"""Parameters and results as JSON: equal texts for equal values, numbers of few digits, an item of a list a line."""
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
+
+#: Significant digits of costs that are kept.
+DIGITS = 7
 
 
 def canonical(value: object) -> str:
@@ -26,3 +29,18 @@ def jsonable(value: Any) -> Any:
     if isinstance(value, float) and not math.isfinite(value):
         return str(value)
     return value if value is None or isinstance(value, (bool, int, float, str)) else repr(value)
+
+
+def rounded(value: float, digits: int = 4) -> float:
+    """A number with so many significant digits."""
+    return float(f"{value:.{digits}g}")
+
+
+def one_line(values: Mapping[str, Any]) -> str:
+    """An object on a line."""
+    return json.dumps(values, ensure_ascii=False, allow_nan=False)
+
+
+def with_list(values: Mapping[str, Any], name: str, items: Iterable[str]) -> str:
+    """The JSON of an object with one more member, a list with each item on lines of its own."""
+    return f'{one_line(values)[:-1]}, "{name}": [\n' + ",\n".join(items) + "\n]}"

@@ -35,7 +35,6 @@ EXTRAS = {
     "stable_baselines3": "train",
     "tensorboard": "train",
     "rich": "train",
-    "scipy": "train",
     "pinocchio": "urdf",
     "moviepy": "video",
 }

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from baselines.policy import Memory, Report, SolverPolicy
 from ikgym.exceptions import InvalidInputError
-from ikgym.scenarios.scenario import furthest
+from ikgym.preview import furthest
 from ikgym.validation import FloatArray, float_array, whole_number
 
 #: Task coordinates, or rotation and position.

@@ -12,8 +12,7 @@ from ikgym.compilation import announced
 from ikgym.exceptions import InvalidInputError
 from ikgym.parallel import in_chunks
 from ikgym.preview import FARTHEST as FARTHEST
-from ikgym.preview import Preview
-from ikgym.preview import offsets as offsets
+from ikgym.preview import Preview, offsets
 from ikgym.scenarios import Scenario
 from ikgym.simulation import Constants, Outcome, State, outcome
 from ikgym.trajectories import Trajectory

@@ -84,7 +84,6 @@ ARM = """<robot name="arm"><link name="base_link"/><link name="upper"/><link nam
 <limit lower="-3" upper="3" velocity="3" effort="1"/></joint></robot>"""
 
 
-@pytest.mark.skipif(not hasattr(ikgym.scenarios, "load"), reason="scenario files come with another change")
 def test_what_is_ones_own_is_evaluated_by_one_command_each(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", [*sys.path])

@@ -13,8 +13,8 @@ from baselines.policy import Problem, SolverPolicy
 from baselines.spec import parse_policy
 from baselines.wrapper import policies_in
 from ikgym.exceptions import InvalidInputError
+from ikgym.preview import furthest
 from ikgym.scenarios import Preview
-from ikgym.scenarios.scenario import furthest
 from ikgym.validation import FloatArray
 
 

@@ -19,8 +19,8 @@ from baselines.policy import Batch, Memory, Operations, Problem, Solution, statu
 from baselines.solvers.wrappers import orientation
 from baselines.wrapper import Wrapper
 from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.preview import offsets as checked_offsets
 from ikgym.scenarios import Preview
-from ikgym.simulator import offsets as checked_offsets
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

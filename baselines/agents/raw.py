@@ -11,7 +11,7 @@ import numpy.typing as npt
 from baselines.agents.features import Features
 from baselines.policy import Batch, Problem
 from ikgym.exceptions import InvalidInputError
-from ikgym.simulator import offsets as checked_offsets
+from ikgym.preview import offsets as checked_offsets
 from ikgym.validation import FloatArray, Frozen
 
 #: The parts of the observation, in the order in which `Dict` spaces keep them, and so both Stable-Baselines3's

@@ -91,10 +91,10 @@ def _arm(name: str) -> str:
     arm = arms.get(name)
     rows: list[tuple[str, ...]] = [("joint", "kind", "lower", "upper", "velocity limit")]
     numbers = zip(arm.prismatic, arm.lower, arm.upper, arm.velocity_limit, strict=True)  # type: ignore[arg-type]
-    for joint, (slides, *limits) in enumerate(numbers, 1):
-        unit = "m" if slides else "rad"
+    for joint, (prismatic, *limits) in enumerate(numbers, 1):
+        unit = "m" if prismatic else "rad"
         cells = [f"{value:.4g} {ending}" for value, ending in zip(limits, (unit, unit, f"{unit}/s"), strict=True)]
-        rows.append((str(joint), "prismatic" if slides else "revolute", *cells))
+        rows.append((str(joint), "prismatic" if prismatic else "revolute", *cells))
     home = ", ".join(f"{x:.4g}" for x in arm.forward(np.zeros(arm.joints))[1] + 0.0)
     return f"{name}: {arm.joints} joints, tool at home ({home}) m\n\n{aligned(rows, 80)}"
 

@@ -1,13 +1,12 @@
-"""The numbers that an episode is judged by, and how those of several episodes are put together."""
+"""The numbers that an episode is judged by."""
 
 from __future__ import annotations
 
 import collections
 import dataclasses
 import math
-import statistics
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, NamedTuple, Self
+from collections.abc import Mapping
+from typing import Any, Self
 
 import numpy as np
 
@@ -176,160 +175,6 @@ def measure(
         operations={name: float(count.mean()) for name, count in operations.items() if len(count)},
         time_first_us=float(episode.time_ns[0]) / 1e3 if timed else None,
         test_set=test_set,
-    )
-
-
-@dataclasses.dataclass(frozen=True)
-class Spread:
-    """A number over several episodes.
-
-    Args:
-        mean: Its geometric mean.
-        median: Its median.
-        p90: Its 90th percentile.
-        worst: The largest.
-        worst_seed: The reset seed of the episode with the largest.
-    """
-
-    mean: float
-    median: float
-    p90: float
-    worst: float
-    worst_seed: int
-
-    @classmethod
-    def of(cls, values: Mapping[int, float]) -> Self:
-        """The spread of numbers by their reset seeds."""
-        numbers, seed = list(values.values()), max(values, key=lambda seed: values[seed])
-        p90 = float(np.percentile(numbers, 90))
-        return cls(geometric_mean(numbers), statistics.median(numbers), p90, values[seed], seed)
-
-
-@dataclasses.dataclass(frozen=True)
-class Summary:
-    """The episodes of one policy in one scenario, put together.
-
-    Args:
-        scenario: Its name.
-        policy: Its name.
-        parameters: The policy's parameters.
-        steps: Steps of an episode.
-        episodes: How many there are.
-        total_cost: Over the episodes.
-        tracking_cost: Geometric mean.
-        velocity_cost: Geometric mean.
-        cost_ratio: Over the episodes; None where one is not known.
-        position_error_max: The largest, in [m].
-        orientation_error_max: The largest, in [rad]; None without an orientation.
-        qdot_peak: The largest, in [rad/s] or [m/s].
-        time_p50_us: Median of the medians, in [µs]; None, like all times, where no episode was timed.
-        time_p99_us: The largest, in [µs].
-        deadline_misses: Their sum.
-        status: The worst.
-        operations: Means over the episodes; empty where they are not known.
-        time_first_us: The largest, in [µs].
-    """
-
-    scenario: str
-    policy: str
-    parameters: dict[str, Any]
-    steps: int
-    episodes: int
-    total_cost: Spread
-    tracking_cost: float
-    velocity_cost: float
-    cost_ratio: Spread | None
-    position_error_max: float
-    orientation_error_max: float | None
-    qdot_peak: float
-    time_p50_us: float | None
-    time_p99_us: float | None
-    deadline_misses: int | None
-    status: str
-    operations: dict[str, float]
-    time_first_us: float | None
-
-
-class Times(NamedTuple):
-    """Times of single calls over those of several episodes that were timed; None where none was.
-
-    Attributes:
-        timed: How many episodes were timed.
-        p50_us: Median of the medians, in [µs].
-        p99_us: The largest, in [µs].
-        first_us: The longest first call, in [µs].
-    """
-
-    timed: int
-    p50_us: float | None
-    p99_us: float | None
-    first_us: float | None
-
-
-def times(rows: Iterable[Row]) -> Times:
-    """The times of some rows, put together."""
-    timed = [row for row in rows if row.time_p50_us is not None]
-    medians = [row.time_p50_us for row in timed if row.time_p50_us is not None]
-    return Times(
-        len(timed),
-        statistics.median(medians) if medians else None,
-        max((row.time_p99_us for row in timed if row.time_p99_us is not None), default=None),
-        max((row.time_first_us for row in timed if row.time_first_us is not None), default=None),
-    )
-
-
-def summarise(rows: Iterable[Row]) -> list[Summary]:
-    """One summary for each policy with its parameters in each scenario, in the order of their first rows.
-
-    Raises:
-        InvalidInputError: Rows cannot be compared: their scenarios share a name and no more, or they belong to
-            different sets.
-    """
-    groups: dict[tuple[str, str, str, int], list[Row]] = {}
-    contents: dict[str, tuple[str, str | None]] = {}
-    for row in rows:
-        content = row.fingerprint, row.test_set
-        if contents.setdefault(row.scenario, content) != content:
-            raise InvalidInputError(
-                f"The results of {row.scenario!r} cannot be put together: fingerprint and test set are "
-                f"{contents[row.scenario]} and {content}."
-            )
-        groups.setdefault((row.scenario, row.policy, canonical(row.parameters), row.steps), []).append(row)
-    return [_summary(group) for group in groups.values()]
-
-
-def geometric_mean(values: Sequence[float]) -> float:
-    """Exp of the mean logarithm; 0 where a value is 0."""
-    if min(values) <= 0.0:
-        return 0.0
-    return values[0] if len(values) == 1 else math.exp(math.fsum(map(math.log, values)) / len(values))
-
-
-def _summary(rows: Sequence[Row]) -> Summary:
-    first = rows[0]
-    cost_ratios = {row.seed: row.cost_ratio for row in rows if row.cost_ratio is not None}
-    angles = [row.orientation_error_max for row in rows if row.orientation_error_max is not None]
-    clocked = times(rows)
-    misses = [row.deadline_misses for row in rows if row.deadline_misses is not None]
-    return Summary(
-        scenario=first.scenario,
-        policy=first.policy,
-        parameters=first.parameters,
-        steps=first.steps,
-        episodes=len(rows),
-        total_cost=Spread.of({row.seed: row.total_cost for row in rows}),
-        tracking_cost=geometric_mean([row.tracking_cost for row in rows]),
-        velocity_cost=geometric_mean([row.velocity_cost for row in rows]),
-        cost_ratio=Spread.of(cost_ratios) if len(cost_ratios) == len(rows) else None,
-        position_error_max=max(row.position_error_max for row in rows),
-        orientation_error_max=max(angles) if angles else None,
-        qdot_peak=max(row.qdot_peak for row in rows),
-        time_p50_us=clocked.p50_us,
-        time_p99_us=clocked.p99_us,
-        deadline_misses=sum(misses) if misses else None,
-        status=max((row.status for row in rows), key=lambda status: Status[status.upper()]),
-        operations={name: statistics.fmean(row.operations[name] for row in rows) for name in first.operations},
-        time_first_us=clocked.first_us,
     )
 
 

@@ -17,8 +17,8 @@ from baselines.files import ResultsError
 from baselines.fingerprints import fingerprint
 from ikgym import scenarios as scenario_registry
 from ikgym.exceptions import InvalidInputError
+from ikgym.preview import offsets
 from ikgym.scenarios import Preview, Scenario
-from ikgym.simulator import offsets
 from ikgym.validation import whole_number
 
 

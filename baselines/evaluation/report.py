@@ -13,8 +13,9 @@ from typing import Any
 from urllib.parse import quote
 
 from baselines import registry
-from baselines.evaluation.metrics import Row, Spread, Summary, summarise
+from baselines.evaluation.metrics import Row
 from baselines.evaluation.plan import Skipped
+from baselines.evaluation.summary import Spread, Summary, summarise
 from baselines.evaluation.text_table import Column, fitting, plain
 from baselines.oracle import best_known
 from ikgym.exceptions import IkgymError

@@ -24,8 +24,8 @@ from baselines.evaluation.plan import Job, Plan, Skipped
 from baselines.evaluation.runner import Played
 from baselines.files import ResultsError, write
 from ikgym.exceptions import InvalidInputError
+from ikgym.preview import furthest
 from ikgym.scenarios import SPLITS
-from ikgym.scenarios.scenario import furthest
 
 #: The columns of results.csv, which are the keys of a row in results.json.
 COLUMNS = tuple(field.name for field in dataclasses.fields(Row))

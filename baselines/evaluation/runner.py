@@ -26,8 +26,8 @@ from baselines.evaluation.trajectory_log import TrajectoryLog, trajectory_log
 from baselines.oracle import best_known
 from ikgym.compilation import logger
 from ikgym.exceptions import IkgymError
+from ikgym.preview import furthest
 from ikgym.scenarios import Preview, Scenario
-from ikgym.scenarios.scenario import furthest
 
 #: Most episodes that are played in step: what happens in them is in memory until all of them are done.
 MOST = 64

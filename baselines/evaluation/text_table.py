@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Sequence
 
-from baselines.evaluation.metrics import Summary
+from baselines.evaluation.summary import Summary
 
 # Of a name that stands in its line; longer ones stand above it.
 LONGEST = 20

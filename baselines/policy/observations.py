@@ -9,8 +9,8 @@ import numpy as np
 from baselines.policy.problem import Batch, Problem
 from ikgym.exceptions import InvalidInputError
 from ikgym.jit import kernel
+from ikgym.preview import furthest
 from ikgym.scenarios import Preview
-from ikgym.scenarios.scenario import furthest
 from ikgym.simulator import Observation
 from ikgym.validation import FloatArray
 

@@ -22,8 +22,8 @@ from baselines import registry
 from baselines.agents.features import Features, Processing
 from baselines.episode import added_up
 from baselines.episode import play as play_episodes
-from baselines.evaluation.metrics import geometric_mean
 from baselines.evaluation.rollout import rollouts
+from baselines.evaluation.summary import geometric_mean
 from baselines.files import write
 from baselines.fingerprints import fingerprint
 from baselines.policy import Batch

@@ -18,6 +18,7 @@ def from_home(
     prismatic: Sequence[bool],
     rotation: FloatArray,
     position: FloatArray,
+    *,
     lower: npt.ArrayLike | None = None,
     upper: npt.ArrayLike | None = None,
     velocity_limit: npt.ArrayLike | None = None,

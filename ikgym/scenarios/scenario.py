@@ -14,8 +14,7 @@ from gymnasium.utils import seeding
 from ikgym.arms import Arm
 from ikgym.cost import TrackingCost
 from ikgym.exceptions import InvalidInputError
-from ikgym.preview import Preview
-from ikgym.preview import furthest as furthest
+from ikgym.preview import Preview, furthest
 from ikgym.scenarios import writing
 from ikgym.scenarios.disturbance import Disturbance
 from ikgym.simulation import nominal_rows

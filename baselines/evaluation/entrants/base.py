@@ -9,8 +9,8 @@ from typing import Any
 
 from baselines.evaluation.rollout import Player
 from ikgym.exceptions import InvalidInputError
+from ikgym.preview import offsets
 from ikgym.scenarios import Preview, Scenario
-from ikgym.simulator import offsets
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

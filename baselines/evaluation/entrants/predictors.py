@@ -15,8 +15,8 @@ from baselines.evaluation.entrants.solvers import InstanceEntrant
 from baselines.evaluation.rollout import Player
 from baselines.policy import SolverPolicy
 from ikgym.exceptions import InvalidInputError
+from ikgym.preview import offsets
 from ikgym.scenarios import Preview, Scenario
-from ikgym.simulator import offsets
 
 
 class _RefusedError(InvalidInputError):

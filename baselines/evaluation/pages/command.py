@@ -12,6 +12,7 @@ from typing import Annotated, Final, Literal
 
 import tyro
 
+from baselines import command as shared
 from baselines.evaluation.machine import describe
 from baselines.evaluation.pages import cost_time, families, leaderboard, sets
 from baselines.evaluation.pages.entries import FORESIGHT, HORIZONS, Entry, agents, playing, solvers
@@ -22,7 +23,7 @@ from baselines.evaluation.pages.tuning import DATA, EPISODES, Tuning, tune
 from baselines.evaluation.plots.style import small_png
 from baselines.evaluation.report import number
 from baselines.files import write
-from ikgym.exceptions import IkgymError, InvalidInputError
+from ikgym.exceptions import InvalidInputError
 
 #: The names of the pages on the command line.
 Page = Literal["leaderboard", "cost-time"]
@@ -63,20 +64,27 @@ class Options:
     """Processes that play what is not timed. What is timed is played in one, after that."""
 
 
-MANUAL = """\
+#: What the command is called where Python has run its module.
+PROGRAM = "python -m baselines.leaderboard"
+
+
+def manual(prog: str) -> str:
+    """The text of ``--help`` above the options."""
+    return f"""\
 Plays trained agents and all solvers on test sets and scenarios, and writes the leaderboard and the cost-time page.
 
 Examples:
-  python -m baselines.leaderboard --tune baselines/data/tuned.json
-  python -m baselines.leaderboard --out results/pages --agents "PPO=results/ppo" --write docs
-  python -m baselines.leaderboard --pages cost-time --out results/quick --quick
-  python -m baselines.leaderboard --write docs
+  {prog} --tune baselines/data/tuned.json
+  {prog} --out results/pages --agents "PPO=results/ppo" --write docs
+  {prog} --pages cost-time --out results/quick --quick
+  {prog} --write docs
 
 Files:
-  DIR/SET/results.json             rows as python -m baselines.evaluate has them
+  DIR/SET/results.json             rows as those of evaluate
   leaderboard.md, cost_time.md     what the numbers say, tables and plots
   leaderboard.json, cost_time.json what they are made from
   images/*.png                     the plots"""
+
 
 #: Who plays in a quick trial.
 QUICK = ("dls", "mfac", "rhc_gradient", *HORIZONS[:2], FORESIGHT)
@@ -190,26 +198,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
         The exit code: 0, 2 where something expected went wrong, 130 after Ctrl-C.
     """
     arguments = sys.argv[1:] if arguments is None else list(arguments)
-    options = tyro.cli(Options, prog="python -m baselines.leaderboard", description=MANUAL, args=arguments)
-    command = shlex.join(["python", "-m", "baselines.leaderboard", *arguments])
-    folder = options.write or options.out or pathlib.Path()
-    try:
+    prog, out = shared.program("leaderboard", PROGRAM), "the folder of --out"
+
+    def work() -> int:
+        nonlocal out
+        options = shared.parse(Options, arguments, prog=prog, description=manual(prog))
+        out = str(options.out)
+        command = shlex.join([*prog.split(), *arguments])
         if options.tune is not None:
             print(search(options, command, options.tune))
             print(f"written to {options.tune}")
             return 0
-        tuning = Tuning.load(DATA)
+        folder, tuning = options.write or options.out or pathlib.Path(), Tuning.load(DATA)
         for page, measurement in measured(options, command, tuning).items():
             draw_up(measurement, page, tuning, folder)
             print(f"written to {_file(folder, page)}")
-    except IkgymError as e:
-        print(f"error: {' '.join(str(e).split())}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print(f"\nStopped. What was finished is in {options.out}; continue with --resume.", file=sys.stderr)
-        return 130
-    return 0
+        return 0
 
-
-if __name__ == "__main__":
-    sys.exit(main())
+    return shared.run(work, lambda: f"Stopped. What was finished is in {out}; continue with --resume.")

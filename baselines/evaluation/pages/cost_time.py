@@ -7,7 +7,6 @@ from collections.abc import Iterator
 
 from matplotlib.figure import Figure
 
-from baselines.evaluation.metrics import Spread
 from baselines.evaluation.pages import cost_time_plot, sets
 from baselines.evaluation.pages.entries import FORESIGHT
 from baselines.evaluation.pages.families import FAMILIES, family, presets
@@ -17,6 +16,7 @@ from baselines.evaluation.plots import style
 from baselines.evaluation.plots.cost_time import Mark
 from baselines.evaluation.report import NOTHING, number
 from baselines.evaluation.results import slug
+from baselines.evaluation.summary import Spread
 
 # Colours: of the families, of presets, and of all others.
 COLOURS, PRESET, OTHER = style.COLOURS[:4], style.COLOURS[4], style.STEEL

@@ -9,7 +9,6 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from baselines.evaluation.metrics import Spread
 from baselines.evaluation.pages import leaderboard_plots as plots
 from baselines.evaluation.pages import sets
 from baselines.evaluation.pages.claims import few, quoted, sentences
@@ -29,6 +28,7 @@ from baselines.evaluation.pages.measurement import (
 from baselines.evaluation.pages.statistics import interval
 from baselines.evaluation.pages.tuning import UPDATE, Tuning
 from baselines.evaluation.report import NOTHING, number
+from baselines.evaluation.summary import Spread
 from ikgym.validation import FloatArray
 
 #: The plots, seen from the page.

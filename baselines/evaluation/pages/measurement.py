@@ -10,10 +10,11 @@ from typing import Any, Self
 
 import numpy as np
 
-from baselines.evaluation.metrics import Row, Spread, times
+from baselines.canonical import DIGITS, one_line, rounded, with_list
+from baselines.evaluation.metrics import Row
 from baselines.evaluation.pages import sets
 from baselines.evaluation.pages.entries import ENOUGH, FORESIGHT, PAPER, Entry, Training, label
-from baselines.evaluation.pages.jsonlines import DIGITS, one_line, rounded, with_list
+from baselines.evaluation.summary import Spread, times
 from baselines.files import ResultsError, write
 from baselines.fingerprints import fingerprint
 from baselines.oracle import best_known

@@ -10,10 +10,11 @@ from matplotlib.figure import Figure
 from tqdm import tqdm
 
 from baselines.canonical import canonical
-from baselines.evaluation.metrics import Row, Summary
+from baselines.evaluation.metrics import Row
 from baselines.evaluation.plots import cost_time, joints, style, tracking
 from baselines.evaluation.report import OVERVIEW, Pictures, by_scenario, is_reference, labels
 from baselines.evaluation.results import Results, slug
+from baselines.evaluation.summary import Summary
 from baselines.files import write
 
 __all__ = ["draw"]
@@ -32,7 +33,7 @@ def draw(results: Results, *, progress: bool = False) -> dict[str, Pictures]:
         The plots of each scenario.
 
     Raises:
-        ResultsError: A course cannot be read, or a plot not be written.
+        ResultsError: A log cannot be read, or a plot not be written.
     """
     out: dict[str, Pictures] = {}
     groups = by_scenario(results.rows)
@@ -71,31 +72,31 @@ def _figures(
 
     # The seed says which episode is shown, where there are others.
     episode = scenario if rows[0].seed == 0 else f"{scenario}, seed {rows[0].seed}"
-    courses = [(summary, results.series(first[summary.policy, canonical(summary.parameters)])) for summary in summaries]
-    pages = [courses[i : i + tracking.MOST] for i in range(0, len(courses), tracking.MOST)]
+    logs = [(summary, results.series(first[summary.policy, canonical(summary.parameters)])) for summary in summaries]
+    pages = [logs[i : i + tracking.MOST] for i in range(0, len(logs), tracking.MOST)]
     for number, page in enumerate(pages, 1):
         ending = f"-{number}" if len(pages) > 1 else ""
         title = f"{episode}: task coordinates and errors"
         yield (
             OVERVIEW,
             f"tracking{ending}",
-            f"Nominal and realised task coordinates, and errors, in {episode}",
-            tracking.draw(title, [(names[id(summary)], course) for summary, course in page]),
+            f"Nominal and actual task coordinates, and errors, in {episode}",
+            tracking.draw(title, [(names[id(summary)], log) for summary, log in page]),
         )
-    for summary, course in courses:
+    for summary, log in logs:
         name = names[id(summary)]
-        held = len(course["time"]) < summary.steps
+        held = len(log["time"]) < summary.steps
         episode_of = f"{episode}, last step of each nominal point" if held else episode
         yield (
             "Joint velocities and joint paths",
             f"velocities-{slug(plain[id(summary)])}",
             f"Joint velocities of {name} in {episode}",
-            joints.draw_velocities(f"{episode_of}: joint velocities of {name}", course),
+            joints.draw_velocities(f"{episode_of}: joint velocities of {name}", log),
         )
-        if "nominal_q" in course:
+        if "nominal_q" in log:
             yield (
                 "Joint velocities and joint paths",
                 f"joints-{slug(plain[id(summary)])}",
                 f"Joint paths of {name} in {episode}",
-                joints.draw_paths(f"{episode}: joint paths of {name}", course),
+                joints.draw_paths(f"{episode}: joint paths of {name}", log),
             )

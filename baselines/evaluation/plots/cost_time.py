@@ -15,8 +15,8 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullFormatter
 
-from baselines.evaluation.metrics import Spread, Summary
 from baselines.evaluation.plots import style
+from baselines.evaluation.summary import Spread, Summary
 from ikgym.validation import FloatArray
 
 DOT = 8.0  # how wide names take a point to be, in [pt]

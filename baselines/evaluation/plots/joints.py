@@ -15,9 +15,9 @@ from ikgym.validation import FloatArray
 Series = Mapping[str, npt.NDArray[Any]]
 
 
-def draw_velocities(title: str, course: Series) -> Figure:
+def draw_velocities(title: str, log: Series) -> Figure:
     """Joint velocities over the episode, and closer where they fluctuate most."""
-    time, qdot, sliding = course["time"], course["qdot"], course["prismatic"]
+    time, qdot, prismatic = log["time"], log["qdot"], log["prismatic"]
     window = busiest(qdot)
     drawn = style.figure(4.6)
     whole, close = drawn.subplots(2, 1)
@@ -27,19 +27,19 @@ def draw_velocities(title: str, course: Series) -> Figure:
             axes.plot(time[part], qdot[part, joint], lw=0.9, **style.looks(joint), **marks)
     edges = time[window][[0, -1]]
     whole.axvspan(*edges, color=style.MIST, lw=0, zorder=0)
-    unit = "[m/s]" if sliding.all() else "[rad/s], [m/s]" if sliding.any() else "[rad/s]"
+    unit = "[m/s]" if prismatic.all() else "[rad/s], [m/s]" if prismatic.any() else "[rad/s]"
     for axes, panel in ((whole, "whole episode; shaded: the part below"), (close, "where it fluctuates most")):
         style.dress(axes, ylabel=f"velocity {unit}", title=panel)
         axes.margins(x=0.01)
     close.set_xlabel("time [s]", fontsize=style.MEDIUM)
-    names = [rf"$\dot q_{{{j + 1}}}$" + (" [m/s]" if slides else "") for j, slides in enumerate(sliding)]
+    names = [rf"$\dot q_{{{j + 1}}}$" + (" [m/s]" if linear else "") for j, linear in enumerate(prismatic)]
     style.legend(drawn, title, whole.get_lines(), names)
     return drawn
 
 
-def draw_paths(title: str, course: Series) -> Figure:
-    """Joint coordinates over the episode, one panel a joint, nominal and realised."""
-    time, q, nominal = course["time"], course["q"], course["nominal_q"]
+def draw_paths(title: str, log: Series) -> Figure:
+    """Joint coordinates over the episode, one panel a joint: nominal and actual."""
+    time, q, nominal = log["time"], log["q"], log["nominal_q"]
     joints = q.shape[1]
     columns = 2 if joints > 3 else 1
     rows = -(-joints // columns)
@@ -47,14 +47,14 @@ def draw_paths(title: str, course: Series) -> Figure:
     grid = drawn.add_gridspec(rows, columns)
     for joint in range(joints):
         axes = drawn.add_subplot(grid[joint // columns, joint % columns])
-        (realised,) = axes.plot(time, q[:, joint], color=style.COLOURS[0], lw=1.4)
+        (actual,) = axes.plot(time, q[:, joint], color=style.COLOURS[0], lw=1.4)
         (meant,) = axes.plot(time, nominal[:, joint], color=style.COLOURS[1], lw=1.2, ls=(0, (4, 3)))
-        unit = "[m]" if course["prismatic"][joint] else "[rad]"
+        unit = "[m]" if log["prismatic"][joint] else "[rad]"
         last = joint + columns >= joints
         style.dress(axes, ylabel=rf"$q_{{{joint + 1}}}$ {unit}", xlabel="time [s]" if last else "", ticks=12 // columns)
         axes.margins(x=0.01)
     drawn.align_ylabels()
-    style.legend(drawn, title, [realised, meant], ["realised", "nominal"])
+    style.legend(drawn, title, [actual, meant], ["actual", "nominal"])
     return drawn
 
 

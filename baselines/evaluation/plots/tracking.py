@@ -1,4 +1,4 @@
-"""Task coordinates over time, nominal and realised, and the errors: all policies of a scenario in one picture."""
+"""Task coordinates over time, nominal and actual, and the errors: all policies of a scenario in one picture."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ SMALLEST = 1e-10  # [m] and [rad]
 COLUMNS = 3
 
 
-def draw(title: str, courses: Sequence[tuple[str, Series]]) -> Figure:
+def draw(title: str, logs: Sequence[tuple[str, Series]]) -> Figure:
     """The picture.
 
     Args:
         title: Stands above it.
-        courses: Names of policies, those of references with a star at the end, and the courses of their episodes;
+        logs: Names of policies, those of references with a star at the end, and the logs of their episodes;
             at most :data:`MOST`. A later one is drawn wider and below those before, so that all are seen where
             they agree.
     """
-    first = courses[0][1]
+    first = logs[0][1]
     coordinates = first["nominal"].shape[1]
     oriented = "orientation_error" in first
     rows, errors = -(-coordinates // COLUMNS), 1 + oriented
@@ -43,19 +43,17 @@ def draw(title: str, courses: Sequence[tuple[str, Series]]) -> Figure:
         axes = drawn.add_subplot(grid[place // COLUMNS, place % COLUMNS])
         nominal = first["nominal"][:, column]
         lines = axes.plot(first["time"], nominal, color="#c4c4c4", lw=5.0, solid_capstyle="round")
-        for number, (_, course) in reversed(list(enumerate(courses))):
-            lines += axes.plot(
-                course["time"], course["pose"][:, column], lw=_width(number, len(courses)), **style.looks(number)
-            )
-        _limit(axes, nominal, [course["pose"][:, column] for _, course in courses])
+        for number, (_, log) in reversed(list(enumerate(logs))):
+            lines += axes.plot(log["time"], log["pose"][:, column], lw=_width(number, len(logs)), **style.looks(number))
+        _limit(axes, nominal, [log["pose"][:, column] for _, log in logs])
         style.dress(axes, ylabel=label, xlabel="time [s]" if place >= coordinates - COLUMNS else "", ticks=4)
         axes.margins(x=0.02)
-    style.legend(drawn, title, [lines[0], *lines[:0:-1]], ["nominal", *(name for name, _ in courses)])
+    style.legend(drawn, title, [lines[0], *lines[:0:-1]], ["nominal", *(name for name, _ in logs)])
 
     kinds = [("position_error", "position error [m]"), ("orientation_error", "orientation error [rad]")][:errors]
     for place, (kind, label) in enumerate(kinds):
         axes = drawn.add_subplot(grid[rows + place, :])
-        _draw_errors(axes, [(name, course[kind]) for name, course in courses], first["time"])
+        _draw_errors(axes, [(name, log[kind]) for name, log in logs], first["time"])
         style.dress(axes, ylabel=label, xlabel="time [s]" if place + 1 == errors else "")
     drawn.align_ylabels()
     return drawn
@@ -94,11 +92,11 @@ def _width(number: int, of: int) -> float:
     return 0.9 + 1.7 * number / max(of - 1, 1)
 
 
-def _limit(axes: Axes, nominal: FloatArray, realised: Sequence[FloatArray]) -> None:
+def _limit(axes: Axes, nominal: FloatArray, actual: Sequence[FloatArray]) -> None:
     """Shows the nominal in full, and of those who have lost it no more than half its range beyond."""
     low, high = float(nominal.min()), float(nominal.max())
     span = max(high - low, 1e-2)
-    low = max(low - 0.5 * span, min(low, *(float(values.min()) for values in realised)))
-    high = min(high + 0.5 * span, max(high, *(float(values.max()) for values in realised)))
+    low = max(low - 0.5 * span, min(low, *(float(values.min()) for values in actual)))
+    high = min(high + 0.5 * span, max(high, *(float(values.max()) for values in actual)))
     margin = 0.06 * max(high - low, span)
     axes.set_ylim(low - margin, high + margin)

@@ -13,7 +13,7 @@ from baselines.solvers.receding_horizon.newton.grid import offsets
 from baselines.solvers.receding_horizon.newton.plan import PlanSettings
 from baselines.solvers.receding_horizon.newton.receding import HorizonMemory, plan_rows
 from ikgym.exceptions import InvalidInputError
-from ikgym.simulator import FARTHEST
+from ikgym.preview import FARTHEST
 from ikgym.validation import FloatArray, number, whole_number
 
 # What the kernel's counters and random numbers can hold.

@@ -8,7 +8,7 @@ from typing import ClassVar
 from baselines.policy import Batch, Memory, Operations, Problem, Solution
 from baselines.solvers.wrappers import orientation
 from baselines.wrapper import NamedWrapper
-from ikgym.scenarios.scenario import furthest
+from ikgym.preview import furthest
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

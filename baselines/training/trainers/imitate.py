@@ -22,10 +22,9 @@ from baselines.training.randomness import episode_seed, sequence
 from baselines.training.trainer import SegmentMetrics
 from baselines.training.trainers.actor_only import ActorTrainer
 from baselines.training.trainers.models import network_outputs
+from ikgym.preview import furthest, offsets
 from ikgym.scenarios import Scenario
-from ikgym.scenarios.scenario import furthest
 from ikgym.simulation import Outcome
-from ikgym.simulator import offsets
 from ikgym.validation import FloatArray
 
 #: From joint coordinates and velocities to the velocities that network outputs can make. Shapes (N, n).

@@ -10,10 +10,11 @@ import ikgym
 from baselines import registry
 from baselines.evaluate import evaluate, main, manual
 from baselines.evaluation import report
-from baselines.evaluation.metrics import TIME_COLUMNS, summarise
+from baselines.evaluation.metrics import TIME_COLUMNS
 from baselines.evaluation.plan import make_plan
 from baselines.evaluation.results import read_rows
 from baselines.evaluation.runner import play
+from baselines.evaluation.summary import summarise
 from baselines.files import ResultsError
 from ikgym.exceptions import InvalidInputError
 from tests.baselines.random_agents import OFFSETS, write_agent

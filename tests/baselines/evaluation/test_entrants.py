@@ -16,10 +16,11 @@ import pytest
 import baselines
 import ikgym
 from baselines.evaluate import evaluate, main
-from baselines.evaluation.metrics import TIME_COLUMNS, Row, summarise
+from baselines.evaluation.metrics import TIME_COLUMNS, Row
 from baselines.evaluation.plan import make_plan
 from baselines.evaluation.report import table
 from baselines.evaluation.results import read_rows
+from baselines.evaluation.summary import summarise
 from baselines.files import ResultsError
 from baselines.policy import Problem
 from baselines.solvers.resolved_rate.dls import DampedLeastSquares

@@ -10,8 +10,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 import baselines
 import ikgym
 from baselines.canonical import jsonable
-from baselines.evaluation.metrics import TIME_COLUMNS, Row, Spread, geometric_mean, measure, summarise
+from baselines.evaluation.metrics import TIME_COLUMNS, Row, measure
 from baselines.evaluation.rollout import Episode, rollout
+from baselines.evaluation.summary import Spread, geometric_mean, summarise
 from baselines.policy import Operations
 from baselines.status import Status
 from ikgym.exceptions import InvalidInputError

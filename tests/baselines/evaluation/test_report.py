@@ -9,9 +9,10 @@ from matplotlib.text import Text
 
 from baselines.evaluate import evaluate
 from baselines.evaluation import report
-from baselines.evaluation.metrics import Row, summarise
+from baselines.evaluation.metrics import Row
 from baselines.evaluation.plan import Skipped
 from baselines.evaluation.plots import cost_time, joints, style, tracking
+from baselines.evaluation.summary import summarise
 from baselines.files import ResultsError
 
 BASE = Row(

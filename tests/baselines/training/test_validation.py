@@ -9,8 +9,8 @@ import pytest
 
 import baselines
 from baselines.agents.features import Processing
-from baselines.evaluation.metrics import geometric_mean
 from baselines.evaluation.rollout import rollouts
+from baselines.evaluation.summary import geometric_mean
 from baselines.fingerprints import fingerprint
 from baselines.spec import parse_policy
 from baselines.training import validation
