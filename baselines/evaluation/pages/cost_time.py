@@ -44,7 +44,7 @@ which have privileged information, are left out. Written by `python -m baselines
   points, where the task is to iterate. The column of episodes says how many each line has.
 - Presets that draw at random were played with several seeds of their own, put together here: 3 × 64 are three seeds.
 - `rhc` to the optimum makes as many Newton steps as it takes; with one iteration it makes one in each control period
-  (the real-time iteration); with blocks (move blocks) it has fewer knots, closer together near the present.
+  (the real-time iteration); with move blocks it has fewer knots, closer together near the present.
 """
 
 

@@ -20,7 +20,7 @@ BLOCKS_A_DOUBLING = 3.5
 TIMED = 8
 
 OPTIMUM, REAL_TIME = "rhc to the optimum", "rhc, one iteration"
-OPTIMUM_BLOCKS, BLOCKS = "rhc to the optimum, blocks", "rhc, one iteration and blocks"
+OPTIMUM_BLOCKS, BLOCKS = "rhc to the optimum, move blocks", "rhc, one iteration and move blocks"
 #: The ways to compute a receding horizon, from costly to cheap; each is measured at all horizons.
 FAMILIES = (OPTIMUM, OPTIMUM_BLOCKS, REAL_TIME, BLOCKS)
 
