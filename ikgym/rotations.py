@@ -53,24 +53,19 @@ def quaternion(rotation):
         Four numbers w, x, y, z.
     """
     return quaternion_of(
-        rotation[0, 0],
-        rotation[0, 1],
-        rotation[0, 2],
-        rotation[1, 0],
-        rotation[1, 1],
-        rotation[1, 2],
-        rotation[2, 0],
-        rotation[2, 1],
-        rotation[2, 2],
+        (rotation[0, 0], rotation[0, 1], rotation[0, 2]),
+        (rotation[1, 0], rotation[1, 1], rotation[1, 2]),
+        (rotation[2, 0], rotation[2, 1], rotation[2, 2]),
     )
 
 
 @kernel
-def quaternion_of(r00, r01, r02, r10, r11, r12, r20, r21, r22):
-    """:func:`quaternion` of a matrix given element by element, by Shepperd's choice of the largest part.
+def quaternion_of(first, second, third):
+    """:func:`quaternion` of a matrix given by its rows, three numbers each, by Shepperd's choice of the largest part.
 
     It keeps every division well away from 0/0, so that the quaternion is exact to rounding near 0 and near π alike.
     """
+    (r00, r01, r02), (r10, r11, r12), (r20, r21, r22) = first, second, third
     trace = r00 + r11 + r22
     if trace >= r00 and trace >= r11 and trace >= r22:
         w = 1.0 + trace
@@ -140,15 +135,9 @@ def geodesic_angle(first, second):
         Angle in [rad], between 0 and π.
     """
     w, x, y, z = quaternion_of(
-        _dot(second[0], first[0]),
-        _dot(second[0], first[1]),
-        _dot(second[0], first[2]),
-        _dot(second[1], first[0]),
-        _dot(second[1], first[1]),
-        _dot(second[1], first[2]),
-        _dot(second[2], first[0]),
-        _dot(second[2], first[1]),
-        _dot(second[2], first[2]),
+        (_dot(second[0], first[0]), _dot(second[0], first[1]), _dot(second[0], first[2])),
+        (_dot(second[1], first[0]), _dot(second[1], first[1]), _dot(second[1], first[2])),
+        (_dot(second[2], first[0]), _dot(second[2], first[1]), _dot(second[2], first[2])),
     )
     return 2.0 * math.atan2(math.sqrt(x * x + y * y + z * z), w)
 

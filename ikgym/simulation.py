@@ -199,8 +199,9 @@ def step(
     the block of an outcome (see :func:`outcome`), written in place; the rows that are meant, of shape (N,); whether
     they move or are observed where they are; the first row, and the row after the last.
 
-    The tuples are taken apart by the caller: numba takes their parts over one by one in less time, and would count
-    references at each access to a part, which in the loop over rows takes longer than the kinematics.
+    The tuples are taken apart by the caller, since this is called once a step: a call with 32 values takes 3.5 µs, with
+    the same values in four named tuples 8.2 µs (medians on one machine, by empty kernels). And numba counts references
+    at each access to a part of a tuple, which in the loop over rows takes longer than the kinematics.
     """
     chain = Chain(offsets, axes, prismatic, tool, tool_rotation)
     cost = CostParameters(delta_x, p_x, delta_qdot, p_out, p_in)

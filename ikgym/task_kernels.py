@@ -72,15 +72,9 @@ def error(kind, nominal, coordinates, out):
             out[i] = nominal[9 + i] - coordinates[9 + i]
         # The quaternion of R* Rᵀ, without the matrix itself, which would have to be allocated.
         w, x, y, z = quaternion_of(
-            _rows(nominal, 0, coordinates, 0),
-            _rows(nominal, 0, coordinates, 3),
-            _rows(nominal, 0, coordinates, 6),
-            _rows(nominal, 3, coordinates, 0),
-            _rows(nominal, 3, coordinates, 3),
-            _rows(nominal, 3, coordinates, 6),
-            _rows(nominal, 6, coordinates, 0),
-            _rows(nominal, 6, coordinates, 3),
-            _rows(nominal, 6, coordinates, 6),
+            (_rows(nominal, 0, coordinates, 0), _rows(nominal, 0, coordinates, 3), _rows(nominal, 0, coordinates, 6)),
+            (_rows(nominal, 3, coordinates, 0), _rows(nominal, 3, coordinates, 3), _rows(nominal, 3, coordinates, 6)),
+            (_rows(nominal, 6, coordinates, 0), _rows(nominal, 6, coordinates, 3), _rows(nominal, 6, coordinates, 6)),
         )
         factor = vector_factor(w, x, y, z)
         out[3] = factor * x
