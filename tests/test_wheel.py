@@ -131,7 +131,7 @@ def test_agents_are_evaluated_from_the_wheel(installed):
 @pytest.mark.slow
 def test_an_agent_is_trained_from_the_wheel(installed):
     run, _, folder = installed
-    tiny = "--scenario faitli3-regular --steps 20 --hidden 8 --offsets 1 2 10 --segments 2 --envs 4 --batch-size 20"
+    tiny = "--scenario faitli3-regular --steps 20 --hidden 8 --offsets 1 2 10 --segments 2 --n-envs 4 --batch-size 20"
     few = "--validation-episodes 1 --no-progress --out runs"
     run("ikgym", "train", "ppo", *tiny.split(), *few.split())
     agent = folder / "runs" / "seed-0" / "agent.safetensors"
