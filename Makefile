@@ -5,9 +5,10 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 # What tells the story; DEMO=all plays all policies.
 DEMO := moore_penrose truncated_svd dls null_space full_orientation mfac rhc_gradient rhc rhc_foresight follow_nominal
+FUZZ := 20000
 PYTEST := $(BIN)/python -m pytest -n auto --dist worksteal
 
-.PHONY: help setup demo test slow check format lint types layers bench rivals clean
+.PHONY: help setup demo test slow fuzz check format lint types layers bench rivals clean
 
 help: ## Show this list
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /  make \1\t/' | expand -t 18
@@ -27,6 +28,9 @@ test: $(STAMP) ## Run the tests that are not marked slow
 
 slow: $(STAMP) ## Run the tests that are marked slow
 	$(PYTEST) -m slow
+
+fuzz: $(STAMP) ## Hand random input to the environments, FUZZ examples a property (a few minutes)
+	IKGYM_FUZZ=$(FUZZ) $(PYTEST) tests/test_fuzz.py
 
 format: $(STAMP) ## Format the code and sort its imports
 	$(BIN)/ruff format .

@@ -11,7 +11,10 @@ import numpy.typing as npt
 from ikgym import cost_kernels
 from ikgym.cost_kernels import CostParameters
 from ikgym.exceptions import InvalidInputError
-from ikgym.validation import FloatArray, Frozen, float_array, number
+from ikgym.validation import LARGEST, SMALLEST, FloatArray, Frozen, float_array, number
+
+#: The exponents of the cost do not exceed it.
+LARGEST_EXPONENT = 100.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -25,14 +28,16 @@ class TrackingCost(Frozen):
 
     Args:
         delta_x: Δx, the tracking error that counts as 1, in [m] and [rad] (or as a number, for parts of a
-            rotation matrix).
-        p_x: P_X, the exponent of errors above Δx.
-        delta_qdot: Δq̇, the joint velocity that counts as 1, in [rad/s] or [m/s].
-        p_out: The exponent of velocities above Δq̇.
-        p_in: The exponent of velocities up to Δq̇.
+            rotation matrix). From 1e-12 to 1e12.
+        p_x: P_X, the exponent of errors above Δx. From 1 to 100.
+        delta_qdot: Δq̇, the joint velocity that counts as 1, in [rad/s] or [m/s]. From 1e-12 to 1e12.
+        p_out: The exponent of velocities above Δq̇. From 1 to 100.
+        p_in: The exponent of velocities up to Δq̇. From 1 to 100.
+
+    A scenario refuses a cost that is within these bounds, but may grow too large in an episode of it.
 
     Raises:
-        InvalidInputError: Δx or Δq̇ is not above 0, or an exponent is below 1.
+        InvalidInputError: A parameter is not within its bounds.
     """
 
     delta_x: float = 1e-3
@@ -43,14 +48,27 @@ class TrackingCost(Frozen):
 
     def __post_init__(self) -> None:
         for name in ("delta_x", "delta_qdot"):
-            object.__setattr__(self, name, number(name, getattr(self, name), above=0.0))
+            object.__setattr__(self, name, number(name, getattr(self, name), at_least=SMALLEST, at_most=LARGEST))
         for name in ("p_x", "p_out", "p_in"):
-            object.__setattr__(self, name, number(name, getattr(self, name), at_least=1.0))
+            object.__setattr__(self, name, number(name, getattr(self, name), at_least=1.0, at_most=LARGEST_EXPONENT))
 
     @property
     def parameters(self) -> CostParameters:
         """The cost as its kernels see it."""
         return CostParameters(self.delta_x, self.p_x, self.delta_qdot, self.p_out, self.p_in)
+
+    def largest(self, errors: FloatArray, velocities: FloatArray) -> float:
+        """The most that a step can cost, Φ^X + Φ^U; infinite where that is beyond all floats.
+
+        Args:
+            errors: What the components of the error do not exceed. Shape (e,).
+            velocities: What the joint velocities do not exceed, in [rad/s] or [m/s]. Shape (n,).
+        """
+        x, u = errors / self.delta_x, velocities / self.delta_qdot
+        with np.errstate(over="ignore", under="ignore"):
+            tracking = np.where(x > 1.0, x**self.p_x, x**cost_kernels.P_X_INSIDE).sum()
+            velocity = np.where(u > 1.0, u**self.p_out, u**self.p_in).sum()
+        return float(tracking + velocity)
 
     def tracking(self, error: npt.ArrayLike) -> FloatArray | float:
         """Φ^X of a tracking error.

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from typing import Any, ClassVar
 
 import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
+from gymnasium.envs.registration import EnvSpec
 
 from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError, ResetNeededError
 from ikgym.scenarios import Preview, Scenario
 from ikgym.simulator import Observation, Simulator, observation
 from ikgym.spaces import action_space, observation_space
-from ikgym.validation import FloatArray, known_names
+from ikgym.validation import FloatArray, known_names, shortened
 
 OBSERVED = ("q", "qdot", "pose", "nominal", "remaining")
 #: The keys of `info` after a step; the orientation error is there where the task has an orientation.
@@ -80,7 +82,8 @@ class RedundantIKEnv(gym.Env[Any, Any]):
     from home in each joint (or as far as the scenario's own start, if that is farther).
 
     ## Episode end
-    Truncated by the environment itself after the scenario's `steps`; never terminated.
+    Truncated by the environment itself after the scenario's `steps`, which `spec.max_episode_steps` repeats for
+    wrappers that ask for it; never terminated.
 
     Args:
         scenario: A scenario or what names one: a registered name, a file ending in `.toml`, or
@@ -90,7 +93,8 @@ class RedundantIKEnv(gym.Env[Any, Any]):
 
     Raises:
         UnknownNameError: There is no such scenario.
-        InvalidInputError: The scenario, the preview or the render mode is not valid.
+        InvalidInputError: The scenario, the preview or the render mode is not valid, or there is no memory for so
+            many steps.
     """
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": ["human", "rgb_array"], "render_fps": 50}  # type: ignore[misc]
@@ -106,14 +110,24 @@ class RedundantIKEnv(gym.Env[Any, Any]):
                 f"render_mode: expected None or one of {self.metadata['render_modes']}, got {render_mode!r}."
             )
         self.scenario = scenarios.find(scenario)
+        self._spec: EnvSpec | None = None
         self.render_mode = render_mode
+        self._simulator = Simulator(self.scenario, None, preview)  # first: it says whether there is memory
         self.observation_space = observation_space(self.scenario, preview)
         self.action_space = action_space(self.scenario)
-        self._simulator = Simulator(self.scenario, None, preview)
         self._step = -1  # no episode yet
         self._steps, self._dt = self.scenario.steps, self.scenario.dt
         self._has_orientation = self.scenario.task.has_orientation
         self._renderer: Any = None if render_mode is None else _renderer(self.scenario, render_mode)
+
+    @property
+    def spec(self) -> EnvSpec | None:  # an attribute of the base, which gym.make() sets
+        """What the environment was made from, with the steps of its episodes; None without `gym.make`."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:
+        self._spec = limited(spec, self.scenario)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -206,6 +220,15 @@ def _renderer(scenario: Scenario, mode: str) -> Any:
     return Renderer(scenario.arm, mode, title=scenario.name, has_orientation=scenario.task.has_orientation)
 
 
+def limited(spec: EnvSpec | None, scenario: Scenario) -> EnvSpec | None:
+    """A copy of a specification that says how long episodes are, which is known only with the scenario."""
+    if spec is None:
+        return None
+    spec = copy.copy(spec)
+    spec.max_episode_steps = scenario.steps
+    return spec
+
+
 def checked_options(options: dict[str, Any] | None, known: Sequence[str]) -> dict[str, Any]:
     """The options of a reset.
 
@@ -216,6 +239,6 @@ def checked_options(options: dict[str, Any] | None, known: Sequence[str]) -> dic
     if options is None:
         return {}
     if not isinstance(options, dict):
-        raise InvalidInputError(f"options: expected None or a dict, got {options!r}.")
+        raise InvalidInputError(f"options: expected None or a dict, got {shortened(options)}.")
     known_names("option of reset", options, known)
     return options

@@ -7,6 +7,9 @@ from collections.abc import Iterable
 
 import gymnasium
 
+#: Letters of a name that messages show.
+SHOWN = 200
+
 
 class IkgymError(Exception):
     """Base class of all errors raised by ikgym and its baselines."""
@@ -21,13 +24,19 @@ class UnknownNameError(IkgymError, LookupError):
 
     def __init__(self, kind: str, name: object, available: Iterable[str]) -> None:
         self.kind, self.name, self.available = kind, name, tuple(available)
-        near = difflib.get_close_matches(str(name), self.available, n=1, cutoff=0.5)
+        near = difflib.get_close_matches(name, self.available, n=1, cutoff=0.5) if isinstance(name, str) else ()
         hint = f" Did you mean {near[0]!r}?" if near else ""
         listing = ", ".join(self.available) or "none"
-        super().__init__(f"There is no {kind} {name!r}.{hint} Available: {listing}.")
+        shown = " ".join(repr(name).split())  # arrays take several lines
+        shown = shown if len(shown) <= SHOWN else f"{shown[: SHOWN - 1]}…"
+        super().__init__(f"There is no {kind} {shown}.{hint} Available: {listing}.")
 
     def __reduce__(self) -> tuple[type[UnknownNameError], tuple[str, object, tuple[str, ...]]]:
         return type(self), (self.kind, self.name, self.available)
+
+
+class NoAttributeError(IkgymError, AttributeError):
+    """Arms that are stepped together were asked for an attribute that they do not have one by one."""
 
 
 class ResetNeededError(IkgymError, gymnasium.error.ResetNeeded):

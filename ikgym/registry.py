@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Generic, TypeVar
 
-from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.exceptions import IkgymError, InvalidInputError, UnknownNameError
 
 Member = TypeVar("Member")
 
@@ -15,10 +15,11 @@ class Registry(Generic[Member]):
 
     Args:
         kind: What the members are called in messages, for example ``"arm"``.
+        member: The class that all members are of.
     """
 
-    def __init__(self, kind: str) -> None:
-        self.kind = kind
+    def __init__(self, kind: str, member: type[Member]) -> None:
+        self.kind, self._member = kind, member
         self._makers: dict[str, Callable[[], Member]] = {}
         self._made: dict[str, Member] = {}
 
@@ -51,9 +52,26 @@ class Registry(Generic[Member]):
 
         Raises:
             UnknownNameError: There is no such name; the message has the nearest one.
+            InvalidInputError: Its maker fails, or makes something else; all others can be had nevertheless.
         """
         if not isinstance(name, str) or name not in self._makers:
             raise UnknownNameError(self.kind, name, self._makers)
         if name not in self._made:
-            self._made[name] = self._makers[name]()
+            self._made[name] = self._make(name)
         return self._made[name]
+
+    def _make(self, name: str) -> Member:
+        try:
+            made = self._makers[name]()
+        except IkgymError:  # says what is wrong
+            raise
+        except Exception as error:  # whatever the code of others raises
+            raise InvalidInputError(
+                f"The {self.kind} {name!r}: making it failed: {type(error).__name__}: {error}"
+            ) from error
+        if not isinstance(made, self._member):
+            raise InvalidInputError(
+                f"The {self.kind} {name!r}: expected its maker to give an object of {self._member.__name__}, got "
+                f"{made!r}."
+            )
+        return made

@@ -13,6 +13,7 @@ from gymnasium.vector import AutoresetMode
 
 from ikgym.env import OPTIONS, REPORTED, checked_options
 from ikgym.exceptions import InvalidInputError, MissingDependencyError
+from ikgym.rows import Row
 from ikgym.scenarios import Preview, Scenario
 from ikgym.simulator import Observation
 from ikgym.validation import FloatArray, float_array
@@ -53,13 +54,20 @@ class RedundantIKVecEnv(VecEnv):
 
     Raises:
         UnknownNameError: There is no such scenario.
-        InvalidInputError: N, the scenario or the preview is not valid.
+        InvalidInputError: N, the scenario or the preview is not valid, there is no memory for N arms, or a step may
+            cost more than fits into a float32.
     """
 
     def __init__(self, num_envs: int = 1, scenario: str | Scenario = "varga7-fast", preview: Preview = 2) -> None:
         self._envs = RedundantIKVectorEnv(num_envs, scenario, preview, AutoresetMode.SAME_STEP)
         self.scenario = self._envs.scenario
-        self._rows = [_Row(self._envs, index) for index in range(num_envs)]
+        worst, most = self.scenario.largest_step_cost(), float(np.finfo(np.float32).max)
+        if worst > most:
+            raise InvalidInputError(
+                f"Scenario {self.scenario.name!r}: expected steps that cost at most {most:.3g}, since rewards of "
+                f"Stable-Baselines3 are in float32, got up to {worst:.3g}."
+            )
+        self._rows = [Row(self._envs, index) for index in range(num_envs)]
         self._actions: npt.NDArray[Any] | None = None
         self._returns = np.zeros(num_envs)
         self._made = time.perf_counter()
@@ -123,7 +131,7 @@ class RedundantIKVecEnv(VecEnv):
         """What rows say of themselves: `scenario`, spaces, `np_random`, … and what `set_attr` has given them.
 
         Raises:
-            AttributeError: They have no such attribute.
+            NoAttributeError: They have no such attribute.
         """
         return [getattr(self._rows[index], attr_name) for index in self._get_indices(indices)]
 
@@ -131,7 +139,7 @@ class RedundantIKVecEnv(VecEnv):
         """Gives rows an attribute that they did not have before; the arms use none.
 
         Raises:
-            AttributeError: It is one of those that all arms share, such as the scenario: make another environment.
+            NoAttributeError: It is one of those that all arms share, such as the scenario: make another environment.
         """
         for index in self._get_indices(indices):
             setattr(self._rows[index], attr_name, value)
@@ -142,7 +150,7 @@ class RedundantIKVecEnv(VecEnv):
         """Calls what `get_attr` finds; arms are not reset or stepped one by one.
 
         Raises:
-            AttributeError: Rows have no such method.
+            NoAttributeError: Rows have no such method.
         """
         return [method(*method_args, **method_kwargs) for method in self.get_attr(method_name, indices)]
 
@@ -171,34 +179,3 @@ class RedundantIKVecEnv(VecEnv):
                 f"options: expected a start 'q' for all rows or for none, got {len(given)} of {self.num_envs}."
             )
         return {"q": np.stack(given)}
-
-
-class _Row:
-    """One of the N arms, as SB3 asks for its attributes: those of a single environment, which all arms share."""
-
-    def __init__(self, envs: RedundantIKVectorEnv, index: int) -> None:
-        self._envs, self._index = envs, index
-
-    @property
-    def scenario(self) -> Scenario:
-        return self._envs.scenario
-
-    @property
-    def observation_space(self) -> gym.Space[Any]:
-        return self._envs.single_observation_space
-
-    @property
-    def action_space(self) -> gym.Space[Any]:
-        return self._envs.single_action_space
-
-    @property
-    def render_mode(self) -> None:
-        return None
-
-    @property
-    def np_random(self) -> np.random.Generator:
-        return self._envs.np_random[self._index]
-
-    @property
-    def np_random_seed(self) -> int:
-        return self._envs.np_random_seed[self._index]

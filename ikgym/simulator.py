@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -10,13 +11,14 @@ import numpy.typing as npt
 from ikgym import simulation
 from ikgym.compilation import announced
 from ikgym.exceptions import InvalidInputError
+from ikgym.memory import afford, of_rows
 from ikgym.parallel import in_chunks
 from ikgym.preview import FARTHEST as FARTHEST
 from ikgym.preview import Preview, offsets
 from ikgym.scenarios import Scenario
 from ikgym.simulation import Constants, Outcome, State, outcome
 from ikgym.trajectories import Trajectory
-from ikgym.validation import FloatArray, float_array
+from ikgym.validation import FloatArray, float_array, shortened
 
 #: What a policy sees of an arm, see :func:`observation`.
 Observation = dict[str, FloatArray]
@@ -43,7 +45,7 @@ class Simulator:
             more are computed block by block on the way; a block is never shorter than the preview looks ahead.
 
     Raises:
-        InvalidInputError: The preview is not valid.
+        InvalidInputError: The preview is not valid, or there is no memory for so many rows or steps.
     """
 
     def __init__(self, scenario: Scenario, rows: int | None, preview: Preview, memory: int = MEMORY) -> None:
@@ -63,6 +65,8 @@ class Simulator:
         self._block = points if points <= affordable else min(points, max(affordable // 2, self.preview[-1]))
         self._in_blocks = self._block < points
         known = self._block * (2 if self._in_blocks else 1)
+        shown = 2 * joints + size + len(self.preview) * size + 6
+        afford(f"{rows} environments", of_rows(rows, shown, tables * known * width))
         self._last_block = self._point[self.preview[-1] :] // self._block
         self._blocks_known = np.zeros(tables, dtype=np.int64)
         self._episodes: list[Trajectory] = [scenario.trajectory] * tables
@@ -90,17 +94,22 @@ class Simulator:
             self._know(np.zeros(1, dtype=np.int64))
         self._shape = (rows, joints, size, len(self.preview))
         self._nominal_shape = (len(self.preview), size)
-        self._count = rows * (2 * joints + size + len(self.preview) * size + 6)
+        self._count = rows * shown
         # Where the parts of the only arm are in the block.
         parts = self._outcome(np.arange(self._count, dtype=np.float64))[1:6]
         self._parts = [slice(int(part.flat[0]), int(part.flat[-1]) + 1) for part in parts]
-        # The kernels take tuples apart, see simulation.step: what never changes is taken apart once.
-        self._constants = (*scenario.arm.chain, *self._shared, *scenario.cost.parameters, *self._state)
+        self._constants = self._taken_apart()
         self._all = np.ones(rows, dtype=np.bool_)
         self._own_start = np.zeros(rows, dtype=np.bool_)
         with announced("the simulation kernels"):
             simulation.first_not_finite(self._state.q, ~self._all)
             self._run(~self._all, self._new(self._count), moving=False)
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        # Copied, read-only arrays can be written to: the kernels would be compiled once more for them.
+        self._shared = self._shared._replace(velocity_limit=self.scenario.velocity_limit)
+        self._constants = self._taken_apart()
 
     def reset(
         self,
@@ -153,7 +162,7 @@ class Simulator:
         if (np.abs(starts) > bound).any():
             raise InvalidInputError(
                 f"options['q']: expected absolute values of at most {np.round(bound, 4).tolist()} in [rad] or [m], "
-                f"got {starts.tolist()}."
+                f"got {shortened(starts.tolist())}."
             )
         return np.broadcast_to(starts, (self.rows, joints))
 
@@ -230,7 +239,9 @@ class Simulator:
         except ValueError:  # lists of different lengths
             raw = np.asarray(None)
         if raw.dtype.kind not in "fiub":
-            raise InvalidInputError(f"action: expected numbers of shape {self._action_shape}, got {actions!r}.")
+            raise InvalidInputError(
+                f"action: expected numbers of shape {self._action_shape}, got {shortened(actions)}."
+            )
         if raw.shape != self._action_shape:
             raise InvalidInputError(f"action: expected shape {self._action_shape}, got {raw.shape}.")
         accepted = self._state.actions
@@ -250,6 +261,10 @@ class Simulator:
             self.rows,
             GRAIN_STEP,
         )
+
+    def _taken_apart(self) -> tuple[Any, ...]:
+        """What never changes, in parts as :func:`simulation.step` takes it."""
+        return *self.scenario.arm.chain, *self._shared, *self.scenario.cost.parameters, *self._state
 
     def _outcome(self, numbers: FloatArray) -> Outcome:
         return outcome(numbers, *self._shape)
@@ -280,10 +295,4 @@ class Simulator:
 
 def observation(out: Outcome) -> Observation:
     """What a policy sees of the only arm: the observation of the environment, without a row axis."""
-    return {
-        "q": out.q[0],
-        "qdot": out.qdot[0],
-        "pose": out.pose[0],
-        "nominal": out.nominal[0],
-        "remaining": out.remaining[0],
-    }
+    return {key: getattr(out, key)[0] for key in ("q", "qdot", "pose", "nominal", "remaining")}

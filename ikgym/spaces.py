@@ -32,9 +32,7 @@ def observation_space(scenario: Scenario, preview: Preview) -> spaces.Dict:
         InvalidInputError: The preview is not valid.
     """
     ahead = offsets(preview)
-    disturbance = np.abs(scenario.disturbance.bias) + np.abs(scenario.disturbance.noise)
-    travel = scenario.steps * scenario.dt * (scenario.velocity_limit + disturbance)
-    q = SLACK * (scenario.start_bound() + travel)
+    q = SLACK * scenario.joint_bound()
     pose = _coordinate_bound(scenario, scenario.arm.reach(q))
     if scenario.initial_pose is not None:
         pose = np.maximum(pose, np.abs(scenario.initial_pose))

@@ -117,19 +117,25 @@ class Task(Frozen):
         """Derivative of the error by the joint coordinates, exact for errors of any size below π.
 
         Args:
-            nominal: Nominal coordinates. Shape (m,).
-            coordinates: Coordinates. Shape (m,).
-            jacobian: Task Jacobian, as :meth:`jacobian` gives it. Shape (e, n).
+            nominal: Nominal coordinates. Shape (..., m).
+            coordinates: Coordinates. Shape (..., m).
+            jacobian: Task Jacobians, as :meth:`jacobian` gives them. Shape (..., e, n).
 
         Returns:
-            ∂error/∂q. Shape (e, n).
+            ∂error/∂q. Shape (..., e, n).
 
         Raises:
             InvalidInputError: A shape is wrong, or a number not finite.
         """
-        task_jacobian = float_array("jacobian", jacobian, (self.error_size, None))
+        error, task_jacobian = self.error(nominal, coordinates), float_array("jacobian", jacobian)
+        if task_jacobian.ndim < 2 or task_jacobian.shape[:-1] != error.shape:
+            raise InvalidInputError(
+                f"jacobian: expected shape {(*error.shape, 'n')}, as the error has {error.shape}, got "
+                f"{task_jacobian.shape}."
+            )
         out = np.empty_like(task_jacobian)
-        task_kernels.error_jacobian(self.kind, self.error(nominal, coordinates), task_jacobian, out)
+        for index in np.ndindex(error.shape[:-1]):
+            task_kernels.error_jacobian(self.kind, error[index], task_jacobian[index], out[index])
         return out
 
 
@@ -141,7 +147,7 @@ def _array(name: str, value: npt.ArrayLike, tail: tuple[int, ...]) -> FloatArray
     return array
 
 
-_registry: Registry[Task] = Registry("task")
+_registry: Registry[Task] = Registry("task", Task)
 for _task in (
     # x, y, z in [m].
     Task("position", task_kernels.POSITION, size=3, error_size=3, has_orientation=False),

@@ -17,20 +17,26 @@ FloatArray = npt.NDArray[np.float64]
 # What is this close to unit length, or to a rotation, was meant to be one, and is made one exactly.
 UNIT_TOLERANCE = 1e-6
 
+# Lengths, angles, times and speeds of a scenario lie within: far beyond any arm, and no product of them overflows.
+SMALLEST, LARGEST = 1e-12, 1e12
 
-def float_array(name: str, value: npt.ArrayLike, shape: tuple[int | None, ...] | None = None) -> FloatArray:
+
+def float_array(
+    name: str, value: npt.ArrayLike, shape: tuple[int | None, ...] | None = None, *, at_most: float = math.inf
+) -> FloatArray:
     """A fresh, C-contiguous float64 copy of finite numbers.
 
     Args:
         name: What the value is called in messages.
         value: Anything that NumPy can cast to float64 without losing its meaning.
         shape: The shape to insist on; None stands for any length. All shapes are right if it is left out.
+        at_most: Absolute value that no number may exceed.
 
     Returns:
         The copy. Shape as given.
 
     Raises:
-        InvalidInputError: The value is no array of numbers, has another shape, or is not finite.
+        InvalidInputError: The value is no array of numbers, has another shape, is not finite or too large.
     """
     try:
         raw = np.asarray(value)
@@ -38,18 +44,22 @@ def float_array(name: str, value: npt.ArrayLike, shape: tuple[int | None, ...] |
             raise TypeError
         array = np.array(raw, dtype=np.float64, order="C")
     except (TypeError, ValueError):
-        raise InvalidInputError(f"{name}: expected an array of real numbers, got {_shorten(value)}.") from None
+        raise InvalidInputError(f"{name}: expected an array of real numbers, got {shortened(value)}.") from None
     if shape is not None and not _fits(array.shape, shape):
         wanted = "(" + ", ".join("any" if n is None else str(n) for n in shape) + ("," if len(shape) == 1 else "") + ")"
         raise InvalidInputError(f"{name}: expected shape {wanted}, got {array.shape}.")
     if not np.isfinite(array).all():
-        raise InvalidInputError(f"{name}: expected finite numbers, got {_shorten(value)}.")
+        raise InvalidInputError(f"{name}: expected finite numbers, got {shortened(value)}.")
+    if at_most < math.inf and (np.abs(array) > at_most).any():
+        raise InvalidInputError(f"{name}: expected absolute values of at most {at_most:g}, got {shortened(value)}.")
     return array
 
 
-def frozen_array(name: str, value: npt.ArrayLike, shape: tuple[int | None, ...] | None = None) -> FloatArray:
+def frozen_array(
+    name: str, value: npt.ArrayLike, shape: tuple[int | None, ...] | None = None, *, at_most: float = math.inf
+) -> FloatArray:
     """Like :func:`float_array`, and read-only."""
-    return read_only(float_array(name, value, shape))
+    return read_only(float_array(name, value, shape, at_most=at_most))
 
 
 def read_only(array: FloatArray) -> FloatArray:
@@ -58,25 +68,32 @@ def read_only(array: FloatArray) -> FloatArray:
     return array
 
 
-def per_joint(name: str, value: npt.ArrayLike, n: int) -> FloatArray:
+def per_joint(name: str, value: npt.ArrayLike, n: int, *, at_most: float = math.inf) -> FloatArray:
     """One number for all joints, or one a joint, as a read-only array of shape (n,).
 
     Raises:
-        InvalidInputError: There is neither one number nor one a joint, or one is not finite.
+        InvalidInputError: There is neither one number nor one a joint, or one is not finite or too large.
     """
-    array = frozen_array(name, value)
+    array = frozen_array(name, value, at_most=at_most)
     return frozen_array(name, array, (n,)) if array.ndim else read_only(np.full(n, array))
 
 
-def number(name: str, value: float, *, above: float | None = None, at_least: float | None = None) -> float:
+def number(
+    name: str,
+    value: float,
+    *,
+    above: float | None = None,
+    at_least: float | None = None,
+    at_most: float | None = None,
+) -> float:
     """A finite number within its bounds.
 
     Raises:
         InvalidInputError: The value is no finite number, or outside the bounds.
     """
-    bound = f" above {above:g}" if above is not None else f" of at least {at_least:g}" if at_least is not None else ""
+    bound = _range(above, at_least, at_most)
     if isinstance(value, bool) or not isinstance(value, (int, float, np.integer, np.floating)):
-        raise InvalidInputError(f"{name}: expected a finite number{bound}, got {value!r}.")
+        raise InvalidInputError(f"{name}: expected a finite number{bound}, got {shortened(value)}.")
     try:
         out = float(value)
     except OverflowError:  # a whole number beyond all floats
@@ -85,9 +102,19 @@ def number(name: str, value: float, *, above: float | None = None, at_least: flo
         not math.isfinite(out)
         or (above is not None and not out > above)
         or (at_least is not None and not out >= at_least)
+        or (at_most is not None and not out <= at_most)
     ):
         raise InvalidInputError(f"{name}: expected a finite number{bound}, got {out!r}.")
     return out
+
+
+def signed(name: str, value: float) -> float:
+    """A number of either sign, not beyond :data:`LARGEST`.
+
+    Raises:
+        InvalidInputError: The value is no finite number, or too large.
+    """
+    return number(name, value, at_least=-LARGEST, at_most=LARGEST)
 
 
 def whole_number(name: str, value: int, *, at_least: int) -> int:
@@ -97,7 +124,7 @@ def whole_number(name: str, value: int, *, at_least: int) -> int:
         InvalidInputError: The value is no whole number, or below the bound.
     """
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < at_least:
-        raise InvalidInputError(f"{name}: expected a whole number of at least {at_least}, got {value!r}.")
+        raise InvalidInputError(f"{name}: expected a whole number of at least {at_least}, got {shortened(value)}.")
     return int(value)
 
 
@@ -127,8 +154,18 @@ def known_names(kind: str, given: Iterable[str], available: Iterable[str]) -> No
     """
     available = tuple(available)
     for name in given:
-        if name not in available:
-            raise UnknownNameError(kind, name, available)
+        known_name(kind, name, available)
+
+
+def known_name(kind: str, name: object, available: Iterable[str]) -> None:
+    """Insists that a name is among those available; what is no text, such as a list or an array, is none of them.
+
+    Raises:
+        UnknownNameError: It is not; the message has the nearest match.
+    """
+    available = tuple(available)
+    if not isinstance(name, str) or name not in available:
+        raise UnknownNameError(kind, name, available)
 
 
 class Frozen:
@@ -159,6 +196,16 @@ def _fits(shape: tuple[int, ...], wanted: tuple[int | None, ...]) -> bool:
     return len(shape) == len(wanted) and all(w is None or n == w for n, w in zip(shape, wanted, strict=True))
 
 
-def _shorten(value: object, limit: int = 120) -> str:
+def _range(above: float | None, at_least: float | None, at_most: float | None) -> str:
+    """How messages say which numbers are allowed."""
+    if above is not None:
+        return f" above {above:g}" + ("" if at_most is None else f" and of at most {at_most:g}")
+    if at_least is None:
+        return "" if at_most is None else f" of at most {at_most:g}"
+    return f" of at least {at_least:g}" if at_most is None else f" from {at_least:g} to {at_most:g}"
+
+
+def shortened(value: object, limit: int = 120) -> str:
+    """A value as messages show it: in one line, and not all of a long one."""
     text = " ".join(repr(value).split())
     return text if len(text) <= limit else text[: limit - 1] + "…"

@@ -2,24 +2,27 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from typing import Any
 
 import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
 from ikgym import scenarios
-from ikgym.env import OPTIONS, RedundantIKEnv, checked_options
+from ikgym.env import OPTIONS, RedundantIKEnv, checked_options, limited
 from ikgym.exceptions import InvalidInputError, ResetNeededError, UnknownNameError
+from ikgym.rows import Row
 from ikgym.scenarios import Preview, Scenario
 from ikgym.simulation import Outcome
 from ikgym.simulator import Observation, Simulator
 from ikgym.spaces import action_space, observation_space
-from ikgym.validation import FloatArray, whole_number
+from ikgym.validation import FloatArray, shortened, whole_number
 
 Flags = npt.NDArray[np.bool_]
 Infos = dict[str, Any]
@@ -38,6 +41,9 @@ class RedundantIKVectorEnv(gym.vector.VectorEnv[Observation, npt.NDArray[np.floa
     | `SAME_STEP` | it is reset at once: the last observation and info are in `final_obs` and `final_info` |
     | `DISABLED` | it must be reset with a mask before the next step, which is an error otherwise |
 
+    `get_attr`, `set_attr` and `call` are there for what rows have in common with single environments, but nothing in a
+    row can be stepped or drawn alone.
+
     `reset(options={"reset_mask": mask})` resets just the rows where the mask, a Boolean array of shape (N,), is
     true; `options={"q": …}` starts elsewhere, with shape (n,) for all rows or (N, n).
 
@@ -47,10 +53,12 @@ class RedundantIKVectorEnv(gym.vector.VectorEnv[Observation, npt.NDArray[np.floa
         preview: How many steps ahead the nominal coordinates are shown, or which ones.
         autoreset_mode: A mode of Gymnasium, or its value such as ``"SameStep"``.
         render_mode: None; there is nothing to see of N arms. Make a single environment to render.
+        max_episode_steps: None or the scenario's own number of steps, as Gymnasium hands it over from a `spec`.
 
     Raises:
         UnknownNameError: There is no such scenario or autoreset mode.
-        InvalidInputError: N, the scenario, the preview or the render mode is not valid.
+        InvalidInputError: N, the scenario, the preview, the render mode or the number of steps is not valid, or
+            there is no memory for N arms.
     """
 
     def __init__(
@@ -60,6 +68,7 @@ class RedundantIKVectorEnv(gym.vector.VectorEnv[Observation, npt.NDArray[np.floa
         preview: Preview = 2,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
         render_mode: str | None = None,
+        max_episode_steps: int | None = None,
     ) -> None:
         if render_mode is not None:
             raise InvalidInputError(
@@ -69,26 +78,39 @@ class RedundantIKVectorEnv(gym.vector.VectorEnv[Observation, npt.NDArray[np.floa
         self.autoreset_mode = _autoreset_mode(autoreset_mode)
         self.metadata = {**RedundantIKEnv.metadata, "autoreset_mode": self.autoreset_mode}
         self.scenario = scenarios.find(scenario)
+        if max_episode_steps not in (None, self.scenario.steps):
+            raise InvalidInputError(
+                f"max_episode_steps: expected the {self.scenario.steps} of the scenario, got {max_episode_steps!r}."
+            )
+        self._spec: EnvSpec | None = None
+        self._simulator = Simulator(self.scenario, self.num_envs, preview)  # first: it says whether there is memory
         self.single_observation_space = observation_space(self.scenario, preview)
         self.single_action_space = action_space(self.scenario)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
-        self._simulator = Simulator(self.scenario, self.num_envs, preview)
         self._generators: list[np.random.Generator | None] = [None] * self.num_envs
         self._seeds: list[int | None] = [None] * self.num_envs
         self._begun = np.zeros(self.num_envs, dtype=np.bool_)
         self._ended = np.zeros(self.num_envs, dtype=np.bool_)
 
+    @property
+    def spec(self) -> EnvSpec | None:  # an attribute of the base, which gym.make_vec() sets
+        """What the environment was made from, with the steps of its episodes; None without `gym.make_vec`."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:
+        self._spec = limited(spec, self.scenario)
+
     @property  # type: ignore[misc]  # read-only and one a row, as SyncVectorEnv has it
     def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override]
         """The rows' generators, made from fresh entropy where there was no seed."""
-        return tuple(self._generator(row) for row in range(self.num_envs))
+        return tuple(self.generator(row)[0] for row in range(self.num_envs))
 
     @property
     def np_random_seed(self) -> tuple[int, ...]:  # type: ignore[override]
         """The seeds of the rows' generators."""
-        self.np_random  # noqa: B018  # draws the seeds that are missing
-        return tuple(seed for seed in self._seeds if seed is not None)
+        return tuple(self.generator(row)[1] for row in range(self.num_envs))
 
     def reset(
         self,
@@ -155,8 +177,50 @@ class RedundantIKVectorEnv(gym.vector.VectorEnv[Observation, npt.NDArray[np.floa
         self._ended = np.zeros_like(ended) if same_step else ended
         return _observation(out), rewards, np.zeros_like(ended), ended.copy(), infos
 
+    def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
+        """What `get_attr` finds in the rows; what can be called is called, as `SyncVectorEnv` does.
+
+        Raises:
+            NoAttributeError: Rows have no such attribute.
+        """
+        found = [getattr(row, name) for row in self._rows]
+        return tuple(one(*args, **kwargs) if callable(one) else one for one in found)
+
+    def get_attr(self, name: str) -> tuple[Any, ...]:
+        """What rows say of themselves: `scenario`, spaces, `np_random`, … and what `set_attr` has given them.
+
+        Raises:
+            NoAttributeError: They have no such attribute.
+        """
+        return self.call(name)
+
+    def set_attr(self, name: str, values: Any) -> None:
+        """Gives rows an attribute of no meaning to the arms: one value a row in a list or tuple, or one for all.
+
+        Raises:
+            NoAttributeError: All arms share it, such as the scenario: make another environment.
+            InvalidInputError: There are more or fewer values than rows.
+        """
+        values = values if isinstance(values, (list, tuple)) else [values] * self.num_envs
+        if len(values) != self.num_envs:
+            raise InvalidInputError(f"values: expected {self.num_envs}, one a row, got {len(values)}.")
+        for row, value in zip(self._rows, values, strict=True):
+            setattr(row, name, value)
+
+    def generator(self, row: int) -> tuple[np.random.Generator, int]:
+        """A row's generator and its seed, made from fresh entropy where there was none."""
+        generator, seed = self._generators[row], self._seeds[row]
+        if generator is None or seed is None:
+            generator, seed = seeding.np_random()
+            self._generators[row], self._seeds[row] = generator, seed
+        return generator, seed
+
+    @functools.cached_property
+    def _rows(self) -> list[Row]:
+        return [Row(self, index) for index in range(self.num_envs)]
+
     def _begin(self, mask: Flags, starts: FloatArray | None = None) -> None:
-        self._simulator.reset(mask, {row: self._generator(row) for row in np.flatnonzero(mask).tolist()}, starts)
+        self._simulator.reset(mask, {row: self.generator(row)[0] for row in np.flatnonzero(mask).tolist()}, starts)
         self._begun |= mask
         self._ended = self._ended & ~mask
 
@@ -180,13 +244,6 @@ class RedundantIKVectorEnv(gym.vector.VectorEnv[Observation, npt.NDArray[np.floa
             infos[f"_{key}"] = rows.copy()
         return infos
 
-    def _generator(self, row: int) -> np.random.Generator:
-        generator = self._generators[row]
-        if generator is None:
-            generator, self._seeds[row] = seeding.np_random()
-            self._generators[row] = generator
-        return generator
-
     def _checked_seeds(self, seed: int | Sequence[int | None] | None) -> Sequence[int | None]:
         if seed is None:
             return [None] * self.num_envs
@@ -205,7 +262,7 @@ class RedundantIKVectorEnv(gym.vector.VectorEnv[Observation, npt.NDArray[np.floa
             return np.ones(self.num_envs, dtype=np.bool_)
         if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_ or mask.shape != (self.num_envs,):
             raise InvalidInputError(
-                f"options['reset_mask']: expected a Boolean array of shape ({self.num_envs},), got {mask!r}."
+                f"options['reset_mask']: expected a Boolean array of shape ({self.num_envs},), got {shortened(mask)}."
             )
         if not mask.any():
             raise InvalidInputError("options['reset_mask']: expected at least one true entry, got none.")

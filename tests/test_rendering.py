@@ -1,5 +1,7 @@
+import copy
 import itertools
 import logging
+import pickle
 import subprocess
 import sys
 
@@ -392,3 +394,25 @@ env.render()
 assert "matplotlib.pyplot" not in sys.modules
 """
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+@pytest.mark.parametrize("mode", ["rgb_array", "human"])
+@pytest.mark.parametrize("duplicate", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))])
+def test_copies_draw_the_episode_on_a_figure_of_their_own(mode, duplicate):
+    env = environment(mode=mode)
+    move(env)
+    picture = env.render()
+    twin = duplicate(env)
+    assert twin._renderer.figure is None
+    for _ in range(3):
+        step, again = move(env), move(twin)
+        np.testing.assert_array_equal(step[0]["q"], again[0]["q"])
+    if mode == "rgb_array":
+        fresh = environment(mode=mode)
+        for _ in range(4):
+            move(fresh)
+        np.testing.assert_array_equal(twin.render(), fresh.render())
+        assert not np.array_equal(picture, env.render())
+        assert twin._renderer.figure is not env._renderer.figure
+    for each in (env, twin):
+        each.close()

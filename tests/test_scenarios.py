@@ -113,9 +113,9 @@ def test_seed_ranges_are_disjoint_and_documented():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"dt": 0.0}, "dt: expected a finite number above 0"),
-        ({"dt": -1e-3}, "dt: expected a finite number above 0"),
-        ({"dt": np.nan}, "dt: expected a finite number above 0, got nan"),
+        ({"dt": 0.0}, r"dt: expected a finite number from 1e-12 to 1e\+12"),
+        ({"dt": -1e-3}, r"dt: expected a finite number from 1e-12 to 1e\+12"),
+        ({"dt": np.nan}, r"dt: expected a finite number from 1e-12 to 1e\+12, got nan"),
         ({"steps": 0}, "steps: expected a whole number of at least 1, got 0"),
         ({"steps": -5}, "steps: expected a whole number of at least 1"),
         ({"steps": 10.5}, "steps: expected a whole number"),
@@ -167,7 +167,7 @@ def test_register_your_own(monkeypatch):
     assert isinstance(scenarios.get("mine"), Scenario)
     assert ikgym.RedundantIKEnv("mine").scenario.steps == 3
     scenarios.register("nothing", lambda: 3)
-    with pytest.raises(InvalidInputError, match="'nothing': its maker gave 3, which is no Scenario"):
+    with pytest.raises(InvalidInputError, match="'nothing': expected its maker to give an object of Scenario, got 3"):
         scenarios.get("nothing")
     with pytest.raises(InvalidInputError, match="scenario 'mine' is registered already"):
         scenarios.register("mine", lambda: scenarios.get("varga7-slow"))

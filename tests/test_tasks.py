@@ -100,3 +100,19 @@ def test_bad_input():
         task.error(np.zeros(6), np.full(6, np.nan))
     with pytest.raises(InvalidInputError, match="jacobian: expected shape"):
         task.jacobian(np.eye(3), np.zeros((5, 7)))
+
+
+@pytest.mark.parametrize("name", ikgym.tasks.names())
+def test_error_jacobians_of_a_batch_are_those_of_its_rows(name):
+    task, arm, rng = ikgym.tasks.get(name), ikgym.arms.get("varga7"), np.random.default_rng(4)
+    rotation, position, geometric = arm.forward_and_jacobian(rng.normal(size=(2, 3, 7)))
+    nominal = task.coordinates(*arm.forward(rng.normal(size=(2, 3, 7))))
+    here, jacobian = task.coordinates(rotation, position), task.jacobian(rotation, geometric)
+    got = task.error_jacobian(nominal, here, jacobian)
+    assert got.shape == jacobian.shape
+    for index in np.ndindex(2, 3):
+        np.testing.assert_array_equal(got[index], task.error_jacobian(nominal[index], here[index], jacobian[index]))
+    with pytest.raises(InvalidInputError, match=r"jacobian: expected shape .*'n'.*, as the error has"):
+        task.error_jacobian(nominal, here, jacobian[0, 0])
+    with pytest.raises(InvalidInputError, match="jacobian: expected shape"):
+        task.error_jacobian(nominal[0, 0], here[0, 0], 3.0)

@@ -9,9 +9,9 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.exceptions import InvalidInputError
 from ikgym.jit import kernel
-from ikgym.validation import Frozen
+from ikgym.validation import Frozen, known_name
 
 Singles = npt.NDArray[np.float32]
 
@@ -54,10 +54,8 @@ class Network(Frozen):
     _constants: tuple[object, ...] = dataclasses.field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        if self.activation not in ACTIVATIONS:
-            raise UnknownNameError("activation", self.activation, ACTIVATIONS)
-        if self.squash not in SQUASHES:
-            raise UnknownNameError("squash", self.squash, SQUASHES)
+        known_name("activation", self.activation, ACTIVATIONS)
+        known_name("squash", self.squash, SQUASHES)
         weights, biases = _layers("weights", self.weights, 2), _layers("biases", self.biases, 1)
         if not weights or len(weights) != len(biases):
             raise InvalidInputError(

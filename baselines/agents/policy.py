@@ -153,7 +153,7 @@ class Agent(LearnedPolicy):
         object.__setattr__(self, "path", os.fspath(self.path))
         super().__post_init__()
         digits = self.file.digits
-        if self.hash not in (None, digits):
+        if self.hash is not None and (not isinstance(self.hash, str) or self.hash != digits):
             raise InvalidInputError(f"hash: expected {digits}, which {self.path} has, got {self.hash!r}.")
         object.__setattr__(self, "hash", digits)
 

@@ -35,7 +35,7 @@ class ShippedAgent(LearnedPolicy):
     def load(self) -> AgentFile:
         """See :meth:`LearnedPolicy.load`."""
         file = files.parse_agent(self.name, untrusted.read(self.folder / f"{self.name}{untrusted.SUFFIX}"))
-        if self.hash != file.digits:
+        if not isinstance(self.hash, str) or self.hash != file.digits:
             raise ResultsError(f"Agent {self.name} has the hash {file.digits}, expected {self.hash!r}.")
         return file
 

@@ -90,10 +90,13 @@ def _all_finite(q, qdot, pose, nominal, remaining):
 
 
 def _as_floats(value: object) -> FloatArray:
-    """A C-contiguous float64 array; refuses what is no array of real numbers, such as strings."""
-    if type(value) is np.ndarray and value.dtype is _FLOAT and value.flags.c_contiguous:
+    """A C-contiguous float64 array; refuses what is no array of real numbers, such as strings.
+
+    Read-only arrays are copied: the kernels would be compiled anew for them.
+    """
+    if type(value) is np.ndarray and value.dtype is _FLOAT and value.flags.carray:
         return value
     raw = np.asarray(value)
     if raw.dtype.kind not in "fiub":
         raise TypeError(f"no real numbers: {raw.dtype}")
-    return np.ascontiguousarray(raw, dtype=np.float64)
+    return np.array(raw, dtype=np.float64, order="C")

@@ -7,17 +7,18 @@ import dataclasses
 import functools
 import math
 import threading
+from collections.abc import Callable
 from typing import Any, ClassVar, Self
 
 import numpy as np
 import numpy.typing as npt
 
+from baselines.policy import state as states
 from baselines.policy.observations import as_batch
 from baselines.policy.problem import Batch, Memory, Operations, Problem, Solution
 from baselines.policy.state import REPORTED, Report, joined, pack, remembered, replace_rows
 from baselines.status import Status
 from ikgym.compilation import announced
-from ikgym.exceptions import InvalidInputError
 from ikgym.jit import kernel
 from ikgym.parallel import in_chunks
 from ikgym.scenarios import Preview, Scenario
@@ -208,21 +209,18 @@ class SolverPolicy(Frozen, abc.ABC):
         return as_batch(self.name, observation, self.problem, self.preview)
 
     def _recall(self, state: Memory | None, episode_start: npt.ArrayLike | None, rows: int) -> Memory:
-        starting = None if episode_start is None else np.asarray(episode_start)
-        if starting is not None and (starting.dtype.kind not in "biuf" or starting.shape not in {(), (rows,)}):
-            raise InvalidInputError(f"episode_start: expected {rows} truth values, got {episode_start!r}.")
+        starting = None if episode_start is None else states.truth_values(episode_start, rows)
         if state is None:
             return self.memory(rows)
-        shapes = [(rows, *array.shape[1:]) for array in self._example]
-        arrays = isinstance(state, tuple) and all(isinstance(array, np.ndarray) for array in state)
-        if not arrays or [array.shape for array in remembered(state)] != shapes:
-            raise InvalidInputError(
-                f"state: expected what {self.name}.predict returned for a batch of {rows}, got "
-                f"{[np.shape(k) for k in state] if isinstance(state, tuple) else state!r}."
-            )
+        memory = states.checked_memory(self.name, state, self._signature(rows), rows)
         if starting is None or not starting.any():
-            return remembered(state)
-        return self.restarted(remembered(state), np.broadcast_to(starting.astype(np.bool_), (rows,)))
+            return memory
+        return self.restarted(memory, np.broadcast_to(starting, (rows,)))
+
+    @functools.cached_property
+    def _signature(self) -> Callable[[int], states.Signature]:
+        """What the memory of so many rows is; kept, since `predict` is called with as many again and again."""
+        return functools.lru_cache(16)(functools.partial(states.signature, self._example))
 
     @functools.cached_property
     def _example(self) -> Memory:

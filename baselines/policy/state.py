@@ -7,12 +7,13 @@ Only this module needs to know the layout: :func:`pack` makes a state, `SolverPo
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from baselines.policy.problem import Memory, Solution
+from ikgym.exceptions import InvalidInputError
 
 
 class Report(NamedTuple):
@@ -21,6 +22,9 @@ class Report(NamedTuple):
     status: npt.NDArray[np.int64]
     iterations: npt.NDArray[np.int64]
 
+
+#: Shapes and types of the arrays of a memory.
+Signature = list[tuple[tuple[int, ...], np.dtype[Any]]]
 
 #: Arrays of a state in front of the memory.
 REPORTED = len(Report._fields)
@@ -40,6 +44,77 @@ def pack(status: npt.NDArray[np.int64], iterations: npt.NDArray[np.int64], memor
 def remembered(state: Memory) -> Memory:
     """The memory in a state, without its names; `SolverPolicy.memory_of` gives it with them."""
     return state[REPORTED:]
+
+
+def signature(example: Memory, rows: int) -> Signature:
+    """What the arrays of a memory of so many rows are to be.
+
+    Args:
+        example: The memory of one row.
+        rows: B.
+    """
+    return [((rows, *array.shape[1:]), array.dtype) for array in example]
+
+
+def checked_memory(name: str, state: object, expected: Signature, rows: int) -> Memory:
+    """The memory in a state that a user hands in.
+
+    Args:
+        name: The policy's, for messages.
+        state: What is to be a state.
+        expected: See :func:`signature`.
+        rows: B, of the observations that come with it.
+
+    Returns:
+        The memory; copies of arrays that kernels would have to be compiled anew for, such as read-only ones.
+
+    Raises:
+        InvalidInputError: It is no state of the policy, or belongs to another batch.
+    """
+    if isinstance(state, tuple):
+        memory = state[REPORTED:]
+        try:
+            if [(array.shape, array.dtype) for array in memory] == expected and len(state) >= REPORTED:
+                for array in memory:
+                    if not array.flags.carray:
+                        return tuple(array.copy() for array in memory)
+                return memory
+        except AttributeError:  # no arrays
+            pass
+    raise _refused(name, state, expected, rows)
+
+
+def _refused(name: str, state: object, expected: Signature, rows: int) -> InvalidInputError:
+    """An error that says why a state is none."""
+    given: object = type(state).__name__
+    if isinstance(state, tuple):
+        given = [getattr(part, "shape", type(part).__name__) for part in state]
+        if len(given) >= REPORTED and given[REPORTED:] == [shape for shape, _ in expected]:
+            # Right for Python, but the kernels would be compiled anew for it, for many seconds.
+            dtypes = [str(getattr(part, "dtype", type(part).__name__)) for part in state[REPORTED:]]
+            return InvalidInputError(
+                f"state: expected arrays of {[str(dtype) for _, dtype in expected]} behind status and iterations, as "
+                f"{name}.predict returned, got {dtypes}."
+            )
+    return InvalidInputError(
+        f"state: expected what {name}.predict returned for a batch of {rows}, got {str(given)[:200]}."
+    )
+
+
+def truth_values(episode_start: npt.ArrayLike, rows: int) -> npt.NDArray[np.bool_]:
+    """Where an episode begins. Shape (B,) or ().
+
+    Raises:
+        InvalidInputError: There are not B truth values, nor one.
+    """
+    try:
+        starting = np.asarray(episode_start)
+    except ValueError:  # lists of different lengths
+        starting = np.asarray(None)
+    if starting.dtype.kind not in "biuf" or starting.shape not in {(), (rows,)}:
+        got = " ".join(repr(episode_start).split())
+        raise InvalidInputError(f"episode_start: expected {rows} truth values, got {got[:120]}.")
+    return starting.astype(np.bool_)
 
 
 def replace_rows(memory: Memory, fresh: Memory, rows: npt.NDArray[np.bool_]) -> Memory:

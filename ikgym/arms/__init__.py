@@ -17,7 +17,7 @@ from ikgym.registry import Registry
 
 __all__ = ["SHIPPED", "Arm", "from_dh", "from_urdf", "get", "names", "register"]
 
-_registry: Registry[Arm] = Registry("arm")
+_registry: Registry[Arm] = Registry("arm", Arm)
 for _family in (varga, faitli, khan, zhang):
     for _name, _make in _family.ARMS.items():
         _registry.register(_name, _make)
@@ -30,6 +30,7 @@ def get(name: str) -> Arm:
 
     Raises:
         UnknownNameError: There is no such arm; the message has the nearest name.
+        InvalidInputError: What makes it fails, or makes something else.
     """
     return _registry.get(name)
 
@@ -47,6 +48,6 @@ def register(name: str, make: Callable[[], Arm]) -> None:
         make: Called without arguments when the arm is first asked for.
 
     Raises:
-        InvalidInputError: The name is taken.
+        InvalidInputError: The name is taken or no text, or there is nothing that makes the arm.
     """
     _registry.register(name, make)

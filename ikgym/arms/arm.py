@@ -13,7 +13,16 @@ import numpy.typing as npt
 from ikgym import kinematics
 from ikgym.exceptions import InvalidInputError
 from ikgym.kinematics import Chain
-from ikgym.validation import UNIT_TOLERANCE, FloatArray, Frozen, float_array, frozen_array, read_only, rotation_matrix
+from ikgym.validation import (
+    LARGEST,
+    UNIT_TOLERANCE,
+    FloatArray,
+    Frozen,
+    float_array,
+    frozen_array,
+    read_only,
+    rotation_matrix,
+)
 
 # What is this close to unit length is a unit vector that was rounded: three parts cannot come closer in general.
 ROUNDING = 4e-16
@@ -61,7 +70,7 @@ class Arm(Frozen):
         velocity_limit: Largest speeds of the joints in [rad/s] or [m/s], inf where there is none. Shape (n,).
 
     Raises:
-        InvalidInputError: A shape, an axis, the tool's orientation or a limit is wrong.
+        InvalidInputError: A shape, an axis, the tool's orientation or a limit is wrong, or a length beyond 1e12.
     """
 
     name: str
@@ -78,7 +87,7 @@ class Arm(Frozen):
     urdf: UrdfReference | None = dataclasses.field(init=False, repr=False, default=None)
 
     def __post_init__(self) -> None:
-        offsets = frozen_array(f"offsets of arm {self.name!r}", self.offsets, (None, 3))
+        offsets = frozen_array(f"offsets of arm {self.name!r}", self.offsets, (None, 3), at_most=LARGEST)
         n = len(offsets)
         if n == 0:
             raise InvalidInputError(f"Arm {self.name!r}: expected at least one joint, got none.")
@@ -88,7 +97,7 @@ class Arm(Frozen):
             raise InvalidInputError(
                 f"prismatic of arm {self.name!r}: expected {n} truth values, one a joint, got {self.prismatic!r}."
             )
-        tool = frozen_array(f"tool of arm {self.name!r}", self.tool, (3,))
+        tool = frozen_array(f"tool of arm {self.name!r}", self.tool, (3,), at_most=LARGEST)
         tool_rotation = rotation_matrix(f"tool_rotation of arm {self.name!r}", self.tool_rotation)
         lower = _limits(self.name, "lower", self.lower, n, -np.inf)
         upper = _limits(self.name, "upper", self.upper, n, np.inf)

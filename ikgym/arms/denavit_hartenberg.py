@@ -9,8 +9,8 @@ import numpy.typing as npt
 
 from ikgym.arms.arm import Arm
 from ikgym.arms.home import from_home
-from ikgym.exceptions import InvalidInputError, UnknownNameError
-from ikgym.validation import FloatArray, float_array
+from ikgym.exceptions import InvalidInputError
+from ikgym.validation import FloatArray, float_array, known_name
 
 CONVENTIONS = ("standard", "modified")
 
@@ -53,8 +53,7 @@ def from_dh(
         InvalidInputError: The columns are of different lengths, or hold something else than finite numbers.
         UnknownNameError: There is no such convention.
     """
-    if convention not in CONVENTIONS:
-        raise UnknownNameError("Denavit–Hartenberg convention", convention, CONVENTIONS)
+    known_name("Denavit–Hartenberg convention", convention, CONVENTIONS)
     a = float_array(f"a of arm {name!r}", a, (None,))
     n = len(a)
     d = float_array(f"d of arm {name!r}", d, (n,))

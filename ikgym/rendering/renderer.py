@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import math
 import time as clock
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -39,6 +40,10 @@ class Renderer:
         self._scene: Scene | None = None
         self._in_window = False
         self._shown_at = self._shown = -math.inf  # the last picture, in wall time and in the episode's own
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All but the figure: a copy knows the episode, and draws on a figure of its own when it is asked to."""
+        return {**self.__dict__, "_scene": None, "_in_window": False, "_staged": False}
 
     @property
     def figure(self) -> Figure | None:

@@ -12,7 +12,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 
-from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.exceptions import InvalidInputError
 from ikgym.preview import Preview
 from ikgym.registry import Registry
 from ikgym.scenarios.catalogue import SCENARIOS
@@ -20,7 +20,7 @@ from ikgym.scenarios.disturbance import Disturbance
 from ikgym.scenarios.importing import imported
 from ikgym.scenarios.reading import load
 from ikgym.scenarios.scenario import Scenario
-from ikgym.validation import whole_number
+from ikgym.validation import known_name, shortened, whole_number
 
 __all__ = ["SPLITS", "Disturbance", "Preview", "Scenario", "find", "get", "load", "names", "register", "seeds"]
 
@@ -32,7 +32,7 @@ SPLITS = {
     "test": range(2_000_000, 3_000_000),
 }
 
-_registry: Registry[Scenario] = Registry("scenario")
+_registry: Registry[Scenario] = Registry("scenario", Scenario)
 for _name, _make in SCENARIOS.items():
     _registry.register(_name, _make)
 
@@ -42,11 +42,9 @@ def get(name: str) -> Scenario:
 
     Raises:
         UnknownNameError: There is no such scenario; the message has the nearest name.
+        InvalidInputError: What makes it fails, or makes something else.
     """
-    scenario = _registry.get(name)
-    if not isinstance(scenario, Scenario):
-        raise InvalidInputError(f"Scenario {name!r}: its maker gave {scenario!r}, which is no Scenario.")
-    return scenario
+    return _registry.get(name)
 
 
 def names() -> tuple[str, ...]:
@@ -91,7 +89,7 @@ def find(item: Scenario | str | os.PathLike[str]) -> Scenario:
     if not isinstance(item, str):
         raise InvalidInputError(
             "scenario: expected a Scenario, a name of one, a file ending in .toml or 'package.module:attribute', got "
-            f"{item!r}."
+            f"{shortened(item)}."
         )
     if item not in names():
         if item.endswith(".toml"):
@@ -112,8 +110,7 @@ def seeds(split: str, episodes: int) -> tuple[int, ...]:
         UnknownNameError: There is no such split.
         InvalidInputError: The split has fewer seeds, or the number is below 1.
     """
-    if split not in SPLITS:
-        raise UnknownNameError("split", split, SPLITS)
+    known_name("split", split, SPLITS)
     available = SPLITS[split]
     if whole_number("episodes", episodes, at_least=1) > len(available):
         raise InvalidInputError(f"episodes: expected at most {len(available)} in split {split!r}, got {episodes}.")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 
 from ikgym.exceptions import InvalidInputError
-from ikgym.validation import Frozen, frozen_array
+from ikgym.validation import LARGEST, Frozen, frozen_array
 
 
 @dataclasses.dataclass(frozen=True)
@@ -18,7 +18,7 @@ class Disturbance(Frozen):
             joint.
 
     Raises:
-        InvalidInputError: A number is not finite, or a bound negative.
+        InvalidInputError: A number is not finite or beyond 1e12, or a bound negative.
     """
 
     bias: float | tuple[float, ...] = 0.0
@@ -26,7 +26,7 @@ class Disturbance(Frozen):
 
     def __post_init__(self) -> None:
         for name in ("bias", "noise"):
-            value = frozen_array(name, getattr(self, name))
+            value = frozen_array(name, getattr(self, name), at_most=LARGEST)
             if value.ndim > 1 or (name == "noise" and (value < 0.0).any()):
                 least = " of at least 0" if name == "noise" else ""
                 raise InvalidInputError(f"{name}: expected a number{least} or one a joint, got {value.tolist()}.")

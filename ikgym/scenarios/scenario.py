@@ -15,12 +15,12 @@ from ikgym.arms import Arm
 from ikgym.cost import TrackingCost
 from ikgym.exceptions import InvalidInputError
 from ikgym.preview import Preview, furthest
-from ikgym.scenarios import writing
+from ikgym.scenarios import bounds, writing
 from ikgym.scenarios.disturbance import Disturbance
 from ikgym.simulation import nominal_rows
 from ikgym.tasks import Task
 from ikgym.trajectories import Trajectory, frames_of
-from ikgym.validation import FloatArray, Frozen, frozen_array, number, per_joint, whole_number
+from ikgym.validation import LARGEST, SMALLEST, FloatArray, Frozen, frozen_array, number, per_joint
 
 # A start given by `options={"q": …}` may be this far from home in each joint, in [rad] or [m].
 START_RANGE = 2.0 * np.pi
@@ -37,9 +37,9 @@ class Scenario(Frozen):
         trajectory: The nominal trajectory. X^N(k) is where it stands at the time k Δt.
         velocity_limit: The joint velocity that an action of 1 means, in [rad/s] or [m/s]. A number, or one a
             joint.
-        cost: The stage cost.
+        cost: The stage cost. The worst episode costs at most 1e150.
         dt: Δt in [s].
-        steps: Steps of an episode.
+        steps: Steps of an episode, 100,000,000 at most.
         model: The arm that solvers know, and through which nominal joint paths are mapped; the arm itself if it
             is left out.
         start: Joint coordinates at the start in [rad] or [m], the nominal ones if left out. Shape (n,).
@@ -48,6 +48,8 @@ class Scenario(Frozen):
             and costs of a point count at its last step.
         disturbance: What the drives add to the joint velocity.
         source: Where the scenario comes from.
+
+    Lengths, angles and velocities are at most 1e12; Δt and velocity limits are at least 1e-12, too.
 
     Raises:
         InvalidInputError: A value is out of its range, or arm, task and trajectory do not fit together.
@@ -96,23 +98,27 @@ class Scenario(Frozen):
             raise InvalidInputError(
                 f"Scenario {self.name!r}: task {self.task.name!r} needs orientations, the trajectory has none."
             )
-        settle("velocity_limit", per_joint("velocity_limit", self.velocity_limit, n))
-        if (self.velocity_limit <= 0.0).any():
-            raise InvalidInputError(f"velocity_limit: expected numbers above 0, got {self.velocity_limit.tolist()}.")
-        settle("dt", number("dt", self.dt, above=0.0))
-        settle("steps", whole_number("steps", self.steps, at_least=1))
+        settle("velocity_limit", per_joint("velocity_limit", self.velocity_limit, n, at_most=LARGEST))
+        if (self.velocity_limit < SMALLEST).any():
+            raise InvalidInputError(
+                f"velocity_limit: expected numbers above 0, at least {SMALLEST:g}, got {self.velocity_limit.tolist()}."
+            )
+        settle("dt", number("dt", self.dt, at_least=SMALLEST, at_most=LARGEST))
+        settle("steps", bounds.step_count("steps", self.steps, n))
         if self.start is not None:
-            settle("start", frozen_array("start", self.start, (n,)))
+            settle("start", frozen_array("start", self.start, (n,), at_most=LARGEST))
         elif self.trajectory.joint_bound() is None:
             raise InvalidInputError(f"Scenario {self.name!r}: a Cartesian trajectory needs a start.")
         if self.initial_pose is not None:
-            settle("initial_pose", frozen_array("initial_pose", self.initial_pose, (self.task.size,)))
+            settle("initial_pose", frozen_array("initial_pose", self.initial_pose, (self.task.size,), at_most=LARGEST))
         held = self._held()
         if not held:
             raise InvalidInputError("iterations_per_point: expected at least one number, got none.")
-        settle("iterations_per_point", tuple(whole_number("iterations_per_point", h, at_least=1) for h in held))
+        held = tuple(bounds.step_count("iterations_per_point", number_of_steps, n) for number_of_steps in held)
+        settle("iterations_per_point", held)
         for name in ("bias", "noise"):
             per_joint(name, getattr(self.disturbance, name), n)
+        bounds.check_cost(self.name, self.largest_step_cost(), self.steps)
 
     def replace(self, **changes: Any) -> Self:
         """A copy with some fields changed, checked like a new one; a new arm is its own model if none is given.
@@ -195,9 +201,14 @@ class Scenario(Frozen):
 
         Returns:
             Numbers of points. Shape (steps + preview + 1,).
+
+        Raises:
+            InvalidInputError: There is no memory for so many.
         """
         last = self.steps + furthest(preview)
-        *first, usual = self._held()
+        bounds.afford_points(last + 1, self.joints)
+        # What is held for longer than the episode is held to its end.
+        *first, usual = (min(held, last + 1) for held in self._held())
         ends = np.cumsum(first, dtype=np.int64)
         rest = (last - (int(ends[-1]) if len(ends) else 0)) // usual + 1
         lengths = np.concatenate([np.array(first, dtype=np.int64), np.full(max(rest, 0), usual)])
@@ -255,6 +266,21 @@ class Scenario(Frozen):
             raise InvalidInputError(f"Scenario {self.name!r}: a Cartesian trajectory needs a start.")
         start: FloatArray = path[0]
         return start
+
+    def joint_bound(self) -> FloatArray:
+        """Absolute joint coordinates that no arm exceeds in an episode, in [rad] or [m]. Shape (n,)."""
+        disturbance: FloatArray = np.abs(self.disturbance.bias) + np.abs(self.disturbance.noise)
+        return self.start_bound() + self.steps * self.dt * (self.velocity_limit + disturbance)
+
+    def largest_step_cost(self) -> float:
+        """The most that one step of any episode can cost."""
+        trajectory = self.trajectory
+        if trajectory.random and trajectory.joint_bound() is None and type(trajectory).reach is Trajectory.reach:
+            nominal = LARGEST  # a distribution that does not say how far its paths go
+        else:
+            nominal = trajectory.reach(self.times(int(self.points()[-1]) + 1), self.model)
+        distance = self.arm.reach(self.joint_bound()) + nominal
+        return bounds.largest_step_cost(self.task, self.cost, self.velocity_limit, distance)
 
     def start_bound(self) -> FloatArray:
         """Absolute joint coordinates that no start exceeds, in [rad] or [m]. Shape (n,)."""

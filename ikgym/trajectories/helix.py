@@ -9,7 +9,7 @@ import numpy as np
 
 from ikgym.arms import Arm
 from ikgym.trajectories.trajectory import Trajectory
-from ikgym.validation import FloatArray, frozen_array, number
+from ikgym.validation import LARGEST, FloatArray, frozen_array, number, signed
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -26,7 +26,7 @@ class Helix(Trajectory):
         start: Time at which the helix is entered, in [s].
 
     Raises:
-        InvalidInputError: A shape is wrong, or a number not finite.
+        InvalidInputError: A shape is wrong, or a number not finite or beyond 1e12.
     """
 
     center: FloatArray
@@ -37,10 +37,10 @@ class Helix(Trajectory):
     has_orientation: typing.ClassVar[bool] = False
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "center", frozen_array("center", self.center, (3,)))
-        object.__setattr__(self, "radius", number("radius", self.radius, above=0.0))
+        object.__setattr__(self, "center", frozen_array("center", self.center, (3,), at_most=LARGEST))
+        object.__setattr__(self, "radius", number("radius", self.radius, above=0.0, at_most=LARGEST))
         for name in ("frequency", "climb", "start"):
-            object.__setattr__(self, name, number(name, getattr(self, name)))
+            object.__setattr__(self, name, signed(name, getattr(self, name)))
 
     def frames(self, times: FloatArray, model: Arm) -> FloatArray:
         """See :meth:`Trajectory.frames`."""

@@ -10,7 +10,7 @@ import numpy as np
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 from ikgym.trajectories.trajectory import Trajectory
-from ikgym.validation import FloatArray, frozen_array, number, per_joint
+from ikgym.validation import LARGEST, FloatArray, frozen_array, number, per_joint
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -27,7 +27,7 @@ class Sinusoid(Trajectory):
         sigmoid: S in [rad] or [m]; None for the plain form.
 
     Raises:
-        InvalidInputError: A shape is wrong, or a number not finite.
+        InvalidInputError: A shape is wrong, or a number not finite or beyond 1e12.
     """
 
     amplitude: FloatArray
@@ -37,11 +37,11 @@ class Sinusoid(Trajectory):
     sigmoid: float | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "amplitude", frozen_array("amplitude", self.amplitude, (None,)))
+        object.__setattr__(self, "amplitude", frozen_array("amplitude", self.amplitude, (None,), at_most=LARGEST))
         for name in ("frequency", "phase", "offset"):
-            object.__setattr__(self, name, per_joint(name, getattr(self, name), len(self.amplitude)))
+            object.__setattr__(self, name, per_joint(name, getattr(self, name), len(self.amplitude), at_most=LARGEST))
         if self.sigmoid is not None:
-            object.__setattr__(self, "sigmoid", number("sigmoid", self.sigmoid, above=0.0))
+            object.__setattr__(self, "sigmoid", number("sigmoid", self.sigmoid, above=0.0, at_most=LARGEST))
 
     def joint_path(self, times: FloatArray) -> FloatArray:
         """See :meth:`Trajectory.joint_path`."""
@@ -68,7 +68,7 @@ class RandomSinusoid(Trajectory):
         phase: Phases are drawn from U(phase), in [rad].
 
     Raises:
-        InvalidInputError: A shape is wrong, a number not finite, or a range the wrong way round.
+        InvalidInputError: A shape is wrong, a number not finite or beyond 1e12, or a range the wrong way round.
     """
 
     amplitude: FloatArray
@@ -78,12 +78,13 @@ class RandomSinusoid(Trajectory):
     random: typing.ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "amplitude", frozen_array("amplitude", self.amplitude, (None,)))
+        object.__setattr__(self, "amplitude", frozen_array("amplitude", self.amplitude, (None,), at_most=LARGEST))
         for name in ("scale", "frequency", "phase"):
-            low, high = frozen_array(name, getattr(self, name), (2,)).tolist()
+            low, high = frozen_array(name, getattr(self, name), (2,), at_most=LARGEST).tolist()
             if low > high:
                 raise InvalidInputError(f"{name}: expected a range (low, high), got ({low:g}, {high:g}).")
             object.__setattr__(self, name, (low, high))
+        frozen_array("amplitude times scale", self.joint_bound(), at_most=LARGEST)
 
     def sample(self, rng: np.random.Generator) -> Sinusoid:
         """See :meth:`Trajectory.sample`. Draws scales, then frequencies, then phases."""

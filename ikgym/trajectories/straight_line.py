@@ -10,7 +10,7 @@ from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 from ikgym.rotations import rodrigues, rotation_vector
 from ikgym.trajectories.trajectory import Trajectory
-from ikgym.validation import FloatArray, frozen_array, number, rotation_matrix
+from ikgym.validation import LARGEST, SMALLEST, FloatArray, frozen_array, number, rotation_matrix
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -26,7 +26,8 @@ class StraightLine(Trajectory):
         blend: Time of each parabolic blend, in [s]; at most half of the duration.
 
     Raises:
-        InvalidInputError: A shape is wrong, a number not finite, a rotation none, or the blends do not fit.
+        InvalidInputError: A shape is wrong, a number not finite or beyond 1e12, a time below 1e-12, a rotation
+            none, or the blends do not fit.
     """
 
     start: FloatArray
@@ -36,11 +37,11 @@ class StraightLine(Trajectory):
 
     def __post_init__(self) -> None:
         for name in ("start", "end"):
-            frame = frozen_array(name, getattr(self, name), (12,))
+            frame = frozen_array(name, getattr(self, name), (12,), at_most=LARGEST)
             rotation_matrix(f"rotation of {name}", frame[:9].reshape(3, 3))
             object.__setattr__(self, name, frame)
         for name in ("duration", "blend"):
-            object.__setattr__(self, name, number(name, getattr(self, name), above=0.0))
+            object.__setattr__(self, name, number(name, getattr(self, name), at_least=SMALLEST, at_most=LARGEST))
         if 2.0 * self.blend > self.duration:
             raise InvalidInputError(
                 f"blend: expected at most half of the duration of {self.duration:g} s, got {self.blend:g} s."

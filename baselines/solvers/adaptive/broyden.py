@@ -13,10 +13,9 @@ from baselines.solvers.arm_task import arm_task_of, plain_arm_task, pose_arrays,
 from baselines.solvers.resolved_rate.base import NominalMemory
 from baselines.solvers.resolved_rate.dls import DampedLeastSquares
 from ikgym import task_kernels
-from ikgym.exceptions import UnknownNameError
 from ikgym.jit import inlined, kernel
 from ikgym.kinematics import forward_and_jacobian
-from ikgym.validation import FloatArray, number
+from ikgym.validation import FloatArray, known_name, number
 
 LEARNS = ("correction", "jacobian")
 
@@ -77,8 +76,7 @@ class Broyden(DampedLeastSquares):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.learns not in LEARNS:
-            raise UnknownNameError("thing to learn", self.learns, LEARNS)
+        known_name("thing to learn", self.learns, LEARNS)
         object.__setattr__(self, "motion", number("motion", self.motion, above=0.0))
 
     def memory(self, rows: int) -> Memory:

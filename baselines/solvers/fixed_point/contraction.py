@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.exceptions import InvalidInputError
 from ikgym.jit import kernel
-from ikgym.validation import number
+from ikgym.validation import known_name, number
 
 #: The families by name, with their numbers in the kernel.
 FAMILIES = {"affine": 0, "sigmoid": 1}
@@ -46,8 +46,7 @@ def contraction(family: str, slope: float, d: float) -> Contraction:
         UnknownNameError: There is no such family.
         InvalidInputError: A number is not finite, or the slope not between -1 and 1, or 0.
     """
-    if family not in FAMILIES:
-        raise UnknownNameError("family", family, FAMILIES)
+    known_name("family", family, FAMILIES)
     slope, d = number("slope", slope), number("d", d)
     if not 0.0 < abs(slope) < 1.0:
         raise InvalidInputError(f"slope: expected a number between -1 and 1 other than 0, got {slope:g}.")

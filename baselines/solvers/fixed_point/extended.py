@@ -54,7 +54,7 @@ class FixedPointExtended(PrivilegedPath, FixedPoint):
     name: ClassVar[str] = "fixed_point_extended"
 
     def __post_init__(self) -> None:
-        if self.transformation != "transpose":
+        if not isinstance(self.transformation, str) or self.transformation != "transpose":
             raise InvalidInputError(
                 f"transformation: a longer x needs the transposed Jacobian, expected 'transpose', got "
                 f"{self.transformation!r}."

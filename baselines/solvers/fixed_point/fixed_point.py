@@ -17,10 +17,10 @@ from baselines.solvers.linear_algebra import dot
 from baselines.status import Status
 from ikgym import task_kernels
 from ikgym.arms import Arm
-from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.exceptions import InvalidInputError
 from ikgym.jit import kernel
 from ikgym.kinematics import Chain, forward, forward_and_jacobian
-from ikgym.validation import FloatArray, number, whole_number
+from ikgym.validation import FloatArray, known_name, number, whole_number
 
 #: What is done to f(q) - x before it is added to q, with the numbers that the kernel knows.
 TRANSFORMATIONS = {"transpose": 0, "none": 1, "sign": 2}
@@ -121,8 +121,7 @@ class FixedPoint(SolverPolicy):
     name: ClassVar[str] = "fixed_point"
 
     def __post_init__(self) -> None:
-        if self.transformation not in TRANSFORMATIONS:
-            raise UnknownNameError("transformation", self.transformation, TRANSFORMATIONS)
+        known_name("transformation", self.transformation, TRANSFORMATIONS)
         size, joints = self.problem.task.error_size, self.problem.model.joints
         if self.transformation != "transpose" and size != joints:
             raise InvalidInputError(

@@ -9,8 +9,8 @@ import numpy as np
 
 from baselines.solvers.levenberg_marquardt.damping_rules import LENGTH_POWERS, RULES, DampingLaw
 from ikgym.arms import Arm
-from ikgym.exceptions import InvalidInputError, UnknownNameError
-from ikgym.validation import float_array, frozen_array, number
+from ikgym.exceptions import InvalidInputError
+from ikgym.validation import float_array, frozen_array, known_name, number
 
 
 def checked_parameters(rule: str, given: Mapping[str, Any], arm: Arm) -> dict[str, Any]:
@@ -25,8 +25,7 @@ def checked_parameters(rule: str, given: Mapping[str, Any], arm: Arm) -> dict[st
         InvalidInputError: A number is out of its range, or does not belong to the rule.
         UnknownNameError: There is no such rule.
     """
-    if rule not in RULES:
-        raise UnknownNameError("damping rule", rule, RULES)
+    known_name("damping rule", rule, RULES)
     numbers, length, checked = RULES[rule].numbers, typical_link(arm), {}
     for name, check in _CHECKS.items():
         value = given[name]

@@ -31,10 +31,9 @@ from baselines.solvers.levenberg_marquardt.iteration import (
 )
 from baselines.solvers.linear_algebra import dot, pseudoinverse_rows
 from ikgym import task_kernels
-from ikgym.exceptions import UnknownNameError
 from ikgym.jit import inlined, kernel
 from ikgym.kinematics import forward, forward_and_jacobian
-from ikgym.validation import whole_number
+from ikgym.validation import known_name, whole_number
 
 JACOBIANS = ("predicted", "constant")
 STOPS = ("horizon", "first_point")
@@ -104,8 +103,7 @@ class ModelFreeAdaptivePredictiveControl(DampedIteration):
         super().__post_init__()
         whole_number("horizon", self.horizon, at_least=1)
         for kind, value, available in (("jacobians", self.jacobians, JACOBIANS), ("stop", self.stop, STOPS)):
-            if value not in available:
-                raise UnknownNameError(f"choice of {kind}", value, available)
+            known_name(f"choice of {kind}", value, available)
 
     @property
     def preview(self) -> int:

@@ -21,11 +21,14 @@ from baselines.solvers.receding_horizon.descent import (
 )
 from baselines.solvers.receding_horizon.horizon import analytic_gradient, difference_gradient
 from baselines.solvers.receding_horizon.problem_data import ProblemData
-from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.exceptions import InvalidInputError
 from ikgym.jit import kernel
-from ikgym.validation import FloatArray, number, whole_number
+from ikgym.validation import FloatArray, known_name, number, whole_number
 
 GRADIENTS = ("finite_difference", "analytic")
+
+# Smaller ones drown in the rounding of the states, which they change by Δt times as much.
+SMALLEST_DIFFERENCE = 1e-9
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -51,7 +54,7 @@ class RecedingHorizonGradient(SolverPolicy):
         alpha_max: Largest α.
         alpha_factor: By what α grows or shrinks. At least 1.
         gradient: ``"finite_difference"`` as in the paper, or ``"analytic"``.
-        difference: The finite difference of the joint velocities, in [rad/s] or [m/s].
+        difference: The finite difference of the joint velocities, in [rad/s] or [m/s]. From 1e-9 to 1.
 
     Raises:
         InvalidInputError: A parameter is out of its range.
@@ -80,9 +83,8 @@ class RecedingHorizonGradient(SolverPolicy):
                 f"alpha_max: expected at least alpha_min = {self.alpha_min:g}, got {self.alpha_max:g}."
             )
         number("alpha_factor", self.alpha_factor, at_least=1.0)
-        number("difference", self.difference, above=0.0)
-        if self.gradient not in GRADIENTS:
-            raise UnknownNameError("gradient", self.gradient, GRADIENTS)
+        number("difference", self.difference, at_least=SMALLEST_DIFFERENCE, at_most=1.0)
+        known_name("gradient", self.gradient, GRADIENTS)
 
     @property
     def preview(self) -> int:

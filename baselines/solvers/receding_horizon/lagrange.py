@@ -42,7 +42,7 @@ class RecedingHorizonLagrange(RecedingHorizonGradient):
         alpha_max: Largest α.
         alpha_factor: By what α grows or shrinks. At least 1.
         gradient: ``"finite_difference"`` or ``"analytic"``.
-        difference: The finite difference δ of the joint velocities; Δt δ is that of the states.
+        difference: The finite difference δ of the joint velocities, from 1e-9 to 1; Δt δ is that of the states.
 
     Raises:
         InvalidInputError: A parameter is out of its range.

@@ -14,10 +14,10 @@ from baselines.solvers.linear_algebra import cholesky, cholesky_solve
 from baselines.solvers.resolved_rate.dls import damped_rows
 from baselines.solvers.resolved_rate.moore_penrose import MoorePenrose
 from ikgym.arms import Arm
-from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.exceptions import InvalidInputError
 from ikgym.jit import kernel
 from ikgym.kinematics import forward_and_jacobian
-from ikgym.validation import FloatArray, number, per_joint, read_only
+from ikgym.validation import FloatArray, known_name, number, per_joint, read_only
 
 OBJECTIVES = ("posture", "joint_centring", "manipulability")
 
@@ -68,8 +68,7 @@ class NullSpace(MoorePenrose):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.objective not in OBJECTIVES:
-            raise UnknownNameError("objective", self.objective, OBJECTIVES)
+        known_name("objective", self.objective, OBJECTIVES)
         model = self.problem.model
         gain = number("secondary_gain", self.secondary_gain, at_least=0.0)
         if gain * self.problem.dt >= 2.0:

@@ -10,9 +10,9 @@ import numpy.typing as npt
 
 from baselines.policy import Batch, Memory, Operations, Solution
 from baselines.wrapper import NamedWrapper
-from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.exceptions import InvalidInputError
 from ikgym.task_kernels import pose_rows
-from ikgym.validation import FloatArray, number
+from ikgym.validation import FloatArray, known_name, number
 
 FEEDBACKS = ("calculated", "measured")
 
@@ -79,8 +79,7 @@ class Smoothed(NamedWrapper):
             raise InvalidInputError(
                 f"relaxation: explicit Euler is stable below 2/Δt = {2.0 / self.problem.dt:g}, got {relaxation:g}."
             )
-        if self.feedback not in FEEDBACKS:
-            raise UnknownNameError("feedback", self.feedback, FEEDBACKS)
+        known_name("feedback", self.feedback, FEEDBACKS)
         object.__setattr__(self, "relaxation", relaxation)
 
     def own_memory(self, rows: int) -> SmoothedMemory:

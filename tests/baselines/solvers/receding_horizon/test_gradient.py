@@ -153,7 +153,7 @@ def test_preview_is_what_the_horizon_needs():
         ({"alpha_min": 0}, InvalidInputError, "alpha_min: expected a finite number above 0"),
         ({"alpha_max": 1e-9}, InvalidInputError, "alpha_max: expected at least alpha_min = 1e-08, got 1e-09"),
         ({"alpha_factor": 0.5}, InvalidInputError, "alpha_factor: expected a finite number of at least 1"),
-        ({"difference": 0}, InvalidInputError, "difference: expected a finite number above 0"),
+        ({"difference": 0}, InvalidInputError, "difference: expected a finite number from 1e-09 to 1"),
         ({"gradient": "analytc"}, UnknownNameError, "Did you mean 'analytic'"),
     ],
 )

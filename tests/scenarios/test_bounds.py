@@ -1,0 +1,160 @@
+"""Bounds of a scenario: what would overflow, or fill the memory, is refused in one clear line."""
+
+from __future__ import annotations
+
+import math
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+import ikgym
+from ikgym import memory, scenarios
+from ikgym.exceptions import InvalidInputError
+from ikgym.scenarios import Disturbance
+from ikgym.trajectories import Helix, RandomSinusoid, Sinusoid, StraightLine
+
+FAST = scenarios.get("varga7-fast")
+FRAME = [*np.eye(3).ravel(), 1.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: ikgym.TrackingCost(p_x=400), "p_x: expected a finite number from 1 to 100, got 400"),
+        (
+            lambda: ikgym.TrackingCost(delta_x=1e-320),
+            r"delta_x: expected a finite number from 1e-12 to 1e\+12, got 1e-320",
+        ),
+        (lambda: ikgym.TrackingCost(delta_qdot=1e300), "delta_qdot: expected a finite number from"),
+        (lambda: ikgym.TrackingCost(p_out=1e300), r"p_out: expected a finite number from 1 to 100, got 1e\+300"),
+        (lambda: FAST.replace(dt=1e300), r"dt: expected a finite number from 1e-12 to 1e\+12, got 1e\+300"),
+        (lambda: FAST.replace(dt=5e-324), "dt: expected a finite number from"),
+        (lambda: FAST.replace(velocity_limit=1e308), r"velocity_limit: expected absolute values of at most 1e\+12"),
+        (lambda: FAST.replace(velocity_limit=5e-324), "velocity_limit: expected numbers above 0, at least 1e-12"),
+        (lambda: FAST.replace(start=np.full(7, 1e308)), "start: expected absolute values of at most"),
+        (lambda: FAST.replace(initial_pose=np.full(6, -1e308)), "initial_pose: expected absolute values of at most"),
+        (lambda: Sinusoid([1e308]), r"amplitude: expected absolute values of at most 1e\+12, got \[1e\+308\]"),
+        (lambda: Sinusoid([1.0], frequency=1e308), "frequency: expected absolute values of at most"),
+        (lambda: Sinusoid([1.0], sigmoid=1e308), r"sigmoid: expected a finite number above 0 and of at most 1e\+12"),
+        (lambda: RandomSinusoid([1.0], scale=(0, 1e308)), "scale: expected absolute values of at most"),
+        (lambda: RandomSinusoid([1e10], scale=(0, 1e10)), "amplitude times scale: expected absolute values"),
+        (lambda: Helix([0, 0, 0], 1e308, 1, 1), "radius: expected a finite number above 0 and of at most"),
+        (lambda: Helix([0, 0, 0], 1, 1, -1e308), r"climb: expected a finite number from -1e\+12 to 1e\+12"),
+        (lambda: StraightLine(FRAME, FRAME, 1.0, 5e-324), "blend: expected a finite number from 1e-12"),
+        (lambda: Disturbance(bias=1e308), "bias: expected absolute values of at most"),
+        (lambda: ikgym.Arm("far", [[0, 0, 1e308]], [[0, 0, 1]]), "offsets of arm 'far': expected absolute values"),
+    ],
+)
+def test_numbers_that_overflow_are_refused(make, message):
+    with pytest.raises(InvalidInputError, match=message):
+        make()
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"cost": ikgym.TrackingCost(p_x=100)},
+        {"cost": ikgym.TrackingCost(p_out=100), "velocity_limit": 100.0},
+        {"cost": ikgym.TrackingCost(delta_x=1e-12, p_x=20)},
+        {"cost": ikgym.TrackingCost(p_out=50), "velocity_limit": 1e5},
+    ],
+)
+def test_a_worst_episode_that_costs_too_much_is_refused(change):
+    with pytest.raises(InvalidInputError, match=r"expected a cost of at most 1e\+150 for the worst episode, got"):
+        FAST.replace(**change)
+
+
+@pytest.mark.parametrize("name", scenarios.names())
+def test_no_step_costs_more_than_the_bound(name):
+    """From the farthest start, at full speed: the bound is true, and within 12 decades of what happens."""
+    scenario = scenarios.get(name).replace(steps=30, iterations_per_point=1, dt=0.3)
+    bound, env, worst = scenario.largest_step_cost(), ikgym.RedundantIKEnv(scenario), 0.0
+    for sign in (-1.0, 1.0):
+        env.reset(seed=0, options={"q": sign * scenario.start_bound()})
+        for _ in range(scenario.steps):
+            worst = max(worst, -env.step(np.full(scenario.joints, sign))[1])
+    assert 0.0 < worst <= bound < 1e12 * worst
+
+
+def test_at_the_bounds_all_is_finite():
+    scenario = FAST.replace(
+        cost=ikgym.TrackingCost(delta_x=1e-12),
+        dt=1e12,
+        velocity_limit=1e12,
+        trajectory=Sinusoid([1e12] * 7, 1e12),
+    )
+    env = ikgym.RedundantIKEnv(scenario.replace(steps=3))
+    env.reset(seed=0)
+    for _ in range(3):
+        observation, reward, *_ = env.step(np.ones(7))
+        assert math.isfinite(reward)
+        assert env.observation_space.contains(observation)
+
+
+@pytest.mark.parametrize("steps", [10**12, 10**9, 10**400])
+@pytest.mark.parametrize("field", ["steps", "iterations_per_point"])
+def test_more_steps_than_any_memory_holds(field, steps):
+    message = (
+        rf"{field}: expected a whole number of at most 100000000, got \d+; .* would take about [\d,.]+ GiB of memory"
+    )
+    with pytest.raises(InvalidInputError, match=message):
+        FAST.replace(**{field: steps})
+
+
+def test_a_point_that_is_held_for_longer_than_the_episode_takes_no_more_memory():
+    scenario = FAST.replace(iterations_per_point=(2, 10**8), steps=5)
+    np.testing.assert_array_equal(scenario.points(3), [0, 1, 1, 2, 2, 2, 2, 2, 2])
+    np.testing.assert_array_equal(scenario.points(3), FAST.replace(iterations_per_point=(2, 50), steps=5).points(3))
+
+
+@pytest.fixture
+def little(monkeypatch):
+    """A machine with 1 GiB."""
+    monkeypatch.setattr(memory, "available", lambda: memory.GIB)
+
+
+NO_MEMORY = r"expected what fits into memory, got what takes about [\d,.]+ GiB, where 1\.0 GiB are available"
+
+
+@pytest.mark.usefixtures("little")
+def test_many_steps_need_memory():
+    with pytest.raises(InvalidInputError, match=f"An episode with 50000001 nominal points: {NO_MEMORY}"):
+        FAST.replace(steps=50_000_000)
+
+
+@pytest.mark.parametrize("make", [
+    lambda n: gym.make_vec("RedundantIK-v0", num_envs=n, scenario="varga7-random"),
+    lambda n: ikgym.RedundantIKVectorEnv(n),
+    lambda n: __import__("ikgym.sb3").sb3.RedundantIKVecEnv(n, "varga7-random"),
+])  # fmt: skip
+@pytest.mark.parametrize("number", [10**6, 10**13, 10**400])
+@pytest.mark.usefixtures("little")
+def test_many_environments_need_memory(make, number):
+    with pytest.raises(
+        InvalidInputError, match=f"{number} environments: expected what fits" if number < 10**400 else "fits"
+    ):
+        make(number)
+
+
+def test_what_is_available_is_what_system_and_group_leave(tmp_path, monkeypatch):
+    system, most, taken = (tmp_path / name for name in ("meminfo", "max", "current"))
+    monkeypatch.setattr(memory, "SYSTEM", system)
+    monkeypatch.setattr(memory, "GROUP", (most, taken))
+    system.write_text("MemTotal: 9000 kB\nMemAvailable:    4000 kB\n")
+    assert memory.available() == 4000 * 1024
+    most.write_text("3000000\n")
+    taken.write_text("1000000\n")
+    assert memory.available() == 2_000_000
+    most.write_text("max\n")
+    assert memory.available() == 4000 * 1024
+    system.unlink()
+    assert memory.available() is None or memory.available() > 0
+
+
+def test_rewards_that_stable_baselines3_cannot_hold():
+    sb3 = pytest.importorskip("ikgym.sb3")
+    steep = FAST.replace(cost=ikgym.TrackingCost(p_x=15))
+    assert steep.largest_step_cost() > 1e39
+    with pytest.raises(InvalidInputError, match=r"expected steps that cost at most 3\.4e\+38, since rewards of"):
+        sb3.RedundantIKVecEnv(2, steep)

@@ -1,0 +1,98 @@
+"""`call`, `get_attr`, `set_attr` and `spec`, as Gymnasium's own environments have them."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+import ikgym
+from ikgym.exceptions import InvalidInputError, NoAttributeError
+from tests.comparison import identical
+
+N = 3
+SHORT = ikgym.scenarios.get("varga7-random").replace(steps=4)
+
+
+def native(**options):
+    return gym.make_vec("RedundantIK-v0", num_envs=N, scenario=SHORT, **options)
+
+
+def sync():
+    return gym.make_vec("RedundantIK-v0", num_envs=N, scenario=SHORT, vectorization_mode="sync")
+
+
+def test_attributes_are_those_of_sync_environments():
+    ours, theirs = native(), sync()
+    for envs in (ours, theirs):
+        envs.reset(seed=4)
+    for name in ("scenario", "observation_space", "action_space", "metadata", "render_mode", "np_random_seed"):
+        assert ours.get_attr(name) == theirs.get_attr(name)
+    assert ours.get_attr("np_random_seed") == (4, 5, 6)
+    assert [g.random() for g in ours.get_attr("np_random")] == [g.random() for g in theirs.get_attr("np_random")]
+    for envs in (ours, theirs):
+        envs.set_attr("level", [1, 2, 3])
+        assert envs.get_attr("level") == (1, 2, 3)
+        envs.set_attr("level", 7)
+        assert envs.call("level") == (7, 7, 7)
+        envs.set_attr("scaled", lambda x, by: x * by)
+        assert envs.call("scaled", 3, by=2) == (6, 6, 6)
+
+
+def test_what_rows_do_not_have_is_said():
+    envs = native()
+    for name in ("step", "reset", "render", "nothing"):
+        message = rf"have no '{name}': they are reset, stepped and seen together\. Available: scenario, .*mode='sync'"
+        with pytest.raises(NoAttributeError, match=message) as caught:
+            envs.call(name)
+        assert isinstance(caught.value, AttributeError)
+    with pytest.raises(NoAttributeError, match="'scenario' of one arm cannot be set: make another environment"):
+        envs.set_attr("scenario", SHORT)
+    with pytest.raises(InvalidInputError, match="values: expected 3, one a row, got 2"):
+        envs.set_attr("level", [1, 2])
+
+
+def test_specs_say_how_long_episodes_are():
+    single, many = gym.make("RedundantIK-v0", scenario=SHORT), native()
+    assert single.spec.max_episode_steps == single.unwrapped.spec.max_episode_steps == 4
+    assert many.spec.max_episode_steps == 4
+    assert gym.spec("RedundantIK-v0").max_episode_steps is None
+    assert ikgym.RedundantIKEnv(SHORT).spec is None
+    assert ikgym.RedundantIKVectorEnv(2, SHORT).spec is None
+
+
+def test_wrappers_that_ask_for_the_length_work():
+    env = gym.wrappers.TimeAwareObservation(gym.make("RedundantIK-v0", scenario=SHORT), flatten=False)
+    assert env.max_timesteps == 4
+    env.reset(seed=0)
+    assert env.step(np.zeros(7, dtype=np.float32))[0]["time"] == 1
+
+
+def test_environments_are_made_again_from_their_specs():
+    single = gym.make("RedundantIK-v0", scenario=SHORT, preview=3)
+    for again in (gym.make(single.spec), gym.make(single.unwrapped.spec)):
+        assert identical(again.reset(seed=1), single.reset(seed=1))
+        ends = [again.step(np.zeros(7, dtype=np.float32))[3] for _ in range(4)]
+        assert ends == [False, False, False, True]
+    many = native()
+    assert gym.make_vec(many.spec).num_envs == N
+    assert gym.make_vec("RedundantIK-v0", num_envs=2, scenario=SHORT, max_episode_steps=4).num_envs == 2
+    with pytest.raises(InvalidInputError, match="max_episode_steps: expected the 4 of the scenario, got 5"):
+        gym.make_vec("RedundantIK-v0", num_envs=2, scenario=SHORT, max_episode_steps=5)
+
+
+@pytest.mark.parametrize("duplicate", [copy.deepcopy, lambda envs: pickle.loads(pickle.dumps(envs))])
+def test_copies_go_on_as_the_original_does(duplicate):
+    envs = native()
+    envs.reset(seed=2)
+    envs.set_attr("level", [1, 2, 3])
+    actions = np.full((N, 7), 0.3, dtype=np.float32)
+    envs.step(actions)
+    twin = duplicate(envs)
+    assert twin.get_attr("level") == (1, 2, 3)
+    assert twin.spec.max_episode_steps == 4
+    for _ in range(9):
+        assert identical(twin.step(actions), envs.step(actions))
