@@ -37,7 +37,7 @@ def kernel(function: Any) -> Any:
 
 
 def inlined(function: Any) -> Any:
-    """Like :func:`kernel`, and copied into its callers, so that constant arguments are folded away."""
+    """Like :func:`kernel`, and copied into its callers, so that constant arguments become constants."""
     return _cached(function, inline="always")
 
 

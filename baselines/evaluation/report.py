@@ -96,12 +96,12 @@ def readme(
         audit = _markdown(_operations(names), summaries)
         out += ["<details>", "<summary>Operations in one step, mean</summary>", "", *audit, "", "</details>", ""]
         for group, files in (pictures or {}).get(scenario, {}).items():
-            # Those of each policy are many: folded away, so that the tables stay together.
-            folded = group != OVERVIEW
-            out += ["<details>", f"<summary>{group}</summary>", ""] if folded else []
+            # Those of each policy are many: collapsed, so that the tables stay together.
+            collapsed = group != OVERVIEW
+            out += ["<details>", f"<summary>{group}</summary>", ""] if collapsed else []
             for caption, file in files:
                 out += [f"![{_escaped(caption)}]({quote(file.as_posix())})", "", f"*{_escaped(caption)}.*", ""]
-            out += ["</details>", ""] if folded else []
+            out += ["</details>", ""] if collapsed else []
     out += ["## Notes", "", *(f"- {_escaped(note)}" for note in _notes(rows)), ""]
     if skipped:
         out += ["Skipped, since the policy does not suit the scenario:", ""]

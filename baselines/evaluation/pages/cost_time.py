@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from baselines.evaluation.pages import cost_time_plot, sets
 from baselines.evaluation.pages.entries import FORESIGHT
 from baselines.evaluation.pages.families import FAMILIES, family, presets
-from baselines.evaluation.pages.markdown import IMAGES, conditions, folded, runs, share, table, time
+from baselines.evaluation.pages.markdown import IMAGES, conditions, collapsed, runs, share, table, time
 from baselines.evaluation.pages.measurement import LOST, Line, Measurement, Section
 from baselines.evaluation.plots import style
 from baselines.evaluation.plots.cost_time import Mark
@@ -142,7 +142,7 @@ def _section(one: Section) -> list[str]:
         for line in one.ranked()
     ]
     rows = table(head, lines, text=(1,))
-    return [*out, *rows, ""] if len(one.seeds) > 1 else [*out, *folded(f"All policies on {one.name}", rows)]
+    return [*out, *rows, ""] if len(one.seeds) > 1 else [*out, *collapsed(f"All policies on {one.name}", rows)]
 
 
 def _episodes(one: Section) -> str:

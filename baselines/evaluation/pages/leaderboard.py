@@ -13,7 +13,7 @@ from baselines.evaluation.pages import leaderboard_plots as plots
 from baselines.evaluation.pages import sets
 from baselines.evaluation.pages.claims import few, quoted, sentences
 from baselines.evaluation.pages.entries import ENOUGH, FORESIGHT, PAPER, label, short
-from baselines.evaluation.pages.markdown import IMAGES, conditions, episodes, folded, runs, share, table, time
+from baselines.evaluation.pages.markdown import IMAGES, conditions, episodes, collapsed, runs, share, table, time
 from baselines.evaluation.pages.measurement import (
     AGENT,
     FAR,
@@ -162,7 +162,7 @@ def _medians(section: Section) -> list[str]:
     ]
     head = ["policy", "median", "95 %", "steps ahead", "runs", "timed", "first call [µs]"]
     summary = "Intervals of the median, how far each looks ahead, runs and first calls"
-    return folded(summary, table(head, lines, text=(0,)))
+    return collapsed(summary, table(head, lines, text=(0,)))
 
 
 def _generalisation(sections: Sequence[Section]) -> list[str]:

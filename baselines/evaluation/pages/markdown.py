@@ -28,7 +28,7 @@ def table(head: Sequence[str], lines: Iterable[Sequence[str]], *, text: Sequence
     return [f"| {' | '.join(line)} |" for line in (head, rules, *lines)]
 
 
-def folded(summary: str, lines: Sequence[str]) -> list[str]:
+def collapsed(summary: str, lines: Sequence[str]) -> list[str]:
     """Lines that are shown when the reader asks for them."""
     return ["<details>", f"<summary>{summary}</summary>", "", *lines, "", "</details>", ""]
 
