@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import difflib
-import json
 import pathlib
 import textwrap
 from typing import Any, Final, NoReturn
 
+from baselines import json_files
 from baselines.files import ResultsError
 
 #: Agents of ours.
@@ -34,8 +34,8 @@ def parse_json(source: str, text: bytes) -> dict[str, Any]:
         ResultsError: It is none.
     """
     try:
-        value = json.loads(text.decode())
-    except (ValueError, RecursionError) as e:
+        value = json_files.parse(text)
+    except json_files.JsonError as e:
         refuse(source, f"is damaged: {e}")
     if not isinstance(value, dict):
         refuse(source, f"is damaged: expected a JSON object, got {type(value).__name__}")
