@@ -139,7 +139,9 @@ def _fitted(name: str, kind: Any, value: Any) -> tuple[bool, Any]:
     if origin in (dict, collections.abc.Mapping):
         inner = (*typing.get_args(kind), Any, Any)[1]
         pairs = value.items() if isinstance(value, dict) else ()
-        return isinstance(value, dict), {key: _typed(name, inner, item) for key, item in pairs}
+        for _, item in pairs:
+            _typed(name, inner, item)
+        return isinstance(value, dict), value
     return type(value) is origin, value
 
 

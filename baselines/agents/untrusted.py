@@ -8,7 +8,7 @@ import textwrap
 from typing import Any, Final, NoReturn
 
 from baselines import json_files
-from baselines.files import ResultsError
+from baselines.files import ResultsError, read_bytes
 
 #: Agents of ours.
 SUFFIX: Final = ".safetensors"
@@ -59,13 +59,11 @@ def read(file: pathlib.Path) -> bytes:
     """
     check_file(file)
     try:
-        size = file.stat().st_size
-        if size > MOST:
-            refuse(str(file), f"is too large for an agent: expected at most {MOST} bytes, got {size}")
-        with file.open("rb") as stream:
-            return stream.read(MOST)
-    except (OSError, ValueError) as e:
-        refuse(str(file), f"cannot be read: {getattr(e, 'strerror', None) or e}")
+        return read_bytes(file, MOST)
+    except OSError as e:
+        refuse(str(file), f"cannot be read: {e.strerror or e}")
+    except ValueError as e:
+        refuse(str(file), f"cannot be an agent: {e}")
 
 
 def check_trust(file: pathlib.Path, *, trust: bool) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from safetensors.numpy import save
 
+import baselines
 import ikgym
 from baselines.agents import files
 from baselines.agents.features import Processing
@@ -223,3 +224,8 @@ def test_a_file_that_is_too_large_is_not_read(tmp_path):
 def test_helper_writes_agents(tmp_path):
     path = write_agent(tmp_path / "a.safetensors", SCENARIO, "dls")
     assert load_agent(tmp_path / "a.safetensors").source == path
+
+
+def test_a_home_of_nobody():
+    with pytest.raises(ResultsError, match="Agent ~nosuchuser/x: expected a path, got one with an unknown user's home"):
+        baselines.make("agent", "varga7-fast", path="~nosuchuser/x")

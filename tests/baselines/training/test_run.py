@@ -248,7 +248,7 @@ def test_a_flipped_byte_of_a_checkpoint_is_noticed(finished, tmp_path):
         damaged[place] ^= 64
         (tmp_path / "checkpoint.pt").write_bytes(damaged)
         (tmp_path / "run.json").write_bytes((folder / "run.json").read_bytes())
-        with pytest.raises(TrainingError, match="Cannot go on from .*it is damaged: expected the SHA-256"):
+        with pytest.raises(TrainingError, match=r"Cannot go on from .*it is damaged: expected the SHA-256"):
             train(config, 3, tmp_path, resume=True)
 
 
