@@ -63,7 +63,7 @@ def read(file: pathlib.Path) -> bytes:
     except OSError as e:
         refuse(str(file), f"cannot be read: {e.strerror or e}")
     except ValueError as e:
-        refuse(str(file), f"cannot be an agent: {e}")
+        refuse(str(file), f"is no agent: {e}")
 
 
 def check_trust(file: pathlib.Path, *, trust: bool) -> None:

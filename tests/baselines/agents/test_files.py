@@ -217,7 +217,7 @@ def test_no_file(tmp_path, file):
 def test_a_file_that_is_too_large_is_not_read(tmp_path):
     with (tmp_path / "large.safetensors").open("wb") as stream:
         stream.truncate(2**28 + 1)
-    with pytest.raises(ResultsError, match="is too large for an agent: expected at most 268435456 bytes, got"):
+    with pytest.raises(ResultsError, match="is no agent: it is too large: expected at most 268435456 bytes, got"):
         load_agent(tmp_path / "large.safetensors")
 
 
