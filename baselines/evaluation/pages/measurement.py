@@ -229,7 +229,8 @@ class Measurement:
         except (OSError, ValueError, IkgymError) as e:
             if isinstance(e, ResultsError):
                 raise
-            raise ResultsError(f"Cannot read what was measured from {file}: {e}.") from None
+            reason = str(e).removesuffix(".")
+            raise ResultsError(f"Cannot read what was measured from {file}: {reason}.") from None
         return out
 
 

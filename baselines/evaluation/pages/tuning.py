@@ -119,7 +119,8 @@ class Tuning:
             for one in out.solvers:
                 refuse_trust(one.variant, str(file))
         except (OSError, ValueError, IkgymError) as e:
-            raise ResultsError(f"Cannot read settings from {file}: {e}. Search them anew with: {UPDATE}") from None
+            reason = str(e).removesuffix(".")
+            raise ResultsError(f"Cannot read settings from {file}: {reason}. Search them anew with: {UPDATE}") from None
         if out.stale:
             raise ResultsError(f"{file}: {out.scenario} has changed since it was tuned on. Tune again with: {UPDATE}")
         return out
