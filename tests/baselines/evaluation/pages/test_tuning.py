@@ -108,7 +108,7 @@ class TestTuning:
     ("changes", "message"),
     [
         ({"settings": {"path": "x.zip", "trust": True}, "spec": "agent"}, "trust is given on the command line"),
-        ({"spec": "agent:path=x.zip,trust=True"}, "trust is given on the command line"),
+        ({"spec": "agent:path=x.zip,trust=True", "settings": {}}, "trust is given on the command line"),
         ({"tried": "many"}, "the key 'tried' should have a value of type int, got 'many'"),
         ({"spec": 3}, "the key 'spec' should have a value of type str, got 3"),
         ({"spec": "nobody"}, "There is no policy 'nobody'"),
