@@ -28,6 +28,7 @@ from baselines.evaluation.plan import Plan, make_plan
 from baselines.evaluation.results import Results, Rows
 from baselines.evaluation.runner import run
 from baselines.files import write
+from baselines.locks import locked
 from ikgym.scenarios import Preview, Scenario
 from ikgym.validation import whole_number
 
@@ -138,6 +139,33 @@ def _carry_out(
     show: Callable[[Rows], None] | None = None,
 ) -> Rows:
     whole_number("workers", workers, at_least=1)
+    with contextlib.nullcontext() if out is None else locked(out):
+        return _in_folder(
+            plan,
+            workers=workers,
+            out=out,
+            resume=resume,
+            overwrite=overwrite,
+            plots=plots,
+            progress=progress,
+            command=command,
+            show=show,
+        )
+
+
+def _in_folder(
+    plan: Plan,
+    *,
+    workers: int,
+    out: pathlib.Path | None,
+    resume: bool,
+    overwrite: bool,
+    plots: bool,
+    progress: bool,
+    command: str,
+    show: Callable[[Rows], None] | None,
+) -> Rows:
+    """Carries a plan out in a folder that no other process writes into."""
     results = None if out is None else Results(out, plan, describe(), resume=resume, overwrite=overwrite)
     left = [job for job in plan.jobs if results is None or not results.done(job)]
     rows = {} if results is None else {row.key: row for row in results.rows}

@@ -1,7 +1,8 @@
-"""Files of results and agents, written in one go."""
+"""Files of results and agents: written in one go, read within bounds."""
 
 from __future__ import annotations
 
+import os
 import pathlib
 
 from ikgym import files
@@ -22,3 +23,21 @@ def write(file: pathlib.Path, content: bytes) -> None:
         files.write(file, content)
     except OSError as e:
         raise ResultsError(f"Cannot write {file}: {e.strerror or e}.") from None
+
+
+def read_bytes(file: pathlib.Path, most: int) -> bytes:
+    """All bytes of a file, none of which is read if there are too many.
+
+    Args:
+        file: Where to read.
+        most: How many there may be.
+
+    Raises:
+        OSError: It cannot be read.
+        ValueError: There are more.
+    """
+    with file.open("rb") as stream:
+        size = os.fstat(stream.fileno()).st_size
+        if size > most:
+            raise ValueError(f"it is too large: expected at most {most} bytes, got {size}")
+        return stream.read(size)

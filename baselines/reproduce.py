@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import json
 import pathlib
@@ -20,6 +21,7 @@ from baselines.canonical import jsonable
 from baselines.evaluation.machine import describe
 from baselines.evaluation.plots.style import png
 from baselines.files import write
+from baselines.locks import locked
 from baselines.papers import PAPERS, get
 from baselines.papers.ledger import ledger
 from baselines.papers.paper import Finding, Paper
@@ -62,7 +64,13 @@ def reproduce(
     numbers = None if figures is None else set(figures)
     _check_figures(chosen, numbers)
     folder = None if out is None else pathlib.Path(out)
-    runs = Runs(steps, progress=progress)
+    with contextlib.nullcontext() if folder is None else locked(folder):
+        return _reproduced(chosen, numbers, Runs(steps, progress=progress), folder, progress=progress)
+
+
+def _reproduced(
+    chosen: Sequence[Paper], numbers: set[int] | None, runs: Runs, folder: pathlib.Path | None, *, progress: bool
+) -> Findings:
     findings: Findings = {}
     for paper in chosen:
         drawn = _draw(paper, runs, numbers, folder, progress=progress)

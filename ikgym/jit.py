@@ -10,7 +10,9 @@ from __future__ import annotations
 import functools
 import hashlib
 import logging
+import pickle
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -55,10 +57,29 @@ def _cached(function: Any, **options: Any) -> Any:
         logger.info("No folder to keep machine code in: %s is compiled anew in each process.", function.__qualname__)
         return njit(nogil=True, **options)(function)
     # Not public, and absent where compilation is switched off: then numba's own stamp has to do.
-    file = getattr(getattr(compiled, "_cache", None), "_cache_file", None)
+    cache = getattr(compiled, "_cache", None)
+    if cache is not None:
+        cache.load_overload = _forgiving(cache.load_overload, function)
+        cache.save_overload = _forgiving(cache.save_overload, function)
+    file = getattr(cache, "_cache_file", None)
     if hasattr(file, "_source_stamp"):
         file._source_stamp = _stamp(function.__module__)  # type: ignore[union-attr]
     return compiled
+
+
+def _forgiving(call: Callable[..., Any], function: Any) -> Callable[..., Any]:
+    """A call of numba's cache that goes without one where the disk is full or closed, or a file on it is damaged."""
+
+    def tried(*arguments: Any) -> Any:
+        try:
+            return call(*arguments)
+        except (OSError, EOFError, pickle.UnpicklingError, ValueError, TypeError, AttributeError, ImportError) as e:
+            if kept_on_disk():  # said once: what hinders one kernel hinders most
+                logger.warning("Machine code cannot be kept on disk, and is compiled anew in each process: %s", e)
+            _not_kept.add(f"{function.__module__}.{function.__qualname__}")
+            return None
+
+    return tried
 
 
 def _stamp(module: str) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
+import pathlib
 import subprocess
 import sys
 import threading
@@ -78,6 +79,47 @@ def test_without_a_folder_to_write_to(monkeypatch, caplog):
         threading.Event().wait(0.2)
     assert "Compiling the test; this happens once in each process, since there is no folder" in caplog.text
     assert "kept on disk" not in caplog.text
+
+
+CACHE = """
+import sys
+from ikgym.jit import kept_on_disk
+if sys.argv[1:] == ["full"]:
+    import resource, signal
+    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
+from callee import scaled
+print(scaled(1.0), kept_on_disk())
+"""
+
+
+def with_cache(folder, *arguments):
+    """What a fresh process prints."""
+    (folder / "callee.py").write_text(CALLEE.format(jit=OURS, scale=2.0))
+    (folder / "run.py").write_text(CACHE)
+    sources = {"PYTHONPATH": str(pathlib.Path(jit.__file__).parents[1]), "PYTHONDONTWRITEBYTECODE": "1"}
+    line = [sys.executable, "run.py", *arguments]
+    done = subprocess.run(line, cwd=folder, env={**os.environ, **sources}, capture_output=True, text=True, check=False)
+    return done.stdout.strip(), done.stderr
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no limits there that stand in for a full disk")
+def test_a_full_disk_is_said_once_and_hinders_nothing(tmp_path):
+    out, said = with_cache(tmp_path, "full")
+    assert out == "2.0 False"
+    assert said.startswith("Machine code cannot be kept on disk, and is compiled anew in each process: ")
+    assert "Traceback" not in said
+    assert with_cache(tmp_path) == ("2.0 True", "")
+
+
+@pytest.mark.parametrize("suffix", ["nbi", "nbc"])
+def test_damaged_machine_code_is_made_anew(tmp_path, suffix):
+    assert with_cache(tmp_path) == ("2.0 True", "")
+    for file in tmp_path.glob(f"__pycache__/*.{suffix}"):
+        file.write_bytes(file.read_bytes()[:20])
+    out, said = with_cache(tmp_path)
+    assert out == "2.0 False"
+    assert said.startswith("Machine code cannot be kept on disk")
 
 
 @pytest.mark.parametrize("module", ["ikgym", "baselines"])

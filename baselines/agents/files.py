@@ -67,10 +67,10 @@ def save_agent(
         **description(processing, scenario, training),
         "network": {"sizes": list(network.sizes), "activation": network.activation, "squash": network.squash},
     }
-    digest = _digest(tensors, about)
-    metadata = {KEY: json.dumps({**about, "hash": digest}, ensure_ascii=False, allow_nan=False)}
+    found = digest(tensors, about)
+    metadata = {KEY: json.dumps({**about, "hash": found}, ensure_ascii=False, allow_nan=False)}
     write(file, save(dict(tensors), metadata))
-    return digest
+    return found
 
 
 def description(processing: Processing, scenario: Scenario, training: Mapping[str, Any] | None) -> dict[str, Any]:
@@ -126,10 +126,10 @@ def parse_agent(source: str, content: bytes) -> AgentFile:
         network = _network(about["network"], tensors)
     except _UNREADABLE as e:
         refuse(source, f"is no agent that this version can read: {_said(e)}")
-    digest = _digest(_tensors(network), about)
-    if digest != claimed:
-        refuse(source, f"was changed after it was written: expected the hash {claimed}, got {digest}")
-    return AgentFile(source, network, processing, about, digest)
+    found = digest(_tensors(network), about)
+    if found != claimed:
+        refuse(source, f"was changed after it was written: expected the hash {claimed}, got {found}")
+    return AgentFile(source, network, processing, about, found)
 
 
 def parse_header(source: str, content: bytes) -> dict[str, Any]:
@@ -224,12 +224,13 @@ def _check_types(about: Mapping[str, Any], processing: Processing) -> None:
         raise InvalidInputError(f"training: expected an object, got {about['training']!r}")
 
 
-def _digest(tensors: list[tuple[str, Singles]], about: Mapping[str, Any]) -> str:
-    digest = hashlib.sha256(canonical(about).encode())
+def digest(tensors: list[tuple[str, Singles]], about: Mapping[str, Any]) -> str:
+    """The hash of a file: of what it says, and of its tensors in their order."""
+    out = hashlib.sha256(canonical(about).encode())
     for name, tensor in tensors:
-        digest.update(f"{name}{tensor.shape}".encode())
-        digest.update(tensor.astype("<f4", copy=False).tobytes())
-    return digest.hexdigest()
+        out.update(f"{name}{tensor.shape}".encode())
+        out.update(tensor.astype("<f4", copy=False).tobytes())
+    return out.hexdigest()
 
 
 def _names(value: object) -> str:

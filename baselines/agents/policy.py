@@ -159,7 +159,10 @@ class Agent(LearnedPolicy):
 
     def load(self) -> AgentFile:
         """See :meth:`LearnedPolicy.load`."""
-        file = pathlib.Path(self.path).expanduser()
+        try:
+            file = pathlib.Path(self.path).expanduser()
+        except RuntimeError:
+            raise ResultsError(f"Agent {self.path}: expected a path, got one with an unknown user's home.") from None
         if file.suffix == untrusted.ZIP:
             untrusted.check_trust(file, trust=self.trust)
             # Only these files need a learning library.

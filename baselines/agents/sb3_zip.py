@@ -26,6 +26,7 @@ from baselines.agents.protocols import AgentFile, Transform
 from baselines.agents.raw import ORDER, RawObservation
 from baselines.agents.sb3_network import network_of
 from baselines.agents.untrusted import check_trust, parse_json, read, refuse
+from baselines.archives import ArchiveError, packed, unpacked
 from baselines.files import write
 from baselines.policy import Problem
 from ikgym.exceptions import InvalidInputError, MissingDependencyError
@@ -68,7 +69,11 @@ def load_zip(
     """
     check_trust(file, trust=trust)
     source, content = str(file), read(file)
-    described = _described(source, content)
+    try:
+        members = unpacked(content)
+    except ArchiveError as e:
+        refuse(source, f"is damaged, or no .zip file: {e}")
+    described = members.get(MEMBER)
     about: dict[str, Any] = {}
     processing: Transform | None = None
     if described is not None:
@@ -77,7 +82,7 @@ def load_zip(
         processing = check_described(source, about)
         if offsets is not None:
             raise InvalidInputError(f"offsets: {file} says itself what it sees, got {offsets}.")
-    network = _loaded(source, content)
+    network = _loaded(source, packed(members))  # not the file, whose directory may claim whatever it likes
     if processing is None:
         try:
             processing = RawObservation.of_size(network.inputs, problem, offsets)
@@ -197,15 +202,6 @@ class TrustedModel:
             end = begin + math.prod(shape)
             out[name], begin = numbers[begin:end].reshape(shape), end
         return out[""] if self._flat else out
-
-
-def _described(source: str, content: bytes) -> bytes | None:
-    """What :func:`save_zip` wrote of an agent; None where it did not."""
-    try:
-        with zipfile.ZipFile(io.BytesIO(content)) as archive:
-            return archive.read(MEMBER) if MEMBER in archive.namelist() else None
-    except Exception as e:  # whatever a damaged file makes the reader raise
-        refuse(source, f"is damaged, or no .zip file: {e}")
 
 
 def _loaded(source: str, content: bytes) -> TrustedModel:

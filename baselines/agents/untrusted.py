@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import difflib
-import json
 import pathlib
 import textwrap
 from typing import Any, Final, NoReturn
 
-from baselines.files import ResultsError
+from baselines import json_files
+from baselines.files import ResultsError, read_bytes
 
 #: Agents of ours.
 SUFFIX: Final = ".safetensors"
@@ -34,8 +34,8 @@ def parse_json(source: str, text: bytes) -> dict[str, Any]:
         ResultsError: It is none.
     """
     try:
-        value = json.loads(text.decode())
-    except (ValueError, RecursionError) as e:
+        value = json_files.parse(text)
+    except json_files.JsonError as e:
         refuse(source, f"is damaged: {e}")
     if not isinstance(value, dict):
         refuse(source, f"is damaged: expected a JSON object, got {type(value).__name__}")
@@ -59,13 +59,11 @@ def read(file: pathlib.Path) -> bytes:
     """
     check_file(file)
     try:
-        size = file.stat().st_size
-        if size > MOST:
-            refuse(str(file), f"is too large for an agent: expected at most {MOST} bytes, got {size}")
-        with file.open("rb") as stream:
-            return stream.read(MOST)
-    except (OSError, ValueError) as e:
-        refuse(str(file), f"cannot be read: {getattr(e, 'strerror', None) or e}")
+        return read_bytes(file, MOST)
+    except OSError as e:
+        refuse(str(file), f"cannot be read: {e.strerror or e}")
+    except ValueError as e:
+        refuse(str(file), f"is no agent: {e}")
 
 
 def check_trust(file: pathlib.Path, *, trust: bool) -> None:

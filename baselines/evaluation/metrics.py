@@ -13,6 +13,7 @@ import numpy as np
 from baselines.canonical import canonical
 from baselines.episode import added_up
 from baselines.evaluation.rollout import Episode
+from baselines.json_files import JsonError, made, shown
 from baselines.status import Status
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
@@ -109,14 +110,18 @@ class Row:
         Raises:
             InvalidInputError: A key is missing, is one too many, or has a value of a wrong type.
         """
-        if not isinstance(values, Mapping):
-            raise InvalidInputError(f"expected an object with the keys of a row, got {type(values).__name__}")
-        types = {field.name: str(field.type) for field in dataclasses.fields(cls)}
-        if missing := [name for name in types if name not in values]:
-            raise InvalidInputError(f"the key {missing[0]!r} is missing")
-        if unknown := [name for name in values if name not in types]:
-            raise InvalidInputError(f"there is a key {unknown[0]!r} that no row has")
-        return cls(**{name: _typed(name, types[name], values[name]) for name in types})
+        numbers = {field.name for field in dataclasses.fields(cls) if field.type == "float"}
+        given = values
+        if isinstance(values, dict):
+            given = {name: math.nan if value is None and name in numbers else value for name, value in values.items()}
+        try:
+            row = made(cls, given)
+        except JsonError as e:
+            raise InvalidInputError(str(e)) from None
+        for status in (row.status, *row.status_counts):
+            if status.upper() not in Status.__members__:
+                raise InvalidInputError(f"the key 'status' should be one of a solve, got {shown(status)}")
+        return row
 
 
 def key(
@@ -184,21 +189,3 @@ def _rms(values: FloatArray) -> float:
 
 def _finite_or_none(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
-def _typed(name: str, kind: str, value: Any) -> Any:
-    """A value of JSON as the field's type, or words that say why not."""
-    number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    right = {
-        "str": isinstance(value, str),
-        "int": isinstance(value, int) and number,
-        "float": number or value is None,
-        "float | None": number or value is None,
-        "int | None": value is None or (isinstance(value, int) and number),
-        "str | None": value is None or isinstance(value, str),
-    }.get(kind, isinstance(value, dict))
-    if not right or (name == "status" and value.upper() not in Status.__members__):
-        raise InvalidInputError(f"the key {name!r} should have a value of type {kind}, got {value!r}")
-    if kind.startswith("float") and value is not None:
-        return float(value)
-    return math.nan if kind == "float" and value is None else value

@@ -10,7 +10,6 @@ import json
 import pathlib
 import re
 import tempfile
-import zipfile
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -18,11 +17,12 @@ import numpy as np
 import numpy.typing as npt
 
 import ikgym
+from baselines import archives, json_files
 from baselines.canonical import canonical
 from baselines.evaluation.metrics import Row
 from baselines.evaluation.plan import Job, Plan, Skipped
 from baselines.evaluation.runner import Played
-from baselines.files import ResultsError, write
+from baselines.files import ResultsError, read_bytes, write
 from ikgym.exceptions import InvalidInputError
 from ikgym.preview import furthest
 from ikgym.scenarios import SPLITS
@@ -162,9 +162,8 @@ class Results:
         """
         file = self.series_file(row)
         try:
-            with np.load(file, allow_pickle=False) as content:
-                return dict(content)
-        except (OSError, ValueError, EOFError, zipfile.BadZipFile) as e:
+            return archives.arrays(read_bytes(file, archives.MOST))
+        except (OSError, ValueError) as e:
             raise ResultsError(f"Cannot read {file}: {e}. Delete it and run again with --resume.") from None
 
     def _clear(self) -> None:
@@ -195,16 +194,12 @@ def read_rows(file: pathlib.Path) -> list[Row]:
     Raises:
         ResultsError: It cannot be read, was written by a version with other columns, or is damaged; nothing is deleted.
     """
-
-    def refuse(constant: str) -> None:
-        raise ValueError(f"{constant} is no JSON")
-
     advice = "Nothing was changed; mend or remove the file, or choose another directory."
     try:
-        content = json.loads(file.read_text(encoding="utf-8"), parse_constant=refuse)
+        content = json_files.read(file)
     except OSError as e:
         raise ResultsError(f"Cannot read {file}: {e.strerror}.") from None
-    except (ValueError, RecursionError) as e:
+    except ValueError as e:
         raise ResultsError(f"{file} is damaged: {e}. {advice}") from None
     if not isinstance(content, list):
         raise ResultsError(f"{file} is damaged: expected a list of rows, got {type(content).__name__}. {advice}")

@@ -23,6 +23,7 @@ from baselines.evaluation.metrics import Row, measure
 from baselines.evaluation.plan import Job
 from baselines.evaluation.rollout import Episode, Player, Tick, rollout, rollouts
 from baselines.evaluation.trajectory_log import TrajectoryLog, trajectory_log
+from baselines.lifetime import end_with_parent
 from baselines.oracle import best_known
 from ikgym.compilation import logger
 from ikgym.exceptions import IkgymError
@@ -248,5 +249,6 @@ def _in_processes(parts: Sequence[list[Job]], workers: int) -> Iterator[tuple[li
 
 
 def _die_quietly() -> None:
-    """Lets Ctrl-C end a worker without a traceback."""
+    """Lets Ctrl-C end a worker without a traceback, and ends it with its parent."""
+    end_with_parent()
     signal.signal(signal.SIGINT, signal.SIG_DFL)

@@ -14,6 +14,7 @@ import pathlib
 from collections.abc import Iterable, Mapping
 from typing import Any, Protocol
 
+from baselines import json_files
 from baselines.files import ResultsError, write
 from baselines.fingerprints import episode_hash
 from ikgym.scenarios import Scenario
@@ -130,10 +131,13 @@ def _lookup(name: str, seed: int, content: Scenario | str) -> Record | None:
 @functools.cache
 def _read(path: pathlib.Path) -> dict[tuple[str, int], Record]:
     try:
-        records = [Record(**values) for values in json.loads(path.read_text(encoding="utf-8"))]
+        content = json_files.read(path)
+        if not isinstance(content, list):
+            raise ValueError(f"expected a list of records, got {json_files.shown(content)}")
+        records = [json_files.made(Record, values) for values in content]
     except FileNotFoundError:
         return {}
-    except (OSError, ValueError, TypeError) as e:
+    except (OSError, ValueError) as e:
         raise ResultsError(f"{path} is damaged: {e}. Mend it, or find the costs anew with: {UPDATE}") from None
     return {(one.scenario, one.seed): one for one in records}
 

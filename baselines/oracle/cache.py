@@ -5,20 +5,19 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import io
-import json
 import logging
 import os
 import pathlib
 import sys
-import zipfile
 from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from baselines import archives, json_files
 from baselines.canonical import canonical
-from baselines.files import ResultsError, write
+from baselines.files import ResultsError, read_bytes, write
 from baselines.fingerprints import episode_hash
-from baselines.oracle.optimum import Optimum, Search, Start
+from baselines.oracle.optimum import Optimum, Search
 from baselines.oracle.search import VERSION, search
 from ikgym import scenarios
 from ikgym.scenarios import Scenario
@@ -105,13 +104,14 @@ def _packed(optimum: Optimum) -> bytes:
 
 def _read(file: pathlib.Path) -> Optimum | None:
     try:
-        # Read before it is opened as an archive: NumPy would leave the file of a damaged one open.
-        with np.load(io.BytesIO(file.read_bytes()), allow_pickle=False) as content:
-            rest = json.loads(str(content["rest"]))
-            rest["starts"] = tuple(Start(**start) for start in rest["starts"])
-            return Optimum(q=content["q"], qdot=content["qdot"], **rest)
+        content = archives.arrays(read_bytes(file, archives.MOST))
+        rest = json_files.parse(str(content.pop("rest")).encode(), finite=False)
+        optimum = json_files.made(Optimum, {**rest, **content})
+        if not all(path.dtype == np.float64 and path.ndim == 2 for path in content.values()):
+            raise ValueError("expected paths of finite numbers")
+        return optimum
     except FileNotFoundError:
         return None
-    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as e:
+    except (OSError, ValueError, KeyError, TypeError) as e:
         logger.warning("%s is damaged, and is made anew: %s", file, e)
         return None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 import io
 import pathlib
 import pickle
@@ -10,11 +11,18 @@ from typing import Any
 
 import torch
 
-from baselines.files import write
+from baselines import archives
+from baselines.files import read_bytes, write
 from baselines.training.errors import TrainingError
 
 #: Changes when earlier files can no longer be resumed.
-FORMAT = 1
+FORMAT = 2
+#: What a file begins with, before the digest of all that follows.
+MAGIC = b"ikgym checkpoint "
+#: Bytes of a file that are read at most: one with a buffer of the largest size has fewer.
+MOST = 2**36
+# Letters of the digest and the end of its line.
+_DIGEST = 65
 
 
 @dataclasses.dataclass
@@ -46,20 +54,38 @@ class Checkpoint:
         content = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
         stream = io.BytesIO()
         torch.save({"format": FORMAT, **content}, stream)
-        write(file, stream.getvalue())
+        write(file, sealed(stream.getvalue()))
 
 
 def load(file: pathlib.Path) -> Checkpoint:
     """The checkpoint of a file; nothing in it is executed.
 
     Raises:
-        TrainingError: It cannot be read.
+        TrainingError: It cannot be read, or is not as it was written.
     """
     try:
-        content = torch.load(file, map_location="cpu", weights_only=True)
+        content = torch.load(io.BytesIO(_payload(file)), map_location="cpu", weights_only=True)
         if content.pop("format") != FORMAT:
             raise ValueError("it was written by another version")
         return Checkpoint(**content)
     except (OSError, RuntimeError, ValueError, KeyError, TypeError, AttributeError, EOFError, pickle.PickleError) as e:
         reason = " ".join(str(e).split()) or type(e).__name__
         raise TrainingError(f"Cannot go on from {file}: {reason[:300]}. Begin anew with --overwrite.") from None
+
+
+def sealed(payload: bytes) -> bytes:
+    """What a file holds: the digest, and what it is of."""
+    return b"".join([MAGIC, hashlib.sha256(payload).hexdigest().encode(), b"\n", payload])
+
+
+def _payload(file: pathlib.Path) -> bytes:
+    """What :func:`torch.load` may read: as it was written, and no archive that unpacks to more than its own bytes."""
+    content = read_bytes(file, MOST)
+    if not content.startswith(MAGIC):
+        raise ValueError("it is no checkpoint, or was written by another version")
+    begin = len(MAGIC) + _DIGEST
+    claimed, payload = content[len(MAGIC) : begin].rstrip(b"\n").decode(errors="replace"), content[begin:]
+    if (digest := hashlib.sha256(payload).hexdigest()) != claimed:
+        raise ValueError(f"it is damaged: expected the SHA-256 {claimed}, got {digest}")
+    archives.check_stored(payload)
+    return payload

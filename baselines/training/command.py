@@ -17,6 +17,7 @@ import tyro
 
 from baselines import command as shared
 from baselines import registry
+from baselines.spec import refuse_trust
 from baselines.training import methods, presets
 from baselines.training.config.base import SHAPE, Config
 from baselines.training.errors import TrainingError
@@ -240,6 +241,9 @@ def _repeat(command: Repeat) -> int:
     wanted = about.get("weights_sha256")
     if not wanted:
         raise TrainingError(f"{command.run} is of a run that has not ended: finish it with --resume.")
+    for name in {"base_policy", "expert"} & about["config"].keys():
+        if about["config"][name] is not None:
+            refuse_trust(about["config"][name], f"{command.run}: {name}")
     config = methods.get(about["method"]).config.from_json(about["config"])
     runs = SeedRuns(
         config,

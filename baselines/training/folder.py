@@ -7,6 +7,7 @@ import pathlib
 from collections.abc import Mapping
 from typing import Any
 
+from baselines import json_files
 from baselines.files import write
 from baselines.training.config.base import differences
 from baselines.training.errors import TrainingError
@@ -110,10 +111,10 @@ def read_run(file: pathlib.Path) -> dict[str, Any]:
         InvalidInputError: Its seed is none.
     """
     try:
-        content = json.loads(file.read_text(encoding="utf-8"))
+        content = json_files.read(file)
     except OSError as e:
         raise TrainingError(f"Cannot read {file}: {e.strerror}.") from None
-    except (ValueError, RecursionError) as e:
+    except ValueError as e:
         raise TrainingError(f"{file} is damaged: {e}.") from None
     if not isinstance(content, dict) or not {"method", "seed", "config"} <= content.keys():
         raise TrainingError(f"{file} is no run.json of a training.")

@@ -34,6 +34,7 @@ from torch.utils.tensorboard import SummaryWriter
 import ikgym
 from baselines.evaluation.machine import describe
 from baselines.fingerprints import fingerprint
+from baselines.locks import locked
 from baselines.training import checkpoint, methods
 from baselines.training.checkpoint import Checkpoint
 from baselines.training.config.base import Config
@@ -96,7 +97,7 @@ def train(
     Raises:
         IkgymError: What training, validation or files can go wrong with.
     """
-    with deterministic_torch():
+    with locked(path), deterministic_torch():
         run = _Run(config, seed, Folder(path), command)
         run.begin(resume=resume, overwrite=overwrite)
         return run.go(checkpoint_every, on_segment)
@@ -269,7 +270,8 @@ def about_file(file: pathlib.Path | None) -> dict[str, Any] | None:
     if file is None:
         return None
     try:
-        return {"file": str(file), "sha256": hashlib.sha256(file.read_bytes()).hexdigest()}
+        with file.open("rb") as stream:
+            return {"file": str(file), "sha256": hashlib.file_digest(stream, "sha256").hexdigest()}
     except OSError as e:
         raise TrainingError(f"Cannot read {file}: {e.strerror or e}.") from None
 

@@ -14,6 +14,7 @@ from multiprocessing.context import SpawnProcess
 
 from tqdm import tqdm
 
+from baselines.lifetime import end_with_parent
 from baselines.training.config.base import Config
 from baselines.training.score import Score
 from ikgym.exceptions import IkgymError
@@ -189,6 +190,7 @@ def _in_processes(runs: SeedRuns, seeds: Sequence[int], workers: int, bar: Bar) 
 
 def _child(runs: SeedRuns, seed: int, connection: Connection) -> None:
     """The life of a process."""
+    end_with_parent()
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C ends it without a traceback
     try:
         result = _train(runs, seed, connection)

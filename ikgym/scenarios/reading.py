@@ -29,6 +29,8 @@ URDF_TEXTS = {
     "tip": "the name of a link",
 }
 URDF_NUMBERS = ("tool", "tool_rotation")
+#: Bytes of a file that are read at most.
+MOST = 2**24
 
 
 def load(file: str | os.PathLike[str]) -> Scenario:
@@ -74,7 +76,11 @@ def _table(file: str | os.PathLike[str]) -> Table:
     import tomllib  # seldom needed, and slow to import
 
     try:
-        return tomllib.loads(pathlib.Path(file).read_bytes().decode())
+        with pathlib.Path(file).open("rb") as stream:
+            content = stream.read(MOST + 1)
+        if len(content) > MOST:
+            raise ValueError(f"it has more than {MOST} bytes")
+        return tomllib.loads(content.decode())
     except tomllib.TOMLDecodeError as error:
         raise InvalidInputError(f"expected TOML, got a fault: {error}.") from None
     except UnicodeDecodeError as error:

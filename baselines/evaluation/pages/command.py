@@ -23,7 +23,9 @@ from baselines.evaluation.pages.tuning import DATA, EPISODES, Tuning, tune
 from baselines.evaluation.plots.style import small_png
 from baselines.evaluation.report import number
 from baselines.files import write
+from baselines.locks import locked
 from ikgym.exceptions import InvalidInputError
+from ikgym.validation import whole_number
 
 #: The names of the pages on the command line.
 Page = Literal["leaderboard", "cost-time"]
@@ -132,12 +134,13 @@ def draw_up(measurement: Measurement, page: str, tuning: Tuning, folder: pathlib
         MissingDependencyError: There is no scipy.
     """
     file = _file(folder, page)
-    measurement.save(file.with_suffix(".json"))
-    drawn = (leaderboard if page == LEADERBOARD else cost_time).pictures(measurement)
-    for where, figure in drawn:
-        write(folder / where, small_png(figure))
-    text = leaderboard.page(measurement, tuning) if page == LEADERBOARD else cost_time.page(measurement)
-    write(file, text.encode())
+    with locked(folder):
+        measurement.save(file.with_suffix(".json"))
+        drawn = (leaderboard if page == LEADERBOARD else cost_time).pictures(measurement)
+        for where, figure in drawn:
+            write(folder / where, small_png(figure))
+        text = leaderboard.page(measurement, tuning) if page == LEADERBOARD else cost_time.page(measurement)
+        write(file, text.encode())
 
 
 def search(options: Options, command: str, file: pathlib.Path) -> str:
@@ -204,6 +207,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         nonlocal out
         options = shared.parse(Options, arguments, prog=prog, description=manual(prog))
         out = str(options.out)
+        whole_number("workers", options.workers, at_least=1)
+        if options.episodes is not None:
+            whole_number("episodes", options.episodes, at_least=1)
         command = shlex.join([*prog.split(), *arguments])
         if options.tune is not None:
             print(search(options, command, options.tune))

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 import pathlib
 import re
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
 
-from baselines import registry
+from baselines import json_files, registry
 from baselines.agents.policy import LearnedPolicy
 from baselines.evaluation.pages.sets import MAIN
 from baselines.files import ResultsError
@@ -209,7 +208,7 @@ def policy_of(folder: pathlib.Path) -> tuple[str, dict[str, Any]]:
 def _run(file: pathlib.Path) -> tuple[str, str | None, int, float]:
     """Method, base policy, steps and core-minutes of a training."""
     try:
-        content = json.loads(file.read_text(encoding="utf-8"))
+        content = json_files.read(file)
         training, base_policy = content["training"], content["processing"]["base_policy"]
         if not (base_policy is None or isinstance(base_policy, str)):
             raise TypeError(f"base_policy: expected the spec of a policy or null, got {base_policy!r}")

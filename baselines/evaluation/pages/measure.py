@@ -17,6 +17,7 @@ from baselines.evaluation.pages.measurement import Line, Section
 from baselines.evaluation.plan import Job, Plan, make_plan
 from baselines.evaluation.results import Results, slug
 from baselines.evaluation.runner import run
+from baselines.locks import locked
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
 
@@ -90,7 +91,23 @@ def play(
     for job in (job for some in plans.values() for job in some):
         if job.key not in jobs or job.timed:
             jobs[job.key] = job
-    whole, rows, results = Plan(tuple(jobs.values()), ()), dict[Any, Row](), None
+    with contextlib.nullcontext() if folder is None else locked(folder):
+        rows = _played(
+            Plan(tuple(jobs.values()), ()),
+            folder,
+            workers=workers,
+            resume=resume,
+            overwrite=overwrite,
+            progress=progress,
+        )
+    return {key: [rows[job.key] for job in some] for key, some in plans.items()}
+
+
+def _played(
+    whole: Plan, folder: pathlib.Path | None, *, workers: int, resume: bool, overwrite: bool, progress: bool
+) -> dict[Any, Row]:
+    """The rows of a plan by the keys of its jobs."""
+    rows, results = dict[Any, Row](), None
     if folder is not None:
         results = Results(folder, whole, describe(), resume=resume, overwrite=overwrite)
         rows = {row.key: row for row in results.rows}
@@ -102,7 +119,7 @@ def play(
                 rows |= {row.key: row for _, row, _ in outcomes}
                 if results is not None:
                     results.add(outcomes)
-    return {key: [rows[job.key] for job in some] for key, some in plans.items()}
+    return rows
 
 
 def measure(

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 import pathlib
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Self
 
 import numpy as np
 
+from baselines import json_files
 from baselines.canonical import DIGITS, one_line, rounded, with_list
 from baselines.evaluation.metrics import Row
 from baselines.evaluation.pages import sets
@@ -18,7 +18,7 @@ from baselines.evaluation.summary import Spread, times
 from baselines.files import ResultsError, write
 from baselines.fingerprints import fingerprint
 from baselines.oracle import best_known
-from ikgym.exceptions import InvalidInputError
+from ikgym.exceptions import IkgymError, InvalidInputError
 from ikgym.validation import FloatArray
 
 #: An arm that was farther from its nominal position than this has lost track, in [m].
@@ -83,14 +83,6 @@ class Line:
             time_first_us=first,
             training=entry.training,
         )
-
-    @classmethod
-    def from_json(cls, values: Mapping[str, Any]) -> Self:
-        """The line of what :meth:`Measurement.save` wrote of it."""
-        runs = {name: values[name] and tuple(map(tuple, values[name])) for name in ("cost", "error")}
-        given = values["training"]
-        training = given and Training(**{**given, **{n: tuple(given[n]) for n in ("steps", "core_minutes")}})
-        return cls(**{**values, **runs, "seeds": tuple(values["seeds"]), "training": training})
 
     @property
     def label(self) -> str:
@@ -228,16 +220,30 @@ class Measurement:
             ResultsError: It cannot be read, is damaged, or has another format.
         """
         try:
-            content = json.loads(file.read_text(encoding="utf-8"))
-            if (there := content.pop("format", 1)) != FORMAT:
-                raise ResultsError(f"{file}: expected format {FORMAT}, got {there}. Measure again with --out.")
-            sections = [
-                Section(**{**one, "seeds": tuple(one["seeds"]), "lines": tuple(map(Line.from_json, one["lines"]))})
-                for one in content["sections"]
-            ]
-            return cls(**{**content, "sections": tuple(sections)})
-        except (OSError, ValueError, TypeError, KeyError, AttributeError) as e:
-            raise ResultsError(f"Cannot read what was measured from {file}: {e!r}.") from None
+            content = json_files.read(file)
+            if isinstance(content, dict) and (there := content.pop("format", 1)) != FORMAT:
+                raise ResultsError(f"{file}: expected format {FORMAT}, got {there!r:.60}. Measure again with --out.")
+            out = json_files.made(cls, content)
+            for section in out.sections:
+                _check_runs(section)
+        except (OSError, ValueError, IkgymError) as e:
+            if isinstance(e, ResultsError):
+                raise
+            reason = str(e).removesuffix(".")
+            raise ResultsError(f"Cannot read what was measured from {file}: {reason}.") from None
+        return out
+
+
+def _check_runs(section: Section) -> None:
+    """Insists on a cost above 0 of each episode, and an error of each where they are kept."""
+    for line in section.lines:
+        for name, runs in (("cost", line.cost), ("error", line.error)):
+            if runs is not None and not (runs and all(len(row) == len(section.seeds) > 0 for row in runs)):
+                raise InvalidInputError(
+                    f"{section.name}, {line.label}: the key {name!r} should have {len(section.seeds)} episodes a row"
+                )
+        if any(cost < 0.0 for row in line.cost for cost in row):
+            raise InvalidInputError(f"{section.name}, {line.label}: expected costs of at least 0")
 
 
 def _by_seed(entry: Entry, numbers: Iterable[float]) -> Runs:

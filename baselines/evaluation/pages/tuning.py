@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 import math
 import pathlib
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple, Self
 
+from baselines import json_files
 from baselines.canonical import DIGITS, one_line, rounded, with_list
 from baselines.evaluation.pages.entries import Entry
 from baselines.evaluation.pages.grids import GRIDS, Stage
@@ -16,9 +16,9 @@ from baselines.evaluation.pages.measure import plan, play
 from baselines.evaluation.summary import geometric_mean
 from baselines.files import ResultsError, write
 from baselines.fingerprints import fingerprint
-from baselines.spec import parse_policy
+from baselines.spec import parse_policy, refuse_trust
 from ikgym import scenarios
-from ikgym.exceptions import InvalidInputError
+from ikgym.exceptions import IkgymError, InvalidInputError
 
 #: The settings that the leaderboard reads.
 DATA = pathlib.Path(__file__).parents[2] / "data" / "tuned.json"
@@ -115,10 +115,12 @@ class Tuning:
             ResultsError: It cannot be read, or is damaged, or belongs to a scenario or cost that has changed since.
         """
         try:
-            content = json.loads(file.read_text(encoding="utf-8"))
-            out = cls(**{**content, "solvers": tuple(Tuned(**solver) for solver in content["solvers"])})
-        except (OSError, ValueError, TypeError, KeyError) as e:
-            raise ResultsError(f"Cannot read settings from {file}: {e!r}. Search them anew with: {UPDATE}") from None
+            out = json_files.made(cls, json_files.read(file))
+            for one in out.solvers:
+                refuse_trust(one.variant, str(file))
+        except (OSError, ValueError, IkgymError) as e:
+            reason = str(e).removesuffix(".")
+            raise ResultsError(f"Cannot read settings from {file}: {reason}. Search them anew with: {UPDATE}") from None
         if out.stale:
             raise ResultsError(f"{file}: {out.scenario} has changed since it was tuned on. Tune again with: {UPDATE}")
         return out

@@ -9,11 +9,14 @@ import pathlib
 import tomllib
 from typing import Any
 
+from baselines.files import read_bytes
 from baselines.spec import refuse_trust
 from baselines.training.config.base import Config
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 
 FOLDER = pathlib.Path(__file__).parent
+# Bytes of a file that are read at most.
+MOST = 2**20
 
 
 def names() -> tuple[str, ...]:
@@ -35,9 +38,11 @@ def read(preset: str) -> dict[str, Any]:
     if file.parent == FOLDER and preset not in names():
         raise UnknownNameError("preset", preset, names())
     try:
-        options = tomllib.loads(file.read_text(encoding="utf-8"))
+        options = tomllib.loads(read_bytes(file, MOST).decode())
     except OSError as e:
         raise InvalidInputError(f"Cannot read the preset {file}: {e.strerror}.") from None
+    except RecursionError:
+        raise InvalidInputError(f"The preset {file} is nested too deeply.") from None
     except ValueError as e:
         raise InvalidInputError(f"The preset {file} is no TOML: {e}.") from None
     for name in {"base_policy", "expert"} & options.keys():

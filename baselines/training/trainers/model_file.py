@@ -20,8 +20,9 @@ from safetensors.numpy import save as save_tensors
 from stable_baselines3.common.base_class import BaseAlgorithm
 from torch import Tensor, nn
 
+from baselines import json_files
 from baselines.agents.features import Processing
-from baselines.agents.files import check_described, description, load_agent
+from baselines.agents.files import check_described, description, digest, load_agent
 from baselines.agents.network import Network
 from baselines.agents.untrusted import parse_json, read
 from baselines.files import write
@@ -92,6 +93,7 @@ def save_model(
         "activation": network.activation,
         "squash": network.squash,
     }
+    about["hash"] = digest(sorted(tensors.items()), about)
     write(file, save_tensors(tensors, {KEY: json.dumps(about, ensure_ascii=False)}))
 
 
@@ -118,9 +120,12 @@ def load_weights(file: pathlib.Path) -> InitialWeights:
 
 
 def _parse(source: str, content: bytes, about: dict[str, Any]) -> InitialWeights:
+    claimed = about.pop("hash", None)
     processing = check_described(source, about)
     try:
         arrays = load_tensors(content)
+        if claimed != (found := digest(sorted(arrays.items()), about)):
+            raise ValueError(f"it was changed after it was written: expected the hash {claimed}, got {found}")
         if not all(np.isfinite(array).all() for array in arrays.values()):
             raise InvalidInputError("expected finite weights, got NaN or infinity")
         layers = range(int(about["layers"]))
@@ -143,7 +148,7 @@ def _metadata(content: bytes) -> dict[str, Any]:
     """The texts in the header of a safetensors file; none where it has no header, of which others complain."""
     length = int.from_bytes(content[:8], "little")
     try:
-        metadata = json.loads(content[8 : 8 + length].decode())["__metadata__"]
-    except (ValueError, KeyError, TypeError, RecursionError, OverflowError):
+        metadata = json_files.parse(content[8 : 8 + length])["__metadata__"]
+    except (ValueError, KeyError, TypeError, OverflowError):
         return {}
     return metadata if isinstance(metadata, dict) else {}

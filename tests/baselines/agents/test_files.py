@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from safetensors.numpy import save
 
+import baselines
 import ikgym
 from baselines.agents import files
 from baselines.agents.features import Processing
@@ -107,7 +108,7 @@ def forged(file, spoil):
     spoil(tensors, about)
     about.pop("hash", None)
     try:
-        about["hash"] = files._digest(sorted(tensors.items()), about)
+        about["hash"] = files.digest(sorted(tensors.items()), about)
     except TypeError:
         about["hash"] = "0" * 64
     return save(tensors, {"ikgym": json.dumps(about)})
@@ -133,7 +134,7 @@ def forged(file, spoil):
         (lambda t, a: a["network"].update(activation="gelu"), "no activation 'gelu'"),
         (lambda t, a: a["network"].update(activation=[]), "no activation"),
         (lambda t, a: a["network"].update(sizes=[10**12, 10**12]), "expected float32 tensors of the shapes"),
-        (lambda t, a: a["network"].update(sizes=[float("inf"), 1]), "no agent that this version can read"),
+        (lambda t, a: a["network"].update(sizes=[float("inf"), 1]), "Infinity is no JSON"),
         (lambda t, a: a["network"].update(sizes=[]), "expected float32 tensors"),
         (lambda t, a: t.pop("layers.0.bias"), "expected float32 tensors of the shapes .* got "),
         (lambda t, a: t.update({"more": np.ones(3, dtype=np.float32)}), "expected float32 tensors of the shapes"),
@@ -216,10 +217,15 @@ def test_no_file(tmp_path, file):
 def test_a_file_that_is_too_large_is_not_read(tmp_path):
     with (tmp_path / "large.safetensors").open("wb") as stream:
         stream.truncate(2**28 + 1)
-    with pytest.raises(ResultsError, match="is too large for an agent: expected at most 268435456 bytes, got"):
+    with pytest.raises(ResultsError, match="is no agent: it is too large: expected at most 268435456 bytes, got"):
         load_agent(tmp_path / "large.safetensors")
 
 
 def test_helper_writes_agents(tmp_path):
     path = write_agent(tmp_path / "a.safetensors", SCENARIO, "dls")
     assert load_agent(tmp_path / "a.safetensors").source == path
+
+
+def test_a_home_of_nobody():
+    with pytest.raises(ResultsError, match="Agent ~nosuchuser/x: expected a path, got one with an unknown user's home"):
+        baselines.make("agent", "varga7-fast", path="~nosuchuser/x")

@@ -10,6 +10,7 @@ import os
 import pickle
 import subprocess
 import sys
+import tracemalloc
 import zipfile
 
 import gymnasium as gym
@@ -32,6 +33,7 @@ from baselines.files import ResultsError
 from baselines.policy import Problem
 from ikgym.exceptions import InvalidInputError
 from tests.baselines.random_agents import OFFSETS, write_agent
+from tests.baselines.test_archives import lying_zip
 from tests.comparison import identical
 
 SCENARIO = ikgym.scenarios.get("varga7-fast").replace(steps=6)
@@ -472,3 +474,15 @@ def test_agents_of_ours_need_no_torch(tmp_path):
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert "need Stable-Baselines3: pip install" in done.stdout, done.stderr
+
+
+def test_a_zip_that_lies_of_its_size_costs_no_memory(tmp_path):
+    """Trust is no reason to unpack gigabytes."""
+    (tmp_path / "bomb.zip").write_bytes(lying_zip())
+    tracemalloc.start()
+    try:
+        with pytest.raises(ResultsError, match=r"is damaged, or no \.zip file"):
+            agent(tmp_path / "bomb.zip")
+        assert tracemalloc.get_traced_memory()[1] < 2**26
+    finally:
+        tracemalloc.stop()

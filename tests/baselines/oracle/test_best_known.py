@@ -102,7 +102,7 @@ def test_bad_costs_are_refused_and_nothing_is_written(file, value):
     assert not file.exists()
 
 
-@pytest.mark.parametrize("content", ["{", "[3]", '[{"scenario": "a"}]'])
+@pytest.mark.parametrize("content", ["{", "[3]", '[{"scenario": "a"}]', "3", "null", "[" * 10_000])
 def test_damaged_data_are_named(file, content):
     file.parent.mkdir()
     file.write_text(content, encoding="utf-8")

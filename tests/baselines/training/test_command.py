@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import base64
 import importlib.util
 import json
 import pathlib
+import pickle
 import subprocess
 import sys
+import zipfile
 
 import pytest
 
@@ -14,6 +17,7 @@ from baselines.training import command, methods, run, seeds
 from baselines.training.command import main, parse
 from baselines.training.config.reinforcement import PPO
 from baselines.training.errors import TrainingError
+from baselines.training.folder import FORMAT
 from baselines.training.seeds import SeedRuns
 from tests.baselines.training.small import about, timeless
 
@@ -285,3 +289,29 @@ def test_no_seeds(tmp_path):
     object.__setattr__(options, "seeds", ())
     with pytest.raises(TrainingError, match="seeds: expected at least one"):
         command._train(asked, given, "")
+
+
+@pytest.mark.parametrize(
+    "expert",
+    [
+        "agent:path={zip},trust=True",
+        "smoothed:policy=agent,options={{'path': '{zip}', 'trust': True}}",
+    ],
+)
+def test_a_run_json_grants_no_trust(tmp_path, capsys, expert):
+    """Whoever repeats the run of somebody else runs none of their code."""
+
+    class Evil:
+        def __reduce__(self):
+            return pathlib.Path.touch, (tmp_path / "ran",)
+
+    with zipfile.ZipFile(tmp_path / "evil.zip", "w") as archive:
+        serialized = base64.b64encode(pickle.dumps(Evil())).decode()
+        archive.writestr("data", json.dumps({"policy_class": {":type:": "x", ":serialized:": serialized}}))
+    config = {**methods.get("imitate").config().to_json(), "expert": expert.format(zip=tmp_path / "evil.zip")}
+    about = {"format": FORMAT, "method": "imitate", "seed": 0, "config": config, "weights_sha256": "0" * 64}
+    (tmp_path / "run.json").write_text(json.dumps(about))
+    assert main(["repeat", str(tmp_path / "run.json"), "--out", str(tmp_path / "again"), "--no-progress"]) == 2
+    said = capsys.readouterr().err
+    assert "run.json: expert: trust is given on the command line or by the caller, never by a file" in said
+    assert not (tmp_path / "ran").exists()

@@ -13,8 +13,9 @@ import pytest
 import torch
 from safetensors.numpy import load, save
 
+from baselines.agents.files import digest
 from baselines.files import ResultsError
-from baselines.training import methods
+from baselines.training import checkpoint, methods
 from baselines.training.errors import TrainingError
 from baselines.training.randomness import reseed
 from baselines.training.run import train
@@ -72,7 +73,7 @@ def test_actors_are_the_same(sources, source, method, suffix):
 
 @pytest.mark.parametrize("method", ["ppo", "sac", "td3"])
 def test_critics_come_with_models_of_the_same_kind(sources, method):
-    final = torch.load(sources[method] / "checkpoint.pt", weights_only=True)["trainer"]["parameters"]["policy"]
+    final = checkpoint.load(sources[method] / "checkpoint.pt").trainer["parameters"]["policy"]
     given = begun(method, sources[method] / "model.safetensors").state()["parameters"]["policy"]
     assert [name for name, tensor in final.items() if not given[name].equal(tensor)] == (
         ["log_std"] if method == "ppo" else []
@@ -130,9 +131,21 @@ def test_weights_that_are_not_finite_or_of_another_shape_are_refused(sources, tm
         ("policy.more", np.zeros(3, np.float32), "Unexpected key"),
     ]:
         file = tmp_path / "model.safetensors"
-        file.write_bytes(save({**tensors, name: value}, {model_file.KEY: text}))
+        forged, described = {**tensors, name: value}, json.loads(text)
+        del described["hash"]
+        described["hash"] = digest(sorted(forged.items()), described)
+        file.write_bytes(save(forged, {model_file.KEY: json.dumps(described)}))
         with pytest.raises(TrainingError, match=f"Cannot begin from .*{message}"):
             begun("ppo", file)
+
+
+def test_changed_weights_are_noticed(sources, tmp_path):
+    """A flipped bit of a weight is a weight, too: only the hash tells."""
+    content = bytearray((sources["ppo"] / "model.safetensors").read_bytes())
+    content[-3] ^= 1
+    (tmp_path / "model.safetensors").write_bytes(content)
+    with pytest.raises(TrainingError, match="was changed after it was written: expected the hash"):
+        begun("ppo", tmp_path / "model.safetensors")
 
 
 def test_zips_are_never_loaded(sources, tmp_path):

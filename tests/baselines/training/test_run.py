@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import io
 import json
+import zipfile
 
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ from tensorboard.backend.event_processing.event_accumulator import EventAccumula
 import baselines
 from baselines.evaluation.rollout import rollouts
 from baselines.files import ResultsError
+from baselines.training import checkpoint
 from baselines.training import run as run_module
 from baselines.training.errors import TrainingError
 from baselines.training.folder import read_run
@@ -222,10 +225,41 @@ def test_damaged_files(finished, tmp_path):
         (tmp_path / name).write_bytes(content)
         with pytest.raises(TrainingError, match=message):
             train(config, 3, tmp_path, resume=True)
-    torch.save({"format": 99}, tmp_path / "checkpoint.pt")
+    save_sealed({"format": 99}, tmp_path / "checkpoint.pt")
     (tmp_path / "run.json").write_bytes((folder / "run.json").read_bytes())
     with pytest.raises(TrainingError, match="written by another version"):
         train(config, 3, tmp_path, resume=True)
+
+
+def save_sealed(content, file):
+    """A checkpoint whose digest is right, whatever is in it."""
+    stream = io.BytesIO()
+    torch.save(content, stream)
+    file.write_bytes(checkpoint.sealed(stream.getvalue()))
+
+
+def test_a_flipped_byte_of_a_checkpoint_is_noticed(finished, tmp_path):
+    """PyTorch reads it without a word: another weight is a weight, too."""
+    config, folder, _ = finished
+    whole = (folder / "checkpoint.pt").read_bytes()
+    begin = len(checkpoint.MAGIC) + 65
+    for place in np.random.default_rng(0).integers(begin, len(whole), 20):
+        damaged = bytearray(whole)
+        damaged[place] ^= 64
+        (tmp_path / "checkpoint.pt").write_bytes(damaged)
+        (tmp_path / "run.json").write_bytes((folder / "run.json").read_bytes())
+        with pytest.raises(TrainingError, match=r"Cannot go on from .*it is damaged: expected the SHA-256"):
+            train(config, 3, tmp_path, resume=True)
+
+
+def test_checkpoints_unpack_to_no_more_than_they_have(tmp_path):
+    """PyTorch believes the directory of an archive, and asks for the memory that it claims."""
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("archive/data.pkl", b"0" * 2**20)
+    (tmp_path / "checkpoint.pt").write_bytes(checkpoint.sealed(stream.getvalue()))
+    with pytest.raises(TrainingError, match="its members claim more bytes than it has"):
+        checkpoint.load(tmp_path / "checkpoint.pt")
 
 
 def test_runs_of_the_first_version_are_refused(finished, tmp_path):
@@ -252,7 +286,7 @@ def test_checkpoints_run_nothing(finished, tmp_path):
 
     config, folder, _ = finished
     (tmp_path / "run.json").write_bytes((folder / "run.json").read_bytes())
-    torch.save({"format": 1, "segments": Evil()}, tmp_path / "checkpoint.pt")
+    save_sealed({"format": checkpoint.FORMAT, "segments": Evil()}, tmp_path / "checkpoint.pt")
     with pytest.raises(TrainingError, match="Cannot go on from"):
         train(config, 3, tmp_path, resume=True)
 

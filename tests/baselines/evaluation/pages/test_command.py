@@ -56,6 +56,17 @@ def test_plays_writes_and_writes_anew(tmp_path, capsys, monkeypatch):
     assert "--resume" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("option", "value", "wanted"), [("--episodes", "0", "episodes"), ("--workers", "0", "workers")]
+)
+@pytest.mark.parametrize("more", [("--out", "out"), ("--tune", "tuned.json")])
+def test_numbers_are_checked_before_anything_is_played(tmp_path, capsys, monkeypatch, option, value, wanted, more):
+    monkeypatch.chdir(tmp_path)
+    assert main([*more, option, value]) == 2
+    assert capsys.readouterr().err == f"error: {wanted}: expected a whole number of at least 1, got {value}.\n"
+    assert not list(tmp_path.iterdir())
+
+
 def test_one_page_alone(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(families, "entries", lambda *_: (solver("dls", timed=1),))
     arguments = ["--pages", "cost-time", "--sets", "varga7-fast", "--out", str(tmp_path)]

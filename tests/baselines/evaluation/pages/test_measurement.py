@@ -62,6 +62,24 @@ class TestLines:
         with pytest.raises(ResultsError, match=r"it\.json"):
             Measurement.load(tmp_path / "it.json")
 
+    @pytest.mark.parametrize(
+        ("old", "new", "message"),
+        [
+            ('"lost": 0', '"lost": "many"', "the key 'lost' should have a value of type int, got 'many'"),
+            ('"training": null', '"training": {"method": 3}', "the key 'base_policy' is missing"),
+            ('"seeds": [2000000, 2000001]', '"seeds": [2000000]', "should have 1 episodes a row"),
+            ('"cost": [[', '"cost": [[[', "it\\.json"),
+            ('"format": 2', '"format": {"a": 1}', "expected format 2, got {'a': 1}"),
+        ],
+    )
+    def test_wrong_types_are_named(self, tmp_path, old, new, message):
+        file = tmp_path / "it.json"
+        a_measurement(a_section(line())).save(file)
+        assert old in file.read_text()
+        file.write_text(file.read_text().replace(old, new))
+        with pytest.raises(ResultsError, match=message):
+            Measurement.load(file)
+
     def test_another_format(self, tmp_path):
         file = tmp_path / "it.json"
         a_measurement().save(file)

@@ -1,6 +1,7 @@
 """The search of settings on validation episodes, and its file."""
 
 import dataclasses
+import json
 
 import numpy as np
 import pytest
@@ -101,3 +102,21 @@ class TestTuning:
         (then,) = [one for one in there.solvers if one.spec == "dls"]
         rows = evaluate(sets.MAIN, [then.variant], episodes=there.episodes, split="validation")
         assert np.exp(np.log([row.total_cost for row in rows]).mean()) == pytest.approx(then.tuned, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"settings": {"path": "x.zip", "trust": True}, "spec": "agent"}, "trust is given on the command line"),
+        ({"spec": "agent:path=x.zip,trust=True", "settings": {}}, "trust is given on the command line"),
+        ({"tried": "many"}, "the key 'tried' should have a value of type int, got 'many'"),
+        ({"spec": 3}, "the key 'spec' should have a value of type str, got 3"),
+        ({"spec": "nobody"}, "There is no policy 'nobody'"),
+    ],
+)
+def test_settings_that_are_none_or_ask_for_trust(tmp_path, changes, message):
+    content = json.loads(DATA.read_text(encoding="utf-8"))
+    content["solvers"][0] |= changes
+    (tmp_path / "tuned.json").write_text(json.dumps(content))
+    with pytest.raises(ResultsError, match=rf"Cannot read settings from .*{message}"):
+        Tuning.load(tmp_path / "tuned.json")
