@@ -28,7 +28,7 @@ from baselines.evaluation.plan import Plan, make_plan
 from baselines.evaluation.results import Results, Rows
 from baselines.evaluation.runner import run
 from baselines.files import write
-from baselines.locks import locked
+from baselines.files.locks import locked
 from ikgym.scenarios import Preview, Scenario
 from ikgym.validation import whole_number
 

@@ -21,7 +21,7 @@ from baselines.canonical import jsonable
 from baselines.evaluation.machine import describe
 from baselines.evaluation.plots.style import png
 from baselines.files import write
-from baselines.locks import locked
+from baselines.files.locks import locked
 from baselines.papers import PAPERS, get
 from baselines.papers.ledger import ledger
 from baselines.papers.paper import Finding, Paper

@@ -26,8 +26,8 @@ from baselines.agents.protocols import AgentFile, Transform
 from baselines.agents.raw import ORDER, RawObservation
 from baselines.agents.sb3_network import network_of
 from baselines.agents.untrusted import check_trust, parse_json, read, refuse
-from baselines.archives import ArchiveError, packed, unpacked
 from baselines.files import write
+from baselines.files.archives import ArchiveError, packed, unpacked
 from baselines.policy import Problem
 from ikgym.exceptions import InvalidInputError, MissingDependencyError
 from ikgym.scenarios import Scenario

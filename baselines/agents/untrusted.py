@@ -7,8 +7,7 @@ import pathlib
 import textwrap
 from typing import Any, Final, NoReturn
 
-from baselines import json_files
-from baselines.files import ResultsError, read_bytes
+from baselines.files import ResultsError, json_files, read_bytes
 
 #: Agents of ours.
 SUFFIX: Final = ".safetensors"

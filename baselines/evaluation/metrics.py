@@ -13,7 +13,7 @@ import numpy as np
 from baselines.canonical import canonical
 from baselines.episode import added_up
 from baselines.evaluation.rollout import Episode
-from baselines.json_files import JsonError, made, shown
+from baselines.files.json_files import JsonError, made, shown
 from baselines.status import Status
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario

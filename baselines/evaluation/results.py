@@ -17,12 +17,11 @@ import numpy as np
 import numpy.typing as npt
 
 import ikgym
-from baselines import archives, json_files
 from baselines.canonical import canonical
 from baselines.evaluation.metrics import Row
 from baselines.evaluation.plan import Job, Plan, Skipped
 from baselines.evaluation.runner import Played
-from baselines.files import ResultsError, read_bytes, write
+from baselines.files import ResultsError, archives, json_files, read_bytes, write
 from ikgym.exceptions import InvalidInputError
 from ikgym.preview import furthest
 from ikgym.scenarios import SPLITS

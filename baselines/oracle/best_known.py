@@ -14,8 +14,7 @@ import pathlib
 from collections.abc import Iterable, Mapping
 from typing import Any, Protocol
 
-from baselines import json_files
-from baselines.files import ResultsError, write
+from baselines.files import ResultsError, json_files, write
 from baselines.fingerprints import episode_hash
 from ikgym.scenarios import Scenario
 

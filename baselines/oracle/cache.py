@@ -13,9 +13,8 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from baselines import archives, json_files
 from baselines.canonical import canonical
-from baselines.files import ResultsError, read_bytes, write
+from baselines.files import ResultsError, archives, json_files, read_bytes, write
 from baselines.fingerprints import episode_hash
 from baselines.oracle.optimum import Optimum, Search
 from baselines.oracle.search import VERSION, search

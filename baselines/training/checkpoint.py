@@ -11,8 +11,7 @@ from typing import Any
 
 import torch
 
-from baselines import archives
-from baselines.files import read_bytes, write
+from baselines.files import archives, read_bytes, write
 from baselines.training.errors import TrainingError
 
 #: Changes when earlier files can no longer be resumed.

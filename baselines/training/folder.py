@@ -7,8 +7,7 @@ import pathlib
 from collections.abc import Mapping
 from typing import Any
 
-from baselines import json_files
-from baselines.files import write
+from baselines.files import json_files, write
 from baselines.training.config.base import differences
 from baselines.training.errors import TrainingError
 from ikgym.validation import whole_number

@@ -33,8 +33,8 @@ from torch.utils.tensorboard import SummaryWriter
 
 import ikgym
 from baselines.evaluation.machine import describe
+from baselines.files.locks import locked
 from baselines.fingerprints import fingerprint
-from baselines.locks import locked
 from baselines.training import checkpoint, methods
 from baselines.training.checkpoint import Checkpoint
 from baselines.training.config.base import Config

@@ -23,7 +23,7 @@ from baselines.evaluation.pages.tuning import DATA, EPISODES, Tuning, tune
 from baselines.evaluation.plots.style import small_png
 from baselines.evaluation.report import number
 from baselines.files import write
-from baselines.locks import locked
+from baselines.files.locks import locked
 from ikgym.exceptions import InvalidInputError
 from ikgym.validation import whole_number
 

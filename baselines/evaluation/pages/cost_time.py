@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from baselines.evaluation.pages import cost_time_plot, sets
 from baselines.evaluation.pages.entries import FORESIGHT
 from baselines.evaluation.pages.families import FAMILIES, family, presets
-from baselines.evaluation.pages.markdown import IMAGES, conditions, collapsed, runs, share, table, time
+from baselines.evaluation.pages.markdown import IMAGES, collapsed, conditions, runs, share, table, time
 from baselines.evaluation.pages.measurement import LOST, Line, Measurement, Section
 from baselines.evaluation.plots import style
 from baselines.evaluation.plots.cost_time import Mark

@@ -9,10 +9,10 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
 
-from baselines import json_files, registry
+from baselines import registry
 from baselines.agents.policy import LearnedPolicy
 from baselines.evaluation.pages.sets import MAIN
-from baselines.files import ResultsError
+from baselines.files import ResultsError, json_files
 from baselines.solvers.receding_horizon.rhc import RecedingHorizon
 from baselines.spec import parse_policy
 from ikgym.exceptions import InvalidInputError

@@ -13,7 +13,7 @@ from baselines.evaluation.pages import leaderboard_plots as plots
 from baselines.evaluation.pages import sets
 from baselines.evaluation.pages.claims import few, quoted, sentences
 from baselines.evaluation.pages.entries import ENOUGH, FORESIGHT, PAPER, label, short
-from baselines.evaluation.pages.markdown import IMAGES, conditions, episodes, collapsed, runs, share, table, time
+from baselines.evaluation.pages.markdown import IMAGES, collapsed, conditions, episodes, runs, share, table, time
 from baselines.evaluation.pages.measurement import (
     AGENT,
     FAR,

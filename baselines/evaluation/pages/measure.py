@@ -17,7 +17,7 @@ from baselines.evaluation.pages.measurement import Line, Section
 from baselines.evaluation.plan import Job, Plan, make_plan
 from baselines.evaluation.results import Results, slug
 from baselines.evaluation.runner import run
-from baselines.locks import locked
+from baselines.files.locks import locked
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
 

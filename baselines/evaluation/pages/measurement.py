@@ -9,13 +9,12 @@ from typing import Any, Self
 
 import numpy as np
 
-from baselines import json_files
 from baselines.canonical import DIGITS, one_line, rounded, with_list
 from baselines.evaluation.metrics import Row
 from baselines.evaluation.pages import sets
 from baselines.evaluation.pages.entries import ENOUGH, FORESIGHT, PAPER, Entry, Training, label
 from baselines.evaluation.summary import Spread, times
-from baselines.files import ResultsError, write
+from baselines.files import ResultsError, json_files, write
 from baselines.fingerprints import fingerprint
 from baselines.oracle import best_known
 from ikgym.exceptions import IkgymError, InvalidInputError

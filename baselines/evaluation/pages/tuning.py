@@ -8,13 +8,12 @@ import pathlib
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple, Self
 
-from baselines import json_files
 from baselines.canonical import DIGITS, one_line, rounded, with_list
 from baselines.evaluation.pages.entries import Entry
 from baselines.evaluation.pages.grids import GRIDS, Stage
 from baselines.evaluation.pages.measure import plan, play
 from baselines.evaluation.summary import geometric_mean
-from baselines.files import ResultsError, write
+from baselines.files import ResultsError, json_files, write
 from baselines.fingerprints import fingerprint
 from baselines.spec import parse_policy, refuse_trust
 from ikgym import scenarios

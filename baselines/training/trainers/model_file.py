@@ -20,12 +20,11 @@ from safetensors.numpy import save as save_tensors
 from stable_baselines3.common.base_class import BaseAlgorithm
 from torch import Tensor, nn
 
-from baselines import json_files
 from baselines.agents.features import Processing
 from baselines.agents.files import check_described, description, digest, load_agent
 from baselines.agents.network import Network
 from baselines.agents.untrusted import parse_json, read
-from baselines.files import write
+from baselines.files import json_files, write
 from baselines.training.config.base import Activation, Algorithm
 from baselines.training.errors import TrainingError
 from baselines.training.trainers.models import algorithm_of, mean_network, squash_of

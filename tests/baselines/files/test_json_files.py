@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from baselines import json_files
-from baselines.json_files import JsonError, made, parse
+from baselines.files import json_files
+from baselines.files.json_files import JsonError, made, parse
 
 
 @dataclasses.dataclass(frozen=True)

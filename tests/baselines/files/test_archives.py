@@ -9,8 +9,8 @@ import zipfile
 import numpy as np
 import pytest
 
-from baselines import archives
-from baselines.archives import ArchiveError
+from baselines.files import archives
+from baselines.files.archives import ArchiveError
 
 
 def lying_zip(size=2**28, claims=10, name="ikgym.json"):

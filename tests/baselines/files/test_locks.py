@@ -13,11 +13,11 @@ import pytest
 
 from baselines.evaluate import evaluate
 from baselines.files import ResultsError
-from baselines.locks import NAME, locked
+from baselines.files.locks import NAME, locked
 
 HOLD = """
 import pathlib, sys, time
-from baselines.locks import locked
+from baselines.files.locks import locked
 with locked(pathlib.Path(sys.argv[1])):
     print("held", flush=True)
     time.sleep(60)
