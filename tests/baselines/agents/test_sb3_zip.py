@@ -32,8 +32,8 @@ from baselines.evaluation.rollout import rollout
 from baselines.files import ResultsError
 from baselines.policy import Problem
 from ikgym.exceptions import InvalidInputError
+from tests.baselines.files.test_archives import lying_zip
 from tests.baselines.random_agents import OFFSETS, write_agent
-from tests.baselines.test_archives import lying_zip
 from tests.comparison import identical
 
 SCENARIO = ikgym.scenarios.get("varga7-fast").replace(steps=6)
