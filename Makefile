@@ -29,8 +29,8 @@ test: $(STAMP) ## Run the tests that are not marked slow
 slow: $(STAMP) ## Run the tests that are marked slow
 	$(PYTEST) -m slow
 
-fuzz: $(STAMP) ## Hand random input to the environments, FUZZ examples a property (a few minutes)
-	IKGYM_FUZZ=$(FUZZ) $(PYTEST) tests/test_fuzz.py
+fuzz: $(STAMP) ## Hand random input and damaged files to what reads them, FUZZ examples a property
+	IKGYM_FUZZ=$(FUZZ) $(PYTEST) tests/test_fuzz.py tests/baselines/test_damaged_files.py
 
 format: $(STAMP) ## Format the code and sort its imports
 	$(BIN)/ruff format .
