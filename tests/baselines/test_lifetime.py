@@ -15,7 +15,11 @@ EVALUATE = (
     *("baselines.evaluate", "--scenarios", "varga7-random", "--episodes", "400", "--no-plots", "--workers", "2"),
     *("--policies", "rhc:horizon=100,starts=1"),
 )
-TRAIN = ("baselines.training.command", "ppo", "--preset", "smoke", "--seeds", "0", "1", "--workers", "2", "--out")
+# Segments enough that nobody is done before it is stopped.
+TRAIN = (
+    *("baselines.training.command", "ppo", "--preset", "smoke", "--segments", "100000", "--evaluate-every", "100000"),
+    *("--seeds", "0", "1", "--workers", "2", "--out"),
+)
 # `baselines.training.command` has no main of its own: train.py calls it.
 MAIN = "import sys; from {module} import main; sys.exit(main(sys.argv[1:]))"
 
