@@ -24,7 +24,7 @@ from baselines.evaluation import report
 from baselines.evaluation.entrants import ALL, AnyPolicy, Wrap
 from baselines.evaluation.machine import describe
 from baselines.evaluation.manual import manual
-from baselines.evaluation.plan import Plan, make_plan
+from baselines.evaluation.plan import EvaluationPlan, make_plan
 from baselines.evaluation.results import Results, Rows
 from baselines.evaluation.runner import run
 from baselines.files import write
@@ -127,7 +127,7 @@ def evaluate(
 
 
 def _carry_out(
-    plan: Plan,
+    plan: EvaluationPlan,
     *,
     workers: int,
     out: pathlib.Path | None,
@@ -154,7 +154,7 @@ def _carry_out(
 
 
 def _in_folder(
-    plan: Plan,
+    plan: EvaluationPlan,
     *,
     workers: int,
     out: pathlib.Path | None,
@@ -182,7 +182,7 @@ def _in_folder(
     return of_all
 
 
-def _finish(results: Results, plan: Plan, *, plots: bool, progress: bool, command: str) -> None:
+def _finish(results: Results, plan: EvaluationPlan, *, plots: bool, progress: bool, command: str) -> None:
     """Writes what is made from the rows."""
     pictures = {}
     if plots:

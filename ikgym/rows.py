@@ -12,7 +12,7 @@ from ikgym.exceptions import NoAttributeError
 from ikgym.scenarios import Scenario
 
 
-class Row:
+class ArmRow:
     """What one of N arms says of itself: what all of them share, its generator, and what users have given it.
 
     Args:

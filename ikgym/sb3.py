@@ -13,7 +13,7 @@ from gymnasium.vector import AutoresetMode
 
 from ikgym.env import OPTIONS, REPORTED, checked_options
 from ikgym.exceptions import InvalidInputError, MissingDependencyError
-from ikgym.rows import Row
+from ikgym.rows import ArmRow
 from ikgym.scenarios import Preview, Scenario
 from ikgym.simulator import Observation
 from ikgym.validation import FloatArray, float_array
@@ -67,7 +67,7 @@ class RedundantIKVecEnv(VecEnv):
                 f"Scenario {self.scenario.name!r}: expected steps that cost at most {most:.3g}, since rewards of "
                 f"Stable-Baselines3 are in float32, got up to {worst:.3g}."
             )
-        self._rows = [Row(self._envs, index) for index in range(num_envs)]
+        self._rows = [ArmRow(self._envs, index) for index in range(num_envs)]
         self._actions: npt.NDArray[Any] | None = None
         self._returns = np.zeros(num_envs)
         self._made = time.perf_counter()

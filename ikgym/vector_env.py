@@ -17,7 +17,7 @@ from gymnasium.vector.utils import batch_space
 from ikgym import scenarios
 from ikgym.env import OPTIONS, RedundantIKEnv, checked_options, limited
 from ikgym.exceptions import InvalidInputError, ResetNeededError, UnknownNameError
-from ikgym.rows import Row
+from ikgym.rows import ArmRow
 from ikgym.scenarios import Preview, Scenario
 from ikgym.simulation import Outcome
 from ikgym.simulator import Observation, Simulator
@@ -216,8 +216,8 @@ class RedundantIKVectorEnv(gym.vector.VectorEnv[Observation, npt.NDArray[np.floa
         return generator, seed
 
     @functools.cached_property
-    def _rows(self) -> list[Row]:
-        return [Row(self, index) for index in range(self.num_envs)]
+    def _rows(self) -> list[ArmRow]:
+        return [ArmRow(self, index) for index in range(self.num_envs)]
 
     def _begin(self, mask: Flags, starts: FloatArray | None = None) -> None:
         self._simulator.reset(mask, {row: self.generator(row)[0] for row in np.flatnonzero(mask).tolist()}, starts)

@@ -80,7 +80,7 @@ class Skipped:
 
 
 @dataclasses.dataclass(frozen=True)
-class Plan:
+class EvaluationPlan:
     """What is to be done, and what is left out."""
 
     jobs: tuple[Job, ...]
@@ -99,7 +99,7 @@ def make_plan(
     wrap: Wrap | None = None,
     timed: int | Literal["all"] = 1,
     trust: bool = False,
-) -> Plan:
+) -> EvaluationPlan:
     """All episodes of an evaluation, policy by policy within each scenario.
 
     Args:
@@ -154,7 +154,7 @@ def make_plan(
                 or "no scenario or no policy given."
             )
         )
-    return Plan(tuple(jobs.values()), tuple(skipped))
+    return EvaluationPlan(tuple(jobs.values()), tuple(skipped))
 
 
 def _fixed(names: Iterable[str]) -> Iterator[tuple[Scenario, tuple[int, ...], str | None]]:

@@ -19,7 +19,7 @@ import numpy.typing as npt
 import ikgym
 from baselines.canonical import canonical
 from baselines.evaluation.metrics import Row
-from baselines.evaluation.plan import Job, Plan, Skipped
+from baselines.evaluation.plan import EvaluationPlan, Job, Skipped
 from baselines.evaluation.runner import Played
 from baselines.files import ResultsError, archives, json_files, read_bytes, write
 from ikgym.exceptions import InvalidInputError
@@ -63,7 +63,7 @@ class Results:
     def __init__(
         self,
         directory: pathlib.Path,
-        plan: Plan,
+        plan: EvaluationPlan,
         machine: Mapping[str, Any],
         *,
         resume: bool = False,
@@ -231,7 +231,7 @@ def slug(name: str) -> str:
     return re.sub(r"[^\w.=+-]+", "_", name).strip(".") or "_"
 
 
-def _check_settings(file: pathlib.Path, rows: list[Row], plan: Plan, machine: Mapping[str, Any]) -> None:
+def _check_settings(file: pathlib.Path, rows: list[Row], plan: EvaluationPlan, machine: Mapping[str, Any]) -> None:
     """Refuses to mix rows that nobody may compare."""
 
     def refuse(what: str, there: object, here: object) -> None:

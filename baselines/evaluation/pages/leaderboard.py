@@ -80,10 +80,10 @@ def pictures(measurement: Measurement) -> Iterator[tuple[pathlib.PurePath, Figur
     """The plots, and where they lie, seen from the page."""
     section = measurement.sections[0]
     cost_ratios, spreads = section.cost_ratios(), section.spreads()
-    marks = [plots.Mark(f"{ORACLE} (best known)", REFERENCE, 1.0, 1.0, 1.0)]
+    marks = [plots.Mean(f"{ORACLE} (best known)", REFERENCE, 1.0, 1.0, 1.0)]
     for line in section.ranked():
         low, high = _interval(cost_ratios[line.label])
-        marks.append(plots.Mark(_plain(line), line.kind, spreads[line.label].mean, low, high))
+        marks.append(plots.Mean(_plain(line), line.kind, spreads[line.label].mean, low, high))
     title = f"{section.name}, {len(section.seeds)} test episodes"
     yield MEANS, plots.means(title, marks)
     shown = profiled(section)

@@ -32,7 +32,7 @@ POINTS = 600  # of a curve
 
 
 @dataclasses.dataclass(frozen=True)
-class Mark:
+class Mean:
     """A line of the leaderboard in the plot of means.
 
     Args:
@@ -50,7 +50,7 @@ class Mark:
     high: float
 
 
-def means(title: str, marks: Sequence[Mark]) -> Figure:
+def means(title: str, marks: Sequence[Mean]) -> Figure:
     """Means with their intervals, one below the other; those beyond the cut stand at the edge, with an arrow.
 
     Args:

@@ -14,7 +14,7 @@ from baselines.evaluation.metrics import Row
 from baselines.evaluation.pages import sets
 from baselines.evaluation.pages.entries import Entry
 from baselines.evaluation.pages.measurement import Line, Section
-from baselines.evaluation.plan import Job, Plan, make_plan
+from baselines.evaluation.plan import EvaluationPlan, Job, make_plan
 from baselines.evaluation.results import Results, slug
 from baselines.evaluation.runner import run
 from baselines.files.locks import locked
@@ -93,7 +93,7 @@ def play(
             jobs[job.key] = job
     with contextlib.nullcontext() if folder is None else locked(folder):
         rows = _played(
-            Plan(tuple(jobs.values()), ()),
+            EvaluationPlan(tuple(jobs.values()), ()),
             folder,
             workers=workers,
             resume=resume,
@@ -104,7 +104,7 @@ def play(
 
 
 def _played(
-    whole: Plan, folder: pathlib.Path | None, *, workers: int, resume: bool, overwrite: bool, progress: bool
+    whole: EvaluationPlan, folder: pathlib.Path | None, *, workers: int, resume: bool, overwrite: bool, progress: bool
 ) -> dict[Any, Row]:
     """The rows of a plan by the keys of its jobs."""
     rows, results = dict[Any, Row](), None

@@ -126,7 +126,7 @@ class RecedingHorizonGradient(SolverPolicy):
 
     def diagnostics(self, state: Memory) -> dict[str, FloatArray]:
         """The step α that is kept for the next horizon, as ``alpha``, of shape (B,)."""
-        return {"alpha": DescentMemory(*state[2:]).alpha}
+        return {"alpha": DescentMemory(*self.memory_of(state)).alpha}
 
     def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
         """A gradient before each step and one for the last test, over the HL - 1 stages of the horizon."""

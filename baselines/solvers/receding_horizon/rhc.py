@@ -149,7 +149,7 @@ class RecedingHorizon(SolverPolicy):
         Returns:
             Joint coordinates in [rad] or [m]. Shape (B, K, n).
         """
-        return HorizonMemory(*state[2:]).plan.copy()
+        return HorizonMemory(*self.memory_of(state)).plan.copy()
 
     def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
         """Jacobians and a factorisation a knot in each Newton step, and forward kinematics for one length tried."""
