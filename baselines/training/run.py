@@ -209,6 +209,8 @@ class _Run:
         self._about["kept"] = {**kept, "weights_sha256": weights_hash(model), "validation": last}
         content = self._content()
         export(self._trainer, config.activation, self._folder, self._scenario, content)
+        # Killed between its last checkpoint and the history that belongs to it, a run lacks the last row.
+        self._folder.write_json(self._folder.history, self._at.history)
         self._folder.write_json(self._folder.run, content)
         return Result(self._folder.path, final, Score(**last))
 

@@ -18,7 +18,7 @@ from baselines.files import ResultsError
 from baselines.training import checkpoint
 from baselines.training import run as run_module
 from baselines.training.errors import TrainingError
-from baselines.training.folder import read_run
+from baselines.training.folder import Folder, read_run
 from baselines.training.run import train
 from baselines.training.trainers.models import weights_hash
 from baselines.training.validation import validation_seeds
@@ -66,6 +66,23 @@ def test_a_run_that_was_stopped_ends_like_one_that_was_not(finished, tmp_path):
         assert about(tmp_path)["training"]["segments"] == segments
         assert not (tmp_path / "model.zip").exists()
     assert train(config, 3, tmp_path, resume=True).weights_sha256 == result.weights_sha256
+    assert_same_run(folder, tmp_path)
+
+
+def test_a_run_killed_between_its_last_checkpoint_and_the_history_is_complete(finished, tmp_path, monkeypatch):
+    config, folder, _ = finished
+    write_json = Folder.write_json
+
+    def killed(self, file, content):
+        if file.name == "history.json" and content[-1]["segment"] == config.segments:
+            raise StoppedError
+        write_json(self, file, content)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Folder, "write_json", killed)
+        with pytest.raises(StoppedError):
+            train(config, 3, tmp_path)
+    assert train(config, 3, tmp_path, resume=True)
     assert_same_run(folder, tmp_path)
 
 
