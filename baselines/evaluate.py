@@ -140,46 +140,20 @@ def _carry_out(
 ) -> Rows:
     whole_number("workers", workers, at_least=1)
     with contextlib.nullcontext() if out is None else locked(out):
-        return _in_folder(
-            plan,
-            workers=workers,
-            out=out,
-            resume=resume,
-            overwrite=overwrite,
-            plots=plots,
-            progress=progress,
-            command=command,
-            show=show,
-        )
-
-
-def _in_folder(
-    plan: EvaluationPlan,
-    *,
-    workers: int,
-    out: pathlib.Path | None,
-    resume: bool,
-    overwrite: bool,
-    plots: bool,
-    progress: bool,
-    command: str,
-    show: Callable[[Rows], None] | None,
-) -> Rows:
-    """Carries a plan out in a folder that no other process writes into."""
-    results = None if out is None else Results(out, plan, describe(), resume=resume, overwrite=overwrite)
-    left = [job for job in plan.jobs if results is None or not results.done(job)]
-    rows = {} if results is None else {row.key: row for row in results.rows}
-    with contextlib.closing(run(left, workers=workers, progress=progress)) as batches:
-        for played in batches:
-            rows.update({one.job.key: one.row for one in played})
-            if results is not None:
-                results.add(played)
-    of_all = Rows([rows[job.key] for job in plan.jobs], plan.skipped)
-    if show is not None:  # before the plots, which take a while
-        show(of_all)
-    if results is not None:
-        _finish(results, plan, plots=plots, progress=progress, command=command)
-    return of_all
+        results = None if out is None else Results(out, plan, describe(), resume=resume, overwrite=overwrite)
+        left = [job for job in plan.jobs if results is None or not results.done(job)]
+        rows = {} if results is None else {row.key: row for row in results.rows}
+        with contextlib.closing(run(left, workers=workers, progress=progress)) as batches:
+            for played in batches:
+                rows.update({one.job.key: one.row for one in played})
+                if results is not None:
+                    results.add(played)
+        of_all = Rows([rows[job.key] for job in plan.jobs], plan.skipped)
+        if show is not None:  # before the plots, which take a while
+            show(of_all)
+        if results is not None:
+            _finish(results, plan, plots=plots, progress=progress, command=command)
+        return of_all
 
 
 def _finish(results: Results, plan: EvaluationPlan, *, plots: bool, progress: bool, command: str) -> None:

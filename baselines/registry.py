@@ -159,8 +159,8 @@ def make(name: str, scenario: str | Scenario, **parameters: Any) -> SolverPolicy
 
     Args:
         name: One of :func:`names`, or ``"agent"`` with the `path` of its file.
-        scenario: What is to be tracked, or its name. The policy is handed the scenario's model of the arm, not the
-            arm itself.
+        scenario: What is to be tracked, as :func:`ikgym.scenarios.find` takes it. The policy is handed the scenario's
+            model of the arm, not the arm itself.
         **parameters: The policy's own, see its class.
 
     Returns:

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 import torch
 
-from baselines.training import methods
 from baselines.training.config.actor_only import APG, Imitate
-from baselines.training.randomness import deterministic_torch, reseed
+from baselines.training.randomness import deterministic_torch
 from baselines.training.trainers.apg import APGTrainer
 from baselines.training.trainers.models import ALGORITHMS, network_outputs, weights_hash
 from baselines.training.validation import play, validation_seeds
 from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError, UnknownNameError
+from tests.baselines.training.segments import made, play_segments
 from tests.baselines.training.small import TINY
 
 SMALL = {name: TINY[name] for name in ("scenario", "steps", "hidden", "offsets", "segments", "n_envs")}
@@ -31,19 +31,6 @@ CONFIGS = {
 def one_thread():
     with deterministic_torch():
         yield
-
-
-def made(config, seed=1):
-    reseed(seed, None)
-    return methods.get(config.method).make(config, config.make_scenario(), seed)
-
-
-def play_segments(trainer, numbers, seed=1):
-    metrics = []
-    for number in numbers:
-        reseed(seed, number)
-        metrics.append(trainer.segment(number))
-    return metrics
 
 
 def cost(trainer, config, episodes=8):

@@ -13,6 +13,7 @@ from baselines.training.randomness import deterministic_torch, episode_seed, res
 from baselines.training.trainers.models import algorithm_of, mean_network, network_outputs, weights_hash
 from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError
+from tests.baselines.training.segments import made, play_segments
 from tests.baselines.training.small import OVER, TINY, tiny
 from tests.comparison import identical
 
@@ -34,36 +35,23 @@ def one_thread():
         yield
 
 
-def made(config, seed=1):
-    reseed(seed, None)
-    return methods.get(config.method).make(config, config.make_scenario(), seed)
-
-
-def play(trainer, numbers, seed=1):
-    metrics = []
-    for number in numbers:
-        reseed(seed, number)
-        metrics.append(trainer.segment(number))
-    return metrics
-
-
 @pytest.mark.parametrize(("method", "changes"), NOISY, ids=str)
 def test_a_segment_follows_from_state_and_number(method, changes, tmp_path):
     """A trainer that was put where another one stood goes on like that one: same metrics, same weights, same state."""
     config = tiny(method, **changes)
     undisturbed = made(config)
-    play(undisturbed, [0, 1])
+    play_segments(undisturbed, [0, 1])
     torch.save(undisturbed.state(), tmp_path / "state.pt")
     at_two = weights_hash(undisturbed.model)
-    wanted = play(undisturbed, [2, 3])
+    wanted = play_segments(undisturbed, [2, 3])
 
     other = made(config, seed=7)  # as if it were another one
-    play(other, [0], seed=7)
+    play_segments(other, [0], seed=7)
     other = made(config)
     other.restore(torch.load(tmp_path / "state.pt", weights_only=True))
     assert weights_hash(other.model) == at_two
     assert other.steps == 2 * config.n_envs * config.episodes * config.steps
-    assert play(other, [2, 3]) == wanted
+    assert play_segments(other, [2, 3]) == wanted
     assert weights_hash(other.model) == weights_hash(undisturbed.model) != at_two
     assert same(other.state(), undisturbed.state())
 
@@ -82,9 +70,9 @@ def test_every_part_of_the_state_matters(method):
     """Without it, whatever it is, the segment to come is another one; but for counters that only count."""
     config = tiny(method)
     trainer = made(config)
-    play(trainer, [0, 1])
+    play_segments(trainer, [0, 1])
     state = trainer.state()
-    play(trainer, [2])
+    play_segments(trainer, [2])
     wanted = weights_hash(trainer.model)
     start = made(config).state()
     for part in state:
@@ -104,16 +92,16 @@ def test_every_part_of_the_state_matters(method):
                 forgetful[part][name] = 1 if name == "_n_updates" else start[part][name]
             other = made(config)
             other.restore(forgetful)
-            play(other, [2])
+            play_segments(other, [2])
             assert weights_hash(other.model) != wanted, (part, name)
 
 
 def test_state_is_a_copy():
     trainer = made(tiny("sac"))
-    play(trainer, [0, 1])
+    play_segments(trainer, [0, 1])
     state = trainer.state()
     before = copy.deepcopy(state)
-    play(trainer, [2])
+    play_segments(trainer, [2])
     assert same(state, before)
     assert not same(trainer.state(), before)
 
@@ -121,7 +109,7 @@ def test_state_is_a_copy():
 @pytest.mark.parametrize("method", METHODS)
 def test_all_episodes_are_played_to_their_end(method):
     trainer = made(tiny(method, episodes=2))
-    play(trainer, [0])
+    play_segments(trainer, [0])
     assert len(trainer.model.ep_info_buffer) == 2 * 4
     assert trainer.steps == 2 * 4 * 20
     assert (trainer._env.venv._envs._simulator.steps_made == 0).all()
@@ -132,7 +120,7 @@ def test_episodes_grow():
     trainer = made(tiny("ppo", initial_episode_steps=5, segments=8, batch_size=80))
     lengths, costs = [], []
     for number in range(8):
-        costs.append(play(trainer, [number])[0]["train/cost"])
+        costs.append(play_segments(trainer, [number])[0]["train/cost"])
         lengths.append({episode["l"] for episode in trainer.model.ep_info_buffer})
         assert len(trainer.model.ep_info_buffer) == 4 * 20 / lengths[-1].copy().pop()
     assert lengths == [{5}, {5}, {10}, {20}, {20}, {20}, {20}, {20}]
@@ -171,7 +159,7 @@ def test_critics_warm_up_while_the_actor_rests(method):
     parts = trainer.state()["parameters"]["policy"]
     rest = {name: tensor for name, tensor in parts.items() if resting(name)}
     assert rest
-    play(trainer, [0, 1])
+    play_segments(trainer, [0, 1])
     after = trainer.state()["parameters"]["policy"]
     assert all(after[name].equal(tensor) for name, tensor in rest.items())
     moved = [name for name, tensor in parts.items() if not after[name].equal(tensor)]
@@ -180,7 +168,7 @@ def test_critics_warm_up_while_the_actor_rests(method):
     if temperature is not None:
         assert temperature.item() == pytest.approx(np.log(0.01), rel=1e-6)
     assert all(parameter.requires_grad for parameter in trainer._actor())
-    play(trainer, [2])
+    play_segments(trainer, [2])
     finally_ = trainer.state()["parameters"]["policy"]
     assert not any(finally_[name].equal(tensor) for name, tensor in rest.items())
 
@@ -192,10 +180,10 @@ def resting(name):
 def test_nothing_is_learned_while_memory_is_filled():
     trainer = made(tiny("td3", learning_starts=160))
     before = weights_hash(trainer.model)
-    play(trainer, [0, 1])
+    play_segments(trainer, [0, 1])
     assert weights_hash(trainer.model) == before
     assert trainer.model.replay_buffer.size() == 40
-    play(trainer, [2])
+    play_segments(trainer, [2])
     assert weights_hash(trainer.model) != before
 
 
@@ -204,10 +192,10 @@ def test_learning_starts_after_steps_of_all_arms(learning_starts, updates):
     """As in Stable-Baselines3: an update, here each 5 steps of 4 arms, needs more steps than that before it. Until
     then the agent acts as it is; at random, its actions would fill the box."""
     trainer = made(tiny("td3", learning_starts=learning_starts, gradient_steps=1, action_noise=0.01))
-    play(trainer, [0])
+    play_segments(trainer, [0])
     assert trainer.model._n_updates == updates
     assert np.abs(trainer.model.replay_buffer.actions[:20]).max() < 0.2
-    play(trainer, [1])
+    play_segments(trainer, [1])
     assert trainer.model._n_updates == updates + 4
 
 
@@ -226,14 +214,14 @@ def test_entropy_of_sac_is_that_of_all_joints(changes, wanted):
 
 def test_a_fixed_weight_of_the_entropy():
     trainer = made(tiny("sac", ent_coef=0.25, critic_warmup=2, learning_starts=0))
-    play(trainer, [0, 1, 2])
+    play_segments(trainer, [0, 1, 2])
     assert trainer.state()["others"]["ent_coef_tensor"].item() == 0.25
 
 
 def test_learning_rate_of_a_segment():
     trainer = made(tiny("sac", learning_rate=1e-3, learning_rate_end=1e-5))
     for number, wanted in enumerate([1e-3, 1e-4, 1e-5]):
-        play(trainer, [number])
+        play_segments(trainer, [number])
         rates = {group["lr"] for group in trainer.model.actor.optimizer.param_groups}
         assert rates == {trainer.model.lr_schedule(0.5)} or number == 0  # at first it collects
         assert trainer.model.lr_schedule(0.5) == pytest.approx(wanted)
@@ -319,6 +307,6 @@ def test_ppo_learns():
         }
     )
     trainer = made(config)
-    costs = [metrics["train/cost"] for metrics in play(trainer, range(30))]
+    costs = [metrics["train/cost"] for metrics in play_segments(trainer, range(30))]
     print(costs)
     assert costs[-1] < 0.1 * costs[0]
