@@ -24,6 +24,7 @@ def test_catalogue():
         for s in map(scenarios.get, ALL)
     }
     varga, literal = ("varga7", "varga7", "skew", 1e-3), ("varga7_literal", "varga7_literal", "skew", 1e-3)
+    pose = ("varga7", "varga7", "pose", 1e-3)
     faitli = ("faitli3", "faitli3", "position", 1e-3, 6283, 50.0)
     khan = ("khan8", "khan8_approximate", "matrix", 1e-3, 100_500, 50.0)
     assert table == {
@@ -33,6 +34,8 @@ def test_catalogue():
         "varga7-literal-slow": (*literal, 3000, 20.0),
         "varga7-random": (*varga, 1000, 20.0),
         "varga7-random-long": (*varga, 3000, 20.0),
+        "varga7-pose-random": (*pose, 1000, 20.0),
+        "varga7-pose-random-long": (*pose, 3000, 20.0),
         "faitli3-stretched": faitli,
         "faitli3-regular": faitli,
         "faitli3-shoulder": faitli,

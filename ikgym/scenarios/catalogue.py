@@ -16,11 +16,11 @@ VARGA_SLOW = Sinusoid(0.5 * VARGA_AMPLITUDE, frequency=3.0, sigmoid=0.3)
 VARGA_RANDOM = RandomSinusoid(VARGA_AMPLITUDE, scale=(0.2, 1.0), frequency=(1.0, 3.0))
 
 
-def _varga(name: str, arm: str, trajectory: Trajectory, steps: int, source: str) -> Scenario:
+def _varga(name: str, arm: str, trajectory: Trajectory, steps: int, source: str, task: str = "skew") -> Scenario:
     return Scenario(
         name,
         arms.get(arm),
-        tasks.get("skew"),
+        tasks.get(task),
         trajectory,
         velocity_limit=np.full(7, 20.0),
         steps=steps,
@@ -106,6 +106,13 @@ SCENARIOS: dict[str, Callable[[], Scenario]] = {
     "varga7-random": lambda: _varga("varga7-random", "varga7", VARGA_RANDOM, 1000, "amplitudes of Varga 2021, eq. 11"),
     "varga7-random-long": lambda: _varga(
         "varga7-random-long", "varga7", VARGA_RANDOM, 3000, "amplitudes of Varga 2021, eq. 11"
+    ),
+    # The same motions, with an orientation that cannot be mistaken: skew coordinates are the same for θ and 180° - θ.
+    "varga7-pose-random": lambda: _varga(
+        "varga7-pose-random", "varga7", VARGA_RANDOM, 1000, "amplitudes of Varga 2021, eq. 11", task="pose"
+    ),
+    "varga7-pose-random-long": lambda: _varga(
+        "varga7-pose-random-long", "varga7", VARGA_RANDOM, 3000, "amplitudes of Varga 2021, eq. 11", task="pose"
     ),
     # q = (sin t, .3 + .5 sin 2t, .2 + .8 sin(3t + .5)): passes the stretched elbow.
     "faitli3-stretched": lambda: _faitli(
