@@ -7,6 +7,7 @@ import numpy as np
 from baselines.papers.faitli.episodes import STRETCHED, TRAJECTORIES
 from baselines.papers.paper import Claim, Finding, rms, verdict
 from baselines.papers.runs import Runs
+from baselines.solvers.resolved_rate.dls import damped_rows
 from baselines.status import Status
 
 
@@ -80,6 +81,33 @@ def _damping_distorts(runs: Runs) -> Finding:
     )
 
 
+def _distortion_ratio(runs: Runs) -> Finding:
+    """Solutions exist for all directions away from singular configurations, which random ones are."""
+    scenario, rng = runs.scenario(TRAJECTORIES[1]), np.random.default_rng(0)
+    rows = min(1000, runs.steps or 1000)
+    jacobian = scenario.model.jacobian(rng.uniform(-np.pi, np.pi, (rows, 3)))[:, :3]
+    shift = rng.normal(size=(rows, 3))
+    exact = np.linalg.solve(jacobian, shift[:, :, None])[:, :, 0]
+    smallest = np.linalg.svd(jacobian, compute_uv=False)[:, -1] ** 2
+    ratios, distortions = [], []
+    for mu in (1e-6, 1e-5, 1e-4, 1e-3, 1e-2):
+        damped = np.empty_like(shift)
+        damped_rows(jacobian, shift, mu, damped)
+        ratios.append(mu / smallest)
+        distortions.append(np.linalg.norm(damped - exact, axis=1) / np.linalg.norm(exact, axis=1))
+    ratio, distortion = np.concatenate(ratios), np.concatenate(distortions)
+    share = distortion / np.minimum(ratio, 1.0)
+    inside = float(((share <= 1.0 + 1e-6) & (share >= 0.1)).mean())
+    return verdict(
+        inside >= 0.95,
+        f"{100 * inside:.1f} % of {len(share)} solutions are; the distortion is {np.median(share):.2f} of μ / λ_min in "
+        f"the median, {share.max():.2f} at most, with λ_min between {smallest.min():.1g} and {smallest.max():.1g} m²",
+        share_within=inside,
+        median_of_the_ratio=float(np.median(share)),
+        largest_of_the_ratio=float(share.max()),
+    )
+
+
 CLAIMS = (
     Claim(
         "stagnation",
@@ -108,5 +136,13 @@ CLAIMS = (
         "abstract; section 2",
         "`dls` and `moore_penrose` on a path without singular points",
         _damping_distorts,
+    ),
+    Claim(
+        "distortion ratio",
+        "The distortion by damping can be estimated roughly as the ratio of μ and the smallest eigenvalue of J Jᵀ.",
+        "section 2, after eq. 2.3",
+        "the inverse of `dls` with μ of 1e-6 to 1e-2 m² in 1000 random configurations of Faitli's arm, random directions: roughly is "
+        "between a tenth of μ / λ_min, or of 1 if that is less, and all of it, in 95 % of the solutions",
+        _distortion_ratio,
     ),
 )

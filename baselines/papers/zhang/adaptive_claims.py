@@ -1,4 +1,4 @@
-"""Zhang 2020, section III: what is claimed of MFAC, its poles, its static error and its robustness."""
+"""Zhang 2020, section III: what is claimed of MFAC, its poles and its static error."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from baselines.papers.paper import Claim, Finding, verdict
 from baselines.papers.runs import Runs
 from baselines.papers.zhang.episodes import HELIX, constant, jacobians_used, listed, predictive, settled_from
 from baselines.registry import make
-from baselines.solvers.levenberg_marquardt.damping_parameters import typical_link
 from ikgym.trajectories import StraightLine
 from ikgym.validation import FloatArray
 
@@ -104,25 +103,6 @@ def _no_static_error(runs: Runs) -> Finding:
     )
 
 
-def _near_singular(runs: Runs) -> Finding:
-    shares = (0.0, 1e-3, 0.1)
-    peaks = {}
-    for name, scenario in {
-        "start of example 1": HELIX,
-        "above the shoulder": "faitli3-shoulder",
-        "stretched elbow": "faitli3-stretched",
-    }.items():
-        square = typical_link(runs.scenario(scenario).arm) ** 2
-        episodes = (constant(runs, scenario, share * square) for share in shares)
-        peaks[name] = [float(np.abs(episode.qdot).max()) for episode in episodes]
-    evidence = "; ".join(f"{name}: {', '.join(f'{v:.3g}' for v in values)} rad/s" for name, values in peaks.items())
-    return verdict(
-        all(np.diff(values).max() <= 0.0 for values in peaks.values()),
-        f"peak joint velocities at λ = 0, 0.001 l², 0.1 l²: {evidence}",
-        **{f"{name}, λ = {d} l²": v for name, of in peaks.items() for d, v in zip(shares, of, strict=True)},
-    )
-
-
 CLAIMS = (
     Claim(
         "poles",
@@ -158,13 +138,5 @@ CLAIMS = (
         "section III B, eq. 10; section IV B, eq. 33",
         "the same ramp at two velocities: an error of the first order in the velocity would be the static error",
         _no_static_error,
-    ),
-    Claim(
-        "robustness",
-        "Robustness improves as λ increases, also where the robot approaches singular points.",
-        "section III B",
-        "peak joint velocity of `mfac` with `one_step` and three λ, in three singular places; at the start of "
-        "example 1 the limit is 10 rad/s",
-        _near_singular,
     ),
 )

@@ -9,24 +9,22 @@ import numpy as np
 
 from baselines.evaluation.rollout import Episode
 from baselines.papers.runs import Runs
-from baselines.solvers.levenberg_marquardt.mfapc import EXAMPLE_1, EXAMPLE_2
+from baselines.solvers.levenberg_marquardt.presets import HelixPredictiveControl
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray
 
 HELIX, LINE = "zhang3-helix", "zhang6-lspb"
-#: The controller (5) under the rule of (44): what is left of example 1 without prediction.
-WITHOUT_PREDICTION = {key: value for key, value in EXAMPLE_1.items() if key not in ("horizon", "jacobians")}
 SETTLED = 60  # samples after which the transient of example 1 has died away
 
 
 def predictive(runs: Runs) -> Episode:
     """Example 1: the controller (27), (28), (44) on the helix."""
-    return runs.play(HELIX, "mfapc", **EXAMPLE_1)
+    return runs.play(HELIX, "mfapc_helix")
 
 
 def adaptive(runs: Runs) -> Episode:
     """The same without prediction."""
-    return runs.play(HELIX, "mfac", **WITHOUT_PREDICTION)
+    return runs.play(HELIX, "mfac_helix")
 
 
 def constant(runs: Runs, scenario: str, damping: float, horizon: int = 1) -> Episode:
@@ -39,7 +37,7 @@ def constant(runs: Runs, scenario: str, damping: float, horizon: int = 1) -> Epi
 
 def iterative(runs: Runs, **numbers: Any) -> Episode:
     """Example 2: the iteration (55)-(59) on the line."""
-    return runs.play(LINE, "mfapc", **EXAMPLE_2, **numbers)
+    return runs.play(LINE, "mfapc_line", **numbers)
 
 
 def settled_from(episode: Episode) -> int:
@@ -68,7 +66,7 @@ def jacobians_used(scenario: Scenario, episode: Episode) -> FloatArray:
 
 def lambdas_used(episode: Episode) -> FloatArray:
     """λ(1), λ(2), … of example 1, as the controller used them; what it kept is for the next sample. Shape (steps,)."""
-    return np.concatenate([[EXAMPLE_1["damping"]], episode.diagnostics["lambda"][:-1]])
+    return np.concatenate([[HelixPredictiveControl.damping], episode.diagnostics["lambda"][:-1]])
 
 
 def listed(values: Mapping[str, float], form: str = ".3g", unit: str = "") -> str:

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
-from types import MappingProxyType
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -37,23 +35,6 @@ from ikgym.validation import known_name, whole_number
 
 JACOBIANS = ("predicted", "constant")
 STOPS = ("horizon", "first_point")
-
-#: The controller of example 1, for the scenario ``zhang3-helix``: (27), (28) and (44).
-EXAMPLE_1: Mapping[str, Any] = MappingProxyType(
-    {
-        "horizon": 5,
-        "one_step": True,
-        "jacobians": "constant",
-        "rule": "threshold",
-        "damping": 2.0,
-        "growth": 1.1,
-        "decay": 1.02,
-        "threshold": 10.0,
-        "carry": True,
-    }
-)
-#: The solver of example 2, for the scenario ``zhang6-lspb``: (55)-(59).
-EXAMPLE_2: Mapping[str, Any] = MappingProxyType({"horizon": 2, "iterations": 10, "rule": "constant", "damping": 0.0})
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

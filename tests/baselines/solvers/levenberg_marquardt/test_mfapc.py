@@ -9,7 +9,6 @@ import baselines
 import ikgym
 from baselines.evaluation.rollout import rollout
 from baselines.solvers.levenberg_marquardt import mfapc as module
-from baselines.solvers.levenberg_marquardt.mfapc import EXAMPLE_1, EXAMPLE_2
 from baselines.status import Status
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 from tests.baselines.solvers.levenberg_marquardt.test_block_tridiagonal import printed as dense
@@ -198,7 +197,7 @@ def test_running_away_stops_the_arm():
 def test_example_1_follows_the_printed_controller():
     """(27), (28) and (44) with constant J; the first measurement is 0, and λ falls from the eighth sample on."""
     scenario = ikgym.scenarios.get("zhang3-helix").replace(steps=120)
-    policy = baselines.make("mfapc", scenario, **EXAMPLE_1)
+    policy = baselines.make("mfapc_helix", scenario)
     assert policy.preview == 5
     nominal = scenario.nominal(preview=5)
     q, pose, damping, falls = np.zeros(3), np.zeros(3), 2.0, []
@@ -220,14 +219,14 @@ def test_example_1_follows_the_printed_controller():
 
 def test_example_2_tracks_in_ten_iterations():
     scenario = ikgym.scenarios.get("zhang6-lspb").replace(steps=300)
-    policy = baselines.make("mfapc", scenario, **EXAMPLE_2)
+    policy = baselines.make("mfapc_line", scenario)
     assert policy.preview == 2
     episode = rollout(scenario, policy, seed=0)
     assert episode.position_error.max() < 1e-9
     assert episode.orientation_error.max() < 1e-8
     # (40) cannot be met on the way, the first point can.
     assert Status.ITERATION_LIMIT in episode.status
-    nearest = rollout(scenario, baselines.make("mfapc", scenario, stop="first_point", **EXAMPLE_2), seed=0)
+    nearest = rollout(scenario, baselines.make("mfapc_line", scenario, stop="first_point"), seed=0)
     assert set(nearest.status) == {Status.CONVERGED}
     assert nearest.iterations.max() <= 3
 
