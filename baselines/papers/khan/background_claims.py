@@ -141,8 +141,9 @@ CLAIMS = (
         "distortion ratio",
         "The distortion by damping can be estimated roughly as the ratio of μ and the smallest eigenvalue of J Jᵀ.",
         "section 2, after eq. 2.3",
-        "the inverse of `dls` with μ of 1e-6 to 1e-2 m² in 1000 random configurations of Faitli's arm, random directions: roughly is "
-        "between a tenth of μ / λ_min, or of 1 if that is less, and all of it, in 95 % of the solutions",
+        "the inverse of `dls` with μ of 1e-6 to 1e-2 m² in 1000 random configurations of Faitli's arm, random "
+        "directions: roughly is between a tenth of μ / λ_min, or of 1 if that is less, and all of it, in 95 % of the "
+        "solutions",
         _distortion_ratio,
     ),
 )

@@ -68,7 +68,7 @@ def _peak(runs: Runs, scenario: str, share: float) -> float:
 
 
 def _robustness(runs: Runs) -> Finding:
-    lost = {f"links of {links:.0%}": [_lost(runs, share, links) for share in SHARES] for links in (0.45, 0.3)}
+    lost = {f"links of {100 * links:.0f} %": [_lost(runs, share, links) for share in SHARES] for links in (0.45, 0.3)}
     peaks = {name: [_peak(runs, scenario, share) for share in SHARES] for name, scenario in PLACES.items()}
     pairs: dict[str, tuple[float, float]] = {}
     for name, values in {**lost, **peaks}.items():
