@@ -52,6 +52,8 @@ class SolverPolicy(Frozen, abc.ABC):
     name: ClassVar[str]
     #: Whether the policy knows more than its observation: a reference, not a contender.
     reference: ClassVar[bool] = False
+    #: Whether its numbers are those of one scenario: an example of a paper, no contender elsewhere.
+    example: ClassVar[bool] = False
     #: Rows that are worth a thread of their own: the fewer, the longer a row takes.
     grain: ClassVar[int] = 256
     #: Whether the policy is read from a file, as learned agents are.

@@ -110,14 +110,15 @@ def short(name: str) -> str:
 def solvers(tuned: Mapping[str, Mapping[str, Any]] = MappingProxyType({})) -> tuple[Entry, ...]:
     """All registered solvers as they are, some receding horizons, and what tuning made of them.
 
-    References, which have privileged information, are left out, and so are agents that come with the package: agents
-    are entered with all of their training seeds, see :func:`agents`.
+    References, which have privileged information, are left out, and so are examples for one scenario, and agents that
+    come with the package: agents are entered with all of their training seeds, see :func:`agents`.
 
     Args:
         tuned: The best settings of solvers, by their specs; one that they do not change is not listed twice.
     """
     classes = {name: registry.get(name) for name in registry.names()}
-    names = [name for name, kind in classes.items() if not (kind.reference or issubclass(kind, LearnedPolicy))]
+    left_out = {n for n, kind in classes.items() if kind.reference or kind.example or issubclass(kind, LearnedPolicy)}
+    names = [name for name in classes if name not in left_out]
     better = (solver(spec, settings) for spec, settings in tuned.items() if settings)
     return (*map(solver, (*names, *HORIZONS)), *better)
 

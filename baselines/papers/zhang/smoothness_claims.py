@@ -9,7 +9,7 @@ import numpy as np
 from baselines.evaluation.rollout import Episode
 from baselines.papers.paper import Claim, Finding, roughness
 from baselines.papers.runs import Runs
-from baselines.papers.zhang.comparing import Pairs, falls, in_words
+from baselines.papers.zhang.comparing import falls, in_words
 from baselines.papers.zhang.episodes import HELIX, LINE, adaptive, constant, predictive, settled_from
 from baselines.solvers.levenberg_marquardt.damping_parameters import typical_link
 from ikgym.validation import FloatArray
@@ -28,12 +28,16 @@ def _both(runs: Runs, scenario: str, share: float) -> tuple[Episode, Episode]:
     return constant(runs, scenario, damping), constant(runs, scenario, damping, 5)
 
 
-def _pairs(runs: Runs, figure: Callable[[str, Episode], float], paths: tuple[str, ...]) -> dict[str, Pairs]:
+def _pairs(
+    runs: Runs, figure: Callable[[str, Episode], float], paths: tuple[str, ...]
+) -> dict[str, tuple[float, float]]:
     """A figure of MFAC and of MFAPC by path and λ."""
-    return {
-        f"`{path}`": {f"λ = {s:g} l²": tuple(figure(path, e) for e in _both(runs, path, s)) for s in SHARES}  # type: ignore[misc]
-        for path in paths
-    }
+    pairs = {}
+    for path in paths:
+        for share in SHARES:
+            before, after = (figure(path, episode) for episode in _both(runs, path, share))
+            pairs[f"`{path}`, λ = {share:g} l²"] = before, after
+    return pairs
 
 
 def _smoothness(runs: Runs, values: Callable[[Episode], FloatArray]) -> Finding:
@@ -43,12 +47,11 @@ def _smoothness(runs: Runs, values: Callable[[Episode], FloatArray]) -> Finding:
         return roughness(values(episode)[settled_from(episode) :])
 
     example = adaptive(runs), predictive(runs)
-    pairs: dict[str, tuple[float, float]] = {
+    pairs = {
         "example 1, whole run": (roughness(values(example[0])), roughness(values(example[1]))),
         "example 1, after the transient": (settled(HELIX, example[0]), settled(HELIX, example[1])),
     }
-    for path, of in _pairs(runs, settled, PATHS).items():
-        pairs.update({f"{path}, {condition}": pair for condition, pair in of.items()})
+    pairs.update(_pairs(runs, settled, PATHS))
     return falls(pairs, in_words(pairs))
 
 
@@ -66,8 +69,7 @@ def _singular_points(runs: Runs) -> Finding:
 
     pairs = {}
     for reading, figure in (("1 / σ", closeness), ("time near", time_near)):
-        for path, of in _pairs(runs, figure, SINGULAR).items():
-            pairs.update({f"{reading}, {path}, {condition}": pair for condition, pair in of.items()})
+        pairs.update({f"{reading}, {name}": pair for name, pair in _pairs(runs, figure, SINGULAR).items()})
     return falls(pairs, in_words(pairs))
 
 

@@ -25,6 +25,7 @@ class HelixAdaptiveControl(ModelFreeAdaptiveControl):
     one_step: bool = True
 
     name: ClassVar[str] = "mfac_helix"
+    example: ClassVar[bool] = True
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -45,6 +46,7 @@ class HelixPredictiveControl(ModelFreeAdaptivePredictiveControl):
     jacobians: str = "constant"
 
     name: ClassVar[str] = "mfapc_helix"
+    example: ClassVar[bool] = True
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -57,3 +59,4 @@ class LinePredictiveControl(ModelFreeAdaptivePredictiveControl):
     horizon: int = 2
 
     name: ClassVar[str] = "mfapc_line"
+    example: ClassVar[bool] = True
