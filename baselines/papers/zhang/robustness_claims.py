@@ -14,12 +14,22 @@ from baselines.papers.zhang.episodes import HELIX, constant
 from baselines.policy import Batch
 from baselines.registry import make
 from baselines.solvers.levenberg_marquardt.damping_parameters import typical_link
+from ikgym.arms import Arm
 from ikgym.validation import FloatArray
 
 SHARES = (0.0, 1e-3, 1e-1)  # λ in l²; those above 0 are the range of remark 2
 PLACES = {"start of example 1": HELIX, "above the shoulder": "faitli3-shoulder", "stretched elbow": "faitli3-stretched"}
 PERIODS = 200
 REGULAR = 10.0  # cond(J) up to which a state counts as away from singular points
+
+
+def _regular(arm: Arm, rows: int, shift: float) -> tuple[FloatArray, FloatArray]:
+    """States and, a shift in [rad] from each, joint coordinates of targets, both away from singular points."""
+    rng = np.random.default_rng(0)
+    goal, way = rng.uniform(-np.pi, np.pi, (20 * rows, 3)), rng.normal(size=(20 * rows, 3))
+    q = goal + shift * way / np.linalg.norm(way, axis=1, keepdims=True)
+    kept = np.all([np.linalg.cond(arm.jacobian(ends)[:, :3]) < REGULAR for ends in (q, goal)], axis=0)
+    return q[kept][:rows], goal[kept][:rows]
 
 
 def _at_rest(runs: Runs, share: float, shift: float, *, links: float = 1.0) -> tuple[FloatArray, FloatArray]:
@@ -34,23 +44,19 @@ def _at_rest(runs: Runs, share: float, shift: float, *, links: float = 1.0) -> t
     Returns:
         The error, and how far the tool is beyond its target, in the distance at the start: shapes (periods, states).
     """
-    scenario, rows = runs.scenario(HELIX), min(200, runs.steps or 200)
-    arm, rng = scenario.arm, np.random.default_rng(0)
-    goal, way = rng.uniform(-np.pi, np.pi, (20 * rows, 3)), rng.normal(size=(20 * rows, 3))
-    q = goal + shift * way / np.linalg.norm(way, axis=1, keepdims=True)
-    regular = [np.linalg.cond(arm.jacobian(ends)[:, :3]) < REGULAR for ends in (q, goal)]
-    q, goal = (ends[regular[0] & regular[1]][:rows] for ends in (q, goal))
-    model = dataclasses.replace(arm, offsets=links * arm.offsets, tool=links * arm.tool)
-    changed = scenario.replace(model=model)
-    damping = share * typical_link(arm) ** 2
-    policy = make("mfac", changed, one_step=True, rule="constant", damping=damping)
-    target, start = arm.forward(goal)[1], arm.forward(q)[1]
-    distance = np.linalg.norm(target - start, axis=1)
+    scenario = runs.scenario(HELIX)
+    arm = scenario.arm
+    changed = scenario.replace(model=dataclasses.replace(arm, offsets=links * arm.offsets, tool=links * arm.tool))
+    policy = make("mfac", changed, one_step=True, rule="constant", damping=share * typical_link(arm) ** 2)
+    q, goal = _regular(arm, min(200, runs.steps or 200), shift)
+    target = arm.forward(goal)[1]
+    way = target - arm.forward(q)[1]
+    distance = np.linalg.norm(way, axis=1)
     errors, beyond = [], []
     for _ in range(PERIODS):
         pose = arm.forward(q)[1]
         errors.append(np.linalg.norm(target - pose, axis=1) / distance)
-        beyond.append(((pose - target) * (target - start)).sum(axis=1) / distance**2)
+        beyond.append(((pose - target) * way).sum(axis=1) / distance**2)
         batch = Batch(q, np.zeros_like(q), pose, target[:, None], np.ones((len(q), 1)))
         q = q + policy.solve(batch, policy.memory(len(q))).qdot * scenario.dt
     return np.array(errors), np.array(beyond)
