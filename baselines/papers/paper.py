@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from baselines.papers.runs import Runs
 from ikgym.validation import FloatArray
 
-Verdict = Literal["reproduced", "contradicted", "not testable"]
+Verdict = Literal["reproduced", "contradicted", "depends", "not testable"]
 
 
 class Drawn(NamedTuple):
@@ -31,7 +31,8 @@ class Finding(NamedTuple):
     """What the test of a claim found.
 
     Attributes:
-        verdict: Whether the claim holds. A contradicted claim is a result.
+        verdict: Whether the claim holds. A contradicted claim is a result; one that depends holds in one reading or
+            condition that the text allows, and fails in another.
         evidence: The figures that show it, in one line with units.
         numbers: The same by name, for machines.
     """
@@ -44,6 +45,14 @@ class Finding(NamedTuple):
 def verdict(holds: bool | np.bool_, evidence: str, /, **numbers: Any) -> Finding:
     """The finding that a claim is reproduced if it holds, and contradicted if not."""
     return Finding("reproduced" if holds else "contradicted", evidence, numbers)
+
+
+def by_reading(holds: Iterable[bool | np.bool_], evidence: str, /, **numbers: Any) -> Finding:
+    """The finding of a claim with several readings: reproduced or contradicted if they agree, and else it depends."""
+    outcomes = {bool(one) for one in holds}
+    if len(outcomes) > 1:
+        return Finding("depends", evidence, numbers)
+    return verdict(outcomes == {True}, evidence, **numbers)
 
 
 def rms(values: FloatArray) -> float:
