@@ -119,8 +119,8 @@ def _no_yanks(runs: Runs) -> Finding:
             "method_error_m": float(episodes["method"].position_error.max()),
         }
     parts = [
-        f"`{name}` {v['pseudoinverse_rad_per_s']:.3g} rad/s ({v['pseudoinverse_multiple']:.2g} times the median), "
-        f"without {v['method_rad_per_s']:.2f} rad/s ({v['method_multiple']:.2g} times), error up to "
+        f"`{name}` {v['pseudoinverse_rad_per_s']:.3g} rad/s ({v['pseudoinverse_multiple']:.2g} × the median), "
+        f"without {v['method_rad_per_s']:.2f} rad/s ({v['method_multiple']:.2g} ×), error up to "
         f"{1e3 * v['method_error_m']:.1f} mm"
         for name, v in numbers.items()
     ]

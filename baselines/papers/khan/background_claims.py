@@ -80,7 +80,7 @@ def _distortion(runs: Runs) -> Finding:
     return verdict(
         abs(of_mu - 1.0) < 0.2 and abs(of_least + 1.0) < 0.2,
         f"the relative distortion of q̇ goes with μ^{of_mu:.2f} λ_min^{of_least:.2f}; in nine of ten cases it is "
-        f"between {low:.2g} and {high:.2g} times μ/λ_min",
+        f"between {low:.2g} and {high:.2g} · μ/λ_min",
         exponent_of_mu=float(of_mu),
         exponent_of_least=float(of_least),
     )
