@@ -84,7 +84,7 @@ def by_hand(scenario, actions, seed):
         )
 
 
-@pytest.mark.parametrize("name", [name for name in ALL if not name.startswith("khan8")])
+@pytest.mark.parametrize("name", [name for name in ALL if ikgym.scenarios.get(name).iterations_per_point == (1,)])
 def test_steps_are_what_the_specification_says(name):
     scenario = ikgym.scenarios.get(name).replace(steps=12)
     env = make(scenario)

@@ -41,6 +41,7 @@ def test_catalogue():
         "faitli3-shoulder": faitli,
         "khan8-q1": khan,
         "khan8-q7q8": khan,
+        "planar2-bent": ("planar2", "planar2", "position", 1e-3, 20_000, 50.0),
         "zhang3-helix": ("zhang3", "zhang3", "position", 1.0, 799, 10.0),
         "zhang6-lspb": ("puma560", "puma560", "pose", 1e-3, 2000, 20.0),
     }

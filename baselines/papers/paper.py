@@ -32,7 +32,8 @@ class Finding(NamedTuple):
     """What the test of a claim found.
 
     Attributes:
-        verdict: Whether the claim holds. A contradicted claim is a result.
+        verdict: Whether the claim holds. A contradicted claim is a result; one that depends holds in one reading or
+            condition that the text allows, and fails in another.
         evidence: The figures that show it, in one line with units.
         numbers: The same by name, for machines.
     """

@@ -9,6 +9,7 @@ from tqdm import tqdm
 
 from baselines.canonical import canonical, jsonable
 from baselines.evaluation.rollout import Episode, rollout
+from baselines.fingerprints import episode_hash
 from baselines.registry import make
 from ikgym import scenarios
 from ikgym.scenarios import Scenario
@@ -26,28 +27,28 @@ class Runs:
         self.steps, self._progress = steps, progress
         self._episodes: dict[tuple[str, str, str], Episode] = {}
 
-    def scenario(self, name: str) -> Scenario:
+    def scenario(self, name: str | Scenario) -> Scenario:
         """A scenario, shortened if the run is a trial."""
-        whole = scenarios.get(name)
+        whole = scenarios.find(name)
         return whole if self.steps is None else whole.replace(steps=min(self.steps, whole.steps))
 
-    def play(self, scenario: str, policy: str, /, **parameters: Any) -> Episode:
+    def play(self, scenario: str | Scenario, policy: str, /, **parameters: Any) -> Episode:
         """The episode of a policy in a fixed scenario, from seed 0.
 
         Args:
-            scenario: The scenario's name.
+            scenario: The scenario, or its name.
             policy: The policy's name.
             **parameters: The policy's parameters.
 
         Returns:
             The recorded episode; the same object at every call.
         """
-        key = scenario, policy, canonical(jsonable(parameters))
+        what = self.scenario(scenario)
+        key = episode_hash(what, 0), policy, canonical(jsonable(parameters))
         if key not in self._episodes:
-            what = self.scenario(scenario)
             bar = tqdm(
                 total=what.steps,
-                desc=f"{scenario} · {policy}",
+                desc=f"{what.name} · {policy}",
                 unit="step",
                 unit_scale=True,
                 leave=False,

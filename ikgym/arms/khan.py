@@ -1,6 +1,7 @@
 """The 8-joint arm of Khan and Tar 2020: the approximate model (eq. 3.13, 3.14) and the exact arm (Table 1, eq. 3.15).
 
-A solver knows the approximate arm; poses are measured on the exact one.
+A solver knows the approximate arm; poses are measured on the exact one. Beside them the planar arm with 2 joints that
+the paper's section 2 speaks of.
 """
 
 from __future__ import annotations
@@ -54,6 +55,16 @@ def khan8() -> Arm:
     return Arm("khan8", _segments(1.2, 1.8, 2.2), _unit(np.array(axes)), tool=np.array([2.6, 2.4, 2.3]))
 
 
+def planar2() -> Arm:
+    """The simplest arm with 2 joints (section 2): axes z, z; links of 0.8 and 0.5 m, those of Faitli and Tar 2018."""
+    return Arm(
+        "planar2",
+        offsets=np.array([[0, 0, 0], [0.8, 0, 0]]),
+        axes=np.array([[0, 0, 1], [0, 0, 1]], dtype=float),
+        tool=np.array([0.5, 0, 0]),
+    )
+
+
 def _segments(l1: float, l2: float, l3: float) -> FloatArray:
     """The shift parameters of eq. 3.14 and 3.15, one row a joint, in [m]."""
     return np.array(
@@ -76,4 +87,4 @@ def _unit(axes: FloatArray) -> FloatArray:
     return scaled
 
 
-ARMS = {"khan8": khan8, "khan8_approximate": khan8_approximate}
+ARMS = {"khan8": khan8, "khan8_approximate": khan8_approximate, "planar2": planar2}

@@ -57,6 +57,20 @@ def _khan(name: str, amplitude: list[float], frequency: list[float]) -> Scenario
     )
 
 
+def _planar() -> Scenario:
+    """Bent between 0.5 and 1.1 rad, so that both eigenvalues of ∂(x, y)/∂q keep negative real parts (eq. 2.6)."""
+    return Scenario(
+        "planar2-bent",
+        arms.get("planar2"),
+        tasks.get("position"),
+        _sines([0.3, 0.3], [np.pi, 2 * np.pi], [0.0, 0.0], [1.2, 0.8]),
+        velocity_limit=np.full(2, 50.0),
+        iterations_per_point=10,
+        steps=20_000,
+        source="Khan 2020, section 2: the arm with 2 joints; trajectory of this project",
+    )
+
+
 def _zhang_helix() -> Scenario:
     """Sample times 1 … 800; the first measurement is 0, although q = 0 says otherwise."""
     return Scenario(
@@ -128,6 +142,7 @@ SCENARIOS: dict[str, Callable[[], Scenario]] = {
     ),
     "khan8-q1": lambda: _khan("khan8-q1", [0.5, 0, 0, 0, 0, 0, 0, 0], [1, 1, 1, 1, 1, 1, 1, 1]),
     "khan8-q7q8": lambda: _khan("khan8-q7q8", [0, 0, 0, 0, 0, 0, 0.5, 0.5], [1, 1, 1, 1, 1, 1, 1, 2]),
+    "planar2-bent": _planar,
     "zhang3-helix": _zhang_helix,
     "zhang6-lspb": _zhang_line,
 }

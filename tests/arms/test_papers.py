@@ -81,6 +81,12 @@ def test_faitli_position_and_jacobian_are_eq_2_and_eq_3(q):
     np.testing.assert_allclose(jacobian[:3], expected_jacobian, rtol=0, atol=1e-14)
 
 
+@pytest.mark.parametrize("q", CONFIGURATIONS[:, :2])
+def test_planar_position_is_that_of_two_links(q):
+    expected = 0.8 * np.exp(1j * q[0]) + 0.5 * np.exp(1j * (q[0] + q[1]))
+    np.testing.assert_allclose(arms.get("planar2").forward(q)[1], [expected.real, expected.imag, 0], atol=1e-15)
+
+
 @pytest.mark.parametrize("q", CONFIGURATIONS[:, :3])
 def test_zhang_position_is_eq_42_with_its_parenthesis_in_place(q):
     length1, length2, length3 = 5, 7, 7

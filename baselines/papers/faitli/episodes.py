@@ -11,16 +11,63 @@ from baselines.evaluation.rollout import Episode
 from baselines.papers.runs import Runs
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
+from ikgym.trajectories import StraightLine
 from ikgym.validation import FloatArray
 
 STRETCHED, REGULAR, SHOULDER = "faitli3-stretched", "faitli3-regular", "faitli3-shoulder"
 TRAJECTORIES = (STRETCHED, REGULAR, SHOULDER)
 METHOD = "fixed_point"
+#: The share of a path's extent that can be seen in a plot of it: what is below is the width of the line.
+VISIBLE = 0.01
+#: A yank: the largest joint velocity of a run is above this many times the median over time of the fastest joint's.
+YANK = 10.0
+#: Distances of the shoulder axis from straight lines past it, in [m].
+DISTANCES = (0.1, 0.01, 0.001)
 
 
-def solved(runs: Runs, name: str = STRETCHED, **parameters: Any) -> Episode:
+def solved(runs: Runs, name: str | Scenario = STRETCHED, **parameters: Any) -> Episode:
     """The paper's method, with the parameters of its Table 1 unless others are given."""
     return runs.play(name, METHOD, **parameters)
+
+
+def past_shoulder(runs: Runs, distance: float) -> Scenario:
+    """A straight line at 0.9 m/s past the shoulder axis, with a velocity limit that no solver should meet.
+
+    The tool is at rest at both ends, and the elbow stays bent.
+
+    Args:
+        runs: Gives the scenario that is changed.
+        distance: Of the line from the axis, in [m].
+    """
+    scenario = runs.scenario(REGULAR)
+    radius = scenario.arm.forward(np.array([0.0, -1.3, 0.9]))[1][0]
+    start = np.array([-np.arccos(distance / radius), -1.3, 0.9])
+    x, y, z = scenario.arm.forward(start)[1]
+    first, last = (np.concatenate([np.eye(3).ravel(), (x, way, z)]) for way in (y, -y))
+    return scenario.replace(
+        name=f"line {1e3 * distance:g} mm from the shoulder axis",
+        trajectory=StraightLine(first, last, duration=2.0, blend=0.5),
+        start=start,
+        steps=min(2000, scenario.steps),
+        velocity_limit=1e4,
+    )
+
+
+def singular_places(runs: Runs) -> tuple[Scenario, ...]:
+    """Where yanks are looked for: both trajectories with singular points, and the lines past the shoulder axis."""
+    return *map(runs.scenario, (STRETCHED, SHOULDER)), *(past_shoulder(runs, d) for d in DISTANCES)
+
+
+def speeds(episode: Episode) -> FloatArray:
+    """The fastest joint's speed in each step, in [rad/s]. Shape (steps,)."""
+    out: FloatArray = np.abs(episode.qdot).max(axis=1)
+    return out
+
+
+def yank(episode: Episode) -> float:
+    """The largest joint velocity, as a multiple of the median over time of the fastest joint's."""
+    speed = speeds(episode)
+    return float(speed.max() / np.median(speed))
 
 
 def jacobians(scenario: Scenario, q: FloatArray) -> FloatArray:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 from matplotlib.artist import Artist
 from matplotlib.ticker import MaxNLocator
 
 from baselines.evaluation.plots import style
 from baselines.papers.drawing import Curve, Panel, picture
 from baselines.papers.faitli.episodes import (
+    SHOULDER,
     STRETCHED,
     jacobians,
     nominal_joints,
@@ -20,6 +22,7 @@ from baselines.papers.faitli.episodes import (
 )
 from baselines.papers.paper import Drawn, PaperFigure, rms
 from baselines.papers.runs import Runs
+from ikgym.validation import FloatArray
 
 LABELS = ("x", "y", "z")
 
@@ -83,23 +86,38 @@ def _joint(runs: Runs, joint: int) -> Drawn:
 
 
 def _eigenvalues(runs: Runs) -> Drawn:
-    scenario, episode = runs.scenario(STRETCHED), solved(runs)
-    time, panels, singular, numbers = times(scenario), [], [], {}
-    for label, q in {"calculated": episode.q, "nominal": nominal_joints(scenario)}.items():
-        jacobian = jacobians(scenario, q)
-        real = np.sort(np.linalg.eigvals(jacobian).real, axis=1)
-        smallest = singular_values(jacobian)[:, -1]
-        order = {"smallest": 0, "largest": 2, "middle": 1}  # the dashed line last, as pairs lie upon each other
-        curves = [Curve(name, time, real[:, i], dashed=i == 1) for name, i in order.items()]
-        panels.append(Panel("real part of the\neigenvalues [m]", curves, title=f"{label} joint path"))
-        singular.append(Curve(f"{label} joint path", time, smallest, dashed=label == "nominal"))
-        numbers[label] = {
-            "singular_points": len(sign_changes(np.linalg.det(jacobian))),
-            "zeros_of_a_real_part": len(real_zeros(jacobian)),
-            "smallest_singular_value_m": float(smallest.min()),
-        }
-    panels.append(Panel("smallest singular\nvalue [m]", singular, title="0 where the arm is singular"))
-    return Drawn(picture("Real parts of the eigenvalues of the position Jacobian", panels, height=2.2), numbers)
+    """Two trajectories side by side: the paper's arm passes singular points, which not every calculated path does."""
+    rows: list[list[Panel]] = []
+    numbers = {}
+    for name in (STRETCHED, SHOULDER):
+        scenario = runs.scenario(name)
+        time, paths = times(scenario), {"calculated": solved(runs, name).q, "nominal": nominal_joints(scenario)}
+        panels, singular = [], []
+        for label, q in paths.items():
+            jacobian = jacobians(scenario, q)
+            smallest, passes = singular_values(jacobian)[:, -1], sign_changes(np.linalg.det(jacobian))
+            title = f"{name}, {label} joint path"
+            panels.append(Panel("real part of the\neigenvalues [m]", _parts(time, jacobian, passes), title=title))
+            singular.append(Curve(f"{label} joint path", time, smallest, dashed=label == "nominal"))
+            numbers[f"{name}, {label}"] = {
+                "singular_points": len(passes),
+                "zeros_of_a_real_part": len(real_zeros(jacobian)),
+                "smallest_singular_value_m": float(smallest.min()),
+            }
+        panels.append(Panel("smallest singular\nvalue [m]", singular, title="0 where the arm is singular"))
+        rows.append(panels)
+    panels = [panel for row in zip(*rows, strict=True) for panel in row]
+    return Drawn(
+        picture("Real parts of the eigenvalues of the position Jacobian", panels, columns=2, height=2.2), numbers
+    )
+
+
+def _parts(time: FloatArray, jacobian: FloatArray, passes: npt.NDArray[np.intp]) -> list[Curve]:
+    """The real parts by size, and the singular points; the dashed line is the last, as pairs lie upon each other."""
+    real = np.sort(np.linalg.eigvals(jacobian).real, axis=1)
+    order = {"smallest": 0, "largest": 2, "middle": 1}
+    curves = [Curve(name, time, real[:, i], dashed=i == 1) for name, i in order.items()]
+    return [*curves, Curve("singular point: an eigenvalue is 0", time[passes], np.zeros(len(passes)), dots=True)]
 
 
 FIGURES = (

@@ -6,13 +6,16 @@ import numpy as np
 
 from baselines.papers.faitli.episodes import (
     REGULAR,
-    SHOULDER,
     STRETCHED,
     TRAJECTORIES,
+    YANK,
     jacobians,
     nominal_joints,
+    singular_places,
     singular_values,
     solved,
+    speeds,
+    yank,
 )
 from baselines.papers.paper import Claim, Finding, rms, verdict
 from baselines.papers.runs import Runs
@@ -106,24 +109,27 @@ def _inversion_free(runs: Runs) -> Finding:
 
 
 def _no_yanks(runs: Runs) -> Finding:
+    """Where inversion does not yank there is nothing to be avoided."""
     numbers = {}
-    for name in (STRETCHED, SHOULDER):
-        scenario = runs.scenario(name)
-        nominal = np.abs(np.diff(nominal_joints(scenario), axis=0)) / scenario.dt
-        numbers[name] = {
-            "method": float(np.abs(solved(runs, name).qdot).max()),
-            "pseudoinverse": float(np.abs(runs.play(name, "moore_penrose").qdot).max()),
-            "nominal": float(nominal.max()),
+    for scenario in singular_places(runs):
+        episodes = {"method": solved(runs, scenario), "pseudoinverse": runs.play(scenario, "moore_penrose")}
+        numbers[scenario.name] = {
+            **{f"{name}_rad_per_s": float(speeds(e).max()) for name, e in episodes.items()},
+            **{f"{name}_multiple": yank(e) for name, e in episodes.items()},
+            "method_error_m": float(episodes["method"].position_error.max()),
         }
     parts = [
-        f"`{n}` {v['method']:.2f} rad/s against {v['pseudoinverse']:.2f} rad/s of the pseudoinverse and "
-        f"{v['nominal']:.2f} rad/s of the nominal path"
-        for n, v in numbers.items()
+        f"`{name}` {v['pseudoinverse_rad_per_s']:.3g} rad/s ({v['pseudoinverse_multiple']:.2g} × the median), "
+        f"without {v['method_rad_per_s']:.2f} rad/s ({v['method_multiple']:.2g} ×), error up to "
+        f"{1e3 * v['method_error_m']:.1f} mm"
+        for name, v in numbers.items()
     ]
+    yanked = {name: v["method_multiple"] for name, v in numbers.items() if v["pseudoinverse_multiple"] > YANK}
     return verdict(
-        all(v["method"] < v["pseudoinverse"] for v in numbers.values()),
-        f"peak joint velocity {'; '.join(parts)}",
-        **numbers,
+        bool(yanked) and max(yanked.values()) <= YANK,
+        f"peak joint velocity with inversion {'; '.join(parts)}: inversion yanks at {len(yanked)} of {len(numbers)} "
+        "places; the stretched elbow is crossed by a path that needs no great velocities",
+        places=numbers,
     )
 
 
@@ -144,7 +150,7 @@ CLAIMS = (
         "A decides convergence",
         "A is important to guarantee convergence; it is usually a small, signed value.",
         "section 1.1",
-        "largest error with values of A within and beyond the bound -4/σ_max² < A < 0",
+        "largest error with values of A within and beyond the bound -4/σ_max² < A < 0: any beyond above any within",
         _a_matters,
     ),
     Claim(
@@ -165,21 +171,23 @@ CLAIMS = (
         "several iterations",
         "After several iterations the sequence gets close to the fixed point.",
         "section 1.1",
-        "error with 1, 10 and 100 iterations per grid point",
+        "error with 1, 10 and 100 iterations per grid point, which must fall",
         _several_iterations,
     ),
     Claim(
         "no inversion",
         "The method does not include a matrix inversion.",
         "abstract, section 1",
-        "operation audit of the policies",
+        "operations of a step as the policies state them",
         _inversion_free,
     ),
     Claim(
         "no yanks",
         "Inversion can cause rapid, yank-like movement at singularities; without it the difficulties are avoided.",
         "section 1",
-        "peak joint velocity on both trajectories with singular points, beside `moore_penrose`",
+        "peak joint velocity of `moore_penrose` and `fixed_point` on both trajectories with singular points, and on "
+        "straight lines past the shoulder axis without velocity limit; a yank is a peak above 10 times the median over "
+        "time; wherever inversion yanks the method must not",
         _no_yanks,
     ),
     Claim(

@@ -6,16 +6,17 @@ import numpy as np
 
 from baselines.papers.khan.episodes import (
     BLOCKED,
+    CHANGED,
     METHOD,
     Q1,
     Q7Q8,
     at_points,
     compare,
+    growth,
     in_words,
     settled_errors,
     spectra,
     turned,
-    variant,
 )
 from baselines.papers.khan.level_path_claims import moved
 from baselines.papers.paper import Claim, Finding, verdict
@@ -39,20 +40,20 @@ def _general(runs: Runs) -> Finding:
 
 def _acceptable(runs: Runs) -> Finding:
     errors = settled_errors(at_points(runs, Q7Q8))
+    extent = float(np.linalg.norm(np.ptp(runs.scenario(Q7Q8).nominal()[:, 9:], axis=0)))
     return Finding(
         "not testable",
         f"no number is given; root mean squares after 1 s {1e3 * errors['rms_position_error_m']:.0f} mm and "
         f"{errors['rms_orientation_error_rad']:.2f} rad, "
-        f"{1e3 * errors['largest_position_error_m']:.0f} mm and {errors['largest_orientation_error_rad']:.2f} rad at "
-        "most",
+        f"{1e3 * errors['largest_position_error_m']:.0f} mm, {errors['largest_position_error_m'] / extent:.1%} of the "
+        f"path's extent, and {errors['largest_orientation_error_rad']:.2f} rad at most",
         {**errors},
     )
 
 
 def _degraded(runs: Runs) -> Finding:
     before, after = compare(runs, Q7Q8, BLOCKED)
-    worse = all(after[key] > before[key] for key in ("rms_position_error_m", "rms_orientation_error_rad"))
-    return verdict(worse, in_words(before, after), before=before, after=after)
+    return verdict(min(growth(before, after)) > CHANGED, in_words(before, after), before=before, after=after)
 
 
 def _stable(runs: Runs) -> Finding:
@@ -60,7 +61,7 @@ def _stable(runs: Runs) -> Finding:
     episode, points = runs.play(Q7Q8, METHOD, **BLOCKED), at_points(runs, Q7Q8, **BLOCKED)
     sound = bool((episode.status <= int(Status.ITERATION_LIMIT)).all())
     scenario = runs.scenario(Q7Q8)
-    held = variant(scenario.replace(iterations_per_point=(scenario.steps,)), **BLOCKED)
+    held = runs.play(scenario.replace(iterations_per_point=(scenario.steps,)), METHOD, **BLOCKED)
     at = [min(k, scenario.steps) - 1 for k in (1_000, 10_000, 100_000)]
     position, angle = held.position_error[at], held.orientation_error[at]
     falls = bool((np.diff(position) <= 0.0).all() and (np.diff(angle) <= 0.0).all())
@@ -121,7 +122,7 @@ CLAIMS = (
         "general path",
         "With q7 and q8 all of X₁, X₂, X₃ vary, and the orientation changes in a complicated way.",
         "section 4.3, fig. 11 and 12",
-        f"nominal poses of `{Q7Q8}`",
+        f"nominal poses of `{Q7Q8}`: each coordinate varies, and the axis of the rotation from home changes",
         _general,
     ),
     Claim(
@@ -135,7 +136,7 @@ CLAIMS = (
         "W degrades q7 and q8",
         "With W on the path by q7 and q8 the precision is degraded.",
         "section 4.3, fig. 16",
-        f"errors on `{Q7Q8}` with and without",
+        f"errors on `{Q7Q8}` with and without: both root mean squares grow by more than a tenth",
         _degraded,
     ),
     Claim(
@@ -149,14 +150,16 @@ CLAIMS = (
         "stable and convergent",
         "With W on the path by q7 and q8 the algorithm remains stable and convergent.",
         "section 4.3, fig. 18",
-        "statuses and errors on the path, and errors with the first grid point held for the whole episode",
+        "no step fails, and the last error on the path is not above the first; with the first grid point held for the "
+        "whole episode errors fall",
         _stable,
     ),
     Claim(
         "smallest eigenvalue",
         "The smallest real part of the eigenvalues of J̃ᵀJ scatters around 0 with an order of 1e-14.",
         "section 4.3, fig. 19",
-        f"eigenvalues along the path of `{Q7Q8}` with W",
+        f"eigenvalues along the path of `{Q7Q8}` with W: on both sides of 0, their size between 1e-15 and 1e-13 m² in "
+        "the median",
         _smallest,
     ),
     Claim(

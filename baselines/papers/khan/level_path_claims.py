@@ -4,21 +4,22 @@ from __future__ import annotations
 
 import numpy as np
 
+from baselines.papers.faitli.episodes import VISIBLE
 from baselines.papers.khan.episodes import (
     BLOCKED,
+    CHANGED,
     LOOSE,
     METHOD,
     Q1,
     Q7Q8,
     at_points,
     compare,
+    growth,
     in_words,
-    points_of,
     settled_errors,
     turned,
-    variant,
 )
-from baselines.papers.paper import Claim, Finding, verdict
+from baselines.papers.paper import Claim, Finding, verdict, verdict_by_condition
 from baselines.papers.runs import Runs
 from ikgym.validation import FloatArray
 
@@ -62,38 +63,29 @@ def _position_relaxes(runs: Runs) -> Finding:
     )
 
 
-def _orientation_relaxes(runs: Runs) -> Finding:
-    episode = runs.play(Q1, METHOD)
-    angle = episode.orientation_error
-    peak = int(angle.argmax())
-    half, tenth = (_steps_until(angle[peak:], share * angle[peak]) for share in (0.5, 0.1))
-    late = settled_errors(at_points(runs, Q1))["rms_orientation_error_rad"]
-    tenth_text = "never" if np.isnan(tenth) else f"after {tenth:.0f} steps"
-    return verdict(
-        _steps_until(angle[peak:], 0.1 * angle[peak]) < 1500,
-        f"both arms are upright at home, so it starts at 0, grows to {angle[peak]:.2f} rad after {peak + 1} inner "
-        f"steps while the position approaches its target, is half of that {half:.0f} steps later and a tenth "
-        f"{tenth_text}; root mean square after 1 s {late:.2f} rad",
-        peak_rad=float(angle[peak]),
-        steps_to_peak=peak + 1,
-        steps_from_peak_to_half=half,
-        steps_from_peak_to_tenth=tenth,
-    )
-
-
 def _orientation_small(runs: Runs) -> Finding:
+    angle = runs.play(Q1, METHOD).orientation_error
+    peak = int(angle.argmax())
+    half = _steps_until(angle[peak:], 0.5 * angle[peak])
     numbers = {name: settled_errors(at_points(runs, name)) for name in (Q1, Q7Q8)}
     parts = [
-        f"`{n}` up to {v['largest_orientation_error_rad']:.2f} rad and {1e3 * v['largest_position_error_m']:.0f} mm"
+        f"`{n}` up to {v['largest_orientation_error_rad']:.2f} rad, root mean square "
+        f"{v['rms_orientation_error_rad']:.2f} rad"
         for n, v in numbers.items()
     ]
-    return Finding("not testable", f"no number is given; largest errors after 1 s: {'; '.join(parts)}", numbers)
+    return Finding(
+        "not testable",
+        f"no number is given; after 1 s {'; '.join(parts)}; on `{Q1}` both arms are upright at home, so it starts at "
+        f"0, grows to {angle[peak]:.2f} rad within {peak + 1} inner steps while the position approaches its target, "
+        f"and is half of that {half:.0f} steps later",
+        {**numbers, "peak_rad": float(angle[peak]), "steps_to_peak": peak + 1, "steps_from_peak_to_half": half},
+    )
 
 
 def _more_at_first(runs: Runs) -> Finding:
     scenario = runs.scenario(Q1)
     usual = scenario.replace(iterations_per_point=(10,), steps=min(scenario.steps, 1000))
-    few, many = points_of(usual, variant(usual)), at_points(runs, Q1)
+    few, many = at_points(runs, usual), at_points(runs, Q1)
     at = [min(k, len(many.time), len(few.time)) - 1 for k in (10, 100)]
     a, b = (points.position_error[at] for points in (few, many))
     return verdict(
@@ -107,19 +99,14 @@ def _more_at_first(runs: Runs) -> Finding:
 
 def _weighted_down(runs: Runs) -> Finding:
     before, after = compare(runs, Q1, LOOSE)
-    return verdict(
-        after["rms_orientation_error_rad"] > before["rms_orientation_error_rad"],
-        in_words(before, after),
-        before=before,
-        after=after,
-    )
+    _position, angle = growth(before, after)
+    return verdict(angle > CHANGED, in_words(before, after), before=before, after=after)
 
 
 def _coupling(runs: Runs) -> Finding:
-    before, after = compare(runs, Q1, LOOSE)
-    change = after["rms_position_error_m"] / before["rms_position_error_m"] - 1.0
+    change, _angle = growth(*compare(runs, Q1, LOOSE))
     return verdict(
-        abs(change) > 0.01,
+        abs(change) > CHANGED,
         f"the root mean square of the position error changes by {change:+.0%}",
         relative_change=change,
     )
@@ -146,19 +133,20 @@ def moved(runs: Runs, name: str) -> Finding:
     )
 
 
-def _growth(runs: Runs, name: str) -> float:
-    """By how much 𝒲 multiplies the position error."""
-    before, after = compare(runs, name, BLOCKED)
-    return after["rms_position_error_m"] / before["rms_position_error_m"]
-
-
 def _still_good(runs: Runs) -> Finding:
-    mine, other = _growth(runs, Q1), _growth(runs, Q7Q8)
-    return verdict(
-        mine < other,
-        f"{in_words(*compare(runs, Q1, BLOCKED))}: position {mine:.1f} times, against {other:.1f} times on `{Q7Q8}`",
-        position_growth=mine,
-        position_growth_q7q8=other,
+    """By the measure of the rows that speak of degraded precision, and by that of Faitli's rows on accuracy."""
+    before, after = compare(runs, Q1, BLOCKED)
+    grown = max(growth(before, after))
+    extent = float(np.linalg.norm(np.ptp(runs.scenario(Q1).nominal()[:, 9:], axis=0)))
+    share = after["largest_position_error_m"] / extent
+    _position, loosened = growth(*compare(runs, Q1, LOOSE))
+    return verdict_by_condition(
+        {"beside the run without W": grown <= CHANGED, "beside the extent": share < VISIBLE},
+        f"{in_words(before, after)}; the paper calls an orientation error of {loosened:+.0%} with F degraded; the "
+        f"largest position error after 1 s is {1e3 * after['largest_position_error_m']:.0f} mm, "
+        f"{share:.2%} of the path's extent",
+        growth=grown,
+        share_of_extent=share,
     )
 
 
@@ -167,7 +155,7 @@ CLAIMS = (
         "level path",
         "With q1 alone X₃ᴺ is constant, and the last link turns about an axis parallel to X₃.",
         "section 4.2, fig. 3",
-        f"nominal poses of `{Q1}`",
+        f"nominal poses of `{Q1}`, constant to 1e-12",
         _level,
     ),
     Claim(
@@ -178,38 +166,31 @@ CLAIMS = (
         _position_relaxes,
     ),
     Claim(
-        "initial orientation error relaxes",
-        "The inevitable initial tracking error rapidly decreases: orientation.",
-        "section 4.2, fig. 4",
-        "the same for the angle, from its peak: a tenth within the 1500 inner steps of the first hundredth",
-        _orientation_relaxes,
-    ),
-    Claim(
         "small errors",
-        "The orientation error is small, too; the results correspond to the expectations.",
+        "The orientation error is small, too.",
         "section 4.2, fig. 3 and 4",
-        "largest errors at grid points from s = 1 s on",
+        "angles at grid points from s = 1 s on, and how the first one grows and falls",
         _orientation_small,
     ),
     Claim(
         "60 inner steps at first",
         "60 instead of 10 inner steps at the first 10 points are better for the relaxation.",
         "section 3",
-        f"`{Q1}` with 60 and with 10",
+        f"`{Q1}` with 60 and with 10: smaller position errors at points 10 and 100",
         _more_at_first,
     ),
     Claim(
         "F weights orientation down",
         "With F_ii = 0.5 for i = 1 … 9 the orientation precision is degraded.",
         "section 4.2, fig. 7",
-        f"`{Q1}` with `task_weights`",
+        f"`{Q1}` with `task_weights`: degraded is a root mean square of the error that grows by more than a tenth",
         _weighted_down,
     ),
     Claim(
         "F couples",
         "This shows some coupling with the tracking error of the end point.",
         "section 4.2, fig. 7",
-        "change of the position error, more than 1 %",
+        "change of the root mean square of the position error, by more than a tenth",
         _coupling,
     ),
     Claim(
@@ -230,7 +211,9 @@ CLAIMS = (
         "W keeps precision",
         "With W on the path by q1 the tracking precision remains good.",
         "section 4.2, fig. 9",
-        f"growth of the position error, below that on `{Q7Q8}`, where the paper calls precision degraded",
+        f"`{Q1}` with `joint_weights`, in two readings: remained, neither root mean square grows by more than a tenth, "
+        "which is degraded in the other rows; good, the largest position error is below 1 % of the path's extent, the "
+        "width of a line",
         _still_good,
     ),
 )

@@ -20,8 +20,15 @@ from ikgym import task_kernels
 from ikgym.exceptions import InvalidInputError
 from ikgym.jit import kernel
 from ikgym.kinematics import forward_and_jacobian
-from ikgym.validation import FloatArray, number, per_joint
+from ikgym.validation import FloatArray, known_name, number, per_joint
 
+#: What 𝒩 turns, with the numbers that the kernel knows.
+COUNTER_ROTATIONS = {"none": 0, "joints": 1, "task": 2}
+#: What makes the next joint coordinates of what is measured and wanted.
+DEFORMATIONS = {"rotation": 0, "contraction": 1}
+#: When the model's Jacobian is worked out anew.
+JACOBIANS = ("step", "point")
+_JOINTS, _TASK, _CONTRACTION = COUNTER_ROTATIONS["joints"], COUNTER_ROTATIONS["task"], DEFORMATIONS["contraction"]
 _CONVERGED, _LIMIT, _NO_ROTATION = int(Status.CONVERGED), int(Status.ITERATION_LIMIT), int(Status.NOT_A_ROTATION)
 
 
@@ -41,12 +48,17 @@ class RotationMemory(NamedTuple):
     """What is remembered from the step before.
 
     Attributes:
-        direction: h(n-1), zero at the start. Shape (B, n).
+        direction: h(n-1), or ℱ (xᴺ - f) where 𝒩 turns task coordinates; zero at the start. Shape (B, n or m).
         angles: The angles of both rotations, those of :class:`Angles`. Shape (B, 2).
+        point: The nominal point since which the Jacobian is held, NaN at the start; of no columns where it is not
+            held. Shape (B, m or 0).
+        held: The joint coordinates that it belongs to. Shape (B, n or 0).
     """
 
     direction: FloatArray
     angles: FloatArray
+    point: FloatArray
+    held: FloatArray
 
 
 class RotationRule(NamedTuple):
@@ -55,15 +67,17 @@ class RotationRule(NamedTuple):
     Attributes:
         task_weights: The diagonal of ℱ. Shape (m,).
         joint_weights: The diagonal of 𝒲. Shape (n,).
-        counter_rotation: Whether 𝒩 is applied.
-        deformation: R_a, λ_a, ``epsa`` and ``q_pp_max``.
+        counter_rotation: One of the numbers in COUNTER_ROTATIONS.
+        deformation: One of the numbers in DEFORMATIONS.
+        numbers: R_a, λ_a, ``epsa`` and ``q_pp_max``.
         tolerance: ‖xᴺ - f‖ up to which the iteration has converged.
     """
 
     task_weights: FloatArray
     joint_weights: FloatArray
-    counter_rotation: bool
-    deformation: tuple[float, float, float, float]
+    counter_rotation: int
+    deformation: int
+    numbers: tuple[float, float, float, float]
     tolerance: float
 
 
@@ -86,7 +100,12 @@ class AbstractRotation(SolverPolicy):
     The counter-rotation 𝒩 turns h(n) = J̃ᵀ ℱ (xᴺ - f) into the direction of h(n-1), as it was before its own
     rotation; otherwise no direction could ever change. It is n × n, without which eq. 3.16 does not fit together
     (the conclusion says 12 dimensions). h is remembered from point to point, and is not known at the first step,
-    where 𝒩 = I. Between opposite vectors the plane is not determined, see :func:`rotations.plane`.
+    where 𝒩 = I. Between opposite vectors the plane is not determined, see :func:`rotations.plane`. Read with the
+    conclusion's 12 dimensions, 𝒩 turns ℱ (xᴺ - f) before J̃ᵀ is applied: 𝒲 J̃ᵀ 𝒩 ℱ f, and likewise for xᴺ.
+
+    The method that the paper starts from (eq. 2.9) is Dineva's iteration (eq. 2.5) with the same 𝒩 and the measured
+    f: q(n+1) = q + [F(A ‖h‖ + ξ*) - ξ*] h/‖h‖ with h = 𝒩 J̃ᵀ (f - xᴺ). Of an affine F only the product of A and its
+    slope acts, which is -λ_a here: q + λ_a 𝒲 𝒩 J̃ᵀ ℱ (xᴺ - f).
 
     Slow where the arm is short, since λ_a σ² goes with the square of its length and there is one iteration a step; and
     along the directions of small σ, in which an error takes 1 / (λ_a σ²) steps: some 25,000 on the paper's arm, where
@@ -97,16 +116,21 @@ class AbstractRotation(SolverPolicy):
     Args:
         problem: What the policy is told of the scenario.
         r_a: R_a, the common length of the extended vectors. In the mixed units of J̃ᵀ f, like all that is turned.
-        lambda_a: λ_a, the share of the rotation that is applied. Above 0.
+        lambda_a: λ_a, the share of the rotation that is applied; with ``"contraction"`` -A F'(ξ*). Above 0.
         epsa: What the listing adds to a norm before it divides by it. Above 0; not printed.
         q_pp_max: Where the listing limits joint coordinates, by a tanh, in [rad] or [m]; not printed.
         task_weights: The diagonal of ℱ, a number or one a task coordinate. Above 0, at most 1.
         joint_weights: The diagonal of 𝒲, a number or one a joint. Above 0, at most 1.
-        counter_rotation: Whether 𝒩 is applied; without it 𝒩 = I.
+        counter_rotation: What 𝒩 turns: ``"joints"``, J̃ᵀ ℱ f and J̃ᵀ ℱ xᴺ; ``"task"``, ℱ f and ℱ xᴺ; or ``"none"``.
+        deformation: ``"rotation"``, AdaptiveDeform; or ``"contraction"``, Dineva's iteration (eq. 2.9), in which R_a,
+            ``epsa`` and ``q_pp_max`` have no part.
+        jacobian: ``"step"``: J̃ belongs to the joint coordinates of each inner iteration. ``"point"``: to those with
+            which the grid point began, which is when xᴺ changes (the listing's ``J_Prev_a`` may mean either).
         tolerance: ‖xᴺ - f‖ up to which the status is ``converged`` instead of ``iteration_limit``, in [m] and [1].
 
     Raises:
         InvalidInputError: A parameter is out of its range.
+        UnknownNameError: There is no such counter-rotation, deformation or Jacobian.
     """
 
     r_a: float = 100.0
@@ -115,7 +139,9 @@ class AbstractRotation(SolverPolicy):
     q_pp_max: float = 1e3
     task_weights: float | Sequence[float] = 1.0
     joint_weights: float | Sequence[float] = 1.0
-    counter_rotation: bool = True
+    counter_rotation: str = "joints"
+    deformation: str = "rotation"
+    jacobian: str = "step"
     tolerance: float = 1e-3
     _weights: tuple[FloatArray, FloatArray] = dataclasses.field(init=False, repr=False)
 
@@ -131,12 +157,17 @@ class AbstractRotation(SolverPolicy):
         for name, array in zip(sizes, weights, strict=True):
             given = getattr(self, name)
             object.__setattr__(self, name, float(given) if np.ndim(given) == 0 else tuple(array.tolist()))
-        if not isinstance(self.counter_rotation, bool):
-            raise InvalidInputError(f"counter_rotation: expected True or False, got {self.counter_rotation!r}.")
+        known_name("counter_rotation", self.counter_rotation, COUNTER_ROTATIONS)
+        known_name("deformation", self.deformation, DEFORMATIONS)
+        known_name("jacobian", self.jacobian, JACOBIANS)
 
     def memory(self, rows: int) -> Memory:
         """A :class:`RotationMemory` without a step before."""
-        return RotationMemory(np.zeros((rows, self.problem.model.joints)), np.full((rows, 2), np.nan))
+        n, m = self.problem.model.joints, self.problem.task.size
+        kept = (m, n) if self.jacobian == "point" else (0, 0)
+        point, held = (np.full((rows, size), np.nan) for size in kept)
+        turned = m if self.counter_rotation == "task" else n
+        return RotationMemory(np.zeros((rows, turned)), np.full((rows, 2), np.nan), point, held)
 
     @staticmethod
     def angles(state: Memory) -> Angles:
@@ -152,7 +183,7 @@ class AbstractRotation(SolverPolicy):
     def solve(self, batch: Batch, memory: Memory) -> Solution:
         """See :meth:`SolverPolicy.solve`."""
         rows, n = batch.q.shape
-        kept = RotationMemory(RotationMemory(*memory).direction.copy(), np.empty((rows, 2)))
+        kept = RotationMemory(*(array.copy() for array in memory))
         goal, status = np.empty((rows, n)), np.empty(rows, dtype=np.int64)
         observed = batch.q, batch.pose, np.ascontiguousarray(batch.nominal[:, 0])
         turn_rows(plain_arm_task(self.problem), self._rule, observed, tuple(kept), goal, status)
@@ -162,8 +193,8 @@ class AbstractRotation(SolverPolicy):
     @functools.cached_property
     def _rule(self) -> tuple[Any, ...]:
         """A plain :class:`RotationRule`."""
-        deformation = self.r_a, self.lambda_a, self.epsa, self.q_pp_max
-        return *self._weights, self.counter_rotation, deformation, self.tolerance
+        kinds = COUNTER_ROTATIONS[self.counter_rotation], DEFORMATIONS[self.deformation]
+        return *self._weights, *kinds, (self.r_a, self.lambda_a, self.epsa, self.q_pp_max), self.tolerance
 
     def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
         """One Jacobian of the model, one measurement, nothing inverted."""
@@ -185,44 +216,75 @@ def turn_rows(arm_task, rule, observed, memory, goal, status):
     (chain, kind), method, (q, pose, target) = arm_task_of(arm_task), RotationRule(*rule), observed
     # The coordinates of `pose` are those of `matrix`, and the method knows no other error than a difference.
     kind = task_kernels.MATRIX if kind == task_kernels.POSE else kind
-    task_weights, joint_weights, (direction, angles) = method.task_weights, method.joint_weights, memory
-    n, m = q.shape[1], pose.shape[1]
+    direction, angles, point, held = memory
+    n, m, turned = q.shape[1], pose.shape[1], direction.shape[1]
     rotation, position, geometric, _ = pose_arrays(n, m)
     jacobian, error, extended = np.empty((m, n)), np.empty(m), np.empty((3, n + 1))
-    h, actual, desired, e_a, e_b = np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty(n)
+    h, actual, desired, e_a, e_b = np.empty(n), np.empty(n), np.empty(n), np.empty(turned), np.empty(turned)
+    missing, seen, wanted = np.empty(m), np.empty(m), np.empty(m)
     for row in range(q.shape[0]):
-        forward_and_jacobian(chain, q[row], rotation, position, geometric)
+        forward_and_jacobian(
+            chain, _configuration(q[row], target[row], point, held, row), rotation, position, geometric
+        )
         task_kernels.jacobian(kind, rotation, geometric, jacobian)
         for i in range(m):
             error[i] = target[row, i] - pose[row, i]
-        _transposed(jacobian, task_weights, error, h)
-        _transposed(jacobian, task_weights, pose[row], actual)
-        _transposed(jacobian, task_weights, target[row], desired)
+            missing[i] = method.task_weights[i] * error[i]
+            seen[i] = method.task_weights[i] * pose[row, i]
+            wanted[i] = method.task_weights[i] * target[row, i]
         angles[row, 0] = 0.0
-        if method.counter_rotation:
-            angles[row, 0] = plane(h, direction[row], e_a, e_b)
-            turn(e_a, e_b, angles[row, 0], actual)
-            turn(e_a, e_b, angles[row, 0], desired)
+        if method.counter_rotation == _TASK:
+            angles[row, 0] = _turn_back(missing, direction[row], e_a, e_b, seen, wanted)
+        _transposed(jacobian, missing, h)
+        _transposed(jacobian, seen, actual)
+        _transposed(jacobian, wanted, desired)
+        if method.counter_rotation == _JOINTS:
+            angles[row, 0] = _turn_back(h, direction[row], e_a, e_b, actual, desired)
+        direction[row] = missing if method.counter_rotation == _TASK else h
         for j in range(n):
-            direction[row, j] = h[j]
-            actual[j] *= joint_weights[j]
-            desired[j] *= joint_weights[j]
+            actual[j] *= method.joint_weights[j]
+            desired[j] *= method.joint_weights[j]
         goal[row] = q[row]
-        angles[row, 1] = adaptive_deform(actual, q[row], desired, method.deformation, extended, goal[row])
-        if math.isnan(angles[row, 1]):
-            status[row] = _NO_ROTATION
+        status[row] = _CONVERGED if math.sqrt(dot(error, error)) <= method.tolerance else _LIMIT
+        if method.deformation == _CONTRACTION:
+            angles[row, 1] = math.nan
+            for j in range(n):
+                goal[row, j] += method.numbers[1] * (desired[j] - actual[j])
         else:
-            status[row] = _CONVERGED if math.sqrt(dot(error, error)) <= method.tolerance else _LIMIT
+            angles[row, 1] = adaptive_deform(actual, q[row], desired, method.numbers, extended, goal[row])
+            if math.isnan(angles[row, 1]):
+                status[row] = _NO_ROTATION
 
 
 @kernel
-def _transposed(jacobian, weights, vector, out):
-    """J̃ᵀ ℱ times a vector: shapes (m, n), (m,), (m,), (n,)."""
+def _configuration(q, target, point, held, row):
+    """Where the Jacobian is worked out: at q, or where the arm was when the target last changed."""
+    if held.shape[1] == 0:
+        return q
+    for i in range(target.shape[0]):
+        if target[i] != point[row, i]:
+            point[row] = target
+            held[row] = q
+            break
+    return held[row]
+
+
+@kernel
+def _turn_back(now, last, e_a, e_b, actual, desired):
+    """Applies the 𝒩 that turns a vector into its last direction, and returns the angle."""
+    angle = plane(now, last, e_a, e_b)
+    turn(e_a, e_b, angle, actual)
+    turn(e_a, e_b, angle, desired)
+    return angle
+
+
+@kernel
+def _transposed(jacobian, vector, out):
+    """J̃ᵀ times a vector: shapes (m, n), (m,), (n,)."""
     out[:] = 0.0
     for i in range(vector.shape[0]):
-        weighted = weights[i] * vector[i]
         for j in range(out.shape[0]):
-            out[j] += jacobian[i, j] * weighted
+            out[j] += jacobian[i, j] * vector[i]
 
 
 def _checked_weights(name: str, value: float | Sequence[float], size: int) -> FloatArray:

@@ -30,10 +30,12 @@ class FixedPointExtended(PrivilegedPath, FixedPoint):
         transformation: ``"transpose"``; nothing else fits a longer x.
         family: See :class:`FixedPoint`, like all up to the tolerance.
         slope: The factor in F.
-        a: A; if left out, chosen for the longer Jacobian.
+        a: A; if left out, chosen for the longer Jacobian as there for J: -0.815 on the paper's arm, of whose A = -1
+            the bound is not sure. With -1 it converges on its trajectories, too, and comes nearer.
         d: D.
         iterations: Iterations in one step.
         tolerance: Norm of both errors together after the last up to which the status is ``converged``.
+        components: None, see :class:`FixedPoint`.
         seed: Which episode of a random scenario is played.
         link: ℓ, whose end point, the place of joint ℓ + 1, x is extended by. From 1 to n - 1; of use where that point
             moves, unlike the end of link 2 of ``varga7``.

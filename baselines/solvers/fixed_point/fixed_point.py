@@ -5,27 +5,22 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
+from collections.abc import Sequence
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from baselines.policy import Batch, Memory, Solution, SolverPolicy
-from baselines.solvers.arm_task import arm_task_of, plain_arm_task, pose_arrays
-from baselines.solvers.fixed_point.contraction import Contraction, contraction, evaluate
-from baselines.solvers.linear_algebra import dot
-from baselines.status import Status
+from baselines.solvers.arm_task import plain_arm_task
+from baselines.solvers.fixed_point.contraction import Contraction, contraction
+from baselines.solvers.fixed_point.iteration import TRANSFORMATIONS, iterate_rows
 from ikgym import task_kernels
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
-from ikgym.jit import kernel
-from ikgym.kinematics import Chain, forward, forward_and_jacobian
+from ikgym.kinematics import Chain
 from ikgym.validation import FloatArray, known_name, number, whole_number
 
-#: What is done to f(q) - x before it is added to q, with the numbers that the kernel knows.
-TRANSFORMATIONS = {"transpose": 0, "none": 1, "sign": 2}
-_TRANSPOSE, _SIGN = TRANSFORMATIONS["transpose"], TRANSFORMATIONS["sign"]
-_CONVERGED, _LIMIT, _DIVERGED = int(Status.CONVERGED), int(Status.ITERATION_LIMIT), int(Status.DIVERGED)
 # ‖∂x/∂q‖² of the orientation's numbers for a joint that turns at 1 rad/s, at most.
 _TURNING = {task_kernels.POSITION: 0.0, task_kernels.SKEW: 1.0, task_kernels.MATRIX: 2.0, task_kernels.POSE: 1.0}
 
@@ -34,42 +29,20 @@ class DirectionMemory(NamedTuple):
     """What the transformation ``"sign"`` remembers of the last iteration of the step before.
 
     Attributes:
-        direction: σ (f - x), zero where there was none. Shape (B, n).
+        direction: f - x, zero where there was none. Shape (B, n).
     """
 
     direction: FloatArray
 
 
-class FixedPointRule(NamedTuple):
-    """What the parameters of the policy say to the kernel.
+class GrowthMemory(NamedTuple):
+    """What the transformation ``"sign_by_growth"`` remembers of the last iteration of the step before.
 
     Attributes:
-        transformation: One of the numbers in TRANSFORMATIONS.
-        function: F.
-        a: A.
-        iterations: How many are made.
-        tolerance: ‖f - x‖ up to which they have converged.
-        longest: How far the joints can go in one step, in [rad] or [m]. Shape (n,).
+        sign_and_length: σ and ‖f - x‖, infinite where there was none. Shape (B, 2).
     """
 
-    transformation: int
-    function: Contraction
-    a: float
-    iterations: int
-    tolerance: float
-    longest: FloatArray
-
-
-class Extension(NamedTuple):
-    """What x is extended by: a point of the arm, and where it should be.
-
-    Attributes:
-        chain: The chain to the point.
-        points: Where it should be, in [m]; of no columns if x is not extended. Shape (B, 3 or 0).
-    """
-
-    chain: Chain
-    points: FloatArray
+    sign_and_length: FloatArray
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -92,8 +65,9 @@ class FixedPoint(SolverPolicy):
             (Khan 2020, eq. 2.5), which converges where all eigenvalues of F'(ξ*) A J have negative real parts, as
             those of few arms do. ``"sign"``: h = σ (f(q) - x), σ = ±1 (Khan 2020, eq. 2.8; he had no success with it
             beyond 2 joints). The paper says only that σ depends on the direction of the previous step; it is read as
-            the one-dimensional case of his 𝒩: σ = -1 where f - x points away from the one before. The last two
-            use no Jacobian, and need as many components of the error as joints.
+            the one-dimensional case of his 𝒩: σ = -1 where f - x points away from the one before. The other reading,
+            ``"sign_by_growth"``: σ changes where the step before has led further away, so that ‖f - x‖ has grown.
+            All but the first use no Jacobian, and need a component of the error for each joint.
         family: The family of F, ``"affine"`` or ``"sigmoid"``.
         slope: The factor in F; ½ in the paper.
         a: A, negative with a rising F and ``"transpose"``. If left out, the paper's -1 where 2/σ_max² allows it, and
@@ -102,6 +76,8 @@ class FixedPoint(SolverPolicy):
         d: D.
         iterations: Iterations in one step; all of them are made.
         tolerance: ‖f(q) - x‖ after the last up to which the status is ``converged``, in [m] and [rad] or [1].
+        components: Where no Jacobian is used, the number of the error's component, from 0, that corrects each joint;
+            all in their order if left out. An arm with 2 joints in a plane has (0, 1).
 
     Raises:
         InvalidInputError: A parameter is out of its range, or the transformation does not suit the task.
@@ -115,6 +91,7 @@ class FixedPoint(SolverPolicy):
     d: float = 0.3
     iterations: int = 10
     tolerance: float = 1e-6
+    components: Sequence[int] | None = None
     #: F.
     function: Contraction = dataclasses.field(init=False, repr=False)
 
@@ -122,12 +99,7 @@ class FixedPoint(SolverPolicy):
 
     def __post_init__(self) -> None:
         known_name("transformation", self.transformation, TRANSFORMATIONS)
-        size, joints = self.problem.task.error_size, self.problem.model.joints
-        if self.transformation != "transpose" and size != joints:
-            raise InvalidInputError(
-                f"transformation {self.transformation!r} needs as many components of the error as joints; task "
-                f"{self.problem.task.name!r} has {size}, arm {self.problem.model.name!r} {joints} joints."
-            )
+        object.__setattr__(self, "components", self._checked_components())
         object.__setattr__(self, "function", contraction(self.family, self.slope, self.d))
         object.__setattr__(self, "a", self._contracting() if self.a is None else number("a", self.a))
         if self.a == 0.0:
@@ -136,7 +108,9 @@ class FixedPoint(SolverPolicy):
         number("tolerance", self.tolerance, at_least=0.0)
 
     def memory(self, rows: int) -> Memory:
-        """A :class:`DirectionMemory` without a step before, where the sign depends on it; else nothing."""
+        """A :class:`DirectionMemory` or :class:`GrowthMemory` without a step before; else nothing."""
+        if self.transformation == "sign_by_growth":
+            return GrowthMemory(np.tile([1.0, np.inf], (rows, 1)))
         zeros = np.zeros((rows, self.problem.model.joints))
         return DirectionMemory(zeros) if self.transformation == "sign" else ()
 
@@ -145,7 +119,7 @@ class FixedPoint(SolverPolicy):
         problem = self.problem
         rows = len(batch.q)
         q, status = batch.q.copy(), np.empty(rows, dtype=np.int64)
-        previous = DirectionMemory(*memory).direction.copy() if memory else np.empty((rows, 0))
+        previous = memory[0].copy() if memory else np.empty((rows, 0))
         branch, points = self._extension(batch)
         iterate_rows(
             plain_arm_task(problem),
@@ -156,8 +130,9 @@ class FixedPoint(SolverPolicy):
             q,
             status,
         )
-        kept = DirectionMemory(previous) if memory else ()
-        return Solution((q - batch.q) / problem.dt, kept, status, np.full(rows, self.iterations))
+        return Solution(
+            (q - batch.q) / problem.dt, (previous,) if memory else (), status, np.full(rows, self.iterations)
+        )
 
     def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
         """A Jacobian an iteration, or forward kinematics where none is used, and the last error for the status."""
@@ -168,8 +143,30 @@ class FixedPoint(SolverPolicy):
     @functools.cached_property
     def _method(self) -> tuple[Any, ...]:
         """A plain :class:`FixedPointRule`."""
-        transformation, longest = TRANSFORMATIONS[self.transformation], self.problem.velocity_limit * self.problem.dt
-        return transformation, tuple(self.function), self.a, self.iterations, self.tolerance, longest
+        longest = self.problem.velocity_limit * self.problem.dt
+        components = np.array(self.components or range(self.problem.model.joints))
+        numbers = self.a, self.iterations, self.tolerance, longest, components
+        return TRANSFORMATIONS[self.transformation], tuple(self.function), *numbers
+
+    def _checked_components(self) -> tuple[int, ...] | None:
+        size, joints = self.problem.task.error_size, self.problem.model.joints
+        if self.components is None:
+            if self.transformation != "transpose" and size != joints:
+                raise InvalidInputError(
+                    f"transformation {self.transformation!r} needs as many components of the error as joints, or "
+                    f"`components`; task {self.problem.task.name!r} has {size}, arm {self.problem.model.name!r} "
+                    f"{joints} joints."
+                )
+            return None
+        if self.transformation == "transpose":
+            raise InvalidInputError("components: expected none with transformation 'transpose', which uses all.")
+        listed = self.components if isinstance(self.components, Sequence | np.ndarray) else (self.components,)
+        given = tuple(whole_number("components", one, at_least=0) for one in listed)
+        if len(given) != joints or len(set(given)) != joints or max(given) >= size:
+            raise InvalidInputError(
+                f"components: expected {joints} different numbers below {size}, one a joint, got {given}."
+            )
+        return given
 
     def _extension(self, batch: Batch) -> tuple[Chain, FloatArray]:
         """What x is extended by: the chain to another point of the arm, and its nominal position; here nothing."""
@@ -195,101 +192,3 @@ def jacobian_bound(arm: Arm, turning: float) -> float:
     links = np.append(np.linalg.norm(arm.offsets[1:], axis=1), np.linalg.norm(arm.tool))
     reach = np.cumsum(links[::-1])[::-1]
     return float(np.where(arm.prismatic, 1.0, reach**2 + turning).sum())
-
-
-@kernel
-def iterate_rows(arm_task, extension, method, target, previous, q, status):
-    """The iterations of one step, row by row.
-
-    Args:
-        arm_task: The model of the arm and the task, a plain :class:`ArmTask`.
-        extension: A plain :class:`Extension`.
-        method: A plain :class:`FixedPointRule`.
-        target: x. Shape (B, m).
-        previous: With the sign variant, the last f - x; overwritten. Shape (B, n).
-        q: Joint coordinates, changed in place. Shape (B, n).
-        status: Receives values of :class:`Status`. Shape (B,).
-    """
-    (chain, kind), chain_to_point, points = arm_task_of(arm_task), Chain(*extension[0]), extension[1]
-    transformation, numbers, a, iterations, tolerance, longest = method
-    function = Contraction(*numbers)
-    n, m, joints = q.shape[1], target.shape[1], chain_to_point.axes.shape[0]
-    e = 6 if kind == task_kernels.POSE else m
-    rotation, position, geometric, pose = pose_arrays(n, m)
-    error, jacobian, partial = np.empty(e), np.empty((e, n)), np.empty((6, joints))
-    h, start, missing = np.empty(n), np.empty(n), np.empty(3)
-    for row in range(q.shape[0]):
-        here = q[row]
-        start[:] = here
-        first = residual = 0.0
-        for step in range(iterations + 1):
-            last = step == iterations
-            if last or transformation != _TRANSPOSE:
-                forward(chain, here, rotation, position)
-            else:
-                forward_and_jacobian(chain, here, rotation, position, geometric)
-                task_kernels.jacobian(kind, rotation, geometric, jacobian)
-            task_kernels.coordinates(kind, rotation, position, pose)
-            task_kernels.error(kind, target[row], pose, error)
-            square = dot(error, error)
-            h[:] = 0.0
-            if transformation == _TRANSPOSE:
-                _add_transposed(jacobian, error, h)
-            else:
-                for j in range(n):
-                    h[j] = -error[j]
-            if points.shape[1] > 0:
-                if last:
-                    forward(chain_to_point, here[:joints], rotation, position)
-                else:
-                    forward_and_jacobian(chain_to_point, here[:joints], rotation, position, partial)
-                for i in range(3):
-                    missing[i] = points[row, i] - position[i]
-                square += dot(missing, missing)
-                _add_transposed(partial[:3], missing, h)
-            residual = math.sqrt(square)
-            if step == 0:
-                first = residual
-            if last:
-                break
-            if transformation == _SIGN:
-                _keep_direction(h, previous[row])
-            _contract(function, a, h, here)
-        status[row] = _CONVERGED if residual <= tolerance else _LIMIT
-        # Further off than at the start, and further away than the drives can go.
-        if not residual <= first:
-            for j in range(n):
-                if not abs(here[j] - start[j]) <= longest[j]:
-                    status[row] = _DIVERGED
-        if status[row] == _DIVERGED:
-            here[:] = start
-            if transformation == _SIGN:
-                previous[row] = 0.0
-
-
-@kernel
-def _contract(function, a, h, q):
-    """Eq. 1; where h = 0 its limit, which is to stay."""
-    norm = math.sqrt(dot(h, h))
-    if norm == 0.0:
-        return
-    amount = evaluate(function, a * norm + function.fixed_point) - function.fixed_point
-    for j in range(q.shape[0]):
-        q[j] += amount * (h[j] / norm)
-
-
-@kernel
-def _add_transposed(jacobian, missing, h):
-    """Adds Jᵀ (f - x) to h, with ``missing`` = x - f of shape (e,); the joints past J's columns have no part."""
-    for i in range(jacobian.shape[0]):
-        for j in range(jacobian.shape[1]):
-            h[j] -= jacobian[i, j] * missing[i]
-
-
-@kernel
-def _keep_direction(h, previous):
-    """Khan 2020, eq. 2.8: turns h about where it points away from the one before, which it then replaces."""
-    sign = -1.0 if dot(h, previous) < 0.0 else 1.0
-    for j in range(h.shape[0]):
-        previous[j] = h[j]
-        h[j] *= sign

@@ -229,7 +229,8 @@ class TestTheTestsThemselves:
     def text(self):
         findings = {
             paper.name: {
-                claim.name: Finding(VERDICTS[i % 4], f"{i} | {i}.5e-3 m", {}) for i, claim in enumerate(paper.claims)
+                claim.name: Finding(VERDICTS[i % len(VERDICTS)], f"{i} | {i}.5e-3 m", {})
+                for i, claim in enumerate(paper.claims)
             }
             for paper in PAPERS.values()
         }

@@ -11,7 +11,7 @@ import pytest
 import baselines
 import ikgym
 from baselines.status import Status
-from ikgym.exceptions import InvalidInputError
+from ikgym.exceptions import InvalidInputError, UnknownNameError
 from tests.baselines.solvers.fixed_point.test_rotations import listing, rotation
 from tests.comparison import identical
 
@@ -56,7 +56,7 @@ def test_is_what_the_paper_prints(name, task_weights, joint_weights, counter):
         scenario,
         task_weights=task_weights,
         joint_weights=joint_weights,
-        counter_rotation=counter,
+        counter_rotation="joints" if counter else "none",
     )
     env = gym.make("RedundantIK-v0", scenario=scenario, preview=1)
     observation, _ = env.reset()
@@ -234,9 +234,22 @@ def plain_action():
         ({"task_weights": (1.0,) * 8}, r"task_weights: expected shape \(12,\), got \(8,\)"),
         ({"joint_weights": (1.0,) * 7 + (1.5,)}, "joint_weights: expected numbers above 0 and at most 1, got"),
         ({"joint_weights": "no"}, "joint_weights: expected an array of real numbers"),
-        ({"counter_rotation": 1}, "counter_rotation: expected True or False, got 1"),
     ],
 )
 def test_bad_parameters(change, message):
     with pytest.raises(InvalidInputError, match=message):
+        baselines.make("abstract_rotation", KHAN, **change)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"counter_rotation": True}, "no counter_rotation True. Available: none, joints, task"),
+        ({"counter_rotation": "joint"}, "Did you mean 'joints'"),
+        ({"deformation": "rotations"}, "Did you mean 'rotation'"),
+        ({"jacobian": "points"}, "Did you mean 'point'"),
+    ],
+)
+def test_unknown_names(change, message):
+    with pytest.raises(UnknownNameError, match=message):
         baselines.make("abstract_rotation", KHAN, **change)

@@ -8,7 +8,7 @@ import pytest
 
 import baselines
 import ikgym
-from baselines.solvers.fixed_point import fixed_point
+from baselines.solvers.fixed_point import fixed_point, iteration
 from baselines.solvers.fixed_point.contraction import contraction, evaluate
 from baselines.solvers.fixed_point.fixed_point import jacobian_bound
 from baselines.status import Status
@@ -17,6 +17,9 @@ from tests.comparison import identical
 
 REGULAR = "faitli3-regular"
 Q = np.array([0.1, 0.4, 1.0])
+
+
+NONE = {"transformation": "none"}
 
 
 def observed(name, q):
@@ -45,6 +48,11 @@ def printed(scenario, q, target, iterations, a, function, transformation, last=N
         h = error
         if transformation == "transpose":
             h = scenario.task.jacobian(rotation, geometric).T @ error
+        elif transformation == "sign_by_growth":
+            last = (1.0, np.inf) if last is None else last
+            length = np.linalg.norm(error)
+            last = (-last[0] if length > last[1] else last[0], length)
+            h = last[0] * error
         elif transformation == "sign":
             h, last = (-error if last is not None and error @ last < 0 else error), error
         xi = function.fixed_point
@@ -60,6 +68,7 @@ def printed(scenario, q, target, iterations, a, function, transformation, last=N
         (REGULAR, "transpose"),
         (REGULAR, "none"),
         (REGULAR, "sign"),
+        (REGULAR, "sign_by_growth"),
         ("varga7-fast", "transpose"),
         ("khan8-q1", "transpose"),
         ("zhang6-lspb", "transpose"),
@@ -334,6 +343,21 @@ class TestExtended:
         ({"d": np.inf}, InvalidInputError, "d: expected a finite number"),
         ({"iterations": 0}, InvalidInputError, "iterations: expected a whole number of at least 1"),
         ({"tolerance": -1.0}, InvalidInputError, "tolerance: expected a finite number of at least 0"),
+        ({"components": (0, 1, 2)}, InvalidInputError, "components: expected none with transformation 'transpose'"),
+        (
+            {"components": (0, 1), **NONE},
+            InvalidInputError,
+            r"components: expected 3 different numbers below 3.*\(0, 1\)",
+        ),
+        ({"components": (0, 1, 1), **NONE}, InvalidInputError, "components: expected 3 different numbers"),
+        ({"components": (0, 1, 3), **NONE}, InvalidInputError, "components: expected 3 different numbers below 3"),
+        ({"components": (0, 1, -1), **NONE}, InvalidInputError, "components: expected a whole number of at least 0"),
+        ({"components": 2, **NONE}, InvalidInputError, r"components: expected 3 different numbers.*got \(2,\)"),
+        (
+            {"components": "xyz", **NONE},
+            InvalidInputError,
+            "components: expected a whole number of at least 0, got 'x'",
+        ),
     ],
 )
 def test_bad_parameters(change, error, message):
@@ -341,19 +365,19 @@ def test_bad_parameters(change, error, message):
         baselines.make("fixed_point", REGULAR, **change)
 
 
-@pytest.mark.parametrize("transformation", ["transpose", "none", "sign"])
+@pytest.mark.parametrize("transformation", ["transpose", "none", "sign", "sign_by_growth"])
 def test_operations_are_what_is_called(transformation, monkeypatch):
     """Counted by calling the kernel as plain Python."""
     calls = {"forward": 0, "forward_and_jacobian": 0}
     for name in calls:
-        kernel = getattr(fixed_point, name)
+        kernel = getattr(iteration, name)
 
         def counted(*args, name=name, kernel=kernel):
             calls[name] += 1
             return kernel(*args)
 
-        monkeypatch.setattr(fixed_point, name, counted)
-    monkeypatch.setattr(fixed_point, "iterate_rows", fixed_point.iterate_rows.py_func)
+        monkeypatch.setattr(iteration, name, counted)
+    monkeypatch.setattr(fixed_point, "iterate_rows", iteration.iterate_rows.py_func)
     policy = baselines.make("fixed_point", REGULAR, transformation=transformation, iterations=7)
     _, state = policy.predict(away())
     forwards, jacobians, factorisations, measurements = (int(c[0]) for c in policy.operations(state))

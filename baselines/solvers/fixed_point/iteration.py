@@ -1,0 +1,170 @@
+"""The kernel of the fixed-point transformation: the iterations of one step (Faitli 2018, eq. 1; Khan 2020, eq. 2.8)."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from baselines.solvers.arm_task import arm_task_of, pose_arrays
+from baselines.solvers.fixed_point.contraction import Contraction, evaluate
+from baselines.solvers.linear_algebra import dot
+from baselines.status import Status
+from ikgym import task_kernels
+from ikgym.jit import kernel
+from ikgym.kinematics import Chain, forward, forward_and_jacobian
+from ikgym.validation import FloatArray
+
+#: What is done to f(q) - x before it is added to q, with the numbers that the kernel knows.
+TRANSFORMATIONS = {"transpose": 0, "none": 1, "sign": 2, "sign_by_growth": 3}
+_TRANSPOSE, _SIGN, _BY_GROWTH = (TRANSFORMATIONS[name] for name in ("transpose", "sign", "sign_by_growth"))
+_CONVERGED, _LIMIT, _DIVERGED = int(Status.CONVERGED), int(Status.ITERATION_LIMIT), int(Status.DIVERGED)
+
+
+class FixedPointRule(NamedTuple):
+    """What the parameters of the policy say to the kernel.
+
+    Attributes:
+        transformation: One of the numbers in TRANSFORMATIONS.
+        function: F.
+        a: A.
+        iterations: How many are made.
+        tolerance: ‖f - x‖ up to which they have converged.
+        longest: How far the joints can go in one step, in [rad] or [m]. Shape (n,).
+        components: Which component of f - x corrects each joint where there is no Jacobian. Shape (n,).
+    """
+
+    transformation: int
+    function: Contraction
+    a: float
+    iterations: int
+    tolerance: float
+    longest: FloatArray
+    components: npt.NDArray[np.int64]
+
+
+class Extension(NamedTuple):
+    """What x is extended by: a point of the arm, and where it should be.
+
+    Attributes:
+        chain: The chain to the point.
+        points: Where it should be, in [m]; of no columns if x is not extended. Shape (B, 3 or 0).
+    """
+
+    chain: Chain
+    points: FloatArray
+
+
+@kernel
+def iterate_rows(arm_task, extension, method, target, previous, q, status):
+    """The iterations of one step, row by row.
+
+    Args:
+        arm_task: The model of the arm and the task, a plain :class:`ArmTask`.
+        extension: A plain :class:`Extension`.
+        method: A plain :class:`FixedPointRule`.
+        target: x. Shape (B, m).
+        previous: With a sign variant, what it remembers; overwritten. Shape (B, n), (B, 2) or (B, 0).
+        q: Joint coordinates, changed in place. Shape (B, n).
+        status: Receives values of :class:`Status`. Shape (B,).
+    """
+    (chain, kind), chain_to_point, points = arm_task_of(arm_task), Chain(*extension[0]), extension[1]
+    transformation, numbers, a, iterations, tolerance, longest, components = method
+    function = Contraction(*numbers)
+    n, m, joints = q.shape[1], target.shape[1], chain_to_point.axes.shape[0]
+    e = 6 if kind == task_kernels.POSE else m
+    rotation, position, geometric, pose = pose_arrays(n, m)
+    error, jacobian, partial = np.empty(e), np.empty((e, n)), np.empty((6, joints))
+    h, start, missing = np.empty(n), np.empty(n), np.empty(3)
+    for row in range(q.shape[0]):
+        here = q[row]
+        start[:] = here
+        first = residual = 0.0
+        for step in range(iterations + 1):
+            last = step == iterations
+            if last or transformation != _TRANSPOSE:
+                forward(chain, here, rotation, position)
+            else:
+                forward_and_jacobian(chain, here, rotation, position, geometric)
+                task_kernels.jacobian(kind, rotation, geometric, jacobian)
+            task_kernels.coordinates(kind, rotation, position, pose)
+            task_kernels.error(kind, target[row], pose, error)
+            square = dot(error, error)
+            h[:] = 0.0
+            if transformation == _TRANSPOSE:
+                _add_transposed(jacobian, error, h)
+            else:
+                for j in range(n):
+                    h[j] = -error[components[j]]
+            if points.shape[1] > 0:
+                if last:
+                    forward(chain_to_point, here[:joints], rotation, position)
+                else:
+                    forward_and_jacobian(chain_to_point, here[:joints], rotation, position, partial)
+                for i in range(3):
+                    missing[i] = points[row, i] - position[i]
+                square += dot(missing, missing)
+                _add_transposed(partial[:3], missing, h)
+            residual = math.sqrt(square)
+            if step == 0:
+                first = residual
+            if last:
+                break
+            if transformation == _SIGN:
+                _keep_direction(h, previous[row])
+            elif transformation == _BY_GROWTH:
+                _turn_where_grown(h, previous[row])
+            _contract(function, a, h, here)
+        status[row] = _CONVERGED if residual <= tolerance else _LIMIT
+        # Further off than at the start, and further away than the drives can go.
+        if not residual <= first:
+            for j in range(n):
+                if not abs(here[j] - start[j]) <= longest[j]:
+                    status[row] = _DIVERGED
+        if status[row] == _DIVERGED:
+            here[:] = start
+            if transformation == _SIGN:
+                previous[row] = 0.0
+            elif transformation == _BY_GROWTH:
+                previous[row, 1] = math.inf
+
+
+@kernel
+def _contract(function, a, h, q):
+    """Eq. 1; where h = 0 its limit, which is to stay."""
+    norm = math.sqrt(dot(h, h))
+    if norm == 0.0:
+        return
+    amount = evaluate(function, a * norm + function.fixed_point) - function.fixed_point
+    for j in range(q.shape[0]):
+        q[j] += amount * (h[j] / norm)
+
+
+@kernel
+def _add_transposed(jacobian, missing, h):
+    """Adds Jᵀ (f - x) to h, with ``missing`` = x - f of shape (e,); the joints past J's columns have no part."""
+    for i in range(jacobian.shape[0]):
+        for j in range(jacobian.shape[1]):
+            h[j] -= jacobian[i, j] * missing[i]
+
+
+@kernel
+def _keep_direction(h, previous):
+    """Khan 2020, eq. 2.8: turns h about where it points away from the one before, which it then replaces."""
+    sign = -1.0 if dot(h, previous) < 0.0 else 1.0
+    for j in range(h.shape[0]):
+        previous[j] = h[j]
+        h[j] *= sign
+
+
+@kernel
+def _turn_where_grown(h, previous):
+    """The other reading of eq. 2.8: σ changes where ‖h‖ has grown; both are remembered."""
+    length = math.sqrt(dot(h, h))
+    if length > previous[1]:
+        previous[0] = -previous[0]
+    previous[1] = length
+    for j in range(h.shape[0]):
+        h[j] *= previous[0]
