@@ -10,8 +10,10 @@ from baselines.papers.paper import Finding, Paper
 HEAD = """\
 # The ledger of claims
 
-Every claim of the four papers that can be checked, with the verdict *reproduced*, *contradicted* or *not testable*. A
-contradicted claim is a result: nothing here was bent to make a paper right. Written by
+Every claim of the four papers that can be checked, with the verdict *reproduced*, *contradicted*, *depends* or *not
+testable*. *Depends* means that it holds in one reading or condition that the text allows and fails in another; the row
+says which. A contradicted claim fails in all of them. It is a result: nothing here was bent to make a paper right.
+Written by
 
 ```sh
 python -m baselines.reproduce --ledger docs/papers.md

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -12,7 +12,8 @@ from matplotlib.figure import Figure
 from baselines.papers.runs import Runs
 from ikgym.validation import FloatArray
 
-Verdict = Literal["reproduced", "contradicted", "not testable"]
+#: *depends*: holds in one reading or condition that the text allows and fails in another; the evidence says which.
+Verdict = Literal["reproduced", "contradicted", "depends", "not testable"]
 
 
 class Drawn(NamedTuple):
@@ -44,6 +45,19 @@ class Finding(NamedTuple):
 def verdict(holds: bool | np.bool_, evidence: str, /, **numbers: Any) -> Finding:
     """The finding that a claim is reproduced if it holds, and contradicted if not."""
     return Finding("reproduced" if holds else "contradicted", evidence, numbers)
+
+
+def verdict_by_condition(holds: Mapping[str, bool | np.bool_], evidence: str, /, **numbers: Any) -> Finding:
+    """The finding on a claim that was tested in several readings or conditions, all of which the text allows.
+
+    Args:
+        holds: Whether the claim holds, by reading or condition.
+        evidence: See :class:`Finding`; says which reading or condition does what.
+        **numbers: The same by name.
+    """
+    if len(set(map(bool, holds.values()))) == 1:
+        return verdict(all(holds.values()), evidence, **numbers)
+    return Finding("depends", evidence, numbers)
 
 
 def rms(values: FloatArray) -> float:
