@@ -33,7 +33,7 @@ WEIGHTS = tuple(tuple(float(f"{ratio**j:.3g}") for j in range(_JOINTS)) for rati
 #: A heavily damped iteration that is given more makes all of them, in each period.
 _ITERATIONS = (1, 10)
 _DESCENT: tuple[Stage, ...] = (
-    product(alpha_max=(5e-5, 1e-4, 2e-4, 3e-4), tolerance=(4.0, 20.0, 80.0)),
+    product(alpha_start=("kept",), alpha_max=(5e-5, 1e-4, 2e-4, 3e-4), tolerance=(4.0, 20.0, 80.0)),
     product(iterations=(150, 1500)) + product(alpha_factor=(1.5,)),
 )
 

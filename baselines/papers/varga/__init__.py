@@ -16,7 +16,9 @@ PAPER = Paper(
         "before it in `varga7_literal`. Figures and claims are those of `varga7`.",
         "The sum over q̇ runs over all 7 joints; the printed 6 is a slip.",
         "A horizon of HL = 3 has two free velocity vectors; grid point 1 is the present.",
-        "With α up to 5e-4 as printed the descent diverges on the fast trajectory; figures are drawn with 1e-4.",
+        "Whether α starts anew in each control step or is kept, and whether the warm start is shifted, is not said; "
+        "figures are drawn with α restarted at 1e-8 and the warm start unshifted, where the printed bounds of α work.",
+        "Eq. 3 for this task has the task coordinates X as unknowns beside q and q̇, held to X = F(q) by constraints.",
         "Eq. 16 lacks a dot: q̈ˢ = Λ²(q − qˢ) − 2Λ q̇ˢ.",
         "The third panel of figure 6 (a symbol is lost in print) is taken to be α.",
     ),

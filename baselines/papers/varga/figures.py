@@ -7,10 +7,22 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from baselines.evaluation.rollout import Episode
 from baselines.papers.drawing import Curve, Panel, picture
-from baselines.papers.paper import Drawn, PaperFigure, rms
+from baselines.papers.paper import Drawn, PaperFigure, rms, roughness
 from baselines.papers.runs import Runs
-from baselines.papers.varga.episodes import FAST, METHOD, PRINTED, SLOW, fast, fluctuation, slow, smooth
-from baselines.status import Status
+from baselines.papers.varga.episodes import (
+    FAST,
+    METHOD,
+    SLOW,
+    at_limit,
+    diverged,
+    fast,
+    fluctuation,
+    largest_jump,
+    nominal_path,
+    slow,
+    smooth,
+    variation,
+)
 from ikgym.validation import FloatArray
 
 WINDOW = 150  # steps of a close-up
@@ -58,8 +70,7 @@ def _orientation(title: str, runs: Runs, name: str, episode: Episode) -> Drawn:
 
 def _joints(title: str, runs: Runs, name: str, episode: Episode) -> Drawn:
     scenario, time = runs.scenario(name), _times(runs, name)
-    path = scenario.nominal_joint_path()
-    nominal = episode.q if path is None else path[1:]
+    nominal = nominal_path(runs, name)[1:]
     panels = [
         Panel(
             f"$q_{i + 1}$ [{'m' if prismatic else 'rad'}]",
@@ -72,37 +83,41 @@ def _joints(title: str, runs: Runs, name: str, episode: Episode) -> Drawn:
 
 
 def busiest(qdot: FloatArray) -> slice:
-    """The steps of a close-up: where the velocities fluctuate most."""
-    width = min(WINDOW, len(qdot) - 2)
-    second_differences = np.square(np.diff(qdot, 2, axis=0)).sum(axis=1)
-    start = int(sliding_window_view(second_differences, width).sum(axis=1).argmax())
+    """The steps of a close-up: where the velocities fluctuate most, the jump from rest at the start apart."""
+    width, skipped = min(WINDOW, len(qdot) // 2), len(qdot) // 20
+    second_differences = np.square(np.diff(qdot[skipped:], 2, axis=0)).sum(axis=1)
+    start = skipped + int(sliding_window_view(second_differences, width).sum(axis=1).argmax())
     return slice(start, start + width)
 
 
-def _velocities(title: str, runs: Runs, name: str, episode: Episode, part: slice) -> Drawn:
+def _velocities(title: str, runs: Runs, name: str, episode: Episode, part: slice, caption: str) -> Drawn:
+    """Joint velocities of a whole episode and of a part, which the paper's caption describes."""
     time = _times(runs, name)
     names = [f"$\\dot q_{i + 1}$" + (" [m/s]" if s else "") for i, s in enumerate(runs.scenario(name).arm.prismatic)]
     curves = [Curve(n, time, episode.qdot[:, i]) for i, n in enumerate(names)]
     close = [Curve(c.name, time[part], c.y[part]) for c in curves]
     label = "joint velocity\n[rad/s] or [m/s]"
     return Drawn(
-        picture(title, [Panel(label, curves), Panel(label, close, title="where it fluctuates most")], height=2.5),
+        picture(title, [Panel(label, curves), Panel(label, close, title=f"the paper: “{caption}”")], height=2.5),
         {
+            "caption": caption,
             "peak": float(np.abs(episode.qdot).max()),
             "rms": rms(episode.qdot),
             "rms_of_second_differences": fluctuation(episode.qdot),
+            "largest_change_in_a_step_over_the_peak": largest_jump(episode.qdot),
+            "total_variation": variation(episode.qdot),
             "close_up_s": [float(time[part][0]), float(time[part][-1])],
+            "close_up_rms_of_second_differences": roughness(episode.qdot[part]),
         },
     )
 
 
 def _effort(runs: Runs) -> Drawn:
+    """With α restarted, as the other figures, and kept, both with the printed bounds of α."""
     time = _times(runs, FAST)
     panels, numbers = [], {}
-    for label, episode in {
-        "α up to 1e-4": fast(runs),
-        "α up to 5e-4, as printed": runs.play(FAST, METHOD, **PRINTED),
-    }.items():
+    kept = runs.play(FAST, METHOD, alpha_start="kept")
+    for label, episode in {"α restarted in each control step": fast(runs), "α kept": kept}.items():
         millis = 1e-6 * episode.time_ns.astype(np.float64)
         panels.append(
             (
@@ -115,18 +130,20 @@ def _effort(runs: Runs) -> Drawn:
             "median_time_ms": float(np.median(millis)),
             "p99_time_ms": float(np.percentile(millis, 99)),
             "mean_iterations": float(episode.iterations.mean()),
-            "share_at_limit": float((episode.iterations == 450).mean()),
-            "share_diverged": float((episode.status == Status.DIVERGED).mean()),
+            "share_at_limit": at_limit(episode),
+            "share_diverged": diverged(episode),
         }
     times, steps, alphas = zip(*panels, strict=True)
     return Drawn(
         picture(
             "Time of each control step, steps of the descent, and α",
-            [Panel("time [ms]", times, log=True), Panel("steps [1]", steps), Panel("α [1]", alphas, log=True)],
+            [Panel("time [ms]", times, log=True), Panel("steps [1]", steps), Panel("last α [1]", alphas, log=True)],
         ),
         numbers,
     )
 
+
+FLUCTUATES = "zoomed in to a domain where considerable fluctuations occur"
 
 FIGURES = (
     PaperFigure(2, "Cartesian tracking, fast", lambda r: _cartesian("Cartesian tracking, fast", r, FAST, fast(r))),
@@ -137,7 +154,7 @@ FIGURES = (
     PaperFigure(
         5,
         "Joint velocities, fast",
-        lambda r: _velocities("Joint velocities, fast", r, FAST, fast(r), busiest(fast(r).qdot)),
+        lambda r: _velocities("Joint velocities, fast", r, FAST, fast(r), busiest(fast(r).qdot), FLUCTUATES),
     ),
     PaperFigure(6, "Time, steps and α of the descent, fast", _effort),
     PaperFigure(7, "Cartesian tracking, slow", lambda r: _cartesian("Cartesian tracking, slow", r, SLOW, slow(r))),
@@ -148,12 +165,19 @@ FIGURES = (
     PaperFigure(
         10,
         "Joint velocities, slow",
-        lambda r: _velocities("Joint velocities, slow", r, SLOW, slow(r), busiest(slow(r).qdot)),
+        lambda r: _velocities("Joint velocities, slow", r, SLOW, slow(r), busiest(slow(r).qdot), FLUCTUATES),
     ),
     PaperFigure(
         11,
         "Smoothed joint velocities, the same part as figure 5",
-        lambda r: _velocities("Smoothed joint velocities", r, FAST, smooth(r), busiest(fast(r).qdot)),
+        lambda r: _velocities(
+            "Smoothed joint velocities",
+            r,
+            FAST,
+            smooth(r),
+            busiest(fast(r).qdot),
+            "zoomed in to the domain as in Fig. 5",
+        ),
     ),
     PaperFigure(12, "Joint paths, smoothed", lambda r: _joints("Joint paths, smoothed", r, FAST, smooth(r))),
     PaperFigure(

@@ -86,6 +86,24 @@ def adapted(alpha, norm, last_norm, settings):
 
 
 @kernel
+def squares(x):
+    """The sum of squares; shape (HL - 1, width)."""
+    total = 0.0
+    for i in range(x.shape[0]):
+        for j in range(x.shape[1]):
+            total += x[i, j] * x[i, j]
+    return total
+
+
+@kernel
+def take_step(x, alpha, gradient):
+    """One step x − α g, in place; shapes (HL - 1, width)."""
+    for i in range(x.shape[0]):
+        for j in range(x.shape[1]):
+            x[i, j] -= alpha * gradient[i, j]
+
+
+@kernel
 def stop_if_diverged(status, value, first_value, limit, qdot):
     """Finds out a blow-up that looks like convergence, and clears the plan after any.
 

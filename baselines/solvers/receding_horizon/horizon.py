@@ -31,7 +31,7 @@ def horizon_cost(data, q, nominal, qdot):
         The cost.
     """
     stages = np.empty(qdot.shape[0])
-    return _roll(data, q.copy(), nominal, qdot, 0, stages, _frame_workspace(data.kind, nominal))
+    return _roll(data, q.copy(), nominal, qdot, 0, stages, frame_workspace(data.kind, nominal))
 
 
 @kernel
@@ -50,7 +50,7 @@ def difference_gradient(data, q, nominal, qdot, delta, gradient):
         The cost.
     """
     steps, n = qdot.shape
-    workspace = _frame_workspace(data.kind, nominal)
+    workspace = frame_workspace(data.kind, nominal)
     stages, shifted = np.empty(steps), np.empty(steps)
     total = _roll(data, q.copy(), nominal, qdot, 0, stages, workspace)
     start, here = q.copy(), np.empty(n)
@@ -88,7 +88,7 @@ def _roll(data, here, nominal, qdot, first, stages, workspace):
 
 
 @kernel
-def _frame_workspace(kind, nominal):
+def frame_workspace(kind, nominal):
     """Orientation (3, 3), position (3,), task coordinates (m,) and error (e,) of a grid point."""
     m = nominal.shape[1]
     return np.empty((3, 3)), np.empty(3), np.empty(m), np.empty(6 if kind == task_kernels.POSE else m)
@@ -99,7 +99,7 @@ def analytic_gradient(data, q, nominal, qdot, gradient):
     """∂Φ/∂q̇ by the chain rule, and Φ; arguments as in :func:`difference_gradient`."""
     steps, n = qdot.shape
     chain, cost, dt = data.chain, data.cost, data.dt
-    workspace = _gradient_workspace(data.kind, nominal, n)
+    workspace = gradient_workspace(data.kind, nominal, n)
     rotation, position, geometric = workspace.rotation, workspace.position, workspace.geometric
     by_q = np.empty((steps, n))
     here = q.copy()
@@ -137,7 +137,7 @@ def analytic_state_gradient(data, nominal, q, qdot, by_q, by_qdot):
     """
     steps, n = q.shape
     chain, cost = data.chain, data.cost
-    workspace = _gradient_workspace(data.kind, nominal, n)
+    workspace = gradient_workspace(data.kind, nominal, n)
     rotation, position, geometric = workspace.rotation, workspace.position, workspace.geometric
     total = 0.0
     for i in range(steps):
@@ -157,7 +157,7 @@ def difference_state_gradient(data, nominal, q, qdot, delta, by_q, by_qdot):
     """
     steps, n = q.shape
     chain, kind, cost, dt = data.chain, data.kind, data.cost, data.dt
-    rotation, position, pose, error = _frame_workspace(kind, nominal)
+    rotation, position, pose, error = frame_workspace(kind, nominal)
     total = 0.0
     for i in range(steps):
         forward(chain, q[i], rotation, position)
@@ -194,8 +194,9 @@ class _GradientWorkspace(NamedTuple):
 
 
 @kernel
-def _gradient_workspace(kind, nominal, n):
-    rotation, position, pose, error = _frame_workspace(kind, nominal)
+def gradient_workspace(kind, nominal, n):
+    """Arrays of one grid point, for the derivatives by n joint coordinates."""
+    rotation, position, pose, error = frame_workspace(kind, nominal)
     e = error.shape[0]
     return _GradientWorkspace(
         rotation, position, np.empty((6, n)), pose, error, np.empty(e), np.empty((e, n)), np.empty((e, n))
@@ -203,14 +204,25 @@ def _gradient_workspace(kind, nominal, n):
 
 
 @kernel
+def linearise(kind, nominal, workspace):
+    """Task coordinates, their error and its derivative by the joint coordinates, of the frame and geometric Jacobian.
+
+    Args:
+        kind: The kind of task coordinates.
+        nominal: Nominal coordinates. Shape (m,).
+        workspace: Of :func:`gradient_workspace`; pose, error, Jacobian and error Jacobian are changed in place.
+    """
+    task_kernels.coordinates(kind, workspace.rotation, workspace.position, workspace.pose)
+    task_kernels.error(kind, nominal, workspace.pose, workspace.error)
+    task_kernels.jacobian(kind, workspace.rotation, workspace.geometric, workspace.jacobian)
+    task_kernels.error_jacobian(kind, workspace.error, workspace.jacobian, workspace.error_jacobian)
+
+
+@kernel
 def _tracking_gradient(data, nominal, workspace, gradient):
     """Φ^X of one grid point, and its derivative by the joint coordinates there, which ``gradient`` (n,) receives."""
-    kind, rotation, pose, error = data.kind, workspace.rotation, workspace.pose, workspace.error
-    by_error, jacobian, error_jacobian = workspace.gradient, workspace.jacobian, workspace.error_jacobian
-    task_kernels.coordinates(kind, rotation, workspace.position, pose)
-    task_kernels.error(kind, nominal, pose, error)
-    task_kernels.jacobian(kind, rotation, workspace.geometric, jacobian)
-    task_kernels.error_jacobian(kind, error, jacobian, error_jacobian)
+    error, by_error, error_jacobian = workspace.error, workspace.gradient, workspace.error_jacobian
+    linearise(data.kind, nominal, workspace)
     cost_kernels.tracking_gradient(data.cost, error, by_error)
     for j in range(gradient.shape[0]):
         gradient[j] = 0.0

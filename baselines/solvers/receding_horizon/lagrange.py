@@ -3,14 +3,34 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
-from baselines.solvers.receding_horizon.descent import DIVERGED, GOES_ON, adapted, stop_if_diverged, stop_test
+from baselines.solvers.receding_horizon.descent import (
+    DIVERGED,
+    GOES_ON,
+    adapted,
+    squares,
+    stop_if_diverged,
+    stop_test,
+    take_step,
+)
 from baselines.solvers.receding_horizon.gradient import RecedingHorizonGradient
-from baselines.solvers.receding_horizon.horizon import analytic_state_gradient, difference_state_gradient
+from baselines.solvers.receding_horizon.horizon import (
+    analytic_state_gradient,
+    difference_state_gradient,
+    frame_workspace,
+)
+from baselines.solvers.receding_horizon.task_constraints import (
+    Unknowns,
+    kinematic_errors,
+    reduced_task_gradient,
+    task_system,
+)
+from ikgym.exceptions import InvalidInputError
 from ikgym.jit import kernel
 
 
@@ -18,20 +38,29 @@ from ikgym.jit import kernel
 class RecedingHorizonLagrange(RecedingHorizonGradient):
     """Minimises the cost of :class:`RecedingHorizonGradient` under the constraints that the other eliminates.
 
-    Variables are the states q(2) … q(HL) and the velocities q̇(1) … q̇(HL-1), constraints
-    c(i) = (q(i+1) − q(i))/Δt − q̇(i) = 0 (eq. 3 with eq. 5). At each step the multipliers are so chosen that the
-    constraints stagnate along the reduced gradient g = ∇Φ + Σ λ(i) ∇c(i) (eq. 4): with A = ∂c they solve
-    A Aᵀ λ = −A ∇Φ, a tridiagonal system, the same for all joints. The step is −α g; α, the stop test and the warm
-    start are as in the plain method, with the norm of g. The paper finds a first feasible point by Newton–Raphson;
-    the constraints being linear, that is one Euler roll-out of the velocities.
+    At each step the multipliers are so chosen that the constraints c(i) stagnate along the reduced gradient
+    g = ∇Φ + Σ λ(i) ∇c(i) (eq. 4): with A = ∂c they solve A Aᵀ λ = −A ∇Φ. The step is −α g; α, the stop test and the
+    warm start are as in the plain method, with the norm of g.
+
+    With ``states`` the unknowns are those of eq. 3 with the kinematics of section III: the task coordinates
+    X(2) … X(HL), the joint coordinates q(2) … q(HL) and the velocities q̇(1) … q̇(HL-1), under the constraints
+    X(i) = F(q(i)) and (q(i+1) − q(i))/Δt = q̇(i). The former are not linear, so that the system of the multipliers, of
+    (HL-1)(e + n) rows, is another at each step. The paper finds a first feasible point by Newton–Raphson; as the
+    velocities are free, that is one Euler roll-out of them. On the way the constraints hold to first order, as in the
+    paper, and X ends off F(q): by at most 1e-5 m in 230 periods of the fast trajectory, and mostly far less.
+
+    Without, X is eliminated, the constraints left are linear, and A Aᵀ is tridiagonal, the same for all joints and
+    steps.
 
     **Against the plain method.** g is ∇Φ projected onto the kernel of A, the velocities' part of it is
-    M⁻¹ ∂Φ/∂q̇ with the plain gradient ∂Φ/∂q̇ along the constraints and M = I + Δt² LᵀL, L the lower triangle of
-    ones; ‖g‖² = (∂Φ/∂q̇)ᵀ M⁻¹ ∂Φ/∂q̇. So an iterate equals the plain one preconditioned by M⁻¹, exactly but for
-    rounding, with analytic gradients and with differences (taken as Δt δ in the states). It equals the plain one
-    itself only to the order Δt² HL²: M is nearly I because a state counts, in rad, as much as a velocity in rad/s.
-    Differences of that size can change which way α goes, where two norms are nearly equal; the paths then separate
-    for a while. Where Δt is 1 (``zhang3-helix``), M is far from I and the two are different methods.
+    M⁻¹ ∂Φ/∂q̇ with the plain gradient ∂Φ/∂q̇ along the constraints and ‖g‖² = (∂Φ/∂q̇)ᵀ M⁻¹ ∂Φ/∂q̇. Here
+    M = I + Δt² LᵀL, L the lower triangle of ones, and CᵀC besides with ``states``, C the derivative of X by q̇. So an
+    iterate equals the plain one preconditioned by M⁻¹: without ``states`` exactly but for rounding, with analytic
+    gradients and with differences (taken as Δt δ in the joint coordinates), with ``states`` but for what X is off. It
+    equals the plain one itself only to the order Δt² HL², or ‖C‖²: M is nearly I because a state counts, in rad or m,
+    as much as a velocity in rad/s. Differences of that size can change which way α goes, where two norms are nearly
+    equal; the paths then separate for a while. Where Δt is 1 (``zhang3-helix``), M is far from I, and these are
+    different methods.
 
     Args:
         problem: What the policy is told of the scenario.
@@ -41,34 +70,49 @@ class RecedingHorizonLagrange(RecedingHorizonGradient):
         alpha_min: Smallest α.
         alpha_max: Largest α.
         alpha_factor: By what α grows or shrinks. At least 1.
+        alpha_start: ``"restart"`` or ``"kept"``.
+        warm_start: ``"unshifted"`` or ``"shifted"``.
         gradient: ``"finite_difference"`` or ``"analytic"``.
-        difference: The finite difference δ of the joint velocities, from 1e-9 to 1; Δt δ is that of the states.
+        difference: The finite difference δ of the joint velocities, from 1e-9 to 1; Δt δ is that of all coordinates.
+        states: Whether the task coordinates are unknowns, as in the paper, or are eliminated.
 
     Raises:
         InvalidInputError: A parameter is out of its range.
-        UnknownNameError: There is no such gradient.
+        UnknownNameError: There is no such gradient, start of α or warm start.
     """
+
+    states: bool = False
 
     name: ClassVar[str] = "rhc_lagrange"
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not isinstance(self.states, (bool, np.bool_)):
+            raise InvalidInputError(f"states: expected True or False, got {self.states!r}.")
+
     def _descend(self) -> Any:
         """See :class:`RecedingHorizonGradient`."""
-        return reduce_rows
+        return functools.partial(reduce_rows, bool(self.states))
 
     def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
-        """A gradient before each step and one for the last test; the system of the multipliers is factorised once."""
+        """A gradient before each step and one for the last test.
+
+        The system of the multipliers is factorised for each with ``states``, and once without.
+        """
         stages, joints, gradients = self.horizon - 1, self.problem.model.joints, iterations + 1
+        factorisations = gradients if self.states else 1
         if self.gradient == "analytic":
-            return 0, gradients * stages, 1, 0
-        # A difference in a state moves that grid point alone.
-        return gradients * stages * (1 + joints), 0, 1, 0
+            return 0, gradients * stages, factorisations, 0
+        # A difference in a joint coordinate moves that grid point alone.
+        return gradients * stages * (1 + joints), 0, factorisations, 0
 
 
 @kernel
-def reduce_rows(data, settings, q, nominal, memory, status, iterations):
+def reduce_rows(with_tasks, data, settings, q, nominal, memory, status, iterations):
     """Descent along the reduced gradient row by row.
 
     Args:
+        with_tasks: Whether the task coordinates are unknowns.
         data: The :class:`ProblemData`.
         settings: :class:`DescentSettings`.
         q: Joint coordinates in [rad] or [m]. Shape (B, n).
@@ -77,24 +121,32 @@ def reduce_rows(data, settings, q, nominal, memory, status, iterations):
         status: Receives values of :class:`Status`. Shape (B,).
         iterations: Receives the steps made. Shape (B,).
     """
-    plan, alpha, difference, dt = memory.plan, memory.alpha, settings.difference, data.dt
-    steps, n = plan.shape[1:]
+    alpha, difference, dt, (_, steps, n) = memory.alpha, settings.difference, data.dt, memory.plan.shape
+    e = frame_workspace(data.kind, nominal[0])[3].shape[0] if with_tasks else 0
+    errors, by_errors = np.empty((steps, e)), np.empty((steps, e))
     states, by_q, by_qdot = np.empty((steps, n)), np.empty((steps, n)), np.empty((steps, n))
     diagonal, ratio, multipliers = np.empty(steps), np.empty(steps), np.empty((steps, n))
     factorise(dt, diagonal, ratio)
-    for row in range(plan.shape[0]):
-        qdot, step = plan[row], 0
+    system = task_system(steps, e, n if with_tasks else 0)
+    for row in range(q.shape[0]):
+        qdot, step = memory.plan[row], 0
         for i in range(steps):
             for j in range(n):
                 states[i, j] = (states[i - 1, j] if i > 0 else q[row, j]) + dt * qdot[i, j]  # eq. 5
+        if with_tasks:
+            kinematic_errors(data, nominal[row], states, errors)
         first_value = last_norm = 0.0
         while True:
-            if difference > 0.0:
-                value = difference_state_gradient(data, nominal[row], states, qdot, difference, by_q, by_qdot)
+            if with_tasks:
+                x, gradient = Unknowns(errors, states, qdot), Unknowns(by_errors, by_q, by_qdot)
+                value = reduced_task_gradient(data, nominal[row], difference, x, system, gradient)
             else:
-                value = analytic_state_gradient(data, nominal[row], states, qdot, by_q, by_qdot)
-            reduce_gradient(dt, diagonal, ratio, multipliers, by_q, by_qdot)
-            norm = np.sqrt(np.sum(by_q * by_q) + np.sum(by_qdot * by_qdot))
+                if difference > 0.0:
+                    value = difference_state_gradient(data, nominal[row], states, qdot, difference, by_q, by_qdot)
+                else:
+                    value = analytic_state_gradient(data, nominal[row], states, qdot, by_q, by_qdot)
+                reduce_gradient(dt, diagonal, ratio, multipliers, by_q, by_qdot)
+            norm = np.sqrt(squares(by_errors) + squares(by_q) + squares(by_qdot))
             if step == 0:
                 first_value = value
             status[row] = stop_test(value, norm, settings, step)
@@ -102,10 +154,9 @@ def reduce_rows(data, settings, q, nominal, memory, status, iterations):
                 break
             alpha[row] = adapted(alpha[row], norm, last_norm, settings)
             last_norm = norm
-            for i in range(steps):
-                for j in range(n):
-                    states[i, j] -= alpha[row] * by_q[i, j]
-                    qdot[i, j] -= alpha[row] * by_qdot[i, j]
+            take_step(errors, alpha[row], by_errors)
+            take_step(states, alpha[row], by_q)
+            take_step(qdot, alpha[row], by_qdot)
             step += 1
         iterations[row] = step
         status[row] = stop_if_diverged(status[row], value, first_value, data.velocity_limit, qdot)

@@ -1,8 +1,17 @@
-"""What the kernels are told of a scenario."""
+"""Horizons for the tests of the kernels."""
 
 from __future__ import annotations
 
+import numpy as np
+import pytest
+
+import ikgym
 from baselines.solvers.receding_horizon.problem_data import ProblemData
+from baselines.solvers.receding_horizon.task_constraints import Unknowns, kinematic_errors, task_system
+
+HORIZONS = pytest.mark.parametrize(
+    ("kind", "horizon"), [("finite_difference", 3), ("finite_difference", 6), ("analytic", 4)]
+)
 
 
 def data_of(problem) -> ProblemData:
@@ -11,3 +20,41 @@ def data_of(problem) -> ProblemData:
     return ProblemData(
         model.chain, problem.task.kind, cost, problem.dt, model.lower, model.upper, problem.velocity_limit
     )
+
+
+def constraints(dt, stages, n):
+    """A: c(i) = (q(i+1) - q(i))/Δt - q̇(i) by (q(2 … HL), q̇(1 … HL-1)); q(1) is no variable."""
+    rise = (np.eye(stages) - np.eye(stages, k=-1)) / dt
+    return np.kron(np.hstack([rise, -np.eye(stages)]), np.eye(n))
+
+
+def problem(name, stages):
+    """A horizon off the nominal path, and its kernels' arguments."""
+    scenario = ikgym.scenarios.get(name)
+    rng = np.random.default_rng(stages)
+    q = rng.uniform(-1, 1, scenario.joints)
+    path = q + rng.uniform(-5e-3, 5e-3, (stages, scenario.joints))
+    nominal = scenario.task.coordinates(*scenario.model.forward(path))
+    return scenario, q, nominal, rng.uniform(-2, 2, (stages, scenario.joints))
+
+
+def with_tasks(scenario, q, nominal, qdot):
+    """The unknowns on the constraints, a system and arrays for the gradient."""
+    data, e = data_of(scenario), scenario.task.error_size
+    x = Unknowns(np.empty((len(qdot), e)), q + scenario.dt * np.cumsum(qdot, axis=0), qdot.copy())
+    kinematic_errors(data, nominal, x.q, x.errors)
+    return data, x, task_system(len(qdot), e, scenario.joints), Unknowns(*map(np.empty_like, x))
+
+
+def counted(module, monkeypatch):
+    """Counts how often a module calls the kinematics."""
+    calls = {"forward": 0, "forward_and_jacobian": 0}
+    for name in calls:
+        kernel = getattr(module, name)
+
+        def counting(*args, name=name, kernel=kernel):
+            calls[name] += 1
+            return kernel(*args)
+
+        monkeypatch.setattr(module, name, counting)
+    return calls

@@ -8,7 +8,10 @@ import pytest
 
 import baselines
 import ikgym
+from baselines.evaluation import rollout as episodes
 from baselines.solvers.receding_horizon import horizon as horizon_module
+from baselines.solvers.receding_horizon.descent import DescentMemory, DescentSettings
+from baselines.solvers.receding_horizon.gradient import descend_rows
 from baselines.solvers.receding_horizon.horizon import analytic_gradient, difference_gradient, horizon_cost
 from baselines.status import Status
 from ikgym.exceptions import InvalidInputError, UnknownNameError
@@ -45,21 +48,47 @@ def printed(scenario, q, nominal, qdot, alpha, alpha_max, steps):
         qdot = qdot - alpha * gradient
 
 
+@pytest.mark.parametrize("alpha_start", ["restart", "kept"])
+@pytest.mark.parametrize("warm_start", ["unshifted", "shifted"])
 @pytest.mark.parametrize("name", ["varga7-fast", "varga7-literal-slow", "zhang6-lspb"])
-def test_follows_the_printed_descent(name):
+def test_follows_the_printed_descent(name, warm_start, alpha_start):
     scenario = ikgym.scenarios.get(name).replace(steps=12)
-    policy = baselines.make("rhc_gradient", scenario, iterations=8)
+    policy = baselines.make("rhc_gradient", scenario, iterations=8, warm_start=warm_start, alpha_start=alpha_start)
     env = gym.make("RedundantIK-v0", scenario=scenario, preview=2)
     observation, _ = env.reset()
     state, plan, alpha = None, np.zeros((2, scenario.joints)), 1e-8
     for _ in range(12):
-        plan, alpha, made = printed(scenario, observation["q"], observation["nominal"], plan, alpha, 1e-4, 8)
+        if alpha_start == "restart":
+            alpha = 1e-8
+        if warm_start == "shifted":
+            plan = plan[[1, 1]]
+        plan, alpha, made = printed(scenario, observation["q"], observation["nominal"], plan, alpha, 5e-4, 8)
         action, state = policy.predict(observation, state)
         np.testing.assert_allclose(action * scenario.velocity_limit, plan[0], rtol=1e-5, atol=1e-6)
         np.testing.assert_allclose(state[2][0], plan, rtol=1e-6, atol=1e-9)
         assert state[3][0] == pytest.approx(alpha, rel=1e-12)
         assert policy.report(state).iterations[0] == made
         observation, *_ = env.step(action)
+
+
+def test_kept_alpha_with_the_smaller_bound_is_what_the_default_was():
+    """Bit for bit the kernel with its memory handed on; the sum of the costs was recorded before α could restart."""
+    scenario = ikgym.scenarios.get("varga7-fast").replace(steps=300)
+    policy = baselines.make("rhc_gradient", scenario, alpha_start="kept", alpha_max=1e-4)
+    episode = episodes.rollout(scenario, policy, 0)
+    cost = float((episode.tracking_cost + episode.velocity_cost).sum())
+    assert cost == pytest.approx(7155972.453893215, rel=1e-9)
+
+    settings = DescentSettings(20.0, 450, 1e-8, 1e-4, 1.2, 1e-3)
+    memory = DescentMemory(np.zeros((1, 2, 7)), np.full(1, 1e-8))
+    status, iterations = np.empty((2, 1), dtype=np.int64)
+    nominal, q = scenario.nominal(preview=2), scenario.nominal_joint_path()[0]
+    for k in range(300):
+        descend_rows(data_of(scenario), settings, q[None], nominal[None, k + 1 : k + 3], memory, status, iterations)
+        assert (status[0], iterations[0]) == (episode.status[k], episode.iterations[k])
+        assert memory.alpha[0] == episode.diagnostics["alpha"][k]
+        np.testing.assert_allclose(memory.plan[0, 0], episode.qdot[k], rtol=1e-6, atol=1e-6)
+        q = episode.q[k]
 
 
 @pytest.mark.parametrize("name", ikgym.scenarios.names())
@@ -86,30 +115,46 @@ def test_gradients_against_central_differences(name, steps):
     np.testing.assert_allclose(forward, central, atol=1e-3 * scale)
 
 
-def rollout(policy, scenario, steps):
-    env = gym.make("RedundantIK-v0", scenario=scenario, preview=policy.preview)
-    observation, _ = env.reset()
-    state, status, errors = None, [], []
-    for _ in range(steps):
-        action, state = policy.predict(observation, state)
-        assert np.isfinite(action).all()
-        status.append(int(policy.report(state).status[0]))
-        observation, *_, info = env.step(action)
-        errors.append(info["position_error"])
-    return status, errors
+@pytest.mark.parametrize(
+    ("alpha_start", "warm_start", "name", "steps"),
+    [
+        ("kept", "unshifted", "varga7-fast", 100),
+        ("kept", "shifted", "varga7-fast", 120),
+        pytest.param("restart", "shifted", "varga7-fast", 1300, marks=pytest.mark.slow),
+        ("kept", "unshifted", "varga7-literal-fast", 150),
+        ("kept", "shifted", "varga7-literal-fast", 120),
+        ("restart", "shifted", "varga7-literal-fast", 220),
+        pytest.param("restart", "unshifted", "varga7-literal-fast", 2000, marks=pytest.mark.slow),
+    ],
+)
+def test_diverges_as_printed_and_says_so(alpha_start, warm_start, name, steps):
+    """After a blow-up the row goes on, and nothing claims to have converged."""
+    scenario = ikgym.scenarios.get(name).replace(steps=steps)
+    policy = baselines.make("rhc_gradient", scenario, alpha_start=alpha_start, warm_start=warm_start)
+    assert (policy.alpha_min, policy.alpha_max) == (1e-8, 5e-4)
+    episode = episodes.rollout(scenario, policy, 0)
+    assert Status.DIVERGED in episode.status
+    assert np.isfinite(episode.qdot).all()
 
 
-def test_diverges_as_printed_and_says_so():
-    """alpha_max = 5e-4 blows up on the fast trajectory; the row goes on, and nothing claims to have converged."""
-    policy = baselines.make("rhc_gradient", "varga7-fast", alpha_max=5e-4)
-    status, _ = rollout(policy, "varga7-fast", 1500)
-    assert Status.DIVERGED in status
+@pytest.mark.parametrize(("steps", "cost"), [(300, 7.154e6), pytest.param(3000, 5.604e7, marks=pytest.mark.slow)])
+def test_restarted_alpha_does_not_diverge_as_printed(steps, cost):
+    scenario = ikgym.scenarios.get("varga7-fast").replace(steps=steps)
+    policy = baselines.make("rhc_gradient", scenario)
+    assert (policy.alpha_start, policy.warm_start, policy.alpha_max) == ("restart", "unshifted", 5e-4)
+    episode = episodes.rollout(scenario, policy, 0)
+    assert Status.DIVERGED not in episode.status
+    assert episode.position_error.max() < 0.06
+    assert (episode.tracking_cost + episode.velocity_cost).sum() == pytest.approx(cost, rel=1e-3)
 
 
-def test_the_default_step_does_not_diverge():
-    status, errors = rollout(baselines.make("rhc_gradient", "varga7-fast"), "varga7-fast", 1500)
-    assert Status.DIVERGED not in status
-    assert max(errors) < 0.1
+@pytest.mark.parametrize("name", ["varga7-fast", "varga7-literal-fast"])
+def test_kept_alpha_with_the_smaller_bound_does_not_diverge(name):
+    scenario = ikgym.scenarios.get(name).replace(steps=600)
+    policy = baselines.make("rhc_gradient", scenario, alpha_start="kept", alpha_max=1e-4)
+    episode = episodes.rollout(scenario, policy, 0)
+    assert Status.DIVERGED not in episode.status
+    assert episode.position_error.max() < 0.1
 
 
 @pytest.mark.parametrize("gradient", ["finite_difference", "analytic"])
@@ -155,6 +200,8 @@ def test_preview_is_what_the_horizon_needs():
         ({"alpha_factor": 0.5}, InvalidInputError, "alpha_factor: expected a finite number of at least 1"),
         ({"difference": 0}, InvalidInputError, "difference: expected a finite number from 1e-09 to 1"),
         ({"gradient": "analytc"}, UnknownNameError, "Did you mean 'analytic'"),
+        ({"alpha_start": "restarted"}, UnknownNameError, "no alpha_start 'restarted'. Did you mean 'restart'"),
+        ({"warm_start": True}, UnknownNameError, "no warm_start True"),
     ],
 )
 def test_bad_parameters(change, error, message):
@@ -175,7 +222,7 @@ def test_operations_are_what_is_called(gradient, horizon, monkeypatch):
             return kernel(*args)
 
         monkeypatch.setattr(horizon_module, name, counted)
-    for name in ("_roll", "_frame_workspace"):
+    for name in ("_roll", "frame_workspace"):
         monkeypatch.setattr(horizon_module, name, getattr(horizon_module, name).py_func)
     scenario = ikgym.scenarios.get("varga7-fast")
     common = (data_of(scenario), np.zeros(7), scenario.nominal()[1:horizon])

@@ -17,25 +17,10 @@ from baselines.solvers.receding_horizon.horizon import (
     difference_state_gradient,
 )
 from baselines.solvers.receding_horizon.lagrange import factorise, reduce_gradient
+from baselines.solvers.receding_horizon.task_constraints import analytic_task_gradient
 from baselines.status import Status
 from ikgym.exceptions import InvalidInputError, UnknownNameError
-from tests.baselines.solvers.receding_horizon.data import data_of
-
-
-def constraints(dt, stages, n):
-    """A: c(i) = (q(i+1) - q(i))/Δt - q̇(i) by (q(2 … HL), q̇(1 … HL-1)); q(1) is no variable."""
-    rise = (np.eye(stages) - np.eye(stages, k=-1)) / dt
-    return np.kron(np.hstack([rise, -np.eye(stages)]), np.eye(n))
-
-
-def problem(name, stages):
-    """A horizon off the nominal path, and its kernels' arguments."""
-    scenario = ikgym.scenarios.get(name)
-    rng = np.random.default_rng(stages)
-    q = rng.uniform(-1, 1, scenario.joints)
-    path = q + rng.uniform(-5e-3, 5e-3, (stages, scenario.joints))
-    nominal = scenario.task.coordinates(*scenario.model.forward(path))
-    return scenario, q, nominal, rng.uniform(-2, 2, (stages, scenario.joints))
+from tests.baselines.solvers.receding_horizon.data import HORIZONS, constraints, counted, data_of, problem, with_tasks
 
 
 def gradients(kind, scenario, q, nominal, qdot):
@@ -105,38 +90,63 @@ def run(name, steps, **parameters):
 @KINDS
 def test_follows_the_plain_method_on_the_papers_trajectory(kind):
     """To the order Δt² HL² in each iterate; iterations are the same in number."""
-    plain, reduced = (run(name, 600, gradient=kind) for name in ("rhc_gradient", "rhc_lagrange"))
+    common = {"gradient": kind, "alpha_start": "kept", "alpha_max": 1e-4}
+    plain, reduced = (run(name, 600, **common) for name in ("rhc_gradient", "rhc_lagrange"))
     np.testing.assert_array_equal(plain.iterations, reduced.iterations)
     np.testing.assert_array_equal(plain.status, reduced.status)
     np.testing.assert_allclose(plain.qdot, reduced.qdot, atol=2e-5)
     assert not np.array_equal(plain.qdot, reduced.qdot)
 
 
+@pytest.mark.parametrize("states", [False, True])
+@KINDS
+def test_costs_are_those_of_the_plain_method(kind, states):
+    """As printed, with α restarted: the paths separate for a while, the costs do not."""
+    plain = run("rhc_gradient", 300, gradient=kind)
+    reduced = run("rhc_lagrange", 300, gradient=kind, states=states)
+    cost, wanted = (float((e.tracking_cost + e.velocity_cost).sum()) for e in (reduced, plain))
+    assert cost == pytest.approx(wanted, rel=3e-3)
+    assert set(reduced.status) == {Status.CONVERGED}
+    assert np.mean(reduced.iterations) == pytest.approx(np.mean(plain.iterations), rel=0.05)
+
+
 def test_one_step_differs_from_the_plain_one_by_what_the_metric_says():
     """One α from rest, so that rounding and the rule for α have no say: the difference is (M⁻¹ − I) of the step."""
-    observation, _ = gym.make("RedundantIK-v0", preview=4).reset(options={"q": np.full(7, 0.3)})
+    q = np.full(7, 0.3)
+    observation, _ = gym.make("RedundantIK-v0", preview=4).reset(options={"q": q})
     common = {"horizon": 5, "iterations": 1, "tolerance": 0.0, "gradient": "analytic"}
     scenario = ikgym.scenarios.get("varga7-fast")
-    plans = []
-    for name in ("rhc_gradient", "rhc_lagrange"):
-        _, state = baselines.make(name, scenario, **common).predict(observation)
-        plans.append(state[2][0])
-    lower = np.tril(np.ones((4, 4)))
-    m = np.eye(4) + scenario.dt**2 * lower.T @ lower
-    np.testing.assert_allclose(plans[1], np.linalg.solve(m, plans[0]), rtol=1e-9, atol=1e-12 * abs(plans[0]).max())
-    difference = np.linalg.norm(plans[1] - plans[0]) / np.linalg.norm(plans[0])
-    assert 1e-7 < difference < scenario.dt**2 * 5**2
+
+    def plan(name, **parameters):
+        _, state = baselines.make(name, scenario, **common, **parameters).predict(observation)
+        return state[2][0]
+
+    def agree(plan, m):
+        np.testing.assert_allclose(plan.ravel(), np.linalg.solve(m, plain.ravel()), rtol=1e-8, atol=1e-11)
+        assert 1e-7 < np.linalg.norm(plan - plain) / np.linalg.norm(plain) < 1e-2
+
+    plain, lower = plan("rhc_gradient"), np.kron(np.tril(np.ones((4, 4))), np.eye(7))
+    m = np.eye(28) + scenario.dt**2 * lower.T @ lower
+    agree(plan("rhc_lagrange"), m)
+    # At rest, all grid points are at q.
+    _, x, system, g = with_tasks(scenario, q, observation["nominal"], np.zeros((4, 7)))
+    analytic_task_gradient(data_of(scenario), observation["nominal"], x, system.jacobian, g)
+    by_qdot = scenario.dt * np.kron(np.tril(np.ones((4, 4))), system.jacobian[0])
+    agree(plan("rhc_lagrange", states=True), m + by_qdot.T @ by_qdot)
 
 
-def test_diverges_as_printed_and_says_so():
-    episode = run("rhc_lagrange", 1500, alpha_max=5e-4)
+@pytest.mark.parametrize("states", [False, True])
+def test_diverges_as_printed_with_alpha_kept_and_says_so(states):
+    episode = run("rhc_lagrange", 150, alpha_start="kept", states=states)
     assert Status.DIVERGED in episode.status
     assert np.isfinite(episode.qdot).all()
 
 
+@pytest.mark.parametrize("states", [False, True])
 @KINDS
-def test_a_blow_up_is_not_taken_for_convergence(kind):
-    policy = baselines.make("rhc_lagrange", "varga7-fast", alpha_min=1.0, alpha_max=1.0, iterations=3, gradient=kind)
+def test_a_blow_up_is_not_taken_for_convergence(kind, states):
+    common = {"alpha_min": 1.0, "alpha_max": 1.0, "iterations": 3, "gradient": kind}
+    policy = baselines.make("rhc_lagrange", "varga7-fast", states=states, **common)
     env = gym.make("RedundantIK-v0")
     env.reset()
     observation = env.step(np.full(7, 0.01, dtype=np.float32))[0]
@@ -157,28 +167,17 @@ def test_statuses():
         assert policy.report(state).status[0] == wanted
 
 
-@pytest.mark.parametrize(("kind", "horizon"), [("finite_difference", 3), ("finite_difference", 6), ("analytic", 4)])
+@HORIZONS
 def test_operations_are_what_is_called(kind, horizon, monkeypatch):
     policy = baselines.make("rhc_lagrange", "varga7-fast", gradient=kind, horizon=horizon)
-    calls = {"forward": 0, "forward_and_jacobian": 0}
-    for name in calls:
-        kernel = getattr(horizon_module, name)
-
-        def counted(*args, name=name, kernel=kernel):
-            calls[name] += 1
-            return kernel(*args)
-
-        monkeypatch.setattr(horizon_module, name, counted)
+    calls = counted(horizon_module, monkeypatch)
     scenario, _, nominal, qdot = problem("varga7-fast", horizon - 1)
     data, out = data_of(scenario), np.empty((2, *qdot.shape))
     if kind == "analytic":
         analytic_state_gradient.py_func(data, nominal, qdot.copy(), qdot, out[0], out[1])
     else:
         difference_state_gradient.py_func(data, nominal, qdot.copy(), qdot, 1e-3, out[0], out[1])
-    forwards, jacobians, factorisations, measurements = policy.count(np.array([0]))
-    assert np.all(forwards == calls["forward"])
-    assert np.all(jacobians == calls["forward_and_jacobian"])
-    assert (factorisations, measurements) == (1, 0)
+    assert [int(c) for c in policy.count(np.array(0))] == [*calls.values(), 1, 0]
 
 
 @pytest.mark.parametrize(
@@ -187,6 +186,7 @@ def test_operations_are_what_is_called(kind, horizon, monkeypatch):
         ({"horizon": 1}, InvalidInputError, "horizon: expected a whole number of at least 2, got 1"),
         ({"alpha_max": 1e-9}, InvalidInputError, "alpha_max: expected at least alpha_min"),
         ({"gradient": "analytc"}, UnknownNameError, "Did you mean 'analytic'"),
+        ({"states": "yes"}, InvalidInputError, "states: expected True or False, got 'yes'"),
     ],
 )
 def test_bad_parameters(change, error, message):
