@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ikgym import simulation
+from ikgym.arms.limits import limit_rows, within_limits
 from ikgym.compilation import announced
 from ikgym.exceptions import InvalidInputError
 from ikgym.memory import afford, of_rows
@@ -65,7 +66,7 @@ class Simulator:
         self._block = points if points <= affordable else min(points, max(affordable // 2, self.preview[-1]))
         self._in_blocks = self._block < points
         known = self._block * (2 if self._in_blocks else 1)
-        shown = 2 * joints + size + len(self.preview) * size + 6
+        shown = 2 * joints + size + len(self.preview) * size + 9
         afford(f"{rows} environments", of_rows(rows, shown, tables * known * width))
         self._last_block = self._point[self.preview[-1] :] // self._block
         self._blocks_known = np.zeros(tables, dtype=np.int64)
@@ -80,6 +81,7 @@ class Simulator:
             preview=np.array(self.preview, dtype=np.int64),
             bias=np.broadcast_to(scenario.disturbance.bias, joints).astype(np.float64),
             noise=np.broadcast_to(scenario.disturbance.noise, joints).astype(np.float64),
+            limits=limit_rows(scenario.arm, scenario.largest_qdot, scenario.dt),
         )
         self._state = State(
             actions=np.zeros((rows, joints)),
@@ -151,7 +153,7 @@ class Simulator:
             One start a row, of shape (N, n), or None.
 
         Raises:
-            InvalidInputError: A start has a wrong shape, is not finite or out of range.
+            InvalidInputError: A start has a wrong shape, is not finite, out of range or outside the arm's limits.
         """
         if q is None:
             return None
@@ -164,6 +166,7 @@ class Simulator:
                 f"options['q']: expected absolute values of at most {np.round(bound, 4).tolist()} in [rad] or [m], "
                 f"got {shortened(starts.tolist())}."
             )
+        within_limits("options['q']", starts, self.scenario.arm)
         return np.broadcast_to(starts, (self.rows, joints))
 
     def observe(self, active: npt.NDArray[np.bool_] | None = None, out: Outcome | None = None) -> Outcome:
@@ -204,8 +207,7 @@ class Simulator:
         """:meth:`step` of the only arm, in less time.
 
         Returns:
-            What a policy sees, without a row axis; tracking cost, velocity cost, position error, orientation error
-            and whether the action was clipped.
+            What a policy sees, without a row axis; costs, errors, clipped and joints held back as in an outcome.
         """
         self._accept(action, self._all)
         numbers = np.empty(self._count)
@@ -218,7 +220,7 @@ class Simulator:
             "nominal": numbers[nominal].reshape(self._nominal_shape),
             "remaining": numbers[remaining],
         }
-        return seen, numbers[-5:].tolist()
+        return seen, numbers[-8:].tolist()
 
     def nominal_positions(self, row: int) -> FloatArray:
         """The nominal positions of a row's episode in [m], one a step. Shape (steps + 1, 3)."""

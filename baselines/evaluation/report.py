@@ -28,6 +28,7 @@ Pictures = Mapping[str, Sequence[tuple[str, pathlib.PurePath]]]
 #: The group of plots that show all policies.
 OVERVIEW = "overview"
 REFERENCE_NOTE = "* reference: has privileged information"
+STOP_NOTE = "† ran into a stop: a limit of a joint's coordinate held it back"
 
 
 def number(value: float | None, scale: float = 1.0) -> str:
@@ -233,7 +234,8 @@ def _operations(names: Mapping[int, str]) -> list[Column]:
 
 def _policy(names: Mapping[int, str]) -> Column:
     def cell(summary: Summary) -> str:
-        return names[id(summary)] + (" *" if is_reference(summary.policy) else "")
+        stopped = " †" if summary.steps_at_joint_limit else ""
+        return names[id(summary)] + (" *" if is_reference(summary.policy) else "") + stopped
 
     return Column("policy", "", cell, left=True)
 
@@ -249,6 +251,8 @@ def _notes(rows: Sequence[Row]) -> list[str]:
     notes = []
     if any(is_reference(row.policy) for row in rows):
         notes.append(REFERENCE_NOTE)
+    if any(row.steps_at_joint_limit for row in rows):
+        notes.append(STOP_NOTE)
     notes.append(
         "cost ratio: total cost / best known cost, – where none is known; p50, p99: time of a call after the first; "
         "misses: such calls longer than Δt"

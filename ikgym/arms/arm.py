@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -81,10 +82,10 @@ class Arm(Frozen):
     prismatic: Sequence[bool] = ()
     tool: FloatArray = dataclasses.field(default_factory=lambda: np.zeros(3))
     tool_rotation: FloatArray = dataclasses.field(default_factory=lambda: np.eye(3))
-    lower: FloatArray | None = None
-    upper: FloatArray | None = None
-    velocity_limit: FloatArray | None = None
-    acceleration_limit: FloatArray | None = None
+    lower: FloatArray = None  # type: ignore[assignment]  # none
+    upper: FloatArray = None  # type: ignore[assignment]  # none
+    velocity_limit: FloatArray = None  # type: ignore[assignment]  # none
+    acceleration_limit: FloatArray = None  # type: ignore[assignment]  # none
     chain: Chain = dataclasses.field(init=False, repr=False)
     #: The URDF file that the arm was read from, None for all other arms and for changed copies.
     urdf: UrdfReference | None = dataclasses.field(init=False, repr=False, default=None)
@@ -132,11 +133,11 @@ class Arm(Frozen):
         """The number of joints, n."""
         return len(self.offsets)
 
-    @property
+    @functools.cached_property
     def limited(self) -> bool:
         """Whether any joint has a limit of any kind."""
         limits = (self.lower, self.upper, self.velocity_limit, self.acceleration_limit)
-        return bool(np.isfinite(limits).any())  # type: ignore[arg-type]  # arrays once the arm is made
+        return bool(np.isfinite(limits).any())
 
     def forward(self, q: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Orientation and position of the tool.

@@ -39,6 +39,7 @@ def handmade(steps=4, **changes):
         "velocity_cost": np.zeros(steps),
         "position_error": np.zeros(steps),
         "orientation_error": np.full(steps, np.nan),
+        "at_limit": np.zeros((steps, 3)),
         "status": np.zeros(steps, dtype=np.int64),
         "iterations": np.ones(steps, dtype=np.int64),
         "time_ns": np.full(steps, 1000, dtype=np.int64),

@@ -32,6 +32,11 @@ BASE = Row(
     qdot_peak=13.3125,
     qdot_rms=2.0,
     qdot_total_variation=100.0,
+    qddot_peak=500.0,
+    steps_at_joint_limit=0,
+    steps_at_velocity_limit=0,
+    steps_at_acceleration_limit=0,
+    joint_limit_margin_min=None,
     time_p50_us=16.21,
     time_p99_us=28.79,
     deadline_misses=1,
@@ -241,6 +246,9 @@ def course(steps=60, coordinates=6, joints=7, **changes):
         "position_error": rng.uniform(1e-3, 1, steps),
         "orientation_error": rng.uniform(1e-3, 1, steps),
         "prismatic": np.arange(joints) == 2,
+        "lower": np.full(joints, -np.inf),
+        "upper": np.full(joints, np.inf),
+        "velocity_limit": np.full(joints, np.inf),
     }
     return {**series, **changes}
 
