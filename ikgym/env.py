@@ -52,7 +52,8 @@ class RedundantIKEnv(gym.Env[Any, Any]):
     4. A joint that would pass a limit of its coordinate stops there, whatever the acceleration limit says. Its q̇ is
        (q(k+1) − q(k)) / Δt then, no faster than the velocity limit: 0 where it stood at the stop already.
 
-    An arm without limits does what it is told. `info["at_limit"]` counts the joints that were held back.
+    An arm without limits does what it is told. `info["at_limit"]` counts the joints that were held back, by more than
+    a millionth of the scenario's `velocity_limit`, which is more than what rounding to float32 does.
 
     ## Observation space
     A `Dict` of float64:
@@ -128,7 +129,7 @@ class RedundantIKEnv(gym.Env[Any, Any]):
         self.action_space = action_space(self.scenario)
         self._step = -1  # no episode yet
         self._steps, self._dt = self.scenario.steps, self.scenario.dt
-        self._has_orientation, self._limited = self.scenario.task.has_orientation, self.scenario.arm.limited
+        self._has_orientation = self.scenario.task.has_orientation
         self._renderer: Any = None if render_mode is None else _renderer(self.scenario, render_mode)
 
     @property
@@ -181,7 +182,7 @@ class RedundantIKEnv(gym.Env[Any, Any]):
                 if self._step < 0
                 else f"The episode has ended after {self._steps} steps: call reset() first."
             )
-        seen, (tracking, velocity, position, orientation, clipped, *held) = self._simulator.step_one(action)
+        seen, (tracking, velocity, position, orientation, clipped), held = self._simulator.step_one(action)
         self._step += 1
         info: dict[str, Any] = {
             "tracking_cost": tracking,
@@ -192,7 +193,7 @@ class RedundantIKEnv(gym.Env[Any, Any]):
         if self._has_orientation:
             info["orientation_error"] = orientation
         info["clipped"] = clipped > 0.0
-        info["at_limit"] = np.array(held, dtype=np.int64) if self._limited else np.zeros(3, dtype=np.int64)
+        info["at_limit"] = held
         info["time"] = self._step * self._dt
         if self._renderer is not None:
             self._draw_later(seen["q"], position, orientation)

@@ -16,12 +16,15 @@ from ikgym import cost_kernels, task_kernels
 from ikgym.cost_kernels import CostParameters
 from ikgym.jit import inlined, kernel
 from ikgym.kinematics import Chain, forward
-from ikgym.limit_kernels import FASTEST, LOWER, UPPER, driven, within
+from ikgym.limit_kernels import FASTEST, LOWER, SLACK, UPPER, driven, within
 from ikgym.rotations import geodesic_angle
 
 Floats = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
 Flags = npt.NDArray[np.bool_]
+
+# The rows of a disturbance, see :class:`Constants`.
+BIAS, NOISE = range(2)
 
 
 class Constants(NamedTuple):
@@ -37,8 +40,8 @@ class Constants(NamedTuple):
         counted: Whether costs count at the k-th step, that is whether it is the last of its point.
             Shape (steps + 1,).
         preview: How many steps ahead the nominal coordinates are shown. Shape (p,).
-        bias: Constant disturbance of the joint velocity, in [rad/s] or [m/s]. Shape (n,).
-        noise: Bound of its uniform random disturbance, in [rad/s] or [m/s]. Shape (n,).
+        disturbance: What is added to the joint velocity, in [rad/s] or [m/s]: a constant, and the bound of a uniform
+            random part. Shape (2, n).
         limits: What :func:`ikgym.arms.limits.limit_rows` gives. Shape (4, n), or (0, n) where there are none.
     """
 
@@ -49,8 +52,7 @@ class Constants(NamedTuple):
     point: Integers
     counted: Flags
     preview: Integers
-    bias: Floats
-    noise: Floats
+    disturbance: Floats
     limits: Floats
 
 
@@ -176,8 +178,7 @@ def step(
     point,
     counted,
     preview,
-    bias,
-    noise,
+    disturbance,
     limits,
     # CostParameters.
     delta_x,
@@ -227,7 +228,7 @@ def step(
         if not active[row]:
             continue
         clipped[row] = 0.0
-        at_limit[row] = 0.0
+        at_limit[row, 0] = at_limit[row, 1] = at_limit[row, 2] = 0.0
         if moving:
             for j in range(n):
                 action = actions[row, j]
@@ -236,17 +237,18 @@ def step(
                     action = math.copysign(1.0, action)
                 applied = action * velocity_limit[j]
                 if limited:
-                    applied = driven(limits, j, applied, qdot[row, j], at_limit[row])
+                    slack = SLACK * velocity_limit[j]
+                    applied = driven(limits, j, applied, qdot[row, j], slack, at_limit, row)
                 velocity = applied
-                if bias[j] != 0.0:
-                    velocity += bias[j]
-                if noise[j] != 0.0:
-                    velocity += noise[j] * _uniform(noise_key[row], np.uint64(made[row] * n + j))
+                if disturbance[BIAS, j] != 0.0:
+                    velocity += disturbance[BIAS, j]
+                if disturbance[NOISE, j] != 0.0:
+                    velocity += disturbance[NOISE, j] * _uniform(noise_key[row], np.uint64(made[row] * n + j))
                 reached = q[row, j] + dt * velocity  # Varga 2021, eq. 5
                 if limited and not limits[LOWER, j] <= reached <= limits[UPPER, j]:
-                    at_limit[row, 0] += 1.0
                     reached = limits[LOWER, j] if reached < limits[LOWER, j] else limits[UPPER, j]
                     applied = within((reached - q[row, j]) / dt, limits[FASTEST, j])
+                    at_limit[row, 0] += abs(velocity - applied) > slack
                 q[row, j], qdot[row, j] = reached, applied
             made[row] += 1
         k = made[row]

@@ -32,6 +32,8 @@ PIECE = 64
 
 # What the nominal frames of all rows may take, in bytes: of many long episodes only what is near is kept.
 MEMORY = 2**26
+# Joints held back of an arm without limits: a copy takes less time than a fresh array.
+NONE_HELD = np.zeros(3, dtype=np.int64)
 
 
 class Simulator:
@@ -50,7 +52,7 @@ class Simulator:
     """
 
     def __init__(self, scenario: Scenario, rows: int | None, preview: Preview, memory: int = MEMORY) -> None:
-        joints, size = scenario.joints, scenario.task.size
+        joints, size, disturbance = scenario.joints, scenario.task.size, scenario.disturbance
         self._action_shape = (joints,) if rows is None else (rows, joints)
         # One arm has no rows that do not step, whose outcome would have to be zero.
         self._new = np.empty if rows is None else np.zeros
@@ -79,8 +81,7 @@ class Simulator:
             point=self._point % known,
             counted=scenario.counted(),
             preview=np.array(self.preview, dtype=np.int64),
-            bias=np.broadcast_to(scenario.disturbance.bias, joints).astype(np.float64),
-            noise=np.broadcast_to(scenario.disturbance.noise, joints).astype(np.float64),
+            disturbance=np.array([np.broadcast_to(part, joints) for part in (disturbance.bias, disturbance.noise)]),
             limits=limit_rows(scenario.arm, scenario.largest_qdot, scenario.dt),
         )
         self._state = State(
@@ -101,6 +102,7 @@ class Simulator:
         parts = self._outcome(np.arange(self._count, dtype=np.float64))[1:6]
         self._parts = [slice(int(part.flat[0]), int(part.flat[-1]) + 1) for part in parts]
         self._constants = self._taken_apart()
+        self._limited = scenario.arm.limited
         self._all = np.ones(rows, dtype=np.bool_)
         self._own_start = np.zeros(rows, dtype=np.bool_)
         with announced("the simulation kernels"):
@@ -128,7 +130,7 @@ class Simulator:
         """
         scenario, state = self.scenario, self._state
         rows = np.flatnonzero(active)
-        noisy = bool(self._shared.noise.any())
+        noisy = bool(np.any(scenario.disturbance.noise))
         for row in rows.tolist():
             episode = scenario.trajectory.sample(generators[row])
             if scenario.random:
@@ -161,12 +163,12 @@ class Simulator:
         starts = float_array("options['q']", q)
         if starts.shape not in {(joints,), (self.rows, joints)}:
             raise InvalidInputError(f"options['q']: expected shape ({joints},), got {starts.shape}.")
+        within_limits("options['q']", starts, self.scenario.arm)
         if (np.abs(starts) > bound).any():
             raise InvalidInputError(
                 f"options['q']: expected absolute values of at most {np.round(bound, 4).tolist()} in [rad] or [m], "
                 f"got {shortened(starts.tolist())}."
             )
-        within_limits("options['q']", starts, self.scenario.arm)
         return np.broadcast_to(starts, (self.rows, joints))
 
     def observe(self, active: npt.NDArray[np.bool_] | None = None, out: Outcome | None = None) -> Outcome:
@@ -203,11 +205,11 @@ class Simulator:
         self._run(active, out.numbers, moving=True)
         return out
 
-    def step_one(self, action: npt.ArrayLike) -> tuple[Observation, list[float]]:
+    def step_one(self, action: npt.ArrayLike) -> tuple[Observation, list[float], npt.NDArray[np.int64]]:
         """:meth:`step` of the only arm, in less time.
 
         Returns:
-            What a policy sees, without a row axis; costs, errors, clipped and joints held back as in an outcome.
+            What a policy sees, without a row axis; costs, errors and whether the action was clipped; joints held back.
         """
         self._accept(action, self._all)
         numbers = np.empty(self._count)
@@ -220,7 +222,7 @@ class Simulator:
             "nominal": numbers[nominal].reshape(self._nominal_shape),
             "remaining": numbers[remaining],
         }
-        return seen, numbers[-8:].tolist()
+        return seen, numbers[-8:-3].tolist(), numbers[-3:].astype(np.int64) if self._limited else NONE_HELD.copy()
 
     def nominal_positions(self, row: int) -> FloatArray:
         """The nominal positions of a row's episode in [m], one a step. Shape (steps + 1, 3)."""

@@ -234,15 +234,17 @@ class RedundantIKVectorEnv(gym.vector.VectorEnv[Observation, npt.NDArray[np.floa
             "position_error": out.position_error,
             "orientation_error": out.orientation_error,
             "clipped": out.clipped > 0.0,
-            "at_limit": out.at_limit.astype(np.int64),
             "time": self._simulator.steps_made * self.scenario.dt,
         }
         if not self.scenario.task.has_orientation:
             del columns["orientation_error"]
         infos: Infos = {}
         for key, column in columns.items():
-            infos[key] = np.where(rows if column.ndim == 1 else rows[:, None], column, column.dtype.type(0))
+            infos[key] = np.where(rows, column, column.dtype.type(0))
             infos[f"_{key}"] = rows.copy()
+        infos["at_limit"], infos["_at_limit"] = np.zeros((self.num_envs, 3), dtype=np.int64), rows.copy()
+        if self.scenario.arm.limited:
+            infos["at_limit"] += (out.at_limit * rows[:, None]).astype(np.int64)
         return infos
 
     def _checked_seeds(self, seed: int | Sequence[int | None] | None) -> Sequence[int | None]:

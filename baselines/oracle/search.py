@@ -94,8 +94,9 @@ def search(
 
 def _played(episode: EpisodeProblem, path: FloatArray) -> tuple[FloatArray, FloatArray, float]:
     """Joint coordinates and joint velocities of each step, and their cost in the environment."""
-    limit = episode.scenario.velocity_limit
-    qdot = np.clip(episode.commands(path), -limit, limit)
+    limit, arm = episode.scenario.largest_qdot, episode.scenario.arm
+    # Multipliers keep limits to rounding; what is left over would add up from step to step.
+    qdot = np.clip(episode.commands(np.clip(path, arm.lower, arm.upper)), -limit, limit)
     q, cost = episode.play(qdot)
     return q, qdot, cost
 
