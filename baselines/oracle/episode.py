@@ -113,6 +113,24 @@ class EpisodeProblem:
         q = np.vstack([self.start, path])
         return np.stack([np.interp(fine, knots, column) for column in q.T], axis=1)
 
+    def feasible(self, path: FloatArray) -> FloatArray:
+        """A path within the limits: the nearest that the arm gets to each knot from the one before.
+
+        Args:
+            path: Joint coordinates at the knots, in [rad] or [m]. Shape (K, n).
+
+        Returns:
+            Joint coordinates, those of the path where it keeps the limits. Shape (K, n).
+        """
+        arm, most = self.scenario.arm, self.scenario.dt * self.grid.length[:, None] * self.scenario.largest_qdot
+        out = np.clip(path, arm.lower, arm.upper)
+        here = self.start
+        if (np.abs(np.diff(out, axis=0, prepend=here[None])) > most).any():
+            for knot, way in zip(out, most, strict=True):
+                knot[:] = np.where(np.abs(knot - here) > way, here + np.copysign(way, knot - here), knot)
+                here = knot
+        return out
+
     def commands(self, path: FloatArray) -> FloatArray:
         """The joint velocities that lead along a path, in [rad/s] or [m/s].
 
