@@ -113,7 +113,7 @@ class Outcome(NamedTuple):
 
 
 def outcome(numbers: Floats, rows: int, n: int, m: int, p: int) -> Outcome:
-    """The parts of an outcome that is one block of numbers, as each step fills a fresh one.
+    """The parts of an outcome as views of one block of numbers, as each step fills a fresh one.
 
     One block, since to allocate ten arrays and to hand them to a kernel takes longer than what the kernel does.
 
@@ -123,9 +123,6 @@ def outcome(numbers: Floats, rows: int, n: int, m: int, p: int) -> Outcome:
         n: Joints of the arm.
         m: Task coordinates.
         p: Steps ahead that are shown.
-
-    Returns:
-        Views of the block.
     """
     qdot = rows * n
     pose = qdot + rows * n

@@ -57,7 +57,7 @@ class Simulator:
         # One arm has no rows that do not step, whose outcome would have to be zero.
         self._new = np.empty if rows is None else np.zeros
         rows = 1 if rows is None else rows
-        self.scenario, self.rows = scenario, rows
+        self.scenario, self.rows, self._limited = scenario, rows, scenario.arm.limited
         self.preview = offsets(preview)
         self._point = scenario.points(preview)
         width = 12 if scenario.task.has_orientation else 3
@@ -95,14 +95,12 @@ class Simulator:
         )
         if not scenario.random:
             self._know(np.zeros(1, dtype=np.int64))
-        self._shape = (rows, joints, size, len(self.preview))
-        self._nominal_shape = (len(self.preview), size)
+        self._shape, self._nominal_shape = (rows, joints, size, len(self.preview)), (len(self.preview), size)
         self._count = rows * shown
         # Where the parts of the only arm are in the block.
         parts = self._outcome(np.arange(self._count, dtype=np.float64))[1:6]
         self._parts = [slice(int(part.flat[0]), int(part.flat[-1]) + 1) for part in parts]
         self._constants = self._taken_apart()
-        self._limited = scenario.arm.limited
         self._all = np.ones(rows, dtype=np.bool_)
         self._own_start = np.zeros(rows, dtype=np.bool_)
         with announced("the simulation kernels"):

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 
 from ikgym.arms.arm import Arm
 from ikgym.exceptions import InvalidInputError
-from ikgym.validation import FloatArray
+from ikgym.validation import LARGEST, SMALLEST, FloatArray, per_joint
 
 
 def within_limits(name: str, q: FloatArray, arm: Arm) -> None:
@@ -31,18 +32,31 @@ def within_limits(name: str, q: FloatArray, arm: Arm) -> None:
         )
 
 
-def velocity_scale(arm: Arm) -> FloatArray:
-    """The velocity limits of all joints in [rad/s] or [m/s], as what an action of 1 means. Shape (n,).
+def velocity_scale(arm: Arm, given: npt.ArrayLike | None) -> FloatArray:
+    """What an action of 1 means: the velocity that is given, or else the limits of all joints.
+
+    Args:
+        arm: The arm.
+        given: A number, or one a joint, in [rad/s] or [m/s]; None for the limits.
+
+    Returns:
+        Joint velocities in [rad/s] or [m/s], read-only. Shape (n,).
 
     Raises:
-        InvalidInputError: A joint has none.
+        InvalidInputError: Nothing is given and a joint has no limit; or a number is too small or too large.
     """
-    if without := np.flatnonzero(~np.isfinite(arm.velocity_limit)).tolist():
+    without = np.flatnonzero(~np.isfinite(arm.velocity_limit)).tolist()
+    if given is None and without:
         raise InvalidInputError(
             f"velocity_limit: expected a number, or one a joint, since arm {arm.name!r} has no velocity limit of its "
             f"own at joint {', '.join(map(str, without))}."
         )
-    return arm.velocity_limit
+    scale = per_joint("velocity_limit", arm.velocity_limit if given is None else given, arm.joints, at_most=LARGEST)
+    if (scale < SMALLEST).any():
+        raise InvalidInputError(
+            f"velocity_limit: expected numbers above 0, at least {SMALLEST:g}, got {scale.tolist()}."
+        )
+    return scale
 
 
 def farthest(arm: Arm) -> FloatArray:

@@ -82,12 +82,7 @@ class Scenario(Frozen):
         parts.check_model(self.name, self.model, n)
         self.trajectory.check(self.model)
         parts.check_orientation(self.name, self.task, self.trajectory)
-        scale = velocity_scale(self.arm) if self.velocity_limit is None else self.velocity_limit
-        settle("velocity_limit", per_joint("velocity_limit", scale, n, at_most=LARGEST))
-        if (self.velocity_limit < SMALLEST).any():
-            raise InvalidInputError(
-                f"velocity_limit: expected numbers above 0, at least {SMALLEST:g}, got {self.velocity_limit.tolist()}."
-            )
+        settle("velocity_limit", velocity_scale(self.arm, self.velocity_limit))
         settle("dt", number("dt", self.dt, at_least=SMALLEST, at_most=LARGEST))
         settle("steps", bounds.step_count("steps", self.steps, n))
         if self.start is not None:
@@ -274,7 +269,7 @@ class Scenario(Frozen):
 
     @property
     def largest_qdot(self) -> FloatArray:
-        """The largest joint velocities that the action space and the arm's limits allow. Shape (n,)."""
+        """The largest joint velocities that actions and the arm allow, in [rad/s] or [m/s]. Shape (n,)."""
         return np.minimum(self.velocity_limit, self.arm.velocity_limit)
 
     def largest_step_cost(self) -> float:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from matplotlib.artist import Artist
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from baselines.evaluation.plots import bands, style
@@ -29,21 +30,25 @@ def draw_velocities(title: str, log: Series) -> Figure:
     edges = time[window][[0, -1]]
     whole.axvspan(*edges, color=style.MIST, lw=0, zorder=0)
     unit = "[m/s]" if prismatic.all() else "[rad/s], [m/s]" if prismatic.any() else "[rad/s]"
-    for axes, panel in ((whole, "whole episode; shaded: the part below"), (close, "where it fluctuates most")):
+    dotted = "; dotted: limits of the joints" if np.isfinite(log["velocity_limit"]).any() else ""
+    for axes, panel in ((whole, f"whole episode; shaded: the part below{dotted}"), (close, "where it fluctuates most")):
         style.dress(axes, ylabel=f"velocity {unit}", title=panel)
         axes.margins(x=0.01)
-    fastest, shaded = log["velocity_limit"], list[Artist]()
-    for axes in (whole, close):
-        peak = max(map(abs, axes.get_ylim()))
-        for near in np.flatnonzero(fastest < (1.0 + bands.NEAR) * peak).tolist():
-            for limit in (-fastest[near], fastest[near]):
-                axes.axhline(limit, color=style.looks(near)["color"], lw=0.7, ls=":", zorder=1)
-        shaded = bands.shade(axes, -fastest.max(), fastest.max()) or shaded
     close.set_xlabel("time [s]", fontsize=style.MEDIUM)
     names = [rf"$\dot q_{{{j + 1}}}$" + (" [m/s]" if linear else "") for j, linear in enumerate(prismatic)]
-    lines: list[Artist] = [*whole.get_lines()[: len(names)]]
-    style.legend(drawn, title, lines + shaded[:1], [*names, bands.NAME][: len(lines + shaded[:1])])
+    handles: list[Artist] = [*whole.get_lines()]
+    shaded = [band for axes in (whole, close) for band in _draw_limits(axes, log["velocity_limit"])]
+    style.legend(drawn, title, handles + shaded[:1], names + [bands.NAME] * bool(shaded))
     return drawn
+
+
+def _draw_limits(axes: Axes, fastest: FloatArray) -> list[Artist]:
+    """Draws the velocity limits that are near, and gives the bands beyond the largest."""
+    peak = max(map(abs, axes.get_ylim()))
+    for joint in np.flatnonzero(fastest < (1.0 + bands.NEAR) * peak).tolist():
+        for limit in (-fastest[joint], fastest[joint]):
+            axes.axhline(limit, color=style.looks(joint)["color"], lw=0.7, ls=":", zorder=1)
+    return bands.shade(axes, -fastest.max(), fastest.max())
 
 
 def draw_paths(title: str, log: Series) -> Figure:
