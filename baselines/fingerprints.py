@@ -11,6 +11,7 @@ import numpy as np
 
 from baselines.canonical import canonical, jsonable
 from ikgym import cost_kernels
+from ikgym.arms import Arm
 from ikgym.scenarios import Scenario
 
 #: Numbers in arrays, mostly of the order of 1, count up to here.
@@ -56,6 +57,9 @@ def _digest(*parts: Any) -> str:
 def _canonical(value: Any) -> Any:
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         fields = {f.name: _canonical(getattr(value, f.name)) for f in dataclasses.fields(value) if f.init}
+        if isinstance(value, Arm) and not value.limited:
+            # Without any limit the plant moves as it did before it knew limits, and its digest is the one of then.
+            del fields["acceleration_limit"]
         return [type(value).__qualname__, fields]
     if isinstance(value, Mapping):
         return {str(k): _canonical(v) for k, v in value.items()}

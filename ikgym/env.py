@@ -20,7 +20,7 @@ from ikgym.validation import FloatArray, known_names, shortened
 
 OBSERVED = ("q", "qdot", "pose", "nominal", "remaining")
 #: The keys of `info` after a step; the orientation error is there where the task has an orientation.
-REPORTED = ("tracking_cost", "velocity_cost", "position_error", "orientation_error", "clipped", "time")
+REPORTED = ("tracking_cost", "velocity_cost", "position_error", "orientation_error", "clipped", "at_limit", "time")
 #: The keys that the options of a reset may have.
 OPTIONS = ("q",)
 
@@ -38,12 +38,22 @@ class RedundantIKEnv(gym.Env[Any, Any]):
     |---|---|---|
     | joint velocity as a fraction of the scenario's `velocity_limit` | `Box(-1.0, 1.0, (n,), float32)` | 1 |
 
-    `velocity_limit` is in [rad/s], in [m/s] for a prismatic joint. An action outside the box is clipped, and
-    `info["clipped"]` says so. An action that is not finite or of a wrong shape is an error; the state stays as it
-    was.
+    `velocity_limit` is in [rad/s], in [m/s] for a prismatic joint: the arm's own, unless the scenario says otherwise.
+    An action outside the box is clipped, and `info["clipped"]` says so. An action that is not finite or of a wrong
+    shape is an error; the state stays as it was.
 
     ## Transition
-    q(k+1) = q(k) + Δt q̇(k) (Varga 2021, eq. 5), plus the scenario's disturbance, if it has one.
+    q(k+1) = q(k) + Δt q̇(k) (Varga 2021, eq. 5) with the joint velocities q̇ that the arm makes of the command, joint
+    by joint, in this order:
+
+    1. The command is cut to the arm's velocity limit.
+    2. Its change from the q̇ last applied is cut to the acceleration limit times Δt. An episode begins at rest.
+    3. The scenario's disturbance is added, if it has one; it is not part of q̇.
+    4. A joint that would pass a limit of its coordinate stops there, whatever the acceleration limit says. Its q̇ is
+       (q(k+1) − q(k)) / Δt then, no faster than the velocity limit: 0 where it stood at the stop already.
+
+    An arm without limits does what it is told. `info["at_limit"]` counts the joints that were held back, by more than
+    a millionth of the scenario's `velocity_limit`, which is more than what rounding to float32 does.
 
     ## Observation space
     A `Dict` of float64:
@@ -58,7 +68,7 @@ class RedundantIKEnv(gym.Env[Any, Any]):
 
     `preview` = an int p gives X^N(k+1) … X^N(k+p); a tuple such as (1, 10, 40, 120) gives just those steps ahead.
     The nominal goes on past the end of the episode. All bounds are finite and true: they follow from the start,
-    the velocity limit, the number of steps and the arm's reach.
+    the limits, the number of steps and the arm's reach.
 
     ## Reward
     −(Φ^X(X^N(k+1) − F(q(k+1))) + Φ^U(q̇(k))), minus the stage cost of the scenario's `TrackingCost`. Where a
@@ -72,14 +82,16 @@ class RedundantIKEnv(gym.Env[Any, Any]):
     | `position_error` | distance of the tool point from its nominal position | [m] |
     | `orientation_error` | geodesic angle to the nominal orientation; absent where the task has none | [rad] |
     | `clipped` | whether the action left its box | bool |
+    | `at_limit` | joints held back by a stop, by the velocity limit, by the acceleration limit; int64 (3,) | 1 |
     | `time` | time since the start | [s] |
 
     After a reset `info` is empty.
 
     ## Starting state
     The scenario's start, with no velocity. `reset(seed=…)` chooses the trajectory of a random scenario, see
-    `ikgym.scenarios.SPLITS` for the seeds; `reset(options={"q": …})` starts elsewhere, at most 2π [rad] or [m]
-    from home in each joint (or as far as the scenario's own start, if that is farther).
+    `ikgym.scenarios.SPLITS` for the seeds; `reset(options={"q": …})` starts elsewhere, within the limits of the arm. A
+    joint without limits starts at most 2π [rad] or [m] from home (or as far as the scenario's own start, if that is
+    farther).
 
     ## Episode end
     Truncated by the environment itself after the scenario's `steps`, which `spec.max_episode_steps` repeats for
@@ -143,7 +155,8 @@ class RedundantIKEnv(gym.Env[Any, Any]):
 
         Raises:
             UnknownNameError: There is no such option.
-            InvalidInputError: The options are no dict, or the start has a wrong shape, is not finite or out of range.
+            InvalidInputError: The options are no dict, or the start has a wrong shape, is not finite, out of range or
+                outside the limits.
         """
         options = checked_options(options, OPTIONS)
         starts = self._simulator.checked_starts(options.get("q"))
@@ -169,7 +182,7 @@ class RedundantIKEnv(gym.Env[Any, Any]):
                 if self._step < 0
                 else f"The episode has ended after {self._steps} steps: call reset() first."
             )
-        seen, (tracking, velocity, position, orientation, clipped) = self._simulator.step_one(action)
+        seen, (tracking, velocity, position, orientation, clipped), held = self._simulator.step_one(action)
         self._step += 1
         info: dict[str, Any] = {
             "tracking_cost": tracking,
@@ -180,6 +193,7 @@ class RedundantIKEnv(gym.Env[Any, Any]):
         if self._has_orientation:
             info["orientation_error"] = orientation
         info["clipped"] = clipped > 0.0
+        info["at_limit"] = held
         info["time"] = self._step * self._dt
         if self._renderer is not None:
             self._draw_later(seen["q"], position, orientation)

@@ -115,7 +115,7 @@ class RedundantIKVecEnv(VecEnv):
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         for row in np.flatnonzero(ended).tolist():
             infos[row] = {
-                **{key: final["final_info"][key][row].item() for key in REPORTED if key in final["final_info"]},
+                **{key: _plain(final["final_info"][key][row]) for key in REPORTED if key in final["final_info"]},
                 "TimeLimit.truncated": True,
                 "terminal_observation": final["final_obs"][row],
                 "episode": self._summary(row),
@@ -179,3 +179,8 @@ class RedundantIKVecEnv(VecEnv):
                 f"options: expected a start 'q' for all rows or for none, got {len(given)} of {self.num_envs}."
             )
         return {"q": np.stack(given)}
+
+
+def _plain(value: Any) -> Any:
+    """A number of Python, as a single environment reports it; an array as it is."""
+    return value.item() if value.ndim == 0 else value

@@ -16,11 +16,15 @@ from ikgym import cost_kernels, task_kernels
 from ikgym.cost_kernels import CostParameters
 from ikgym.jit import inlined, kernel
 from ikgym.kinematics import Chain, forward
+from ikgym.limit_kernels import FASTEST, LOWER, SLACK, UPPER, driven, within
 from ikgym.rotations import geodesic_angle
 
 Floats = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
 Flags = npt.NDArray[np.bool_]
+
+# The rows of a disturbance, see :class:`Constants`.
+BIAS, NOISE = range(2)
 
 
 class Constants(NamedTuple):
@@ -36,8 +40,9 @@ class Constants(NamedTuple):
         counted: Whether costs count at the k-th step, that is whether it is the last of its point.
             Shape (steps + 1,).
         preview: How many steps ahead the nominal coordinates are shown. Shape (p,).
-        bias: Constant disturbance of the joint velocity, in [rad/s] or [m/s]. Shape (n,).
-        noise: Bound of its uniform random disturbance, in [rad/s] or [m/s]. Shape (n,).
+        disturbance: What is added to the joint velocity, in [rad/s] or [m/s]: a constant, and the bound of a uniform
+            random part. Shape (2, n).
+        limits: What :func:`ikgym.arms.limits.limit_rows` gives. Shape (4, n), or (0, n) where there are none.
     """
 
     kind: int
@@ -47,8 +52,8 @@ class Constants(NamedTuple):
     point: Integers
     counted: Flags
     preview: Integers
-    bias: Floats
-    noise: Floats
+    disturbance: Floats
+    limits: Floats
 
 
 class State(NamedTuple):
@@ -90,6 +95,7 @@ class Outcome(NamedTuple):
         position_error: In [m]. Shape (N,).
         orientation_error: Geodesic angle in [rad], NaN where the task has no orientation. Shape (N,).
         clipped: 1 where the action left its box, 0 elsewhere. Shape (N,).
+        at_limit: Joints held back by a stop, by the velocity and by the acceleration limit. Shape (N, 3).
     """
 
     numbers: Floats
@@ -103,22 +109,20 @@ class Outcome(NamedTuple):
     position_error: Floats
     orientation_error: Floats
     clipped: Floats
+    at_limit: Floats
 
 
 def outcome(numbers: Floats, rows: int, n: int, m: int, p: int) -> Outcome:
-    """The parts of an outcome that is one block of numbers, as each step fills a fresh one.
+    """The parts of an outcome as views of one block of numbers, as each step fills a fresh one.
 
     One block, since to allocate ten arrays and to hand them to a kernel takes longer than what the kernel does.
 
     Args:
-        numbers: The block. Shape (N (2 n + m + p m + 6),).
+        numbers: The block. Shape (N (2 n + m + p m + 9),).
         rows: N.
         n: Joints of the arm.
         m: Task coordinates.
         p: Steps ahead that are shown.
-
-    Returns:
-        Views of the block.
     """
     qdot = rows * n
     pose = qdot + rows * n
@@ -136,7 +140,8 @@ def outcome(numbers: Floats, rows: int, n: int, m: int, p: int) -> Outcome:
         numbers[reward + rows : reward + 2 * rows],
         numbers[reward + 2 * rows : reward + 3 * rows],
         numbers[reward + 3 * rows : reward + 4 * rows],
-        numbers[reward + 4 * rows :],
+        numbers[reward + 4 * rows : reward + 5 * rows],
+        numbers[reward + 5 * rows :].reshape(rows, 3),
     )
 
 
@@ -170,8 +175,8 @@ def step(
     point,
     counted,
     preview,
-    bias,
-    noise,
+    disturbance,
+    limits,
     # CostParameters.
     delta_x,
     p_x,
@@ -196,8 +201,8 @@ def step(
     """Moves rows, and observes them.
 
     The arguments are the parts of :class:`Chain`, :class:`Constants`, :class:`CostParameters` and :class:`State`; then
-    the block of an outcome (see :func:`outcome`), written in place; the rows that are meant, of shape (N,); whether
-    they move or are observed where they are; the first row, and the row after the last.
+    the block of an outcome, written in place; the rows that are meant, of shape (N,); whether they move or are observed
+    where they are; the first row, and the row after the last.
 
     The tuples are taken apart by the caller, since this is called once a step: a call with 32 values takes 3.5 µs, with
     the same values in four named tuples 8.2 µs (medians on one machine, by empty kernels). And numba counts references
@@ -207,11 +212,12 @@ def step(
     cost = CostParameters(delta_x, p_x, delta_qdot, p_out, p_in)
     rows, n = q.shape
     p, width = preview.shape[0], tables.shape[2]
-    m = (numbers.shape[0] // rows - 2 * n - 6) // (p + 1)
+    m = (numbers.shape[0] // rows - 2 * n - 9) // (p + 1)
     out = _outcome(numbers, rows, n, m, p)
     seen_q, seen_qdot, seen_pose, seen_nominal, remaining = out.q, out.qdot, out.pose, out.nominal, out.remaining
     tracking_cost, velocity_cost, clipped = out.tracking_cost, out.velocity_cost, out.clipped
-    position_error, orientation_error = out.position_error, out.orientation_error
+    position_error, orientation_error, at_limit = out.position_error, out.orientation_error, out.at_limit
+    limited = limits.shape[0] > 0
     # Each call has the scratch of its first row to itself.
     rotation, position = scratch[start, :9].reshape(3, 3), scratch[start, 9:12]
     nominal, error = scratch[start, 12 : 12 + m], scratch[start, 12 + m :]
@@ -219,19 +225,28 @@ def step(
         if not active[row]:
             continue
         clipped[row] = 0.0
+        at_limit[row, 0] = at_limit[row, 1] = at_limit[row, 2] = 0.0
         if moving:
             for j in range(n):
                 action = actions[row, j]
                 if abs(action) > 1.0:
                     clipped[row] = 1.0
                     action = math.copysign(1.0, action)
-                velocity = action * velocity_limit[j]
-                qdot[row, j] = velocity
-                if bias[j] != 0.0:
-                    velocity += bias[j]
-                if noise[j] != 0.0:
-                    velocity += noise[j] * _uniform(noise_key[row], np.uint64(made[row] * n + j))
-                q[row, j] += dt * velocity  # Varga 2021, eq. 5
+                applied = action * velocity_limit[j]
+                if limited:
+                    slack = SLACK * velocity_limit[j]
+                    applied = driven(limits, j, applied, qdot[row, j], slack, at_limit, row)
+                velocity = applied
+                if disturbance[BIAS, j] != 0.0:
+                    velocity += disturbance[BIAS, j]
+                if disturbance[NOISE, j] != 0.0:
+                    velocity += disturbance[NOISE, j] * _uniform(noise_key[row], np.uint64(made[row] * n + j))
+                reached = q[row, j] + dt * velocity  # Varga 2021, eq. 5
+                if limited and not limits[LOWER, j] <= reached <= limits[UPPER, j]:
+                    reached = limits[LOWER, j] if reached < limits[LOWER, j] else limits[UPPER, j]
+                    applied = within((reached - q[row, j]) / dt, limits[FASTEST, j])
+                    at_limit[row, 0] += abs(velocity - applied) > slack
+                q[row, j], qdot[row, j] = reached, applied
             made[row] += 1
         k = made[row]
         for j in range(n):

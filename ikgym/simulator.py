@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ikgym import simulation
+from ikgym.arms.limits import limit_rows, within_limits
 from ikgym.compilation import announced
 from ikgym.exceptions import InvalidInputError
 from ikgym.memory import afford, of_rows
@@ -31,6 +32,8 @@ PIECE = 64
 
 # What the nominal frames of all rows may take, in bytes: of many long episodes only what is near is kept.
 MEMORY = 2**26
+# Joints held back of an arm without limits: a copy takes less time than a fresh array.
+NONE_HELD = np.zeros(3, dtype=np.int64)
 
 
 class Simulator:
@@ -49,12 +52,12 @@ class Simulator:
     """
 
     def __init__(self, scenario: Scenario, rows: int | None, preview: Preview, memory: int = MEMORY) -> None:
-        joints, size = scenario.joints, scenario.task.size
+        joints, size, disturbance = scenario.joints, scenario.task.size, scenario.disturbance
         self._action_shape = (joints,) if rows is None else (rows, joints)
         # One arm has no rows that do not step, whose outcome would have to be zero.
         self._new = np.empty if rows is None else np.zeros
         rows = 1 if rows is None else rows
-        self.scenario, self.rows = scenario, rows
+        self.scenario, self.rows, self._limited = scenario, rows, scenario.arm.limited
         self.preview = offsets(preview)
         self._point = scenario.points(preview)
         width = 12 if scenario.task.has_orientation else 3
@@ -65,7 +68,7 @@ class Simulator:
         self._block = points if points <= affordable else min(points, max(affordable // 2, self.preview[-1]))
         self._in_blocks = self._block < points
         known = self._block * (2 if self._in_blocks else 1)
-        shown = 2 * joints + size + len(self.preview) * size + 6
+        shown = 2 * joints + size + len(self.preview) * size + 9
         afford(f"{rows} environments", of_rows(rows, shown, tables * known * width))
         self._last_block = self._point[self.preview[-1] :] // self._block
         self._blocks_known = np.zeros(tables, dtype=np.int64)
@@ -78,8 +81,8 @@ class Simulator:
             point=self._point % known,
             counted=scenario.counted(),
             preview=np.array(self.preview, dtype=np.int64),
-            bias=np.broadcast_to(scenario.disturbance.bias, joints).astype(np.float64),
-            noise=np.broadcast_to(scenario.disturbance.noise, joints).astype(np.float64),
+            disturbance=np.array([np.broadcast_to(part, joints) for part in (disturbance.bias, disturbance.noise)]),
+            limits=limit_rows(scenario.arm, scenario.largest_qdot, scenario.dt),
         )
         self._state = State(
             actions=np.zeros((rows, joints)),
@@ -92,8 +95,7 @@ class Simulator:
         )
         if not scenario.random:
             self._know(np.zeros(1, dtype=np.int64))
-        self._shape = (rows, joints, size, len(self.preview))
-        self._nominal_shape = (len(self.preview), size)
+        self._shape, self._nominal_shape = (rows, joints, size, len(self.preview)), (len(self.preview), size)
         self._count = rows * shown
         # Where the parts of the only arm are in the block.
         parts = self._outcome(np.arange(self._count, dtype=np.float64))[1:6]
@@ -126,7 +128,7 @@ class Simulator:
         """
         scenario, state = self.scenario, self._state
         rows = np.flatnonzero(active)
-        noisy = bool(self._shared.noise.any())
+        noisy = bool(np.any(scenario.disturbance.noise))
         for row in rows.tolist():
             episode = scenario.trajectory.sample(generators[row])
             if scenario.random:
@@ -151,7 +153,7 @@ class Simulator:
             One start a row, of shape (N, n), or None.
 
         Raises:
-            InvalidInputError: A start has a wrong shape, is not finite or out of range.
+            InvalidInputError: A start has a wrong shape, is not finite, out of range or outside the arm's limits.
         """
         if q is None:
             return None
@@ -159,6 +161,7 @@ class Simulator:
         starts = float_array("options['q']", q)
         if starts.shape not in {(joints,), (self.rows, joints)}:
             raise InvalidInputError(f"options['q']: expected shape ({joints},), got {starts.shape}.")
+        within_limits("options['q']", starts, self.scenario.arm)
         if (np.abs(starts) > bound).any():
             raise InvalidInputError(
                 f"options['q']: expected absolute values of at most {np.round(bound, 4).tolist()} in [rad] or [m], "
@@ -200,12 +203,11 @@ class Simulator:
         self._run(active, out.numbers, moving=True)
         return out
 
-    def step_one(self, action: npt.ArrayLike) -> tuple[Observation, list[float]]:
+    def step_one(self, action: npt.ArrayLike) -> tuple[Observation, list[float], npt.NDArray[np.int64]]:
         """:meth:`step` of the only arm, in less time.
 
         Returns:
-            What a policy sees, without a row axis; tracking cost, velocity cost, position error, orientation error
-            and whether the action was clipped.
+            What a policy sees, without a row axis; costs, errors and whether the action was clipped; joints held back.
         """
         self._accept(action, self._all)
         numbers = np.empty(self._count)
@@ -218,7 +220,7 @@ class Simulator:
             "nominal": numbers[nominal].reshape(self._nominal_shape),
             "remaining": numbers[remaining],
         }
-        return seen, numbers[-5:].tolist()
+        return seen, numbers[-8:-3].tolist(), numbers[-3:].astype(np.int64) if self._limited else NONE_HELD.copy()
 
     def nominal_positions(self, row: int) -> FloatArray:
         """The nominal positions of a row's episode in [m], one a step. Shape (steps + 1, 3)."""

@@ -19,7 +19,7 @@ def action_space(scenario: Scenario) -> spaces.Box:
 
 
 def observation_space(scenario: Scenario, preview: Preview) -> spaces.Dict:
-    """What a policy sees; the bounds follow from start, velocity limit, number of steps and reach.
+    """What a policy sees; the bounds follow from start, limits, number of steps and reach.
 
     Args:
         scenario: The tracking problem.
@@ -40,8 +40,8 @@ def observation_space(scenario: Scenario, preview: Preview) -> spaces.Dict:
     nominal = _coordinate_bound(scenario, scenario.trajectory.reach(times, scenario.model))
     return spaces.Dict(
         {
-            "q": _box(q),
-            "qdot": _box(scenario.velocity_limit),
+            "q": spaces.Box(np.maximum(-q, scenario.arm.lower), np.minimum(q, scenario.arm.upper), dtype=np.float64),
+            "qdot": _box(scenario.largest_qdot),
             "pose": _box(pose),
             "nominal": _box(np.tile(nominal, (len(ahead), 1))),
             "remaining": spaces.Box(0.0, float(scenario.steps), (1,), np.float64),

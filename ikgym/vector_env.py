@@ -242,6 +242,9 @@ class RedundantIKVectorEnv(gym.vector.VectorEnv[Observation, npt.NDArray[np.floa
         for key, column in columns.items():
             infos[key] = np.where(rows, column, column.dtype.type(0))
             infos[f"_{key}"] = rows.copy()
+        infos["at_limit"], infos["_at_limit"] = np.zeros((self.num_envs, 3), dtype=np.int64), rows.copy()
+        if self.scenario.arm.limited:
+            infos["at_limit"] += (out.at_limit * rows[:, None]).astype(np.int64)
         return infos
 
     def _checked_seeds(self, seed: int | Sequence[int | None] | None) -> Sequence[int | None]:

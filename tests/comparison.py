@@ -24,6 +24,8 @@ def identical(a: Any, b: Any) -> bool:
     a, b = np.asarray(a), np.asarray(b)
     if a.dtype != b.dtype or a.shape != b.shape:
         return False
+    if a.dtype == object and a.ndim == 0:  # such as None, where a row has no last observation
+        return bool(a == b)
     if a.dtype == object:
         return all(identical(x, y) for x, y in zip(a.ravel(), b.ravel(), strict=True))
     return a.tobytes() == b.tobytes()

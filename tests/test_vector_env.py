@@ -11,8 +11,10 @@ from gymnasium.wrappers.vector import RecordEpisodeStatistics
 import ikgym
 from ikgym.exceptions import InvalidInputError, ResetNeededError, UnknownNameError
 from tests.comparison import identical
+from tests.limited import limited
 
 N = 3
+NOISE = ikgym.Disturbance(bias=0.1, noise=0.3)
 
 
 def pair(scenario, mode, preview=2, num_envs=N):
@@ -33,13 +35,14 @@ def short(name, steps=7):
 
 
 def noisy(name, steps=7):
-    return short(name, steps).replace(disturbance=ikgym.Disturbance(bias=0.1, noise=0.3))
+    return short(name, steps).replace(disturbance=NOISE)
 
 
 @pytest.mark.parametrize("mode", list(AutoresetMode), ids=lambda mode: mode.value)
 @pytest.mark.parametrize(
     "scenario",
-    [short(name) for name in ikgym.scenarios.names()] + [noisy("varga7-random"), short("khan8-q1", 130)],
+    [short(name) for name in ikgym.scenarios.names()]
+    + [noisy("varga7-random"), short("khan8-q1", 130), limited(), limited(disturbance=NOISE)],
     ids=lambda scenario: f"{scenario.name}-{scenario.steps}-{scenario.disturbance.noise}",
 )
 def test_bit_identical_to_sync_over_whole_episodes(scenario, mode):
@@ -50,7 +53,7 @@ def test_bit_identical_to_sync_over_whole_episodes(scenario, mode):
     assert native.single_observation_space == sync.single_observation_space
     rng = np.random.default_rng(1)
     assert identical(native.reset(seed=11), sync.reset(seed=11))
-    ends = 0
+    ends, held = 0, np.zeros(3)
     for _ in range(3 * scenario.steps + 2):
         actions = rng.uniform(-1.2, 1.2, native.action_space.shape).astype(np.float32)
         got, wanted = native.step(actions), sync.step(actions)
@@ -58,10 +61,12 @@ def test_bit_identical_to_sync_over_whole_episodes(scenario, mode):
         assert native.observation_space.contains(got[0])
         ended = got[3]
         ends += int(ended.sum())
+        held += got[4].get("at_limit", np.zeros((N, 3))).sum(axis=0)
         if mode is AutoresetMode.DISABLED and ended.any():
             native_obs, sync_obs = (envs.reset(options={"reset_mask": ended.copy()}) for envs in (native, sync))
             assert identical(native_obs, sync_obs)
     assert ends >= 2 * N
+    assert (held > 0).all() == scenario.arm.limited
 
 
 def test_partial_resets_by_mask_put_rows_out_of_step():
@@ -85,6 +90,20 @@ def test_partial_resets_by_mask_put_rows_out_of_step():
                 for envs in (native, sync):
                     envs.reset(options={"reset_mask": ended.copy()})
         assert identical(*both)
+
+
+def test_rows_that_end_by_themselves_leave_what_held_them_back_to_the_final_info():
+    scenario = limited(steps=6)
+    native, sync = pair(scenario, AutoresetMode.SAME_STEP)
+    assert identical(native.reset(seed=3), sync.reset(seed=3))
+    for k in range(14):
+        if k == 2:  # puts the rows out of step
+            mask = {"reset_mask": np.array([True, False, False])}
+            assert identical(native.reset(options=dict(mask)), sync.reset(options=dict(mask)))
+        actions = np.full(native.action_space.shape, 1.0 if k % 4 < 2 else -1.0, dtype=np.float32)
+        got = native.step(actions)
+        assert identical(got, sync.step(actions))
+        assert (got[4].get("at_limit", np.zeros((N, 3)))[got[3]] == 0).all()
 
 
 def test_mask_is_left_in_the_options_for_wrappers():

@@ -15,7 +15,6 @@ from ikgym import arms, scenarios
 from ikgym.arms import Arm
 from ikgym.exceptions import UnknownNameError
 from ikgym.scenarios import Scenario
-from ikgym.validation import FloatArray
 
 
 @dataclasses.dataclass(frozen=True)
@@ -82,18 +81,18 @@ def _arm_row(name: str) -> tuple[str, ...]:
 def _limits(arm: Arm) -> list[str]:
     """Which kinds of limits an arm has."""
     ends = np.concatenate([arm.lower, arm.upper])
-    speeds: FloatArray = np.asarray(arm.velocity_limit)
-    kinds = {"joints": ends, "velocity": speeds}
+    kinds = {"joints": ends, "velocity": arm.velocity_limit, "acceleration": arm.acceleration_limit}
     return [kind for kind, values in kinds.items() if np.isfinite(values).any()]
 
 
 def _arm(name: str) -> str:
     arm = arms.get(name)
-    rows: list[tuple[str, ...]] = [("joint", "kind", "lower", "upper", "velocity limit")]
-    numbers = zip(arm.prismatic, arm.lower, arm.upper, arm.velocity_limit, strict=True)  # type: ignore[arg-type]
+    rows: list[tuple[str, ...]] = [("joint", "kind", "lower", "upper", "velocity limit", "acceleration limit")]
+    numbers = zip(arm.prismatic, arm.lower, arm.upper, arm.velocity_limit, arm.acceleration_limit, strict=True)
     for joint, (prismatic, *limits) in enumerate(numbers, 1):
         unit = "m" if prismatic else "rad"
-        cells = [f"{value:.4g} {ending}" for value, ending in zip(limits, (unit, unit, f"{unit}/s"), strict=True)]
+        units = unit, unit, f"{unit}/s", f"{unit}/s²"
+        cells = [f"{value:.4g} {ending}" for value, ending in zip(limits, units, strict=True)]
         rows.append((str(joint), "prismatic" if prismatic else "revolute", *cells))
     home = ", ".join(f"{x:.4g}" for x in arm.forward(np.zeros(arm.joints))[1] + 0.0)
     return f"{name}: {arm.joints} joints, tool at home ({home}) m\n\n{aligned(rows, 80)}"

@@ -46,6 +46,12 @@ Columns:
   position_error_max, position_error_rms         distance from the nominal position in [m]
   orientation_error_max, orientation_error_rms   geodesic angle in [rad], null where the task has none
   qdot_peak, qdot_rms, qdot_total_variation      of the joint velocities, in [rad/s] or [m/s]
+  qddot_peak                                     their largest change in a step over dt, in [rad/s²] or [m/s²]
+  steps_at_joint_limit, steps_at_velocity_limit, steps_at_acceleration_limit
+                                                 steps in which the arm held a joint back: at a stop, at its velocity
+                                                 or at its acceleration limit
+  joint_limit_margin_min                         smallest distance of a joint from a limit in [rad] or [m], null where
+                                                 the arm has none
   time_first_us                                  wall time of the first call of the policy in [µs]
   time_p50_us, time_p99_us                       that of the later calls, null where the episode was not timed
   deadline_misses                                later calls that were longer than the time step of the scenario

@@ -15,6 +15,7 @@ from baselines.episode import added_up
 from baselines.evaluation.rollout import Episode
 from baselines.files.json_files import JsonError, made, shown
 from baselines.status import Status
+from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray
@@ -47,6 +48,12 @@ class Row:
         qdot_peak: Largest absolute joint velocity, in [rad/s] or [m/s].
         qdot_rms: Root mean square over steps and joints, in [rad/s] or [m/s].
         qdot_total_variation: Σ_k Σ_j |q̇_j(k+1) − q̇_j(k)|, in [rad/s] or [m/s].
+        qddot_peak: Largest |q̇_j(k+1) − q̇_j(k)| / Δt, from rest at the start, in [rad/s²] or [m/s²].
+        steps_at_joint_limit: Steps in which a stop held a joint back.
+        steps_at_velocity_limit: Steps in which the velocity limit of the arm held a joint back.
+        steps_at_acceleration_limit: Steps in which the acceleration limit of the arm held a joint back.
+        joint_limit_margin_min: Smallest distance of a joint from a limit of its coordinate, in [rad] or [m]; None where
+            the arm has no such limit.
         time_p50_us: Median wall time of one call of the policy, in [µs], over all but the first, which often does more
             than the others (and is taken only where there is no other). None, like all times, where the episode was
             played together with others.
@@ -80,6 +87,11 @@ class Row:
     qdot_peak: float
     qdot_rms: float
     qdot_total_variation: float
+    qddot_peak: float
+    steps_at_joint_limit: int
+    steps_at_velocity_limit: int
+    steps_at_acceleration_limit: int
+    joint_limit_margin_min: float | None
     time_p50_us: float | None
     time_p99_us: float | None
     deadline_misses: int | None
@@ -149,6 +161,7 @@ def measure(
     timed, later = len(episode.time_ns) > 0, episode.time_ns[1:] if len(episode.time_ns) > 1 else episode.time_ns
     counted = scenario.counted()[1:]
     angles = episode.orientation_error[counted] if scenario.task.has_orientation else None
+    held = (episode.at_limit > 0.0).sum(axis=0).tolist()
     statuses = collections.Counter(episode.status.tolist())
     worst, operations = Status(max(statuses)), episode.operations._asdict()
     return Row(
@@ -168,6 +181,11 @@ def measure(
         qdot_peak=float(np.abs(episode.qdot).max()),
         qdot_rms=_rms(episode.qdot),
         qdot_total_variation=float(np.abs(np.diff(episode.qdot, axis=0)).sum()),
+        qddot_peak=float(np.abs(np.diff(episode.qdot, axis=0, prepend=0.0)).max() / scenario.dt),
+        steps_at_joint_limit=held[0],
+        steps_at_velocity_limit=held[1],
+        steps_at_acceleration_limit=held[2],
+        joint_limit_margin_min=_margin(scenario.arm, episode.q),
         time_p50_us=float(np.percentile(later, 50)) / 1e3 if timed else None,
         time_p99_us=float(np.percentile(later, 99)) / 1e3 if timed else None,
         deadline_misses=int((later > 1e9 * scenario.dt).sum()) if timed else None,
@@ -185,6 +203,13 @@ def measure(
 
 def _rms(values: FloatArray) -> float:
     return float(np.sqrt(np.mean(np.square(values))))
+
+
+def _margin(arm: Arm, q: FloatArray) -> float | None:
+    """The smallest distance from a limit of the joint coordinates, None where there is none."""
+    if not np.isfinite([arm.lower, arm.upper]).any():
+        return None
+    return float(min((q - arm.lower).min(), (arm.upper - q).min()))
 
 
 def _finite_or_none(value: Any) -> Any:

@@ -28,6 +28,7 @@ Pictures = Mapping[str, Sequence[tuple[str, pathlib.PurePath]]]
 #: The group of plots that show all policies.
 OVERVIEW = "overview"
 REFERENCE_NOTE = "* reference: has privileged information"
+STOP_NOTE = "† ran into a stop: a limit of a joint's coordinate held it back"
 
 
 def number(value: float | None, scale: float = 1.0) -> str:
@@ -233,7 +234,8 @@ def _operations(names: Mapping[int, str]) -> list[Column]:
 
 def _policy(names: Mapping[int, str]) -> Column:
     def cell(summary: Summary) -> str:
-        return names[id(summary)] + (" *" if is_reference(summary.policy) else "")
+        marks = " *" * is_reference(summary.policy) + " †" * (summary.steps_at_joint_limit > 0)
+        return names[id(summary)] + marks
 
     return Column("policy", "", cell, left=True)
 
@@ -246,9 +248,8 @@ def _markdown(columns: Sequence[Column], summaries: Sequence[Summary]) -> list[s
 
 
 def _notes(rows: Sequence[Row]) -> list[str]:
-    notes = []
-    if any(is_reference(row.policy) for row in rows):
-        notes.append(REFERENCE_NOTE)
+    notes = [REFERENCE_NOTE] * any(is_reference(row.policy) for row in rows)
+    notes += [STOP_NOTE] * any(row.steps_at_joint_limit for row in rows)
     notes.append(
         "cost ratio: total cost / best known cost, – where none is known; p50, p99: time of a call after the first; "
         "misses: such calls longer than Δt"

@@ -62,6 +62,7 @@ class Episode:
         velocity_cost: Φ^U, 0 where the step does not count. Shape (steps,).
         position_error: In [m]. Shape (steps,).
         orientation_error: Geodesic angle in [rad], NaN where the task has no orientation. Shape (steps,).
+        at_limit: Joints held back by a stop, by the velocity and by the acceleration limit. Shape (steps, 3).
         status: Values of :class:`baselines.Status`. Shape (steps,).
         iterations: Iterations of the policy. Shape (steps,).
         time_ns: Wall time of the call of `predict`, in [ns]. Shape (steps,), or (0,) where the calls were not timed.
@@ -78,6 +79,7 @@ class Episode:
     velocity_cost: FloatArray
     position_error: FloatArray
     orientation_error: FloatArray
+    at_limit: FloatArray
     status: npt.NDArray[np.int64]
     iterations: npt.NDArray[np.int64]
     time_ns: npt.NDArray[np.int64]
@@ -180,6 +182,7 @@ def _play(
     shown = policy.preview if preview is None else preview
     q, qdot, pose = np.empty((rows, steps, n)), np.empty((rows, steps, n)), np.empty((rows, steps, m))
     tracking, velocity, position, orientation = np.empty((4, rows, steps))
+    at_limit = np.empty((rows, steps, 3))
     status, iterations = np.empty((2, rows, steps), dtype=np.int64)
     time_ns = np.empty(steps if timed else 0, dtype=np.int64)
     diagnostics: dict[str, FloatArray] = {}
@@ -210,6 +213,7 @@ def _play(
             q[:, k], qdot[:, k], pose[:, k] = out.q, out.qdot, out.pose
             tracking[:, k], velocity[:, k] = out.tracking_cost, out.velocity_cost
             position[:, k], orientation[:, k] = out.position_error, out.orientation_error
+            at_limit[:, k] = out.at_limit
             status[:, k], iterations[:, k] = report.status, report.iterations
             for name, value in policy.diagnostics(state).items():
                 diagnostics.setdefault(name, np.empty((rows, steps, *value.shape[1:])))[:, k] = value
@@ -230,6 +234,7 @@ def _play(
             velocity[row],
             position[row],
             orientation[row],
+            at_limit[row],
             status[row],
             iterations[row],
             time_ns,

@@ -59,6 +59,7 @@ class Summary:
         position_error_max: The largest, in [m].
         orientation_error_max: The largest, in [rad]; None without an orientation.
         qdot_peak: The largest, in [rad/s] or [m/s].
+        steps_at_joint_limit: Their sum.
         time_p50_us: Median of the medians, in [µs]; None, like all times, where no episode was timed.
         time_p99_us: The largest, in [µs].
         deadline_misses: Their sum.
@@ -79,6 +80,7 @@ class Summary:
     position_error_max: float
     orientation_error_max: float | None
     qdot_peak: float
+    steps_at_joint_limit: int
     time_p50_us: float | None
     time_p99_us: float | None
     deadline_misses: int | None
@@ -161,6 +163,7 @@ def _summary(rows: Sequence[Row]) -> Summary:
         position_error_max=max(row.position_error_max for row in rows),
         orientation_error_max=max(angles) if angles else None,
         qdot_peak=max(row.qdot_peak for row in rows),
+        steps_at_joint_limit=sum(row.steps_at_joint_limit for row in rows),
         time_p50_us=clocked.p50_us,
         time_p99_us=clocked.p99_us,
         deadline_misses=sum(misses) if misses else None,

@@ -25,7 +25,8 @@ def trajectory_log(scenario: Scenario, seed: int, episode: Episode) -> Trajector
     Returns:
         ``time`` in [s], of shape (k,), and over it ``nominal`` and ``pose`` (k, m), ``q`` and ``qdot`` (k, n),
         ``position_error`` and, where there is one, ``orientation_error`` (k,); ``nominal_q`` (k, n) where there is a
-        nominal joint path; ``prismatic`` says which joints are prismatic, of shape (n,).
+        nominal joint path; ``prismatic`` says which joints are prismatic, ``lower``, ``upper`` and ``velocity_limit``
+        what the arm is limited to, infinite where it is not, all of shape (n,).
     """
     after = np.flatnonzero(scenario.counted())
     kept = after - 1
@@ -37,6 +38,9 @@ def trajectory_log(scenario: Scenario, seed: int, episode: Episode) -> Trajector
         "qdot": episode.qdot[kept],
         "position_error": episode.position_error[kept],
         "prismatic": np.array(scenario.arm.prismatic, dtype=np.bool_),
+        "lower": scenario.arm.lower,
+        "upper": scenario.arm.upper,
+        "velocity_limit": scenario.arm.velocity_limit,
     }
     if scenario.task.has_orientation:
         log["orientation_error"] = episode.orientation_error[kept]

@@ -33,7 +33,7 @@ class EpisodeProblem:
     Args:
         scenario: What is tracked.
         seed: The reset seed.
-        data: The arm itself, not its model; no joint limits, since the environment has none; the velocity limit.
+        data: The arm itself, not its model, with its limits of position and velocity.
         start: Joint coordinates at the start in [rad] or [m]. Shape (n,).
         nominal: Nominal task coordinates after the steps 1, 2, … Shape (steps, m).
         grid: K knots, one a step that counts.
@@ -51,23 +51,30 @@ class EpisodeProblem:
         """The episode that a reset with the seed begins.
 
         Raises:
-            InvalidInputError: The seed is no whole number of at least 0, or the scenario has a disturbance.
+            InvalidInputError: The seed is no whole number of at least 0, or the scenario has a disturbance or limits of
+                acceleration.
         """
         whole_number("seed", seed, at_least=0)
-        n, disturbance = scenario.joints, scenario.disturbance
+        disturbance = scenario.disturbance
         if np.any(disturbance.noise) or np.any(disturbance.bias):
             raise InvalidInputError(
                 "The best cost of an episode is that of a joint path, which knows of no disturbance; scenario "
                 f"{scenario.name!r}: expected noise=0 and bias=0, got {disturbance}."
+            )
+        if np.isfinite(scenario.arm.acceleration_limit).any():
+            raise InvalidInputError(
+                "The search for the best cost of an episode keeps limits of position and velocity; scenario "
+                f"{scenario.name!r}: expected an arm without limits of acceleration, got "
+                f"{scenario.arm.acceleration_limit.tolist()} of arm {scenario.arm.name!r}."
             )
         data = ProblemData(
             scenario.arm.chain,
             scenario.task.kind,
             scenario.cost.parameters,
             scenario.dt,
-            np.full(n, -np.inf),
-            np.full(n, np.inf),
-            scenario.velocity_limit,
+            scenario.arm.lower,
+            scenario.arm.upper,
+            scenario.largest_qdot,
         )
         at = np.flatnonzero(scenario.counted())
         held = np.diff(at, prepend=0)
@@ -105,6 +112,24 @@ class EpisodeProblem:
         fine, knots = np.cumsum(self.grid.length), np.append(0.0, np.cumsum(grid.length))
         q = np.vstack([self.start, path])
         return np.stack([np.interp(fine, knots, column) for column in q.T], axis=1)
+
+    def feasible(self, path: FloatArray) -> FloatArray:
+        """A path within the limits: the nearest that the arm gets to each knot from the one before.
+
+        Args:
+            path: Joint coordinates at the knots, in [rad] or [m]. Shape (K, n).
+
+        Returns:
+            Joint coordinates, those of the path where it keeps the limits. Shape (K, n).
+        """
+        arm, most = self.scenario.arm, self.scenario.dt * self.grid.length[:, None] * self.scenario.largest_qdot
+        out = np.clip(path, arm.lower, arm.upper)
+        here = self.start
+        if (np.abs(np.diff(out, axis=0, prepend=here[None])) > most).any():
+            for knot, way in zip(out, most, strict=True):
+                knot[:] = np.where(np.abs(knot - here) > way, here + np.copysign(way, knot - here), knot)
+                here = knot
+        return out
 
     def commands(self, path: FloatArray) -> FloatArray:
         """The joint velocities that lead along a path, in [rad/s] or [m/s].

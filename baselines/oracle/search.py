@@ -62,6 +62,8 @@ def search(
     done = tick or (lambda share: None)
     known = _known_paths(episode)
     known |= {name: np.ascontiguousarray(q[episode.grid.at - 1]) for name, q in (paths or {}).items()}
+    # Newton's method keeps the cheaper of a path and what it makes of it: no path may be cheap by passing a limit.
+    known = {name: episode.feasible(path) for name, path in known.items()}
     starts, fine = [Start(kind) for kind in known], dict(enumerate(known.values()))
     done(0.1)
     # Where no velocity costs, as with held points, each knot is a problem of its own: nothing to search for.
@@ -94,8 +96,9 @@ def search(
 
 def _played(episode: EpisodeProblem, path: FloatArray) -> tuple[FloatArray, FloatArray, float]:
     """Joint coordinates and joint velocities of each step, and their cost in the environment."""
-    limit = episode.scenario.velocity_limit
-    qdot = np.clip(episode.commands(path), -limit, limit)
+    limit = episode.scenario.largest_qdot
+    # Multipliers keep limits to rounding; what is left over would add up from step to step.
+    qdot = np.clip(episode.commands(episode.feasible(path)), -limit, limit)
     q, cost = episode.play(qdot)
     return q, qdot, cost
 

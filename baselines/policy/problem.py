@@ -40,6 +40,11 @@ class Problem(Frozen):
         limit = frozen_array("velocity_limit", self.velocity_limit, (self.model.joints,))
         object.__setattr__(self, "velocity_limit", limit)
 
+    @property
+    def largest_qdot(self) -> FloatArray:
+        """The largest joint velocities that actions and the limits of the model allow. Shape (n,)."""
+        return np.minimum(self.velocity_limit, self.model.velocity_limit)
+
     @classmethod
     def of(cls, scenario: Scenario) -> Self:
         """What a scenario tells."""

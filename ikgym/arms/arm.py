@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -64,10 +65,12 @@ class Arm(Frozen):
         tool: Tool point in the last frame, in [m]. Shape (3,).
         tool_rotation: Orientation of the tool in the last frame, a rotation matrix to within 1e-6, which is made
             exactly orthogonal. Shape (3, 3).
-        lower: Lower limits of the joints in [rad] or [m], -inf where there is none. Shape (n,). The limits are
-            data for solvers: nothing in the kinematics stops at them.
+        lower: Lower limits of the joints in [rad] or [m], -inf where there is none. Shape (n,). Kinematics take
+            no notice of any limit.
         upper: Upper limits of the joints in [rad] or [m], inf where there is none. Shape (n,).
         velocity_limit: Largest speeds of the joints in [rad/s] or [m/s], inf where there is none. Shape (n,).
+        acceleration_limit: Largest accelerations of the joints in [rad/s²] or [m/s²], inf where there is none.
+            Shape (n,).
 
     Raises:
         InvalidInputError: A shape, an axis, the tool's orientation or a limit is wrong, or a length beyond 1e12.
@@ -79,9 +82,10 @@ class Arm(Frozen):
     prismatic: Sequence[bool] = ()
     tool: FloatArray = dataclasses.field(default_factory=lambda: np.zeros(3))
     tool_rotation: FloatArray = dataclasses.field(default_factory=lambda: np.eye(3))
-    lower: FloatArray | None = None
-    upper: FloatArray | None = None
-    velocity_limit: FloatArray | None = None
+    lower: FloatArray = None  # type: ignore[assignment]  # none
+    upper: FloatArray = None  # type: ignore[assignment]  # none
+    velocity_limit: FloatArray = None  # type: ignore[assignment]  # none
+    acceleration_limit: FloatArray = None  # type: ignore[assignment]  # none
     chain: Chain = dataclasses.field(init=False, repr=False)
     #: The URDF file that the arm was read from, None for all other arms and for changed copies.
     urdf: UrdfReference | None = dataclasses.field(init=False, repr=False, default=None)
@@ -101,15 +105,12 @@ class Arm(Frozen):
         tool_rotation = rotation_matrix(f"tool_rotation of arm {self.name!r}", self.tool_rotation)
         lower = _limits(self.name, "lower", self.lower, n, -np.inf)
         upper = _limits(self.name, "upper", self.upper, n, np.inf)
-        velocity_limit = _limits(self.name, "velocity_limit", self.velocity_limit, n, np.inf)
+        velocity_limit = _limits(self.name, "velocity_limit", self.velocity_limit, n, np.inf, positive=True)
+        acceleration_limit = _limits(self.name, "acceleration_limit", self.acceleration_limit, n, np.inf, positive=True)
         if (lower >= upper).any():
             i = int(np.argmax(lower >= upper))
             raise InvalidInputError(
                 f"Limits of arm {self.name!r}: expected lower < upper, got {lower[i]:g} and {upper[i]:g} at joint {i}."
-            )
-        if (velocity_limit <= 0.0).any():
-            raise InvalidInputError(
-                f"velocity_limit of arm {self.name!r}: expected numbers above 0, got {velocity_limit.tolist()}."
             )
         chain = Chain(offsets, axes, np.array(prismatic, dtype=np.bool_), tool, tool_rotation)
         chain.prismatic.flags.writeable = False
@@ -122,6 +123,7 @@ class Arm(Frozen):
             "lower": lower,
             "upper": upper,
             "velocity_limit": velocity_limit,
+            "acceleration_limit": acceleration_limit,
             "chain": chain,
         }.items():
             object.__setattr__(self, field, value)
@@ -130,6 +132,12 @@ class Arm(Frozen):
     def joints(self) -> int:
         """The number of joints, n."""
         return len(self.offsets)
+
+    @functools.cached_property
+    def limited(self) -> bool:
+        """Whether any joint has a limit of any kind."""
+        limits = (self.lower, self.upper, self.velocity_limit, self.acceleration_limit)
+        return bool(np.isfinite(limits).any())
 
     def forward(self, q: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Orientation and position of the tool.
@@ -234,7 +242,9 @@ def _unit_axes(name: str, axes: FloatArray) -> FloatArray:
     return np.where(exact[:, None], axes, axes / lengths[:, None])
 
 
-def _limits(name: str, what: str, value: npt.ArrayLike | None, n: int, default: float) -> FloatArray:
+def _limits(
+    name: str, what: str, value: npt.ArrayLike | None, n: int, default: float, *, positive: bool = False
+) -> FloatArray:
     """Limits may be infinite, unlike everything else."""
     if value is None:
         return read_only(np.full(n, default))
@@ -245,4 +255,6 @@ def _limits(name: str, what: str, value: npt.ArrayLike | None, n: int, default: 
             raise ValueError
     except (TypeError, ValueError):
         raise InvalidInputError(f"{what} of arm {name!r}: expected {n} numbers, got {value!r}.") from None
+    if positive and (raw <= 0.0).any():
+        raise InvalidInputError(f"{what} of arm {name!r}: expected numbers above 0, got {raw.tolist()}.")
     return read_only(raw.astype(np.float64))

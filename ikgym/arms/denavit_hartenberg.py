@@ -27,6 +27,7 @@ def from_dh(
     lower: npt.ArrayLike | None = None,
     upper: npt.ArrayLike | None = None,
     velocity_limit: npt.ArrayLike | None = None,
+    acceleration_limit: npt.ArrayLike | None = None,
 ) -> Arm:
     """An arm from its Denavit–Hartenberg table.
 
@@ -45,6 +46,7 @@ def from_dh(
         lower: Lower limits of the joints in [rad] or [m]. Shape (n,).
         upper: Upper limits of the joints in [rad] or [m]. Shape (n,).
         velocity_limit: Largest speeds of the joints in [rad/s] or [m/s]. Shape (n,).
+        acceleration_limit: Largest accelerations of the joints in [rad/s²] or [m/s²]. Shape (n,).
 
     Returns:
         The arm, in the one form that all arms have.
@@ -84,6 +86,7 @@ def from_dh(
         lower=lower,
         upper=upper,
         velocity_limit=velocity_limit,
+        acceleration_limit=acceleration_limit,
     )
 
 

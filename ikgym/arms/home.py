@@ -22,6 +22,7 @@ def from_home(
     lower: npt.ArrayLike | None = None,
     upper: npt.ArrayLike | None = None,
     velocity_limit: npt.ArrayLike | None = None,
+    acceleration_limit: npt.ArrayLike | None = None,
 ) -> Arm:
     """An arm from the home pose of its joints and of its tool, all in the base frame.
 
@@ -38,6 +39,7 @@ def from_home(
         lower: Lower limits of the joints in [rad] or [m]. Shape (n,).
         upper: Upper limits of the joints in [rad] or [m]. Shape (n,).
         velocity_limit: Largest speeds of the joints in [rad/s] or [m/s]. Shape (n,).
+        acceleration_limit: Largest accelerations of the joints in [rad/s²] or [m/s²]. Shape (n,).
 
     Returns:
         The arm.
@@ -55,4 +57,5 @@ def from_home(
         lower=lower,  # type: ignore[arg-type]
         upper=upper,  # type: ignore[arg-type]
         velocity_limit=velocity_limit,  # type: ignore[arg-type]
+        acceleration_limit=acceleration_limit,  # type: ignore[arg-type]
     )

@@ -42,7 +42,8 @@ def from_urdf(
 ) -> Arm:
     """An arm from the chain between two links of a URDF file.
 
-    Revolute, continuous, prismatic and fixed joints are read, with their limits; a continuous joint has none.
+    Revolute, continuous, prismatic and fixed joints are read, with their limits of position and velocity; a continuous
+    joint has none of position. A URDF has no limits of acceleration: ``arm.replace(acceleration_limit=…)`` adds them.
     Joints off the chain, a gripper's for example, have no coordinate in the arm. Meshes are never opened.
 
     An axis whose length differs from 1 by more than 1e-2 is an error; within that it is taken to be rounded,

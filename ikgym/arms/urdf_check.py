@@ -14,6 +14,8 @@ from ikgym.exceptions import InvalidInputError
 from ikgym.validation import known_names
 
 MOVING = ("revolute", "continuous", "prismatic")
+# Those that must have limits of their coordinate.
+BOUNDED = ("revolute", "prismatic")
 READABLE = (*MOVING, "fixed")
 KINDS = (*READABLE, "floating", "planar")
 # Files round their axes, to (0.71, 0.71, 0) at worst; a length further from 1 is a mistake.
@@ -74,7 +76,12 @@ def read_chain(data: bytes, base: str | None, tip: str | None) -> tuple[str, lis
     known_names("link", [link for link in (base, tip) if link is not None], tree.links)
     base = tree.root if base is None else base
     tip = tree.only_leaf(base) if tip is None else tip
-    joints = [_joint(element) for element in tree.path(base, tip)]
+    path = tree.path(base, tip)
+    if without := [_label(joint) for joint in path if joint.get("type") in BOUNDED and joint.find("limit") is None]:
+        raise InvalidInputError(
+            f"{', '.join(without)}: expected a <limit>, got none; what turns without end is of type 'continuous'."
+        )
+    joints = [_joint(element) for element in path]
     if not any(joint.kind in MOVING for joint in joints):
         raise InvalidInputError(f"expected a joint that moves between links {base!r} and {tip!r}, got none.")
     return _attribute("robot", robot, "name"), joints

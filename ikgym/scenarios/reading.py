@@ -65,7 +65,6 @@ def load(file: str | os.PathLike[str]) -> Scenario:
                 parts[key] = _made(key, kind, checked(table, key, dict, "a table"))
         if "source" in table:
             parts["source"] = checked(table, "source", str, "a text")
-        checked(table, "velocity_limit", object, "a number, or one a joint")
         numbers = {key: value for key, value in table.items() if key not in parts}
         for key, value in numbers.items():
             only_numbers(key, value)

@@ -12,10 +12,11 @@ import numpy.typing as npt
 from gymnasium.utils import seeding
 
 from ikgym.arms import Arm
+from ikgym.arms.limits import farthest, velocity_scale, within_limits
 from ikgym.cost import TrackingCost
 from ikgym.exceptions import InvalidInputError
 from ikgym.preview import Preview, furthest
-from ikgym.scenarios import bounds, writing
+from ikgym.scenarios import bounds, parts, writing
 from ikgym.scenarios.disturbance import Disturbance
 from ikgym.simulation import nominal_rows
 from ikgym.tasks import Task
@@ -32,17 +33,18 @@ class Scenario(Frozen):
 
     Args:
         name: What the scenario is called.
-        arm: The arm that moves and is measured.
+        arm: The arm that moves, within its limits, and is measured.
         task: The task coordinates.
         trajectory: The nominal trajectory. X^N(k) is where it stands at the time k Δt.
         velocity_limit: The joint velocity that an action of 1 means, in [rad/s] or [m/s]. A number, or one a
-            joint.
+            joint. The arm's own velocity limits if it is left out, where all of them are finite.
         cost: The stage cost. The worst episode costs at most 1e150.
         dt: Δt in [s].
         steps: Steps of an episode, 100,000,000 at most.
         model: The arm that solvers know, and through which nominal joint paths are mapped; the arm itself if it
             is left out.
-        start: Joint coordinates at the start in [rad] or [m], the nominal ones if left out. Shape (n,).
+        start: Joint coordinates at the start in [rad] or [m], within the limits of the arm; the nominal ones if left
+            out. Shape (n,).
         initial_pose: What is measured at the start, where it is not the arm's pose. Shape (m,).
         iterations_per_point: Steps for which the nominal point 1, 2, … is held; the last number goes on. Errors
             and costs of a point count at its last step.
@@ -59,7 +61,7 @@ class Scenario(Frozen):
     arm: Arm
     task: Task
     trajectory: Trajectory
-    velocity_limit: FloatArray
+    velocity_limit: FloatArray = None  # type: ignore[assignment]  # that of the arm
     cost: TrackingCost = dataclasses.field(default_factory=TrackingCost)
     dt: float = 1e-3
     steps: int = 1000
@@ -74,35 +76,13 @@ class Scenario(Frozen):
         def settle(field: str, value: object) -> None:
             object.__setattr__(self, field, value)
 
-        for field, kind in {
-            "arm": Arm,
-            "task": Task,
-            "trajectory": Trajectory,
-            "cost": TrackingCost,
-            "disturbance": Disturbance,
-        }.items():
-            if not isinstance(getattr(self, field), kind):
-                raise InvalidInputError(
-                    f"{field} of scenario {self.name!r}: expected {kind.__name__}, got {getattr(self, field)!r}."
-                )
-        for field in ("name", "source"):
-            if not isinstance(getattr(self, field), str):
-                raise InvalidInputError(f"{field} of a scenario: expected a text, got {getattr(self, field)!r}.")
+        parts.check_kinds(self._fields())
         n = self.arm.joints
         settle("model", self.arm if self.model is None else self.model)
-        if not isinstance(self.model, Arm) or self.model.joints != n:
-            got = f"{self.model.name!r} with {self.model.joints}" if isinstance(self.model, Arm) else repr(self.model)
-            raise InvalidInputError(f"model of scenario {self.name!r}: expected an Arm with {n} joints, got {got}.")
+        parts.check_model(self.name, self.model, n)
         self.trajectory.check(self.model)
-        if self.task.has_orientation and not self.trajectory.has_orientation:
-            raise InvalidInputError(
-                f"Scenario {self.name!r}: task {self.task.name!r} needs orientations, the trajectory has none."
-            )
-        settle("velocity_limit", per_joint("velocity_limit", self.velocity_limit, n, at_most=LARGEST))
-        if (self.velocity_limit < SMALLEST).any():
-            raise InvalidInputError(
-                f"velocity_limit: expected numbers above 0, at least {SMALLEST:g}, got {self.velocity_limit.tolist()}."
-            )
+        parts.check_orientation(self.name, self.task, self.trajectory)
+        settle("velocity_limit", velocity_scale(self.arm, self.velocity_limit))
         settle("dt", number("dt", self.dt, at_least=SMALLEST, at_most=LARGEST))
         settle("steps", bounds.step_count("steps", self.steps, n))
         if self.start is not None:
@@ -118,10 +98,15 @@ class Scenario(Frozen):
         settle("iterations_per_point", held)
         for name in ("bias", "noise"):
             per_joint(name, getattr(self.disturbance, name), n)
+        if self.arm.limited and (self.start is not None or not self.random):
+            self.first_q(self.trajectory)  # says whether the arm can be there
         bounds.check_cost(self.name, self.largest_step_cost(), self.steps)
 
     def replace(self, **changes: Any) -> Self:
-        """A copy with some fields changed, checked like a new one; a new arm is its own model if none is given.
+        """A copy with some fields changed, checked like a new one.
+
+        A new arm is its own model if none is given. An action of 1 means the new arm's velocity limits, if it meant the
+        old one's and the new one has them in all joints.
 
         Raises:
             UnknownNameError: There is no field of that name.
@@ -129,6 +114,10 @@ class Scenario(Frozen):
         """
         if "arm" in changes and self.model is self.arm:
             changes.setdefault("model", None)
+        arm = changes.get("arm")
+        own_scale = np.array_equal(self.velocity_limit, self.arm.velocity_limit)
+        if own_scale and isinstance(arm, Arm) and np.isfinite(arm.velocity_limit).all():
+            changes.setdefault("velocity_limit", None)
         return super().replace(**changes)
 
     def save(self, file: str | os.PathLike[str]) -> None:
@@ -260,17 +249,28 @@ class Scenario(Frozen):
 
         Args:
             trajectory: What was drawn for the episode.
+
+        Raises:
+            InvalidInputError: The arm cannot be there; the message names the joint.
         """
         path = trajectory.joint_path(np.zeros(1)) if self.start is None else self.start[None]
         if path is None:
             raise InvalidInputError(f"Scenario {self.name!r}: a Cartesian trajectory needs a start.")
         start: FloatArray = path[0]
+        if self.arm.limited:
+            within_limits(f"Start of scenario {self.name!r}", start, self.arm)
         return start
 
     def joint_bound(self) -> FloatArray:
         """Absolute joint coordinates that no arm exceeds in an episode, in [rad] or [m]. Shape (n,)."""
         disturbance: FloatArray = np.abs(self.disturbance.bias) + np.abs(self.disturbance.noise)
-        return self.start_bound() + self.steps * self.dt * (self.velocity_limit + disturbance)
+        travelled = self.start_bound() + self.steps * self.dt * (self.velocity_limit + disturbance)
+        return np.minimum(travelled, farthest(self.arm))
+
+    @property
+    def largest_qdot(self) -> FloatArray:
+        """The largest joint velocities that actions and the arm allow, in [rad/s] or [m/s]. Shape (n,)."""
+        return np.minimum(self.velocity_limit, self.arm.velocity_limit)
 
     def largest_step_cost(self) -> float:
         """The most that one step of any episode can cost."""
@@ -286,7 +286,9 @@ class Scenario(Frozen):
         """Absolute joint coordinates that no start exceeds, in [rad] or [m]. Shape (n,)."""
         known = self.trajectory.joint_bound() if self.start is None else np.abs(self.start)
         usual = np.full(self.joints, START_RANGE)
-        return usual if known is None else np.maximum(usual, known)
+        reachable = np.maximum(usual, 0.0 if known is None else known)
+        within = farthest(self.arm)
+        return np.where(np.isfinite(within), within, reachable)
 
     def _held(self) -> tuple[int, ...]:
         held = self.iterations_per_point

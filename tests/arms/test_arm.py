@@ -11,7 +11,7 @@ from ikgym.exceptions import InvalidInputError, UnknownNameError
 
 every_arm = pytest.mark.parametrize("arm", [arms.get(name) for name in arms.names()], ids=arms.names())
 
-ARRAYS = ("offsets", "axes", "tool", "tool_rotation", "lower", "upper", "velocity_limit")
+ARRAYS = ("offsets", "axes", "tool", "tool_rotation", "lower", "upper", "velocity_limit", "acceleration_limit")
 
 
 def parts(**changes):
@@ -61,8 +61,11 @@ def parts(**changes):
         ({"upper": [1j, 2]}, "upper of arm 'two': expected 2 numbers"),
         ({"upper": [[1], [2, 3]]}, "upper of arm 'two': expected 2 numbers"),
         ({"upper": 1.0}, "upper of arm 'two': expected 2 numbers"),
-        ({"velocity_limit": [1, 0]}, r"velocity_limit of arm 'two': expected .* above 0, got \[1.0, 0.0\]"),
+        ({"velocity_limit": [1, 0]}, r"velocity_limit of arm 'two': expected .* above 0, got \[1, 0\]"),
         ({"velocity_limit": [1, -1]}, "velocity_limit of arm 'two': expected numbers above 0"),
+        ({"acceleration_limit": [0, 1]}, r"acceleration_limit of arm 'two': expected .* above 0, got \[0, 1\]"),
+        ({"acceleration_limit": [1]}, "acceleration_limit of arm 'two': expected 2 numbers"),
+        ({"acceleration_limit": [1, np.nan]}, "acceleration_limit of arm 'two': expected 2 numbers"),
     ],
 )
 def test_bad_input_is_refused(changes, message):
@@ -79,6 +82,7 @@ def test_what_is_left_out_has_its_default():
     np.testing.assert_array_equal(arm.lower, [-np.inf])
     np.testing.assert_array_equal(arm.upper, [np.inf])
     np.testing.assert_array_equal(arm.velocity_limit, [np.inf])
+    np.testing.assert_array_equal(arm.acceleration_limit, [np.inf])
 
 
 def test_an_axis_that_is_nearly_a_unit_vector_is_made_one():
@@ -103,6 +107,7 @@ def test_arrays_are_no_aliases_of_the_input():
         "lower": np.array([-1.0, -2]),
         "upper": np.array([1.0, 2]),
         "velocity_limit": np.array([3.0, 4]),
+        "acceleration_limit": np.array([5.0, 6]),
     }
     arm = Arm("two", **given)
     for field, array in given.items():

@@ -99,8 +99,10 @@ def test_theta_is_where_the_coordinate_begins():
 
 
 def test_limits_are_handed_on():
-    arm = from_dh("one", [1], [0], [0], lower=[-1], upper=[2], velocity_limit=[3])
-    np.testing.assert_array_equal([arm.lower, arm.upper, arm.velocity_limit], [[-1], [2], [3]])
+    arm = from_dh("one", [1], [0], [0], lower=[-1], upper=[2], velocity_limit=[3], acceleration_limit=[4])
+    np.testing.assert_array_equal(
+        [arm.lower, arm.upper, arm.velocity_limit, arm.acceleration_limit], [[-1], [2], [3], [4]]
+    )
 
 
 @pytest.mark.parametrize(

@@ -287,6 +287,15 @@ BAD_FILES = {
         with_joint(inside=""),
         "joint 'j1': expected a <limit>, got none",
     ),
+    "no limits": (
+        robot(
+            joint("j1", "a", "b", inside=""),
+            joint("j2", "b", "c"),
+            joint("j3", "c", "d", "prismatic", ""),
+            links="abcd",
+        ),
+        "joint 'j1', joint 'j3': expected a <limit>, got none; what turns without end is of type 'continuous'",
+    ),
     "no slide limit": (
         with_joint("prismatic", ""),
         "joint 'j1': expected a <limit>, got none",

@@ -24,6 +24,14 @@ def test_fingerprints_tell_scenarios_apart():
     assert fingerprint(pickle.loads(pickle.dumps(fast()))) == prints[0]
 
 
+def test_arms_without_limits_have_the_digests_of_before_plants_had_limits():
+    assert fingerprint(fast()) == "ed50afef1802"
+    assert fingerprint(ikgym.scenarios.get("khan8-q1")) == "869499f919f0"
+    bounded = {"upper": [9.0] * 7, "velocity_limit": [9.0] * 7, "acceleration_limit": [9.0] * 7}
+    prints = {fingerprint(fast().replace(arm=fast().arm.replace(**{name: bounded[name]}))) for name in bounded}
+    assert len(prints | {fingerprint(fast())}) == 4
+
+
 def test_the_last_bits_of_calculated_numbers_do_not_count():
     arm = fast().arm
     turned = arm.replace(axes=arm.axes + 1e-16 * (arm.axes == 0.0))

@@ -293,7 +293,10 @@ BAD = {
     "no arm": ({"arm": None}, "arm: expected the name of an arm or a table, got no such key"),
     "no task": ({"task": None}, "task: expected the name of a task, got no such key"),
     "no trajectory": ({"trajectory": None}, "trajectory: expected a table, got no such key"),
-    "no limit": ({"velocity_limit": None}, "velocity_limit: expected a number, or one a joint, got no such key"),
+    "no limit": (
+        {"velocity_limit": None},
+        "velocity_limit: expected a number, or one a joint, since arm 'varga7' has no velocity limit",
+    ),
     "name": ({"name": "3"}, "name: expected a text, got 3"),
     "source": ({"source": "[]"}, r"source: expected a text, got \[\]"),
     "arm": ({"arm": "3"}, "arm: expected the name of an arm or a table, got 3"),

@@ -189,7 +189,8 @@ class Recorder(gym.Wrapper[Any, Any, Any, Any]):
             numbers = [info[key] for key in ("tracking_cost", "velocity_cost", "position_error")]
             numbers.append(info.get("orientation_error", math.nan))  # absent where the task has none
             # Copies: wrappers may write into what they are handed.
-            self.rows.append((*(seen[key].copy() for key in ("q", "qdot", "pose")), *map(np.asarray, numbers)))
+            copies = [seen[key].copy() for key in ("q", "qdot", "pose")]
+            self.rows.append((*copies, *map(np.asarray, numbers), info["at_limit"].astype(np.float64)))
         return result
 
 
@@ -225,7 +226,7 @@ def play_wrapped(
         )
     if tick is not None:
         tick(scenario.steps)
-    q, qdot, pose, tracking, velocity, position, orientation = map(np.array, zip(*recorder.rows, strict=True))
+    q, qdot, pose, tracking, velocity, position, orientation, at_limit = map(np.array, zip(*recorder.rows, strict=True))
     return Episode(
         q,
         qdot,
@@ -234,6 +235,7 @@ def play_wrapped(
         velocity,
         position,
         orientation,
+        at_limit,
         status=np.full(scenario.steps, int(Status.UNKNOWN)),
         iterations=np.zeros(scenario.steps, dtype=np.int64),
         time_ns=np.array(times if timed else [], dtype=np.int64),

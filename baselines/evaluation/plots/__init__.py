@@ -6,6 +6,7 @@ import pathlib
 import sys
 from collections.abc import Iterator
 
+import numpy as np
 from matplotlib.figure import Figure
 from tqdm import tqdm
 
@@ -93,7 +94,7 @@ def _figures(
             f"Joint velocities of {name} in {episode}",
             joints.draw_velocities(f"{episode_of}: joint velocities of {name}", log),
         )
-        if "nominal_q" in log:
+        if "nominal_q" in log or np.isfinite([log["lower"], log["upper"]]).any():
             yield (
                 "Joint velocities and joint paths",
                 f"joints-{slug(plain[id(summary)])}",

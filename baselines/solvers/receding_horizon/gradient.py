@@ -135,7 +135,7 @@ class RecedingHorizonGradient(SolverPolicy):
         """The arguments of the kernel that never change."""
         problem, model = self.problem, self.problem.model
         kind, cost = problem.task.kind, problem.cost.parameters
-        limits: tuple[Any, ...] = (model.lower, model.upper, problem.velocity_limit)
+        limits: tuple[Any, ...] = (model.lower, model.upper, problem.largest_qdot)
         data = ProblemData(model.chain, kind, cost, problem.dt, *limits)
         settings = DescentSettings(
             tolerance=float(self.tolerance),

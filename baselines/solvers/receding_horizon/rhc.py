@@ -111,7 +111,7 @@ class RecedingHorizon(SolverPolicy):
             self.seed,
         )
         data = (*model.chain, problem.task.kind, *problem.cost.parameters, problem.dt, model.lower, model.upper)
-        object.__setattr__(self, "_constants", (*data, problem.velocity_limit, *settings))
+        object.__setattr__(self, "_constants", (*data, problem.largest_qdot, *settings))
 
     @property
     def preview(self) -> int:

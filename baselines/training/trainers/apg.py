@@ -174,7 +174,7 @@ class APGTrainer(ActorTrainer):
         features, speed = self._arm.features(config.processing, q, qdot, nominal, remaining, base)
         output = self._outputs(features.float())
         output.register_hook(lambda gradient: _clipped(gradient, most))  # type: ignore[no-untyped-call]
-        return self._arm.step(q, self._arm.action(config.processing, q, speed, output, base))
+        return self._arm.step(q, qdot, self._arm.action(config.processing, q, speed, output, base))
 
     def _nominal(self, ahead: Sequence[int]) -> FloatArray:
         """Nominal coordinates some steps ahead. Shape (N, p, m)."""

@@ -11,6 +11,7 @@ from torch import Tensor
 
 from baselines.agents.features import LARGEST, Processing, speed_rows
 from baselines.training.trainers.arm_gradients import projected, task_error
+from ikgym.arms.limits import limit_rows
 from ikgym.cost_kernels import P_X_INSIDE
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
@@ -34,6 +35,7 @@ class DifferentiableArm:
             raise InvalidInputError(f"Scenario {scenario.name!r}: its first pose is not that of the arm.")
         self.scenario = scenario
         self._limit = torch.from_numpy(scenario.velocity_limit.copy())
+        self._limits = torch.from_numpy(limit_rows(scenario.arm, scenario.largest_qdot, scenario.dt))
         self._prismatic = torch.from_numpy(np.array(scenario.model.chain.prismatic))
 
     def error(self, q: Tensor, nominal: FloatArray) -> Tensor:
@@ -48,18 +50,26 @@ class DifferentiableArm:
         """
         return task_error(q, nominal, self.scenario.arm, self.scenario.task)
 
-    def step(self, q: Tensor, action: Tensor) -> tuple[Tensor, Tensor]:
-        """Where the arm is after a step (Varga 2021, eq. 5).
+    def step(self, q: Tensor, last: Tensor, action: Tensor) -> tuple[Tensor, Tensor]:
+        """Where the arm is after a step (Varga 2021, eq. 5), within its limits: what they hold back has no gradient.
 
         Args:
             q: Joint coordinates in [rad] or [m]. Shape (N, n).
+            last: Joint velocities last applied, in [rad/s] or [m/s]. Shape (N, n).
             action: As fractions of the velocity limit; clipped to the box. Shape (N, n).
 
         Returns:
             Joint coordinates, and joint velocities in [rad/s] or [m/s]. Shapes (N, n).
         """
-        qdot = action.clamp(-1.0, 1.0) * self._limit
-        return q + self.scenario.dt * qdot, qdot
+        dt, qdot = self.scenario.dt, action.clamp(-1.0, 1.0) * self._limit
+        if not len(self._limits):
+            return q + dt * qdot, qdot
+        lower, upper, fastest, change = self._limits
+        qdot = torch.minimum(torch.maximum(qdot, -fastest), fastest)
+        qdot = torch.minimum(torch.maximum(qdot, last - change), last + change)
+        free = q + dt * qdot
+        reached = torch.minimum(torch.maximum(free, lower), upper)
+        return reached, torch.where(reached == free, qdot, (reached - q) / dt)
 
     def stage_cost(self, error: Tensor, qdot: Tensor) -> Tensor:
         """Φ^X + Φ^U, see :class:`ikgym.TrackingCost`.

@@ -251,11 +251,13 @@ def test_files(tmp_path):
     with (tmp_path / "results.csv").open(encoding="utf-8", newline="") as file:
         table = list(csv.DictReader(file))
     assert tuple(table[0]) == COLUMNS
-    assert COLUMNS[:20] == (
+    assert COLUMNS[:25] == (
         "scenario", "policy", "parameters", "seed", "steps", "total_cost", "tracking_cost", "velocity_cost",
         "cost_ratio",
         "position_error_max", "position_error_rms", "orientation_error_max", "orientation_error_rms", "qdot_peak",
-        "qdot_rms", "qdot_total_variation", "time_p50_us", "time_p99_us", "deadline_misses", "status",
+        "qdot_rms", "qdot_total_variation", "qddot_peak", "steps_at_joint_limit", "steps_at_velocity_limit",
+        "steps_at_acceleration_limit", "joint_limit_margin_min", "time_p50_us", "time_p99_us", "deadline_misses",
+        "status",
     )  # fmt: skip
     for cells, row in zip(table, rows, strict=True):
         assert float(cells["total_cost"]) == row.total_cost
@@ -411,7 +413,7 @@ def renamed(row, old, new):
         lambda row: renamed(row, "cost_ratio", "regret"),
         lambda row: renamed(row, "test_set", "frozen"),
         lambda row: {name: value for name, value in row.items() if name != "operations"},
-        lambda row: {**row, "qddot_peak": 1.0},
+        lambda row: {**row, "qdddot_peak": 1.0},
         lambda row: {**row, "status": "no such status"},
     ],
 )

@@ -10,12 +10,14 @@ from numpy.testing import assert_allclose, assert_array_equal
 import baselines
 import ikgym
 from baselines.canonical import jsonable
+from baselines.evaluate import evaluate
 from baselines.evaluation.metrics import TIME_COLUMNS, Row, measure
 from baselines.evaluation.rollout import Episode, rollout
 from baselines.evaluation.summary import Spread, geometric_mean, summarise
 from baselines.policy import Operations
 from baselines.status import Status
 from ikgym.exceptions import InvalidInputError
+from tests.limited import limited
 
 MACHINE = {"cpu": "a", "ikgym": "0"}
 
@@ -39,6 +41,7 @@ def handmade(steps=4, **changes):
         "velocity_cost": np.zeros(steps),
         "position_error": np.zeros(steps),
         "orientation_error": np.full(steps, np.nan),
+        "at_limit": np.zeros((steps, 3)),
         "status": np.zeros(steps, dtype=np.int64),
         "iterations": np.ones(steps, dtype=np.int64),
         "time_ns": np.full(steps, 1000, dtype=np.int64),
@@ -88,6 +91,44 @@ def test_noise_is_drawn_as_in_the_environment():
         observation, *_ = env.step(action)
     assert_array_equal(rollout(which, solver, 7).q[-1], observation["q"])
     assert (rollout(which, solver, 8).q[-1] != observation["q"]).any()
+
+
+class Pushing:
+    """A policy that pushes all joints to and fro."""
+
+    preview = 1
+
+    def predict(self, observation, state=None, episode_start=None, deterministic=True):
+        return np.full(7, 1.0 if observation["remaining"][0] % 14 < 7 else -0.9, dtype=np.float32), state
+
+
+@pytest.mark.parametrize("wrap", [None, gym.wrappers.OrderEnforcing], ids=["plain", "wrapped"])
+def test_limits_are_in_the_row(wrap):
+    which = limited(steps=40)
+    (row,) = evaluate(which, Pushing(), wrap=wrap)
+    env = gym.make("RedundantIK-v0", scenario=which, preview=1)
+    seen, _ = env.reset(seed=row.seed)
+    held, margin, last, change = np.zeros(3, dtype=int), np.inf, np.zeros(7), 0.0
+    for _ in range(40):
+        seen, *_, info = env.step(Pushing().predict(seen)[0])
+        held += info["at_limit"] > 0
+        margin = min(margin, (seen["q"] - which.arm.lower).min(), (which.arm.upper - seen["q"]).min())
+        change, last = max(change, np.abs(seen["qdot"] - last).max()), seen["qdot"]
+    assert (held > 0).all()
+    assert [row.steps_at_joint_limit, row.steps_at_velocity_limit, row.steps_at_acceleration_limit] == held.tolist()
+    assert row.joint_limit_margin_min == margin == 0.0
+    assert row.qddot_peak == pytest.approx(change / which.dt)
+
+
+def test_margins_are_distances_from_the_nearest_limit():
+    inside = handmade(2, q=[[0.5, 0.0], [0.2, -1.5]], qdot=[[0.3, 0.0], [0.3, -0.6]])
+    bounded = ikgym.arms.from_dh("two", [1, 1], [0, 0], [0, 0], lower=[-1, -2], upper=[0.75, np.inf])
+    still = ikgym.trajectories.Sinusoid(np.zeros(2))
+    small = ikgym.Scenario("two", bounded, ikgym.tasks.get("position"), still, velocity_limit=1.0, dt=0.1, steps=2)
+    assert row_of(small, inside).joint_limit_margin_min == 0.25
+    assert row_of(small, inside).qddot_peak == pytest.approx(6.0)
+    free = small.replace(arm=bounded.replace(lower=None, upper=None))
+    assert row_of(free, inside).joint_limit_margin_min is None
 
 
 def test_the_warm_up_call_leaves_no_trace_in_the_episode():

@@ -11,7 +11,7 @@ from baselines.evaluate import evaluate
 from baselines.evaluation import report
 from baselines.evaluation.metrics import Row
 from baselines.evaluation.plan import Skipped
-from baselines.evaluation.plots import cost_time, joints, style, tracking
+from baselines.evaluation.plots import bands, cost_time, joints, style, tracking
 from baselines.evaluation.summary import summarise
 from baselines.files import ResultsError
 
@@ -32,6 +32,11 @@ BASE = Row(
     qdot_peak=13.3125,
     qdot_rms=2.0,
     qdot_total_variation=100.0,
+    qddot_peak=500.0,
+    steps_at_joint_limit=0,
+    steps_at_velocity_limit=0,
+    steps_at_acceleration_limit=0,
+    joint_limit_margin_min=None,
     time_p50_us=16.21,
     time_p99_us=28.79,
     deadline_misses=1,
@@ -101,6 +106,15 @@ def test_table():
 
 def test_no_star_without_a_reference():
     assert "*" not in report.table([BASE])
+
+
+def test_a_policy_that_ran_into_a_stop_is_marked():
+    stopped = row(policy="moore_penrose", parameters={}, steps_at_joint_limit=3)
+    text = report.table([BASE, stopped, dataclasses.replace(REFERENCE, steps_at_joint_limit=1)])
+    assert [line.split("  ")[0] for line in text.split("\n")[4:7]] == ["dls", "moore_penrose †", "follow_nominal * †"]
+    assert report.STOP_NOTE in text
+    assert "†" not in report.table([BASE, row(policy="moore_penrose", steps_at_velocity_limit=3)])
+    assert summarise([stopped, dataclasses.replace(stopped, seed=1)])[0].steps_at_joint_limit == 6
 
 
 def test_a_task_without_orientation_shows_a_dash():
@@ -241,6 +255,9 @@ def course(steps=60, coordinates=6, joints=7, **changes):
         "position_error": rng.uniform(1e-3, 1, steps),
         "orientation_error": rng.uniform(1e-3, 1, steps),
         "prismatic": np.arange(joints) == 2,
+        "lower": np.full(joints, -np.inf),
+        "upper": np.full(joints, np.inf),
+        "velocity_limit": np.full(joints, np.inf),
     }
     return {**series, **changes}
 
@@ -259,6 +276,37 @@ def test_every_axis_has_a_label_and_a_unit(coordinates):
         assert all(re.search(r"\[.+\]$", label) for label in labels), labels
         assert any(axes.get_xlabel() == "time [s]" for axes in figure.axes)
     assert len(figures[0].axes) == coordinates + 2
+
+
+def bands_of(axes):
+    """Lower and upper ends of what is shaded across the whole width."""
+    boxes = [patch.get_bbox() for patch in axes.patches if (patch.get_x(), patch.get_width()) == (0.0, 1.0)]
+    return sorted((round(box.y0, 9), round(box.y1, 9)) for box in boxes)
+
+
+def test_limits_that_are_near_are_shaded():
+    q = np.zeros((60, 3))
+    q[:, 0] = np.linspace(-1.0, 1.0, 60)
+    q[:, 1] = np.linspace(-1.0, 0.5, 60)
+    lower, upper = np.array([-np.inf, -1.0, -9.0]), np.array([1.2, 9.0, 9.0])
+    one = course(joints=3, q=q, nominal_q=q, lower=lower, upper=upper)
+    figure = joints.draw_paths("p", one)
+    first, second, third = figure.axes
+    assert bands_of(first) == [(1.2, pytest.approx(first.get_ylim()[1]))]
+    assert bands_of(second) == [(pytest.approx(second.get_ylim()[0]), -1.0)]
+    assert second.get_ylim()[0] < -1.0
+    assert bands_of(third) == []
+    assert [text.get_text() for text in figure.legends[0].texts] == ["actual", "nominal", bands.NAME]
+    # Without a nominal joint path, too.
+    figure = joints.draw_paths("p", {name: value for name, value in one.items() if name != "nominal_q"})
+    assert [text.get_text() for text in figure.legends[0].texts] == ["actual", bands.NAME]
+    qdot = np.sin(np.linspace(0.0, 6.0, 60))[:, None] * [1.0, 2.0, 0.1]
+    figure = joints.draw_velocities("v", course(joints=3, qdot=qdot, velocity_limit=np.array([1.1, 2.0, 2.0])))
+    assert bands_of(figure.axes[0])[1][0] == 2.0
+    assert figure.legends[0].texts[-1].get_text() == bands.NAME
+    dotted = [line.get_ydata()[0] for line in figure.axes[0].get_lines() if line.get_linestyle() == ":"]
+    assert sorted(dotted) == [-2.0, -2.0, -1.1, 1.1, 2.0, 2.0]
+    assert bands_of(joints.draw_velocities("v", course()).axes[0]) == []
 
 
 def test_a_reference_below_the_errors_of_the_others_is_named():

@@ -262,6 +262,32 @@ def kept(folder):
     return sorted(folder.glob("*")) if folder.exists() else []
 
 
+def test_limits_are_kept_and_cost_what_they_must():
+    free = short(steps=40)
+    path = free.nominal_joint_path()
+    bounds = {"upper": np.maximum(0.5 * path.max(axis=0), 1e-2), "lower": -np.ones(7)}
+    bounds["velocity_limit"] = np.append(np.full(6, np.inf), 0.9 * np.abs(np.diff(path, axis=0)[:, 6]).max() / free.dt)
+    for names in (["lower", "upper"], ["velocity_limit"]):
+        scenario = free.replace(arm=free.arm.replace(**{name: bounds[name] for name in names}))
+        optimum = solve(scenario, 0, QUICK)
+        assert (optimum.q <= scenario.arm.upper).all()
+        assert (np.abs(optimum.qdot) <= scenario.largest_qdot).all()
+        if "upper" in names:
+            assert (scenario.arm.upper - optimum.q).min() < 1e-9  # a limit in the way
+        policy = baselines.make("oracle", scenario, starts=0, generations=0)
+        assert not rollout(scenario, policy, 0).at_limit.any()
+        assert optimum.cost >= solve(free, 0, QUICK).cost
+        for name in ("dls", "rhc", "follow_nominal"):
+            assert optimum.cost <= rolled(scenario, 0, name)[1] * (1.0 + 1e-9), (names, name)
+
+
+def test_limits_of_acceleration_are_refused():
+    arm = short().arm
+    scenario = short(arm=arm.replace(acceleration_limit=np.full(7, 10.0)))
+    with pytest.raises(InvalidInputError, match=r"expected an arm without limits of acceleration, got \[10.0, "):
+        solve(scenario, 0, QUICK)
+
+
 class TestCache:
     def test_a_hit_is_what_was_found(self, folder, monkeypatch):
         fresh = solve(short(), 0, QUICK, cached=False)

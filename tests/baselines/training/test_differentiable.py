@@ -66,22 +66,37 @@ def test_errors_and_their_gradients(name):
     np.testing.assert_allclose(q.grad, differences(lambda q: (arm.error(q, nominal) * weights).sum(), q), atol=1e-7)
 
 
+def limited(name):
+    """The scenario with limits that random actions run into."""
+    scenario = scenarios.get(name)
+    q, speed = scenario.nominal_joint_path(0)[0], scenario.velocity_limit
+    way = 2.0 * scenario.dt * speed
+    limits = {"lower": q - way, "upper": q + way, "velocity_limit": 0.8 * speed, "acceleration_limit": 3e2 * speed}
+    return scenario.replace(arm=scenario.arm.replace(**limits), start=q)
+
+
+@pytest.mark.parametrize("make", [scenarios.get, limited])
 @pytest.mark.parametrize("name", NAMES)
-def test_steps_and_costs_are_those_of_the_environment(name):
-    scenario = scenarios.get(name).replace(steps=12, iterations_per_point=1)
+def test_steps_and_costs_are_those_of_the_environment(name, make):
+    if make is limited and scenarios.get(name).nominal_joint_path(0) is None:
+        pytest.skip("no joint path to put limits around")
+    scenario = make(name).replace(steps=12, iterations_per_point=1)
     rng, arm = np.random.default_rng(0), DifferentiableArm(scenario)
     simulator = Simulator(scenario, 1, 1)
     simulator.reset(np.ones(1, dtype=bool), [np.random.default_rng(3)])
     out = simulator.observe()
-    q = torch.from_numpy(out.q.copy())
+    q, qdot = torch.from_numpy(out.q.copy()), torch.from_numpy(out.qdot.copy())
+    held = np.zeros(3)
     for _ in range(12):
         nominal = out.nominal[:, 0].copy()
         action = rng.uniform(-1.3, 1.3, out.q.shape)
         out = simulator.step(action)
-        q, qdot = arm.step(q, torch.from_numpy(action))
+        q, qdot = arm.step(q, qdot, torch.from_numpy(action))
+        held += out.at_limit[0]
         np.testing.assert_allclose(q.numpy(), out.q, rtol=0, atol=1e-14)
         cost = arm.stage_cost(arm.error(q, nominal), qdot)
         np.testing.assert_allclose(cost.numpy(), out.tracking_cost + out.velocity_cost, rtol=1e-11)
+    assert (held > 0).all() == scenario.arm.limited
 
 
 @pytest.mark.parametrize("exponents", [(3.0, 4.0, 4.0), (2.0, 3.0, 1.5), (1.0, 2.0, 1.0)])

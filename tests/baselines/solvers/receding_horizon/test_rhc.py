@@ -11,6 +11,7 @@ import pytest
 
 import baselines
 import ikgym
+from baselines.evaluation.rollout import rollout
 from baselines.policy import Problem
 from baselines.status import Status
 from benchmarks.rivals.casadi_horizon import OPTIONS, CasadiHorizon
@@ -312,6 +313,19 @@ def test_an_episode_stays_within_its_limits(iterations, share):
         pressed |= bool((abs(action) > 0.999).any())
     assert inside
     assert pressed or share > 0.0
+
+
+def test_the_plant_never_holds_it_back():
+    """It knows the limits of its model; damped least squares, which does not, is held back by the very same arm."""
+    scenario = limited("varga7-fast", share=0.1).replace(steps=400)
+    arm = scenario.arm.replace(velocity_limit=np.full(7, 4.5))
+    scenario = scenario.replace(arm=arm, model=arm)
+    policies = baselines.make("rhc", scenario, horizon=8), baselines.make("dls", scenario)
+    aware, unaware = (rollout(scenario, policy, 0) for policy in policies)
+    assert not aware.at_limit.any()
+    assert unaware.at_limit[:, :2].any(axis=0).all()
+    costs = [float((episode.tracking_cost + episode.velocity_cost).sum()) for episode in (aware, unaware)]
+    assert costs[0] < costs[1]
 
 
 def test_a_single_newton_step_from_a_wrong_plan_stays_within_the_limits():

@@ -1,0 +1,81 @@
+"""What follows from the limits of an arm."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from ikgym.arms.arm import Arm
+from ikgym.exceptions import InvalidInputError
+from ikgym.validation import LARGEST, SMALLEST, FloatArray, per_joint
+
+
+def within_limits(name: str, q: FloatArray, arm: Arm) -> None:
+    """Insists that an arm can be at joint coordinates.
+
+    Args:
+        name: What the coordinates are called in messages.
+        q: Joint coordinates in [rad] or [m]. Shape (..., n).
+        arm: The arm.
+
+    Raises:
+        InvalidInputError: A joint is outside its limits; the message names it.
+    """
+    rows = q.reshape(-1, arm.joints)
+    outside = np.argwhere((rows < arm.lower) | (rows > arm.upper))
+    if len(outside):
+        row, joint = outside[0].tolist()
+        raise InvalidInputError(
+            f"{name}: expected joint {joint} of arm {arm.name!r} within its limits, from {float(arm.lower[joint])!r} "
+            f"to {float(arm.upper[joint])!r} [{'m' if arm.prismatic[joint] else 'rad'}], got "
+            f"{float(rows[row, joint])!r}."
+        )
+
+
+def velocity_scale(arm: Arm, given: npt.ArrayLike | None) -> FloatArray:
+    """What an action of 1 means: the velocity that is given, or else the limits of all joints.
+
+    Args:
+        arm: The arm.
+        given: A number, or one a joint, in [rad/s] or [m/s]; None for the limits.
+
+    Returns:
+        Joint velocities in [rad/s] or [m/s], read-only. Shape (n,).
+
+    Raises:
+        InvalidInputError: Nothing is given and a joint has no limit; or a number is too small or too large.
+    """
+    without = np.flatnonzero(~np.isfinite(arm.velocity_limit)).tolist()
+    if given is None and without:
+        raise InvalidInputError(
+            f"velocity_limit: expected a number, or one a joint, since arm {arm.name!r} has no velocity limit of its "
+            f"own at joint {', '.join(map(str, without))}."
+        )
+    scale = per_joint("velocity_limit", arm.velocity_limit if given is None else given, arm.joints, at_most=LARGEST)
+    if (scale < SMALLEST).any():
+        raise InvalidInputError(
+            f"velocity_limit: expected numbers above 0, at least {SMALLEST:g}, got {scale.tolist()}."
+        )
+    return scale
+
+
+def farthest(arm: Arm) -> FloatArray:
+    """The largest absolute joint coordinates within the limits in [rad] or [m], inf where there is none. Shape (n,)."""
+    return np.maximum(np.abs(arm.lower), np.abs(arm.upper))
+
+
+def limit_rows(arm: Arm, fastest: FloatArray, dt: float) -> FloatArray:
+    """The limits of an arm as kernels take them, see :mod:`ikgym.limit_kernels`.
+
+    Args:
+        arm: The arm.
+        fastest: The largest joint velocities in [rad/s] or [m/s]. Shape (n,).
+        dt: Δt in [s].
+
+    Returns:
+        Lower and upper limits in [rad] or [m], the largest velocities, and how much they change at most in one step, in
+        [rad/s] or [m/s]. Shape (4, n), or (0, n) where the arm has no limit.
+    """
+    if not arm.limited:
+        return np.empty((0, arm.joints))
+    return np.array([arm.lower, arm.upper, fastest, dt * arm.acceleration_limit])

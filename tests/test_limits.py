@@ -1,0 +1,262 @@
+"""Limits belong to the plant: what no policy can do, and how it is told."""
+
+from __future__ import annotations
+
+import copy
+import math
+import pickle
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+import ikgym
+from ikgym.exceptions import InvalidInputError
+from tests.comparison import identical
+from tests.limited import ACCELERATION, LOWER, UPPER, VELOCITY, limited
+
+DT, SCALE = 0.1, 4.0
+
+
+def one_joint(lower=-1.0, upper=1.0, velocity=2.0, acceleration=np.inf, **changes):
+    """A slide along x that starts at 0 and is told up to ±4 m/s."""
+    arm = ikgym.Arm("slide", [[0, 0, 0]], [[1, 0, 0]], (True,), [0, 0, 0], np.eye(3), [lower], [upper])
+    arm = arm.replace(velocity_limit=[velocity], acceleration_limit=[acceleration])
+    still = ikgym.trajectories.Sinusoid(np.zeros(1))
+    task = ikgym.tasks.get("position")
+    given = {"velocity_limit": SCALE, "dt": DT, "start": [0.0], "steps": 50}
+    return ikgym.Scenario("slide", arm, task, still, **{**given, **changes})
+
+
+def played(scenario, commands):
+    """q, q̇ and joints held back after each command in [m/s]."""
+    env = ikgym.RedundantIKEnv(scenario)
+    env.reset(seed=0)
+    steps = [env.step(np.array([command / SCALE])) for command in commands]
+    return [(seen["q"][0], seen["qdot"][0], tuple(info["at_limit"].tolist())) for seen, *_, info in steps]
+
+
+@pytest.mark.parametrize(
+    ("scenario", "commands", "wanted"),
+    [
+        # The command is cut to the velocity limit, and so is what is observed.
+        (one_joint(), [1.0, 4.0, -4.0], [(0.1, 1.0, (0, 0, 0)), (0.3, 2.0, (0, 1, 0)), (0.1, -2.0, (0, 1, 0))]),
+        # The change is cut, beginning at rest; from 1.5 back to 0 takes two steps.
+        (
+            one_joint(velocity=np.inf, acceleration=10.0),
+            [2.0, 1.5, 0.0, 0.0],
+            [(0.1, 1.0, (0, 0, 1)), (0.25, 1.5, (0, 0, 0)), (0.3, 0.5, (0, 0, 1)), (0.3, 0.0, (0, 0, 0))],
+        ),
+        # Both: first the velocity, then its change.
+        (
+            one_joint(acceleration=10.0),
+            [4.0, 4.0, 4.0],
+            [(0.1, 1.0, (0, 1, 1)), (0.3, 2.0, (0, 1, 0)), (0.5, 2.0, (0, 1, 0))],
+        ),
+        # The joint goes as far as its stop, and stands there; it leaves at once.
+        (
+            one_joint(upper=0.25),
+            [2.0, 2.0, 2.0, -1.0],
+            [(0.2, 2.0, (0, 0, 0)), (0.25, 0.5, (1, 0, 0)), (0.25, 0.0, (1, 0, 0)), (0.15, -1.0, (0, 0, 0))],
+        ),
+        # It stands, whatever the acceleration limit says, and is accelerated from there.
+        (
+            one_joint(upper=0.15, acceleration=10.0),
+            [1.0, 2.0, 0.0, -2.0],
+            [(0.1, 1.0, (0, 0, 0)), (0.15, 0.5, (1, 0, 0)), (0.15, 0.0, (0, 0, 0)), (0.05, -1.0, (0, 0, 1))],
+        ),
+        # A joint that cannot brake in time runs into its stop.
+        (
+            one_joint(upper=0.3, acceleration=10.0),
+            [1.0, 2.0, 0.0],
+            [(0.1, 1.0, (0, 0, 0)), (0.3, 2.0, (0, 0, 0)), (0.3, 0.0, (1, 0, 1))],
+        ),
+        # The disturbance comes after velocity and acceleration, before the stop; it is no part of what is observed.
+        (
+            one_joint(upper=0.5, disturbance=ikgym.Disturbance(bias=0.5)),
+            [4.0, 2.0, -0.5, 0.0],
+            [(0.25, 2.0, (0, 1, 0)), (0.5, 2.0, (0, 0, 0)), (0.5, -0.5, (0, 0, 0)), (0.5, 0.0, (1, 0, 0))],
+        ),
+    ],
+)  # fmt: skip
+def test_a_step_goes_by_the_order_of_the_limits(scenario, commands, wanted):
+    for got, want in zip(played(scenario, commands), wanted, strict=True):
+        np.testing.assert_allclose(got[:2], want[:2], rtol=0, atol=1e-12)
+        assert got[2] == want[2]
+
+
+def test_the_applied_velocity_is_charged():
+    env = ikgym.RedundantIKEnv(one_joint(upper=0.0))
+    env.reset()
+    _, reward, _, _, info = env.step(np.ones(1))
+    assert info["at_limit"].tolist() == [1, 1, 0]
+    assert info["velocity_cost"] == 0.0 == -reward
+
+
+def test_who_keeps_a_limit_exactly_is_not_held_back():
+    """Actions in float32 miss it by some 1e-8, which is no matter of the policy."""
+    env = ikgym.RedundantIKEnv(one_joint(upper=1 / 3, velocity=0.7))
+    env.reset()
+    held = np.zeros(3)
+    for _ in range(4):
+        seen, *_, info = env.step(np.array([0.7 / SCALE], dtype=np.float32))
+        held += info["at_limit"]
+        assert abs(seen["qdot"][0]) <= 0.7
+    seen, _, _, _, info = env.step(np.array([(1 / 3 - seen["q"][0]) / DT / SCALE], dtype=np.float32))
+    assert not (held + info["at_limit"]).any()
+    assert seen["q"][0] <= 1 / 3
+
+
+def by_the_book(scenario, q, last, action):
+    """q, q̇ and joints held back, as the specification has them."""
+    most, change = np.minimum(scenario.velocity_limit, VELOCITY), scenario.dt * ACCELERATION
+    command = np.clip(action.astype(np.float64), -1, 1) * scenario.velocity_limit
+    allowed = np.clip(command, -most, most)
+    driven = np.clip(allowed, last - change, last + change)
+    reached = np.clip(q + scenario.dt * driven, LOWER, UPPER)
+    stopped = reached != q + scenario.dt * driven
+    applied = np.where(stopped, (reached - q) / scenario.dt, driven)
+    lost = np.abs([driven - applied, command - allowed, allowed - driven]) > 1e-6 * scenario.velocity_limit
+    return reached, applied, lost.sum(axis=1).tolist()
+
+
+ACTIONS = hnp.arrays(np.float32, (25, 7), elements=st.floats(-1.5, 1.5, width=32))
+
+
+@settings(max_examples=40, derandomize=True, deadline=None)
+@given(ACTIONS, st.integers(0, 10_000), st.sampled_from([0.0, 3.0]))
+def test_no_action_leaves_the_limits(actions, seed, noise):
+    scenario = limited(steps=len(actions), disturbance=ikgym.Disturbance(noise=noise))
+    env = ikgym.RedundantIKEnv(scenario)
+    last, _ = env.reset(seed=seed)
+    for action in actions:
+        seen, *_, info = env.step(action)
+        q, qdot, dt = seen["q"], seen["qdot"], scenario.dt
+        assert ((q >= LOWER) & (q <= UPPER)).all()
+        assert (np.abs(qdot) <= np.minimum(VELOCITY, scenario.velocity_limit)).all()
+        assert env.observation_space.contains(seen)
+        free = (q > LOWER) & (q < UPPER)
+        change = np.abs(qdot - last["qdot"])
+        assert (change[free] <= dt * ACCELERATION[free] * (1 + 1e-9) + 1e-12).all()
+        if noise == 0.0:
+            wanted = by_the_book(scenario, last["q"], last["qdot"], action)
+            np.testing.assert_allclose([q, qdot], wanted[:2], rtol=0, atol=1e-12)
+            assert info["at_limit"].tolist() == wanted[2]
+        last = seen
+
+
+def test_without_limits_nothing_is_held_back():
+    env = gym.make("RedundantIK-v0", scenario="varga7-fast")
+    env.reset(seed=0)
+    info = env.step(np.full(7, 1.5, dtype=np.float32))[4]
+    assert info["clipped"]
+    assert info["at_limit"].dtype == np.int64
+    assert info["at_limit"].tolist() == [0, 0, 0]
+
+
+def test_wide_limits_change_no_bit():
+    plain = limited(arm=ikgym.arms.get("varga7"))
+    wide = np.full(7, 1e9)
+    arm = plain.arm.replace(lower=-wide, upper=wide, velocity_limit=wide, acceleration_limit=1e6 * wide)
+    envs = [ikgym.RedundantIKEnv(plain), ikgym.RedundantIKEnv(plain.replace(arm=arm))]
+    firsts = [env.reset(seed=5) for env in envs]
+    assert identical(*firsts)
+    rng = np.random.default_rng(0)
+    for _ in range(plain.steps):
+        action = rng.uniform(-1.2, 1.2, 7)
+        assert identical(*(env.step(action) for env in envs))
+
+
+def test_gymnasium_finds_no_fault():
+    check_env(ikgym.RedundantIKEnv(limited()), skip_render_check=True)
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))])
+def test_a_copy_in_the_middle_of_an_episode_goes_on_alike(copied):
+    env = ikgym.RedundantIKEnv(limited())
+    env.reset(seed=1)
+    for _ in range(4):
+        env.step(np.ones(7, dtype=np.float32))
+    other = copied(env)
+    for _ in range(4):
+        pair = [one.step(np.full(7, -0.7, dtype=np.float32)) for one in (env, other)]
+        assert identical(*pair)
+        assert pair[0][4]["at_limit"].any()
+
+
+@pytest.mark.parametrize("make", [ikgym.RedundantIKEnv, lambda scenario: ikgym.RedundantIKVectorEnv(2, scenario)])
+def test_a_start_outside_the_limits_is_refused_with_its_joint(make):
+    env = make(limited())
+    before, _ = env.reset(seed=3)
+    env.reset(seed=3, options={"q": [0.8, -1.0, 0, 3, 0, -5, 2.0]})  # at the stops, and beyond where there are none
+    env.reset(seed=3)
+    message = (
+        r"options\['q'\]: expected joint 4 of arm 'limited7' within its limits, from -1.6 to 1.6 \[rad\], got 1.601"
+    )
+    with pytest.raises(InvalidInputError, match=message):
+        env.reset(options={"q": [0, 0, 0, 0, 1.601, 9, 0]})
+    with pytest.raises(InvalidInputError, match=r"joint 2 of arm .* from -1.2 to 1.2 \[m\], got -1.3"):
+        env.reset(options={"q": [0, 0, -1.3, 0, 0, 0, 0]})
+    assert identical(env.reset(seed=3)[0], before)
+
+
+def test_starts_of_scenarios_are_within_the_limits():
+    with pytest.raises(InvalidInputError, match=r"Start of scenario 'limited7-random': expected joint 1 .* got 1.5"):
+        limited(start=[0, 1.5, 0, 0, 0, 0, 0])
+    shifted = ikgym.trajectories.Sinusoid(np.zeros(7), offset=np.array([0.0, 0, 0, 9, 0, 0, -3]))
+    with pytest.raises(InvalidInputError, match=r"Start of scenario .* joint 6 of arm 'limited7' .* got -3"):
+        limited(trajectory=shifted)
+    assert limited(trajectory=shifted, start=np.zeros(7)).start is not None
+    # Of a random motion it is known when it is drawn.
+    wide = ikgym.trajectories.RandomSinusoid(np.full(7, 4.0), scale=(1.0, 1.0))
+    with pytest.raises(InvalidInputError, match="Start of scenario 'limited7-random': expected joint"):
+        ikgym.RedundantIKEnv(limited(trajectory=wide)).reset(seed=0)
+
+
+def test_the_bounds_of_q_are_the_limits():
+    box = ikgym.RedundantIKEnv(limited(steps=100_000)).observation_space["q"]
+    np.testing.assert_array_equal(box.low[np.isfinite(LOWER)], LOWER[np.isfinite(LOWER)])
+    np.testing.assert_array_equal(box.high[np.isfinite(UPPER)], UPPER[np.isfinite(UPPER)])
+    assert np.isfinite([box.low, box.high]).all()
+    reach = limited(steps=100_000).arm.reach(limited(steps=100_000).joint_bound())
+    assert reach < 13.0  # the slide ends at its stop
+    speeds = ikgym.RedundantIKEnv(limited()).observation_space["qdot"].high
+    np.testing.assert_array_equal(speeds, np.minimum(VELOCITY, 20.0))
+
+
+def test_an_action_of_1_means_the_limits_of_the_arm():
+    made = {"arm": one_joint().arm, "task": one_joint().task, "trajectory": one_joint().trajectory}
+    scenario = ikgym.Scenario("own", **made)
+    assert scenario.velocity_limit.tolist() == [2.0] == scenario.largest_qdot.tolist()
+    faster = scenario.arm.replace(velocity_limit=[3.0])
+    assert scenario.replace(arm=faster).velocity_limit.tolist() == [3.0]
+    assert scenario.replace(arm=faster, velocity_limit=1.0).velocity_limit.tolist() == [1.0]
+    free = scenario.arm.replace(velocity_limit=None)
+    assert scenario.replace(arm=free).velocity_limit.tolist() == [2.0]
+    assert one_joint().replace(arm=faster).velocity_limit.tolist() == [SCALE]
+    with pytest.raises(InvalidInputError, match="arm 'slide' has no velocity limit of its own at joint 0"):
+        ikgym.Scenario("own", **{**made, "arm": free})
+    with pytest.raises(InvalidInputError, match=r"has no velocity limit of its own at joint 1, 3\."):
+        limited(velocity_limit=None)
+
+
+def test_a_scenario_with_limits_survives_its_file(tmp_path):
+    scenario = limited()
+    scenario.save(tmp_path / "limited.toml")
+    again = ikgym.scenarios.load(tmp_path / "limited.toml")
+    for name in ("lower", "upper", "velocity_limit", "acceleration_limit"):
+        np.testing.assert_array_equal(getattr(again.arm, name), getattr(scenario.arm, name))
+    file = tmp_path / "limited.toml"
+    text = file.read_text(encoding="utf-8")
+    assert "acceleration_limit = [300.0, inf, " in text
+    own = one_joint(velocity_limit=None)
+    own.save(file)
+    lines = [line for line in file.read_text(encoding="utf-8").splitlines() if not line.startswith("velocity_limit")]
+    head, arm = "\n".join(lines), f"\n[arm]\nvelocity_limit = [{own.velocity_limit[0]}]\n"
+    file.write_text(head.replace("\n[arm]\n", arm), encoding="utf-8")
+    assert ikgym.scenarios.load(file).velocity_limit.tolist() == [2.0]
+    assert math.isinf(ikgym.scenarios.load(file).arm.acceleration_limit[0])
