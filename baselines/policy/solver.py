@@ -189,7 +189,24 @@ class SolverPolicy(Frozen, abc.ABC):
 
     def operations(self, state: Memory) -> Operations:
         """What the call that returned a state has cost; worked out when asked for, at no cost otherwise."""
-        iterations = self.report(state).iterations
+        return self.operations_of(self.report(state).iterations, self.counters(state))
+
+    def counters(self, state: Memory) -> Memory:
+        """What the call that returned a state has counted besides its iterations, each of shape (B,).
+
+        Nothing for most solvers, whose iterations tell what they have cost.
+        """
+        del state
+        return ()
+
+    def operations_of(self, iterations: npt.NDArray[np.int64], counters: Memory) -> Operations:
+        """What calls have cost, from what is kept of each of them.
+
+        Args:
+            iterations: Those that the calls reported. Shape (B,).
+            counters: What :meth:`counters` told of them, each of shape (B,).
+        """
+        del counters
         counts = self.count(iterations)
         return Operations(*(np.broadcast_to(np.asarray(c, dtype=np.int64), iterations.shape).copy() for c in counts))
 

@@ -127,4 +127,4 @@ def task_shift_rows(arm_task, gain, observed, present, jacobian, shift):
 
 def status_of(rank_deficient: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
     """Statuses of rows by whether the Jacobian had lost rank. Shapes (B,)."""
-    return np.where(rank_deficient, int(Status.RANK_DEFICIENT), int(Status.CONVERGED))
+    return np.where(rank_deficient, int(Status.RANK_DEFICIENT), int(Status.APPLIED))
