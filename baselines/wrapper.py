@@ -116,6 +116,11 @@ class Wrapper(SolverPolicy, abc.ABC):
         size, _ = self._own
         return pack(*self.report(state), remembered(state)[size:])
 
+    @property
+    def stated(self) -> bool:
+        """As the inner policy's."""
+        return self.inner is not None and self.inner.stated
+
     def counters(self, state: Memory) -> Memory:
         """Those of the inner policy."""
         return () if self.inner is None else self.inner.counters(self.inner_state(state))
