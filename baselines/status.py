@@ -17,18 +17,20 @@ class Status(enum.IntEnum):
     #: Nothing is said: the policy is no solver of this package, such as a model of Stable-Baselines3.
     UNKNOWN = -1
 
-    #: The solver found what it looks for; for a solver without iterations: its formula applied.
+    #: The solver's own test was passed: what it iterates, or measures, is within a tolerance.
     CONVERGED = 0
-    #: The iterations ran out first; the last iterate was used.
-    ITERATION_LIMIT = 1
+    #: A formula was applied, a network evaluated or a path played, in one pass: nothing is said about convergence.
+    APPLIED = 1
+    #: The test was not passed: the iterations ran out, or led no further; the last iterate was used.
+    ITERATION_LIMIT = 2
     #: The Jacobian had lost rank, and the directions lost were left out.
-    RANK_DEFICIENT = 2
+    RANK_DEFICIENT = 3
     #: More was asked for than the velocity limit allows; each joint was cut to its limit by itself.
-    SATURATED = 3
+    SATURATED = 4
     #: A vector was too long for the rotation that was to turn it; the arm was stopped for this step.
-    NOT_A_ROTATION = 4
+    NOT_A_ROTATION = 5
     #: The iterates blew up, or are no numbers; the arm was stopped for this step and the memory cleared.
-    DIVERGED = 5
+    DIVERGED = 6
 
     @property
     def label(self) -> str:
@@ -36,6 +38,6 @@ class Status(enum.IntEnum):
         return self.name.lower()
 
 
-def statuses(rows: int, status: Status = Status.CONVERGED) -> npt.NDArray[np.int64]:
-    """The same status for all rows. Shape (B,)."""
+def statuses(rows: int, status: Status = Status.APPLIED) -> npt.NDArray[np.int64]:
+    """The same status for all rows; that of a formula if left out. Shape (B,)."""
     return np.full(rows, int(status))

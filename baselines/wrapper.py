@@ -116,11 +116,20 @@ class Wrapper(SolverPolicy, abc.ABC):
         size, _ = self._own
         return pack(*self.report(state), remembered(state)[size:])
 
-    def operations(self, state: Memory) -> Operations:
-        """Those of the inner policy, which may keep count in its memory, and the wrapper's own."""
+    @property
+    def stated(self) -> bool:
+        """As the inner policy's."""
+        return self.inner is not None and self.inner.stated
+
+    def counters(self, state: Memory) -> Memory:
+        """Those of the inner policy."""
+        return () if self.inner is None else self.inner.counters(self.inner_state(state))
+
+    def operations_of(self, iterations: npt.NDArray[np.int64], counters: Memory) -> Operations:
+        """Those of the inner policy, and the wrapper's own."""
         if self.inner is None:
-            return super().operations(state)
-        return self.counted(self.inner.operations(self.inner_state(state)))
+            return super().operations_of(iterations, counters)
+        return self.counted(self.inner.operations_of(iterations, counters))
 
     def diagnostics(self, state: Memory) -> dict[str, FloatArray]:
         """What the inner policy shows of itself."""

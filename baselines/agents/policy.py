@@ -17,6 +17,7 @@ from baselines.agents.view import AgentView
 from baselines.files import ResultsError
 from baselines.policy import Batch, Memory, Operations, Problem, Solution, statuses
 from baselines.solvers.wrappers import orientation
+from baselines.status import Status
 from baselines.wrapper import Wrapper
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 from ikgym.preview import offsets as checked_offsets
@@ -29,7 +30,7 @@ class LearnedPolicy(Wrapper, abc.ABC):
 
     It plays every scenario whose features have the shape of those that it was trained on, be it another one. The
     base policy sees what it would see alone, and has its memory in that of the agent: a network output of 0 is the
-    base policy, bit for bit.
+    base policy, bit for bit. The status is that of the base policy, at best ``applied``.
 
     Its preview is a tuple of steps ahead. Observations that show 1, 2, … up to the furthest of them do, too. An agent
     that was trained on whole poses plays scenarios that show skew coordinates, too: their 90° ambiguity is resolved by
@@ -96,7 +97,9 @@ class LearnedPolicy(Wrapper, abc.ABC):
         qdot = fractions * self.problem.velocity_limit
         if seen.step is None:
             return Solution(qdot, own, statuses(len(qdot)), np.ones(len(qdot), dtype=np.int64))
-        return self.solution(qdot, own, seen.step)
+        # Where the base policy has converged, its action with a correction has not.
+        status = np.maximum(seen.step.status, int(Status.APPLIED))
+        return self.solution(qdot, own, seen.step._replace(status=status))
 
     def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
         """Those of the base policy, or a measurement; what a projector into the null space takes."""

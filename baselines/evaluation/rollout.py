@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.episode import play
-from baselines.policy import Batch, Operations, Report
+from baselines.policy import Batch, Memory, Operations, Report
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Preview, Scenario
 from ikgym.simulation import Outcome
@@ -46,8 +46,11 @@ class Player(Protocol):
     def diagnostics(self, state: Any) -> dict[str, FloatArray]:
         """What it shows of how it came to its action."""
 
-    def operations(self, state: Any) -> Operations:
-        """What the call that returned a state has cost; arrays of length 0 where nobody counts."""
+    def counters(self, state: Any) -> Memory:
+        """What the call that returned a state has counted besides its iterations."""
+
+    def operations_of(self, iterations: npt.NDArray[np.int64], counters: Memory) -> Operations:
+        """What calls have cost; arrays of length 0 where nobody counts."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -186,6 +189,7 @@ def _play(
     status, iterations = np.empty((2, rows, steps), dtype=np.int64)
     time_ns = np.empty(steps if timed else 0, dtype=np.int64)
     diagnostics: dict[str, FloatArray] = {}
+    counters: list[Memory] = []
 
     clock = time.perf_counter_ns
     state: Any = None
@@ -215,6 +219,7 @@ def _play(
             position[:, k], orientation[:, k] = out.position_error, out.orientation_error
             at_limit[:, k] = out.at_limit
             status[:, k], iterations[:, k] = report.status, report.iterations
+            counters.append(policy.counters(state))
             for name, value in policy.diagnostics(state).items():
                 diagnostics.setdefault(name, np.empty((rows, steps, *value.shape[1:])))[:, k] = value
             if tick is not None and (k + 1) % TICK == 0:
@@ -225,6 +230,7 @@ def _play(
             gc.enable()
     if tick is not None:
         tick(steps % TICK * rows)
+    counted = [np.array(steps) for steps in zip(*counters, strict=True)]
     return [
         Episode(
             q[row],
@@ -238,7 +244,7 @@ def _play(
             status[row],
             iterations[row],
             time_ns,
-            policy.operations((status[row], iterations[row])),
+            policy.operations_of(iterations[row], tuple(counter[:, row] for counter in counted)),
             {name: values[row] for name, values in diagnostics.items()},
         )
         for row in range(rows)

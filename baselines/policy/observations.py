@@ -2,47 +2,110 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import operator
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from baselines.policy.problem import Batch, Problem
 from ikgym.exceptions import InvalidInputError
-from ikgym.jit import kernel
 from ikgym.preview import furthest
 from ikgym.scenarios import Preview
 from ikgym.simulator import Observation
 from ikgym.validation import FloatArray
 
 _FLOAT = np.dtype(np.float64)
+#: The arrays of an observation, in the order of :class:`Batch`.
+Parts = Sequence[FloatArray]
+
+_parts = operator.itemgetter(*Batch._fields)
 
 
-def as_batch(name: str, observation: Observation, problem: Problem, preview: Preview) -> tuple[Batch, bool]:
-    """A batch of observations for a policy, and whether it was a single observation.
+class ObservationReader:
+    """Turns observations into batches for one policy, and refuses those that are not good.
+
+    A policy is shown observations of the same shapes again and again: what is to be made of them is worked out once.
 
     Args:
         name: The policy's, for messages.
-        observation: As the environment gives it; single, or all arrays with a leading batch axis.
         problem: What the policy is told of the scenario.
         preview: What the policy has to be shown.
-
-    Raises:
-        InvalidInputError: The observation lacks something, has a wrong shape or is not finite, or shows too little.
     """
-    batch = _floats(observation)
-    single = batch.q.ndim == 1
-    if single:
-        batch = Batch(*[a[None] for a in batch])
-    _check_shapes(batch, problem, preview, single)
-    if not _all_finite(*batch):
-        raise InvalidInputError("observation: expected finite numbers, got NaN or infinity.")
-    needed = _needed(name, batch.nominal, preview)
-    return batch if needed is batch.nominal else batch._replace(nominal=needed), single
+
+    def __init__(self, name: str, problem: Problem, preview: Preview) -> None:
+        self._name, self._problem, self._preview = name, problem, preview
+        #: The last shapes that were good, with what is to be made of them; replaced as a whole, for threads.
+        self._last: tuple[Any, int, bool, npt.NDArray[np.int64] | None] = (None, 0, False, None)
+
+    def __call__(self, observation: Observation) -> tuple[Parts, int, bool]:
+        """The arrays of an observation as they are, how many rows they have, and whether it was a single observation.
+
+        Whether the numbers are finite is left to :func:`all_finite`, which a compiled solver can do on its way.
+
+        Args:
+            observation: As the environment gives it; single, or all arrays with a leading batch axis.
+
+        Raises:
+            InvalidInputError: The observation lacks something, has a wrong shape, or shows too little.
+        """
+        parts = _floats(observation)
+        q, qdot, pose, nominal, remaining = parts
+        shapes = q.shape, qdot.shape, pose.shape, nominal.shape, remaining.shape
+        known, rows, single, steps = self._last
+        if shapes != known:
+            rows, single, steps = self._layout(*shapes)
+            self._last = shapes, rows, single, steps
+        if steps is not None:
+            parts = q, qdot, pose, nominal.take(steps, axis=-2), remaining
+        return parts, rows, single
+
+    def _layout(self, *shapes: tuple[int, ...]) -> tuple[int, bool, npt.NDArray[np.int64] | None]:
+        """Rows of arrays of such shapes, whether they are a single observation, and which steps ahead are taken."""
+        q, *_, nominal, _ = shapes
+        single = len(q) == 1
+        rows: tuple[int, ...] = () if single else (*q[:1],)
+        n, m = self._problem.model.joints, self._problem.task.size
+        ahead = nominal[-2] if len(nominal) == len(rows) + 2 else furthest(self._preview)
+        expected = (n,), (n,), (m,), (ahead, m), (1,)
+        for key, parts, shape in zip(Batch._fields, expected, shapes, strict=True):
+            if shape != (*rows, *parts):
+                raise InvalidInputError(f"observation[{key!r}]: expected shape {(*rows, *parts)}, got {shape}.")
+        return 1 if single else q[0], single, self._steps(ahead)
+
+    def _steps(self, ahead: int) -> npt.NDArray[np.int64] | None:
+        """Which of the steps that are shown the policy asks for, counted from 0; None for all of them."""
+        preview = self._preview
+        if isinstance(preview, int):
+            if ahead >= preview:
+                return None
+            wanted = f"{preview} steps"
+        else:
+            if ahead == len(preview):
+                return None
+            if ahead >= preview[-1]:
+                return np.array(preview) - 1
+            wanted = f"the steps {preview}"
+        raise InvalidInputError(
+            f"{self._name} needs to be shown {wanted} ahead, the observation has {ahead}: make the environment with "
+            f"preview={preview}."
+        )
 
 
-def _floats(observation: Observation) -> Batch:
+def as_batch(parts: Parts, single: bool) -> Batch:
+    """A batch from the arrays of an observation."""
+    return Batch(*[part[None] for part in parts]) if single else Batch(*parts)
+
+
+def _floats(observation: Observation) -> Parts:
+    """The arrays of an observation as kernels take them."""
     try:
-        return Batch(*[_as_floats(observation[key]) for key in Batch._fields])
+        arrays: Parts = _parts(observation)
+        for array in arrays:
+            if not (type(array) is np.ndarray and array.dtype is _FLOAT and array.flags.carray):
+                return [_as_floats(part) for part in arrays]
+        return arrays
     except (KeyError, IndexError, TypeError, ValueError) as e:
         keys = sorted(observation) if isinstance(observation, Mapping) else type(observation).__name__
         raise InvalidInputError(
@@ -50,43 +113,9 @@ def _floats(observation: Observation) -> Batch:
         ) from None
 
 
-def _check_shapes(batch: Batch, problem: Problem, preview: Preview, single: bool) -> None:
-    rows, n, m = len(batch.q), problem.model.joints, problem.task.size
-    ahead = batch.nominal.shape[1] if batch.nominal.ndim == 3 else furthest(preview)
-    shapes = (rows, n), (rows, n), (rows, m), (rows, ahead, m), (rows, 1)
-    for key, shape, array in zip(Batch._fields, shapes, batch, strict=True):
-        if array.shape != shape:
-            begin = 1 if single else 0
-            raise InvalidInputError(f"observation[{key!r}]: expected shape {shape[begin:]}, got {array.shape[begin:]}.")
-
-
-def _needed(name: str, nominal: FloatArray, preview: Preview) -> FloatArray:
-    """The nominal coordinates that a policy asks for, of those that are shown. Shapes (B, any, m)."""
-    ahead = nominal.shape[1]
-    if isinstance(preview, int):
-        if ahead >= preview:
-            return nominal
-        wanted = f"{preview} steps"
-    else:
-        if ahead == len(preview):
-            return nominal
-        if ahead >= preview[-1]:
-            return nominal.take(np.array(preview) - 1, axis=1)
-        wanted = f"the steps {preview}"
-    raise InvalidInputError(
-        f"{name} needs to be shown {wanted} ahead, the observation has {ahead}: make the environment with "
-        f"preview={preview}."
-    )
-
-
-@kernel
-def _all_finite(q, qdot, pose, nominal, remaining):
-    """Whether all numbers of a batch are finite, without the temporary arrays that NumPy makes."""
-    for array in (q.ravel(), qdot.ravel(), pose.ravel(), nominal.ravel(), remaining.ravel()):
-        for value in array:
-            if not np.isfinite(value):
-                return False
-    return True
+def not_finite() -> InvalidInputError:
+    """The error for a batch that is not :func:`all_finite`."""
+    return InvalidInputError("observation: expected finite numbers, got NaN or infinity.")
 
 
 def _as_floats(value: object) -> FloatArray:

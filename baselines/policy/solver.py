@@ -5,7 +5,6 @@ from __future__ import annotations
 import abc
 import dataclasses
 import functools
-import math
 import threading
 from collections.abc import Callable
 from typing import Any, ClassVar, Self
@@ -14,18 +13,15 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.policy import state as states
-from baselines.policy.observations import as_batch
+from baselines.policy.observations import ObservationReader, Parts, as_batch, not_finite
 from baselines.policy.problem import Batch, Memory, Operations, Problem, Solution
 from baselines.policy.state import REPORTED, Report, joined, pack, remembered, replace_rows
-from baselines.status import Status
+from baselines.policy_kernels import all_finite, cut_rows
 from ikgym.compilation import announced
-from ikgym.jit import kernel
 from ikgym.parallel import in_chunks
 from ikgym.scenarios import Preview, Scenario
 from ikgym.simulator import Observation
 from ikgym.validation import FloatArray, Frozen
-
-_SATURATED, _DIVERGED = int(Status.SATURATED), int(Status.DIVERGED)
 
 #: Policies that have solved something in this process, and so are compiled.
 _compiled: set[type] = set()
@@ -141,9 +137,8 @@ class SolverPolicy(Frozen, abc.ABC):
                 too short, or the state belongs to another batch.
         """
         del deterministic
-        batch, single = self._batch(observation)
-        action, after = self.act(batch, self._recall(state, episode_start, len(batch.q)))
-        return action[0] if single else action, after
+        parts, rows, single = self._read(observation)
+        return self._answer(parts, single, self._recall(state, episode_start, rows))
 
     def act(self, batch: Batch, memory: Memory) -> tuple[npt.NDArray[np.float32], Memory]:
         """What `predict` does with observations that are known to be good, as policies around other ones may know.
@@ -155,12 +150,11 @@ class SolverPolicy(Frozen, abc.ABC):
         Returns:
             Actions, of shape (B, n), and the state for the next call of `predict`.
         """
-        solution, rows = self._solve(batch, memory), len(batch.q)
-        action, status = np.empty(batch.q.shape, dtype=np.float32), solution.status.copy()
-        lost, kept = np.empty(rows, dtype=np.bool_), solution.memory
-        if _cut_rows(solution.qdot, self.problem.velocity_limit, action, status, lost):
-            kept = self.restarted(kept, lost)
-        return action, pack(status, solution.iterations, kept)
+        qdot, kept, status, iterations = self._solve(batch, memory)
+        action, status = np.empty(qdot.shape, np.float32), status.copy()
+        if cut_rows(qdot, self.problem.velocity_limit, action, status):
+            kept = self._without_lost(kept, qdot)
+        return action, pack(status, iterations, kept)
 
     @staticmethod
     def report(state: Memory) -> Report:
@@ -191,9 +185,34 @@ class SolverPolicy(Frozen, abc.ABC):
 
     def operations(self, state: Memory) -> Operations:
         """What the call that returned a state has cost; worked out when asked for, at no cost otherwise."""
-        iterations = self.report(state).iterations
+        return self.operations_of(self.report(state).iterations, self.counters(state))
+
+    def counters(self, state: Memory) -> Memory:
+        """What the call that returned a state has counted besides its iterations, each of shape (B,).
+
+        Nothing for most solvers, whose iterations tell what they have cost.
+        """
+        del state
+        return ()
+
+    def operations_of(self, iterations: npt.NDArray[np.int64], counters: Memory) -> Operations:
+        """What calls have cost, from what is kept of each of them.
+
+        Args:
+            iterations: Those that the calls reported. Shape (B,).
+            counters: What :meth:`counters` told of them, each of shape (B,).
+        """
+        del counters
         counts = self.count(iterations)
         return Operations(*(np.broadcast_to(np.asarray(c, dtype=np.int64), iterations.shape).copy() for c in counts))
+
+    @property
+    def stated(self) -> bool:
+        """Whether :meth:`operations` are an estimate from the iterations, not what was done in them, call by call.
+
+        Others are held against counts by :mod:`baselines.evaluation.operation_audit`.
+        """
+        return False
 
     @abc.abstractmethod
     def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
@@ -206,9 +225,23 @@ class SolverPolicy(Frozen, abc.ABC):
             The numbers of :class:`Operations`, in its order; each one number, or of shape (B,).
         """
 
-    def _batch(self, observation: Observation) -> tuple[Batch, bool]:
-        """The observations, checked, and whether there was a single one."""
-        return as_batch(self.name, observation, self.problem, self.preview)
+    @functools.cached_property
+    def _read(self) -> ObservationReader:
+        """The arrays of an observation, checked, their rows, and whether there was a single one."""
+        return ObservationReader(self.name, self.problem, self.preview)
+
+    def _answer(self, parts: Parts, single: bool, memory: Memory) -> tuple[npt.NDArray[np.float32], Memory]:
+        """What `predict` returns, for the arrays of an observation and a memory whose shapes are right."""
+        batch = as_batch(parts, single)
+        if not all_finite(*batch):
+            raise not_finite()
+        action, after = self.act(batch, memory)
+        return action[0] if single else action, after
+
+    def _without_lost(self, memory: Memory, qdot: FloatArray) -> Memory:
+        """A memory, cleared where a joint velocity is no number."""
+        lost = np.asarray(~np.isfinite(qdot / self.problem.velocity_limit).all(axis=1))
+        return self.restarted(memory, lost)
 
     def _recall(self, state: Memory | None, episode_start: npt.ArrayLike | None, rows: int) -> Memory:
         starting = None if episode_start is None else states.truth_values(episode_start, rows)
@@ -229,6 +262,10 @@ class SolverPolicy(Frozen, abc.ABC):
         """The memory of one row, for its shapes and its type."""
         return self.memory(1)
 
+    def _undivided(self, rows: int) -> bool:
+        """Whether so many rows are solved in one call, by a policy that is compiled."""
+        return type(self) in _compiled and (rows < 2 * self.grain or getattr(_sharing, "now", False))
+
     def _named(self, memory: Memory) -> Memory:
         """The memory as the named tuple that :meth:`memory` gives, where it gives one."""
         kind: Any = type(self._example)
@@ -243,7 +280,7 @@ class SolverPolicy(Frozen, abc.ABC):
                 solution = self.solve(batch, memory)
             _compiled.add(policy)
             return solution
-        if rows < 2 * self.grain or getattr(_sharing, "now", False):
+        if self._undivided(rows):
             return self.solve(batch, memory)
         parts: dict[int, Solution] = {}
 
@@ -257,38 +294,3 @@ class SolverPolicy(Frozen, abc.ABC):
 
         in_chunks(work, rows, self.grain)
         return joined([parts[start] for start in sorted(parts)])
-
-
-@kernel
-def _cut_rows(qdot, limit, action, status, lost):
-    """Joint velocities as fractions of their limit, within the box, row by row.
-
-    Args:
-        qdot: In [rad/s] or [m/s]. Shape (B, n).
-        limit: In [rad/s] or [m/s]. Shape (n,).
-        action: Receives the actions; zeros where a number is not finite. Shape (B, n).
-        status: Raised to what the row deserves. Shape (B,).
-        lost: Receives whether a number of the row is not finite. Shape (B,).
-
-    Returns:
-        Whether any row is lost.
-    """
-    any_lost = False
-    for row in range(qdot.shape[0]):
-        lost[row], saturated = False, False
-        for j in range(qdot.shape[1]):
-            fraction = qdot[row, j] / limit[j]
-            if not np.isfinite(fraction):
-                lost[row] = True
-            elif abs(fraction) > 1.0:
-                saturated = True
-                fraction = math.copysign(1.0, fraction)
-            action[row, j] = fraction
-        if lost[row]:
-            any_lost = True
-            status[row] = _DIVERGED
-            for j in range(qdot.shape[1]):
-                action[row, j] = 0.0
-        elif saturated:
-            status[row] = max(status[row], _SATURATED)
-    return any_lost

@@ -23,8 +23,8 @@ class Report(NamedTuple):
     iterations: npt.NDArray[np.int64]
 
 
-#: Shapes and types of the arrays of a memory.
-Signature = list[tuple[tuple[int, ...], np.dtype[Any]]]
+#: Shapes and types of the arrays of a memory, and that they are contiguous and can be written to.
+Signature = list[tuple[tuple[int, ...], np.dtype[Any], bool]]
 
 #: Arrays of a state in front of the memory.
 REPORTED = len(Report._fields)
@@ -53,7 +53,7 @@ def signature(example: Memory, rows: int) -> Signature:
         example: The memory of one row.
         rows: B.
     """
-    return [((rows, *array.shape[1:]), array.dtype) for array in example]
+    return [((rows, *array.shape[1:]), array.dtype, True) for array in example]
 
 
 def checked_memory(name: str, state: object, expected: Signature, rows: int) -> Memory:
@@ -71,14 +71,13 @@ def checked_memory(name: str, state: object, expected: Signature, rows: int) -> 
     Raises:
         InvalidInputError: It is no state of the policy, or belongs to another batch.
     """
-    if isinstance(state, tuple):
+    if isinstance(state, tuple) and len(state) >= REPORTED:
         memory = state[REPORTED:]
         try:
-            if [(array.shape, array.dtype) for array in memory] == expected and len(state) >= REPORTED:
-                for array in memory:
-                    if not array.flags.carray:
-                        return tuple(array.copy() for array in memory)
+            if [(array.shape, array.dtype, array.flags.carray) for array in memory] == expected:
                 return memory
+            if [(array.shape, array.dtype, True) for array in memory] == expected:
+                return tuple(array.copy() for array in memory)
         except AttributeError:  # no arrays
             pass
     raise _refused(name, state, expected, rows)
@@ -89,12 +88,12 @@ def _refused(name: str, state: object, expected: Signature, rows: int) -> Invali
     given: object = type(state).__name__
     if isinstance(state, tuple):
         given = [getattr(part, "shape", type(part).__name__) for part in state]
-        if len(given) >= REPORTED and given[REPORTED:] == [shape for shape, _ in expected]:
+        if len(given) >= REPORTED and given[REPORTED:] == [shape for shape, _, _ in expected]:
             # Right for Python, but the kernels would be compiled anew for it, for many seconds.
             dtypes = [str(getattr(part, "dtype", type(part).__name__)) for part in state[REPORTED:]]
             return InvalidInputError(
-                f"state: expected arrays of {[str(dtype) for _, dtype in expected]} behind status and iterations, as "
-                f"{name}.predict returned, got {dtypes}."
+                f"state: expected arrays of {[str(dtype) for _, dtype, _ in expected]} behind status and iterations, "
+                f"as {name}.predict returned, got {dtypes}."
             )
     return InvalidInputError(
         f"state: expected what {name}.predict returned for a batch of {rows}, got {str(given)[:200]}."

@@ -1,25 +1,29 @@
-"""What kernels are told of an arm and its task, as plain tuples; and the task shift of one row.
+"""What kernels are told of an arm and its task, as one block of numbers; and the task shift of one row.
 
-Policies hand plain tuples to their kernels, which take them apart before their loop. Measured on one core, for a
+Policies hand plain values to their kernels, which take them apart before their loop. Measured on one core, for a
 kernel with 22 values in four groups: 4.9 µs a call with named tuples from Python, 1.6 µs with plain tuples, 1.8 µs with
-flat arguments. Inside an iteration arrays are used one by one: a tuple counts the references of all its arrays each
-time it is passed or a field is read (`mfac` in varga7-fast: 44 µs instead of 29 with tuples throughout, 31.6 with the
-forward kinematics and the Jacobian of the task in one function that takes two tuples).
+flat arguments; an array takes 0.12 to 0.17 µs, so that arm and task are a single one. Inside an iteration arrays are
+used one by one: a tuple counts the references of all its arrays each time it is passed or a field is read (`mfac` in
+varga7-fast: 44 µs instead of 29 with tuples throughout, 31.6 with the forward kinematics and the Jacobian of the task
+in one function that takes two tuples).
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+import functools
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from ikgym import task_kernels
 from ikgym.jit import inlined, kernel
 from ikgym.kinematics import Chain
-from ikgym.validation import FloatArray
 
 if TYPE_CHECKING:
     from baselines.policy import Problem
+
+Floats = npt.NDArray[np.float64]
 
 
 class ArmTask(NamedTuple):
@@ -43,20 +47,51 @@ class Observed(NamedTuple):
         nominal: Nominal task coordinates, of the next step, or of p steps ahead. Shape (B, m) or (B, p, m).
     """
 
-    q: FloatArray
-    pose: FloatArray
-    nominal: FloatArray
+    q: Floats
+    pose: Floats
+    nominal: Floats
 
 
-def plain_arm_task(problem: Problem) -> tuple[Any, ...]:
-    """The :class:`ArmTask` of a problem as plain tuples."""
-    return tuple(problem.model.chain), problem.task.kind
+@functools.lru_cache(64)  # problems are frozen, and asked for at each step
+def plain_arm_task(problem: Problem) -> Floats:
+    """The :class:`ArmTask` of a problem as one read-only block.
+
+    Joints, kind of task and Δt; the scale of actions; least and largest joint coordinates and largest velocities; then
+    the parts of the chain.
+    """
+    model = problem.model
+    limits = problem.velocity_limit, model.lower, model.upper, problem.largest_qdot
+    block = np.concatenate([[model.joints, problem.task.kind, problem.dt], *limits, *map(np.ravel, model.chain)])
+    block.flags.writeable = False
+    return block
 
 
 @inlined
-def arm_task_of(plain):
+def period_of(block):
+    """Δt in [s] and what an action of 1 means, in [rad/s] or [m/s], of shape (n,), from :func:`plain_arm_task`."""
+    return block[2], block[3 : 3 + int(block[0])]
+
+
+@inlined
+def arm_task_of(block):
     """The :class:`ArmTask` that :func:`plain_arm_task` took apart."""
-    return ArmTask(Chain(*plain[0]), plain[1])
+    n = int(block[0])
+    axes, prismatic, tool, rotation = 3 + 7 * n, 3 + 10 * n, 3 + 11 * n, 6 + 11 * n
+    chain = Chain(
+        block[3 + 4 * n : axes].reshape(n, 3),
+        block[axes:prismatic].reshape(n, 3),
+        block[prismatic:tool] != 0.0,
+        block[tool:rotation],
+        block[rotation:].reshape(3, 3),
+    )
+    return ArmTask(chain, int(block[1]))
+
+
+@inlined
+def joint_limits_of(block):
+    """Least and largest joint coordinates and largest velocities, of shapes (n,), from :func:`plain_arm_task`."""
+    n = int(block[0])
+    return block[3 + n : 3 + 2 * n], block[3 + 2 * n : 3 + 3 * n], block[3 + 3 * n : 3 + 4 * n]
 
 
 @inlined

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.evaluation.rollout import Episode, Tick, finite
-from baselines.policy import Operations, Report
+from baselines.policy import Memory, Operations, Report
 from baselines.status import Status
 from ikgym.env import RedundantIKEnv
 from ikgym.exceptions import InvalidInputError
@@ -87,9 +87,14 @@ class ForeignPolicy:
         del state
         return {}
 
-    def operations(self, state: Any) -> Operations:
-        """Nothing is counted. Shapes (0,)."""
+    def counters(self, state: Any) -> Memory:
+        """Nothing is counted."""
         del state
+        return ()
+
+    def operations_of(self, iterations: npt.NDArray[np.int64], counters: Memory) -> Operations:
+        """Nothing is known. Shapes (0,)."""
+        del iterations, counters
         return NOTHING_COUNTED
 
     def misfit(self, scenario: Scenario) -> str | None:

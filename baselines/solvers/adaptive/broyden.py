@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from baselines.policy import Batch, Memory, Solution
-from baselines.solvers.arm_task import arm_task_of, plain_arm_task, pose_arrays, task_shift
-from baselines.solvers.resolved_rate.base import NominalMemory
-from baselines.solvers.resolved_rate.dls import DampedLeastSquares
+from baselines.policy import Memory
+from baselines.policy_kernels import REFUSED, all_finite, answer_parts, as_rows
+from baselines.solvers.arm_task import arm_task_of, pose_arrays, task_shift
+from baselines.solvers.resolved_rate.base import APPLIED, NominalMemory, answered
+from baselines.solvers.resolved_rate.dls import DampedLeastSquares, damped_rows
 from ikgym import task_kernels
 from ikgym.jit import inlined, kernel
 from ikgym.kinematics import forward_and_jacobian
@@ -87,27 +88,56 @@ class Broyden(DampedLeastSquares):
         q, pose = np.zeros((rows, n)), np.zeros((rows, task.size))
         return BroydenMemory(before.nominal, before.known, learnt, q, pose)
 
-    def solve(self, batch: Batch, memory: Memory) -> Solution:
-        """See :meth:`SolverPolicy.solve`; iterations are 0 where nothing has been measured before, 1 later."""
-        before = BroydenMemory(*memory)
-        learnt = before.learnt.copy()
-        estimate, shift = np.empty_like(learnt), np.empty(learnt.shape[:2])
-        target = batch.nominal[:, 0].copy()
-        learn_rows(
-            plain_arm_task(self.problem),
-            (self.gain, self.motion, self.learns == "correction"),
-            (batch.q, batch.pose, target),
-            (before.nominal, before.known, learnt, before.q, before.pose),
-            estimate,
-            shift,
-        )
-        step, status = self.invert(estimate, shift)
-        remembered = BroydenMemory(target, np.ones_like(before.known), learnt, batch.q.copy(), batch.pose.copy())
-        return Solution(step / self.problem.dt, remembered, status, before.known.astype(np.int64))
+    def kernel(self) -> Any:
+        """See :meth:`CompiledPolicy.kernel`; iterations are 0 where nothing has been measured before, 1 later."""
+        return broyden_rows
+
+    def numbers(self) -> tuple[Any, ...]:
+        """See :meth:`ResolvedRate.numbers`."""
+        return self.damping, self.motion, self.learns == "correction"
 
     def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
         """One factorisation and one measurement; one Jacobian, where it is learnt at the start only."""
         return 0, 1 if self.learns == "correction" else 1 - iterations, 1, 1
+
+
+@kernel
+def broyden_rows(
+    arm_task,
+    gain,
+    damping,
+    motion,
+    correcting,
+    checking,
+    q,
+    qdot_before,
+    pose,
+    nominal,
+    remaining,
+    before,
+    known,
+    learnt,
+    q_before,
+    pose_before,
+    action,
+    answer,
+):
+    """One step of :class:`Broyden`; see :class:`CompiledPolicy` for the arguments."""
+    if checking and not all_finite(q, qdot_before, pose, nominal, remaining):
+        return REFUSED
+    q, pose, nominal = as_rows(int(arm_task[0]), q, pose, nominal)
+    qdot, status, iterations = answer_parts(answer, q.shape[0], q.shape[1])
+    target = nominal[:, 0].copy()
+    estimate, shift = np.empty(learnt.shape), np.empty(learnt.shape[:2])
+    memory = before, known, learnt, q_before, pose_before
+    learn_rows(arm_task, (gain, motion, correcting), (q, pose, target), memory, estimate, shift)
+    damped_rows(estimate, shift, damping, qdot)
+    status[:] = APPLIED
+    code = answered(arm_task, (qdot, status, iterations), action)
+    for row in range(q.shape[0]):
+        iterations[row] = known[row]
+    before[:], known[:], q_before[:], pose_before[:] = target, True, q, pose
+    return code
 
 
 @kernel

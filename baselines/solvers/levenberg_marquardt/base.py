@@ -7,8 +7,10 @@ import dataclasses
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from baselines.policy import Batch, Memory, Operations, Solution, SolverPolicy
+from baselines.policy.state import remembered
 from baselines.solvers.levenberg_marquardt.damping_parameters import checked_parameters, damping_law, truth
 from baselines.solvers.levenberg_marquardt.damping_rules import DampingLaw
 from baselines.solvers.levenberg_marquardt.iteration import DampingMemory, Iterates, IterationLimits
@@ -110,14 +112,14 @@ class DampedIteration(SolverPolicy, abc.ABC):
         _status, _iterations, *memory = state
         return {"lambda": DampingMemory(*memory).damping}
 
-    def operations(self, state: Memory) -> Operations:
-        """See :meth:`SolverPolicy.operations`; the factorisations are those counted while solving.
+    def counters(self, state: Memory) -> Memory:
+        """The factorisations, which depend on the rule and on the ranks met."""
+        return (DampingMemory(*remembered(state)).factorised,)
 
-        A state without memory, as a rollout passes it, tells of none: one factorisation an iteration is given then.
-        """
-        _status, iterations, *memory = state
-        factorised = DampingMemory(*memory).factorised if memory else iterations
-        return super().operations(state)._replace(factorisations=factorised.copy())
+    def operations_of(self, iterations: npt.NDArray[np.int64], counters: Memory) -> Operations:
+        """See :meth:`SolverPolicy.operations_of`; the factorisations are those counted while solving."""
+        (factorised,) = counters
+        return super().operations_of(iterations, counters)._replace(factorisations=factorised.copy())
 
     def solve(self, batch: Batch, memory: Memory) -> Solution:
         """See :meth:`SolverPolicy.solve`."""

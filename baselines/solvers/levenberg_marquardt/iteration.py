@@ -11,7 +11,7 @@ from baselines.status import Status
 from ikgym.jit import kernel
 from ikgym.validation import FloatArray
 
-CONVERGED, LIMIT = int(Status.CONVERGED), int(Status.ITERATION_LIMIT)
+CONVERGED, APPLIED, LIMIT = int(Status.CONVERGED), int(Status.APPLIED), int(Status.ITERATION_LIMIT)
 DEFICIENT, DIVERGED = int(Status.RANK_DEFICIENT), int(Status.DIVERGED)
 
 #: Singular values below this share of the largest count as zero.

@@ -19,6 +19,7 @@ from baselines.solvers.levenberg_marquardt.damping_rules import (
     damping_now,
 )
 from baselines.solvers.levenberg_marquardt.iteration import (
+    APPLIED,
     CONVERGED,
     DEFICIENT,
     DIVERGED,
@@ -55,7 +56,7 @@ class ModelFreeAdaptiveControl(DampedIteration):
         tolerance: δ, norm of the error at which the iteration stops, in the units of the task, [m] and [rad].
         iterations: N_up, most iterations of one period.
         one_step: Whether to apply the controller (5) once to the measured pose; δ and N_up do not matter then, and
-            the status is ``converged`` where J has full rank.
+            the status is ``applied`` where J has full rank.
 
     Raises:
         InvalidInputError: A number is out of its range, or does not belong to the rule.
@@ -135,7 +136,7 @@ def iterate_rows(arm_task, law, limits, observed, memory, found):
             i += 1
             if one_step:
                 if status[row] == LIMIT:
-                    status[row] = CONVERGED
+                    status[row] = APPLIED
                 break
         iterations[row] = i
         if not one_step and norm > first:

@@ -20,6 +20,7 @@ from baselines.solvers.levenberg_marquardt.damping_rules import (
     damping_now,
 )
 from baselines.solvers.levenberg_marquardt.iteration import (
+    APPLIED,
     CONVERGED,
     DEFICIENT,
     DIVERGED,
@@ -62,7 +63,7 @@ class ModelFreeAdaptivePredictiveControl(DampedIteration):
         tolerance: δ, norm of the error at which the iteration stops, in the units of the task, [m] and [rad].
         iterations: N_up, most iterations of one period.
         one_step: Whether to apply the controller (27), (28) once to the measured pose; δ and N_up do not matter then,
-            and the status is ``converged`` where J has full rank.
+            and the status is ``applied`` where J has full rank.
         horizon: n, the points that must be shown ahead.
         jacobians: ``"predicted"`` over the horizon, or ``"constant"``. One step knows no prediction yet.
         stop: Whose error is tested: that of the ``"horizon"`` (40), or of the ``"first_point"`` (16).
@@ -196,7 +197,7 @@ def iterate_horizon_rows(arm_task, law, limits, ahead, observed, memory, found):
             i += 1
             if one_step:
                 if status[row] == LIMIT:
-                    status[row] = CONVERGED
+                    status[row] = APPLIED
                 break
         iterations[row] = i
         if not one_step and first_square > first:

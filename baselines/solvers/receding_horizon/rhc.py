@@ -8,7 +8,9 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from baselines.policy import Batch, Memory, Solution, SolverPolicy
+from baselines.policy import Memory
+from baselines.policy.compiled import CompiledPolicy
+from baselines.solvers.arm_task import plain_arm_task
 from baselines.solvers.receding_horizon.newton.grid import offsets
 from baselines.solvers.receding_horizon.newton.plan import PlanSettings
 from baselines.solvers.receding_horizon.newton.receding import HorizonMemory, plan_rows
@@ -21,7 +23,7 @@ MOST = 2**31 - 1
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class RecedingHorizon(SolverPolicy):
+class RecedingHorizon(CompiledPolicy):
     """Minimises the cost of Varga 2021 over a horizon of any length; the first joint velocity is applied.
 
     The unknowns are the joint coordinates at the knots of the horizon. In them the Hessian is block-tridiagonal, so
@@ -110,8 +112,8 @@ class RecedingHorizon(SolverPolicy):
             self.restart_rate,
             self.seed,
         )
-        data = (*model.chain, problem.task.kind, *problem.cost.parameters, problem.dt, model.lower, model.upper)
-        object.__setattr__(self, "_constants", (*data, problem.largest_qdot, *settings))
+        data = plain_arm_task(problem), model.chain.prismatic, *problem.cost.parameters
+        object.__setattr__(self, "_constants", (*data, *settings))
 
     @property
     def preview(self) -> int:
@@ -131,15 +133,13 @@ class RecedingHorizon(SolverPolicy):
             candidate_steps=np.zeros(rows, dtype=np.int64),
         )
 
-    def solve(self, batch: Batch, memory: Memory) -> Solution:
-        """See :meth:`SolverPolicy.solve`."""
-        changed = HorizonMemory(*[array.copy() for array in memory])
-        qdot = np.empty_like(batch.q)
-        status, iterations = np.empty((2, len(qdot)), dtype=np.int64)
-        observed = (batch.q, batch.qdot, batch.nominal, batch.remaining)
-        # Taken apart, see the kernel.
-        plan_rows(*self._constants, *observed, *changed, qdot, status, iterations)
-        return Solution(qdot, changed, status, iterations)
+    def kernel(self) -> Any:
+        """See :meth:`CompiledPolicy.kernel`."""
+        return plan_rows
+
+    def constants(self) -> tuple[Any, ...]:
+        """See :meth:`CompiledPolicy.constants`."""
+        return self._constants
 
     def plan(self, state: Memory) -> FloatArray:
         """The plan behind a state that `predict` returned: joint coordinates at the knots :attr:`offsets` ahead.
@@ -152,7 +152,16 @@ class RecedingHorizon(SolverPolicy):
         return HorizonMemory(*self.memory_of(state)).plan.copy()
 
     def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
-        """Jacobians and a factorisation a knot in each Newton step, and forward kinematics for one length tried."""
-        # Even a plan that is found to be optimal at once has been linearised.
-        each = (iterations + 1) * len(self.offsets)
-        return each, each, each, 0
+        """Jacobians and a factorisation a knot in each Newton step, and forward kinematics for one length tried.
+
+        Stated: a step that is damped or shortened takes more, and an initial guess its own Jacobians.
+        """
+        # An optimum is linearised once more to be known as one; who makes so many steps and stops is spared that.
+        steps = iterations * len(self.offsets)
+        linearised = steps + len(self.offsets) if self.iterations is None else steps
+        return steps, linearised, linearised, 0
+
+    @property
+    def stated(self) -> bool:
+        """The number of Newton steps does not tell what each of them took."""
+        return True

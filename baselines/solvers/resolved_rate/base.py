@@ -9,14 +9,18 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from baselines.policy import Batch, Memory, Solution, SolverPolicy
-from baselines.solvers.arm_task import arm_task_of, plain_arm_task, pose_arrays, task_shift
+from baselines.policy import Memory
+from baselines.policy.compiled import CompiledPolicy
+from baselines.policy_kernels import cut_rows
+from baselines.solvers.arm_task import arm_task_of, period_of, plain_arm_task, pose_arrays, task_shift
 from baselines.status import Status
 from ikgym import task_kernels
 from ikgym.exceptions import InvalidInputError
-from ikgym.jit import kernel
+from ikgym.jit import inlined
 from ikgym.kinematics import forward_and_jacobian
 from ikgym.validation import FloatArray, number
+
+APPLIED, DEFICIENT = int(Status.APPLIED), int(Status.RANK_DEFICIENT)
 
 
 class NominalMemory(NamedTuple):
@@ -32,7 +36,7 @@ class NominalMemory(NamedTuple):
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class ResolvedRate(SolverPolicy, abc.ABC):
+class ResolvedRate(CompiledPolicy, abc.ABC):
     """Follows the nominal motion of the next step, and takes back a share of the present error.
 
     The shift asked for in one step is ``Δx = (X^N(k+1) - X^N(k)) + gain (X^N(k) - x(k))``, where X^N(k) is
@@ -59,23 +63,13 @@ class ResolvedRate(SolverPolicy, abc.ABC):
         """A :class:`NominalMemory` without a step before."""
         return NominalMemory(np.zeros((rows, self.problem.task.size)), np.zeros(rows, dtype=np.bool_))
 
-    def solve(self, batch: Batch, memory: Memory) -> Solution:
-        """See :meth:`SolverPolicy.solve`."""
-        before = NominalMemory(*memory)
-        rows, n = batch.q.shape
-        size = self.problem.task.error_size
-        jacobian, shift = np.empty((rows, size, n)), np.empty((rows, size))
-        task_shift_rows(
-            plain_arm_task(self.problem),
-            self.gain,
-            (batch.q, batch.pose, np.ascontiguousarray(batch.nominal[:, 0])),
-            np.where(before.known[:, None], before.nominal, batch.pose),
-            jacobian,
-            shift,
-        )
-        step, status = self.move(batch.q, jacobian, shift)
-        remembered = NominalMemory(batch.nominal[:, 0].copy(), np.ones(rows, dtype=np.bool_))
-        return Solution(step / self.problem.dt, remembered, status, np.ones(rows, dtype=np.int64))
+    def constants(self) -> tuple[Any, ...]:
+        """See :meth:`CompiledPolicy.constants`: arm and task, and the gain, then the numbers of the formula."""
+        return plain_arm_task(self.problem), self.gain, *self.numbers()
+
+    @abc.abstractmethod
+    def numbers(self) -> tuple[Any, ...]:
+        """What the formula needs to know besides."""
 
     def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
         """One Jacobian, one factorisation, one measurement."""
@@ -85,11 +79,6 @@ class ResolvedRate(SolverPolicy, abc.ABC):
     def full_rank(self) -> int:
         """The rank that the task Jacobian has where nothing is lost: redundant coordinates add none."""
         return min(self.problem.task.error_size, self.problem.model.joints, 6)
-
-    def move(self, q: FloatArray, jacobian: FloatArray, shift: FloatArray) -> tuple[FloatArray, npt.NDArray[np.int64]]:
-        """As :meth:`invert`, for those that want more than the task: they are told where the joints are, (B, n)."""
-        del q
-        return self.invert(jacobian, shift)
 
     @abc.abstractmethod
     def invert(self, jacobian: FloatArray, shift: FloatArray) -> tuple[FloatArray, npt.NDArray[np.int64]]:
@@ -104,27 +93,58 @@ class ResolvedRate(SolverPolicy, abc.ABC):
         """
 
 
-@kernel
-def task_shift_rows(arm_task, gain, observed, present, jacobian, shift):
-    """Task Jacobians and the task shifts asked for, row by row.
+@inlined
+def task_shifts(arm_task, gain, q, pose, nominal, before, known):
+    """Task Jacobians (B, e, n) and the task shifts asked for (B, e).
 
     Args:
-        arm_task: The model of the arm and the task, a plain :class:`ArmTask`.
+        arm_task: See :func:`plain_arm_task`.
         gain: Share of the present error to take back.
-        observed: A plain :class:`Observed` with X^N(k+1).
-        present: X^N(k). Shape (B, m).
-        jacobian: Receives the task Jacobians. Shape (B, e, n).
-        shift: Receives the task shifts. Shape (B, e).
+        q: Joint coordinates in [rad] or [m]. Shape (B, n).
+        pose: Measured task coordinates. Shape (B, m).
+        nominal: Nominal task coordinates ahead. Shape (B, p, m).
+        before: X^N(k), where known; becomes X^N(k+1). Shape (B, m).
+        known: Whether there was a step before; becomes True. Shape (B,).
     """
-    (chain, kind), (q, pose, target) = arm_task_of(arm_task), observed
-    rotation, position, geometric, _ = pose_arrays(q.shape[1], pose.shape[1])
-    error = np.empty(shift.shape[1])
-    for row in range(q.shape[0]):
+    chain, kind = arm_task_of(arm_task)
+    rows, n = q.shape
+    size = 6 if kind == task_kernels.POSE else pose.shape[1]
+    jacobian, shift, error = np.empty((rows, size, n)), np.empty((rows, size)), np.empty(size)
+    rotation, position, geometric, _ = pose_arrays(n, pose.shape[1])
+    for row in range(rows):
         forward_and_jacobian(chain, q[row], rotation, position, geometric)
         task_kernels.jacobian(kind, rotation, geometric, jacobian[row])
-        task_shift(kind, gain, pose[row], target[row], present[row], error, shift[row])
+        present = before[row] if known[row] else pose[row]
+        task_shift(kind, gain, pose[row], nominal[row, 0], present, error, shift[row])
+        before[row] = nominal[row, 0]
+        known[row] = True
+    return jacobian, shift
+
+
+@inlined
+def answered(arm_task, answer, action):
+    """Ends a kernel of one iteration: joint shifts become velocities and actions.
+
+    Args:
+        arm_task: See :func:`plain_arm_task`.
+        answer: Joint shifts (B, n), which become joint velocities; status, and iterations, which become 1. Shape (B,).
+        action: Receives the actions. Shape (B n,).
+    """
+    (dt, limit), (qdot, status, iterations) = period_of(arm_task), answer
+    for row in range(qdot.shape[0]):
+        iterations[row] = 1
+        for j in range(qdot.shape[1]):
+            qdot[row, j] /= dt
+    return cut_rows(qdot, limit, action.reshape(qdot.shape), status)
+
+
+@inlined
+def say_deficient(deficient, status):
+    """Statuses of rows by whether the Jacobian had lost rank. Shapes (B,)."""
+    for row in range(status.shape[0]):
+        status[row] = DEFICIENT if deficient[row] else APPLIED
 
 
 def status_of(rank_deficient: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
     """Statuses of rows by whether the Jacobian had lost rank. Shapes (B,)."""
-    return np.where(rank_deficient, int(Status.RANK_DEFICIENT), int(Status.CONVERGED))
+    return np.where(rank_deficient, DEFICIENT, APPLIED)

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
 from baselines.policy import statuses
+from baselines.policy_kernels import REFUSED, all_finite, answer_parts, as_rows
 from baselines.solvers.linear_algebra import cholesky, cholesky_solve, damped_gram, transposed_product
-from baselines.solvers.resolved_rate.base import ResolvedRate
+from baselines.solvers.resolved_rate.base import APPLIED, ResolvedRate, answered, task_shifts
 from ikgym.jit import kernel
 from ikgym.validation import FloatArray, number
 
@@ -39,11 +40,46 @@ class DampedLeastSquares(ResolvedRate):
         super().__post_init__()
         object.__setattr__(self, "damping", number("damping", self.damping, above=0.0))
 
+    def kernel(self) -> Any:
+        """See :meth:`CompiledPolicy.kernel`."""
+        return dls_rows
+
+    def numbers(self) -> tuple[Any, ...]:
+        """See :meth:`ResolvedRate.numbers`."""
+        return (self.damping,)
+
     def invert(self, jacobian: FloatArray, shift: FloatArray) -> tuple[FloatArray, npt.NDArray[np.int64]]:
         """See :meth:`ResolvedRate.invert`."""
         out = np.empty((len(jacobian), jacobian.shape[2]))
         damped_rows(jacobian, shift, self.damping, out)
         return out, statuses(len(out))
+
+
+@kernel
+def dls_rows(
+    arm_task,
+    gain,
+    damping,
+    checking,
+    q,
+    qdot_before,
+    pose,
+    nominal,
+    remaining,
+    before,
+    known,
+    action,
+    answer,
+):
+    """One step of :class:`DampedLeastSquares`; see :class:`CompiledPolicy` for the arguments."""
+    if checking and not all_finite(q, qdot_before, pose, nominal, remaining):
+        return REFUSED
+    q, pose, nominal = as_rows(int(arm_task[0]), q, pose, nominal)
+    qdot, status, iterations = answer_parts(answer, q.shape[0], q.shape[1])
+    jacobian, shift = task_shifts(arm_task, gain, q, pose, nominal, before, known)
+    status[:] = APPLIED
+    damped_rows(jacobian, shift, damping, qdot)
+    return answered(arm_task, (qdot, status, iterations), action)
 
 
 @kernel

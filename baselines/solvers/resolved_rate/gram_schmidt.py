@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
+from baselines.policy_kernels import REFUSED, all_finite, answer_parts, as_rows
 from baselines.solvers.linear_algebra import dot
-from baselines.solvers.resolved_rate.base import ResolvedRate, status_of
+from baselines.solvers.resolved_rate.base import ResolvedRate, answered, say_deficient, status_of, task_shifts
 from ikgym.exceptions import InvalidInputError
 from ikgym.jit import kernel
 from ikgym.validation import FloatArray, number
@@ -55,12 +56,49 @@ class GramSchmidt(ResolvedRate):
                 f"truncation: expected a number of at least 0 and below 1, got {self.truncation:g}."
             )
 
+    def kernel(self) -> Any:
+        """See :meth:`CompiledPolicy.kernel`."""
+        return gram_schmidt_rows
+
+    def numbers(self) -> tuple[Any, ...]:
+        """See :meth:`ResolvedRate.numbers`."""
+        return self.truncation, self.full_rank
+
     def invert(self, jacobian: FloatArray, shift: FloatArray) -> tuple[FloatArray, npt.NDArray[np.int64]]:
         """See :meth:`ResolvedRate.invert`."""
         rows, _, n = jacobian.shape
         out, deficient = np.empty((rows, n)), np.empty(rows, dtype=np.bool_)
         orthonormal_rows(jacobian, shift, self.truncation, self.full_rank, out, deficient)
         return out, status_of(deficient)
+
+
+@kernel
+def gram_schmidt_rows(
+    arm_task,
+    gain,
+    truncation,
+    full_rank,
+    checking,
+    q,
+    qdot_before,
+    pose,
+    nominal,
+    remaining,
+    before,
+    known,
+    action,
+    answer,
+):
+    """One step of :class:`GramSchmidt`; see :class:`CompiledPolicy` for the arguments."""
+    if checking and not all_finite(q, qdot_before, pose, nominal, remaining):
+        return REFUSED
+    q, pose, nominal = as_rows(int(arm_task[0]), q, pose, nominal)
+    qdot, status, iterations = answer_parts(answer, q.shape[0], q.shape[1])
+    jacobian, shift = task_shifts(arm_task, gain, q, pose, nominal, before, known)
+    deficient = np.empty(q.shape[0], np.bool_)
+    orthonormal_rows(jacobian, shift, truncation, full_rank, qdot, deficient)
+    say_deficient(deficient, status)
+    return answered(arm_task, (qdot, status, iterations), action)
 
 
 @kernel

@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
-from baselines.solvers.resolved_rate.base import ResolvedRate, status_of
+from baselines.policy_kernels import REFUSED, all_finite, answer_parts, as_rows
+from baselines.solvers.resolved_rate.base import (
+    APPLIED,
+    ResolvedRate,
+    answered,
+    say_deficient,
+    status_of,
+    task_shifts,
+)
 from ikgym.jit import kernel
 from ikgym.validation import FloatArray, number
 
@@ -44,6 +52,14 @@ class JacobianTranspose(ResolvedRate):
         super().__post_init__()
         object.__setattr__(self, "rank_tolerance", number("rank_tolerance", self.rank_tolerance, at_least=0.0))
 
+    def kernel(self) -> Any:
+        """See :meth:`CompiledPolicy.kernel`."""
+        return jacobian_transpose_rows
+
+    def numbers(self) -> tuple[Any, ...]:
+        """See :meth:`ResolvedRate.numbers`."""
+        return self.rank_tolerance, self.full_rank
+
     def invert(self, jacobian: FloatArray, shift: FloatArray) -> tuple[FloatArray, npt.NDArray[np.int64]]:
         """See :meth:`ResolvedRate.invert`."""
         rows, size, n = jacobian.shape
@@ -54,6 +70,37 @@ class JacobianTranspose(ResolvedRate):
     def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
         """One Jacobian and one measurement; nothing is factorised."""
         return 0, 1, 0, 1
+
+
+@kernel
+def jacobian_transpose_rows(
+    arm_task,
+    gain,
+    tolerance,
+    full_rank,
+    checking,
+    q,
+    qdot_before,
+    pose,
+    nominal,
+    remaining,
+    before,
+    known,
+    action,
+    answer,
+):
+    """One step of :class:`JacobianTranspose`; see :class:`CompiledPolicy` for the arguments."""
+    if checking and not all_finite(q, qdot_before, pose, nominal, remaining):
+        return REFUSED
+    q, pose, nominal = as_rows(int(arm_task[0]), q, pose, nominal)
+    qdot, status, iterations = answer_parts(answer, q.shape[0], q.shape[1])
+    jacobian, shift = task_shifts(arm_task, gain, q, pose, nominal, before, known)
+    stuck = np.empty(q.shape[0], np.bool_)
+    transpose_rows(jacobian, shift, tolerance, qdot, stuck)
+    say_deficient(stuck, status)
+    if shift.shape[1] != full_rank:
+        status[:] = APPLIED
+    return answered(arm_task, (qdot, status, iterations), action)
 
 
 @kernel

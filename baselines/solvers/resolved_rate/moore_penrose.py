@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
+from baselines.policy_kernels import REFUSED, all_finite, answer_parts, as_rows
 from baselines.solvers.linear_algebra import pseudoinverse_rows
-from baselines.solvers.resolved_rate.base import ResolvedRate, status_of
+from baselines.solvers.resolved_rate.base import ResolvedRate, answered, say_deficient, status_of, task_shifts
 from ikgym.exceptions import InvalidInputError
+from ikgym.jit import kernel
 from ikgym.validation import FloatArray, number
 
 
@@ -41,9 +43,50 @@ class MoorePenrose(ResolvedRate):
         if self.rank_tolerance >= 1.0:
             raise InvalidInputError(f"rank_tolerance: expected a number below 1, got {self.rank_tolerance:g}.")
 
+    def kernel(self) -> Any:
+        """See :meth:`CompiledPolicy.kernel`."""
+        return pseudoinverse_step_rows
+
+    def numbers(self) -> tuple[Any, ...]:
+        """See :meth:`ResolvedRate.numbers`."""
+        return self.rank_tolerance, self.full_rank, np.ones(self.problem.model.joints)
+
     def invert(self, jacobian: FloatArray, shift: FloatArray) -> tuple[FloatArray, npt.NDArray[np.int64]]:
         """See :meth:`ResolvedRate.invert`."""
         rows, _, n = jacobian.shape
         out, deficient = np.empty((rows, n)), np.empty(rows, dtype=np.bool_)
         pseudoinverse_rows(jacobian, shift, self.rank_tolerance, self.full_rank, out, deficient)
         return out, status_of(deficient)
+
+
+@kernel
+def pseudoinverse_step_rows(
+    arm_task,
+    gain,
+    tolerance,
+    full_rank,
+    root,
+    checking,
+    q,
+    qdot_before,
+    pose,
+    nominal,
+    remaining,
+    before,
+    known,
+    action,
+    answer,
+):
+    """One step by the pseudoinverse, the columns of J divided by ``root`` (n,); else see :class:`CompiledPolicy`."""
+    if checking and not all_finite(q, qdot_before, pose, nominal, remaining):
+        return REFUSED
+    q, pose, nominal = as_rows(int(arm_task[0]), q, pose, nominal)
+    qdot, status, iterations = answer_parts(answer, q.shape[0], q.shape[1])
+    jacobian, shift = task_shifts(arm_task, gain, q, pose, nominal, before, known)
+    deficient = np.empty(q.shape[0], np.bool_)
+    pseudoinverse_rows(jacobian / root, shift, tolerance, full_rank, qdot, deficient)
+    say_deficient(deficient, status)
+    for row in range(q.shape[0]):
+        for j in range(q.shape[1]):
+            qdot[row, j] /= root[j]
+    return answered(arm_task, (qdot, status, iterations), action)

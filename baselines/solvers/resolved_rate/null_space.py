@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
-from baselines.policy import statuses
-from baselines.solvers.linear_algebra import cholesky, cholesky_solve
+from baselines.policy_kernels import REFUSED, all_finite, answer_parts, as_rows
+from baselines.solvers.arm_task import arm_task_of, plain_arm_task
+from baselines.solvers.linear_algebra import cholesky, cholesky_solve, pseudoinverse_rows
+from baselines.solvers.resolved_rate.base import APPLIED, answered, say_deficient, task_shifts
 from baselines.solvers.resolved_rate.dls import damped_rows
 from baselines.solvers.resolved_rate.moore_penrose import MoorePenrose
 from ikgym.arms import Arm
@@ -87,28 +89,37 @@ class NullSpace(MoorePenrose):
         }.items():
             object.__setattr__(self, field, value)
 
+    def kernel(self) -> Any:
+        """See :meth:`CompiledPolicy.kernel`."""
+        return null_space_rows
+
+    def numbers(self) -> tuple[Any, ...]:
+        """See :meth:`ResolvedRate.numbers`."""
+        lines = 0
+        if self.objective == "manipulability":
+            lines = 6 if self.problem.task.has_orientation else 3
+        reach = self.problem.model.reach(np.zeros(self.problem.model.joints)) ** 3
+        secondary = lines, self.problem.dt * self.secondary_gain, reach, self._joint_gain, self._target
+        return self.rank_tolerance, self.full_rank, self.damping, *secondary
+
     def move(self, q: FloatArray, jacobian: FloatArray, shift: FloatArray) -> tuple[FloatArray, npt.NDArray[np.int64]]:
-        """See :meth:`ResolvedRate.move`."""
-        aim = self.problem.dt * self.secondary_gain * self.objective_gradient(q)
-        disturbance = np.empty_like(shift)
-        task_rows(jacobian, aim, disturbance)
-        if self.damping == 0.0:
-            # J⁺ Δx + (I - J⁺ J) Δt z with one pseudoinverse.
-            step, status = self.invert(jacobian, shift - disturbance)
-            return step + aim, status
-        first = np.empty_like(aim)
-        damped_rows(jacobian, shift, self.damping, first)
-        taken_off, _ = self.invert(jacobian, disturbance)
-        return first + (aim - taken_off), statuses(len(aim))
+        """The joint shifts for task shifts, and their statuses.
+
+        Args:
+            q: Joint coordinates in [rad] or [m]. Shape (B, n).
+            jacobian: Task Jacobians. Shape (B, e, n).
+            shift: Task shifts. Shape (B, e).
+        """
+        out, status = np.empty_like(q), np.empty(len(q), dtype=np.int64)
+        move_rows(plain_arm_task(self.problem), self.numbers(), q, (jacobian, shift), out, status)
+        return out, status
 
     def objective_gradient(self, q: FloatArray) -> FloatArray:
         """The secondary objective's z / K, at joint coordinates in [rad] or [m]. Shapes (B, n)."""
-        if self.objective != "manipulability":
-            return self._joint_gain * (self._target - q)
-        model, lines = self.problem.model, 6 if self.problem.task.has_orientation else 3
         out = np.empty_like(q)
-        manipulability_rows(model.chain, q, lines, out)
-        return out / model.reach(np.zeros(model.joints)) ** 3
+        lines, _, reach, gain, target = self.numbers()[3:]
+        objective_rows(plain_arm_task(self.problem), (lines, reach, gain, target), q, out)
+        return out
 
     def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
         """A pseudoinverse; a damped system, and the geometric Jacobian with its own factorisation, where used."""
@@ -130,6 +141,91 @@ def _centre(model: Arm) -> tuple[FloatArray, FloatArray]:
     target[limited] = 0.5 * (lower[limited] + upper[limited])
     gains[limited] = (span.min() / span) ** 2
     return target, gains
+
+
+@kernel
+def null_space_rows(
+    arm_task,
+    gain,
+    rank_tolerance,
+    full_rank,
+    damping,
+    lines,
+    secondary_gain,
+    reach,
+    joint_gain,
+    goal,
+    checking,
+    q,
+    qdot_before,
+    pose,
+    nominal,
+    remaining,
+    before,
+    known,
+    action,
+    answer,
+):
+    """One step of :class:`NullSpace`; see :class:`CompiledPolicy` for the arguments."""
+    if checking and not all_finite(q, qdot_before, pose, nominal, remaining):
+        return REFUSED
+    q, pose, nominal = as_rows(int(arm_task[0]), q, pose, nominal)
+    qdot, status, iterations = answer_parts(answer, q.shape[0], q.shape[1])
+    jacobian, shift = task_shifts(arm_task, gain, q, pose, nominal, before, known)
+    rule = rank_tolerance, full_rank, damping, lines, secondary_gain, reach, joint_gain, goal
+    move_rows(arm_task, rule, q, (jacobian, shift), qdot, status)
+    return answered(arm_task, (qdot, status, iterations), action)
+
+
+@kernel
+def move_rows(arm_task, rule, q, wanted, out, status):
+    """J⁺ Δx + (I - J⁺ J) Δt z row by row.
+
+    Args:
+        arm_task: See :func:`plain_arm_task`.
+        rule: What :meth:`NullSpace.numbers` says.
+        q: Joint coordinates in [rad] or [m]. Shape (B, n).
+        wanted: Task Jacobians (B, e, n) and task shifts (B, e).
+        out: Receives the joint shifts. Shape (B, n).
+        status: Receives values of :class:`Status`. Shape (B,).
+    """
+    rank_tolerance, full_rank, damping, lines, secondary_gain, reach, joint_gain, goal = rule
+    jacobian, shift = wanted
+    aim, disturbance, deficient = np.empty(q.shape), np.empty(shift.shape), np.empty(q.shape[0], np.bool_)
+    objective_rows(arm_task, (lines, reach, joint_gain, goal), q, aim)
+    aim *= secondary_gain
+    task_rows(jacobian, aim, disturbance)
+    if damping == 0.0:  # with one pseudoinverse
+        pseudoinverse_rows(jacobian, shift - disturbance, rank_tolerance, full_rank, out, deficient)
+        out += aim
+        say_deficient(deficient, status)
+        return
+    taken_off = np.empty(q.shape)
+    damped_rows(jacobian, shift, damping, out)
+    pseudoinverse_rows(jacobian, disturbance, rank_tolerance, full_rank, taken_off, deficient)
+    out += aim - taken_off
+    status[:] = APPLIED
+
+
+@kernel
+def objective_rows(arm_task, objective, q, out):
+    """The secondary objective's z / K row by row.
+
+    Args:
+        arm_task: See :func:`plain_arm_task`.
+        objective: Rows of the Jacobian whose manipulability is to grow, 0 for none; the third power of the reach; gains
+            and goals of the joints, of shape (n,).
+        q: Joint coordinates in [rad] or [m]. Shape (B, n).
+        out: Receives z / K. Shape (B, n).
+    """
+    lines, reach, joint_gain, goal = objective
+    if lines > 0:
+        manipulability_rows(arm_task_of(arm_task).chain, q, lines, out)
+        out /= reach
+        return
+    for row in range(q.shape[0]):
+        for j in range(q.shape[1]):
+            out[row, j] = joint_gain[j] * (goal[j] - q[row, j])
 
 
 @kernel

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
 from baselines.solvers.linear_algebra import pseudoinverse_rows
 from baselines.solvers.resolved_rate.base import ResolvedRate, status_of
+from baselines.solvers.resolved_rate.moore_penrose import pseudoinverse_step_rows
 from ikgym.exceptions import InvalidInputError
 from ikgym.validation import FloatArray, number
 
@@ -42,6 +43,14 @@ class TruncatedSVD(ResolvedRate):
         object.__setattr__(self, "threshold", number("threshold", self.threshold, at_least=0.0))
         if self.threshold >= 1.0:
             raise InvalidInputError(f"threshold: expected a number of at least 0 and below 1, got {self.threshold:g}.")
+
+    def kernel(self) -> Any:
+        """See :meth:`CompiledPolicy.kernel`."""
+        return pseudoinverse_step_rows
+
+    def numbers(self) -> tuple[Any, ...]:
+        """See :meth:`ResolvedRate.numbers`."""
+        return self.threshold, self.full_rank, np.ones(self.problem.model.joints)
 
     def invert(self, jacobian: FloatArray, shift: FloatArray) -> tuple[FloatArray, npt.NDArray[np.int64]]:
         """See :meth:`ResolvedRate.invert`."""

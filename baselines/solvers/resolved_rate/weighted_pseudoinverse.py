@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -45,6 +45,11 @@ class WeightedPseudoinverse(MoorePenrose):
             raise InvalidInputError(f"weights: expected numbers above 0, got {weights.tolist()}.")
         scalar = np.ndim(self.weights) == 0
         object.__setattr__(self, "weights", float(weights[0]) if scalar else tuple(weights.tolist()))
+
+    def numbers(self) -> tuple[Any, ...]:
+        """See :meth:`ResolvedRate.numbers`."""
+        root = np.sqrt(np.broadcast_to(np.asarray(self.weights), self.problem.model.joints))
+        return self.rank_tolerance, self.full_rank, root
 
     def invert(self, jacobian: FloatArray, shift: FloatArray) -> tuple[FloatArray, npt.NDArray[np.int64]]:
         """See :meth:`ResolvedRate.invert`."""

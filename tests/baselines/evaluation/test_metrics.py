@@ -140,7 +140,8 @@ def test_the_warm_up_call_leaves_no_trace_in_the_episode():
         preview = solver.preview
         report = staticmethod(solver.report)
         diagnostics = staticmethod(solver.diagnostics)
-        operations = staticmethod(solver.operations)
+        counters = staticmethod(solver.counters)
+        operations_of = staticmethod(solver.operations_of)
 
         def predict(self, observation, state=None):
             calls.append(state)

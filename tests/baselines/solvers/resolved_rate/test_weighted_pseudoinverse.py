@@ -32,7 +32,7 @@ def test_is_the_formula(name):
         if tolerance < 1e-3:
             np.testing.assert_allclose(dq, wanted, atol=tolerance * np.linalg.norm(wanted) + 1e-15)
         full = min(scenario.task.error_size, scenario.joints, 6)
-        assert s == (Status.CONVERGED if len(kept) == full else Status.RANK_DEFICIENT)
+        assert s == (Status.APPLIED if len(kept) == full else Status.RANK_DEFICIENT)
 
 
 def test_minimises_the_weighted_squares_under_the_task():
