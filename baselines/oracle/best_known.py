@@ -16,7 +16,7 @@ from typing import Any, Protocol
 
 from baselines.files import ResultsError, json_files, write
 from baselines.files.locks import locked
-from baselines.fingerprints import episode_hash
+from baselines.fingerprints import episode_hash, fingerprint
 from ikgym.scenarios import Scenario
 
 #: Scenario and reset seed.
@@ -77,8 +77,14 @@ def lookup(scenario: Scenario, seed: int) -> Record | None:
 
 def cost(scenario: Scenario, seed: int) -> float | None:
     """The best known cost that a cost ratio is stated against; None where there is none, or none above 1e-9."""
-    known = lookup(scenario, seed)
-    return None if known is None or known.cost <= MEANINGLESS else known.cost
+    return costs(scenario, (seed,))[0]
+
+
+def costs(scenario: Scenario, seeds: Iterable[int]) -> list[float | None]:
+    """What :func:`cost` says of several episodes, in one go."""
+    content = fingerprint(scenario)
+    found = (_lookup(scenario.name, seed, content) for seed in seeds)
+    return [None if one is None or one.cost <= MEANINGLESS else one.cost for one in found]
 
 
 def beaten(row: Scored) -> Record | None:

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 import baselines
 import ikgym
 from baselines.canonical import jsonable
-from baselines.evaluation.metrics import TIME_COLUMNS, Row, measure
+from baselines.evaluation.metrics import TIME_COLUMNS, Row, lost, measure
 from baselines.evaluation.rollout import Episode, rollout
 from baselines.evaluation.summary import Spread, geometric_mean, summarise
 from baselines.policy import Operations
@@ -391,6 +391,27 @@ def test_rows_of_different_content_are_not_put_together(change):
     with pytest.raises(InvalidInputError, match="results of 'zhang3-helix' cannot be put together"):
         summarise([base, other])
     assert len(summarise([base, dataclasses.replace(other, scenario="another")])) == 2
+
+
+@pytest.mark.parametrize(
+    ("position", "angle", "expected"),
+    [
+        (0.05, 0.3, False),
+        (0.0501, 0.0, True),
+        (0.0, 0.301, True),
+        (0.0501, None, True),
+        (0.05, None, False),
+        (math.nan, 0.0, True),
+        (0.0, math.nan, True),
+    ],
+)
+def test_lost_by_position_or_orientation(position, angle, expected):
+    assert lost(position, angle) is expected
+    row = row_of(position_scenario(), handmade())
+    row = dataclasses.replace(row, position_error_max=position, orientation_error_max=angle)
+    assert row.lost is expected
+    (summary,) = summarise([row, dataclasses.replace(row, seed=77, position_error_max=9.0)])
+    assert summary.lost == 1 + expected
 
 
 def test_time_columns_are_columns():
