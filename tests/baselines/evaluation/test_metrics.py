@@ -414,5 +414,15 @@ def test_lost_by_position_or_orientation(position, angle, expected):
     assert summary.lost == 1 + expected
 
 
+def test_who_tracks_skew_coordinates_with_a_wrong_orientation_has_lost():
+    """The cost of skew coordinates is low there: a test episode of `varga7-random` that looked well by distance."""
+    where = scenario("varga7-random")
+    policy = baselines.make("rhc", where, horizon=200, iterations=1, move_blocks=27)
+    row = row_of(where, rollout(where, policy, 2_000_018, preview=policy.preview))
+    assert row.position_error_max < 0.005
+    assert row.orientation_error_max > 0.35
+    assert row.lost
+
+
 def test_time_columns_are_columns():
     assert set(TIME_COLUMNS) <= {field.name for field in dataclasses.fields(Row)}
