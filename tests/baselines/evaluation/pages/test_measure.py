@@ -112,7 +112,7 @@ class TestMeasure:
         assert again.cost[0] == found.cost[0]
         assert again.cost[1] != found.cost[1], "another agent in the same file is played again"
         with pytest.raises(InvalidInputError, match="other: made for another task or arm than that of varga7-random"):
-            plan(sets.MAIN, [mine, *agents([f"other={tmp_path / 'other'}"])], 1)
+            plan(sets.SKEW, [mine, *agents([f"other={tmp_path / 'other'}"])], 1)
 
     def test_seeds_of_a_policy_follow_each_other(self, both):
         compared = both["cost-time"]
