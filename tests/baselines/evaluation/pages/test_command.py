@@ -9,9 +9,9 @@ import pytest
 from baselines.evaluation.pages import command, entries, families, foresight, sets
 from baselines.evaluation.pages.command import main
 from baselines.evaluation.pages.entries import Entry, solver
-from baselines.evaluation.pages.grids import product
 from baselines.evaluation.pages.measurement import Measurement
 from baselines.evaluation.pages.tuning import Tuning, tune
+from baselines.evaluation.pages.tuning.grids import product
 from tests.baselines.evaluation.pages.builders import write_runs
 
 FEW = (

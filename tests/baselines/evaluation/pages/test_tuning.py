@@ -9,8 +9,8 @@ import pytest
 from baselines import registry
 from baselines.evaluate import evaluate
 from baselines.evaluation.pages import entries, sets
-from baselines.evaluation.pages.grids import GRIDS, decades, product
 from baselines.evaluation.pages.tuning import DATA, EPISODES, Tuned, Tuning, file_of, of, suiting, tune, update
+from baselines.evaluation.pages.tuning.grids import GRIDS, decades, product
 from baselines.files import ResultsError
 from baselines.spec import parse_policy
 from ikgym import scenarios

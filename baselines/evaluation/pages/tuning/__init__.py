@@ -11,8 +11,8 @@ from typing import Any, NamedTuple, Self
 from baselines import registry
 from baselines.canonical import DIGITS, one_line, rounded, with_list
 from baselines.evaluation.pages.entries import Entry
-from baselines.evaluation.pages.grids import GRIDS, Stage
 from baselines.evaluation.pages.measure import plan, play
+from baselines.evaluation.pages.tuning.grids import GRIDS, Stage
 from baselines.evaluation.summary import geometric_mean
 from baselines.files import ResultsError, json_files, write
 from baselines.fingerprints import fingerprint
@@ -22,7 +22,7 @@ from ikgym.exceptions import IkgymError, InvalidInputError
 from ikgym.scenarios import Scenario
 
 #: Where the settings are that the leaderboards read, by the scenario that they were searched on.
-DATA = pathlib.Path(__file__).parents[2] / "data" / "tuned"
+DATA = pathlib.Path(__file__).parents[3] / "data" / "tuned"
 #: What is tuned on: never what scores are published on.
 SPLIT, EPISODES = "validation", 64
 
