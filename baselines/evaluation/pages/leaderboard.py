@@ -232,8 +232,8 @@ def _tuned(tuning: Tuning) -> list[str]:
     out += [
         f"Searched with `{tuning.command}` on the first {tuning.episodes} {tuning.split} episodes of "
         f"`{tuning.scenario}`, in stages over grids, for the lowest geometric mean of the total cost (which needs no "
-        "best known cost: dividing by it changes no order). No test episode was played for it. What was searched is "
-        f"in `baselines/evaluation/pages/tuning/grids.py`, the result in `baselines/data/tuned/{tuning.scenario}.json`. "
+        "best known cost: dividing by it changes no order). No test episode was played for it. What was searched is in "
+        f"`baselines/evaluation/pages/tuning/grids.py`, the result in `baselines/data/tuned/{tuning.scenario}.json`. "
         "No setting lets a solver look further ahead.",
         "",
     ]
