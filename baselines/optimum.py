@@ -68,7 +68,7 @@ Examples:
   {prog} --scenarios varga7-random --seeds 1000000 1000001 --starts 1000
   {prog} --update
   {prog} --scenarios varga7-fast --policies rhc_foresight --update
-  {prog} --test-sets varga7-random --check
+  {prog} --test-sets varga7-pose-random --check
 
 Of each episode is printed: its cost; how many paths at full resolution came within a millionth of it; how many random
 starts came within 1 % of the best before the local search, their median and their worst cost; the norm of the gradient

@@ -16,6 +16,10 @@ import numpy as np
 import baselines
 import ikgym
 from baselines.console.listing import summary
+from baselines.evaluation import test_sets as sets
+from baselines.evaluation.report import NOTHING
+from baselines.oracle import best_known
+from baselines.oracle.best_known import MARGIN
 from baselines.registry import get
 from baselines.status import Status
 
@@ -69,6 +73,36 @@ def policies() -> list[tuple[str, ...]]:
     return rows
 
 
+def test_sets() -> list[tuple[str, ...]]:
+    """One line a test set."""
+    rows: list[tuple[str, ...]] = [("set", "episodes", "steps", "task coordinates")]
+    for one in map(sets.get, sets.names()):
+        scenario = one.scenario
+        which = f"the first {one.episodes} of the {one.split} split"
+        rows.append((f"`{one.name}`", which, f"{scenario.steps:,}", f"`{scenario.task.name}`"))
+    return rows
+
+
+def records() -> list[tuple[str, ...]]:
+    """One line a test set: how its best known costs were found."""
+    head = ("set", "two or more kinds of starts came to it", "random starts or local search alone did", "which gained")
+    return [(*head, "largest gradient [s/rad]"), *map(_records, sets.names())]
+
+
+def _records(name: str) -> tuple[str, ...]:
+    found = [one for one in best_known.read() if one.scenario == name]
+    several = sum(";" in one.found_by for one in found)
+    known = [(one.cost, one.spread["without_search"]) for one in found if "without_search" in one.spread]
+    gains = [100.0 * (1.0 - cost / without) for cost, without in known if cost < without * (1.0 - MARGIN)]
+    return (
+        f"`{name}`",
+        f"{several} of {len(found)}",
+        f"{len(gains)} of {len(known)}" if known else NOTHING,
+        f"{np.median(gains):.2g} % in the median, {max(gains):.2g} % at most" if gains else NOTHING,
+        f"{max(one.gradient_norm for one in found):.1e}",
+    )
+
+
 def _parameter(field: dataclasses.Field[object]) -> str:
     """A parameter with its default; one without has None, and chooses for itself."""
     default = field.default
@@ -95,6 +129,8 @@ TABLES = {
     "splits": splits,
     "policies": policies,
     "statuses": statuses,
+    "test_sets": test_sets,
+    "records": records,
 }
 
 

@@ -28,7 +28,7 @@ Examples:
   {prog} --policies dls dls:damping=1e-2 rhc_gradient:alpha_max=5e-4,horizon=5
   {prog} --scenarios varga7-random --episodes 20 --workers 4 --out results/random
   {prog} --scenarios varga7-random --episodes 50 --out results/random --resume
-  {prog} --test-sets varga7-random --policies rhc_gradient --out results/test
+  {prog} --test-sets varga7-pose-random --policies rhc_gradient --out results/test
   {prog} --scenarios varga7-random --policies agent:runs/mine.safetensors dls
   {prog} --scenarios lab.toml my_module:scenario --policies my_module:MyPolicy dls
 

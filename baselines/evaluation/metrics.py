@@ -22,6 +22,9 @@ from ikgym.validation import FloatArray
 
 #: The columns that are measured with a clock, and so differ from run to run.
 TIME_COLUMNS = ("time_first_us", "time_p50_us", "time_p99_us", "deadline_misses")
+#: An arm that was at some time farther from its nominal position than this, in [m], has lost track; and so has one that
+#: was turned away from its nominal orientation by more than this, in [rad].
+LOST_POSITION, LOST_ORIENTATION = 0.05, 0.3
 
 
 @dataclasses.dataclass(frozen=True)
@@ -106,6 +109,11 @@ class Row:
     test_set: str | None
 
     @property
+    def lost(self) -> bool:
+        """Whether the arm has lost track, see :func:`lost`."""
+        return lost(self.position_error_max, self.orientation_error_max)
+
+    @property
     def key(self) -> tuple[str, str, str, int, int]:
         """What says which episode of an evaluation this is."""
         return key(self.scenario, self.policy, self.parameters, self.seed, self.steps)
@@ -134,6 +142,17 @@ class Row:
             if status.upper() not in Status.__members__:
                 raise InvalidInputError(f"the key 'status' should be one of a solve, got {shown(status)}")
         return row
+
+
+def lost(position_error: float, orientation_error: float | None) -> bool:
+    """Whether an arm has lost track; an error that is no number says that it has.
+
+    Args:
+        position_error: The largest of the episode, in [m].
+        orientation_error: Likewise, in [rad]; None where the scenario has no orientation.
+    """
+    turned = orientation_error is not None and not orientation_error <= LOST_ORIENTATION
+    return turned or not position_error <= LOST_POSITION
 
 
 def key(

@@ -13,7 +13,7 @@ from typing import Any
 from urllib.parse import quote
 
 from baselines import registry
-from baselines.evaluation.metrics import Row
+from baselines.evaluation.metrics import LOST_ORIENTATION, LOST_POSITION, Row
 from baselines.evaluation.plan import Skipped
 from baselines.evaluation.summary import Spread, Summary, summarise
 from baselines.evaluation.text_table import Column, fitting, plain
@@ -214,6 +214,7 @@ def _spread(names: Mapping[int, str], summaries: Sequence[Summary]) -> list[Colu
         column("p90", lambda spread: number(spread.p90)),
         column("worst", lambda spread: number(spread.worst)),
         column("worst seed", lambda spread: str(spread.worst_seed)),
+        Column("lost", "", lambda s: str(s.lost)),
     ]
 
 
@@ -258,7 +259,8 @@ def _notes(rows: Sequence[Row]) -> list[str]:
     if any(summary.episodes > 1 for summaries in by_scenario(rows).values() for summary in summaries):
         notes.append(
             "several episodes: costs and cost ratio are geometric means, errors, q̇ peak, p99 and status the worst, p50 "
-            "the median, misses the sum; times are those of episodes that were played alone"
+            "the median, misses the sum; times are those of episodes that were played alone; lost: episodes with more "
+            f"than {1e3 * LOST_POSITION:g} mm or {LOST_ORIENTATION:g} rad of error at some time"
         )
     return notes + _beaten(rows)
 

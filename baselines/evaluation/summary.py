@@ -14,6 +14,7 @@ from baselines.canonical import canonical
 from baselines.evaluation.metrics import Row
 from baselines.status import Status
 from ikgym.exceptions import InvalidInputError
+from ikgym.validation import FloatArray
 
 
 @dataclasses.dataclass(frozen=True)
@@ -41,6 +42,11 @@ class Spread:
         p90 = float(np.percentile(numbers, 90))
         return cls(geometric_mean(numbers), statistics.median(numbers), p90, values[seed], seed)
 
+    @classmethod
+    def over(cls, values: FloatArray) -> Self:
+        """The spread of numbers that belong to no single episode, such as those of several seeds of a policy."""
+        return cls.of(dict(enumerate(np.ravel(values).tolist())))
+
 
 @dataclasses.dataclass(frozen=True)
 class Summary:
@@ -66,6 +72,7 @@ class Summary:
         status: The worst.
         operations: Means over the episodes; empty where they are not known.
         time_first_us: The largest, in [µs].
+        lost: In how many the arm lost track, see :func:`baselines.evaluation.metrics.lost`.
     """
 
     scenario: str
@@ -87,6 +94,7 @@ class Summary:
     status: str
     operations: dict[str, float]
     time_first_us: float | None
+    lost: int
 
 
 class Times(NamedTuple):
@@ -170,4 +178,5 @@ def _summary(rows: Sequence[Row]) -> Summary:
         status=max((row.status for row in rows), key=lambda status: Status[status.upper()]),
         operations={name: statistics.fmean(row.operations[name] for row in rows) for name in first.operations},
         time_first_us=clocked.first_us,
+        lost=sum(row.lost for row in rows),
     )

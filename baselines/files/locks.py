@@ -8,6 +8,7 @@ import logging
 import os
 import pathlib
 import sys
+import time
 from collections.abc import Iterator
 
 from baselines.files import ResultsError
@@ -16,24 +17,27 @@ logger = logging.getLogger("ikgym")
 
 #: The file in a folder that is locked. It holds the number of the process that has it, and goes with the lock.
 NAME = ".lock"
+# Seconds between two attempts of whoever waits.
+_PAUSE = 0.02
 # Where the byte is that is locked: on Windows nobody else may read what is, and the number should be read.
 _BYTE = 2**20
 
 
 @contextlib.contextmanager
-def locked(folder: pathlib.Path) -> Iterator[None]:
+def locked(folder: pathlib.Path, patience: float = 0.0) -> Iterator[None]:
     """Keeps a folder for this process.
 
     Args:
         folder: It is made if it is not there.
+        patience: How long to wait for another one to be done with it, in [s].
 
     Raises:
-        ResultsError: Another process, or another call in this one, writes into it; it cannot be written.
+        ResultsError: Another process, or another call in this one, still writes into it; it cannot be written.
     """
     file = folder / NAME
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        number = _open(file)
+        number = _waited(file, time.monotonic() + patience)
     except OSError as e:
         raise ResultsError(f"Cannot write into {folder}: {e.strerror or e}.") from None
     try:
@@ -42,6 +46,17 @@ def locked(folder: pathlib.Path) -> Iterator[None]:
         with contextlib.suppress(OSError):  # Windows removes no file that is open: it stays, and hinders nobody
             file.unlink()
         os.close(number)
+
+
+def _waited(file: pathlib.Path, until: float) -> int:
+    """The descriptor of the file, locked as soon as it is free."""
+    while True:
+        try:
+            return _open(file)
+        except ResultsError:
+            if time.monotonic() >= until:
+                raise
+            time.sleep(_PAUSE)
 
 
 def _open(file: pathlib.Path) -> int:

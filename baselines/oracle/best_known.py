@@ -15,9 +15,12 @@ from collections.abc import Iterable, Mapping
 from typing import Any, Protocol
 
 from baselines.files import ResultsError, json_files, write
-from baselines.fingerprints import episode_hash
+from baselines.files.locks import locked
+from baselines.fingerprints import episode_hash, fingerprint
 from ikgym.scenarios import Scenario
 
+#: Scenario and reset seed.
+Key = tuple[str, int]
 #: The records that come with the package.
 DATA = pathlib.Path(__file__).parents[1] / "data" / "best_known.json"
 #: What brings them up to date.
@@ -27,6 +30,8 @@ UPDATE = "python -m baselines.optimum --update"
 MEANINGLESS = 1e-9
 #: By what share a cost must lie below the record to beat it; less may be rounding.
 MARGIN = 1e-6
+#: How long to wait for another process that writes records, in [s]; it takes some milliseconds.
+PATIENCE = 30.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -72,8 +77,14 @@ def lookup(scenario: Scenario, seed: int) -> Record | None:
 
 def cost(scenario: Scenario, seed: int) -> float | None:
     """The best known cost that a cost ratio is stated against; None where there is none, or none above 1e-9."""
-    known = lookup(scenario, seed)
-    return None if known is None or known.cost <= MEANINGLESS else known.cost
+    return costs(scenario, (seed,))[0]
+
+
+def costs(scenario: Scenario, seeds: Iterable[int]) -> list[float | None]:
+    """What :func:`cost` says of several episodes, in one go."""
+    content = fingerprint(scenario)
+    found = (_lookup(scenario.name, seed, content) for seed in seeds)
+    return [None if one is None or one.cost <= MEANINGLESS else one.cost for one in found]
 
 
 def beaten(row: Scored) -> Record | None:
@@ -89,7 +100,8 @@ def record(records: Iterable[Record], path: pathlib.Path = DATA) -> list[Record]
 
     Args:
         records: What was found.
-        path: The file; it is replaced in one go, and stays as it is if nothing is better.
+        path: The file; it is replaced in one go, and stays as it is if nothing is better. Several processes may write
+            into it: each waits for the others.
 
     Returns:
         The records that were kept.
@@ -97,20 +109,28 @@ def record(records: Iterable[Record], path: pathlib.Path = DATA) -> list[Record]
     Raises:
         ResultsError: The file is damaged or cannot be written, or a cost is no number of at least 0.
     """
-    _read.cache_clear()  # another process may have written since
-    known, kept = dict(_read(path)), {}
+    with locked(path.parent, PATIENCE):  # read and written by one process at a time, or the slower one's would be all
+        _read.cache_clear()
+        known, kept = dict(_read(path)), _better(records, _read(path))
+        if kept:
+            known |= kept
+            lines = [json.dumps(_plain(known[key]), ensure_ascii=False, allow_nan=False) for key in sorted(known)]
+            write(path, ("[\n" + ",\n".join(lines) + "\n]\n").encode())
+            _read.cache_clear()
+    return list(kept.values())
+
+
+def _better(records: Iterable[Record], known: Mapping[Key, Record]) -> dict[Key, Record]:
+    """The best of each episode, where it is better than what is known."""
+    kept: dict[Key, Record] = {}
     for new in records:
         if not (math.isfinite(new.cost) and new.cost >= 0.0):
             raise ResultsError(f"{new.scenario}, seed {new.seed}: expected a cost of at least 0, got {new.cost}.")
         key = new.scenario, new.seed
-        old = known.get(key)
+        old = kept.get(key, known.get(key))
         if old is None or old.hash != new.hash or new.cost < old.cost:
-            known[key] = kept[key] = new
-    if kept:
-        lines = [json.dumps(_plain(known[key]), ensure_ascii=False, allow_nan=False) for key in sorted(known)]
-        write(path, ("[\n" + ",\n".join(lines) + "\n]\n").encode())
-        _read.cache_clear()
-    return list(kept.values())
+            kept[key] = new
+    return kept
 
 
 def read(path: pathlib.Path = DATA) -> list[Record]:
@@ -128,7 +148,7 @@ def _lookup(name: str, seed: int, content: Scenario | str) -> Record | None:
 
 
 @functools.cache
-def _read(path: pathlib.Path) -> dict[tuple[str, int], Record]:
+def _read(path: pathlib.Path) -> dict[Key, Record]:
     try:
         content = json_files.read(path)
         if not isinstance(content, list):

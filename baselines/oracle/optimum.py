@@ -11,6 +11,7 @@ from ikgym.validation import FloatArray, Frozen, read_only, whole_number
 
 #: What starts are called that were drawn, and paths that the iterated local search has found.
 RANDOM, LOCAL_SEARCH = "random start", "local search"
+SEARCHED = (RANDOM, LOCAL_SEARCH)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -114,7 +115,8 @@ class Optimum(Frozen):
         Returns:
             ``starts`` on the coarse grid, and how many of them came ``within_1_percent`` of the best there without
             local search, their ``median`` and ``worst`` cost; paths ``polished`` at full resolution, and how many of
-            them came ``polished_within_1e-6`` of the best.
+            them came ``polished_within_1e-6`` of the best; and the cost ``without_search``, the lowest of those that
+            did not come from a search: of the nominal joint path, the roll-out, receding horizons, given policies.
         """
         coarse = [one.coarse for one in self.starts if one.coarse is not None]
         first = [one.coarse for one in self.starts if one.coarse is not None and one.kind != LOCAL_SEARCH]
@@ -122,6 +124,8 @@ class Optimum(Frozen):
             "polished": sum(one.cost is not None for one in self.starts),
             "polished_within_1e-6": sum(map(self._reached, self.starts)),
         }
+        if known := [one.cost for one in self.starts if one.cost is not None and one.kind not in SEARCHED]:
+            out["without_search"] = min(known)
         if first:
             out |= {
                 "starts": len(first),

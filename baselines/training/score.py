@@ -15,7 +15,7 @@ class Score:
         cost: Geometric mean of their costs.
         cost_ratio: Geometric mean of their costs over those of the reference; None where there is none.
         worst: Largest of these ratios; of the costs where there is no reference.
-        lost: Share of the episodes in which the arm was more than 50 mm away from its path at some time.
+        lost: Share of the episodes in which the arm lost track, see :func:`baselines.evaluation.metrics.lost`.
     """
 
     episodes: int

@@ -22,6 +22,7 @@ from baselines import registry
 from baselines.agents.features import Features, Processing
 from baselines.episode import added_up
 from baselines.episode import play as play_episodes
+from baselines.evaluation.metrics import lost
 from baselines.evaluation.rollout import rollouts
 from baselines.evaluation.summary import geometric_mean
 from baselines.files import write
@@ -39,9 +40,6 @@ FILE = pathlib.Path(__file__).with_name("validation_reference.json")
 POLICY, SCENARIO, TASKS, EPISODES = "rhc_foresight", "varga7-random", ("skew", "pose"), 64
 #: Digits of a cost that are kept.
 DIGITS = 7
-
-#: An arm that was further from its path than this, in [m], was lost.
-LOST = 0.05
 
 #: From features of shape (N, f) to the deterministic outputs of an agent's network, of shape (N, n).
 Actor = Callable[[Features], npt.NDArray[np.float32]]
@@ -63,7 +61,7 @@ def validate(actor: Actor, processing: Processing, scenario: Scenario, episodes:
         episodes: How many; a deterministic scenario has one.
     """
     seeds = validation_seeds(scenario, episodes)
-    costs, errors = play(actor, processing, scenario, seeds)
+    costs, errors, angles = play(actor, processing, scenario, seeds)
     reference = reference_costs(fingerprint(scenario), seeds)
     ratios = costs if reference is None else costs / reference
     return Score(
@@ -71,13 +69,13 @@ def validate(actor: Actor, processing: Processing, scenario: Scenario, episodes:
         cost=geometric_mean(costs.tolist()),
         cost_ratio=None if reference is None else geometric_mean(ratios.tolist()),
         worst=float(ratios.max()),
-        lost=float((errors > LOST).mean()),
+        lost=float(np.mean([lost(distance, angle) for distance, angle in zip(errors, angles, strict=True)])),
     )
 
 
 def play(
     actor: Actor, processing: Processing, scenario: Scenario, seeds: Sequence[int]
-) -> tuple[FloatArray, FloatArray]:
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Plays episodes in step, as :func:`baselines.evaluation.rollout.rollouts` does.
 
     Args:
@@ -87,7 +85,8 @@ def play(
         seeds: The reset seeds.
 
     Returns:
-        Costs of the episodes, and the largest position errors in [m]. Shapes (N,).
+        Costs of the episodes, the largest position errors in [m], and the largest orientation errors in [rad], 0
+        where the scenario has no orientation. Shapes (N,).
     """
     view, rows = View(processing, scenario), len(seeds)
     starting = np.ones(rows, dtype=np.bool_)
@@ -97,11 +96,13 @@ def play(
         starting[:] = False
         return view.act(actor(features))
 
-    costs, errors = np.empty((rows, scenario.steps)), np.zeros(rows)
+    costs, errors, angles = np.empty((rows, scenario.steps)), np.zeros(rows), np.zeros(rows)
     for k, out in enumerate(play_episodes(scenario, seeds, act, preview=view.preview)):
         costs[:, k] = out.tracking_cost + out.velocity_cost
         errors = np.maximum(errors, out.position_error)
-    return added_up(costs), errors
+        if scenario.task.has_orientation:
+            angles = np.maximum(angles, out.orientation_error)
+    return added_up(costs), errors, angles
 
 
 def reference_costs(digest: str, seeds: Sequence[int]) -> FloatArray | None:

@@ -23,6 +23,7 @@ from baselines.evaluate import evaluate
 from baselines.evaluation import report
 from baselines.evaluation.pages import tuning
 from baselines.evaluation.pages.measurement import Measurement
+from baselines.evaluation.pages.sets import SKEW
 from baselines.evaluation.pages.tuning import Tuning
 from baselines.evaluation.results import read_rows
 from baselines.oracle import best_known
@@ -118,7 +119,7 @@ READERS = {
     "results.json": (rows, read_report),
     "run.json": (run, read_config),
     "leaderboard.json": (measured, Measurement.load),
-    "tuned.json": (lambda _: tuning.DATA.read_bytes(), Tuning.load),
+    "tuned.json": (lambda _: tuning.file_of(SKEW).read_bytes(), Tuning.load),
     "best_known.json": (first_records, read_records),
 }
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import NamedTuple
 
 import numpy as np
 
 from baselines.evaluation.pages.measurement import AGENT, FAR, NEAR, Line, Section
-from baselines.evaluation.pages.statistics import interval
+from baselines.evaluation.pages.statistics import geometric_interval
 from baselines.evaluation.report import number
 from ikgym.validation import FloatArray
 
@@ -28,19 +29,35 @@ class Comparison:
 
     @classmethod
     def of(cls, one: FloatArray, other: FloatArray) -> Comparison:
-        """Compares episode by episode, with the geometric mean of the other's seeds, if it has several."""
-        logs = np.log(one) - np.log(other).mean(axis=0)
-        low, high = interval(logs)
-        return cls(*(float(np.exp(value)) for value in (logs.mean(), low, high)))
+        """Compares episode by episode, with the geometric mean of the other's seeds, if it has several.
+
+        Where one has played fewer episodes, the first ones, both are compared on those.
+        """
+        shared = min(one.shape[1], other.shape[1])
+        ratios = one[:, :shared] / np.exp(np.log(other[:, :shared]).mean(axis=0))
+        return cls(float(np.exp(np.log(ratios).mean())), *geometric_interval(ratios))
 
     def __str__(self) -> str:
         return f"{number(self.ratio)} ({number(self.low)} to {number(self.high)})"
 
 
+class Mean(NamedTuple):
+    """A geometric mean and its interval."""
+
+    mean: float
+    low: float
+    high: float
+
+    def __str__(self) -> str:
+        return f"{number(self.mean)}, {number(self.low)} to {number(self.high)}"
+
+
 def sentences(section: Section) -> list[str]:
-    """What the main set says of agents beside solvers, as lines of Markdown."""
+    """What the main set says of agents beside solvers, as lines of Markdown; each mean with its interval of 95 %."""
     cost_ratios = section.cost_ratios()
-    means = {label: spread.mean for label, spread in section.spreads().items()}
+    means = {
+        label: Mean(spread.mean, *geometric_interval(cost_ratios[label])) for label, spread in section.spreads().items()
+    }
     ranked = section.ranked()
     # An agent with too few seeds says something only where there is no other.
     learned = [line for line in ranked if line.learned]
@@ -50,7 +67,8 @@ def sentences(section: Section) -> list[str]:
     if not learned:
         return ["- No agent has been entered: the lines are those of solvers.", *_solvers(near, far, means)]
     best = learned[0]
-    out = [f"- The best agent is {_name(best, means)}{_few(best)}; it loses track in {best.lost} of {best.runs} runs."]
+    out = [*_solvers(near, far, means)]
+    out += [f"- The best agent is {_name(best, means)}{_few(best)}; it loses track in {best.lost} of {best.runs} runs."]
     if best.training and best.training.base_policy:
         out.append(
             f"- It adds to `{best.training.base_policy}` and sees {best.preview} steps ahead: what that solver reaches "
@@ -65,13 +83,13 @@ def sentences(section: Section) -> list[str]:
         out.append(_beside_near(best, near, cost_ratios, means))
     ratios = [Comparison.of(cost_ratios[best.label], cost_ratios[line.label]) for line in far]
     return out + [
-        f"- Its cost is {r} times that of {_name(line, means)}, which looks further."
+        f"- Its cost is {r} times that of {_name(line, means)}, which looks {line.preview:,} steps ahead."
         for r, line in zip(ratios, far, strict=True)
     ]
 
 
-def _beside_near(best: Line, near: list[Line], cost_ratios: dict[str, FloatArray], means: dict[str, float]) -> str:
-    lower = [line for line in near if means[line.label] <= means[best.label]]
+def _beside_near(best: Line, near: list[Line], cost_ratios: dict[str, FloatArray], means: dict[str, Mean]) -> str:
+    lower = [line for line in near if means[line.label].mean <= means[best.label].mean]
     first = near[0]
     ratio = Comparison.of(cost_ratios[best.label], cost_ratios[first.label])
     if lower:
@@ -87,17 +105,20 @@ def _beside_near(best: Line, near: list[Line], cost_ratios: dict[str, FloatArray
     )
 
 
-def _solvers(near: list[Line], far: list[Line], means: dict[str, float]) -> list[str]:
+def _solvers(near: list[Line], far: list[Line], means: dict[str, Mean]) -> list[str]:
     out = []
-    if near:
-        out.append(f"- The best solver that looks no further than the paper's horizon is {_name(near[0], means)}.")
-    if far:
-        out.append(f"- The best solver that looks further is {_name(far[0], means)}.")
+    for line, how in [*((one, "no further than the paper's horizon") for one in near[:1])] + [
+        (one, f"further, {one.preview:,} steps ahead,") for one in far[:1]
+    ]:
+        out.append(
+            f"- The best solver that looks {how} is {_name(line, means)}; it loses track in {line.lost} of {line.runs} "
+            "runs."
+        )
     return out
 
 
-def _name(line: Line, means: dict[str, float]) -> str:
-    return f"{quoted(line)} ({number(means[line.label])})"
+def _name(line: Line, means: dict[str, Mean]) -> str:
+    return f"{quoted(line)} ({means[line.label]})"
 
 
 def quoted(line: Line) -> str:

@@ -7,38 +7,44 @@ import datetime
 import pathlib
 import shlex
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Annotated, Final, Literal
 
 import tyro
+from matplotlib.figure import Figure
 
 from baselines import command as shared
 from baselines.evaluation.machine import describe
-from baselines.evaluation.pages import cost_time, families, leaderboard, sets
-from baselines.evaluation.pages.entries import FORESIGHT, HORIZONS, Entry, agents, playing, solvers
+from baselines.evaluation.pages import cost_time, families, foresight, leaderboard, sets, tuning
+from baselines.evaluation.pages.entries import FORESIGHT, HORIZONS, Entry, agents, playing, shipped, solvers
 from baselines.evaluation.pages.markdown import table
 from baselines.evaluation.pages.measure import measure
 from baselines.evaluation.pages.measurement import Measurement, Section
-from baselines.evaluation.pages.tuning import DATA, EPISODES, Tuning, tune
+from baselines.evaluation.pages.tuning import EPISODES, tune
 from baselines.evaluation.plots.style import small_png
 from baselines.evaluation.report import number
 from baselines.files import write
 from baselines.files.locks import locked
+from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError
 from ikgym.validation import whole_number
 
 #: The names of the pages on the command line.
-Page = Literal["leaderboard", "cost-time"]
+Page = Literal["leaderboard", "cost-time", "foresight", "leaderboard-skew"]
 LEADERBOARD: Final = "leaderboard"
 COST_TIME: Final = "cost-time"
+FORESIGHT_PAGE: Final = "foresight"
+#: The leaderboards, and the main test set of each.
+LEADERBOARDS: Final = {LEADERBOARD: sets.MAIN, "leaderboard-skew": sets.SKEW}
 
 
 @dataclasses.dataclass(frozen=True)
 class Options:
     """What the command line takes."""
 
-    pages: Annotated[tuple[Page, ...], tyro.conf.arg(metavar="PAGE …")] = (LEADERBOARD, COST_TIME)
-    """The pages: leaderboard, cost-time. What both need is played once."""
+    pages: Annotated[tuple[Page, ...], tyro.conf.arg(metavar="PAGE …")] = (LEADERBOARD, COST_TIME, FORESIGHT_PAGE)
+    """The pages: leaderboard, cost-time, foresight, leaderboard-skew. What several need is played once. If left out
+    all but the last, which stands on the papers' own skew coordinates."""
     out: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="DIR")] = None
     """Folder for the results. If left out nothing is played, and --write writes the pages anew from what lies beside
     them."""
@@ -46,14 +52,14 @@ class Options:
     """Folder for the pages, such as docs; what was measured goes beside each as .json, plots into images/. That of the
     results if left out."""
     agents: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=DIR …")] = ()
-    """Agents for the leaderboard: what to call each, and the folder of its training seeds, with
-    DIR/seed-N/agent.safetensors and DIR/seed-N/run.json."""
+    """Agents for the leaderboard besides those that come with the package: what to call each, and the folder of its
+    training seeds, with DIR/seed-N/agent.safetensors and DIR/seed-N/run.json."""
     sets: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME …")] = ()
-    """Test sets and scenarios of the cost-time page. If left out all test sets, and the fixed scenarios but for those
-    that hold their points."""
+    """Test sets and scenarios of the cost-time page. If left out the test sets of whole poses, and the fixed scenarios
+    but for those that hold their points. With --tune the scenario whose validation episodes are played."""
     tune: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None
     """Search the settings of all solvers on validation episodes, and write them here; nothing else is done. The
-    leaderboard reads baselines/data/tuned.json."""
+    leaderboards read baselines/data/tuned/SCENARIO.json."""
     episodes: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
     """The first so many episodes of each set, or of the search, for trials."""
     quick: bool = False
@@ -73,18 +79,19 @@ PROGRAM = "python -m baselines.leaderboard"
 def manual(prog: str) -> str:
     """The text of ``--help`` above the options."""
     return f"""\
-Plays trained agents and all solvers on test sets and scenarios, and writes the leaderboard and the cost-time page.
+Plays trained agents and all solvers on test sets and scenarios, and writes the leaderboard, the cost-time page and the
+foresight page.
 
 Examples:
-  {prog} --tune baselines/data/tuned.json
+  {prog} --tune baselines/data/tuned/{sets.MAIN}.json --sets {sets.MAIN}
   {prog} --out results/pages --agents "PPO=results/ppo" --write docs
   {prog} --pages cost-time --out results/quick --quick
   {prog} --write docs
 
 Files:
   DIR/SET/results.json             rows as those of evaluate
-  leaderboard.md, cost_time.md     what the numbers say, tables and plots
-  leaderboard.json, cost_time.json what they are made from
+  leaderboard.md, cost_time.md …   what the numbers say, tables and plots
+  leaderboard.json …               what they are made from
   images/*.png                     the plots"""
 
 
@@ -94,7 +101,7 @@ QUICK = ("dls", "mfac", "rhc_gradient", *HORIZONS[:2], FORESIGHT)
 QUICK_SETS, SHORT = (sets.MAIN, "varga7-fast"), (3, 10, 30)
 
 
-def measured(options: Options, command: str, tuning: Tuning) -> dict[str, Measurement]:
+def measured(options: Options, command: str) -> dict[str, Measurement]:
     """What the pages are made from: played, or read from the files beside them.
 
     Raises:
@@ -108,7 +115,7 @@ def measured(options: Options, command: str, tuning: Tuning) -> dict[str, Measur
         if options.agents:
             raise InvalidInputError("--agents are played: expected --out, where the results go.")
         return {page: _read(_file(options.write, page).with_suffix(".json")) for page in options.pages}
-    entered = _entered(options, tuning)
+    entered = _entered(options)
     found: dict[str, list[Section]] = {page: [] for page in options.pages}
     for name in dict.fromkeys(name for by_set in entered.values() for name in by_set):
         sections = measure(
@@ -126,7 +133,7 @@ def measured(options: Options, command: str, tuning: Tuning) -> dict[str, Measur
     return {page: Measurement(command, _today(), describe(), tuple(sections)) for page, sections in found.items()}
 
 
-def draw_up(measurement: Measurement, page: str, tuning: Tuning, folder: pathlib.Path) -> None:
+def draw_up(measurement: Measurement, page: str, folder: pathlib.Path) -> None:
     """Writes a page, its plots, and what they are made from.
 
     Raises:
@@ -136,11 +143,28 @@ def draw_up(measurement: Measurement, page: str, tuning: Tuning, folder: pathlib
     file = _file(folder, page)
     with locked(folder):
         measurement.save(file.with_suffix(".json"))
-        drawn = (leaderboard if page == LEADERBOARD else cost_time).pictures(measurement)
-        for where, figure in drawn:
+        for where, figure in pictures(measurement, page):
             write(folder / where, small_png(figure))
-        text = leaderboard.page(measurement, tuning) if page == LEADERBOARD else cost_time.page(measurement)
-        write(file, text.encode())
+        write(file, text(measurement, page).encode())
+
+
+def pictures(measurement: Measurement, page: str) -> Iterator[tuple[pathlib.PurePath, Figure]]:
+    """The plots of a page, and where they lie, seen from it."""
+    if page in LEADERBOARDS:
+        return leaderboard.pictures(measurement, page)
+    return foresight.pictures(measurement) if page == FORESIGHT_PAGE else cost_time.pictures(measurement)
+
+
+def text(measurement: Measurement, page: str) -> str:
+    """A page as Markdown.
+
+    Raises:
+        ResultsError: The settings of the tuned solvers cannot be read.
+        MissingDependencyError: There is no scipy.
+    """
+    if page in LEADERBOARDS:
+        return leaderboard.page(measurement, tuning.of(LEADERBOARDS[page]), page)
+    return foresight.page(measurement) if page == FORESIGHT_PAGE else cost_time.page(measurement)
 
 
 def search(options: Options, command: str, file: pathlib.Path) -> str:
@@ -149,7 +173,17 @@ def search(options: Options, command: str, file: pathlib.Path) -> str:
     Raises:
         IkgymError: Something expected went wrong, see :func:`baselines.evaluation.pages.tuning.tune`.
     """
-    found = tune(command, _today(), episodes=options.episodes or EPISODES, workers=options.workers, progress=True)
+    if len(options.sets) > 1:
+        raise InvalidInputError(f"--tune: expected one scenario in --sets, got {', '.join(options.sets)}.")
+    (name,) = options.sets or (sets.MAIN,)
+    found = tune(
+        command,
+        _today(),
+        scenarios.get(name),
+        episodes=options.episodes or EPISODES,
+        workers=options.workers,
+        progress=True,
+    )
     found.save(file)
     lines = [
         [one.spec, *map(number, (one.default, one.tuned, one.tuned / one.default)), str(dict(one.settings))]
@@ -158,17 +192,21 @@ def search(options: Options, command: str, file: pathlib.Path) -> str:
     return "\n".join(table(["solver", "as it is", "tuned", "ratio", "settings"], lines, text=(0, 4)))
 
 
-def _entered(options: Options, tuning: Tuning) -> dict[str, dict[str, list[Entry]]]:
+def _entered(options: Options) -> dict[str, dict[str, list[Entry]]]:
     """Who plays what, by page and set of episodes."""
     out: dict[str, dict[str, list[Entry]]] = {}
-    if LEADERBOARD in options.pages:
-        everyone = [*agents(options.agents), *_quick(options, solvers(tuning.settings))]
-        out[LEADERBOARD] = {name: playing(name, everyone) for name in sets.leaderboard()}
+    for page, main in LEADERBOARDS.items():
+        if page in options.pages:
+            tuned = tuning.of(main).settings
+            everyone = [*agents(options.agents), *shipped(), *_quick(options, solvers(tuned))]
+            out[page] = {name: playing(name, everyone, main) for name in sets.leaderboard(main)}
     if COST_TIME in options.pages:
         names = options.sets or (QUICK_SETS if options.quick else sets.cost_time())
         compared = families.entries(SHORT if options.quick else families.HORIZONS)
         first = [dataclasses.replace(one, variants=one.variants[:1], seeds=one.seeds[:1]) for one in compared]
         out[COST_TIME] = {name: first if options.quick else list(compared) for name in names}
+    if FORESIGHT_PAGE in options.pages:
+        out[FORESIGHT_PAGE] = {name: list(foresight.entries()) for name in sets.foresight()}
     return out
 
 
@@ -215,9 +253,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
             print(search(options, command, options.tune))
             print(f"written to {options.tune}")
             return 0
-        folder, tuning = options.write or options.out or pathlib.Path(), Tuning.load(DATA)
-        for page, measurement in measured(options, command, tuning).items():
-            draw_up(measurement, page, tuning, folder)
+        folder = options.write or options.out or pathlib.Path()
+        for page, measurement in measured(options, command).items():
+            draw_up(measurement, page, folder)
             print(f"written to {_file(folder, page)}")
         return 0
 

@@ -10,7 +10,9 @@ from types import MappingProxyType
 from typing import Any
 
 from baselines import registry
+from baselines.agents import files, untrusted
 from baselines.agents.policy import LearnedPolicy
+from baselines.agents.shipped import ShippedAgent
 from baselines.evaluation.pages.sets import MAIN
 from baselines.files import ResultsError, json_files
 from baselines.solvers.receding_horizon.rhc import RecedingHorizon
@@ -23,7 +25,11 @@ PAPER = 2
 FORESIGHT = "rhc_foresight"
 #: Receding horizons beside those that are registered: the paper's, to the optimum and with one iteration, and long
 #: ones with move blocks.
-BLOCKED = ("rhc:horizon=100,iterations=1,move_blocks=23", "rhc:horizon=200,iterations=1,move_blocks=27")
+BLOCKED = (
+    "rhc:horizon=100,iterations=1,move_blocks=23",
+    "rhc:horizon=200,iterations=1,move_blocks=27",
+    "rhc:horizon=400,iterations=1,move_blocks=30",
+)
 #: The same for a policy that is shown the full orientation.
 FULL_ORIENTATION = tuple(
     f"full_orientation:policy=rhc,options={{'horizon': {horizon}, 'iterations': 1, 'move_blocks': {blocks}}}"
@@ -39,6 +45,9 @@ GENERAL = (
 ENOUGH = 5
 #: Episodes of each policy that are played with the clock.
 TIMED = 2
+#: The share of a set's episodes, the first ones, that is played by who takes longer than all others together would:
+#: receding horizons to the optimum over more steps than this, and with more knots than this.
+FEWER, COSTLY_HORIZON, COSTLY_KNOTS = 1 / 8, 30, 150
 #: Seeds of a policy that draws at random.
 SEEDS = (0, 1, 2)
 
@@ -71,6 +80,7 @@ class Entry:
         settings: Parameters that were searched on validation episodes; none for a solver as it is, and for agents.
         training: What it has cost to train; None for solvers.
         timed: Episodes of each seed that are played with the clock.
+        share: Of the episodes, the first ones, that it plays.
     """
 
     name: str
@@ -79,6 +89,7 @@ class Entry:
     settings: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     training: Training | None = None
     timed: int = TIMED
+    share: float = 1.0
 
     @property
     def label(self) -> str:
@@ -110,8 +121,8 @@ def short(name: str) -> str:
 def solvers(tuned: Mapping[str, Mapping[str, Any]] = MappingProxyType({})) -> tuple[Entry, ...]:
     """All registered solvers as they are, some receding horizons, and what tuning made of them.
 
-    References, which have privileged information, are left out, and so are examples for one scenario, and agents that
-    come with the package: agents are entered with all of their training seeds, see :func:`agents`.
+    References, which have privileged information, are left out, and so are examples for one scenario, and agents, see
+    :func:`shipped` and :func:`agents`.
 
     Args:
         tuned: The best settings of solvers, by their specs; one that they do not change is not listed twice.
@@ -134,16 +145,40 @@ def solver(spec: str, settings: Mapping[str, Any] = MappingProxyType({}), *, tim
     name, parameters = parse_policy(spec)
     given, kind = {**parameters, **settings}, registry.get(name)
     draws = issubclass(kind, RecedingHorizon) and (kind.starts > 1 or kind.restart_steps > 0)
+    share = FEWER if issubclass(kind, RecedingHorizon) and _costly(kind, given) else 1.0
     if not draws:
-        return Entry(spec, ((name, given),), settings=dict(settings), timed=timed)
-    return Entry(spec, tuple((name, {**given, "seed": seed}) for seed in SEEDS), SEEDS, dict(settings), timed=timed)
+        return Entry(spec, ((name, given),), settings=dict(settings), timed=timed, share=share)
+    seeded = tuple((name, {**given, "seed": seed}) for seed in SEEDS)
+    return Entry(spec, seeded, SEEDS, dict(settings), timed=timed, share=share)
 
 
-def playing(name: str, entries: Sequence[Entry]) -> list[Entry]:
-    """Who plays a set of the leaderboard: all on the main test set; agents and some solvers, untimed, elsewhere."""
+def _costly(kind: type[RecedingHorizon], given: Mapping[str, Any]) -> bool:
+    """Whether a receding horizon takes so long that it plays fewer episodes."""
+    horizon, blocks = given.get("horizon", kind.horizon), given.get("move_blocks", kind.move_blocks)
+    to_the_optimum = given.get("iterations", kind.iterations) is None
+    return bool((to_the_optimum and horizon > COSTLY_HORIZON) or (blocks or horizon - 1) > COSTLY_KNOTS)
+
+
+def playing(name: str, entries: Sequence[Entry], main: str = MAIN) -> list[Entry]:
+    """Who plays a set of a leaderboard: all on its main test set; agents and some solvers, untimed, elsewhere."""
     return [
-        one if name == MAIN else dataclasses.replace(one, timed=0) for one in entries if name == MAIN or one.general
+        one if name == main else dataclasses.replace(one, timed=0) for one in entries if name == main or one.general
     ]
+
+
+def shipped() -> tuple[Entry, ...]:
+    """The agents that come with the package, each with the one training seed that was kept."""
+    classes = {name: registry.get(name) for name in registry.names()}
+    return tuple(_shipped(name, kind) for name, kind in classes.items() if issubclass(kind, ShippedAgent))
+
+
+def _shipped(name: str, kind: type[ShippedAgent]) -> Entry:
+    about = files.parse_agent(name, untrusted.read(kind.folder / f"{name}{untrusted.SUFFIX}")).about
+    trained, cost = about["training"], about["training"]["training"]
+    training = Training(
+        trained["method"], about["processing"]["base_policy"], (cost["steps"],), (cost["core_minutes"],)
+    )
+    return Entry(name, ((name, {}),), (trained["seed"],), training=training)
 
 
 def agent(name: str, directory: pathlib.Path) -> Entry:
@@ -182,7 +217,7 @@ def agents(given: Sequence[str]) -> tuple[Entry, ...]:
         InvalidInputError: A text has another form, or two agents, or an agent and a solver, share a name.
         ResultsError: See :func:`agent`.
     """
-    taken = {entry.name for entry in solvers()}
+    taken = {entry.name for entry in (*solvers(), *shipped())}
     out: dict[str, Entry] = {}
     for text in given:
         name, _, directory = (part.strip() for part in text.partition("="))

@@ -13,11 +13,22 @@ from baselines.evaluation.pages import leaderboard_plots as plots
 from baselines.evaluation.pages import sets
 from baselines.evaluation.pages.claims import few, quoted, sentences
 from baselines.evaluation.pages.entries import ENOUGH, FORESIGHT, PAPER, label, short
-from baselines.evaluation.pages.markdown import IMAGES, collapsed, conditions, episodes, runs, share, table, time
+from baselines.evaluation.pages.markdown import (
+    IMAGES,
+    between,
+    collapsed,
+    conditions,
+    episodes,
+    fewer_episodes,
+    lost,
+    runs,
+    share,
+    table,
+    time,
+)
 from baselines.evaluation.pages.measurement import (
     AGENT,
     FAR,
-    LOST,
     NEAR,
     REFERENCE,
     RESIDUAL,
@@ -25,14 +36,14 @@ from baselines.evaluation.pages.measurement import (
     Measurement,
     Section,
 )
-from baselines.evaluation.pages.statistics import interval
-from baselines.evaluation.pages.tuning import UPDATE, Tuning
+from baselines.evaluation.pages.statistics import geometric_interval, interval
+from baselines.evaluation.pages.tuning import Tuning
 from baselines.evaluation.report import NOTHING, number
 from baselines.evaluation.summary import Spread
 from ikgym.validation import FloatArray
 
-#: The plots, seen from the page.
-MEANS, PROFILES = IMAGES / "leaderboard-means.png", IMAGES / "leaderboard-profiles.png"
+#: The plots, seen from the page, as the page is called.
+MEANS, PROFILES = "{}-means.png", "{}-profiles.png"
 #: Lines of the profiles besides agents: the best that look further, and the best that do not.
 SHOWN = {FAR: 2, NEAR: 5}
 ORACLE = "oracle"
@@ -40,11 +51,25 @@ ORACLE = "oracle"
 WITHIN = (0.010, 0.001)
 DETERMINISTIC = "deterministic"
 
-INTRODUCTION = f"""\
-Trained agents beside all solvers, on the [test set](evaluation.md#test-sets) `{sets.MAIN}`: 64 test episodes that
+INTRODUCTION = """\
+Trained agents beside all solvers, on the [test set](evaluation.md#test-sets) `{name}`: {count} test episodes that
 nobody was trained or tuned on. Written by `python -m baselines.leaderboard`, see [conditions](#conditions); everything
-below is worked out from what was measured, which lies in [leaderboard.json](leaderboard.json).
+below is worked out from what was measured, which lies in [{file}]({file}).
 """
+#: What has to be said of the pages before that.
+ABOUT = {
+    sets.MAIN: """\
+The arm tracks the whole pose. [leaderboard_skew.md](leaderboard_skew.md) has the same motions in the papers' own skew
+coordinates, in which a wrong orientation can be cheaper than the right one. The agents are those that come with the
+package, which were trained on whole poses; of each one training seed was kept.
+""",
+    sets.SKEW: """\
+**The papers' own coordinates, as they were measured for the test sets of version 0.2.0**, and not since: an arm counted
+as lost by its position alone, and agents that were shown skew coordinates stand here. The
+[leaderboard](leaderboard.md) is that of whole poses: the cost of skew coordinates is the same for some wrong
+orientations, and [rewards them now and then](evaluation.md#what-skew-coordinates-reward).
+""",
+}
 
 LEGEND = f"""\
 - **Cost ratio** is the total cost divided by the [best known cost](evaluation.md#best-known-costs) of the episode. A
@@ -57,8 +82,8 @@ LEGEND = f"""\
 - **Seeds**: solvers are `{DETERMINISTIC}`, their interval is over episodes alone. Of `{FORESIGHT}`, which draws at
   random, they are seeds of the policy; of agents seeds of training, and with fewer than {ENOUGH} an agent is no
   benchmark. All numbers of a line are over the runs of all of its seeds.
-- **≤ 10 mm, ≤ 1 mm** are the shares of runs in which the arm was at no time farther from where it should have been;
-  **lost** is the share in which it was farther than {1e3 * LOST:g} mm at some time.
+- **Foresight** is how many steps ahead a policy looks.
+- **≤ 10 mm, ≤ 1 mm** are the shares of runs in which the arm was at no time farther from where it should have been.
 - **p50, p99** are of single calls of `predict` after the first, in [µs], in episodes that were played alone: the median
   of the medians, and the largest 99th percentile.
 - **Steps** (of the environment, or samples) and **core-min** (minutes × cores) are what a training seed has cost, in
@@ -76,19 +101,19 @@ ones the best solvers.
 """
 
 
-def pictures(measurement: Measurement) -> Iterator[tuple[pathlib.PurePath, Figure]]:
-    """The plots, and where they lie, seen from the page."""
+def pictures(measurement: Measurement, called: str = "leaderboard") -> Iterator[tuple[pathlib.PurePath, Figure]]:
+    """The plots, and where they lie, seen from the page of that name."""
     section = measurement.sections[0]
     cost_ratios, spreads = section.cost_ratios(), section.spreads()
     marks = [plots.Mean(f"{ORACLE} (best known)", REFERENCE, 1.0, 1.0, 1.0)]
     for line in section.ranked():
-        low, high = _interval(cost_ratios[line.label])
+        low, high = geometric_interval(cost_ratios[line.label])
         marks.append(plots.Mean(_plain(line), line.kind, spreads[line.label].mean, low, high))
     title = f"{section.name}, {len(section.seeds)} test episodes"
-    yield MEANS, plots.means(title, marks)
+    yield IMAGES / MEANS.format(called), plots.means(title, marks)
     shown = profiled(section)
     curves = {_plain(line): cost_ratios[line.label] for line in shown}
-    yield PROFILES, plots.profiles(title, curves, {_plain(line): line.kind for line in shown})
+    yield IMAGES / PROFILES.format(called), plots.profiles(title, curves, {_plain(line): line.kind for line in shown})
 
 
 def profiled(section: Section) -> list[Line]:
@@ -103,30 +128,36 @@ def profiled(section: Section) -> list[Line]:
     return out
 
 
-def page(measurement: Measurement, tuning: Tuning) -> str:
+def page(measurement: Measurement, tuning: Tuning, called: str = "leaderboard") -> str:
     """The page as Markdown.
 
     Args:
         measurement: What was measured; its first section is the main test set.
         tuning: How the tuned solvers came to their settings.
+        called: The name of the page, which its pictures have, too.
 
     Raises:
         MissingDependencyError: There is no scipy, which the intervals need.
     """
     section = measurement.sections[0]
-    out = ["# Leaderboard", "", INTRODUCTION, "## What it says", "", *sentences(section), ""]
-    out += ["## All lines", "", f"![Geometric means of the cost ratio]({MEANS.as_posix()})", ""]
-    out += [*_main(section), "", LEGEND, *_medians(section)]
-    out += ["## Performance profiles", "", f"![Performance profiles]({PROFILES.as_posix()})", "", PROFILE]
+    means, profiles = ((IMAGES / name.format(called)).as_posix() for name in (MEANS, PROFILES))
+    about = {"name": section.name, "count": len(section.seeds), "file": f"{called.replace('-', '_')}.json"}
+    out = [f"# Leaderboard: {section.name}", "", INTRODUCTION.format(**about), ABOUT[section.name]]
+    out += ["## What it says", "", *sentences(section), ""]
+    out += ["## All lines", "", f"![Geometric means of the cost ratio]({means})", ""]
+    out += [*_main(section), "", f"- **Lost** is the share of runs in which the arm was {lost(section)} at some time."]
+    out += [LEGEND, *fewer_episodes(section), *_medians(section)]
+    out += ["## Performance profiles", "", f"![Performance profiles]({profiles})", "", PROFILE]
     out += [*_generalisation(measurement.sections[1:]), *_tuned(tuning), *conditions(measurement)]
     return "\n".join(out) + "\n"
 
 
 def _main(section: Section) -> list[str]:
     cost_ratios, spreads = section.cost_ratios(), section.spreads()
-    head = ["policy", "kind", "cost ratio", "95 %", "median", "p90", "worst", *(f"≤ {1e3 * w:g} mm" for w in WITHIN)]
+    head = ["policy", "kind", "foresight", "cost ratio", "95 %", "median", "p90", "worst"]
+    head += [f"≤ {1e3 * w:g} mm" for w in WITHIN]
     head += ["lost", "p50 [µs]", "p99 [µs]", "seeds", "steps", "core-min"]
-    lines = [[f"`{ORACLE}`", REFERENCE, "1.000", NOTHING, *["1.000"] * 3, *[NOTHING] * 8]]
+    lines = [[f"`{ORACLE}`", REFERENCE, "all", "1.000", NOTHING, *["1.000"] * 3, *[NOTHING] * 8]]
     best: set[str] = set()
     for line in section.ranked():
         spread, first = spreads[line.label], line.kind not in best
@@ -134,15 +165,16 @@ def _main(section: Section) -> list[str]:
         cells = [
             quoted(line),
             line.kind + (", tuned" if line.settings else ""),
+            f"{line.preview:,}",
             number(spread.mean),
-            _range(cost_ratios[line.label]),
+            between(cost_ratios[line.label]),
             *map(number, (spread.median, spread.p90, spread.worst)),
             *map(share, (*map(line.within, WITHIN), line.lost / line.runs)),
             *map(time, (line.time_p50_us, line.time_p99_us)),
             _seeds(line),
             *_cost(line),
         ]
-        lines.append([f"**{cell}**" if first and column in (0, 2) else cell for column, cell in enumerate(cells)])
+        lines.append([f"**{cell}**" if first and column in (0, 3) else cell for column, cell in enumerate(cells)])
     return table(head, lines, text=(0, 1))
 
 
@@ -152,16 +184,15 @@ def _medians(section: Section) -> list[str]:
         [
             quoted(line),
             number(spreads[line.label].median),
-            _range(cost_ratios[line.label], np.median),
-            str(line.preview),
+            between(cost_ratios[line.label], lambda values: interval(values, np.median)),
             runs(line, section),
             str(line.timed),
             time(line.time_first_us),
         ]
         for line in section.ranked()
     ]
-    head = ["policy", "median", "95 %", "steps ahead", "runs", "timed", "first call [µs]"]
-    summary = "Intervals of the median, how far each looks ahead, runs and first calls"
+    head = ["policy", "median", "95 %", "runs", "timed", "first call [µs]"]
+    summary = "Intervals of the median, runs and first calls"
     return collapsed(summary, table(head, lines, text=(0,)))
 
 
@@ -190,18 +221,20 @@ def _generalisation(sections: Sequence[Section]) -> list[str]:
 
 
 def _changed(line: Line, cost_ratios: FloatArray, spread: Spread) -> list[str]:
-    between = _range(cost_ratios) if line.runs > 1 else NOTHING
-    return [number(spread.mean), between, number(spread.worst), share(line.lost / line.runs)]
+    interval = between(cost_ratios) if line.runs > 1 else NOTHING
+    return [number(spread.mean), interval, number(spread.worst), share(line.lost / line.runs)]
 
 
 def _tuned(tuning: Tuning) -> list[str]:
     out = ["## Tuned solvers", ""]
+    if not tuning.solvers:
+        return [*out, f"No settings have been searched for this scenario: `{tuning.command}`.", ""]
     out += [
-        f"Searched with `{UPDATE}` on the first {tuning.episodes} {tuning.split} episodes of `{tuning.scenario}`, in "
-        "stages over grids, for the lowest geometric mean of the total cost (which needs no best known cost: dividing "
-        "by it changes no order). No test episode was played for it. What was searched is in "
-        "`baselines/evaluation/pages/grids.py`, the result in `baselines/data/tuned.json`. No setting lets a "
-        "solver look further ahead.",
+        f"Searched with `{tuning.command}` on the first {tuning.episodes} {tuning.split} episodes of "
+        f"`{tuning.scenario}`, in stages over grids, for the lowest geometric mean of the total cost (which needs no "
+        "best known cost: dividing by it changes no order). No test episode was played for it. What was searched is in "
+        f"`baselines/evaluation/pages/tuning/grids.py`, the result in `baselines/data/tuned/{tuning.scenario}.json`. "
+        "No setting lets a solver look further ahead.",
         "",
     ]
     lines = [
@@ -217,16 +250,6 @@ def _tuned(tuning: Tuning) -> list[str]:
     ]
     head = ["solver", "settings", "tried", "cost as it is", "cost tuned", "ratio"]
     return [*out, *table(head, lines, text=(0, 1)), ""]
-
-
-def _interval(values: FloatArray) -> tuple[float, float]:
-    low, high = interval(np.log(values))
-    return float(np.exp(low)), float(np.exp(high))
-
-
-def _range(values: FloatArray, statistic: object = None) -> str:
-    low, high = interval(values, statistic) if statistic is np.median else _interval(values)
-    return f"{number(low)} … {number(high)}"
 
 
 def _seeds(line: Line) -> str:

@@ -3,13 +3,23 @@
 from __future__ import annotations
 
 import pathlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
+from baselines.evaluation.metrics import LOST_ORIENTATION, LOST_POSITION
+from baselines.evaluation.pages.entries import COSTLY_HORIZON, COSTLY_KNOTS, FEWER
 from baselines.evaluation.pages.measurement import Line, Measurement, Section
-from baselines.evaluation.report import NOTHING
+from baselines.evaluation.pages.statistics import geometric_interval
+from baselines.evaluation.report import NOTHING, number
+from ikgym.validation import FloatArray
 
 #: Where the plots lie, seen from the page.
 IMAGES = pathlib.PurePath("images")
+# Who plays fewer episodes, and why.
+_FEWER = (
+    f"Receding horizons to the optimum over more than {COSTLY_HORIZON} steps, and those with more than {COSTLY_KNOTS} "
+    "knots, would take longer than all others together: they play the "
+    f"first {100.0 * FEWER:g} % of the episodes, which the number of their episodes says in bold."
+)
 _TIMES = (
     "Times are those of single calls on one thread, with nothing else under way: garbage collection off, one call "
     "before that."
@@ -38,14 +48,37 @@ def share(value: float | None) -> str:
     return NOTHING if value is None else f"{100.0 * value:.0f} %"
 
 
+def between(values: FloatArray, interval: Callable[[FloatArray], tuple[float, float]] = geometric_interval) -> str:
+    """The interval of what several runs came to as a cell, that of the geometric mean if no other is given.
+
+    Args:
+        values: One row a seed, one column an episode. Shape (s, e).
+        interval: Gives its lower and upper end.
+    """
+    low, high = interval(values)
+    return f"{number(low)} … {number(high)}"
+
+
+def lost(section: Section) -> str:
+    """When an arm counts as lost there, in words."""
+    far = f"more than {1e3 * LOST_POSITION:g} mm away from where it should have been"
+    return f"{far}, or turned away by more than {LOST_ORIENTATION:g} rad," if section.oriented else far
+
+
+def fewer_episodes(section: Section) -> list[str]:
+    """Who has played fewer episodes there, and why; nothing where nobody has."""
+    return [_FEWER, ""] if any(line.episodes < len(section.seeds) for line in section.lines) else []
+
+
 def time(microseconds: float | None) -> str:
     """A time as a cell."""
     return NOTHING if microseconds is None else f"{microseconds:,.0f}"
 
 
 def runs(line: Line, section: Section) -> str:
-    """Seeds × episodes as a cell."""
-    return f"{max(len(line.seeds), 1)} × {len(section.seeds)}"
+    """Seeds × episodes as a cell; in bold where they are fewer than the set has."""
+    fewer = "**" * (line.episodes < len(section.seeds))
+    return f"{fewer}{max(len(line.seeds), 1)} × {line.episodes}{fewer}"
 
 
 def episodes(section: Section) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import math
 import pathlib
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, TypeVar
@@ -49,14 +50,15 @@ def plan(
     for one in everyone:
         for variant in one.variants:
             try:
-                jobs = make_plan(played, [variant], timed=max(one.timed, 1), **kind).jobs[:episodes]
+                jobs = make_plan(played, [variant], timed=max(one.timed, 1), **kind).jobs
             except InvalidInputError:
                 if variant[0] in skipped:
                     continue
                 raise
             # No trajectory log is kept: there are many entries, and nobody draws them.
             timed = one.timed > 0
-            kept = (dataclasses.replace(job, first=False, timed=job.timed and timed) for job in jobs)
+            some = jobs[: math.ceil(one.share * len(jobs))][:episodes]
+            kept = (dataclasses.replace(job, first=False, timed=job.timed and timed) for job in some)
             out.setdefault(one.label, []).extend(kept)
     if missing := [one.label for one in everyone if one.training and one.label not in out]:
         name = where if isinstance(where, str) else where.name
@@ -150,7 +152,8 @@ def measure(
     rows = play(merged, out / slug(name), **options)
     sections = {}
     for page, some in entries.items():
-        first = next(iter(plans[page].values()))
+        # Some play fewer episodes, but not all of them do.
+        first = max(plans[page].values(), key=lambda jobs: len({job.seed for job in jobs}))
         sections[page] = Section(
             name=name,
             fingerprint=first[0].fingerprint,

@@ -20,8 +20,6 @@ from baselines.oracle import best_known
 from ikgym.exceptions import IkgymError, InvalidInputError
 from ikgym.validation import FloatArray
 
-#: An arm that was farther from its nominal position than this has lost track, in [m].
-LOST = 0.05
 #: Of the files; those of another one are refused.
 FORMAT = 2
 #: Kinds of lines, in the order of the legend.
@@ -39,15 +37,19 @@ class Line:
         settings: Parameters that were searched on validation episodes; none for a solver as it is, and for agents.
         preview: Steps ahead that it sees.
         seeds: Seeds of training, or of the policy; none where nothing is drawn at random.
-        cost: Total cost of each episode, a row a seed; one row where there is none.
+        cost: Total cost of each episode, a row a seed; one row where there is none. Who takes very long has played
+            fewer than the others, the first ones.
         error: Largest distance from the nominal position in [m], likewise; None in what was measured when only the
             number of runs that lost track was kept.
-        lost: How many runs lost track.
+        lost: How many runs lost track, see :func:`baselines.evaluation.metrics.lost`; where no angles are kept, by
+            their position alone.
         timed: Episodes that were played with the clock.
         time_p50_us: Median of the medians over the calls after the first, in [µs]; None where nothing was timed.
         time_p99_us: Largest 99th percentile of them, in [µs].
         time_first_us: Longest first call, in [µs].
         training: What it has cost to train; None for solvers.
+        angle: Largest geodesic angle to the nominal orientation in [rad], like the error; None where the scenario has
+            no orientation, and in what was measured when arms were lost by their position alone.
     """
 
     name: str
@@ -62,11 +64,13 @@ class Line:
     time_p99_us: float | None
     time_first_us: float | None
     training: Training | None
+    angle: Runs | None = None
 
     @classmethod
     def of(cls, entry: Entry, rows: Sequence[Row]) -> Self:
         """The line of an entry's rows, seed by seed."""
         clocked = times(rows)
+        angles = [row.orientation_error_max for row in rows if row.orientation_error_max is not None]
         p50, p99, first = (None if time is None else rounded(time) for time in clocked[1:])
         return cls(
             name=entry.name,
@@ -75,12 +79,13 @@ class Line:
             seeds=entry.seeds,
             cost=_by_seed(entry, (rounded(row.total_cost, DIGITS) for row in rows)),
             error=_by_seed(entry, (rounded(row.position_error_max) for row in rows)),
-            lost=sum(row.position_error_max > LOST for row in rows),
+            lost=sum(row.lost for row in rows),
             timed=clocked.timed,
             time_p50_us=p50,
             time_p99_us=p99,
             time_first_us=first,
             training=entry.training,
+            angle=_by_seed(entry, map(rounded, angles)) if angles else None,
         )
 
     @property
@@ -114,6 +119,11 @@ class Line:
         """Seeds × episodes."""
         return int(np.size(self.cost))
 
+    @property
+    def episodes(self) -> int:
+        """How many it has played, the first ones of the set."""
+        return len(self.cost[0])
+
 
 @dataclasses.dataclass(frozen=True)
 class Section:
@@ -136,9 +146,13 @@ class Section:
     @property
     def best_known(self) -> list[float] | None:
         """The best known cost of each episode; None where one is not known."""
-        scenario = sets.get(self.name)
-        costs = [cost for seed in self.seeds if (cost := best_known.cost(scenario, seed)) is not None]
+        costs = [cost for cost in best_known.costs(sets.get(self.name), self.seeds) if cost is not None]
         return costs if len(costs) == len(self.seeds) else None
+
+    @property
+    def oriented(self) -> bool:
+        """Whether arms count as lost by their orientation, too."""
+        return any(line.angle is not None for line in self.lines)
 
     @property
     def quantity(self) -> str:
@@ -156,7 +170,8 @@ class Section:
         """
         if (known := self.best_known) is not None:
             return np.array(known)
-        costs = [row for line in self.lines if line.label.partition(":")[0] == FORESIGHT for row in line.cost]
+        presets = [line for line in self.lines if line.label.partition(":")[0] == FORESIGHT]
+        costs = [row for line in presets for row in line.cost if len(row) == len(self.seeds)]
         if not costs:
             raise InvalidInputError(f"{self.name} has no best known costs, and {FORESIGHT} was not played to stand in.")
         lowest: FloatArray = np.array(costs).min(axis=0)
@@ -165,11 +180,11 @@ class Section:
     def cost_ratios(self) -> dict[str, FloatArray]:
         """The cost of each line relative to the reference, by its label. Shape (s, e) each."""
         reference = self.reference
-        return {line.label: np.array(line.cost) / reference for line in self.lines}
+        return {line.label: np.array(line.cost) / reference[: line.episodes] for line in self.lines}
 
     def spreads(self) -> dict[str, Spread]:
         """The cost ratio of each line over all of its runs, by its label."""
-        return {name: Spread.of(dict(enumerate(np.ravel(r).tolist()))) for name, r in self.cost_ratios().items()}
+        return {name: Spread.over(cost_ratios) for name, cost_ratios in self.cost_ratios().items()}
 
     def ranked(self) -> list[Line]:
         """The lines from the lowest geometric mean on."""
@@ -236,10 +251,12 @@ class Measurement:
 def _check_runs(section: Section) -> None:
     """Insists on a cost above 0 of each episode, and an error of each where they are kept."""
     for line in section.lines:
-        for name, runs in (("cost", line.cost), ("error", line.error)):
-            if runs is not None and not (runs and all(len(row) == len(section.seeds) > 0 for row in runs)):
+        for name, runs in (("cost", line.cost), ("error", line.error), ("angle", line.angle)):
+            lengths = {len(row) for row in (*(runs or ()), *line.cost)}
+            if runs is not None and not (runs and len(lengths) == 1 and 0 < lengths.pop() <= len(section.seeds)):
                 raise InvalidInputError(
-                    f"{section.name}, {line.label}: the key {name!r} should have {len(section.seeds)} episodes a row"
+                    f"{section.name}, {line.label}: the key {name!r} should have at most {len(section.seeds)} episodes "
+                    "a row, as many as it has costs"
                 )
         if any(cost < 0.0 for row in line.cost for cost in row):
             raise InvalidInputError(f"{section.name}, {line.label}: expected costs of at least 0")

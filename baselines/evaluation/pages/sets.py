@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Mapping
 
 from baselines.evaluation import test_sets
@@ -9,43 +10,53 @@ from ikgym import scenarios
 from ikgym.scenarios import Scenario
 from ikgym.trajectories import RandomSinusoid
 
-#: The test set that scores are published on.
-MAIN = "varga7-random"
+#: The test set that scores are published on, the long one beside it, and the one in the papers' own skew coordinates.
+MAIN, LONG, SKEW = "varga7-pose-random", "varga7-pose-random-long", "varga7-random"
 #: Episodes of a random scenario that is no test set: the first of the test split.
 EPISODES = 32
 
 
-def larger() -> Scenario:
+def larger(base: str) -> Scenario:
     """Amplitudes × 1.2."""
-    trajectory = _random()
-    return _changed("varga7-random-amplitude", trajectory.replace(amplitude=1.2 * trajectory.amplitude))
+    trajectory = _random(base)
+    return _changed(f"{base}-amplitude", base, trajectory.replace(amplitude=1.2 * trajectory.amplitude))
 
 
-def faster() -> Scenario:
+def faster(base: str) -> Scenario:
     """Frequencies up to 4 rad/s instead of 3 rad/s."""
-    return _changed("varga7-random-frequency", _random().replace(frequency=(1.0, 4.0)))
+    return _changed(f"{base}-frequency", base, _random(base).replace(frequency=(1.0, 4.0)))
 
 
-#: The scenarios of the leaderboard beside the main test set, and what is different in them.
+#: What a leaderboard plays beside its main test set, and what is different there.
 CHANGED: Mapping[str, tuple[Callable[[], Scenario], str]] = {
-    "varga7-random-amplitude": (larger, "amplitudes × 1.2"),
-    "varga7-random-frequency": (faster, "frequencies of 1 to 4 rad/s instead of 1 to 3 rad/s"),
-    "varga7-fast": (lambda: scenarios.get("varga7-fast"), "the fast trajectory of Varga 2021, 3,000 steps"),
+    "varga7-fast": (lambda: scenarios.get("varga7-fast"), "the fast trajectory of Varga 2021, 3,000 steps")
+} | {
+    f"{base}-{name}": (functools.partial(maker, base), what)
+    for base in (MAIN, SKEW)
+    for name, maker, what in (
+        ("amplitude", larger, "amplitudes × 1.2"),
+        ("frequency", faster, "frequencies of 1 to 4 rad/s instead of 1 to 3 rad/s"),
+    )
 }
 
 
-def leaderboard() -> tuple[str, ...]:
-    """What the leaderboard plays: the main test set, then the changed scenarios."""
-    return MAIN, *CHANGED
+def leaderboard(main: str = MAIN) -> tuple[str, ...]:
+    """What a leaderboard plays: its main test set, then the changed scenarios."""
+    return main, f"{main}-amplitude", f"{main}-frequency", "varga7-fast"
 
 
 def cost_time() -> tuple[str, ...]:
-    """What the cost–time page plays: the test sets, then the scenarios with one episode.
+    """What the cost–time page plays: the test sets of whole poses, then the scenarios with one episode.
 
     Those that hold their points are left out: there the task is to iterate.
     """
     every = map(scenarios.get, scenarios.names())
-    return *test_sets.names(), *(s.name for s in every if not s.random and s.counted()[1:].all())
+    return MAIN, LONG, *(s.name for s in every if not s.random and s.counted()[1:].all())
+
+
+def foresight() -> tuple[str, ...]:
+    """What the foresight page plays."""
+    return MAIN, LONG
 
 
 def get(name: str) -> Scenario:
@@ -60,11 +71,11 @@ def get(name: str) -> Scenario:
     return CHANGED[name][0]() if name in CHANGED else scenarios.get(name)
 
 
-def _random() -> RandomSinusoid:
-    trajectory = scenarios.get(MAIN).trajectory
+def _random(base: str) -> RandomSinusoid:
+    trajectory = scenarios.get(base).trajectory
     assert isinstance(trajectory, RandomSinusoid)  # the catalogue says so
     return trajectory
 
 
-def _changed(name: str, trajectory: RandomSinusoid) -> Scenario:
-    return scenarios.get(MAIN).replace(name=name, trajectory=trajectory)
+def _changed(name: str, base: str, trajectory: RandomSinusoid) -> Scenario:
+    return scenarios.get(base).replace(name=name, trajectory=trajectory)

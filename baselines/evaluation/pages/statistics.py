@@ -5,6 +5,7 @@ Scipy is needed for the intervals alone; it is no dependency of the package.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -78,6 +79,18 @@ def interval(
         random_state=np.random.default_rng(seed),
     ).confidence_interval
     return float(found.low), float(found.high)
+
+
+def geometric_interval(values: FloatArray) -> tuple[float, float]:
+    """The :func:`interval` of a geometric mean; see there."""
+    return _geometric_interval(values.tobytes(), values.shape)
+
+
+@functools.lru_cache(maxsize=4096)
+def _geometric_interval(values: bytes, shape: tuple[int, int]) -> tuple[float, float]:
+    """Several tables and a plot show the same interval, and each takes a while."""
+    low, high = interval(np.log(np.frombuffer(values).reshape(shape)))
+    return float(np.exp(low)), float(np.exp(high))
 
 
 def profile(cost_ratios: FloatArray, ratios: Sequence[float] | FloatArray) -> FloatArray:

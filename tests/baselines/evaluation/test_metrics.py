@@ -11,7 +11,7 @@ import baselines
 import ikgym
 from baselines.canonical import jsonable
 from baselines.evaluate import evaluate
-from baselines.evaluation.metrics import TIME_COLUMNS, Row, measure
+from baselines.evaluation.metrics import TIME_COLUMNS, Row, lost, measure
 from baselines.evaluation.rollout import Episode, rollout
 from baselines.evaluation.summary import Spread, geometric_mean, summarise
 from baselines.policy import Operations
@@ -433,6 +433,37 @@ def test_rows_of_different_content_are_not_put_together(change):
     with pytest.raises(InvalidInputError, match="results of 'zhang3-helix' cannot be put together"):
         summarise([base, other])
     assert len(summarise([base, dataclasses.replace(other, scenario="another")])) == 2
+
+
+@pytest.mark.parametrize(
+    ("position", "angle", "expected"),
+    [
+        (0.05, 0.3, False),
+        (0.0501, 0.0, True),
+        (0.0, 0.301, True),
+        (0.0501, None, True),
+        (0.05, None, False),
+        (math.nan, 0.0, True),
+        (0.0, math.nan, True),
+    ],
+)
+def test_lost_by_position_or_orientation(position, angle, expected):
+    assert lost(position, angle) is expected
+    row = row_of(position_scenario(), handmade())
+    row = dataclasses.replace(row, position_error_max=position, orientation_error_max=angle)
+    assert row.lost is expected
+    (summary,) = summarise([row, dataclasses.replace(row, seed=77, position_error_max=9.0)])
+    assert summary.lost == 1 + expected
+
+
+def test_who_tracks_skew_coordinates_with_a_wrong_orientation_has_lost():
+    """The cost of skew coordinates is low there: a test episode of `varga7-random` that looked well by distance."""
+    where = scenario("varga7-random")
+    policy = baselines.make("rhc", where, horizon=200, iterations=1, move_blocks=27)
+    row = row_of(where, rollout(where, policy, 2_000_018, preview=policy.preview))
+    assert row.position_error_max < 0.005
+    assert row.orientation_error_max > 0.35
+    assert row.lost
 
 
 def test_time_columns_are_columns():

@@ -18,6 +18,8 @@ def test_the_sets_are_what_they_were(name):
 
 def test_the_sets_are_the_published_ones():
     assert {name: (one.episodes, one.split, one.scenario.steps) for name, one in test_sets.SETS.items()} == {
+        "varga7-pose-random": (256, "test", 1000),
+        "varga7-pose-random-long": (32, "test", 3000),
         "varga7-random": (64, "test", 1000),
         "varga7-random-long": (16, "test", 3000),
     }
@@ -26,6 +28,8 @@ def test_the_sets_are_the_published_ones():
 @pytest.mark.parametrize(
     ("name", "seed", "last"),
     [
+        ("varga7-pose-random", 2_000_063, (0.409194226944, -0.488632498827, 0.058888695021, -0.4727872721)),
+        ("varga7-pose-random-long", 2_000_015, (-0.320635318762, 0.603603897137, 0.978702510455, -0.630827291228)),
         ("varga7-random", 2_000_000, (0.331915028534, 0.437288000971, 0.46396646241, -0.218935014377)),
         ("varga7-random", 2_000_063, (0.409194226944, -0.488632498827, 0.058888695021, -0.4727872721)),
         ("varga7-random-long", 2_000_000, (-0.331498392441, -0.187385693911, -0.554270485681, 0.227408558174)),
@@ -57,7 +61,7 @@ def test_a_frozen_set_is_played_as_it_is():
         ("varga7-random", 1000, test_sets.SETS["varga7-random"].digest)
     }
     both = make_plan((), ["dls", "follow_nominal"], test_sets=test_sets.names()).jobs
-    assert len(both) == 2 * (64 + 16)
+    assert len(both) == 2 * (256 + 32 + 64 + 16)
     assert all(job.test_set is None for job in make_plan("varga7-random", "dls").jobs)
 
 

@@ -87,3 +87,12 @@ def test_two_evaluations_at_the_same_time_lose_no_row(tmp_path):
     rows = json.loads((tmp_path / "results.json").read_text())
     assert {row["policy"] for row in rows} == wanted
     assert not list(pathlib.Path(tmp_path).glob(".*"))
+
+
+def test_who_is_patient_waits(tmp_path):
+    with holder(tmp_path) as process:
+        with pytest.raises(ResultsError, match="in use"), locked(tmp_path, 0.1):
+            pass
+        process.send_signal(signal.SIGKILL)
+        with locked(tmp_path, 30.0):
+            assert (tmp_path / NAME).read_text() == str(os.getpid())

@@ -1,6 +1,8 @@
 import dataclasses
 import json
 import math
+import subprocess
+import sys
 
 import pytest
 
@@ -181,3 +183,21 @@ def test_a_record_that_is_too_high_does_not_go_unnoticed(file):
     assert [s.name for s in recorded()] == [NAME]
     with pytest.raises(AssertionError, match="write them down"):
         nobody_beats(recorded(), ["dls"])
+
+
+WRITER = """
+import pathlib, sys
+from baselines.oracle.best_known import Record, record
+path, first = pathlib.Path(sys.argv[1]), int(sys.argv[2])
+for seed in range(first, first + 40):
+    record([Record("varga7-random", seed, 1.0, "a test", 0.0, {}, "0" * 12)], path)
+"""
+
+
+def test_two_processes_lose_no_record(tmp_path):
+    path = tmp_path / "best.json"
+    command = [sys.executable, "-c", WRITER, str(path)]
+    writers = [subprocess.Popen([*command, str(first)]) for first in (0, 1000)]
+    assert [writer.wait() for writer in writers] == [0, 0]
+    assert [one.seed for one in read(path)] == [*range(40), *range(1000, 1040)]
+    assert [file.name for file in tmp_path.iterdir()] == ["best.json"]

@@ -45,6 +45,7 @@ CASES = {
     "another measured start": (short("zhang3-helix"), 0),
     "position": (short("faitli3-regular"), 0),
     "pose": (short("zhang6-lspb"), 0),
+    "random pose": (short("varga7-pose-random"), 1_000_003),
     "narrow limits": (short(velocity_limit=np.full(7, 5.0)), 0),
     "one step": (short(steps=1), 0),
 }
@@ -516,15 +517,15 @@ def test_records_of_frozen_sets_are_reproduced(name, seed):
 # An independent optimiser: CasADi's IPOPT.
 
 
-def agrees_with_ipopt(scenario, *, from_rest):
+def agrees_with_ipopt(scenario, seed=0, *, from_rest):
     from benchmarks.rivals.casadi_horizon import CasadiHorizon
     from benchmarks.rivals.numpy_horizon import Horizon, plan_cost
 
-    problem, nominal = Problem.of(scenario), scenario.nominal()
-    optimum = solve(scenario, 0, Search(starts=20, generations=0))
-    horizon = Horizon(scenario.nominal_joint_path()[0], nominal[1:])
+    problem, nominal = Problem.of(scenario), scenario.nominal(seed)
+    optimum = solve(scenario, seed, Search(starts=20, generations=0))
+    horizon = Horizon(scenario.nominal_joint_path(seed)[0], nominal[1:])
     assert plan_cost(problem, horizon, optimum.q) == pytest.approx(optimum.cost, rel=1e-9)
-    starts = {"ours": optimum.q, "the nominal joint path": scenario.nominal_joint_path()[1:]}
+    starts = {"ours": optimum.q, "the nominal joint path": scenario.nominal_joint_path(seed)[1:]}
     if from_rest:
         starts["rest"] = None
     for name, start in starts.items():
@@ -536,11 +537,22 @@ def agrees_with_ipopt(scenario, *, from_rest):
 
 def test_agrees_with_ipopt_on_a_short_piece():
     agrees_with_ipopt(short(steps=20), from_rest=True)
+    agrees_with_ipopt(short("varga7-pose-random", 20), 2_000_001, from_rest=True)
 
 
 @pytest.mark.slow
 def test_agrees_with_ipopt_on_a_long_piece():
     agrees_with_ipopt(short(steps=300), from_rest=False)
+
+
+#: The first so many steps of ten episodes of the test set.
+PIECES = dict(zip(range(2_000_000, 2_000_010), (20, 40, 60, 80, 100, 140, 180, 220, 260, 300), strict=True))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("seed", "steps"), PIECES.items())
+def test_agrees_with_ipopt_on_whole_poses(seed, steps):
+    agrees_with_ipopt(short("varga7-pose-random", steps), seed, from_rest=False)
 
 
 def test_kernels_draw_what_they_drew():

@@ -37,7 +37,7 @@ def cost(trainer, config, episodes=8):
     """Geometric mean over validation episodes."""
     scenario = config.make_scenario()
     seeds = validation_seeds(scenario, episodes)
-    costs, _ = play(lambda features: network_outputs(trainer.model, features), config.processing, scenario, seeds)
+    costs, *_ = play(lambda features: network_outputs(trainer.model, features), config.processing, scenario, seeds)
     return np.exp(np.log(costs).mean())
 
 

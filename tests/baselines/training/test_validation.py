@@ -29,9 +29,10 @@ def test_outputs_of_zero_score_like_the_base_policy(base_policy):
     name, parameters = parse_policy(base_policy)
     episodes = rollouts(scenario, baselines.make(name, scenario, **parameters), seeds)
     wanted = [float(np.sum(e.tracking_cost + e.velocity_cost)) for e in episodes]
-    costs, errors = play(zero, Processing(base_policy=base_policy), scenario, seeds)
+    costs, errors, angles = play(zero, Processing(base_policy=base_policy), scenario, seeds)
     np.testing.assert_allclose(costs, wanted, rtol=1e-12)
     np.testing.assert_array_equal(errors, [e.position_error.max() for e in episodes])
+    np.testing.assert_array_equal(angles, [e.orientation_error.max() for e in episodes])
     score = validate(zero, Processing(base_policy=base_policy), scenario, 3)
     assert score.cost == pytest.approx(geometric_mean(wanted), rel=1e-12)
     assert (score.cost_ratio, score.episodes, score.lost) == (None, 3, 0.0)
@@ -45,7 +46,7 @@ def test_lost_arms_are_counted():
 
 def test_cost_ratio_is_over_the_reference(monkeypatch):
     scenario = scenarios.get("varga7-random").replace(steps=40)
-    costs, _ = play(zero, Processing(base_policy="dls"), scenario, validation_seeds(scenario, 2))
+    costs, *_ = play(zero, Processing(base_policy="dls"), scenario, validation_seeds(scenario, 2))
     record = {
         "fingerprint": fingerprint(scenario),
         "seeds": list(validation_seeds(scenario, 2)),

@@ -18,13 +18,21 @@ class TestClaims:
             learned("lucky", ((1.5, 1.5),)),
         )
         text = "\n".join(sentences(section))
-        assert "The best agent is residual (2.000); it loses track in 0 of 10 runs." in text
+        assert "The best agent is residual (2.000, 2.000 to 2.000); it loses track in 0 of 10 runs." in text
         assert "It adds to `dls` and sees 240 steps ahead" in text
-        assert "The best without a solver under it is PPO (3.000)." in text
+        assert "The best without a solver under it is PPO (3.000, 3.000 to 3.000)." in text
         assert "below all 2 solvers" in text
-        assert "its cost is 0.5000 (0.5000 to 0.5000) times that of the best of them, `dls` (4.000)." in text
         assert (
-            "Its cost is 2.000 (2.000 to 2.000) times that of `rhc:horizon=100` (1.000), which looks further." in text
+            "its cost is 0.5000 (0.5000 to 0.5000) times that of the best of them, `dls` (4.000, 4.000 to 4.000)."
+            in text
+        )
+        assert (
+            "Its cost is 2.000 (2.000 to 2.000) times that of `rhc:horizon=100` (1.000, 1.000 to 1.000), which looks "
+            "99 steps ahead." in text
+        )
+        assert (
+            "The best solver that looks further, 99 steps ahead, is `rhc:horizon=100` (1.000, 1.000 to 1.000); it "
+            "loses track in 0 of 2 runs." in text
         )
         assert "lucky" not in text
 
@@ -35,15 +43,20 @@ class TestClaims:
             learned("PPO", ((3.0, 3.0),), error=0.06),
         )
         text = "\n".join(sentences(section))
-        assert "PPO (3.000) (1 seed: not a benchmark); it loses track in 2 of 2 runs." in text
+        assert "PPO (3.000, 3.000 to 3.000) (1 seed: not a benchmark); it loses track in 2 of 2 runs." in text
         assert "**not** below" in text
-        assert "1 of 2 are as low or lower, namely `dls`, tuned (2.000)" in text
+        assert "1 of 2 are as low or lower, namely `dls`, tuned (2.000, 2.000 to 2.000)" in text
         assert "1.500 (1.500 to 1.500)" in text
 
     def test_no_agent(self):
         text = "\n".join(sentences(a_section(line("dls"), line("mfac", ((1.0, 1.0),)))))
         assert "No agent has been entered" in text
-        assert "paper's horizon is `mfac` (1.000)" in text
+        assert "paper's horizon is `mfac` (1.000, 1.000 to 1.000)" in text
+
+    def test_who_has_played_fewer_is_compared_on_those(self):
+        one, other = np.array([[4.0, 9.0, 100.0]]), np.array([[2.0, 3.0]])
+        assert Comparison.of(one, other).ratio == pytest.approx(6.0**0.5)
+        assert Comparison.of(other, one).ratio == pytest.approx(6.0**-0.5)
 
     def test_a_comparison_is_by_episodes(self):
         """Episodes that are hard for both say nothing of their ratio."""

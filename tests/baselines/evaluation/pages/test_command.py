@@ -6,12 +6,12 @@ import re
 import PIL.Image
 import pytest
 
-from baselines.evaluation.pages import command, entries, families, sets
+from baselines.evaluation.pages import command, entries, families, foresight, sets
 from baselines.evaluation.pages.command import main
 from baselines.evaluation.pages.entries import Entry, solver
-from baselines.evaluation.pages.grids import product
 from baselines.evaluation.pages.measurement import Measurement
 from baselines.evaluation.pages.tuning import Tuning, tune
+from baselines.evaluation.pages.tuning.grids import product
 from tests.baselines.evaluation.pages.builders import write_runs
 
 FEW = (
@@ -31,7 +31,9 @@ def test_plays_writes_and_writes_anew(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(entries, "policy_of", lambda folder: ("dls", {"damping": 10.0 ** -int(folder.name[5:])}))
     write_runs(tmp_path / "ppo", 5, base_policy="dls")
     folder = tmp_path / "page"
-    files = folder / "leaderboard.md", folder / "cost_time.md"
+    monkeypatch.setattr(foresight, "STEPS", (60, 100))
+    monkeypatch.setattr(foresight.entries, "__defaults__", ((60, 100),))
+    files = folder / "leaderboard.md", folder / "cost_time.md", folder / "foresight.md"
     arguments = ["--agents", f"PPO from scratch={tmp_path / 'ppo'}", "--sets", sets.MAIN, "--episodes", "1"]
     arguments += ["--out", str(tmp_path / "out"), "--write", str(folder)]
     assert main(arguments) == 0
@@ -42,7 +44,8 @@ def test_plays_writes_and_writes_anew(tmp_path, capsys, monkeypatch):
     assert "| residual agent |" in texts[0]
     assert "relative to `rhc_foresight`." in texts[0]
     assert "- command: `python -m baselines.leaderboard --agents" in texts[1]
-    for name in ("leaderboard-means", "leaderboard-profiles", f"cost-time-{sets.MAIN}"):
+    assert "| 60 | knows the end | " in texts[2]
+    for name in ("leaderboard-means", "leaderboard-profiles", f"cost-time-{sets.MAIN}", "foresight"):
         assert_picture(folder / "images" / f"{name}.png")
     measured = Measurement.load(files[0].with_suffix(".json"))
     assert [one.name for one in measured.sections] == list(sets.leaderboard())
@@ -78,6 +81,8 @@ def test_one_page_alone(tmp_path, capsys, monkeypatch):
 
 def test_tunes(tmp_path, capsys, monkeypatch):
     grids = {"dls": (product(gain=(0.5,)),)}
+    assert main(["--tune", str(tmp_path / "x.json"), "--sets", "varga7-random", "varga7-pose-random"]) == 2
+    assert "--tune: expected one scenario in --sets" in capsys.readouterr().err
     monkeypatch.setattr(command, "tune", lambda *a, **k: tune(*a, **{**k, "grids": grids}))
     file = tmp_path / "tuned.json"
     assert main(["--tune", str(file), "--episodes", "1"]) == 0

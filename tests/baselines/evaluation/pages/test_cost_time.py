@@ -15,7 +15,7 @@ from baselines.evaluation.pages.measure import plan
 from baselines.evaluation.pages.measurement import Measurement
 from baselines.oracle import best_known
 from baselines.oracle.best_known import UPDATE
-from tests.baselines.evaluation.pages.builders import DOCS, a_measurement, a_section, point
+from tests.baselines.evaluation.pages.builders import DOCS, a_measurement, a_section, complete, point
 
 REMEDY = "write it anew with `python -m baselines.leaderboard --write docs`"
 NAME = sets.MAIN
@@ -56,11 +56,11 @@ class TestPage:
         text = page(measurement)
         lines = text.splitlines()
         (of_dls,) = [line for line in lines if line.startswith("| ● | `dls`")]
-        # Geometric mean, median, p90 and worst, the share lost, times, episodes.
-        assert of_dls == "| ● | `dls` | 60.00 | 65.00 | 85.00 | 90.00 | 50 % | 15 | 20 | 30 | 2 | 1 |"
+        # Geometric mean and its interval, median, p90 and worst, the share lost, times, episodes.
+        assert of_dls == "| ● | `dls` | 60.00 | 40.00 … 90.00 | 65.00 | 85.00 | 90.00 | 50 % | 15 | 20 | 30 | 2 | 1 |"
         assert any(line.startswith("| ● | `broyden`") for line in lines)
         assert any(line.startswith("|  | `mfac` | 79.37 |") for line in lines)
-        assert "`rhc_foresight` by +10.0 % in the geometric mean, by +10.0 % in the median" in text
+        assert "`rhc_foresight` by +10.0 % (+10.0 % to +10.0 %) in the geometric mean, by +10.0 % in the median" in text
         choice = text.split("## How to choose")[1].split("| horizon |")[0]
         chosen = re.findall(r"\| (\d+) \| `(\S+)`", choice)
         assert chosen == [
@@ -69,8 +69,21 @@ class TestPage:
             ("60", "rhc:horizon=30,iterations=1"),
             ("120", "rhc_foresight:stop_at_end=True"),
         ]
-        assert "| 30 | 1.300 | 180 | – | – | 1.333 | 50 | – | – |" in text
+        assert "| 30 | 1.300 | 1.300 … 1.300 | 180 | – | – | – | 1.333 | 1.333 … 1.333 | 50 | – | – | – |" in text
         assert "- date: 2000-01-01" in lines
+
+    def test_who_has_played_fewer_is_marked_and_not_on_the_front(self, measurement):
+        (one,) = measurement.sections
+        fewer = dataclasses.replace(one.lines[0], cost=((1.0,),))
+        text = page(
+            dataclasses.replace(measurement, sections=(dataclasses.replace(one, lines=(fewer, *one.lines[1:])),))
+        )
+        assert (
+            "|  | `dls` | 1.000 | 1.000 … 1.000 | 1.000 | 1.000 | 1.000 | 100 % | 15 | 20 | 30 | **1 × 1** | 1 |"
+            in text
+        )
+        assert "They play the" not in page(measurement)
+        assert "they play the first 12.5 % of the episodes" in text
 
     def test_seeds_are_counted(self, measurement):
         (one,) = measurement.sections
@@ -102,7 +115,7 @@ class TestPage:
         monkeypatch.setattr(best_known, "DATA", tmp_path / "none.json")
         ((_, figure),) = pictures(measurement)
         assert figure.axes[0].get_ylabel() == "cost relative to rhc_foresight [1], geometric mean"
-        assert "| policy | cost relative to rhc_foresight | median |" in page(measurement)
+        assert "| policy | cost relative to rhc_foresight | 95 % | median |" in page(measurement)
 
 
 class TestTree:
@@ -118,6 +131,7 @@ class TestTree:
         )
 
     def test_it_has_all_entries_and_sets(self, written):
+        complete(written)
         assert [one.name for one in written.sections] == list(sets.cost_time())
         for one in written.sections:
             if one.name in test_sets.names():
@@ -144,6 +158,7 @@ class TestTree:
         ("name", "spec"), [(NAME, "dls"), (NAME, "rhc:horizon=10,iterations=1"), ("varga7-fast", "rhc:horizon=30")]
     )
     def test_a_part_measured_again(self, written, name, spec):
+        complete(written)
         (one,) = [one for one in written.sections if one.name == name]
         (then,) = [line for line in one.lines if line.label == spec]
         (row,) = evaluate(name, spec)

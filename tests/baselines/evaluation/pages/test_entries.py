@@ -4,9 +4,9 @@ import pytest
 
 from baselines import registry
 from baselines.agents.policy import LearnedPolicy
-from baselines.evaluation.pages import entries
+from baselines.agents.shipped import ShippedAgent
+from baselines.evaluation.pages import entries, sets, tuning
 from baselines.evaluation.pages.entries import Training, agents, solvers
-from baselines.evaluation.pages.tuning import Tuning
 from baselines.files import ResultsError
 from baselines.spec import parse_policy
 from ikgym.exceptions import InvalidInputError
@@ -15,7 +15,7 @@ from tests.baselines.evaluation.pages.builders import write_runs
 
 class TestEntries:
     def test_everybody_is_there_once(self):
-        names = [entry.label for entry in solvers(Tuning.load().settings)]
+        names = [entry.label for entry in solvers(tuning.of(sets.SKEW).settings)]
         assert len(set(names)) == len(names)
         there = {parse_policy(entry.name)[0] for entry in solvers()}
         assert there == {
@@ -48,6 +48,14 @@ class TestEntries:
         assert [e.label for e in better if e.name in ("dls", "mfac")] == ["dls", "mfac", "dls, tuned"]
         assert better[-1].variants == (("dls", {"gain": 0.5}),)
         assert better[-1].general
+
+    def test_shipped_agents_have_the_one_seed_that_was_kept(self):
+        found = {entry.name: entry for entry in entries.shipped()}
+        assert set(found) == {name for name in registry.names() if issubclass(registry.get(name), ShippedAgent)}
+        alone, residual = found["agent_alone"], found["agent_residual"]
+        assert (alone.training.method, alone.training.base_policy, alone.seeds) == ("ppo", None, (1,))
+        assert residual.training.base_policy == "rhc:horizon=400,iterations=1,move_blocks=30"
+        assert residual.training.steps == (256_000,)
 
     def test_the_preset_that_draws_has_seeds(self):
         (found,) = [entry for entry in solvers() if entry.name == entries.FORESIGHT]

@@ -37,10 +37,18 @@ class TestEntries:
     def test_families_have_all_horizons(self):
         members = [family(c.name) for c in entries() if family(c.name)]
         assert HORIZONS == (3, 5, 10, 30, 100, 200, 400)
-        for name in (OPTIMUM, REAL_TIME):
-            assert [horizon for kind, horizon in members if kind == name] == list(HORIZONS)
+        assert [horizon for kind, horizon in members if kind == REAL_TIME] == list(HORIZONS)
+        assert [horizon for kind, horizon in members if kind == OPTIMUM] == [3, 5, 10, 30, 100]
         for name in (OPTIMUM_BLOCKS, BLOCKS):
             assert [horizon for kind, horizon in members if kind == name] == [30, 100, 200, 400]
+
+    def test_who_takes_too_long_plays_fewer_episodes(self):
+        fewer = {c.name for c in entries() if c.share < 1.0}
+        assert fewer == {
+            *(f"rhc:horizon={h}" for h in (100,)),
+            *(f"rhc:horizon={h},move_blocks={blocks(h)}" for h in (100, 200, 400)),
+            *(f"rhc:horizon={h},iterations=1" for h in (200, 400)),
+        }
 
     @pytest.mark.parametrize(
         ("spec", "expected"),

@@ -10,13 +10,23 @@ from matplotlib.text import Text
 from baselines.evaluate import evaluate
 from baselines.evaluation import test_sets
 from baselines.evaluation.pages import sets
-from baselines.evaluation.pages.entries import solvers
+from baselines.evaluation.pages import tuning as tunings
+from baselines.evaluation.pages.entries import shipped, solvers
 from baselines.evaluation.pages.leaderboard import page, pictures, profiled
+from baselines.evaluation.pages.measure import plan
 from baselines.evaluation.pages.measurement import Measurement
 from baselines.evaluation.pages.tuning import Tuned, Tuning
 from baselines.fingerprints import fingerprint
 from ikgym import scenarios
-from tests.baselines.evaluation.pages.builders import DOCS, TEST_SEEDS, a_measurement, a_section, learned, line
+from tests.baselines.evaluation.pages.builders import (
+    DOCS,
+    TEST_SEEDS,
+    a_measurement,
+    a_section,
+    complete,
+    learned,
+    line,
+)
 
 REMEDY = "write it anew with `python -m baselines.leaderboard --write docs`"
 
@@ -48,21 +58,23 @@ class TestPage:
 
     def test_what_it_says(self, measurement, tuning):
         lines = page(measurement, tuning).splitlines()
-        rows = [cells for text in lines if len(cells := [cell.strip() for cell in text.strip("|").split("|")]) == 15]
+        rows = [cells for text in lines if len(cells := [cell.strip() for cell in text.strip("|").split("|")]) == 16]
         table = {cells[0].strip("*"): cells for cells in rows}
         assert [*table][2:] == ["`oracle`", "`rhc_foresight`", "few", "`dls`, tuned", "`dls`", "PPO"]
-        kind, cost_ratio, _, median, p90, worst, ten, one, lost, p50, p99, seeds, steps, cost = table["`dls`"][1:]
-        assert (kind, cost_ratio, median, p90, worst) == ("solver", "4.000", "5.000", "7.400", "8.000")
+        kind, ahead, cost_ratio, _, median, p90, worst, ten, one, lost, p50, p99, seeds, steps, cost = table["`dls`"][
+            1:
+        ]
+        assert (kind, ahead, cost_ratio, median, p90, worst) == ("solver", "1", "4.000", "5.000", "7.400", "8.000")
         assert (ten, one, lost, p50, p99, seeds) == ("100 %", "0 %", "0 %", "10", "20", "deterministic")
         assert (steps, cost) == ("–", "–")
-        assert table["PPO"][:3] == ["**PPO**", "agent", "**6.000**"]
-        assert table["PPO"][10 - 1 :] == ["100 %", "10", "20", "5", "1.000e6", "12.00"]
-        assert table["few"][12] == "2 seeds: not a benchmark"
+        assert table["PPO"][:4] == ["**PPO**", "agent", "240", "**6.000**"]
+        assert table["PPO"][10:] == ["100 %", "10", "20", "5", "1.000e6", "12.00"]
+        assert table["few"][13] == "2 seeds: not a benchmark"
         assert table["few"][0] == "**few**"
-        assert table["`rhc_foresight`"][12] == "2 of the policy"
-        assert table["`dls`, tuned"][:3] == ["**`dls`, tuned**", "solver, tuned", "**2.000**"]
+        assert table["`rhc_foresight`"][13] == "2 of the policy"
+        assert table["`dls`, tuned"][:4] == ["**`dls`, tuned**", "solver, tuned", "1", "**2.000**"]
         assert table["`dls`"][0] == "`dls`"
-        low, high = map(float, table["`dls`"][3].split(" … "))
+        low, high = map(float, table["`dls`"][4].split(" … "))
         assert (low, high) == (2.0, 8.0)
 
     def test_generalisation_and_tuning(self, measurement, tuning):
@@ -75,6 +87,10 @@ class TestPage:
         assert float(found.split("|")[3]) == pytest.approx(row.cost_ratio, rel=1e-3)
         assert "| `dls` | `gain=0.5` | 7 | 4.000 | 2.000 | 0.5000 |" in text
         assert "the first 4 validation episodes" in text
+
+    def test_nothing_was_searched(self, measurement, tuning):
+        text = page(measurement, dataclasses.replace(tuning, command="python -m x", solvers=()))
+        assert "No settings have been searched for this scenario: `python -m x`." in text
 
     def test_pictures(self, measurement, tuning):
         text, drawn = page(measurement, tuning), dict(pictures(measurement))
@@ -121,24 +137,41 @@ class TestTree:
 
     def test_the_page_says_what_was_measured(self, written):
         there = (DOCS / "leaderboard.md").read_text(encoding="utf-8")
-        assert page(written, Tuning.load()) == there, f"docs/leaderboard.md is stale: {REMEDY}"
+        assert page(written, tunings.of(sets.MAIN)) == there, f"docs/leaderboard.md is stale: {REMEDY}"
 
     def test_it_has_all_solvers_and_sets(self, written):
+        complete(written)
         assert [one.name for one in written.sections] == list(sets.leaderboard())
         main_set = written.sections[0]
         assert (main_set.test_set, main_set.seeds) == (test_sets.SETS[sets.MAIN].digest, TEST_SEEDS)
         assert not [one.name for one in written.sections if one.stale]
         found = {one.label: one.settings for one in main_set.lines if not one.learned}
-        expected = {e.label: json.loads(json.dumps(e.settings)) for e in solvers(Tuning.load().settings)}
-        assert found == expected
+        entered = solvers(tunings.of(sets.MAIN).settings)
+        suited = plan(sets.MAIN, entered, 1)
+        assert found == {e.label: json.loads(json.dumps(e.settings)) for e in entered if e.label in suited}
 
-    def test_agents_have_seeds_enough(self, written):
-        assert all(one.benchmark for one in written.sections[0].lines)
+    def test_agents_are_those_of_the_package(self, written):
+        assert {one.name for one in written.sections[0].lines if one.learned} == {one.name for one in shipped()}
 
     def test_it_names_no_folder_of_a_machine(self, written):
         assert not re.search(r"(^|[\s=])/", written.command)
 
     def test_a_part_measured_again(self, written):
-        (then,) = [one for one in written.sections[0].lines if one.label == "dls, tuned"]
-        rows = evaluate(sets.MAIN, ("dls", then.settings), episodes=2)
+        (then,) = [one for one in written.sections[0].lines if one.label == "dls"]
+        rows = evaluate(sets.MAIN, "dls", episodes=2)
         assert [row.total_cost for row in rows] == pytest.approx(then.cost[0][:2], rel=1e-4)
+
+
+class TestSkew:
+    """The page on skew coordinates follows from what was measured for the test sets of version 0.2.0."""
+
+    def test_the_page_says_what_was_measured(self):
+        written = Measurement.load(DOCS / "leaderboard_skew.json")
+        assert [one.name for one in written.sections] == list(sets.leaderboard(sets.SKEW))
+        there = (DOCS / "leaderboard_skew.md").read_text(encoding="utf-8")
+        assert page(written, tunings.of(sets.SKEW), "leaderboard-skew") == there, REMEDY
+        assert "64 test episodes" in there
+        assert "at some time" in there
+        assert "rad, at some time" not in there, "angles were not kept then"
+        for place, _ in pictures(written, "leaderboard-skew"):
+            assert (DOCS / place).is_file()

@@ -87,14 +87,14 @@ class TestMeasure:
             measure(sets.MAIN, PAGES, out, episodes=2)
 
     def test_changed_scenarios_are_relative_to_foresight(self, out):
-        there = playing("varga7-random-frequency", FEW[1:])
-        found = measure("varga7-random-frequency", {"page": there}, out, episodes=1)["page"]
+        there = playing("varga7-pose-random-frequency", FEW[1:])
+        found = measure("varga7-pose-random-frequency", {"page": there}, out, episodes=1)["page"]
         assert found.best_known is None
         cost_ratios = found.cost_ratios()
         assert cost_ratios["rhc_foresight"].min() == 1.0 < cost_ratios["rhc_foresight"].max()
         assert cost_ratios["dls"][0, 0] == found.lines[0].cost[0][0] / min(cost for (cost,) in found.lines[2].cost)
         assert found.lines[0].time_p50_us is None
-        (row,) = evaluate(sets.get("varga7-random-frequency"), "dls")
+        (row,) = evaluate(sets.get("varga7-pose-random-frequency"), "dls")
         assert found.lines[0].cost[0][0] == pytest.approx(row.total_cost, rel=1e-6)
 
     def test_agents_from_their_files(self, tmp_path):
@@ -112,7 +112,7 @@ class TestMeasure:
         assert again.cost[0] == found.cost[0]
         assert again.cost[1] != found.cost[1], "another agent in the same file is played again"
         with pytest.raises(InvalidInputError, match="other: made for another task or arm than that of varga7-random"):
-            plan(sets.MAIN, [mine, *agents([f"other={tmp_path / 'other'}"])], 1)
+            plan(sets.SKEW, [mine, *agents([f"other={tmp_path / 'other'}"])], 1)
 
     def test_seeds_of_a_policy_follow_each_other(self, both):
         compared = both["cost-time"]
@@ -124,7 +124,8 @@ class TestMeasure:
         assert np.array(compared.lines[0].cost) == pytest.approx(costs[:1], rel=1e-6)
         assert np.array(compared.lines[2].cost) == pytest.approx(costs[1:], rel=1e-6)
         assert compared.lines[2].cost[0] != compared.lines[2].cost[1]
-        assert compared.lines[0].lost == sum(row.position_error_max > 0.05 for row in rows[:2])
+        assert compared.lines[0].lost == sum(row.lost for row in rows[:2])
+        assert compared.lines[0].angle[0] == pytest.approx([row.orientation_error_max for row in rows[:2]], rel=1e-3)
 
     def test_so_many_are_timed(self, both):
         # Both are timed of `dls`, for the other page's sake: what two pages ask for is played once.
@@ -138,4 +139,4 @@ class TestMeasure:
     def test_jobs_belong_to_the_test_set(self):
         jobs = plan(sets.MAIN, COMPARED)
         assert {job.test_set for of in jobs.values() for job in of} == {test_sets.SETS[sets.MAIN].digest}
-        assert [len(of) for of in jobs.values()] == [64, 64, 128]
+        assert [len(of) for of in jobs.values()] == [256, 256, 512]

@@ -18,16 +18,35 @@ class TestOfRows:
         (row,) = evaluate(NAME, "dls")
         rows = [
             dataclasses.replace(
-                row, total_cost=1.23456789, position_error_max=0.0501, time_p50_us=1.0, time_p99_us=7.0
+                row,
+                total_cost=1.23456789,
+                position_error_max=0.0501,
+                orientation_error_max=0.1,
+                time_p50_us=1.0,
+                time_p99_us=7.0,
             ),
-            dataclasses.replace(row, total_cost=2.0, position_error_max=0.0499, time_p50_us=3.0, time_p99_us=5.0),
             dataclasses.replace(
-                row, total_cost=3.0, position_error_max=0.0, time_p50_us=None, time_p99_us=None, time_first_us=None
+                row,
+                total_cost=2.0,
+                position_error_max=0.0499,
+                orientation_error_max=0.301,
+                time_p50_us=3.0,
+                time_p99_us=5.0,
+            ),
+            dataclasses.replace(
+                row,
+                total_cost=3.0,
+                position_error_max=0.0,
+                orientation_error_max=0.299,
+                time_p50_us=None,
+                time_p99_us=None,
+                time_first_us=None,
             ),
         ]
         first = pytest.approx(max(one.time_first_us for one in rows[:2]), rel=1e-3)
         costs, errors = ((1.234568, 2.0, 3.0),), ((0.0501, 0.0499, 0.0),)
-        expected = Line("dls", {}, 1, (), costs, errors, 1, 2, 2.0, 7.0, first, None)
+        angles = ((0.1, 0.301, 0.299),)
+        expected = Line("dls", {}, 1, (), costs, errors, 2, 2, 2.0, 7.0, first, None, angles)
         assert Line.of(solver("dls"), rows) == expected
 
 
@@ -67,7 +86,8 @@ class TestLines:
         [
             ('"lost": 0', '"lost": "many"', "the key 'lost' should have a value of type int, got 'many'"),
             ('"training": null', '"training": {"method": 3}', "the key 'base_policy' is missing"),
-            ('"seeds": [2000000, 2000001]', '"seeds": [2000000]', "should have 1 episodes a row"),
+            ('"seeds": [2000000, 2000001]', '"seeds": [2000000]', "should have at most 1 episodes a row"),
+            ('"error": [[0.0005, 0.0005]]', '"error": [[0.0005]]', "as many as it has costs"),
             ('"cost": [[', '"cost": [[[', "it\\.json"),
             ('"format": 2', '"format": {"a": 1}', "expected format 2, got {'a': 1}"),
         ],
@@ -93,9 +113,15 @@ class TestLines:
 
 class TestRatios:
     def test_foresight_has_to_be_there(self):
-        section = a_section(line(), name="varga7-random-amplitude")
+        section = a_section(line(), name="varga7-pose-random-amplitude")
         with pytest.raises(InvalidInputError, match="rhc_foresight was not played"):
             section.cost_ratios()
+
+    def test_who_has_played_fewer_episodes(self, records):
+        records(NAME, {2_000_000: 2.0, 2_000_001: 4.0})
+        section = a_section(point("dls", [2.0, 16.0]), point("rhc:horizon=100", [3.0]))
+        assert section.lines[1].episodes == 1
+        assert section.cost_ratios()["rhc:horizon=100"] == pytest.approx(1.5)
 
     def test_seeds_and_episodes_together(self, records):
         records(NAME, {2_000_000: 2.0, 2_000_001: 4.0})

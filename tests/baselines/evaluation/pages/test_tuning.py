@@ -9,20 +9,22 @@ import pytest
 from baselines import registry
 from baselines.evaluate import evaluate
 from baselines.evaluation.pages import entries, sets
-from baselines.evaluation.pages.grids import GRIDS, decades, product
-from baselines.evaluation.pages.tuning import DATA, EPISODES, UPDATE, Tuned, Tuning, tune
+from baselines.evaluation.pages.tuning import DATA, EPISODES, Tuned, Tuning, file_of, of, suiting, tune, update
+from baselines.evaluation.pages.tuning.grids import GRIDS, decades, product
 from baselines.files import ResultsError
 from baselines.spec import parse_policy
 from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError
 from tests.baselines.evaluation.pages.builders import TEST_SEEDS
 
+SEARCHED = sorted(file.stem for file in DATA.glob("*.json"))
+MAIN = scenarios.get(sets.MAIN)
 GRID = {"dls": (product(gain=(0.5, 1.0), damping=(1e-2,)), product(gain=(0.7,)))}
 
 
 @pytest.fixture(scope="module")
 def found():
-    return tune("a command", "2000-01-01", grids=GRID, episodes=2)
+    return tune("a command", "2000-01-01", MAIN, grids=GRID, episodes=2)
 
 
 class TestTuning:
@@ -35,13 +37,13 @@ class TestTuning:
         assert (one.tried, one.default, one.tuned) == (4, pytest.approx(costs[0]), pytest.approx(costs.min()))
 
     def test_a_stage_starts_from_the_best_of_the_one_before(self, monkeypatch):
-        def bowl(trials, *_):
+        def bowl(_, trials, *args, **options):
             wanted = {"damping": 1e-2, "gain": 0.7}
             return [1.0 + sum(trial.settings.get(n, 9.0) != value for n, value in wanted.items()) for trial in trials]
 
         monkeypatch.setattr("baselines.evaluation.pages.tuning._costs", bowl)
         stages = (product(damping=(1e-3, 1e-2, 1e-1)), (), product(gain=(0.5, 0.7)))
-        (one,) = tune("a", "b", grids={"dls": stages}).solvers
+        (one,) = tune("a", "b", MAIN, grids={"dls": stages}).solvers
         assert one == Tuned("dls", {"damping": 1e-2, "gain": 0.7}, 6, 3.0, 1.0)
 
     def test_no_test_episode_is_played(self, monkeypatch):
@@ -53,13 +55,13 @@ class TestTuning:
 
         monkeypatch.setattr("baselines.evaluation.pages.measure.run", spy)
         with pytest.raises(KeyboardInterrupt):
-            tune("a command", "2000-01-01", grids=GRID, episodes=EPISODES)
+            tune("a command", "2000-01-01", MAIN, grids=GRID, episodes=EPISODES)
         assert len(set(seen)) == EPISODES
         assert set(seen) <= set(scenarios.SPLITS["validation"])
         assert not set(seen) & set(scenarios.SPLITS["test"])
 
     def test_nothing_better_is_no_setting(self):
-        found = tune("a", "b", grids={"dls": (product(damping=(1e3,)),)}, episodes=1)
+        found = tune("a", "b", MAIN, grids={"dls": (product(damping=(1e3,)),)}, episodes=1)
         assert found.solvers[0].settings == {}
         assert found.solvers[0].tuned == found.solvers[0].default
 
@@ -81,7 +83,7 @@ class TestTuning:
 
     def test_grids_look_no_further(self):
         assert decades(-2, 0) == (0.01, 0.032, 0.1, 0.32, 1.0)
-        scenario = scenarios.get(sets.MAIN)
+        scenario = scenarios.get(sets.SKEW)
         for spec, stages in GRIDS.items():
             name, parameters = parse_policy(spec)
             ahead = registry.make(name, scenario, **parameters).preview
@@ -89,18 +91,27 @@ class TestTuning:
             for settings in stages[0]:
                 assert registry.make(name, scenario, **{**parameters, **settings}).preview == ahead
 
-    def test_the_file_in_the_tree(self):
-        there = Tuning.load(DATA)
-        assert (there.scenario, there.split, there.episodes) == (sets.MAIN, "validation", EPISODES)
+    def test_some_solvers_suit_skew_coordinates_alone(self):
+        assert {*suiting(scenarios.get(sets.SKEW), GRIDS)} == {*GRIDS}
+        assert {spec for spec in GRIDS if "full_orientation" in spec} == {*GRIDS} - {*suiting(MAIN, GRIDS)}
+
+    def test_where_nothing_was_searched_there_are_none(self):
+        assert of("varga7-fast").settings == {}
+
+    @pytest.mark.parametrize("name", SEARCHED)
+    def test_the_files_in_the_tree(self, name):
+        there = Tuning.load(file_of(name))
+        assert (there.scenario, there.split) == (name, "validation")
+        assert there.episodes >= 16
         assert set(there.seeds) <= set(scenarios.SPLITS["validation"])
         assert not set(there.seeds) & set(TEST_SEEDS)
-        assert {one.spec for one in there.solvers} == set(GRIDS), f"stale: {UPDATE}"
+        assert {one.spec for one in there.solvers} == {*suiting(scenarios.get(name), GRIDS)}, f"stale: {update(name)}"
         assert all(one.tuned <= one.default for one in there.solvers)
 
     def test_a_part_of_it_tuned_again(self):
-        there = Tuning.load(DATA)
+        there = Tuning.load(file_of(sets.SKEW))
         (then,) = [one for one in there.solvers if one.spec == "dls"]
-        rows = evaluate(sets.MAIN, [then.variant], episodes=there.episodes, split="validation")
+        rows = evaluate(there.scenario, [then.variant], episodes=there.episodes, split="validation")
         assert np.exp(np.log([row.total_cost for row in rows]).mean()) == pytest.approx(then.tuned, rel=1e-4)
 
 
@@ -115,7 +126,7 @@ class TestTuning:
     ],
 )
 def test_settings_that_are_none_or_ask_for_trust(tmp_path, changes, message):
-    content = json.loads(DATA.read_text(encoding="utf-8"))
+    content = json.loads(file_of(sets.SKEW).read_text(encoding="utf-8"))
     content["solvers"][0] |= changes
     (tmp_path / "tuned.json").write_text(json.dumps(content))
     with pytest.raises(ResultsError, match=rf"Cannot read settings from .*{message}"):

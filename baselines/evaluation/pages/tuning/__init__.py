@@ -8,23 +8,23 @@ import pathlib
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple, Self
 
+from baselines import registry
 from baselines.canonical import DIGITS, one_line, rounded, with_list
 from baselines.evaluation.pages.entries import Entry
-from baselines.evaluation.pages.grids import GRIDS, Stage
 from baselines.evaluation.pages.measure import plan, play
+from baselines.evaluation.pages.tuning.grids import GRIDS, Stage
 from baselines.evaluation.summary import geometric_mean
 from baselines.files import ResultsError, json_files, write
 from baselines.fingerprints import fingerprint
 from baselines.spec import parse_policy, refuse_trust
 from ikgym import scenarios
 from ikgym.exceptions import IkgymError, InvalidInputError
+from ikgym.scenarios import Scenario
 
-#: The settings that the leaderboard reads.
-DATA = pathlib.Path(__file__).parents[2] / "data" / "tuned.json"
+#: Where the settings are that the leaderboards read, by the scenario that they were searched on.
+DATA = pathlib.Path(__file__).parents[3] / "data" / "tuned"
 #: What is tuned on: never what scores are published on.
-SCENARIO, SPLIT, EPISODES = "varga7-random", "validation", 64
-#: What brings the file up to date.
-UPDATE = "python -m baselines.leaderboard --tune baselines/data/tuned.json"
+SPLIT, EPISODES = "validation", 64
 
 
 @dataclasses.dataclass(frozen=True)
@@ -96,7 +96,7 @@ class Tuning:
         """Whether the scenario, or the cost, is no longer what the settings were searched on."""
         return fingerprint(scenarios.get(self.scenario)) != self.fingerprint
 
-    def save(self, file: pathlib.Path = DATA) -> None:
+    def save(self, file: pathlib.Path) -> None:
         """Writes the settings as JSON, a solver a line.
 
         Raises:
@@ -107,7 +107,7 @@ class Tuning:
         write(file, (with_list(head, "solvers", solvers) + "\n").encode())
 
     @classmethod
-    def load(cls, file: pathlib.Path = DATA) -> Self:
+    def load(cls, file: pathlib.Path) -> Self:
         """What :meth:`save` wrote.
 
         Raises:
@@ -119,10 +119,24 @@ class Tuning:
                 refuse_trust(one.variant, str(file))
         except (OSError, ValueError, IkgymError) as e:
             reason = str(e).removesuffix(".")
-            raise ResultsError(f"Cannot read settings from {file}: {reason}. Search them anew with: {UPDATE}") from None
+            again = update(file.stem)
+            raise ResultsError(f"Cannot read settings from {file}: {reason}. Search them anew with: {again}") from None
         if out.stale:
-            raise ResultsError(f"{file}: {out.scenario} has changed since it was tuned on. Tune again with: {UPDATE}")
+            again = update(out.scenario)
+            raise ResultsError(f"{file}: {out.scenario} has changed since it was tuned on. Tune again with: {again}")
         return out
+
+
+def of(scenario: str) -> Tuning:
+    """The settings for a scenario; none where nothing has been searched for it.
+
+    Raises:
+        ResultsError: See :meth:`Tuning.load`.
+    """
+    file = file_of(scenario)
+    if file.is_file():
+        return Tuning.load(file)
+    return Tuning(update(scenario), "", scenario, fingerprint(scenarios.get(scenario)), SPLIT, 0, ())
 
 
 class Trial(NamedTuple):
@@ -139,9 +153,34 @@ class Trial(NamedTuple):
         return Entry(one_line({"solver": self.solver, **self.settings}), (variant,), timed=0)
 
 
+def file_of(scenario: str) -> pathlib.Path:
+    """Where the settings for a scenario are."""
+    return DATA / f"{scenario}.json"
+
+
+def update(scenario: str) -> str:
+    """What searches the settings for a scenario."""
+    return f"python -m baselines.leaderboard --tune baselines/data/tuned/{scenario}.json --sets {scenario}"
+
+
+def suiting(scenario: Scenario, grids: Mapping[str, Iterable[Stage]]) -> dict[str, tuple[Stage, ...]]:
+    """The grids of the solvers that suit a scenario: some are made for skew coordinates alone."""
+
+    def suits(spec: str) -> bool:
+        try:
+            name, parameters = parse_policy(spec)
+            registry.make(name, scenario, **parameters)
+        except InvalidInputError:
+            return False
+        return True
+
+    return {spec: tuple(stages) for spec, stages in grids.items() if suits(spec)}
+
+
 def tune(
     command: str,
     date: str,
+    scenario: Scenario,
     *,
     grids: Mapping[str, Iterable[Stage]] = GRIDS,
     episodes: int = EPISODES,
@@ -156,6 +195,7 @@ def tune(
     Args:
         command: What searches.
         date: Of today.
+        scenario: What is tuned on. Solvers that do not suit it are left out.
         grids: The stages of each solver.
         episodes: Validation episodes.
         workers: Processes.
@@ -166,8 +206,8 @@ def tune(
         InvalidInputError: A solver refuses a value.
         WorkerError: A worker process has died.
     """
-    stages = {solver: tuple(stages) for solver, stages in grids.items()}
-    costs: dict[str, dict[str, tuple[float, Mapping[str, Any]]]] = {solver: {} for solver in grids}
+    stages = suiting(scenario, grids)
+    costs: dict[str, dict[str, tuple[float, Mapping[str, Any]]]] = {solver: {} for solver in stages}
     for number in range(-1, max(map(len, stages.values()))):
         trials = []
         for solver, known in costs.items():
@@ -175,18 +215,20 @@ def tune(
             stage: Stage = ({},) if number < 0 else next(iter(stages[solver][number : number + 1]), ())
             found = [Trial(solver, {**best, **settings}) for settings in stage]
             trials += [trial for trial in found if trial.entry.name not in known]
-        for trial, cost in zip(trials, _costs(trials, episodes, workers, progress), strict=True):
+        for trial, cost in zip(
+            trials, _costs(scenario, trials, episodes, workers=workers, progress=progress), strict=True
+        ):
             costs[trial.solver][trial.entry.name] = cost, trial.settings
     solvers = []
     for solver, known in costs.items():
         (default, _), (lowest, settings) = next(iter(known.values())), min(known.values(), key=lambda one: one[0])
         solvers.append(Tuned(solver, settings, len(known), rounded(default, DIGITS), rounded(lowest, DIGITS)))
-    return Tuning(command, date, SCENARIO, fingerprint(scenarios.get(SCENARIO)), SPLIT, episodes, tuple(solvers))
+    return Tuning(command, date, scenario.name, fingerprint(scenario), SPLIT, episodes, tuple(solvers))
 
 
-def _costs(trials: list[Trial], episodes: int, workers: int, progress: bool) -> list[float]:
+def _costs(scenario: Scenario, trials: list[Trial], episodes: int, *, workers: int, progress: bool) -> list[float]:
     """The geometric mean of each trial's total costs; infinite where one is no number."""
-    plans = plan(scenarios.get(SCENARIO), [trial.entry for trial in trials], episodes, split=SPLIT)
+    plans = plan(scenario, [trial.entry for trial in trials], episodes, split=SPLIT)
     rows = play(plans, workers=workers, progress=progress)
     totals = [[row.total_cost for row in rows[trial.entry.name]] for trial in trials]
     return [geometric_mean(some) if all(map(math.isfinite, some)) else math.inf for some in totals]
