@@ -9,9 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.policy import statuses
-from baselines.solvers.linear_algebra import cholesky, cholesky_solve, damped_gram, transposed_product
+from baselines.solvers.linear_algebra import damped_gram, transposed_product
 from baselines.solvers.resolved_rate.base import ResolvedRate
 from ikgym.jit import kernel
+from ikgym.linear_algebra import cholesky, cholesky_solve
 from ikgym.validation import FloatArray, number
 
 

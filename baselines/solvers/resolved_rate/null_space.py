@@ -10,13 +10,13 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.policy import statuses
-from baselines.solvers.linear_algebra import cholesky, cholesky_solve
 from baselines.solvers.resolved_rate.dls import damped_rows
 from baselines.solvers.resolved_rate.moore_penrose import MoorePenrose
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 from ikgym.jit import kernel
 from ikgym.kinematics import forward_and_jacobian
+from ikgym.linear_algebra import cholesky, cholesky_solve
 from ikgym.validation import FloatArray, known_name, number, per_joint, read_only
 
 OBJECTIVES = ("posture", "joint_centring", "manipulability")

@@ -1,0 +1,113 @@
+"""Inverse kinematics of poses: what is checked, and what the compiled search is given."""
+
+from __future__ import annotations
+
+import functools
+import math
+from contextlib import nullcontext
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from ikgym import parallel
+from ikgym.arms.posture import Limited, within_limits
+from ikgym.compilation import announced
+from ikgym.exceptions import InvalidInputError
+from ikgym.inverse import Ranges, Settings, inverse_rows
+from ikgym.kinematics import Chain
+from ikgym.validation import FloatArray, float_array, number, rotation_matrices, whole_number
+
+BoolArray = npt.NDArray[np.bool_]
+
+# What an angle of 1 rad counts as, in lengths of the whole arm. From 0.1 to 0.8 differ by less than a fifth.
+LENGTH_OF_RADIAN = 0.25
+# Poses that are worth a thread.
+GRAIN = 64
+
+
+class Solvable(Limited, Protocol):
+    """What is asked of an arm here."""
+
+    @property
+    def home(self) -> FloatArray | None:
+        """A posture to start from in [rad] or [m]. Shape (n,)."""
+
+    @property
+    def chain(self) -> Chain:
+        """The arm as its kernels see it."""
+
+    def reach(self, travel: npt.ArrayLike) -> float:
+        """A radius around the base that the tool point never leaves, in [m]."""
+
+
+def inverse(
+    arm: Solvable,
+    rotation: npt.ArrayLike | None,
+    position: npt.ArrayLike,
+    start: npt.ArrayLike | None,
+    *,
+    tolerance: float,
+    restarts: int,
+    seed: int,
+) -> tuple[FloatArray, BoolArray]:
+    """See :meth:`ikgym.arms.Arm.inverse`."""
+    ranges, length = _search(arm)
+    settings = Settings(
+        number("tolerance", tolerance, above=0.0),
+        length,
+        whole_number("restarts", restarts, at_least=0),
+        np.uint64(whole_number("seed", seed, at_least=0) % 2**64),
+    )
+    positions = _with_last("position", position, 3)
+    rotations = np.empty((0, 0)) if rotation is None else rotation_matrices("rotation", rotation)
+    starts = _start(arm, ranges) if start is None else _with_last("start", start, arm.joints)
+    within_limits("start", starts, arm)
+    try:
+        lead = np.broadcast_shapes(positions.shape[:-1], rotations.shape[:-2], starts.shape[:-1])
+    except ValueError:
+        raise InvalidInputError(
+            "rotation, position and start: expected shapes (..., 3, 3), (..., 3) and "
+            f"(..., {arm.joints}) whose first parts fit together, got {np.shape(rotation)}, {positions.shape} and "
+            f"{starts.shape}."
+        ) from None
+    targets = _rows(rotations, lead, 2), _rows(positions, lead, 1), _rows(starts, lead, 1)
+    constants = *arm.chain, *ranges, *settings
+    q, converged = np.empty((len(targets[1]), arm.joints)), np.empty(len(targets[1]), dtype=np.bool_)
+
+    def work(first: int, last: int) -> None:
+        inverse_rows(*constants, *(array[first:last] for array in (*targets, q, converged)))
+
+    # A look takes less time than a timer that is never needed.
+    with nullcontext() if getattr(inverse_rows, "overloads", True) else announced("the inverse kinematics"):
+        parallel.in_chunks(work, len(q), GRAIN)
+    return q.reshape(*lead, arm.joints), converged.reshape(lead)[()]
+
+
+@functools.lru_cache(maxsize=64)
+def _search(arm: Solvable) -> tuple[Ranges, float]:
+    """Where restarts are drawn from, a full turn where there are no limits; and what an angle of 1 rad counts as."""
+    size = arm.reach(np.zeros(arm.joints)) or 1.0  # an arm of slides alone may have no length at q = 0
+    span = np.where(arm.prismatic, 2.0 * size, 2.0 * np.pi)
+    finite_lower, finite_upper = np.isfinite(arm.lower), np.isfinite(arm.upper)
+    first = np.where(finite_lower, arm.lower, np.where(finite_upper, arm.upper - span, -0.5 * span))
+    last = np.where(finite_upper, arm.upper, first + span)
+    return Ranges(arm.lower, arm.upper, first, last), LENGTH_OF_RADIAN * size
+
+
+def _start(arm: Solvable, ranges: Ranges) -> FloatArray:
+    middle: FloatArray = np.clip(0.5 * (ranges.first + ranges.last), ranges.lower, ranges.upper)
+    return middle if arm.home is None else arm.home
+
+
+def _with_last(name: str, value: npt.ArrayLike, length: int) -> FloatArray:
+    array = float_array(name, value)
+    if array.ndim == 0 or array.shape[-1] != length:
+        raise InvalidInputError(f"{name}: expected shape (..., {length}), got {array.shape}.")
+    return array
+
+
+def _rows(array: FloatArray, lead: tuple[int, ...], own: int) -> FloatArray:
+    """The array repeated for all poses, one row a pose, contiguous."""
+    shape = array.shape[array.ndim - own :]
+    return np.ascontiguousarray(np.broadcast_to(array, (*lead, *shape))).reshape(math.prod(lead), *shape)
