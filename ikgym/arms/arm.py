@@ -73,11 +73,11 @@ class Arm(Frozen):
         velocity_limit: Largest speeds of the joints in [rad/s] or [m/s], inf where there is none. Shape (n,).
         acceleration_limit: Largest accelerations of the joints in [rad/s²] or [m/s²], inf where there is none.
             Shape (n,).
-        home: A posture away from limits and singularities, in [rad] or [m], None where none is stated. Shape (n,).
+        home: A posture away from limits and singularities in [rad] or [m], None where none is stated. Shape (n,).
 
     Raises:
-        InvalidInputError: A shape, an axis, the tool's orientation or a limit is wrong, the home posture is outside
-            the limits, or a length beyond 1e12.
+        InvalidInputError: A shape, an axis, an orientation or a limit is wrong, home is outside the limits, or a
+            length beyond 1e12.
     """
 
     name: str
@@ -195,11 +195,7 @@ class Arm(Frozen):
         rotation, position = np.empty((len(rows), 3, 3)), np.empty((len(rows), 3))
         jacobian = np.empty((len(rows), 6, self.joints))
         kinematics.forward_and_jacobian_rows(self.chain, rows, rotation, position, jacobian)
-        return (
-            rotation.reshape(*lead, 3, 3),
-            position.reshape(*lead, 3),
-            jacobian.reshape(*lead, 6, self.joints),
-        )
+        return rotation.reshape(*lead, 3, 3), position.reshape(*lead, 3), jacobian.reshape(*lead, 6, self.joints)
 
     def inverse(
         self,
@@ -213,26 +209,24 @@ class Arm(Frozen):
     ) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
         """Joint coordinates within the limits at which the tool has a pose, by Levenberg–Marquardt steps.
 
-        The first attempt begins at the start, all others at random postures within the limits, which the seed alone
-        determines: a row of a batch equals the single call. Poses that cannot be reached cost all of the restarts.
+        The first attempt begins at the start, all others at random postures that the seed alone determines: a row of a
+        batch equals the single call.
 
         Args:
-            rotation: Orientations of the tool, or None where they do not matter, as for an arm of three joints; with
-                them, such an arm meets those poses only that it happens to reach. Shape (..., 3, 3).
+            rotation: Orientations of the tool; None where they do not matter, as with three joints. (..., 3, 3).
             position: Tool points in the base frame in [m]. Shape (..., 3).
             start: Joint coordinates within the limits in [rad] or [m]; the home posture if it is left out, or the
                 middle of the limits where none is stated. Shape (..., n).
-            tolerance: The largest distance in [m], and the largest angle in [rad], at which a pose is met.
+            tolerance: Largest distance in [m] and largest angle in [rad] at which a pose is met.
             restarts: Random starts after the first one.
             seed: Of the random starts.
 
         Returns:
-            Joint coordinates of shape (..., n), by full turns as near to the start as the limits allow, and whether
-            they meet the pose, of shape (...). Where they do not, they are the nearest to the pose that were found.
+            Joint coordinates (..., n), by full turns as near to the start as the limits allow, and whether they meet
+            the pose, (...). Where they do not, they are the nearest to it that were found.
 
         Raises:
-            InvalidInputError: A shape is wrong, a number is not finite or out of range, a rotation is none, or a start
-                is outside the limits.
+            InvalidInputError: A shape, a number or a rotation is wrong, or a start is outside the limits.
         """
         return inverse.inverse(self, rotation, position, start, tolerance=tolerance, restarts=restarts, seed=seed)
 

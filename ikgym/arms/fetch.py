@@ -17,7 +17,7 @@ LOWER = np.array([0, -1.6056, -1.221, -np.inf, -2.251, -np.inf, -2.16, -np.inf])
 UPPER = np.array([0.38615, 1.6056, 1.518, np.inf, 2.251, np.inf, 2.16, np.inf])
 VELOCITY = np.array([0.1, 1.256, 1.454, 1.571, 1.521, 1.571, 2.268, 2.268])
 ACCELERATION = np.array([0.5, 1.5, 1.0, 1.5, 1.5, 1.5, 2.5, 2.5])
-HOME = np.array([0.3, 0, 0.5, 0, 0.75, 0, -1.25, 0])
+HOME = np.array([0.2, 0, -0.5, 0, 1.5, 0, -1, 0])
 
 
 def fetch() -> Arm:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Hashable
 from contextlib import nullcontext
 from typing import Protocol
 
@@ -14,7 +15,7 @@ from ikgym import parallel
 from ikgym.arms.posture import Limited, within_limits
 from ikgym.compilation import announced
 from ikgym.exceptions import InvalidInputError
-from ikgym.inverse import Ranges, Settings, inverse_rows
+from ikgym.inverse_kinematics import Ranges, Settings, inverse_rows
 from ikgym.kinematics import Chain
 from ikgym.validation import FloatArray, float_array, number, rotation_matrices, whole_number
 
@@ -26,7 +27,7 @@ LENGTH_OF_RADIAN = 0.25
 GRAIN = 64
 
 
-class Solvable(Limited, Protocol):
+class Solvable(Limited, Hashable, Protocol):
     """What is asked of an arm here."""
 
     @property
@@ -68,7 +69,7 @@ def inverse(
     except ValueError:
         raise InvalidInputError(
             "rotation, position and start: expected shapes (..., 3, 3), (..., 3) and "
-            f"(..., {arm.joints}) whose first parts fit together, got {np.shape(rotation)}, {positions.shape} and "
+            f"(..., {arm.joints}) whose first parts fit together, got {rotations.shape}, {positions.shape} and "
             f"{starts.shape}."
         ) from None
     targets = _rows(rotations, lead, 2), _rows(positions, lead, 1), _rows(starts, lead, 1)
@@ -108,6 +109,6 @@ def _with_last(name: str, value: npt.ArrayLike, length: int) -> FloatArray:
 
 
 def _rows(array: FloatArray, lead: tuple[int, ...], own: int) -> FloatArray:
-    """The array repeated for all poses, one row a pose, contiguous."""
+    """The array repeated for all poses, one row a pose; a copy, since kernels compile anew for read-only arrays."""
     shape = array.shape[array.ndim - own :]
-    return np.ascontiguousarray(np.broadcast_to(array, (*lead, *shape))).reshape(math.prod(lead), *shape)
+    return np.array(np.broadcast_to(array, (*lead, *shape)), order="C").reshape(math.prod(lead), *shape)

@@ -111,27 +111,12 @@ def inverse_rows(
     q,
     converged,
 ):
-    """Joint coordinates for N poses; each row is worked out by itself.
+    """Joint coordinates for N poses, each worked out by itself.
 
-    Args:
-        offsets: Of the arm, a :class:`ikgym.kinematics.Chain`. Shape (n, 3).
-        axes: Of the arm. Shape (n, 3).
-        prismatic: Of the arm. Shape (n,).
-        tool: Of the arm. Shape (3,).
-        tool_rotation: Of the arm. Shape (3, 3).
-        lower: Of the :class:`Ranges`. Shape (n,).
-        upper: Of the ranges. Shape (n,).
-        first: Of the ranges. Shape (n,).
-        last: Of the ranges. Shape (n,).
-        tolerance: Of the :class:`Settings`.
-        length: Of the settings.
-        restarts: Of the settings.
-        key: Of the settings.
-        rotation: Orientations of the tool. Shape (N, 3, 3), or (N, 0, 0) where they do not matter.
-        position: Tool points in the base frame in [m]. Shape (N, 3).
-        start: Where to begin, within the limits. Shape (N, n).
-        q: Receives the joint coordinates, those nearest to the pose where it is not met. Shape (N, n).
-        converged: Receives whether the pose is met. Shape (N,).
+    The first arguments are a :class:`ikgym.kinematics.Chain`, :class:`Ranges` and :class:`Settings`. ``rotation``
+    (N, 3, 3), of shape (N, 0, 0) where orientations do not matter, and ``position`` (N, 3) in [m] are the poses of the
+    tool in the base frame, ``start`` (N, n) is where to begin, within the limits. ``q`` (N, n) receives the joint
+    coordinates, the nearest that were found where the pose is not met, and ``converged`` (N,) whether it is.
     """
     chain = Chain(offsets, axes, prismatic, tool, tool_rotation)
     ranges = Ranges(lower, upper, first, last)
