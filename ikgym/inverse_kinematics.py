@@ -68,10 +68,9 @@ class Work(NamedTuple):
     Attributes:
         q: Shape (n,).
         step: Shape (n,).
-        held: True for joints that the step takes to a limit. Shape (n,).
         rotation: Shape (3, 3).
         position: Shape (3,).
-        jacobian: Its angular rows in units of length. Shape (6, n).
+        jacobian: Its angular rows in units of length; 0 in columns of joints that a step takes to a limit. (6, n).
         error: Shape (m,).
         gram: Shape (m, m).
         weights: The step is Jᵀ times these. Shape (m,).
@@ -79,7 +78,6 @@ class Work(NamedTuple):
 
     q: npt.NDArray[np.float64]
     step: npt.NDArray[np.float64]
-    held: npt.NDArray[np.bool_]
     rotation: npt.NDArray[np.float64]
     position: npt.NDArray[np.float64]
     jacobian: npt.NDArray[np.float64]
@@ -125,7 +123,6 @@ def inverse_rows(
     work = Work(
         np.empty(n),
         np.empty(n),
-        np.empty(n, dtype=np.bool_),
         np.empty((3, 3)),
         np.empty(3),
         np.empty((6, n)),
@@ -147,9 +144,9 @@ def _inverse(chain, ranges, pose, start, settings, work, q):
         else:
             _draw(ranges, settings.key, attempt, work.q)
         _descend(chain, ranges, pose, settings, work)
-        _unwind(chain.prismatic, ranges, start, work.q)
-        forward(chain, work.q, work.rotation, work.position)
-        _error(pose, settings.length, work)
+        if _unwind(chain.prismatic, ranges, start, work.q):
+            forward(chain, work.q, work.rotation, work.position)
+            _error(pose, settings.length, work)
         error = _squared(work.error)
         if error < best:
             best = error
@@ -170,9 +167,9 @@ def _draw(ranges, key, attempt, q):
 
 @kernel
 def _descend(chain, ranges, pose, settings, work):
-    """Steps from ``work.q`` until the pose is met or nothing is gained any more."""
+    """Steps from ``work.q`` until the pose is met or nothing is gained any more; leaves the error where it ends."""
     milestone, waited = math.inf, 0
-    for _ in range(STEPS):
+    for left in range(STEPS, -1, -1):
         forward_and_jacobian(chain, work.q, work.rotation, work.position, work.jacobian)
         _error(pose, settings.length, work)
         if _met(work.error, settings):
@@ -181,7 +178,7 @@ def _descend(chain, ranges, pose, settings, work):
         waited += 1
         if error < PROGRESS * milestone:
             milestone, waited = error, 0
-        elif waited == PATIENCE:
+        if waited == PATIENCE or left == 0:
             return
         for i in range(3, work.error.shape[0]):
             for j in range(work.q.shape[0]):
@@ -192,8 +189,6 @@ def _descend(chain, ranges, pose, settings, work):
 @kernel
 def _step(ranges, damping, work):
     """A step of ``work.q`` within the limits."""
-    for j in range(work.q.shape[0]):
-        work.held[j] = False
     for _ in range(work.q.shape[0]):
         _gram(damping, work)
         if not cholesky(work.gram):
@@ -203,20 +198,18 @@ def _step(ranges, damping, work):
         if not _hold(ranges, work):
             break
     for j in range(work.q.shape[0]):
-        if not work.held[j]:
-            work.q[j] = min(max(work.q[j] + work.step[j], ranges.lower[j]), ranges.upper[j])
+        work.q[j] = min(max(work.q[j] + work.step[j], ranges.lower[j]), ranges.upper[j])
 
 
 @kernel
 def _gram(damping, work):
-    """J Jᵀ + λ of the joints that are not held, its lower triangle."""
-    jacobian, gram, held = work.jacobian, work.gram, work.held
+    """J Jᵀ + λ, its lower triangle."""
+    jacobian, gram = work.jacobian, work.gram
     for i in range(gram.shape[0]):
         for k in range(i + 1):
             total = damping if i == k else 0.0
-            for j in range(held.shape[0]):
-                if not held[j]:
-                    total += jacobian[i, j] * jacobian[k, j]
+            for j in range(jacobian.shape[1]):
+                total += jacobian[i, j] * jacobian[k, j]
             gram[i, k] = total
 
 
@@ -227,8 +220,6 @@ def _hold(ranges, work):
     m = work.error.shape[0]
     passed = False
     for j in range(q.shape[0]):
-        if work.held[j]:
-            continue
         step[j] = 0.0
         for i in range(m):
             step[j] += jacobian[i, j] * work.weights[i]
@@ -236,23 +227,25 @@ def _hold(ranges, work):
         if there != q[j] + step[j]:
             for i in range(m):
                 work.error[i] -= jacobian[i, j] * (there - q[j])
+                jacobian[i, j] = 0.0
             q[j] = there
-            work.held[j] = passed = True
+            passed = True
     return passed
 
 
 @kernel
 def _unwind(prismatic, ranges, start, q):
-    """Takes full turns off the joints, as many as the limits allow, so that they end near the start."""
-    turn = 2.0 * math.pi
+    """Takes full turns off the joints, as the limits allow, so that they end near the start; whether it took any."""
+    turn, unwound = 2.0 * math.pi, False
     for j in range(q.shape[0]):
         turns = 0 if prismatic[j] else round((q[j] - start[j]) / turn)
         while turns != 0:
             there = q[j] - turns * turn
             if ranges.lower[j] <= there <= ranges.upper[j]:
-                q[j] = there
+                q[j], unwound = there, True
                 break
             turns -= 1 if turns > 0 else -1
+    return unwound
 
 
 @kernel
@@ -284,8 +277,13 @@ def _row(row, rotation):
 @kernel
 def _met(error, settings):
     """Whether position and orientation both are within the tolerance."""
-    angle = 0.0 if error.shape[0] == 3 else math.sqrt(_squared(error[3:])) / settings.length
-    return math.sqrt(_squared(error[:3])) <= settings.tolerance and angle <= settings.tolerance
+    most = settings.tolerance * settings.tolerance
+    if not error[0] * error[0] + error[1] * error[1] + error[2] * error[2] <= most:
+        return False
+    if error.shape[0] == 3:
+        return True
+    angle = error[3] * error[3] + error[4] * error[4] + error[5] * error[5]
+    return angle <= most * settings.length * settings.length
 
 
 @kernel
