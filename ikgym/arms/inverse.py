@@ -53,7 +53,7 @@ def inverse(
     seed: int,
 ) -> tuple[FloatArray, BoolArray]:
     """See :meth:`ikgym.arms.Arm.inverse`."""
-    ranges, length = _search(arm)
+    ranges, length, starts = _search(arm)
     settings = Settings(
         number("tolerance", tolerance, above=0.0),
         length,
@@ -62,16 +62,10 @@ def inverse(
     )
     positions = _with_last("position", position, 3)
     rotations = np.empty((0, 0)) if rotation is None else rotation_matrices("rotation", rotation)
-    starts = _start(arm, ranges) if start is None else _with_last("start", start, arm.joints)
-    within_limits("start", starts, arm)
-    try:
-        lead = np.broadcast_shapes(positions.shape[:-1], rotations.shape[:-2], starts.shape[:-1])
-    except ValueError:
-        raise InvalidInputError(
-            "rotation, position and start: expected shapes (..., 3, 3), (..., 3) and "
-            f"(..., {arm.joints}) whose first parts fit together, got {rotations.shape}, {positions.shape} and "
-            f"{starts.shape}."
-        ) from None
+    if start is not None:
+        starts = _with_last("start", start, arm.joints)
+        within_limits("start", starts, arm)
+    lead = _lead(rotations.shape, positions.shape, starts.shape)
     targets = _rows(rotations, lead, 2), _rows(positions, lead, 1), _rows(starts, lead, 1)
     constants = *arm.chain, *ranges, *settings
     q, converged = np.empty((len(targets[1]), arm.joints)), np.empty(len(targets[1]), dtype=np.bool_)
@@ -86,19 +80,15 @@ def inverse(
 
 
 @functools.lru_cache(maxsize=64)
-def _search(arm: Solvable) -> tuple[Ranges, float]:
-    """Where restarts are drawn from, a full turn where there are no limits; and what an angle of 1 rad counts as."""
+def _search(arm: Solvable) -> tuple[Ranges, float, FloatArray]:
+    """Where restarts are drawn from, a full turn without limits; what 1 rad counts as, in [m]; and the usual start."""
     size = arm.reach(np.zeros(arm.joints)) or 1.0  # an arm of slides alone may have no length at q = 0
     span = np.where(arm.prismatic, 2.0 * size, 2.0 * np.pi)
     finite_lower, finite_upper = np.isfinite(arm.lower), np.isfinite(arm.upper)
     first = np.where(finite_lower, arm.lower, np.where(finite_upper, arm.upper - span, -0.5 * span))
     last = np.where(finite_upper, arm.upper, first + span)
-    return Ranges(arm.lower, arm.upper, first, last), LENGTH_OF_RADIAN * size
-
-
-def _start(arm: Solvable, ranges: Ranges) -> FloatArray:
-    middle: FloatArray = np.clip(0.5 * (ranges.first + ranges.last), ranges.lower, ranges.upper)
-    return middle if arm.home is None else arm.home
+    start = 0.5 * (first + last) if arm.home is None else arm.home
+    return Ranges(arm.lower, arm.upper, first, last), LENGTH_OF_RADIAN * size, start
 
 
 def _with_last(name: str, value: npt.ArrayLike, length: int) -> FloatArray:
@@ -108,7 +98,20 @@ def _with_last(name: str, value: npt.ArrayLike, length: int) -> FloatArray:
     return array
 
 
+def _lead(rotation: tuple[int, ...], position: tuple[int, ...], start: tuple[int, ...]) -> tuple[int, ...]:
+    """The shape of a batch of poses, from the shapes of its parts."""
+    try:
+        return np.broadcast_shapes(rotation[:-2], position[:-1], start[:-1])
+    except ValueError:
+        raise InvalidInputError(
+            f"rotation, position and start: expected shapes (..., 3, 3), (..., 3) and (..., {start[-1]}) whose leading "
+            f"parts fit together, got {rotation if any(rotation) else None}, {position} and {start}."
+        ) from None
+
+
 def _rows(array: FloatArray, lead: tuple[int, ...], own: int) -> FloatArray:
-    """The array repeated for all poses, one row a pose; a copy, since kernels compile anew for read-only arrays."""
-    shape = array.shape[array.ndim - own :]
-    return np.array(np.broadcast_to(array, (*lead, *shape)), order="C").reshape(math.prod(lead), *shape)
+    """The array repeated for all poses, one row a pose; never read-only, since kernels would compile anew for that."""
+    shape = (*lead, *array.shape[array.ndim - own :])
+    if array.shape != shape or not array.flags.writeable:
+        array = np.array(np.broadcast_to(array, shape), order="C")
+    return array.reshape(math.prod(lead), *shape[len(lead) :])

@@ -47,9 +47,9 @@ def within_limits(name: str, q: FloatArray, arm: Limited) -> None:
         InvalidInputError: A joint is outside its limits; the message names it.
     """
     rows = q.reshape(-1, arm.joints)
-    outside = np.argwhere((rows < arm.lower) | (rows > arm.upper))
-    if len(outside):
-        row, joint = outside[0].tolist()
+    outside = (rows < arm.lower) | (rows > arm.upper)
+    if outside.any():
+        row, joint = np.argwhere(outside)[0].tolist()
         raise InvalidInputError(
             f"{name}: expected joint {joint} of arm {arm.name!r} within its limits, from {float(arm.lower[joint])!r} "
             f"to {float(arm.upper[joint])!r} [{'m' if arm.prismatic[joint] else 'rad'}], got "
