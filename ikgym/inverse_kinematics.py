@@ -198,7 +198,7 @@ def _step(ranges, damping, work):
         if not _hold(ranges, work):
             break
     for j in range(work.q.shape[0]):
-        work.q[j] = min(max(work.q[j] + work.step[j], ranges.lower[j]), ranges.upper[j])
+        work.q[j] += work.step[j]
 
 
 @kernel
@@ -228,7 +228,7 @@ def _hold(ranges, work):
             for i in range(m):
                 work.error[i] -= jacobian[i, j] * (there - q[j])
                 jacobian[i, j] = 0.0
-            q[j] = there
+            q[j], step[j] = there, 0.0
             passed = True
     return passed
 

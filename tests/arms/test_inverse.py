@@ -3,7 +3,9 @@ import pytest
 
 from ikgym import arms
 from ikgym.arms import Arm
+from ikgym.arms.inverse import LENGTH_OF_RADIAN
 from ikgym.exceptions import InvalidInputError
+from ikgym.inverse_kinematics import Ranges, Work, _step
 from ikgym.rotations import geodesic_angle
 from tests.arms.drawing import postures
 
@@ -80,6 +82,38 @@ def test_a_joint_at_its_limit_stays_there_and_the_others_go_on():
     found, converged = PANDA.inverse(rotation, position)
     assert converged
     check(PANDA, rotation[None], position[None], found[None], np.array([converged]))
+
+
+def test_what_a_joint_at_its_limit_lacks_is_made_up_for_by_the_others():
+    posture = postures(PANDA, 1, seed=10)[0]
+    jacobian = PANDA.jacobian(posture)
+    error = jacobian @ np.full(7, 0.01)
+    free, upper = np.full(7, np.inf), np.where(np.arange(7) == 3, posture + 1e-4, np.inf)
+    steps = []
+    for ranges in (Ranges(-free, free, -free, free), Ranges(-free, upper, -free, free)):
+        arrays = np.empty((3, 3)), np.empty(3), jacobian.copy(), error.copy(), np.empty((6, 6)), np.empty(6)
+        work = Work(posture.copy(), np.empty(7), *arrays)
+        _step(ranges, 1e-12, work)
+        steps.append(work.q - posture)
+        np.testing.assert_allclose(jacobian @ steps[-1], error, atol=1e-8)
+    assert steps[0][3] > 1e-3
+    assert steps[1][3] == pytest.approx(1e-4, abs=1e-12)
+
+
+def test_more_restarts_never_lead_farther_away():
+    arm = arms.get("iiwa14")
+    rotation, position = arm.forward(postures(arm, 40, seed=9))
+    length = LENGTH_OF_RADIAN * arm.reach(np.zeros(7))
+    squares = []
+    for restarts in (0, 4, 8):
+        q, converged = arm.inverse(rotation, 2.5 * position, restarts=restarts)
+        turned, there = arm.forward(q)
+        angles = np.array([geodesic_angle(*pair) for pair in zip(turned, rotation, strict=True)])
+        squares.append(np.sum((there - 2.5 * position) ** 2, axis=1) + (length * angles) ** 2)
+        assert not converged.all()
+    assert (squares[1] <= squares[0] + 1e-12).all()
+    assert (squares[2] <= squares[1] + 1e-12).all()
+    assert (squares[2] < squares[0] - 1e-3).any()
 
 
 def test_a_start_at_the_pose_is_the_answer():
