@@ -12,7 +12,6 @@ import numpy as np
 import numpy.typing as npt
 
 from ikgym import kinematics
-from ikgym.arms import inverse
 from ikgym.arms.posture import within_limits
 from ikgym.exceptions import InvalidInputError
 from ikgym.kinematics import Chain
@@ -228,6 +227,8 @@ class Arm(Frozen):
         Raises:
             InvalidInputError: A shape, a number or a rotation is wrong, or a start is outside the limits.
         """
+        from ikgym.arms import inverse  # its kernels take longer to load than all arms
+
         return inverse.inverse(self, rotation, position, start, tolerance=tolerance, restarts=restarts, seed=seed)
 
     def joint_points(self, q: npt.ArrayLike) -> FloatArray:
