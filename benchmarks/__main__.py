@@ -10,7 +10,7 @@ import sys
 
 import tyro
 
-from benchmarks import collection, environments, growth, horizons, kernels, policies, report
+from benchmarks import collection, environments, growth, horizons, kernels, policies, poses, report
 from benchmarks.effort import FULL, QUICK, Effort
 from benchmarks.table import Column, Table
 
@@ -19,6 +19,7 @@ SECTIONS = {
     "environments": environments.tables,
     "collection": collection.tables,
     "kinematics": kernels.tables,
+    "poses": poses.tables,
     "policies": policies.tables,
     "horizons": horizons.tables,
     "growth": growth.tables,

@@ -15,7 +15,7 @@ import numpy as np
 
 import baselines
 import ikgym
-from baselines.console.listing import summary
+from baselines.console.listing import kinds_of_limits, summary
 from baselines.evaluation import test_sets as sets
 from baselines.evaluation.report import NOTHING
 from baselines.oracle import best_known
@@ -28,11 +28,12 @@ PAGES = Path(__file__).parent
 
 def arms() -> list[tuple[str, ...]]:
     """One line an arm."""
-    rows = [("arm", "joints", "of which prismatic", "tool at home [m]")]
+    rows = [("arm", "joints", "of which prismatic", "limits", "tool at q = 0 [m]")]
     for name in ikgym.arms.names():
         arm = ikgym.arms.get(name)
-        home = ", ".join(f"{x:.4g}" for x in arm.forward(np.zeros(arm.joints))[1] + 0.0)
-        rows.append((f"`{name}`", str(arm.joints), str(sum(arm.prismatic)), f"({home})"))
+        tool = ", ".join(f"{x:.4g}" for x in np.round(arm.forward(np.zeros(arm.joints))[1], 9) + 0.0)
+        limits = ", ".join(kinds_of_limits(arm)) or "none"
+        rows.append((f"`{name}`", str(arm.joints), str(sum(arm.prismatic)), limits, f"({tool})"))
     return rows
 
 

@@ -17,6 +17,7 @@ from ikgym.cost_kernels import CostParameters
 from ikgym.jit import inlined, kernel
 from ikgym.kinematics import Chain, forward
 from ikgym.limit_kernels import FASTEST, LOWER, SLACK, UPPER, driven, within
+from ikgym.random_numbers import uniform
 from ikgym.rotations import geodesic_angle
 
 Floats = npt.NDArray[np.float64]
@@ -240,7 +241,7 @@ def step(
                 if disturbance[BIAS, j] != 0.0:
                     velocity += disturbance[BIAS, j]
                 if disturbance[NOISE, j] != 0.0:
-                    velocity += disturbance[NOISE, j] * _uniform(noise_key[row], np.uint64(made[row] * n + j))
+                    velocity += disturbance[NOISE, j] * uniform(noise_key[row], np.uint64(made[row] * n + j))
                 reached = q[row, j] + dt * velocity  # Varga 2021, eq. 5
                 if limited and not limits[LOWER, j] <= reached <= limits[UPPER, j]:
                     reached = limits[LOWER, j] if reached < limits[LOWER, j] else limits[UPPER, j]
@@ -279,19 +280,6 @@ def step(
             task_kernels.error(kind, nominal, pose, error)
             tracking_cost[row] = cost_kernels.tracking(cost, error)
             velocity_cost[row] = cost_kernels.velocity(cost, qdot[row])
-
-
-@kernel
-def _uniform(key, counter):
-    """The ``counter``-th number of a stream, uniform between -1 and 1 (SplitMix64).
-
-    A counter instead of a generator's state: rows stay independent of each other and of the order they run in.
-    """
-    z = key + (counter + np.uint64(1)) * np.uint64(0x9E3779B97F4A7C15)
-    z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-    z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    z = z ^ (z >> np.uint64(31))
-    return 2.0 * (np.float64(z >> np.uint64(11)) * 2.0**-53) - 1.0
 
 
 @kernel

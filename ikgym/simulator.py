@@ -9,7 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ikgym import simulation
-from ikgym.arms.limits import limit_rows, within_limits
+from ikgym.arms.limits import limit_rows
+from ikgym.arms.posture import within_limits
 from ikgym.compilation import announced
 from ikgym.exceptions import InvalidInputError
 from ikgym.memory import afford, of_rows

@@ -17,6 +17,8 @@ FloatArray = npt.NDArray[np.float64]
 # What is this close to unit length, or to a rotation, was meant to be one, and is made one exactly.
 UNIT_TOLERANCE = 1e-6
 
+IDENTITY = np.eye(3)
+
 # Lengths, angles, times and speeds of a scenario lie within: far beyond any arm, and no product of them overflows.
 SMALLEST, LARGEST = 1e-12, 1e12
 
@@ -134,16 +136,33 @@ def rotation_matrix(name: str, value: npt.ArrayLike) -> FloatArray:
     Raises:
         InvalidInputError: It is no orthogonal matrix with determinant 1.
     """
-    matrix = float_array(name, value, (3, 3))
-    deviation = np.abs(matrix @ matrix.T - np.eye(3)).max()
-    if deviation > UNIT_TOLERANCE or np.linalg.det(matrix) < 0.0:
+    return read_only(rotation_matrices(name, float_array(name, value, (3, 3))))
+
+
+def rotation_matrices(name: str, value: npt.ArrayLike) -> FloatArray:
+    """Rotation matrices, each made exactly orthogonal as :func:`rotation_matrix` does, as a fresh array.
+
+    Args:
+        name: What the value is called in messages.
+        value: The matrices. Shape (..., 3, 3).
+
+    Raises:
+        InvalidInputError: One is no orthogonal matrix with determinant 1; the message has it.
+    """
+    matrices = float_array(name, value)
+    if matrices.shape[-2:] != (3, 3):
+        raise InvalidInputError(f"{name}: expected shape (..., 3, 3), got {matrices.shape}.")
+    rows = matrices.reshape(-1, 3, 3)
+    deviations = np.abs(rows @ rows.transpose(0, 2, 1) - IDENTITY).max(axis=(1, 2))
+    wrong = (deviations > UNIT_TOLERANCE) | (np.linalg.det(rows) < 0.0)
+    if wrong.any():
         raise InvalidInputError(
-            f"{name}: expected a rotation matrix (orthogonal, determinant 1), got {matrix.tolist()}."
+            f"{name}: expected a rotation matrix (orthogonal, determinant 1), got {rows[np.argmax(wrong)].tolist()}."
         )
-    if deviation > 1e-14:
-        left, _, right = np.linalg.svd(matrix)
-        matrix = left @ right
-    return read_only(matrix)
+    for row in np.flatnonzero(deviations > 1e-14):
+        left, _, right = np.linalg.svd(rows[row])
+        rows[row] = left @ right
+    return matrices
 
 
 def known_names(kind: str, given: Iterable[str], available: Iterable[str]) -> None:

@@ -59,6 +59,16 @@ def test_readme_snippets_run(capsys):
     assert cost == pytest.approx(cells()["dls"]["total cost"], rel=1e-3)
 
 
+def test_the_snippet_on_inverse_kinematics_meets_its_pose():
+    page = (PAGES / "scenarios.md").read_text(encoding="utf-8")
+    (snippet,) = (text for text in re.findall(r"```python\n(.*?)```", page, re.DOTALL) if "inverse(" in text)
+    names: dict = {}
+    exec(snippet, names)
+    assert names["converged"]
+    there = names["arm"].forward(names["q"])[1]
+    np.testing.assert_allclose(there, names["position"] + [0.1, 0.2, -0.1], atol=1e-9)
+
+
 def test_the_policy_of_the_readme_follows_the_reference():
     snippet = files()["mine.py"]
     assert len(statements(snippet)) <= 15

@@ -15,6 +15,7 @@ from ikgym import arms, scenarios
 from ikgym.arms import Arm
 from ikgym.exceptions import UnknownNameError
 from ikgym.scenarios import Scenario
+from ikgym.validation import FloatArray
 
 
 @dataclasses.dataclass(frozen=True)
@@ -75,10 +76,10 @@ def aligned(rows: Sequence[Sequence[str]], width: int) -> str:
 
 def _arm_row(name: str) -> tuple[str, ...]:
     arm = arms.get(name)
-    return str(arm.joints), str(sum(arm.prismatic)), ", ".join(_limits(arm)) or "none"
+    return str(arm.joints), str(sum(arm.prismatic)), ", ".join(kinds_of_limits(arm)) or "none"
 
 
-def _limits(arm: Arm) -> list[str]:
+def kinds_of_limits(arm: Arm) -> list[str]:
     """Which kinds of limits an arm has."""
     ends = np.concatenate([arm.lower, arm.upper])
     kinds = {"joints": ends, "velocity": arm.velocity_limit, "acceleration": arm.acceleration_limit}
@@ -94,8 +95,14 @@ def _arm(name: str) -> str:
         units = unit, unit, f"{unit}/s", f"{unit}/s²"
         cells = [f"{value:.4g} {ending}" for value, ending in zip(limits, units, strict=True)]
         rows.append((str(joint), "prismatic" if prismatic else "revolute", *cells))
-    home = ", ".join(f"{x:.4g}" for x in arm.forward(np.zeros(arm.joints))[1] + 0.0)
-    return f"{name}: {arm.joints} joints, tool at home ({home}) m\n\n{aligned(rows, 80)}"
+    tool = _numbers(arm.forward(np.zeros(arm.joints))[1])
+    home = "none stated" if arm.home is None else f"({_numbers(arm.home)}) rad or m"
+    title = f"{name}: {arm.joints} joints, tool at ({tool}) m where q = 0, home posture {home}"
+    return f"{title}\n\n{aligned(rows, 80)}"
+
+
+def _numbers(values: FloatArray) -> str:
+    return ", ".join(f"{x:.4g}" for x in np.round(values, 9) + 0.0)
 
 
 def _scenario_row(name: str) -> tuple[str, ...]:

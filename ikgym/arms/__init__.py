@@ -1,4 +1,4 @@
-"""Arms: the frozen description of a serial chain, the papers' arms, and conversions from other forms.
+"""Arms: the frozen description of a serial chain, the arms of papers and of makers, and conversions from other forms.
 
 >>> import ikgym
 >>> ikgym.arms.get("varga7").joints
@@ -9,7 +9,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from ikgym.arms import faitli, khan, varga, zhang
+from ikgym.arms import (
+    faitli,
+    fetch,
+    flexiv,
+    franka,
+    khan,
+    kinova,
+    kuka,
+    pal,
+    panda_calibrated,
+    ufactory,
+    varga,
+    zhang,
+)
 from ikgym.arms.arm import Arm
 from ikgym.arms.denavit_hartenberg import from_dh
 from ikgym.arms.urdf import from_urdf
@@ -18,7 +31,20 @@ from ikgym.registry import Registry
 __all__ = ["SHIPPED", "Arm", "from_dh", "from_urdf", "get", "names", "register"]
 
 _registry: Registry[Arm] = Registry("arm", Arm)
-for _family in (varga, faitli, khan, zhang):
+for _family in (
+    varga,
+    faitli,
+    khan,
+    zhang,
+    franka,
+    panda_calibrated,
+    kuka,
+    kinova,
+    ufactory,
+    flexiv,
+    pal,
+    fetch,
+):
     for _name, _make in _family.ARMS.items():
         _registry.register(_name, _make)
 #: The arms of this package: what names one of them can be read by everyone.

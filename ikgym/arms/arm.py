@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ikgym import kinematics
+from ikgym.arms.posture import within_limits
 from ikgym.exceptions import InvalidInputError
 from ikgym.kinematics import Chain
 from ikgym.validation import (
@@ -71,9 +72,11 @@ class Arm(Frozen):
         velocity_limit: Largest speeds of the joints in [rad/s] or [m/s], inf where there is none. Shape (n,).
         acceleration_limit: Largest accelerations of the joints in [rad/s²] or [m/s²], inf where there is none.
             Shape (n,).
+        home: A posture away from limits and singularities in [rad] or [m], None where none is stated. Shape (n,).
 
     Raises:
-        InvalidInputError: A shape, an axis, the tool's orientation or a limit is wrong, or a length beyond 1e12.
+        InvalidInputError: A shape, an axis, an orientation or a limit is wrong, home is outside the limits, or a
+            length beyond 1e12.
     """
 
     name: str
@@ -86,6 +89,7 @@ class Arm(Frozen):
     upper: FloatArray = None  # type: ignore[assignment]  # none
     velocity_limit: FloatArray = None  # type: ignore[assignment]  # none
     acceleration_limit: FloatArray = None  # type: ignore[assignment]  # none
+    home: FloatArray | None = None
     chain: Chain = dataclasses.field(init=False, repr=False)
     #: The URDF file that the arm was read from, None for all other arms and for changed copies.
     urdf: UrdfReference | None = dataclasses.field(init=False, repr=False, default=None)
@@ -127,6 +131,10 @@ class Arm(Frozen):
             "chain": chain,
         }.items():
             object.__setattr__(self, field, value)
+        if self.home is not None:
+            home = frozen_array(f"home of arm {self.name!r}", self.home, (n,))
+            within_limits("home", home, self)
+            object.__setattr__(self, "home", home)
 
     @property
     def joints(self) -> int:
@@ -186,11 +194,42 @@ class Arm(Frozen):
         rotation, position = np.empty((len(rows), 3, 3)), np.empty((len(rows), 3))
         jacobian = np.empty((len(rows), 6, self.joints))
         kinematics.forward_and_jacobian_rows(self.chain, rows, rotation, position, jacobian)
-        return (
-            rotation.reshape(*lead, 3, 3),
-            position.reshape(*lead, 3),
-            jacobian.reshape(*lead, 6, self.joints),
-        )
+        return rotation.reshape(*lead, 3, 3), position.reshape(*lead, 3), jacobian.reshape(*lead, 6, self.joints)
+
+    def inverse(
+        self,
+        rotation: npt.ArrayLike | None,
+        position: npt.ArrayLike,
+        start: npt.ArrayLike | None = None,
+        *,
+        tolerance: float = 1e-9,
+        restarts: int = 100,
+        seed: int = 0,
+    ) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
+        """Joint coordinates within the limits at which the tool has a pose, by Levenberg–Marquardt steps.
+
+        The first attempt begins at the start, all others at random postures that the seed alone determines: a row of a
+        batch equals the single call.
+
+        Args:
+            rotation: Orientations of the tool; None where they do not matter, as with three joints. (..., 3, 3).
+            position: Tool points in the base frame in [m]. Shape (..., 3).
+            start: Joint coordinates within the limits in [rad] or [m]; the home posture if it is left out, or the
+                middle of the limits where none is stated. Shape (..., n).
+            tolerance: Largest distance in [m] and largest angle in [rad] at which a pose is met.
+            restarts: Random starts after the first one.
+            seed: Of the random starts.
+
+        Returns:
+            Joint coordinates (..., n), by full turns as near to the start as the limits allow, and whether they meet
+            the pose, (...). Where they do not, they are the nearest to it that were found.
+
+        Raises:
+            InvalidInputError: A shape, a number or a rotation is wrong, or a start is outside the limits.
+        """
+        from ikgym.arms import inverse  # its kernels take longer to load than all arms
+
+        return inverse.inverse(self, rotation, position, start, tolerance=tolerance, restarts=restarts, seed=seed)
 
     def joint_points(self, q: npt.ArrayLike) -> FloatArray:
         """Where each joint begins and ends, in the base frame; the two differ where a joint is prismatic.

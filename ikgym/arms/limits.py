@@ -10,28 +10,6 @@ from ikgym.exceptions import InvalidInputError
 from ikgym.validation import LARGEST, SMALLEST, FloatArray, per_joint
 
 
-def within_limits(name: str, q: FloatArray, arm: Arm) -> None:
-    """Insists that an arm can be at joint coordinates.
-
-    Args:
-        name: What the coordinates are called in messages.
-        q: Joint coordinates in [rad] or [m]. Shape (..., n).
-        arm: The arm.
-
-    Raises:
-        InvalidInputError: A joint is outside its limits; the message names it.
-    """
-    rows = q.reshape(-1, arm.joints)
-    outside = np.argwhere((rows < arm.lower) | (rows > arm.upper))
-    if len(outside):
-        row, joint = outside[0].tolist()
-        raise InvalidInputError(
-            f"{name}: expected joint {joint} of arm {arm.name!r} within its limits, from {float(arm.lower[joint])!r} "
-            f"to {float(arm.upper[joint])!r} [{'m' if arm.prismatic[joint] else 'rad'}], got "
-            f"{float(rows[row, joint])!r}."
-        )
-
-
 def velocity_scale(arm: Arm, given: npt.ArrayLike | None) -> FloatArray:
     """What an action of 1 means: the velocity that is given, or else the limits of all joints.
 

@@ -12,7 +12,8 @@ import numpy.typing as npt
 from gymnasium.utils import seeding
 
 from ikgym.arms import Arm
-from ikgym.arms.limits import farthest, velocity_scale, within_limits
+from ikgym.arms.limits import farthest, velocity_scale
+from ikgym.arms.posture import within_limits
 from ikgym.cost import TrackingCost
 from ikgym.exceptions import InvalidInputError
 from ikgym.preview import Preview, furthest

@@ -142,7 +142,7 @@ def test_a_policy_is_shown_with_its_parameters(capsys):
 def test_an_arm_and_a_scenario_are_shown(capsys):
     assert main(["arms", "varga7"]) == 0
     text = capsys.readouterr().out
-    assert "varga7: 7 joints, tool at home (5.5, 0, 2) m" in text
+    assert "varga7: 7 joints, tool at (5.5, 0, 2) m where q = 0, home posture none stated" in text
     assert re.search(r"^3 +prismatic +-inf m +inf m +inf m/s +inf m/s²$", text, re.MULTILINE)
     assert main(["scenarios", "varga7-fast"]) == 0
     assert "varga7-fast: 3000 steps of 0.001 s" in capsys.readouterr().out

@@ -10,9 +10,10 @@ import numpy.typing as npt
 
 from baselines.policy import statuses
 from baselines.policy_kernels import REFUSED, all_finite, answer_parts, as_rows
-from baselines.solvers.linear_algebra import cholesky, cholesky_solve, damped_gram, transposed_product
+from baselines.solvers.linear_algebra import damped_gram, transposed_product
 from baselines.solvers.resolved_rate.base import APPLIED, ResolvedRate, answered, task_shifts
 from ikgym.jit import kernel
+from ikgym.linear_algebra import cholesky, cholesky_solve
 from ikgym.validation import FloatArray, number
 
 

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from baselines.policy_kernels import REFUSED, all_finite, answer_parts, as_rows
 from baselines.solvers.arm_task import arm_task_of, plain_arm_task
-from baselines.solvers.linear_algebra import cholesky, cholesky_solve, pseudoinverse_rows
+from baselines.solvers.linear_algebra import pseudoinverse_rows
 from baselines.solvers.resolved_rate.base import APPLIED, answered, say_deficient, task_shifts
 from baselines.solvers.resolved_rate.dls import damped_rows
 from baselines.solvers.resolved_rate.moore_penrose import MoorePenrose
@@ -19,6 +19,7 @@ from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 from ikgym.jit import kernel
 from ikgym.kinematics import forward_and_jacobian
+from ikgym.linear_algebra import cholesky, cholesky_solve
 from ikgym.validation import FloatArray, known_name, number, per_joint, read_only
 
 OBJECTIVES = ("posture", "joint_centring", "manipulability")

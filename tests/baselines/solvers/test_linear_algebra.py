@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from baselines.solvers.linear_algebra import cholesky, cholesky_solve, orthogonal_columns
+from baselines.solvers.linear_algebra import orthogonal_columns
+from ikgym.linear_algebra import cholesky, cholesky_solve
 
 
 @pytest.mark.parametrize("m", [1, 3, 6, 12])

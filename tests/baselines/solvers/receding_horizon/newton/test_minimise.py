@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import ikgym
-from baselines.solvers.linear_algebra import cholesky, inverse_of_factor
+from baselines.solvers.linear_algebra import inverse_of_factor
 from baselines.solvers.receding_horizon.newton.cost import true_cost
 from baselines.solvers.receding_horizon.newton.minimise import CONVERGED, RAN_OUT, NewtonSettings, minimise
 from baselines.solvers.receding_horizon.newton.newton_step import newton_step
@@ -16,6 +16,7 @@ from baselines.solvers.receding_horizon.newton.workspace import PathProblem, new
 from baselines.solvers.receding_horizon.problem_data import ProblemData
 from ikgym import TrackingCost
 from ikgym.arms import Arm
+from ikgym.linear_algebra import cholesky
 from tests.baselines.solvers.receding_horizon.newton.problems import grid_of, place
 from tests.baselines.solvers.receding_horizon.newton.test_cost import dense
 

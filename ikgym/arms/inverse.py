@@ -1,0 +1,117 @@
+"""Inverse kinematics of poses: what is checked, and what the compiled search is given."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Hashable
+from contextlib import nullcontext
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from ikgym import parallel
+from ikgym.arms.posture import Limited, within_limits
+from ikgym.compilation import announced
+from ikgym.exceptions import InvalidInputError
+from ikgym.inverse_kinematics import Ranges, Settings, inverse_rows
+from ikgym.kinematics import Chain
+from ikgym.validation import FloatArray, float_array, number, rotation_matrices, whole_number
+
+BoolArray = npt.NDArray[np.bool_]
+
+# What an angle of 1 rad counts as, in lengths of the whole arm. From 0.1 to 0.8 differ by less than a fifth.
+LENGTH_OF_RADIAN = 0.25
+# Poses that are worth a thread.
+GRAIN = 64
+
+
+class Solvable(Limited, Hashable, Protocol):
+    """What is asked of an arm here."""
+
+    @property
+    def home(self) -> FloatArray | None:
+        """A posture to start from in [rad] or [m]. Shape (n,)."""
+
+    @property
+    def chain(self) -> Chain:
+        """The arm as its kernels see it."""
+
+    def reach(self, travel: npt.ArrayLike) -> float:
+        """A radius around the base that the tool point never leaves, in [m]."""
+
+
+def inverse(
+    arm: Solvable,
+    rotation: npt.ArrayLike | None,
+    position: npt.ArrayLike,
+    start: npt.ArrayLike | None,
+    *,
+    tolerance: float,
+    restarts: int,
+    seed: int,
+) -> tuple[FloatArray, BoolArray]:
+    """See :meth:`ikgym.arms.Arm.inverse`."""
+    ranges, length, starts = _search(arm)
+    settings = Settings(
+        number("tolerance", tolerance, above=0.0),
+        length,
+        whole_number("restarts", restarts, at_least=0),
+        np.uint64(whole_number("seed", seed, at_least=0) % 2**64),
+    )
+    positions = _with_last("position", position, 3)
+    rotations = np.empty((0, 0)) if rotation is None else rotation_matrices("rotation", rotation)
+    if start is not None:
+        starts = _with_last("start", start, arm.joints)
+        within_limits("start", starts, arm)
+    lead = _lead(rotations.shape, positions.shape, starts.shape)
+    targets = _rows(rotations, lead, 2), _rows(positions, lead, 1), _rows(starts, lead, 1)
+    constants = *arm.chain, *ranges, *settings
+    q, converged = np.empty((len(targets[1]), arm.joints)), np.empty(len(targets[1]), dtype=np.bool_)
+
+    def work(first: int, last: int) -> None:
+        inverse_rows(*constants, *(array[first:last] for array in (*targets, q, converged)))
+
+    # A look takes less time than a timer that is never needed.
+    with nullcontext() if getattr(inverse_rows, "overloads", True) else announced("the inverse kinematics"):
+        parallel.in_chunks(work, len(q), GRAIN)
+    return q.reshape(*lead, arm.joints), converged.reshape(lead)[()]
+
+
+@functools.lru_cache(maxsize=64)
+def _search(arm: Solvable) -> tuple[Ranges, float, FloatArray]:
+    """Where restarts are drawn from, a full turn without limits; what 1 rad counts as, in [m]; and the usual start."""
+    size = arm.reach(np.zeros(arm.joints)) or 1.0  # an arm of slides alone may have no length at q = 0
+    span = np.where(arm.prismatic, 2.0 * size, 2.0 * np.pi)
+    finite_lower, finite_upper = np.isfinite(arm.lower), np.isfinite(arm.upper)
+    first = np.where(finite_lower, arm.lower, np.where(finite_upper, arm.upper - span, -0.5 * span))
+    last = np.where(finite_upper, arm.upper, first + span)
+    start = 0.5 * (first + last) if arm.home is None else arm.home
+    return Ranges(arm.lower, arm.upper, first, last), LENGTH_OF_RADIAN * size, start
+
+
+def _with_last(name: str, value: npt.ArrayLike, length: int) -> FloatArray:
+    array = float_array(name, value)
+    if array.ndim == 0 or array.shape[-1] != length:
+        raise InvalidInputError(f"{name}: expected shape (..., {length}), got {array.shape}.")
+    return array
+
+
+def _lead(rotation: tuple[int, ...], position: tuple[int, ...], start: tuple[int, ...]) -> tuple[int, ...]:
+    """The shape of a batch of poses, from the shapes of its parts."""
+    try:
+        return np.broadcast_shapes(rotation[:-2], position[:-1], start[:-1])
+    except ValueError:
+        raise InvalidInputError(
+            f"rotation, position and start: expected shapes (..., 3, 3), (..., 3) and (..., {start[-1]}) whose leading "
+            f"parts fit together, got {rotation if any(rotation) else None}, {position} and {start}."
+        ) from None
+
+
+def _rows(array: FloatArray, lead: tuple[int, ...], own: int) -> FloatArray:
+    """The array repeated for all poses, one row a pose; never read-only, since kernels would compile anew for that."""
+    shape = (*lead, *array.shape[array.ndim - own :])
+    if array.shape != shape or not array.flags.writeable:
+        array = np.array(np.broadcast_to(array, shape), order="C")
+    return array.reshape(math.prod(lead), *shape[len(lead) :])

@@ -1,0 +1,83 @@
+"""What the benchmark of inverse kinematics measures is what it says; how fast it is found is nobody's test."""
+
+import dataclasses
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import ikgym
+from benchmarks import effort, pose_solvers, poses
+from benchmarks.rivals.arm_urdf import BASE, TIP, arm_urdf, roll_pitch_yaw
+from ikgym import arms
+from ikgym.rotations import rodrigues
+
+PANDA = ikgym.arms.get("panda")
+
+
+def test_poses_are_reachable_and_postures_that_miss_do_not_count():
+    drawn = poses.random_poses(PANDA, 4)
+    q = PANDA.inverse(drawn[:, :3, :3], drawn[:, :3, 3])[0]
+    np.testing.assert_array_equal(poses.met(PANDA, drawn, q), [True] * 4)
+    q[0, 0] += 1e-3
+    q[1] = np.nan
+    q[2, 3] += 2 * np.pi  # the same pose, outside the limits
+    np.testing.assert_array_equal(poses.met(PANDA, drawn, q), [False, False, False, True])
+
+
+def test_time_is_shared_by_the_poses_that_are_met():
+    drawn = poses.random_poses(PANDA, 20)
+
+    def half(given):
+        q = PANDA.inverse(given[:, :3, :3], given[:, :3, 3])[0]
+        q[::2] = np.nan
+        return q
+
+    (share, seconds), (whole, _) = poses.measured(
+        PANDA, {"half": half, "all": pose_solvers.together(PANDA)}, drawn
+    ).values()
+    assert share == 0.5
+    assert whole == 1.0
+    assert seconds > 0.0
+
+
+@pytest.mark.parametrize("label", [*pose_solvers.OURS, *pose_solvers.RIVALS])
+@pytest.mark.parametrize("name", poses.ARMS)
+def test_every_solver_meets_poses_of_the_very_arm(name, label):
+    arm = arms.get(name)
+    try:
+        solve = {**pose_solvers.OURS, **pose_solvers.RIVALS}[label](arm)
+    except ImportError:
+        pytest.skip("pip install ikgym[rivals]")
+    drawn = poses.random_poses(arm, 5)
+    assert poses.met(arm, drawn, solve(drawn)).mean() >= 0.8
+
+
+def test_tables_say_what_is_left_out():
+    for table in poses.tables(dataclasses.replace(effort.QUICK)):
+        assert set(pose_solvers.OURS) <= set(table.rows)
+        assert len(table.rows) + len(table.skipped) == len(pose_solvers.OURS) + len(pose_solvers.RIVALS)
+
+
+@pytest.mark.parametrize("name", [n for n in arms.names() if np.isfinite(arms.get(n).upper).all()])
+def test_the_urdf_of_an_arm_is_that_arm(name):
+    arm = arms.get(name)
+    model = pin.buildModelFromXML(arm_urdf(arm))
+    data = model.createData()
+    for q in np.random.default_rng(0).uniform(arm.lower, arm.upper, (3, arm.joints)):
+        pin.framesForwardKinematics(model, data, q)
+        there = data.oMf[model.getFrameId(BASE)].actInv(data.oMf[model.getFrameId(TIP)])
+        rotation, position = arm.forward(q)
+        np.testing.assert_allclose(there.rotation, rotation, atol=1e-12)
+        np.testing.assert_allclose(there.translation, position, atol=1e-12)
+    np.testing.assert_array_equal(model.velocityLimit, arm.velocity_limit)
+    np.testing.assert_array_equal(model.upperPositionLimit, arm.upper)
+
+
+@pytest.mark.parametrize("pitch", [0.3, -1.2, np.pi / 2, -np.pi / 2])
+def test_roll_pitch_yaw_are_those_of_the_rotation(pitch):
+    x, y, z = np.eye(3)
+    rotation = rodrigues(z, 0.7) @ rodrigues(y, pitch) @ rodrigues(x, -0.4)
+    roll, tilt, yaw = roll_pitch_yaw(rotation)
+    again = rodrigues(z, yaw) @ rodrigues(y, tilt) @ rodrigues(x, roll)
+    np.testing.assert_allclose(again, rotation, atol=1e-9)
