@@ -28,7 +28,7 @@ COUNTED: Mapping[str, tuple[str, ...]] = {
     "forward_kinematics": ("ikgym.kinematics.forward",),
     "jacobians": ("ikgym.kinematics.forward_and_jacobian",),
     "factorisations": (
-        "baselines.solvers.linear_algebra.cholesky",
+        "ikgym.linear_algebra.cholesky",
         "baselines.solvers.linear_algebra.ldl",
         "baselines.solvers.linear_algebra.orthogonal_columns",
         "baselines.solvers.resolved_rate.gram_schmidt.orthonormal_rows",
