@@ -86,8 +86,9 @@ def test_sets() -> list[tuple[str, ...]]:
 
 def records() -> list[tuple[str, ...]]:
     """One line a test set: how its best known costs were found."""
-    head = ("set", "two or more kinds of starts came to it", "random starts or local search alone did", "which gained")
-    return [(*head, "largest gradient [s/rad]"), *map(_records, sets.names())]
+    several, alone = "two or more kinds of starts came to it", "random starts or local search alone did"
+    head = ("set", "starts: least, median, most", several, alone, "which gained", "largest gradient [s/rad]")
+    return [head, *map(_records, sets.names())]
 
 
 def _records(name: str) -> tuple[str, ...]:
@@ -95,8 +96,10 @@ def _records(name: str) -> tuple[str, ...]:
     several = sum(";" in one.found_by for one in found)
     known = [(one.cost, one.spread["without_search"]) for one in found if "without_search" in one.spread]
     gains = [100.0 * (1.0 - cost / without) for cost, without in known if cost < without * (1.0 - MARGIN)]
+    starts = [int(one.spread["starts"]) for one in found]
     return (
         f"`{name}`",
+        f"{min(starts)}, {np.median(starts):.0f}, {max(starts)}",
         f"{several} of {len(found)}",
         f"{len(gains)} of {len(known)}" if known else NOTHING,
         f"{np.median(gains):.2g} % in the median, {max(gains):.2g} % at most" if gains else NOTHING,
