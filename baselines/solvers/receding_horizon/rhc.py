@@ -18,6 +18,7 @@ from ikgym.validation import FloatArray, number, whole_number
 
 # What the kernel's counters and random numbers can hold.
 MOST = 2**31 - 1
+LEAST = {"starts": 1, "restart_steps": 0, "restart_rate": 1, "seed": 0, "start_steps": 0, "recovery_steps": 0}
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -53,6 +54,12 @@ class RecedingHorizon(SolverPolicy):
             random guess, and replaces the plan when it is cheaper after its last step. 0 for none.
         restart_rate: Newton steps of the restart candidate in one control period.
         seed: Of the random guesses, which are the same in all episodes.
+        start_steps: Newton steps of an initial guess, where each of the ``starts`` has a period of its own: the first
+            plan comes from the first of them, and each period after it tries another instead of a restart candidate.
+            0 to try all of them in the first period, which takes that much longer.
+        recovery_steps: Newton steps in a period instead of ``iterations``, where the one before ended with joint
+            velocities beyond their limits or far from optimal; there is no restart candidate then. 0 for no more than
+            ``iterations``.
         tolerance: Relative precision of the horizon's cost at which it counts as minimal.
 
     Raises:
@@ -68,6 +75,8 @@ class RecedingHorizon(SolverPolicy):
     restart_steps: int = 0
     restart_rate: int = 1
     seed: int = 0
+    start_steps: int = 0
+    recovery_steps: int = 0
     tolerance: float = 1e-7
 
     name: ClassVar[str] = "rhc"
@@ -91,7 +100,7 @@ class RecedingHorizon(SolverPolicy):
         if not isinstance(self.stop_at_end, (bool, np.bool_)):
             raise InvalidInputError(f"stop_at_end: expected True or False, got {self.stop_at_end!r}.")
         terminal_weight = number("terminal_weight", self.terminal_weight, at_least=0.0)
-        for name, least in {"starts": 1, "restart_steps": 0, "restart_rate": 1, "seed": 0}.items():
+        for name, least in LEAST.items():
             if whole_number(name, getattr(self, name), at_least=least) > MOST:
                 raise InvalidInputError(f"{name}: expected at most {MOST}, got {getattr(self, name)}.")
         tolerance = number("tolerance", self.tolerance, above=0.0)
@@ -109,6 +118,8 @@ class RecedingHorizon(SolverPolicy):
             self.restart_steps,
             self.restart_rate,
             self.seed,
+            self.start_steps,
+            self.recovery_steps,
         )
         data = (*model.chain, problem.task.kind, *problem.cost.parameters, problem.dt, model.lower, model.upper)
         object.__setattr__(self, "_constants", (*data, problem.velocity_limit, *settings))
@@ -129,6 +140,8 @@ class RecedingHorizon(SolverPolicy):
             candidate_multipliers=np.zeros((rows, candidate, width)),
             periods=np.zeros(rows, dtype=np.int64),
             candidate_steps=np.zeros(rows, dtype=np.int64),
+            tried=np.zeros(rows, dtype=np.int64),
+            far=np.zeros(rows, dtype=np.int64),
         )
 
     def solve(self, batch: Batch, memory: Memory) -> Solution:

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from baselines.solvers.receding_horizon.newton.cost import true_cost
 from baselines.solvers.receding_horizon.newton.grid import shift_multipliers, shift_path
-from baselines.solvers.receding_horizon.newton.guess import DAMPING, STREAM, draw, initial_guess, uniform
+from baselines.solvers.receding_horizon.newton.guess import DAMPING, STREAM, draw, initial_guess, slow_down, uniform
 from baselines.solvers.receding_horizon.newton.minimise import NewtonSettings, minimise
 from baselines.solvers.receding_horizon.newton.workspace import NewtonWorkspace, newton_workspace
 from ikgym.jit import kernel
@@ -38,6 +38,8 @@ class PlanSettings(NamedTuple):
         restart_steps: Newton steps of a restart candidate, 0 for none.
         restart_rate: Of them in one period.
         seed: Of the random guesses.
+        start_steps: Newton steps of an initial guess that has a period of its own; 0 where all share the first.
+        recovery_steps: Newton steps in a period behind one that ended far from optimal; 0 for as many as in others.
     """
 
     at: Integers
@@ -49,6 +51,8 @@ class PlanSettings(NamedTuple):
     restart_steps: int
     restart_rate: int
     seed: int
+    start_steps: int
+    recovery_steps: int
 
 
 class Plan(NamedTuple):
@@ -124,16 +128,19 @@ def initial_plan(problem, settings, plan, workspace):
         Newton steps made.
     """
     made, best = 0, np.inf
+    trials = 1 if settings.start_steps > 0 else settings.starts
     knots, newton = plan.path.shape[0], workspace.newton
     kept = first_part(workspace.kept, knots)
-    for trial in range(settings.starts):
+    for trial in range(trials):
         damping = DAMPING
         workspace.drift[:] = 0.0
         if trial > 0:
             damping = draw(settings.seed, trial, workspace.drift)
         initial_guess(problem, 0, workspace.drift, damping, plan.path, newton.knot)
         plan.multipliers[:] = 0.0
-        if settings.starts == 1:
+        if settings.recovery_steps > 0:
+            slow_down(problem, plan.path)
+        if trials == 1:
             return 0
         coarse = NewtonSettings(False, STEPS_OF_A_START, TOLERANCE_OF_A_START)
         minimum = minimise(problem, plan.path, plan.multipliers, coarse, newton)
@@ -145,6 +152,35 @@ def initial_plan(problem, settings, plan, workspace):
     if best < np.inf:
         _copy(kept, plan)
     return made
+
+
+@kernel
+def try_start(problem, settings, steps, plan, cost, number, workspace):
+    """Improves an initial guess by some Newton steps, and lets it replace the plan where it is cheaper.
+
+    Args:
+        problem: A :class:`workspace.PathProblem` of K knots.
+        settings: :class:`PlanSettings`.
+        steps: Newton steps.
+        plan: The :class:`Plan`.
+        cost: What the plan costs.
+        number: Which random guess of the seed.
+        workspace: A :class:`PlanWorkspace`.
+
+    Returns:
+        Newton steps made.
+    """
+    guess, newton = first_part(workspace.kept, plan.path.shape[0]), workspace.newton
+    damping = draw(settings.seed, number, workspace.drift)
+    initial_guess(problem, 0, workspace.drift, damping, guess.path, newton.knot)
+    guess.multipliers[:] = 0.0
+    if settings.recovery_steps > 0:
+        slow_down(problem, guess.path)
+    few = NewtonSettings(False, steps, TOLERANCE_OF_A_START)
+    minimum = minimise(problem, guess.path, guess.multipliers, few, newton)
+    if max(minimum.cost, true_cost(problem, guess.path, newton)) < (1.0 - GAIN) * cost:
+        _copy(guess, plan)
+    return minimum.steps
 
 
 @kernel

@@ -19,6 +19,7 @@ from baselines.solvers.receding_horizon.newton.plan import (
     initial_plan,
     plan_workspace,
     shift_plan,
+    try_start,
 )
 from baselines.solvers.receding_horizon.newton.workspace import PathProblem
 from baselines.solvers.receding_horizon.problem_data import ProblemData
@@ -33,6 +34,9 @@ _CONVERGED, _LIMIT, _SATURATED = int(Status.CONVERGED), int(Status.ITERATION_LIM
 KEPT = 1e-5
 # Newton steps of the initial plan at least, and of a plan that is to be brought to its optimum.
 STEPS_OF_THE_FIRST, STEPS_TO_THE_OPTIMUM = 30, 300
+# A plan is far from optimal that may be improved by more than this share of its cost; behind so many periods that ended
+# there, another plan is begun beside it.
+FAR, RETRY = 0.1, 4
 
 
 class HorizonMemory(NamedTuple):
@@ -45,6 +49,8 @@ class HorizonMemory(NamedTuple):
         candidate_multipliers: Likewise. Shape (B, K or 0, e + 2 n).
         periods: Periods planned so far. Shape (B,).
         candidate_steps: Newton steps that the candidates have had. Shape (B,).
+        tried: Initial guesses tried so far. Shape (B,).
+        far: How many periods in a row have ended far from optimal. Shape (B,).
     """
 
     plan: npt.NDArray[np.float64]
@@ -53,6 +59,8 @@ class HorizonMemory(NamedTuple):
     candidate_multipliers: npt.NDArray[np.float64]
     periods: npt.NDArray[np.int64]
     candidate_steps: npt.NDArray[np.int64]
+    tried: npt.NDArray[np.int64]
+    far: npt.NDArray[np.int64]
 
 
 @kernel
@@ -81,6 +89,8 @@ def plan_rows(  # noqa: D417  # the first arguments are described where they com
     restart_steps,
     restart_rate,
     seed,
+    start_steps,
+    recovery_steps,
     q,
     qdot_before,
     nominal,
@@ -91,6 +101,8 @@ def plan_rows(  # noqa: D417  # the first arguments are described where they com
     candidate_multipliers,
     periods,
     candidate_steps,
+    tried,
+    far,
     qdot,
     status,
     iterations,
@@ -107,12 +119,14 @@ def plan_rows(  # noqa: D417  # the first arguments are described where they com
         qdot_before: Joint velocities last applied, in [rad/s] or [m/s]. Shape (B, n).
         nominal: Nominal task coordinates ahead. Shape (B, at least at[-1], m).
         remaining: Steps left. Shape (B, 1).
-        plans: See :class:`HorizonMemory`, as the five that follow; all are changed in place.
+        plans: See :class:`HorizonMemory`, as the seven that follow; all are changed in place.
         multipliers: Likewise.
         candidates: Likewise.
         candidate_multipliers: Likewise.
         periods: Likewise.
         candidate_steps: Likewise.
+        tried: Likewise.
+        far: Likewise.
         qdot: Receives the joint velocities, in [rad/s] or [m/s]. Shape (B, n).
         status: Receives values of :class:`Status`. Shape (B,).
         iterations: Receives the Newton steps made, those of initial guesses and candidates among them. Shape (B,).
@@ -121,7 +135,17 @@ def plan_rows(  # noqa: D417  # the first arguments are described where they com
     cost = CostParameters(delta_x, p_x, delta_qdot, p_out, p_in)
     data = ProblemData(chain, kind, cost, dt, lower, upper, velocity_limit)
     settings = PlanSettings(
-        at, terminal_weight, stop_at_end, max_steps, tolerance, starts, restart_steps, restart_rate, seed
+        at,
+        terminal_weight,
+        stop_at_end,
+        max_steps,
+        tolerance,
+        starts,
+        restart_steps,
+        restart_rate,
+        seed,
+        start_steps,
+        recovery_steps,
     )
     n, knots = q.shape[1], at.shape[0]
     workspace = plan_workspace(kind, nominal.shape[2], knots, n, multipliers.shape[2])
@@ -134,11 +158,23 @@ def plan_rows(  # noqa: D417  # the first arguments are described where they com
         for j in range(n):
             workspace.passed[j] = qdot_before[row, j] * dt
         plan = Plan(plans[row], multipliers[row])
-        outcome, made, value = _plan(problem, settings, periods[row], old, plan, workspace)
-        if restart_steps > 0 and periods[row] > 0:
+        starting = start_steps > 0 and periods[row] > 0 and tried[row] + 1 < starts
+        retried = far[row] > 0 and far[row] % RETRY == 0
+        hurried = far[row] > 0 and not (starting or retried or max_steps < 0)
+        steps = max(recovery_steps, max_steps) if hurried else max_steps
+        minimum, made = _plan(problem, settings, steps, periods[row], old, plan, workspace)
+        value, age = minimum.cost, candidate_steps[row : row + 1]
+        plan = first_part(plan, grid.at.shape[0])
+        if starting:
+            tried[row] += 1
+            made += try_start(problem, settings, start_steps, plan, value, tried[row], workspace)
+        elif far[row] > 0:
+            age[0] = 0  # no time for the candidate, which is left behind
+            if retried:
+                number = starts + periods[row]
+                made += try_start(problem, settings, recovery_steps, plan, value, number, workspace)
+        elif restart_steps > 0 and periods[row] > 0:
             candidate = Plan(candidates[row], candidate_multipliers[row])
-            age = candidate_steps[row : row + 1]
-            plan = first_part(plan, grid.at.shape[0])
             if age[0] == 0:
                 branch_off(problem, settings, plan, starts + periods[row], candidate, workspace)
             else:
@@ -147,37 +183,40 @@ def plan_rows(  # noqa: D417  # the first arguments are described where they com
             made += improve_candidate(problem, settings, plan, value, candidate, age, workspace)
         periods[row] += 1
         kept = _first_velocity(data, q[row], plans[row, 0], grid.length[0], qdot[row])
-        status[row] = (_CONVERGED if outcome == CONVERGED else _LIMIT) if kept else _SATURATED
+        status[row] = (_CONVERGED if minimum.outcome == CONVERGED else _LIMIT) if kept else _SATURATED
+        near = kept and minimum.excess <= FAR * value
+        far[row] = 0 if near or recovery_steps == 0 else far[row] + 1
         iterations[row] = made
 
 
 @inlined
-def _plan(problem, settings, period, old_grid, plan, workspace):
+def _plan(problem, settings, most, period, old_grid, plan, workspace):
     """Plans a period of one arm, from the plan of the period before or from an initial guess.
 
     Args:
         problem: A :class:`PathProblem`.
         settings: :class:`PlanSettings`.
+        most: Newton steps in this period; -1 to the optimum.
         period: Periods planned before.
         old_grid: The grid of the plan before.
         plan: The :class:`Plan`, changed in place.
         workspace: A :class:`plan.PlanWorkspace`.
 
     Returns:
-        How the minimisation ended, Newton steps made, and the cost.
+        The :class:`minimise.Minimum`, and Newton steps made, those of initial guesses among them.
     """
     part = first_part(plan, problem.grid.at.shape[0])
-    made, exact, steps = 0, settings.iterations < 0, settings.iterations
+    made, exact, steps = 0, most < 0, most
     if period == 0:
         made = initial_plan(problem, settings, part, workspace)
-        steps = max(STEPS_OF_THE_FIRST, steps)
+        steps = max(settings.start_steps if settings.start_steps > 0 else STEPS_OF_THE_FIRST, steps)
     else:
         shift_plan(old_grid, plan, problem.grid, workspace)
     if exact:
         steps = STEPS_TO_THE_OPTIMUM
     newton = NewtonSettings(exact, steps, settings.tolerance)
     minimum = minimise(problem, part.path, part.multipliers, newton, workspace.newton)
-    return minimum.outcome, made + minimum.steps, minimum.cost
+    return minimum, made + minimum.steps
 
 
 @inlined
