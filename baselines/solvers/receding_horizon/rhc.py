@@ -54,12 +54,16 @@ class RecedingHorizon(SolverPolicy):
             random guess, and replaces the plan when it is cheaper after its last step. 0 for none.
         restart_rate: Newton steps of the restart candidate in one control period.
         seed: Of the random guesses, which are the same in all episodes.
-        start_steps: Newton steps of an initial guess, where each of the ``starts`` has a period of its own: the first
-            plan comes from the first of them, and each period after it tries another instead of a restart candidate.
-            0 to try all of them in the first period, which takes that much longer.
+        start_steps: Newton steps of an initial guess in a period, where they are spread over the first ``starts``
+            periods: the first plan comes from the first guess, and a period after it goes on with another one, as with
+            a restart candidate, until it is cheaper than the plan or unpromising. 0 to try all of them in the first
+            period, which takes that much longer.
         recovery_steps: Newton steps in a period instead of ``iterations``, where the one before ended with joint
             velocities beyond their limits or far from optimal; there is no restart candidate then. 0 for no more than
             ``iterations``.
+        rate_weight: What changes of velocity cost in the plan, rate_weight · Σ (q̇_k - q̇_{k-1})² over joints and steps,
+            in [cost] / [(rad/s)²] or [cost] / [(m/s)²]; the first change is that from the velocity last applied. The
+            score has no such term: smooth velocities have their price. 0 for none.
         tolerance: Relative precision of the horizon's cost at which it counts as minimal.
 
     Raises:
@@ -77,6 +81,7 @@ class RecedingHorizon(SolverPolicy):
     seed: int = 0
     start_steps: int = 0
     recovery_steps: int = 0
+    rate_weight: float = 0.0
     tolerance: float = 1e-7
 
     name: ClassVar[str] = "rhc"
@@ -103,6 +108,9 @@ class RecedingHorizon(SolverPolicy):
         for name, least in LEAST.items():
             if whole_number(name, getattr(self, name), at_least=least) > MOST:
                 raise InvalidInputError(f"{name}: expected at most {MOST}, got {getattr(self, name)}.")
+        if self.start_steps and not self.restart_steps:
+            raise InvalidInputError(f"start_steps: expected 0 where restart_steps is 0, got {self.start_steps}.")
+        rate_weight = number("rate_weight", self.rate_weight, at_least=0.0)
         tolerance = number("tolerance", self.tolerance, above=0.0)
         knots = offsets(self.horizon - 1, self.move_blocks)
         knots.flags.writeable = False
@@ -120,6 +128,7 @@ class RecedingHorizon(SolverPolicy):
             self.seed,
             self.start_steps,
             self.recovery_steps,
+            rate_weight,
         )
         data = (*model.chain, problem.task.kind, *problem.cost.parameters, problem.dt, model.lower, model.upper)
         object.__setattr__(self, "_constants", (*data, problem.velocity_limit, *settings))

@@ -21,6 +21,7 @@ Integers = npt.NDArray[np.int64]
 STEPS_OF_A_START, TOLERANCE_OF_A_START = 30, 1e-4
 # A restart candidate that is still so many times more costly than the plan after so many Newton steps is given up.
 HOPELESS, TRIED = 10.0, 5
+UNPROMISING = 2.0
 # A restart candidate replaces the plan only for a gain that is worth the jump.
 GAIN = 1e-3
 
@@ -40,6 +41,7 @@ class PlanSettings(NamedTuple):
         seed: Of the random guesses.
         start_steps: Newton steps of an initial guess that has a period of its own; 0 where all share the first.
         recovery_steps: Newton steps in a period behind one that ended far from optimal; 0 for as many as in others.
+        rate_weight: What changes of velocity cost, see :mod:`rate`.
     """
 
     at: Integers
@@ -53,6 +55,7 @@ class PlanSettings(NamedTuple):
     seed: int
     start_steps: int
     recovery_steps: int
+    rate_weight: float
 
 
 class Plan(NamedTuple):
@@ -184,33 +187,37 @@ def try_start(problem, settings, steps, plan, cost, number, workspace):
 
 
 @kernel
-def branch_off(problem, settings, plan, number, candidate, workspace):
+def branch_off(problem, settings, plan, anew, number, candidate, workspace):
     """Begins a restart candidate: the plan up to a random knot, and from there on a random guess.
 
     Args:
         problem: A :class:`workspace.PathProblem` of K knots.
         settings: :class:`PlanSettings`.
         plan: The :class:`Plan`.
+        anew: Whether to branch off at once.
         number: Which random guess of the seed.
         candidate: Receives the candidate, a :class:`Plan` of at least K knots.
         workspace: A :class:`PlanWorkspace`.
     """
     knots = plan.path.shape[0]
-    branch = int(uniform(settings.seed, STREAM * number) * knots)
+    branch = 0 if anew else int(uniform(settings.seed, STREAM * number) * knots)
     candidate.path[:branch] = plan.path[:branch]
     candidate.multipliers[:branch] = plan.multipliers[:branch]
     candidate.multipliers[branch:] = 0.0
     damping = draw(settings.seed, number, workspace.drift)
     initial_guess(problem, branch, workspace.drift, damping, candidate.path[:knots], workspace.newton.knot)
+    if settings.recovery_steps > 0:
+        slow_down(problem, candidate.path[:knots])
 
 
 @kernel
-def improve_candidate(problem, settings, plan, cost, candidate, age, workspace):
-    """Improves a restart candidate by some Newton steps, and lets it replace the plan where it is cheaper at its end.
+def improve_candidate(problem, settings, rate, plan, cost, candidate, age, workspace):
+    """Improves a restart candidate by some Newton steps, and lets it replace the plan where it is cheaper.
 
     Args:
         problem: A :class:`workspace.PathProblem` of K knots.
         settings: :class:`PlanSettings`.
+        rate: Newton steps.
         plan: The :class:`Plan`.
         cost: What the plan costs.
         candidate: The candidate, a :class:`Plan` of K knots.
@@ -220,16 +227,17 @@ def improve_candidate(problem, settings, plan, cost, candidate, age, workspace):
     Returns:
         Newton steps made.
     """
-    newton = workspace.newton
-    few = NewtonSettings(False, settings.restart_rate, settings.tolerance)
+    newton, early = workspace.newton, settings.start_steps > 0
+    few = NewtonSettings(False, rate, settings.tolerance)
     minimum = minimise(problem, candidate.path, candidate.multipliers, few, newton)
-    age[0] += settings.restart_rate
-    if age[0] >= settings.restart_steps:
-        age[0] = 0
+    age[0] += rate
+    last, tried = age[0] >= settings.restart_steps, settings.start_steps if early else TRIED
+    if (early or last) and minimum.cost < (1.0 - GAIN) * cost:
         true = true_cost(problem, candidate.path, newton)
-        if max(minimum.cost, true) < (1.0 - GAIN) * cost:
+        if true < (1.0 - GAIN) * cost:
+            age[0] = 0
             _copy(candidate, plan)
-    elif age[0] >= TRIED and not minimum.cost < HOPELESS * cost:
+    if last or (age[0] >= tried and not minimum.cost < (UNPROMISING if early else HOPELESS) * cost):
         age[0] = 0
     return minimum.steps
 

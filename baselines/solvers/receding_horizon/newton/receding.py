@@ -91,6 +91,7 @@ def plan_rows(  # noqa: D417  # the first arguments are described where they com
     seed,
     start_steps,
     recovery_steps,
+    rate_weight,
     q,
     qdot_before,
     nominal,
@@ -146,6 +147,7 @@ def plan_rows(  # noqa: D417  # the first arguments are described where they com
         seed,
         start_steps,
         recovery_steps,
+        rate_weight,
     )
     n, knots = q.shape[1], at.shape[0]
     workspace = plan_workspace(kind, nominal.shape[2], knots, n, multipliers.shape[2])
@@ -154,7 +156,7 @@ def plan_rows(  # noqa: D417  # the first arguments are described where they com
         left = int(min(max(remaining[row, 0], 1.0), at[-1] + 1.0)) if stop_at_end else at[-1]
         grid = first_knots(new_grid, cut(at, left, terminal_weight, new_grid))
         old = first_knots(old_grid, cut(at, left + 1 if stop_at_end else left, terminal_weight, old_grid))
-        problem = PathProblem(data, grid, q[row], nominal[row])
+        problem = PathProblem(data, grid, q[row], nominal[row], qdot_before[row], rate_weight)
         for j in range(n):
             workspace.passed[j] = qdot_before[row, j] * dt
         plan = Plan(plans[row], multipliers[row])
@@ -165,10 +167,7 @@ def plan_rows(  # noqa: D417  # the first arguments are described where they com
         minimum, made = _plan(problem, settings, steps, periods[row], old, plan, workspace)
         value, age = minimum.cost, candidate_steps[row : row + 1]
         plan = first_part(plan, grid.at.shape[0])
-        if starting:
-            tried[row] += 1
-            made += try_start(problem, settings, start_steps, plan, value, tried[row], workspace)
-        elif far[row] > 0:
+        if far[row] > 0 and not starting:
             age[0] = 0  # no time for the candidate, which is left behind
             if retried:
                 number = starts + periods[row]
@@ -176,11 +175,13 @@ def plan_rows(  # noqa: D417  # the first arguments are described where they com
         elif restart_steps > 0 and periods[row] > 0:
             candidate = Plan(candidates[row], candidate_multipliers[row])
             if age[0] == 0:
-                branch_off(problem, settings, plan, starts + periods[row], candidate, workspace)
+                branch_off(problem, settings, plan, starting, starts + periods[row], candidate, workspace)
             else:
                 shift_plan(old, candidate, grid, workspace)
             candidate = first_part(candidate, grid.at.shape[0])
-            made += improve_candidate(problem, settings, plan, value, candidate, age, workspace)
+            rate = start_steps if starting else restart_rate
+            tried[row] += starting
+            made += improve_candidate(problem, settings, rate, plan, value, candidate, age, workspace)
         periods[row] += 1
         kept = _first_velocity(data, q[row], plans[row, 0], grid.length[0], qdot[row])
         status[row] = (_CONVERGED if minimum.outcome == CONVERGED else _LIMIT) if kept else _SATURATED
