@@ -91,6 +91,19 @@ def test_initial_guesses_one_after_the_other_find_another_plan():
     assert any(not np.array_equal(a.q, b.q) for a, b in zip(many, one, strict=True))
 
 
+@pytest.mark.parametrize(("seed", "same"), [(0, True), (1, False)])
+def test_the_seed_chooses_the_initial_guesses(seed, same):
+    candidates = []
+    for number in (0, seed):
+        policy = baselines.make("rhc_foresight", SCENARIO, seed=number)
+        env = gym.make("RedundantIK-v0", scenario=SCENARIO, preview=policy.preview)
+        observation, _ = env.reset(seed=1_000_000)
+        _, state = policy.predict(observation)
+        _, state = policy.predict(observation, state)
+        candidates.append(policy.memory_of(state).candidate)
+    assert np.array_equal(*candidates) == same
+
+
 @pytest.mark.parametrize(
     ("horizon", "blocks"), [(2, 1), (31, 16), (101, 27), (301, 39), (601, 47), (1001, 52), (1501, 57), (3001, 64)]
 )

@@ -412,7 +412,7 @@ def test_rows_of_a_batch_are_single_calls_with_restart_candidates_and_starts(mor
 
 @pytest.mark.parametrize(("change", "same"), [({}, True), ({"seed": 1}, False)])
 def test_seeds(change, same):
-    base = {"horizon": 200, "move_blocks": 16, "starts": 6}
+    base = {"horizon": 200, "move_blocks": 16, "starts": 6, "start_steps": 0}
     first, second = (episode("varga7-fast", "rhc_foresight", steps=60, **base, **c) for c in ({}, change))
     episode.cache_clear()
     assert (episode("varga7-fast", "rhc_foresight", steps=60, **base, **change) == second) is True
