@@ -21,8 +21,8 @@ class RecedingHorizonForesight(RecedingHorizon):
 
     One Newton step a period for the plan, and one for a restart candidate, which finds the way out of local minima that
     a single plan would keep. 64 knots in 3,000 steps: fewer cost more between the knots, a shorter horizon leads into
-    costly local minima that nothing repairs later. The first 24 periods try an initial guess each, with ten Newton
-    steps; a period behind one that ended far from optimal has four.
+    costly local minima that nothing repairs later. The first 64 periods try initial guesses with ten Newton
+    steps each; a period behind one that ended far from optimal has four.
 
     Args:
         move_blocks: As in ``rhc``, but None for as many knots as 64 in 3,000 steps have up to the horizon.
@@ -31,7 +31,7 @@ class RecedingHorizonForesight(RecedingHorizon):
     horizon: int = STEPS + 1
     iterations: int | None = 1
     stop_at_end: bool = True
-    starts: int = 24
+    starts: int = 64
     restart_steps: int = 20
     start_steps: int = 10
     recovery_steps: int = 4

@@ -64,9 +64,9 @@ def iterations(steps, **parameters):
 
 def test_the_first_call_takes_no_more_than_five_ordinary_ones():
     """In Newton steps; the next ones make one step more, that of the plan itself."""
-    made = iterations(60)
+    made = iterations(120)
     assert made[0] <= 5 * np.median(made[-20:])
-    assert made[1:24].max() <= 6 * np.median(made[-20:])
+    assert made[1:].max() <= 6 * np.median(made[-20:])
     assert iterations(60, start_steps=0)[0] > 50 * np.median(made[-20:])
 
 
@@ -86,7 +86,7 @@ def test_initial_guesses_one_after_the_other_find_another_plan():
     scenario, seeds = ikgym.scenarios.get(SCENARIO).replace(steps=40), ikgym.scenarios.seeds("validation", 3)
     many, one = (
         rollouts(scenario, baselines.make("rhc_foresight", scenario, starts=starts, horizon=41), seeds)
-        for starts in (24, 1)
+        for starts in (64, 1)
     )
     assert any(not np.array_equal(a.q, b.q) for a, b in zip(many, one, strict=True))
 
