@@ -22,7 +22,7 @@ class RecedingHorizonForesight(RecedingHorizon):
     One Newton step a period for the plan, and one for a restart candidate, which finds the way out of local minima that
     a single plan would keep. 64 knots in 3,000 steps: fewer cost more between the knots, a shorter horizon leads into
     costly local minima that nothing repairs later. The first 64 periods try initial guesses with ten Newton
-    steps each; a period behind one that ended far from optimal has four.
+    steps each; a period behind one that ended beyond the velocity limits has four.
 
     Args:
         move_blocks: As in ``rhc``, but None for as many knots as 64 in 3,000 steps have up to the horizon.

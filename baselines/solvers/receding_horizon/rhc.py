@@ -59,7 +59,7 @@ class RecedingHorizon(SolverPolicy):
             a restart candidate, until it is cheaper than the plan or unpromising. 0 to try all of them in the first
             period, which takes that much longer.
         recovery_steps: Newton steps in a period instead of ``iterations``, where the one before ended with joint
-            velocities beyond their limits or far from optimal; there is no restart candidate then. 0 for no more than
+            velocities beyond their limits; there is no restart candidate then. 0 for no more than
             ``iterations``.
         rate_weight: What changes of velocity cost in the plan, rate_weight · Σ (q̇_k - q̇_{k-1})² over joints and steps,
             in [cost] / [(rad/s)²] or [cost] / [(m/s)²]; the first change is that from the velocity last applied. The

@@ -52,14 +52,12 @@ class Minimum(NamedTuple):
         steps: Newton steps made, updates of the multipliers among them.
         cost: The cost (where the steps ran out the merit, which is not above it).
         gradient_norm: Norm of the merit's gradient by q (where the steps ran out that before the last one).
-        excess: What the last Newton step promised to gain, and what the multipliers left open before it.
     """
 
     outcome: int
     steps: int
     cost: float
     gradient_norm: float
-    excess: float
 
 
 class LineSearch(NamedTuple):
@@ -101,7 +99,7 @@ def minimise(problem, path, multipliers, settings, workspace):
     penalty_factor, left_open = workspace.knot.penalty_factor, np.inf
     penalty_factor[0] = 1.0
     value, true, gap = linearise(problem, path, multipliers, True, exact, workspace)
-    made, outcome, updated, damping, excess = 0, RAN_OUT, True, 0.0, np.inf
+    made, outcome, updated, damping = 0, RAN_OUT, True, 0.0
     while True:
         damping = damped_newton_step(problem, exact, damping, unit, workspace, step)
         derivative = _dot(gradient, step)
@@ -109,8 +107,7 @@ def minimise(problem, path, multipliers, settings, workspace):
             outcome = STALLED
             break
         promised = -0.5 * derivative
-        excess = promised + gap
-        if excess <= tolerance * true + NEGLIGIBLE and damping <= CONVERGED_DAMPING:
+        if promised + gap <= tolerance * true + NEGLIGIBLE and damping <= CONVERGED_DAMPING:
             outcome = CONVERGED
             break
         if not updated and promised <= UPDATE_BELOW * min(gap, gap * gap):
@@ -142,7 +139,7 @@ def minimise(problem, path, multipliers, settings, workspace):
             break
         damping = _next_damping(damping, search.length)
         value, true, gap = linearise(problem, path, multipliers, False, exact, workspace)
-    return Minimum(outcome, made, true, np.sqrt(_dot(gradient, gradient)), excess)
+    return Minimum(outcome, made, true, np.sqrt(_dot(gradient, gradient)))
 
 
 @inlined

@@ -34,9 +34,8 @@ _CONVERGED, _LIMIT, _SATURATED = int(Status.CONVERGED), int(Status.ITERATION_LIM
 KEPT = 1e-5
 # Newton steps of the initial plan at least, and of a plan that is to be brought to its optimum.
 STEPS_OF_THE_FIRST, STEPS_TO_THE_OPTIMUM = 30, 300
-# A plan is far from optimal that may be improved by more than this share of its cost; behind so many periods that ended
-# there, another plan is begun beside it.
-FAR, RETRY = 0.1, 4
+# Behind so many periods beyond the velocity limits another plan is begun beside it.
+RETRY = 4
 
 
 class HorizonMemory(NamedTuple):
@@ -50,7 +49,7 @@ class HorizonMemory(NamedTuple):
         periods: Periods planned so far. Shape (B,).
         candidate_steps: Newton steps that the candidates have had. Shape (B,).
         tried: Initial guesses tried so far. Shape (B,).
-        far: How many periods in a row have ended far from optimal. Shape (B,).
+        far: How many periods in a row have ended beyond the velocity limits. Shape (B,).
     """
 
     plan: npt.NDArray[np.float64]
@@ -185,8 +184,7 @@ def plan_rows(  # noqa: D417  # the first arguments are described where they com
         periods[row] += 1
         kept = _first_velocity(data, q[row], plans[row, 0], grid.length[0], qdot[row])
         status[row] = (_CONVERGED if minimum.outcome == CONVERGED else _LIMIT) if kept else _SATURATED
-        near = kept and minimum.excess <= FAR * value
-        far[row] = 0 if near or recovery_steps == 0 else far[row] + 1
+        far[row] = 0 if kept or recovery_steps == 0 else far[row] + 1
         iterations[row] = made
 
 

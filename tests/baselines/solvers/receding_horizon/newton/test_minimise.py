@@ -103,7 +103,7 @@ def slider(goals, weight=1.0, upper=np.inf, speed=np.inf, most=50, tolerance=1e-
     path, multipliers = np.zeros((len(goals), 1)), np.zeros((len(goals), 5))
     workspace = newton_workspace(task.kind, task.size, len(goals), 1)
     problem, settings = PathProblem(data, grid, np.zeros(1), nominal), NewtonSettings(True, most, tolerance)
-    outcome, made, value, slope, _ = minimise(problem, path, multipliers, settings, workspace)
+    outcome, made, value, slope = minimise(problem, path, multipliers, settings, workspace)
     true = true_cost(problem, path, workspace)
     return path[:, 0] / S, multipliers, outcome, made, value, slope, true
 
