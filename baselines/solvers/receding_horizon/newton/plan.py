@@ -40,7 +40,7 @@ class PlanSettings(NamedTuple):
         restart_rate: Of them in one period.
         seed: Of the random guesses.
         start_steps: Newton steps of an initial guess that has a period of its own; 0 where all share the first.
-        recovery_steps: Newton steps in a period behind one that ended beyond the velocity limits; 0 for as many as in others.
+        recovery_steps: Newton steps behind a period that ended beyond the velocity limits; 0 for as many as in others.
         rate_weight: What changes of velocity cost, see :mod:`rate`.
     """
 
