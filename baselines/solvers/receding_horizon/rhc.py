@@ -20,6 +20,7 @@ from ikgym.validation import FloatArray, number, whole_number
 
 # What the kernel's counters and random numbers can hold.
 MOST = 2**31 - 1
+LEAST = {"starts": 1, "restart_steps": 0, "restart_rate": 1, "seed": 0, "start_steps": 0, "recovery_steps": 0}
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -55,6 +56,16 @@ class RecedingHorizon(CompiledPolicy):
             random guess, and replaces the plan when it is cheaper after its last step. 0 for none.
         restart_rate: Newton steps of the restart candidate in one control period.
         seed: Of the random guesses, which are the same in all episodes.
+        start_steps: Newton steps of an initial guess in a period, where they are spread over the first ``starts``
+            periods: the first plan comes from the first guess, and a period after it goes on with another one, as with
+            a restart candidate, until it is cheaper than the plan or unpromising. 0 to try all of them in the first
+            period, which takes that much longer.
+        recovery_steps: Newton steps in a period instead of ``iterations``, where the one before ended with joint
+            velocities beyond their limits; there is no restart candidate then. 0 for no more than
+            ``iterations``.
+        rate_weight: What changes of velocity cost in the plan, rate_weight · Σ (q̇_k - q̇_{k-1})² over joints and steps,
+            in [cost] / [(rad/s)²] or [cost] / [(m/s)²]; the first change is that from the velocity last applied. The
+            score has no such term: smooth velocities have their price. 0 for none.
         tolerance: Relative precision of the horizon's cost at which it counts as minimal.
 
     Raises:
@@ -70,6 +81,9 @@ class RecedingHorizon(CompiledPolicy):
     restart_steps: int = 0
     restart_rate: int = 1
     seed: int = 0
+    start_steps: int = 0
+    recovery_steps: int = 0
+    rate_weight: float = 0.0
     tolerance: float = 1e-7
 
     name: ClassVar[str] = "rhc"
@@ -93,9 +107,12 @@ class RecedingHorizon(CompiledPolicy):
         if not isinstance(self.stop_at_end, (bool, np.bool_)):
             raise InvalidInputError(f"stop_at_end: expected True or False, got {self.stop_at_end!r}.")
         terminal_weight = number("terminal_weight", self.terminal_weight, at_least=0.0)
-        for name, least in {"starts": 1, "restart_steps": 0, "restart_rate": 1, "seed": 0}.items():
+        for name, least in LEAST.items():
             if whole_number(name, getattr(self, name), at_least=least) > MOST:
                 raise InvalidInputError(f"{name}: expected at most {MOST}, got {getattr(self, name)}.")
+        if self.start_steps and not self.restart_steps:
+            raise InvalidInputError(f"start_steps: expected 0 where restart_steps is 0, got {self.start_steps}.")
+        rate_weight = number("rate_weight", self.rate_weight, at_least=0.0)
         tolerance = number("tolerance", self.tolerance, above=0.0)
         knots = offsets(self.horizon - 1, self.move_blocks)
         knots.flags.writeable = False
@@ -111,6 +128,9 @@ class RecedingHorizon(CompiledPolicy):
             self.restart_steps,
             self.restart_rate,
             self.seed,
+            self.start_steps,
+            self.recovery_steps,
+            rate_weight,
         )
         data = plain_arm_task(problem), model.chain.prismatic, *problem.cost.parameters
         object.__setattr__(self, "_constants", (*data, *settings))
@@ -131,6 +151,8 @@ class RecedingHorizon(CompiledPolicy):
             candidate_multipliers=np.zeros((rows, candidate, width)),
             periods=np.zeros(rows, dtype=np.int64),
             candidate_steps=np.zeros(rows, dtype=np.int64),
+            tried=np.zeros(rows, dtype=np.int64),
+            far=np.zeros(rows, dtype=np.int64),
         )
 
     def kernel(self) -> Any:

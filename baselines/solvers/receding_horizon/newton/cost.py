@@ -1,13 +1,15 @@
 """Kernels: the cost of a joint path, the merit function that stands for it, and its quadratic model.
 
 The tracking cost of a knot depends on its own joint coordinates alone, the velocity cost of a block on those of its two
-ends, joint by joint: the Hessian is block-tridiagonal, with diagonal blocks beside the diagonal.
+ends, joint by joint: the Hessian is block-tridiagonal, with diagonal blocks beside the diagonal. Changes of velocity,
+where they cost something, couple three knots: see :mod:`rate`.
 """
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
+from baselines.solvers.receding_horizon.newton.rate import add_rate_cost, rate_cost
 from baselines.solvers.receding_horizon.newton.second_order import second_order
 from baselines.solvers.receding_horizon.newton.terms import (
     joint_limit_term,
@@ -84,6 +86,8 @@ def true_cost(problem, path, workspace):
         for j in range(path.shape[1]):
             velocity = (path[k, j] - (path[k - 1, j] if k > 0 else start[j])) * rate
             total += velocities[k] * velocity_cost(cost, velocity)
+    if problem.rate_weight > 0.0:
+        total += rate_cost(problem, path)
     return total
 
 
@@ -120,6 +124,8 @@ def merit(problem, path, multipliers, workspace):
                 total += velocity_limit_term(data, j, velocity, multipliers[k, e + j], factor).value
             if multipliers[k, e + n + j] != 0.0 or path[k, j] < lower[j] or path[k, j] > upper[j]:
                 total += joint_limit_term(data, j, path[k, j], multipliers[k, e + n + j], factor).value
+    if problem.rate_weight > 0.0:
+        total += rate_cost(problem, path)
     return total
 
 
@@ -219,4 +225,8 @@ def linearise(problem, path, multipliers, advance, exact, workspace):
                 gap += abs(term.linear)
                 gradient[k, j] += term.multiplier
                 diagonal[k, j, j] += term.curvature
+    if problem.rate_weight > 0.0:
+        value = add_rate_cost(problem, path, model)
+        total += value
+        true += value
     return Values(total, true, gap)

@@ -60,6 +60,22 @@ def initial_guess(problem, first, drift, damping, path, workspace):
                 here[j] = min(max(moved, data.lower[j]), data.upper[j])
 
 
+@kernel
+def slow_down(problem, path):
+    """Makes a path follow itself within the velocity limits, and so later where it was too fast; in place.
+
+    Args:
+        problem: A :class:`workspace.PathProblem` of K knots.
+        path: Joint coordinates at the knots in [rad] or [m]. Shape (K, n).
+    """
+    data, start, length = problem.data, problem.start, problem.grid.length
+    for k in range(path.shape[0]):
+        for j in range(path.shape[1]):
+            before = path[k - 1, j] if k > 0 else start[j]
+            most = data.velocity_limit[j] * data.dt * length[k]
+            path[k, j] = min(max(path[k, j], before - most), before + most)
+
+
 @inlined
 def uniform(key, counter):
     """A number between 0 and 1 for a key and a counter (SplitMix64); no state, so that rows stay independent."""

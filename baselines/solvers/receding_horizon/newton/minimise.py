@@ -8,6 +8,7 @@ import numpy as np
 
 from baselines.solvers.receding_horizon.newton.cost import linearise, merit
 from baselines.solvers.receding_horizon.newton.newton_step import newton_step
+from baselines.solvers.receding_horizon.newton.pentadiagonal import pentadiagonal_step
 from ikgym.jit import inlined, kernel
 
 CONVERGED, RAN_OUT, STALLED = 0, 1, 2
@@ -100,7 +101,7 @@ def minimise(problem, path, multipliers, settings, workspace):
     value, true, gap = linearise(problem, path, multipliers, True, exact, workspace)
     made, outcome, updated, damping = 0, RAN_OUT, True, 0.0
     while True:
-        damping = damped_newton_step(model, exact, damping, unit, workspace, step)
+        damping = damped_newton_step(problem, exact, damping, unit, workspace, step)
         derivative = _dot(gradient, step)
         if not (np.isfinite(derivative) and damping <= MOST_DAMPING):
             outcome = STALLED
@@ -142,13 +143,13 @@ def minimise(problem, path, multipliers, settings, workspace):
 
 
 @inlined
-def damped_newton_step(model, exact, damping, unit, workspace, step):
+def damped_newton_step(problem, exact, damping, unit, workspace, step):
     """A Newton step with the least damping, from ``damping`` up, that makes the Hessian positive definite.
 
     Where the exact Hessian is not positive definite its Gauss–Newton part is taken before any damping is added.
 
     Args:
-        model: The :class:`workspace.QuadraticModel`.
+        problem: The :class:`workspace.PathProblem`, whose quadratic model is in the workspace.
         exact: Whether to try the exact Hessian.
         damping: Damping to begin with, in units of ``unit``.
         unit: (Δt Δq̇)⁻².
@@ -158,8 +159,15 @@ def damped_newton_step(model, exact, damping, unit, workspace, step):
     Returns:
         The damping of the step, above MOST_DAMPING where none was found.
     """
+    model, inverse, factor = workspace.model, workspace.inverse, workspace.factor
     second = exact
-    while not newton_step(model, second, damping * unit, workspace.inverse, workspace.factor, step):
+    while True:
+        if problem.rate_weight > 0.0:
+            done = pentadiagonal_step(model, second, damping * unit, inverse, factor, step)
+        else:
+            done = newton_step(model, second, damping * unit, inverse, factor, step)
+        if done:
+            break
         if second:
             second = False
         else:

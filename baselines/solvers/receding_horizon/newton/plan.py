@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from baselines.solvers.receding_horizon.newton.cost import true_cost
 from baselines.solvers.receding_horizon.newton.grid import shift_multipliers, shift_path
-from baselines.solvers.receding_horizon.newton.guess import DAMPING, STREAM, draw, initial_guess, uniform
+from baselines.solvers.receding_horizon.newton.guess import DAMPING, STREAM, draw, initial_guess, slow_down, uniform
 from baselines.solvers.receding_horizon.newton.minimise import NewtonSettings, minimise
 from baselines.solvers.receding_horizon.newton.workspace import NewtonWorkspace, newton_workspace
 from ikgym.jit import kernel
@@ -21,6 +21,7 @@ Integers = npt.NDArray[np.int64]
 STEPS_OF_A_START, TOLERANCE_OF_A_START = 30, 1e-4
 # A restart candidate that is still so many times more costly than the plan after so many Newton steps is given up.
 HOPELESS, TRIED = 10.0, 5
+UNPROMISING = 2.0
 # A restart candidate replaces the plan only for a gain that is worth the jump.
 GAIN = 1e-3
 
@@ -38,6 +39,9 @@ class PlanSettings(NamedTuple):
         restart_steps: Newton steps of a restart candidate, 0 for none.
         restart_rate: Of them in one period.
         seed: Of the random guesses.
+        start_steps: Newton steps of an initial guess that has a period of its own; 0 where all share the first.
+        recovery_steps: Newton steps behind a period that ended beyond the velocity limits; 0 for as many as in others.
+        rate_weight: What changes of velocity cost, see :mod:`rate`.
     """
 
     at: Integers
@@ -49,6 +53,9 @@ class PlanSettings(NamedTuple):
     restart_steps: int
     restart_rate: int
     seed: int
+    start_steps: int
+    recovery_steps: int
+    rate_weight: float
 
 
 class Plan(NamedTuple):
@@ -124,16 +131,19 @@ def initial_plan(problem, settings, plan, workspace):
         Newton steps made.
     """
     made, best = 0, np.inf
+    trials = 1 if settings.start_steps > 0 else settings.starts
     knots, newton = plan.path.shape[0], workspace.newton
     kept = first_part(workspace.kept, knots)
-    for trial in range(settings.starts):
+    for trial in range(trials):
         damping = DAMPING
         workspace.drift[:] = 0.0
         if trial > 0:
             damping = draw(settings.seed, trial, workspace.drift)
         initial_guess(problem, 0, workspace.drift, damping, plan.path, newton.knot)
         plan.multipliers[:] = 0.0
-        if settings.starts == 1:
+        if settings.recovery_steps > 0:
+            slow_down(problem, plan.path)
+        if trials == 1:
             return 0
         coarse = NewtonSettings(False, STEPS_OF_A_START, TOLERANCE_OF_A_START)
         minimum = minimise(problem, plan.path, plan.multipliers, coarse, newton)
@@ -148,33 +158,66 @@ def initial_plan(problem, settings, plan, workspace):
 
 
 @kernel
-def branch_off(problem, settings, plan, number, candidate, workspace):
+def try_start(problem, settings, steps, plan, cost, number, workspace):
+    """Improves an initial guess by some Newton steps, and lets it replace the plan where it is cheaper.
+
+    Args:
+        problem: A :class:`workspace.PathProblem` of K knots.
+        settings: :class:`PlanSettings`.
+        steps: Newton steps.
+        plan: The :class:`Plan`.
+        cost: What the plan costs.
+        number: Which random guess of the seed.
+        workspace: A :class:`PlanWorkspace`.
+
+    Returns:
+        Newton steps made.
+    """
+    guess, newton = first_part(workspace.kept, plan.path.shape[0]), workspace.newton
+    damping = draw(settings.seed, number, workspace.drift)
+    initial_guess(problem, 0, workspace.drift, damping, guess.path, newton.knot)
+    guess.multipliers[:] = 0.0
+    if settings.recovery_steps > 0:
+        slow_down(problem, guess.path)
+    few = NewtonSettings(False, steps, TOLERANCE_OF_A_START)
+    minimum = minimise(problem, guess.path, guess.multipliers, few, newton)
+    if max(minimum.cost, true_cost(problem, guess.path, newton)) < (1.0 - GAIN) * cost:
+        _copy(guess, plan)
+    return minimum.steps
+
+
+@kernel
+def branch_off(problem, settings, plan, anew, number, candidate, workspace):
     """Begins a restart candidate: the plan up to a random knot, and from there on a random guess.
 
     Args:
         problem: A :class:`workspace.PathProblem` of K knots.
         settings: :class:`PlanSettings`.
         plan: The :class:`Plan`.
+        anew: Whether to branch off at once.
         number: Which random guess of the seed.
         candidate: Receives the candidate, a :class:`Plan` of at least K knots.
         workspace: A :class:`PlanWorkspace`.
     """
     knots = plan.path.shape[0]
-    branch = int(uniform(settings.seed, STREAM * number) * knots)
+    branch = 0 if anew else int(uniform(settings.seed, STREAM * number) * knots)
     candidate.path[:branch] = plan.path[:branch]
     candidate.multipliers[:branch] = plan.multipliers[:branch]
     candidate.multipliers[branch:] = 0.0
     damping = draw(settings.seed, number, workspace.drift)
     initial_guess(problem, branch, workspace.drift, damping, candidate.path[:knots], workspace.newton.knot)
+    if settings.recovery_steps > 0:
+        slow_down(problem, candidate.path[:knots])
 
 
 @kernel
-def improve_candidate(problem, settings, plan, cost, candidate, age, workspace):
-    """Improves a restart candidate by some Newton steps, and lets it replace the plan where it is cheaper at its end.
+def improve_candidate(problem, settings, rate, plan, cost, candidate, age, workspace):
+    """Improves a restart candidate by some Newton steps, and lets it replace the plan where it is cheaper.
 
     Args:
         problem: A :class:`workspace.PathProblem` of K knots.
         settings: :class:`PlanSettings`.
+        rate: Newton steps.
         plan: The :class:`Plan`.
         cost: What the plan costs.
         candidate: The candidate, a :class:`Plan` of K knots.
@@ -184,16 +227,17 @@ def improve_candidate(problem, settings, plan, cost, candidate, age, workspace):
     Returns:
         Newton steps made.
     """
-    newton = workspace.newton
-    few = NewtonSettings(False, settings.restart_rate, settings.tolerance)
+    newton, early = workspace.newton, settings.start_steps > 0
+    few = NewtonSettings(False, rate, settings.tolerance)
     minimum = minimise(problem, candidate.path, candidate.multipliers, few, newton)
-    age[0] += settings.restart_rate
-    if age[0] >= settings.restart_steps:
-        age[0] = 0
+    age[0] += rate
+    last, tried = age[0] >= settings.restart_steps, settings.start_steps if early else TRIED
+    if (early or last) and minimum.cost < (1.0 - GAIN) * cost:
         true = true_cost(problem, candidate.path, newton)
-        if max(minimum.cost, true) < (1.0 - GAIN) * cost:
+        if true < (1.0 - GAIN) * cost:
+            age[0] = 0
             _copy(candidate, plan)
-    elif age[0] >= TRIED and not minimum.cost < HOPELESS * cost:
+    if last or (age[0] >= tried and not minimum.cost < (UNPROMISING if early else HOPELESS) * cost):
         age[0] = 0
     return minimum.steps
 

@@ -21,6 +21,7 @@ from baselines.solvers.receding_horizon.newton.plan import (
     initial_plan,
     plan_workspace,
     shift_plan,
+    try_start,
 )
 from baselines.solvers.receding_horizon.newton.workspace import PathProblem
 from baselines.solvers.receding_horizon.problem_data import ProblemData
@@ -35,6 +36,8 @@ _CONVERGED, _LIMIT, _SATURATED = int(Status.CONVERGED), int(Status.ITERATION_LIM
 KEPT = 1e-5
 # Newton steps of the initial plan at least, and of a plan that is to be brought to its optimum.
 STEPS_OF_THE_FIRST, STEPS_TO_THE_OPTIMUM = 30, 300
+# Behind so many periods beyond the velocity limits another plan is begun beside it.
+RETRY = 4
 
 
 class HorizonMemory(NamedTuple):
@@ -47,6 +50,8 @@ class HorizonMemory(NamedTuple):
         candidate_multipliers: Likewise. Shape (B, K or 0, e + 2 n).
         periods: Periods planned so far. Shape (B,).
         candidate_steps: Newton steps that the candidates have had. Shape (B,).
+        tried: Initial guesses tried so far. Shape (B,).
+        far: How many periods in a row have ended beyond the velocity limits. Shape (B,).
     """
 
     plan: npt.NDArray[np.float64]
@@ -55,6 +60,8 @@ class HorizonMemory(NamedTuple):
     candidate_multipliers: npt.NDArray[np.float64]
     periods: npt.NDArray[np.int64]
     candidate_steps: npt.NDArray[np.int64]
+    tried: npt.NDArray[np.int64]
+    far: npt.NDArray[np.int64]
 
 
 @kernel
@@ -75,6 +82,9 @@ def plan_rows(  # the first arguments are described where they come from
     restart_steps,
     restart_rate,
     seed,
+    start_steps,
+    recovery_steps,
+    rate_weight,
     checking,
     q,
     qdot_before,
@@ -87,6 +97,8 @@ def plan_rows(  # the first arguments are described where they come from
     candidate_multipliers,
     periods,
     candidate_steps,
+    tried,
+    far,
     action,
     answer,
 ):
@@ -111,7 +123,18 @@ def plan_rows(  # the first arguments are described where they come from
     cost = CostParameters(delta_x, p_x, delta_qdot, p_out, p_in)
     data = ProblemData(chain, kind, cost, dt, lower, upper, velocity_limit)
     settings = PlanSettings(
-        at, terminal_weight, stop_at_end, max_steps, tolerance, starts, restart_steps, restart_rate, seed
+        at,
+        terminal_weight,
+        stop_at_end,
+        max_steps,
+        tolerance,
+        starts,
+        restart_steps,
+        restart_rate,
+        seed,
+        start_steps,
+        recovery_steps,
+        rate_weight,
     )
     workspace = plan_workspace(kind, nominal.shape[2], knots, n, multipliers.shape[2])
     new_grid, old_grid = empty_grid(knots), empty_grid(knots)
@@ -119,55 +142,68 @@ def plan_rows(  # the first arguments are described where they come from
         left = int(min(max(remaining[row], 1.0), at[-1] + 1.0)) if stop_at_end else at[-1]
         grid = first_knots(new_grid, cut(at, left, terminal_weight, new_grid))
         old = first_knots(old_grid, cut(at, left + 1 if stop_at_end else left, terminal_weight, old_grid))
-        problem = PathProblem(data, grid, q[row], nominal[row])
+        problem = PathProblem(data, grid, q[row], nominal[row], qdot_before[row * n : (row + 1) * n], rate_weight)
         for j in range(n):
             workspace.passed[j] = qdot_before[row * n + j] * dt
         plan = Plan(plans[row], multipliers[row])
-        outcome, made, value = _plan(problem, settings, periods[row], old, plan, workspace)
-        if restart_steps > 0 and periods[row] > 0:
+        starting = start_steps > 0 and periods[row] > 0 and tried[row] + 1 < starts
+        retried = far[row] > 0 and far[row] % RETRY == 0
+        hurried = far[row] > 0 and not (starting or retried or max_steps < 0)
+        steps = max(recovery_steps, max_steps) if hurried else max_steps
+        minimum, made = _plan(problem, settings, steps, periods[row], old, plan, workspace)
+        value, age = minimum.cost, candidate_steps[row : row + 1]
+        plan = first_part(plan, grid.at.shape[0])
+        if far[row] > 0 and not starting:
+            age[0] = 0  # no time for the candidate, which is left behind
+            if retried:
+                number = starts + periods[row]
+                made += try_start(problem, settings, recovery_steps, plan, value, number, workspace)
+        elif restart_steps > 0 and periods[row] > 0:
             candidate = Plan(candidates[row], candidate_multipliers[row])
-            age = candidate_steps[row : row + 1]
-            plan = first_part(plan, grid.at.shape[0])
             if age[0] == 0:
-                branch_off(problem, settings, plan, starts + periods[row], candidate, workspace)
+                branch_off(problem, settings, plan, starting, starts + periods[row], candidate, workspace)
             else:
                 shift_plan(old, candidate, grid, workspace)
             candidate = first_part(candidate, grid.at.shape[0])
-            made += improve_candidate(problem, settings, plan, value, candidate, age, workspace)
+            rate = start_steps if starting else restart_rate
+            tried[row] += starting
+            made += improve_candidate(problem, settings, rate, plan, value, candidate, age, workspace)
         periods[row] += 1
         kept = _first_velocity(data, q[row], plans[row, 0], grid.length[0], qdot[row])
-        status[row] = (_CONVERGED if outcome == CONVERGED else _LIMIT) if kept else _SATURATED
+        status[row] = (_CONVERGED if minimum.outcome == CONVERGED else _LIMIT) if kept else _SATURATED
+        far[row] = 0 if kept or recovery_steps == 0 else far[row] + 1
         iterations[row] = made
     return cut_rows(qdot, action_scale, action.reshape(qdot.shape), status)
 
 
 @inlined
-def _plan(problem, settings, period, old_grid, plan, workspace):
+def _plan(problem, settings, most, period, old_grid, plan, workspace):
     """Plans a period of one arm, from the plan of the period before or from an initial guess.
 
     Args:
         problem: A :class:`PathProblem`.
         settings: :class:`PlanSettings`.
+        most: Newton steps in this period; -1 to the optimum.
         period: Periods planned before.
         old_grid: The grid of the plan before.
         plan: The :class:`Plan`, changed in place.
         workspace: A :class:`plan.PlanWorkspace`.
 
     Returns:
-        How the minimisation ended, Newton steps made, and the cost.
+        The :class:`minimise.Minimum`, and Newton steps made, those of initial guesses among them.
     """
     part = first_part(plan, problem.grid.at.shape[0])
-    made, exact, steps = 0, settings.iterations < 0, settings.iterations
+    made, exact, steps = 0, most < 0, most
     if period == 0:
         made = initial_plan(problem, settings, part, workspace)
-        steps = max(STEPS_OF_THE_FIRST, steps)
+        steps = max(settings.start_steps if settings.start_steps > 0 else STEPS_OF_THE_FIRST, steps)
     else:
         shift_plan(old_grid, plan, problem.grid, workspace)
     if exact:
         steps = STEPS_TO_THE_OPTIMUM
     newton = NewtonSettings(exact, steps, settings.tolerance)
     minimum = minimise(problem, part.path, part.multipliers, newton, workspace.newton)
-    return minimum.outcome, made + minimum.steps, minimum.cost
+    return minimum, made + minimum.steps
 
 
 @inlined

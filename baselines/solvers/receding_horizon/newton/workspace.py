@@ -14,6 +14,9 @@ from ikgym.jit import kernel
 
 Floats = npt.NDArray[np.float64]
 
+# Of problems in which changes of velocity cost nothing.
+NO_VELOCITY: Floats = np.zeros(0)
+
 
 class PathProblem(NamedTuple):
     """From where, along what and through which knots a joint path is sought.
@@ -23,12 +26,17 @@ class PathProblem(NamedTuple):
         grid: The time grid, of K knots.
         start: Joint coordinates now, in [rad] or [m]. Shape (n,).
         nominal: Nominal task coordinates 1, 2, … steps ahead. Shape (at least grid.at[-1], m).
+        qdot_before: Joint velocities of the step that has passed, in [rad/s] or [m/s]; read where changes of velocity
+            cost something. Shape (n,).
+        rate_weight: What changes of velocity cost, see :mod:`rate`, in [cost] / [(rad/s)²] or [cost] / [(m/s)²].
     """
 
     data: ProblemData
     grid: Grid
     start: Floats
     nominal: Floats
+    qdot_before: Floats = NO_VELOCITY
+    rate_weight: float = 0.0
 
 
 class KnotWorkspace(NamedTuple):
@@ -64,19 +72,27 @@ class KnotWorkspace(NamedTuple):
 
 
 class QuadraticModel(NamedTuple):
-    """Gradient and Hessian of the merit function at a path; the Hessian is block-tridiagonal.
+    """Gradient and Hessian of the merit function at a path.
+
+    The Hessian is block-tridiagonal, and block-pentadiagonal where changes of velocity cost something.
 
     Attributes:
         gradient: Shape (K, n).
         diagonal: Gauss–Newton part of the diagonal blocks, lower triangles. Shape (K, n, n).
         second: What is missing to the Hessian itself: Σ gradient_i ∂²error_i, lower triangles. Shape (K, n, n).
         coupling: The block between a knot and the one before is diagonal: its negative. Shape (K, n).
+        far: The block between a knot and the one two before, diagonal as well. Shape (K, n).
+        beside: Scratch of :mod:`pentadiagonal`: blocks beside the diagonal, filled up. Shape (K, n, n).
+        product: Scratch likewise. Shape (n, n).
     """
 
     gradient: Floats
     diagonal: Floats
     second: Floats
     coupling: Floats
+    far: Floats
+    beside: Floats
+    product: Floats
 
 
 class NewtonWorkspace(NamedTuple):
@@ -130,7 +146,15 @@ def knot_workspace(kind, m, n):
 @kernel
 def quadratic_model(knots, n):
     """Arrays for the quadratic model at a path of ``knots`` knots and ``n`` joints."""
-    return QuadraticModel(np.empty((knots, n)), np.empty((knots, n, n)), np.empty((knots, n, n)), np.empty((knots, n)))
+    return QuadraticModel(
+        np.empty((knots, n)),
+        np.empty((knots, n, n)),
+        np.empty((knots, n, n)),
+        np.empty((knots, n)),
+        np.empty((knots, n)),
+        np.empty((knots, n, n)),
+        np.empty((n, n)),
+    )
 
 
 @kernel

@@ -407,7 +407,9 @@ def pushed(policy):
         yield observe(policy.problem, q, ahead, remaining=60 - k), np.array([k == 0, k % 7 == 0, k == 11])
 
 
-@pytest.mark.parametrize("more", [{}, {"stop_at_end": True}, {"iterations": None}])
+@pytest.mark.parametrize(
+    "more", [{}, {"stop_at_end": True}, {"iterations": None}, {"start_steps": 4}, {"recovery_steps": 3}]
+)
 def test_rows_of_a_batch_are_single_calls_with_restart_candidates_and_starts(more):
     policy = baselines.make("rhc", "varga7-fast", **{**RESTARTED, **more})
     states, batched = [None] * 3, None
@@ -424,7 +426,7 @@ def test_rows_of_a_batch_are_single_calls_with_restart_candidates_and_starts(mor
 
 @pytest.mark.parametrize(("change", "same"), [({}, True), ({"seed": 1}, False)])
 def test_seeds(change, same):
-    base = {"horizon": 200, "move_blocks": 16, "starts": 6}
+    base = {"horizon": 200, "move_blocks": 16, "starts": 6, "start_steps": 0}
     first, second = (episode("varga7-fast", "rhc_foresight", steps=60, **base, **c) for c in ({}, change))
     episode.cache_clear()
     assert (episode("varga7-fast", "rhc_foresight", steps=60, **base, **change) == second) is True
@@ -515,6 +517,8 @@ def test_status_and_iterations_are_said():
         ({"starts": 0}, "starts: expected a whole number of at least 1"),
         ({"restart_steps": -1}, "restart_steps: expected a whole number of at least 0"),
         ({"restart_rate": 0}, "restart_rate: expected a whole number of at least 1"),
+        ({"start_steps": -1}, "start_steps: expected a whole number of at least 0"),
+        ({"recovery_steps": -1}, "recovery_steps: expected a whole number of at least 0"),
         ({"seed": -1}, "seed: expected a whole number of at least 0"),
         ({"tolerance": 0.0}, "tolerance: expected a finite number above 0"),
     ],

@@ -1,0 +1,146 @@
+"""Changes of velocity: their cost by plain NumPy, its derivatives, the pentadiagonal Newton step, and IPOPT."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import casadi
+import numpy as np
+import pytest
+
+import baselines
+import ikgym
+from baselines.evaluation.rollout import rollouts
+from baselines.solvers.receding_horizon.newton.cost import true_cost
+from baselines.solvers.receding_horizon.newton.pentadiagonal import pentadiagonal_step
+from baselines.solvers.receding_horizon.newton.rate import rate_cost
+from benchmarks.rivals.casadi_horizon import OPTIONS, CasadiHorizon
+from tests.baselines.solvers.receding_horizon.newton.problems import Place, place
+from tests.baselines.solvers.receding_horizon.newton.test_cost import dense, differences
+from tests.baselines.solvers.receding_horizon.newton.test_minimise import random_blocks
+from tests.baselines.solvers.receding_horizon.test_rhc import planned, states_near
+
+WEIGHT = 0.3
+
+
+@dataclasses.dataclass
+class RatedPlace(Place):
+    """A path whose changes of velocity cost something."""
+
+    @property
+    def problem(self):
+        before = np.linspace(-1.0, 1.0, len(self.start))
+        return super().problem._replace(qdot_before=before, rate_weight=WEIGHT)
+
+
+def rated(**parameters):
+    return RatedPlace(**vars(place("varga7", "skew", **parameters)))
+
+
+def by_numpy(problem, path):
+    """Σ (Δq̇)² over half the steps of both blocks."""
+    lengths = problem.grid.length
+    qdot = np.diff(np.vstack([problem.start, path]), axis=0) / (lengths[:, None] * problem.data.dt)
+    changes = np.diff(np.vstack([problem.qdot_before, qdot]), axis=0)
+    spans = 0.5 * (lengths + np.append(1.0, lengths[:-1]))
+    return problem.rate_weight * np.sum(changes**2 / spans[:, None])
+
+
+def whole(blocks):
+    """The Hessian with the blocks two away from the diagonal."""
+    knots, n = blocks.gradient.shape
+    out = dense(blocks).reshape(knots, n, knots, n)
+    for k in range(2, knots):
+        out[k, :, k - 2] = out[k - 2, :, k] = np.diag(blocks.far[k])
+    return out.reshape(knots * n, knots * n)
+
+
+@pytest.mark.parametrize("at", [(1,), (1, 2), (3, 5, 6), (1, 2, 4, 7, 12)])
+def test_cost_of_changes(at):
+    here = rated(at=at, limits=False)
+    expected = by_numpy(here.problem, here.path)
+    assert rate_cost(here.problem, here.path) == pytest.approx(expected, rel=1e-12)
+    without = true_cost(here.problem._replace(rate_weight=0.0), here.path, here.workspace)
+    assert true_cost(here.problem, here.path, here.workspace) - without == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize("at", [(1,), (1, 2), (1, 2, 4, 7, 12)])
+def test_derivatives_against_central_differences(at):
+    here = rated(at=at)
+    (value, _, _), blocks = here.linearise()
+    assert value == pytest.approx(here.merit(), rel=1e-13)
+    central = differences(here.merit, here.path, 1e-8).reshape(blocks.gradient.shape)
+    np.testing.assert_allclose(blocks.gradient, central, atol=1e-6 * abs(central).max())
+    central = differences(lambda path: here.linearise(path)[1].gradient.ravel(), here.path, 1e-8)
+    np.testing.assert_allclose(whole(blocks), central, atol=1e-5 * abs(central).max())
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.7])
+@pytest.mark.parametrize("exact", [False, True])
+@pytest.mark.parametrize(("knots", "n"), [(1, 1), (1, 7), (2, 3), (3, 2), (5, 7), (30, 8)])
+def test_step_against_a_dense_solve(knots, n, exact, damping):
+    blocks = random_blocks(knots, n, np.random.default_rng(knots))
+    blocks.far[:] = np.random.default_rng(0).uniform(-0.4, 0.4, (knots, n))
+    inverse, factor, step = np.empty((knots, n, n)), np.empty((n, n)), np.empty((knots, n))
+    assert pentadiagonal_step(blocks, exact, damping, inverse, factor, step)
+    if not exact:
+        blocks.second[:] = 0.0
+    matrix = whole(blocks) + damping * np.eye(knots * n)
+    np.testing.assert_allclose(step.ravel(), np.linalg.solve(matrix, -blocks.gradient.ravel()), atol=1e-11)
+
+
+def test_what_is_not_convex_is_refused():
+    blocks = random_blocks(4, 3, np.random.default_rng(0), convex=False)
+    blocks.far[:] = 0.0
+    assert not pentadiagonal_step(blocks, False, 0.0, np.empty((4, 3, 3)), np.empty((3, 3)), np.empty((4, 3)))
+
+
+def ipopt(policy, horizon, qdot, start):
+    """The cheapest plan with changes of velocity, by IPOPT from a plan; its cost, changes apart."""
+    problem, knots, h = policy.problem, horizon.knots, horizon.lengths
+    n, e, cost = problem.model.joints, problem.task.error_size, problem.cost
+    y, t = casadi.SX.sym("y", n, knots), casadi.SX.sym("t", e, knots)
+    residual, before, length = CasadiHorizon(problem, knots)._residual, casadi.DM(qdot), 1.0
+    total, above = casadi.SX(0), []
+    for k in range(knots):
+        speed = (y[:, k] - (y[:, k - 1] if k else 0.0)) / h[k]
+        total += h[k] * casadi.sum1((speed / cost.delta_qdot) ** 4)
+        total += horizon.tracking_weights[k] * casadi.sum1(t[:, k])
+        total += policy.rate_weight * casadi.sumsqr(speed - before) / (0.5 * (length + h[k]))
+        before, length = speed, h[k]
+        r = residual(horizon.q + problem.dt * y[:, k], horizon.nominal[k])
+        above += [t[:, k] - r**2, t[:, k] - r**3, t[:, k] + r**3]
+    nlp = {"x": casadi.vertcat(casadi.vec(y), casadi.vec(t)), "f": total, "g": casadi.vertcat(*above)}
+    solver = casadi.nlpsol("rated", "ipopt", nlp, OPTIONS)
+    first = (start - horizon.q) / problem.dt
+    r = np.array(residual.map(knots)(start.T, horizon.nominal.T))
+    answer = solver(x0=np.concatenate([first.ravel(), np.maximum(r**2, abs(r) ** 3).T.ravel()]), lbg=0.0, ubg=np.inf)
+    assert solver.stats()["success"]
+    return float(answer["f"])
+
+
+@pytest.mark.parametrize("parameters", [{"horizon": 8}, {"horizon": 31, "move_blocks": 8}])
+def test_plans_are_as_cheap_as_ipopts(parameters):
+    scenario = ikgym.scenarios.get("varga7-fast")
+    policy = baselines.make("rhc", scenario, rate_weight=5.0, **parameters)
+    q, nominal = states_near(scenario, policy.preview, 3, 1e-2)
+    qdot = np.random.default_rng(1).normal(size=q.shape)
+    costs, horizons, plans, _ = planned(policy, q, nominal, qdot=qdot)
+    for cost, horizon, plan, before in zip(costs, horizons, plans, qdot, strict=True):
+        speeds = np.diff(np.vstack([horizon.q, plan]), axis=0) / (horizon.lengths[:, None] * scenario.dt)
+        changes = np.diff(np.vstack([before, speeds]), axis=0)
+        spans = 0.5 * (horizon.lengths + np.append(1.0, horizon.lengths[:-1]))
+        cost += policy.rate_weight * np.sum(changes**2 / spans[:, None])
+        assert cost == pytest.approx(ipopt(policy, horizon, before, plan), rel=1e-6)
+
+
+def test_velocities_become_smoother():
+    """At 0 nothing changes; above, second differences fall."""
+    scenario = ikgym.scenarios.get("varga7-pose-random").replace(steps=60)
+    second = []
+    for more in ({}, {"rate_weight": 0.0}, {"rate_weight": 10.0}):
+        policy = baselines.make("rhc", scenario, horizon=20, iterations=1, **more)
+        (episode,) = rollouts(scenario, policy, ikgym.scenarios.seeds("validation", 1))
+        second.append(float(abs(np.diff(episode.qdot, 2, axis=0)).sum()))
+    assert second[0] == second[1]
+    assert second[2] < 0.7 * second[0]

@@ -1,0 +1,124 @@
+"""What the preset for real time does at the beginning of an episode, far off its trajectory, and at each horizon."""
+
+from __future__ import annotations
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+import baselines
+import ikgym
+from baselines.evaluation.rollout import rollouts
+from ikgym.exceptions import InvalidInputError
+
+SCENARIO = "varga7-pose-random"
+# Off by so much in [rad] in each joint; recovered with errors below 10 mm and 0.3 rad.
+AWAY, POSITION, ORIENTATION = 0.5, 0.01, 0.3
+
+
+def recovered(signs, steps, **parameters):
+    """Which of the first validation episodes are back on their trajectory after so many steps.
+
+    Args:
+        signs: Of the displacements. Shape (episodes, n).
+        steps: Steps of each episode, which itself goes on.
+        **parameters: Of the policy.
+    """
+    scenario = ikgym.scenarios.get(SCENARIO)
+    policy = baselines.make("rhc_foresight", scenario, **parameters)
+    seeds = ikgym.scenarios.seeds("validation", len(signs))
+    envs = gym.make_vec("RedundantIK-v0", num_envs=len(signs), scenario=scenario, preview=policy.preview)
+    nominal, _ = envs.reset(seed=list(seeds))
+    observation, _ = envs.reset(seed=list(seeds), options={"q": nominal["q"] + AWAY * signs})
+    state = None
+    for _ in range(steps):
+        action, state = policy.predict(observation, state)
+        observation, *_, info = envs.step(action)
+    envs.close()
+    return (info["position_error"] < POSITION) & (info["orientation_error"] < ORIENTATION)
+
+
+def random_signs(episodes):
+    return np.random.default_rng(0).choice([-1.0, 1.0], size=(episodes, 7))
+
+
+def test_recovers_from_far_off():
+    signs = random_signs(16)[[1, 4]]
+    assert recovered(signs, 130).all()
+    assert not recovered(signs, 130, recovery_steps=0).any()  # which is what the parameter is for
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("signs", [random_signs(16), np.ones((16, 7))], ids=["random signs", "all up"])
+def test_recovers_from_far_off_in_16_episodes(signs):
+    assert recovered(signs, 500).all()
+
+
+def iterations(steps, **parameters):
+    """Newton steps in the periods of an episode."""
+    scenario = ikgym.scenarios.get(SCENARIO).replace(steps=steps)
+    policy = baselines.make("rhc_foresight", scenario, **parameters)
+    (episode,) = rollouts(scenario, policy, ikgym.scenarios.seeds("validation", 1))
+    return episode.iterations
+
+
+def test_the_first_call_takes_no_more_than_five_ordinary_ones():
+    """In Newton steps; the next ones make one step more, that of the plan itself."""
+    made = iterations(120)
+    assert made[0] <= 5 * np.median(made[-20:])
+    assert made[1:].max() <= 6 * np.median(made[-20:])
+    assert iterations(60, start_steps=0)[0] > 50 * np.median(made[-20:])
+
+
+@pytest.mark.slow
+def test_initial_guesses_one_after_the_other_lose_little():
+    """At most 0.5 % in the geometric mean against 64 of them in the first call."""
+    scenario, seeds = ikgym.scenarios.get(SCENARIO), ikgym.scenarios.seeds("validation", 64)
+    costs = []
+    for parameters in ({}, {"start_steps": 0, "starts": 64}):
+        episodes = rollouts(scenario, baselines.make("rhc_foresight", scenario, **parameters), seeds)
+        costs.append([float((e.tracking_cost + e.velocity_cost).sum()) for e in episodes])
+    one_by_one, at_once = np.log(costs)
+    assert np.exp(np.mean(one_by_one - at_once)) <= 1.005
+
+
+def test_initial_guesses_one_after_the_other_find_another_plan():
+    scenario, seeds = ikgym.scenarios.get(SCENARIO).replace(steps=40), ikgym.scenarios.seeds("validation", 3)
+    many, one = (
+        rollouts(scenario, baselines.make("rhc_foresight", scenario, starts=starts, horizon=41), seeds)
+        for starts in (64, 1)
+    )
+    assert any(not np.array_equal(a.q, b.q) for a, b in zip(many, one, strict=True))
+
+
+@pytest.mark.parametrize(("seed", "same"), [(0, True), (1, False)])
+def test_the_seed_chooses_the_initial_guesses(seed, same):
+    candidates = []
+    for number in (0, seed):
+        policy = baselines.make("rhc_foresight", SCENARIO, seed=number)
+        env = gym.make("RedundantIK-v0", scenario=SCENARIO, preview=policy.preview)
+        observation, _ = env.reset(seed=1_000_000)
+        _, state = policy.predict(observation)
+        _, state = policy.predict(observation, state)
+        candidates.append(policy.memory_of(state).candidate)
+    assert np.array_equal(*candidates) == same
+
+
+@pytest.mark.parametrize(
+    ("horizon", "blocks"), [(2, 1), (31, 16), (101, 27), (301, 39), (601, 47), (1001, 52), (1501, 57), (3001, 64)]
+)
+def test_knots_of_each_horizon(horizon, blocks):
+    """As dense near the present, whatever the horizon; or as many as asked for."""
+    policy = baselines.make("rhc_foresight", SCENARIO, horizon=horizon)
+    full = baselines.make("rhc_foresight", SCENARIO).offsets
+    assert policy.move_blocks == blocks
+    assert policy.offsets[-1] == horizon - 1
+    near = policy.offsets[: blocks // 2]
+    assert (abs(near - full[: len(near)]) <= 1 + 0.1 * near).all()
+    asked = baselines.make("rhc_foresight", SCENARIO, horizon=horizon, move_blocks=1)
+    assert len(asked.offsets) == 1
+
+
+def test_initial_guesses_after_the_first_are_restart_candidates():
+    with pytest.raises(InvalidInputError, match="start_steps: expected 0 where restart_steps is 0, got 5"):
+        baselines.make("rhc", SCENARIO, starts=3, start_steps=5)
