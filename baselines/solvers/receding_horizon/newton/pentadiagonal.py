@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from baselines.solvers.linear_algebra import cholesky, inverse_of_factor
+from baselines.solvers.linear_algebra import inverse_of_factor
 from ikgym.jit import inlined, kernel
+from ikgym.linear_algebra import cholesky
 
 
 @kernel
