@@ -105,14 +105,33 @@ def _arm(table: Table, key: str, folder: pathlib.Path) -> Arm:
 
 
 def _trajectory(table: Table) -> Trajectory:
-    with _named("[trajectory] ", " of [trajectory]"):
-        kind = checked(table, "kind", str, f"one of {', '.join(KINDS)}")
-        known_names("kind", [kind], KINDS)
-    return _made("trajectory", KINDS[kind], {key: value for key, value in table.items() if key != "kind"})  # type: ignore[no-any-return]
+    kind: type[Trajectory] = _kind("trajectory", table, KINDS)
+    values = {key: value for key, value in table.items() if key != "kind"}
+    for name, kinds in kind.parts.items():
+        if name in values:
+            key = f"trajectory.{name}"
+            with _named("[trajectory] ", " of [trajectory]"):
+                part = checked(values, name, dict, "a table")
+            known = _kind(key, part, kinds)
+            values[name] = _made(key, known, {k: v for k, v in part.items() if k != "kind"})
+    return _made("trajectory", kind, values, made=tuple(kind.parts))  # type: ignore[no-any-return]
+
+
+def _kind(key: str, table: Table, kinds: Mapping[str, type[Any]]) -> type[Any]:
+    """The class that a table is a description of."""
+    with _named(f"[{key}] ", f" of [{key}]"):
+        kind = checked(table, "kind", str, f"one of {', '.join(kinds)}")
+        known_names("kind", [kind], kinds)
+    return kinds[kind]
 
 
 def _made(
-    key: str, kind: type[Any], table: Mapping[str, Any], texts: tuple[str, ...] = (), truths: tuple[str, ...] = ()
+    key: str,
+    kind: type[Any],
+    table: Mapping[str, Any],
+    texts: tuple[str, ...] = (),
+    truths: tuple[str, ...] = (),
+    made: tuple[str, ...] = (),
 ) -> Any:
     """A part of a scenario, made from its table; all of its values are numbers but those named."""
     fields = [f for f in dataclasses.fields(kind) if f.init]
@@ -120,11 +139,13 @@ def _made(
         known_names("key", table, [f.name for f in fields])
         for f in fields:
             if f.default is f.default_factory is dataclasses.MISSING:
-                checked(table, f.name, object, "a text" if f.name in texts else "numbers")
+                checked(
+                    table, f.name, object, "a text" if f.name in texts else "a table" if f.name in made else "numbers"
+                )
         for name, value in table.items():
             if name in texts:
                 checked(table, name, str, "a text")
-            elif name not in truths:
+            elif name not in truths and name not in made:
                 only_numbers(name, value)
         return kind(**table)
 
