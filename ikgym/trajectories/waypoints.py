@@ -9,7 +9,7 @@ import pathlib
 import numpy as np
 import numpy.typing as npt
 
-from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.exceptions import InvalidInputError
 from ikgym.trajectories.orientations import Orientation, OrientationThrough
 from ikgym.trajectories.path_trajectory import PathTrajectory
 from ikgym.trajectories.paths import Path, Polyline, SplinePath
@@ -108,8 +108,6 @@ def from_csv(
             time_law=time_law,
             orientation=orientation,
         )
-    except UnknownNameError:
-        raise
     except InvalidInputError as error:
         raise InvalidInputError(f"{file}: {error}") from None
 

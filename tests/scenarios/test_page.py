@@ -18,7 +18,7 @@ from tests.arms.test_urdf import joint, robot
 ROOT = Path(__file__).parents[2]
 TEXT = (ROOT / "docs" / "scenarios.md").read_text(encoding="utf-8").split("## A scenario of your own")[1]
 WHOLE, ON_URDF = re.findall(r"```toml\n(.*?)```", TEXT, re.DOTALL)
-(SNIPPET,) = re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL)
+PATH, SNIPPET = re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL)
 
 
 @pytest.fixture
@@ -68,3 +68,12 @@ def test_the_arm_from_a_urdf_is_read(tmp_path):
 
 def test_the_kinds_of_trajectories_are_named():
     assert all(f"`{kind}`" in TEXT for kind in ikgym.trajectories.KINDS)
+
+
+def test_the_path_is_one_and_its_kinds_are_named():
+    found = {}
+    exec(PATH.replace("PathTrajectory(\n", "trajectory = PathTrajectory(\n"), found)
+    assert found["trajectory"].duration > 0.0
+    for name, kinds in ikgym.trajectories.PathTrajectory.parts.items():
+        row = re.search(rf"^\| `{name}`.*\|$", TEXT, re.MULTILINE).group()
+        assert all(f"`{kind}`" in row for kind in kinds)
