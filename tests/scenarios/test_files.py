@@ -252,7 +252,7 @@ HELIX = scenarios.get("zhang3-helix")
         (FAST.replace(arm=OwnArm(**FAST.arm._fields())), "arm 'varga7': expected Arm itself, got OwnArm"),
         (
             FAST.replace(task=FAST.task.replace(name="mine")),
-            "task: expected one of position, skew, matrix, pose, which a file can name, got Task",
+            "task: expected one of position, skew, matrix, pose, axis, which a file can name, got Task",
         ),
         (FAST.replace(name="\ud800"), "cannot be written: .* surrogates not allowed"),
         (OwnScenario(**FAST._fields()), "expected a Scenario itself, got a OwnScenario"),

@@ -183,8 +183,6 @@ def turn_rows(arm_task, rule, observed, memory, goal, status):
         status: Receives values of :class:`Status`. Shape (B,).
     """
     (chain, kind), method, (q, pose, target) = arm_task_of(arm_task), RotationRule(*rule), observed
-    # The coordinates of `pose` are those of `matrix`, and the method knows no other error than a difference.
-    kind = task_kernels.MATRIX if kind == task_kernels.POSE else kind
     task_weights, joint_weights, (direction, angles) = method.task_weights, method.joint_weights, memory
     n, m = q.shape[1], pose.shape[1]
     rotation, position, geometric, _ = pose_arrays(n, m)
@@ -192,7 +190,8 @@ def turn_rows(arm_task, rule, observed, memory, goal, status):
     h, actual, desired, e_a, e_b = np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty(n)
     for row in range(q.shape[0]):
         forward_and_jacobian(chain, q[row], rotation, position, geometric)
-        task_kernels.jacobian(kind, rotation, geometric, jacobian)
+        # The method knows no other error than a difference of coordinates.
+        task_kernels.coordinate_jacobian(kind, rotation, geometric, jacobian)
         for i in range(m):
             error[i] = target[row, i] - pose[row, i]
         _transposed(jacobian, task_weights, error, h)

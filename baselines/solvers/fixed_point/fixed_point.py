@@ -27,7 +27,13 @@ TRANSFORMATIONS = {"transpose": 0, "none": 1, "sign": 2}
 _TRANSPOSE, _SIGN = TRANSFORMATIONS["transpose"], TRANSFORMATIONS["sign"]
 _CONVERGED, _LIMIT, _DIVERGED = int(Status.CONVERGED), int(Status.ITERATION_LIMIT), int(Status.DIVERGED)
 # ‖∂x/∂q‖² of the orientation's numbers for a joint that turns at 1 rad/s, at most.
-_TURNING = {task_kernels.POSITION: 0.0, task_kernels.SKEW: 1.0, task_kernels.MATRIX: 2.0, task_kernels.POSE: 1.0}
+_TURNING = {
+    task_kernels.POSITION: 0.0,
+    task_kernels.SKEW: 1.0,
+    task_kernels.MATRIX: 2.0,
+    task_kernels.POSE: 1.0,
+    task_kernels.AXIS: 1.0,
+}
 
 
 class DirectionMemory(NamedTuple):
@@ -214,7 +220,7 @@ def iterate_rows(arm_task, extension, method, target, previous, q, status):
     transformation, numbers, a, iterations, tolerance, longest = method
     function = Contraction(*numbers)
     n, m, joints = q.shape[1], target.shape[1], chain_to_point.axes.shape[0]
-    e = 6 if kind == task_kernels.POSE else m
+    e = task_kernels.error_size(kind, m)
     rotation, position, geometric, pose = pose_arrays(n, m)
     error, jacobian, partial = np.empty(e), np.empty((e, n)), np.empty((6, joints))
     h, start, missing = np.empty(n), np.empty(n), np.empty(3)

@@ -91,7 +91,7 @@ def _roll(data, here, nominal, qdot, first, stages, workspace):
 def _frame_workspace(kind, nominal):
     """Orientation (3, 3), position (3,), task coordinates (m,) and error (e,) of a grid point."""
     m = nominal.shape[1]
-    return np.empty((3, 3)), np.empty(3), np.empty(m), np.empty(6 if kind == task_kernels.POSE else m)
+    return np.empty((3, 3)), np.empty(3), np.empty(m), np.empty(task_kernels.error_size(kind, m))
 
 
 @kernel
@@ -210,7 +210,7 @@ def _tracking_gradient(data, nominal, workspace, gradient):
     task_kernels.coordinates(kind, rotation, workspace.position, pose)
     task_kernels.error(kind, nominal, pose, error)
     task_kernels.jacobian(kind, rotation, workspace.geometric, jacobian)
-    task_kernels.error_jacobian(kind, error, jacobian, error_jacobian)
+    task_kernels.error_jacobian(kind, nominal, pose, error, jacobian, error_jacobian)
     cost_kernels.tracking_gradient(data.cost, error, by_error)
     for j in range(gradient.shape[0]):
         gradient[j] = 0.0

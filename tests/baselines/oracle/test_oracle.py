@@ -45,6 +45,7 @@ CASES = {
     "another measured start": (short("zhang3-helix"), 0),
     "position": (short("faitli3-regular"), 0),
     "pose": (short("zhang6-lspb"), 0),
+    "axis": (short("zhang6-lspb", task=ikgym.tasks.get("axis")), 0),
     "narrow limits": (short(velocity_limit=np.full(7, 5.0)), 0),
     "one step": (short(steps=1), 0),
 }
