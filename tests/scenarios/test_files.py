@@ -403,6 +403,18 @@ BAD = {
         {"trajectory": f"{{kind = 'path', path = {ROUND}, time_law = {LAW}}}"},
         r"\[trajectory.path\] radius: expected numbers, got 'x'",
     ),
+    "no csv": (
+        {"trajectory": "{kind = 'csv'}"},
+        r"\[trajectory\] file: expected a CSV file, relative to this file, got no such key",
+    ),
+    "missing csv": (
+        {"trajectory": "{kind = 'csv', file = 'missing.csv'}"},
+        r"\[trajectory\] .*missing\.csv: expected a CSV file, got none that can be read",
+    ),
+    "speed": (
+        {"trajectory": "{kind = 'csv', file = 'missing.csv', speed = 'fast'}"},
+        r"\[trajectory\] speed: expected numbers, got 'fast'",
+    ),
     "range of scale": (
         {"trajectory": f"{{kind = 'random_sinusoid', amplitude = {SEVEN}, scale = [1, 0]}}"},
         r"\[trajectory\] scale: expected a range \(low, high\), got \(1, 0\)",
