@@ -123,9 +123,8 @@ def _waypoints(table: Table, folder: pathlib.Path) -> Trajectory:
     """The trajectory through the waypoints of a CSV file; saved again, it is written in numbers."""
     with _named("[trajectory] ", " of [trajectory]"):
         known_names("key", table, (*CSV_TEXTS, *CSV_NUMBERS, "orientation"))
-        values: Table = {
-            name: checked(table, name, str, CSV_TEXTS[name]) for name in CSV_TEXTS if name in ("file", *table)
-        }
+        texts = [name for name in CSV_TEXTS if name in ("file", *table)]
+        values: Table = {name: checked(table, name, str, CSV_TEXTS[name]) for name in texts}
         for name in set(table).intersection(CSV_NUMBERS):
             only_numbers(name, table[name])
             values[name] = table[name]
