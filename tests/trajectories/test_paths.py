@@ -114,6 +114,10 @@ def test_points_in_a_line_have_no_corners():
         (lambda: SplinePath([[0, 0, 0], [1, 0, np.nan]]), "points: expected finite numbers"),
         (lambda: SplinePath([[0, 0], [1, 0]]), r"points: expected shape \(any, 3\), got \(2, 2\)"),
         (lambda: SplinePath([[1, 0, 0], [0, 0, 0], [0, 0, 0]]), "at least 1e-09 m apart, got .* as numbers 1 and 2"),
+        (
+            lambda: SplinePath([[0, 0, 0], [1, 0, 0], [0, 0, 0]]),
+            r"turns straight back, .* number 1, \[1.0, 0.0, 0.0",
+        ),
         (lambda: Line([1, 2, 3], [1, 2, 3]), "start and end: expected points at least"),
         (lambda: Polyline([[0, 0, 0], [1, 0, 0], [0, 0, 0]], 0.1), "no corner that turns straight back, got one at nu"),
         (lambda: Polyline([[0, 0, 0], [1, 0, 0], [1, 1, 0]], 2.0), "at most 1 m, .* number 0 and 1, got 2 m"),

@@ -7,12 +7,15 @@ import functools
 
 import numpy as np
 
+from ikgym.exceptions import InvalidInputError
 from ikgym.splines import ArcLength, CubicSpline
 from ikgym.trajectories.paths.path import Path, points_of
 from ikgym.validation import FloatArray
 
-# Pieces of each interval for its length, and for its largest curvature.
-PIECES, SAMPLES = 8, 64
+# Pieces of each interval for its length, and for its largest curvature and its least speed.
+PIECES, SAMPLES = 8, 128
+# The speed of the curve by its parameter is about 1; one that turns back where it came from stops on the way.
+LEAST_SPEED = 0.02
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -23,13 +26,21 @@ class SplinePath(Path):
         points: In [m]. Shape (k, 3).
 
     Raises:
-        InvalidInputError: There are fewer than two points, or two that follow each other are the same.
+        InvalidInputError: There are fewer than two points, two that follow each other are the same, or the curve
+            would turn straight back; the message says where.
     """
 
     points: FloatArray
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "points", points_of("points", self.points))
+        speed = np.linalg.norm(self._spline(_refined(self._spline.knots, SAMPLES), 1), axis=1)
+        if speed.min() < LEAST_SPEED:
+            i = round(int(np.argmin(speed)) / SAMPLES)
+            raise InvalidInputError(
+                f"points: expected a curve that nowhere turns straight back, got one that does near number {i}, "
+                f"{self.points[i].tolist()}."
+            )
 
     @property
     def length(self) -> float:
@@ -38,7 +49,7 @@ class SplinePath(Path):
 
     @functools.cached_property
     def curvature(self) -> float:
-        """The largest of 64 samples between two points. See :attr:`Path.curvature`."""
+        """The largest of 128 samples between two points. See :attr:`Path.curvature`."""
         u = _refined(self._spline.knots, SAMPLES)
         first, second = self._spline(u, 1), self._spline(u, 2)
         return float((np.linalg.norm(np.cross(first, second), axis=1) / np.linalg.norm(first, axis=1) ** 3).max())
