@@ -9,7 +9,7 @@ import pytest
 import baselines
 import ikgym
 from baselines.policy import Batch
-from baselines.solvers.fixed_point import iteration
+from baselines.solvers.fixed_point import fixed_point, iteration
 from baselines.solvers.fixed_point.contraction import contraction, evaluate
 from baselines.solvers.fixed_point.fixed_point import jacobian_bound
 from baselines.status import Status
