@@ -80,7 +80,7 @@ class RedundantIKEnv(gym.Env[Any, Any]):
     | `tracking_cost` | Φ^X | 1 |
     | `velocity_cost` | Φ^U | 1 |
     | `position_error` | distance of the tool point from its nominal position | [m] |
-    | `orientation_error` | geodesic angle to the nominal orientation; absent where the task has none | [rad] |
+    | `orientation_error` | angle to the nominal orientation, or axis; absent where the task has none | [rad] |
     | `clipped` | whether the action left its box | bool |
     | `at_limit` | joints held back by a stop, by the velocity limit, by the acceleration limit; int64 (3,) | 1 |
     | `time` | time since the start | [s] |

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ikgym import cost_kernels, task_kernels
+from ikgym.axis_kernels import angle_between
 from ikgym.cost_kernels import CostParameters
 from ikgym.jit import inlined, kernel
 from ikgym.kinematics import Chain, forward
@@ -270,6 +271,10 @@ def step(
         position_error[row] = math.sqrt(square)
         if kind == task_kernels.POSITION:
             orientation_error[row] = math.nan
+        elif kind == task_kernels.AXIS:
+            orientation_error[row] = angle_between(
+                rotation[0, 2], rotation[1, 2], rotation[2, 2], frame[2], frame[5], frame[8]
+            )
         else:
             orientation_error[row] = geodesic_angle(rotation, frame[:9].reshape(3, 3))
 

@@ -129,13 +129,14 @@ class Simulator:
         """
         scenario, state = self.scenario, self._state
         rows = np.flatnonzero(active)
-        noisy = bool(np.any(scenario.disturbance.noise))
-        for row in rows.tolist():
-            episode = scenario.trajectory.sample(generators[row])
-            if scenario.random:
+        episodes = scenario.trajectory.samples([generators[row] for row in rows.tolist()])
+        if scenario.random:
+            for row, episode in zip(rows.tolist(), episodes, strict=True):
                 self._episodes[row] = episode
-            state.q[row] = scenario.first_q(episode) if starts is None else starts[row]
-            if noisy:
+        if len(rows):
+            state.q[rows] = scenario.first_q_of(episodes) if starts is None else starts[rows]
+        if np.any(scenario.disturbance.noise):
+            for row in rows.tolist():
                 state.noise_key[row] = generators[row].integers(2**63, dtype=np.uint64)
         self._own_start[active] = starts is None
         state.qdot[active] = 0.0

@@ -10,11 +10,20 @@ import math
 
 import numpy as np
 
+from ikgym.axis_kernels import across, direction_error, direction_error_jacobian
 from ikgym.jit import inlined, kernel
 from ikgym.kinematics import forward
 from ikgym.rotations import quaternion_of, vector_factor
 
-POSITION, SKEW, MATRIX, POSE = 0, 1, 2, 3
+POSITION, SKEW, MATRIX, POSE, AXIS = 0, 1, 2, 3, 4
+
+
+@kernel
+def error_size(kind, m):
+    """e, the components of the error, for a kind of task with ``m`` coordinates."""
+    if kind == AXIS:
+        return 5
+    return 6 if kind == POSE else m
 
 
 @kernel
@@ -22,10 +31,10 @@ def coordinates(kind, rotation, position, out):
     """Task coordinates of a pose.
 
     Args:
-        kind: One of POSITION, SKEW, MATRIX and POSE.
+        kind: One of POSITION, SKEW, MATRIX, POSE and AXIS.
         rotation: Orientation. Shape (3, 3).
         position: Position in [m]. Shape (3,).
-        out: Receives the coordinates. Shape (m,): 3, 6, 12 or 12.
+        out: Receives the coordinates. Shape (m,): 3, 6, 12, 12 or 6.
     """
     m = out.shape[0]
     if kind == SKEW:
@@ -33,6 +42,9 @@ def coordinates(kind, rotation, position, out):
         out[0] = 0.5 * (rotation[0, 1] - rotation[1, 0])
         out[1] = 0.5 * (rotation[0, 2] - rotation[2, 0])
         out[2] = 0.5 * (rotation[1, 2] - rotation[2, 1])
+    elif kind == AXIS:
+        for i in range(3):
+            out[i] = rotation[i, 2]
     elif kind != POSITION:
         for i in range(3):
             for j in range(3):
@@ -49,6 +61,9 @@ def frame_coordinates(kind, frame, out):
         out[0] = 0.5 * (frame[1] - frame[3])
         out[1] = 0.5 * (frame[2] - frame[6])
         out[2] = 0.5 * (frame[5] - frame[7])
+    elif kind == AXIS:
+        for i in range(3):
+            out[i] = frame[3 * i + 2]
     elif kind != POSITION:
         for i in range(9):
             out[i] = frame[i]
@@ -61,11 +76,12 @@ def error(kind, nominal, coordinates, out):
     """What is missing from coordinates to their nominal values.
 
     Args:
-        kind: One of POSITION, SKEW, MATRIX and POSE.
+        kind: One of POSITION, SKEW, MATRIX, POSE and AXIS.
         nominal: Nominal coordinates. Shape (m,).
         coordinates: Coordinates. Shape (m,).
         out: Receives the error. Shape (e,): the difference of the coordinates, but for POSE the position
-            error in [m], then the rotation vector of R* Rᵀ in [rad] (Zhang 2020, eq. 51-54).
+            error in [m], then the rotation vector of R* Rᵀ in [rad] (Zhang 2020, eq. 51-54), and for AXIS the
+            position error, then that of the direction, see :func:`ikgym.axis_kernels.direction_error`.
     """
     if kind == POSE:
         for i in range(3):
@@ -80,6 +96,10 @@ def error(kind, nominal, coordinates, out):
         out[3] = factor * x
         out[4] = factor * y
         out[5] = factor * z
+    elif kind == AXIS:
+        for i in range(3):
+            out[i] = nominal[3 + i] - coordinates[3 + i]
+        out[3], out[4] = direction_error(nominal, coordinates)
     else:
         for i in range(out.shape[0]):
             out[i] = nominal[i] - coordinates[i]
@@ -93,10 +113,10 @@ def _rows(a, i, b, j):
 
 @kernel
 def jacobian(kind, rotation, geometric, out):
-    """Derivative of the task coordinates; for POSE that of -error where the error is 0.
+    """Derivative of the task coordinates; for POSE and AXIS that of -error where the error is 0.
 
     Args:
-        kind: One of POSITION, SKEW, MATRIX and POSE.
+        kind: One of POSITION, SKEW, MATRIX, POSE and AXIS.
         rotation: Orientation. Shape (3, 3).
         geometric: Geometric Jacobian, linear rows first. Shape (6, n).
         out: Receives the task Jacobian. Shape (e, n).
@@ -106,6 +126,15 @@ def jacobian(kind, rotation, geometric, out):
         for i in range(6):
             for j in range(n):
                 out[i, j] = geometric[i, j]
+        return
+    if kind == AXIS:
+        ax, ay, az, bx, by, bz = across(rotation[0, 2], rotation[1, 2], rotation[2, 2])
+        for j in range(n):
+            wx, wy, wz = geometric[3, j], geometric[4, j], geometric[5, j]
+            for i in range(3):
+                out[i, j] = geometric[i, j]
+            out[3, j] = ax * wx + ay * wy + az * wz
+            out[4, j] = bx * wx + by * wy + bz * wz
         return
     for j in range(n):
         wx, wy, wz = geometric[3, j], geometric[4, j], geometric[5, j]
@@ -130,12 +159,31 @@ def jacobian(kind, rotation, geometric, out):
 
 
 @kernel
-def error_jacobian(kind, error, jacobian, out):
+def coordinate_jacobian(kind, rotation, geometric, out):
+    """Derivative of the task coordinates themselves. ``out`` (m, n); else as :func:`jacobian`."""
+    if kind == AXIS:
+        x, y, z = rotation[0, 2], rotation[1, 2], rotation[2, 2]
+        for j in range(geometric.shape[1]):
+            wx, wy, wz = geometric[3, j], geometric[4, j], geometric[5, j]
+            out[0, j] = wy * z - wz * y
+            out[1, j] = wz * x - wx * z
+            out[2, j] = wx * y - wy * x
+            for i in range(3):
+                out[3 + i, j] = geometric[i, j]
+    else:
+        # The coordinates of POSE are those of MATRIX.
+        jacobian(MATRIX if kind == POSE else kind, rotation, geometric, out)
+
+
+@kernel
+def error_jacobian(kind, nominal, coordinates, error, jacobian, out):
     """Derivative of the error by the joint coordinates, exact for errors of any size.
 
     Args:
-        kind: One of POSITION, SKEW, MATRIX and POSE.
-        error: The error. Shape (e,).
+        kind: One of POSITION, SKEW, MATRIX, POSE and AXIS.
+        nominal: Nominal coordinates. Shape (m,).
+        coordinates: Coordinates. Shape (m,).
+        error: The error between them. Shape (e,).
         jacobian: What :func:`jacobian` gave. Shape (e, n).
         out: Receives ∂error/∂q. Shape (e, n).
     """
@@ -159,6 +207,11 @@ def error_jacobian(kind, error, jacobian, out):
             out[3, j] = -(wx + 0.5 * ux + c * vx)
             out[4, j] = -(wy + 0.5 * uy + c * vy)
             out[5, j] = -(wz + 0.5 * uz + c * vz)
+    elif kind == AXIS:
+        for j in range(n):
+            for i in range(3):
+                out[i, j] = -jacobian[i, j]
+        direction_error_jacobian(nominal, coordinates, jacobian[3:], out[3:])
     else:
         for i in range(e):
             for j in range(n):

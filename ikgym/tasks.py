@@ -64,7 +64,9 @@ class Task(Frozen):
 
         Returns:
             ``nominal - coordinates``, but for the task ``pose`` the position error in [m], then the rotation
-            vector of R* Rᵀ in [rad] (Zhang 2020, eq. 51-54). Shape (..., e).
+            vector of R* Rᵀ in [rad] (Zhang 2020, eq. 51-54), and for the task ``axis`` the position error, then
+            the two components across z* of the rotation vector that takes z to z* by the shortest way, in [rad].
+            Its length is the angle between the axes; see :mod:`ikgym.axis_kernels`. Shape (..., e).
 
         Raises:
             InvalidInputError: A shape is wrong, or a number not finite.
@@ -88,8 +90,8 @@ class Task(Frozen):
     def jacobian(self, rotation: npt.ArrayLike, jacobian: npt.ArrayLike) -> FloatArray:
         """Derivative of the task coordinates by the joint coordinates.
 
-        For ``pose``, whose error is not a difference, this is the derivative of -error where the error is 0, that
-        is the geometric Jacobian; :meth:`error_jacobian` is exact everywhere.
+        For ``pose`` and ``axis``, whose errors are not differences, this is the derivative of -error where the error
+        is 0, for ``pose`` the geometric Jacobian; :meth:`error_jacobian` is exact everywhere.
 
         Args:
             rotation: Orientations. Shape (..., 3, 3).
@@ -128,6 +130,8 @@ class Task(Frozen):
             InvalidInputError: A shape is wrong, or a number not finite.
         """
         error, task_jacobian = self.error(nominal, coordinates), float_array("jacobian", jacobian)
+        both = np.broadcast_arrays(float_array("nominal", nominal), float_array("coordinates", coordinates))
+        nominal, coordinates = map(np.ascontiguousarray, both)
         if task_jacobian.ndim < 2 or task_jacobian.shape[:-1] != error.shape:
             raise InvalidInputError(
                 f"jacobian: expected shape {(*error.shape, 'n')}, as the error has {error.shape}, got "
@@ -135,7 +139,8 @@ class Task(Frozen):
             )
         out = np.empty_like(task_jacobian)
         for index in np.ndindex(error.shape[:-1]):
-            task_kernels.error_jacobian(self.kind, error[index], task_jacobian[index], out[index])
+            given = nominal[index], coordinates[index], error[index], task_jacobian[index]
+            task_kernels.error_jacobian(self.kind, *given, out[index])
         return out
 
 
@@ -157,6 +162,8 @@ for _task in (
     Task("matrix", task_kernels.MATRIX, size=12, error_size=12, has_orientation=True),
     # Coordinates as in matrix; errors of the position and the rotation vector (Zhang 2020).
     Task("pose", task_kernels.POSE, size=12, error_size=6, has_orientation=True),
+    # The z axis of the tool and the position; errors of the position and of the direction. Rotation about z is free.
+    Task("axis", task_kernels.AXIS, size=6, error_size=5, has_orientation=True),
 ):
     _registry.register(_task.name, lambda task=_task: task)  # type: ignore[misc]
 

@@ -84,9 +84,13 @@ def by_hand(scenario, actions, seed):
         )
 
 
-@pytest.mark.parametrize("name", [name for name in ALL if ikgym.scenarios.get(name).iterations_per_point == (1,)])
-def test_steps_are_what_the_specification_says(name):
-    scenario = ikgym.scenarios.get(name).replace(steps=12)
+AXIS = ikgym.scenarios.get("zhang6-lspb").replace(name="zhang6-axis", task=ikgym.tasks.get("axis"))
+STEPPED = [*(ikgym.scenarios.get(name) for name in ALL if ikgym.scenarios.get(name).iterations_per_point == (1,)), AXIS]
+
+
+@pytest.mark.parametrize("scenario", STEPPED, ids=[scenario.name for scenario in STEPPED])
+def test_steps_are_what_the_specification_says(scenario):
+    scenario = scenario.replace(steps=12)
     env = make(scenario)
     env.reset(seed=21)
     actions = np.random.default_rng(3).uniform(-1.1, 1.1, (12, scenario.joints)).astype(np.float32)
@@ -99,10 +103,17 @@ def test_steps_are_what_the_specification_says(name):
         assert reward == -(info["tracking_cost"] + info["velocity_cost"])
         assert info["clipped"] is bool((np.abs(actions[k]) > 1).any())
         assert info["time"] == pytest.approx((k + 1) * scenario.dt)
-        position = error[:3] if scenario.task.name == "pose" else error[-3:]
+        position = error[:3] if scenario.task.name in ("pose", "axis") else error[-3:]
         assert info["position_error"] == pytest.approx(np.linalg.norm(position), rel=1e-9)
+        if scenario.task.name in ("pose", "axis"):  # the angle between orientations, or between axes
+            assert info["orientation_error"] == pytest.approx(np.linalg.norm(error[3:]), rel=1e-9)
         assert not terminated
         assert truncated is (k == 11)
+
+
+@pytest.mark.parametrize("check", [test_gymnasium_check_env, test_docstring_tables_are_the_spaces])
+def test_the_task_axis_is_checked_as_well(check):
+    check(AXIS)
 
 
 def test_held_points_count_once():

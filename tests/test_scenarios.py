@@ -11,8 +11,8 @@ import pytest
 import ikgym
 from ikgym import compilation, parallel, scenarios
 from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.random_numbers import uniform as _uniform
 from ikgym.scenarios import Disturbance, Scenario
-from ikgym.simulation import _uniform
 
 ALL = scenarios.names()
 

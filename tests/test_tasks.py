@@ -7,6 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import ikgym
+from ikgym.axis_kernels import SINGULAR
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 
 STEP = 1e-6
@@ -116,3 +117,65 @@ def test_error_jacobians_of_a_batch_are_those_of_its_rows(name):
         task.error_jacobian(nominal, here, jacobian[0, 0])
     with pytest.raises(InvalidInputError, match="jacobian: expected shape"):
         task.error_jacobian(nominal[0, 0], here[0, 0], 3.0)
+
+
+AXIS = ikgym.tasks.get("axis")
+
+
+def frame_with(axis):
+    """A rotation whose z axis is the one given, turned about it at random."""
+    axis = np.asarray(axis) / np.linalg.norm(axis)
+    swing = Rotation.align_vectors([axis], [[0.0, 0.0, 1.0]])[0].as_matrix()
+    return swing @ Rotation.from_rotvec([0.0, 0.0, 1.3]).as_matrix()
+
+
+def test_axis_is_the_z_axis_and_the_position():
+    turn = Rotation.from_rotvec([0.3, -0.7, 0.5]).as_matrix()
+    np.testing.assert_array_equal(AXIS.coordinates(turn, [1.0, 2.0, 3.0]), [*turn[:, 2], 1, 2, 3])
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-12, 1e-9, 1e-4, 1e-3, 1.0, 3.0, np.pi - 1e-9])
+def test_axis_error_is_as_long_as_the_angle_between(angle):
+    rng = np.random.default_rng(3)
+    for axis in [*rng.normal(size=(20, 3)), *np.eye(3), *-np.eye(3), np.array(SINGULAR), -np.array(SINGULAR)]:
+        start = frame_with(axis)
+        turn = Rotation.from_rotvec(angle * start[:, 0]).as_matrix()  # about an axis across
+        about = Rotation.from_rotvec(rng.normal() * start[:, 2]).as_matrix()  # about the axis itself: free
+        here, there = AXIS.coordinates(about @ start, [0.5, 2, 3]), AXIS.coordinates(turn @ start, [1, 2, 3])
+        error = AXIS.error(there, here)
+        np.testing.assert_allclose(error[:3], [0.5, 0, 0], atol=1e-15)
+        assert np.linalg.norm(error[3:]) == pytest.approx(angle, rel=1e-9, abs=1e-15)
+        np.testing.assert_array_equal(AXIS.error(here, here), 0.0)
+        opposite = np.concatenate([-there[:3], there[3:]])
+        assert np.linalg.norm(AXIS.error(opposite, there)[3:]) == pytest.approx(np.pi, abs=1e-12)
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-5, 9.9e-4, 1.01e-3, 0.3, 2.0, 3.1])
+def test_axis_error_has_its_derivative_at_every_angle(angle):
+    """Also where a series takes over, and for desired axes on all sides; a random arm of three axes turns the tool."""
+    rng = np.random.default_rng(4)
+    for axis in [*rng.normal(size=(10, 3)), *-np.eye(3), np.array(SINGULAR)]:
+        start = frame_with(axis)
+        goal = AXIS.coordinates(Rotation.from_rotvec(angle * start[:, 1]).as_matrix() @ start, np.zeros(3))
+        geometric = np.vstack([np.zeros((3, 3)), np.eye(3)])
+
+        def error(vector, goal=goal, start=start):
+            return AXIS.error(goal, AXIS.coordinates(Rotation.from_rotvec(vector).as_matrix() @ start, np.zeros(3)))
+
+        jacobian = AXIS.jacobian(start, geometric)
+        got = AXIS.error_jacobian(goal, AXIS.coordinates(start, np.zeros(3)), jacobian)
+        np.testing.assert_allclose(got, differences(error, np.zeros(3)), atol=3e-8 / (np.pi - angle))
+        # Rotation about the axis itself is free.
+        np.testing.assert_allclose(got @ start[:, 2], 0.0, atol=1e-12)
+
+
+def test_axis_error_is_continuous_but_at_one_desired_axis():
+    """A desired axis that goes around the singular one in a narrow circle turns the components; elsewhere not."""
+    circle = np.linspace(0, 2 * np.pi, 9)[:-1]
+    for center, turned in {(0.0, 0.0, -1.0): False, (0.0, 0.0, 1.0): False, SINGULAR: True}.items():
+        frame = frame_with(center)
+        ring = [frame @ [1e-6 * np.cos(a), 1e-6 * np.sin(a), 1.0] for a in circle]
+        here = np.array([*(frame @ [0.1, 0.0, 0.995]), 0, 0, 0])
+        here[:3] /= np.linalg.norm(here[:3])
+        errors = np.array([AXIS.error([*(z / np.linalg.norm(z)), 0, 0, 0], here)[3:] for z in ring])
+        assert bool(np.ptp(errors, axis=0).max() > 0.05) is turned

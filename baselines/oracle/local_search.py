@@ -15,7 +15,8 @@ import numpy.typing as npt
 from baselines.solvers.receding_horizon.newton.cost import true_cost
 from baselines.solvers.receding_horizon.newton.guess import DAMPING, STREAM, draw, initial_guess, uniform
 from baselines.solvers.receding_horizon.newton.minimise import NewtonSettings, minimise
-from baselines.solvers.receding_horizon.newton.workspace import error_size, knot_workspace, newton_workspace
+from baselines.solvers.receding_horizon.newton.workspace import knot_workspace, newton_workspace
+from ikgym import task_kernels
 from ikgym.jit import inlined, kernel
 
 # Newton steps of a branch, and the relative precision that ends them before.
@@ -174,4 +175,4 @@ def _blend(a, b, middle, width, out):
 def _newton(problem, knots, n):
     """Workspace and multipliers of Newton's method."""
     kind, m = problem.data.kind, problem.nominal.shape[1]
-    return newton_workspace(kind, m, knots, n), np.empty((knots, error_size(kind, m) + 2 * n))
+    return newton_workspace(kind, m, knots, n), np.empty((knots, task_kernels.error_size(kind, m) + 2 * n))

@@ -7,6 +7,7 @@ from typing import Any
 import casadi
 
 from ikgym.arms import Arm
+from ikgym.axis_kernels import SINGULAR
 
 
 def forward(arm: Arm, q: Any) -> tuple[Any, Any]:
@@ -40,6 +41,8 @@ def error(task: str, nominal: Any, rotation: Any, position: Any) -> Any:
         return nominal - casadi.vertcat(skew[0, 1], skew[0, 2], skew[1, 2], position)
     if task == "matrix":
         return nominal - casadi.vertcat(casadi.vec(rotation.T), position)
+    if task == "axis":
+        return casadi.vertcat(nominal[3:] - position, _direction_error(nominal[:3], rotation[:, 2]))
     return casadi.vertcat(nominal[9:] - position, _rotation_vector(casadi.reshape(nominal[:9], 3, 3).T @ rotation.T))
 
 
@@ -52,6 +55,22 @@ def _rotation_vector(turn: Any) -> Any:
     sine = casadi.sqrt(casadi.fmax(square, 1e-4))
     series = 2 + square * (1 / 3 + square * (3 / 20 + square * (5 / 56 + square * 35 / 576)))
     return casadi.if_else(square < 1e-4, series, 2 * casadi.atan2(sine, w) / sine) * v
+
+
+def _direction_error(nominal: Any, here: Any) -> Any:
+    """The rotation vector from an axis to its nominal one, along the two directions across the latter, below π."""
+    reference, first = -casadi.DM(SINGULAR), casadi.DM([1.0, -1.0, 0.0]) / 2**0.5
+    cross = casadi.skew(casadi.cross(reference, nominal))
+    carried = casadi.DM.eye(3) + cross + cross @ cross / (1.0 + casadi.dot(reference, nominal))
+    sine = casadi.cross(here, nominal)
+    square = casadi.sumsqr(sine)
+    # θ / sin θ is 0/0 at 0: a series there, and the square root kept away from 0 in the branch not taken.
+    length = casadi.sqrt(casadi.fmax(square, 1e-4))
+    series = 1 + square * (1 / 6 + square * (3 / 40 + square * (5 / 112 + square * 35 / 1152)))
+    near = casadi.logic_and(square < 1e-4, casadi.dot(here, nominal) > 0)
+    factor = casadi.if_else(near, series, casadi.atan2(length, casadi.dot(here, nominal)) / length)
+    both = casadi.horzcat(carried @ first, carried @ casadi.cross(reference, first))
+    return factor * (both.T @ sine)
 
 
 def _axial(turn: Any) -> Any:

@@ -130,7 +130,7 @@ def _cost(chain, kind, cost, dt, origin, length, weight, nominal, x, qdot):
         total += length * cost_kernels.velocity(cost, qdot)
     if weight > 0.0:
         rotation, position, pose = np.empty((3, 3)), np.empty(3), np.empty(nominal.shape[0])
-        error = np.empty(6 if kind == task_kernels.POSE else nominal.shape[0])
+        error = np.empty(task_kernels.error_size(kind, nominal.shape[0]))
         forward(chain, origin + dt * x, rotation, position)
         task_kernels.coordinates(kind, rotation, position, pose)
         task_kernels.error(kind, nominal, pose, error)
@@ -150,7 +150,7 @@ def _derivatives(chain, kind, cost, dt, origin, length, weight, nominal, x, qdot
             by_u[j] *= length
             by_uu[j, j] = length * curvature[j]
     if weight > 0.0:
-        e = 6 if kind == task_kernels.POSE else nominal.shape[0]
+        e = task_kernels.error_size(kind, nominal.shape[0])
         rotation, position, geometric, pose = (
             np.empty((3, 3)),
             np.empty(3),
@@ -168,7 +168,7 @@ def _derivatives(chain, kind, cost, dt, origin, length, weight, nominal, x, qdot
         task_kernels.coordinates(kind, rotation, position, pose)
         task_kernels.error(kind, nominal, pose, error)
         task_kernels.jacobian(kind, rotation, geometric, jacobian)
-        task_kernels.error_jacobian(kind, error, jacobian, by_q)
+        task_kernels.error_jacobian(kind, nominal, pose, error, jacobian, by_q)
         cost_kernels.tracking_gradient(cost, error, gradient)
         cost_kernels.tracking_curvature(cost, error, curvature)
         for k in range(e):

@@ -14,6 +14,7 @@ import numpy as np
 
 from baselines.policy import Problem
 from ikgym.arms import Arm
+from ikgym.axis_kernels import SINGULAR
 from ikgym.validation import FloatArray
 
 
@@ -102,11 +103,13 @@ def coordinates(task: str, rotation: FloatArray, position: FloatArray) -> FloatA
         return position
     if task == "skew":
         return np.concatenate([(0.5 * (rotation - rotation.T))[[0, 0, 1], [1, 2, 2]], position])
-    return np.concatenate([rotation.ravel(), position])
+    return np.concatenate([rotation[:, 2] if task == "axis" else rotation.ravel(), position])
 
 
 def error(task: str, nominal: FloatArray, here: FloatArray) -> FloatArray:
     """What is missing to the nominal coordinates. Shape (e,)."""
+    if task == "axis":
+        return np.concatenate([nominal[3:] - here[3:], _direction_error(nominal[:3], here[:3])])
     if task != "pose":
         return nominal - here
     turn = nominal[:9].reshape(3, 3) @ here[:9].reshape(3, 3).T
@@ -114,6 +117,17 @@ def error(task: str, nominal: FloatArray, here: FloatArray) -> FloatArray:
     length = float(np.linalg.norm(double_sine))
     angle = np.arctan2(length, np.trace(turn) - 1.0)
     return np.concatenate([nominal[9:] - here[9:], double_sine * (angle / length if length > 0.0 else 0.5)])
+
+
+def _direction_error(nominal: FloatArray, here: FloatArray) -> FloatArray:
+    """The rotation vector from an axis to its nominal one, along the two directions across the latter. Shape (2,)."""
+    reference, first = -np.array(SINGULAR), np.array([1.0, -1.0, 0.0]) / np.sqrt(2.0)
+    cross = np.cross(np.eye(3), np.cross(reference, nominal))
+    carried = np.eye(3) + cross + cross @ cross / (1.0 + reference @ nominal)
+    sine = np.cross(here, nominal)
+    length = float(np.linalg.norm(sine))
+    vector = sine * (np.arctan2(length, here @ nominal) / length if length > 0.0 else 1.0)
+    return np.array([carried @ first, carried @ np.cross(reference, first)]) @ vector
 
 
 def _powers(x: FloatArray, inside: float, outside: float) -> FloatArray:

@@ -62,7 +62,7 @@ def largest_step_cost(task: Task, cost: TrackingCost, velocity_limit: FloatArray
         distance: What the position error does not exceed, in [m].
     """
     # Parts of two rotations differ by 2 at most; a rotation vector is no longer than π.
-    turned = np.pi if task.kind == task_kernels.POSE else 2.0
+    turned = np.pi if task.kind in (task_kernels.POSE, task_kernels.AXIS) else 2.0
     errors = np.array([distance] * 3 + [turned] * (task.error_size - 3))
     return cost.largest(errors, velocity_limit)
 

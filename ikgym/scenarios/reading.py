@@ -16,7 +16,8 @@ from ikgym.exceptions import InvalidInputError, UnknownNameError
 from ikgym.scenarios.disturbance import Disturbance
 from ikgym.scenarios.scenario import Scenario
 from ikgym.scenarios.toml import checked, only_numbers
-from ikgym.trajectories import KINDS, Trajectory
+from ikgym.trajectories import KINDS, Trajectory, from_csv
+from ikgym.trajectories.orientations import ORIENTATIONS
 from ikgym.validation import known_names
 
 Table = dict[str, Any]
@@ -29,6 +30,9 @@ URDF_TEXTS = {
     "tip": "the name of a link",
 }
 URDF_NUMBERS = ("tool", "tool_rotation")
+#: The keys of a trajectory that is read from a CSV file, and what each is; it may have an orientation besides.
+CSV_TEXTS = {"file": "a CSV file, relative to this file", "time_law": "the name of a time law"}
+CSV_NUMBERS = ("speed", "acceleration", "corner_radius")
 #: Bytes of a file that are read at most.
 MOST = 2**24
 
@@ -37,7 +41,7 @@ def load(file: str | os.PathLike[str]) -> Scenario:
     """The scenario of a file.
 
     Args:
-        file: A TOML file, as :meth:`Scenario.save` writes it. Paths of URDF files in it are relative to it.
+        file: A TOML file, as :meth:`Scenario.save` writes it. Paths of other files in it are relative to it.
 
     Returns:
         The scenario, checked like one that is made in Python.
@@ -56,7 +60,7 @@ def load(file: str | os.PathLike[str]) -> Scenario:
             "name": checked(table, "name", str, "a text"),
             "task": tasks.get(checked(table, "task", str, "the name of a task")),
             "arm": _arm(table, "arm", folder),
-            "trajectory": _trajectory(checked(table, "trajectory", dict, "a table")),
+            "trajectory": _trajectory(checked(table, "trajectory", dict, "a table"), folder),
         }
         if "model" in table:
             parts["model"] = _arm(table, "model", folder)
@@ -104,15 +108,54 @@ def _arm(table: Table, key: str, folder: pathlib.Path) -> Arm:
         return arms.from_urdf(path, **texts, **{name: arm[name] for name in URDF_NUMBERS if name in arm})
 
 
-def _trajectory(table: Table) -> Trajectory:
+def _trajectory(table: Table, folder: pathlib.Path) -> Trajectory:
+    kind = _kind("trajectory", table, {**KINDS, "csv": from_csv})
+    values = {key: value for key, value in table.items() if key != "kind"}
+    if kind is from_csv:
+        return _waypoints(values, folder)
+    for name, kinds in kind.parts.items():
+        if name in values:
+            values[name] = _part(name, values, kinds)
+    return _made("trajectory", kind, values, made=tuple(kind.parts))  # type: ignore[no-any-return]
+
+
+def _waypoints(table: Table, folder: pathlib.Path) -> Trajectory:
+    """The trajectory through the waypoints of a CSV file; saved again, it is written in numbers."""
     with _named("[trajectory] ", " of [trajectory]"):
-        kind = checked(table, "kind", str, f"one of {', '.join(KINDS)}")
-        known_names("kind", [kind], KINDS)
-    return _made("trajectory", KINDS[kind], {key: value for key, value in table.items() if key != "kind"})  # type: ignore[no-any-return]
+        known_names("key", table, (*CSV_TEXTS, *CSV_NUMBERS, "orientation"))
+        texts = [name for name in CSV_TEXTS if name in ("file", *table)]
+        values: Table = {name: checked(table, name, str, CSV_TEXTS[name]) for name in texts}
+        for name in set(table).intersection(CSV_NUMBERS):
+            only_numbers(name, table[name])
+            values[name] = table[name]
+    orientation = _part("orientation", table, ORIENTATIONS) if "orientation" in table else None
+    with _named("[trajectory] ", " of [trajectory]"):
+        return from_csv(folder / values.pop("file"), orientation=orientation, **values)
+
+
+def _part(name: str, table: Table, kinds: Mapping[str, type[Any]]) -> Any:
+    """A part of a trajectory, made from its table, which says of which kind it is."""
+    with _named("[trajectory] ", " of [trajectory]"):
+        part = checked(table, name, dict, "a table")
+    key = f"trajectory.{name}"
+    return _made(key, _kind(key, part, kinds), {k: v for k, v in part.items() if k != "kind"})
+
+
+def _kind(key: str, table: Table, kinds: Mapping[str, Any]) -> Any:
+    """What makes the thing that a table is a description of."""
+    with _named(f"[{key}] ", f" of [{key}]"):
+        kind = checked(table, "kind", str, f"one of {', '.join(kinds)}")
+        known_names("kind", [kind], kinds)
+    return kinds[kind]
 
 
 def _made(
-    key: str, kind: type[Any], table: Mapping[str, Any], texts: tuple[str, ...] = (), truths: tuple[str, ...] = ()
+    key: str,
+    kind: type[Any],
+    table: Mapping[str, Any],
+    texts: tuple[str, ...] = (),
+    truths: tuple[str, ...] = (),
+    made: tuple[str, ...] = (),
 ) -> Any:
     """A part of a scenario, made from its table; all of its values are numbers but those named."""
     fields = [f for f in dataclasses.fields(kind) if f.init]
@@ -120,11 +163,13 @@ def _made(
         known_names("key", table, [f.name for f in fields])
         for f in fields:
             if f.default is f.default_factory is dataclasses.MISSING:
-                checked(table, f.name, object, "a text" if f.name in texts else "numbers")
+                checked(
+                    table, f.name, object, "a text" if f.name in texts else "a table" if f.name in made else "numbers"
+                )
         for name, value in table.items():
             if name in texts:
                 checked(table, name, str, "a text")
-            elif name not in truths:
+            elif name not in truths and name not in made:
                 only_numbers(name, value)
         return kind(**table)
 

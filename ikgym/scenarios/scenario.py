@@ -21,7 +21,7 @@ from ikgym.scenarios import bounds, parts, writing
 from ikgym.scenarios.disturbance import Disturbance
 from ikgym.simulation import nominal_rows
 from ikgym.tasks import Task
-from ikgym.trajectories import Trajectory, frames_of
+from ikgym.trajectories import Trajectory, first_joints_of, frames_of
 from ikgym.validation import LARGEST, SMALLEST, FloatArray, Frozen, frozen_array, number, per_joint
 
 # A start given by `options={"q": …}` may be this far from home in each joint, in [rad] or [m].
@@ -254,13 +254,24 @@ class Scenario(Frozen):
         Raises:
             InvalidInputError: The arm cannot be there; the message names the joint.
         """
-        path = trajectory.joint_path(np.zeros(1)) if self.start is None else self.start[None]
-        if path is None:
-            raise InvalidInputError(f"Scenario {self.name!r}: a Cartesian trajectory needs a start.")
-        start: FloatArray = path[0]
-        if self.arm.limited:
-            within_limits(f"Start of scenario {self.name!r}", start, self.arm)
+        start: FloatArray = self.first_q_of([trajectory])[0]
         return start
+
+    def first_q_of(self, episodes: Sequence[Trajectory]) -> FloatArray:
+        """The joint coordinates at the start of several episodes, as :meth:`first_q` gives them. Shape (k, n).
+
+        Args:
+            episodes: What was drawn for the k episodes.
+
+        Raises:
+            InvalidInputError: The arm cannot be at one of them; the message names the joint.
+        """
+        starts = first_joints_of(episodes) if self.start is None else np.tile(self.start, (len(episodes), 1))
+        if starts is None:
+            raise InvalidInputError(f"Scenario {self.name!r}: a Cartesian trajectory needs a start.")
+        if self.arm.limited:
+            within_limits(f"Start of scenario {self.name!r}", starts, self.arm)
+        return starts
 
     def joint_bound(self) -> FloatArray:
         """Absolute joint coordinates that no arm exceeds in an episode, in [rad] or [m]. Shape (n,)."""

@@ -20,18 +20,13 @@ def document(values: Mapping[str, Any]) -> str:
     """The text of a TOML file.
 
     Args:
-        values: Texts, truth values, numbers, arrays, sequences of them, and mappings, which become tables. Keys are
-            of letters, digits and ``_``. What is None is left out.
+        values: Texts, truth values, numbers, arrays, sequences of them, and mappings, which become tables, within
+            each other, too. Keys are of letters, digits and ``_``. What is None is left out.
 
     Returns:
         The text; every number reads as the very same number.
     """
-    given = {key: value for key, value in values.items() if value is not None}
-    lines = [f"{key} = {_text(value)}" for key, value in given.items() if not isinstance(value, Mapping)]
-    for key, value in given.items():
-        if isinstance(value, Mapping):
-            lines += ["", f"[{key}]", *(f"{k} = {_text(v)}" for k, v in value.items() if v is not None)]
-    return "\n".join(lines) + "\n"
+    return "\n".join(_lines(values, "")) + "\n"
 
 
 def checked(table: Mapping[str, Any], key: str, kind: type[Value], meant: str) -> Value:
@@ -59,6 +54,16 @@ def only_numbers(key: str, value: object) -> None:
             only_numbers(key, part)
     elif isinstance(value, bool) or not isinstance(value, (int, float)):
         raise InvalidInputError(f"{key}: expected numbers, got {value!r}.")
+
+
+def _lines(values: Mapping[str, Any], within: str) -> list[str]:
+    """The lines of a table, what belongs to itself first."""
+    given = {key: value for key, value in values.items() if value is not None}
+    lines = [f"{key} = {_text(value)}" for key, value in given.items() if not isinstance(value, Mapping)]
+    for key, value in given.items():
+        if isinstance(value, Mapping):
+            lines += ["", f"[{within}{key}]", *_lines(value, f"{within}{key}.")]
+    return lines
 
 
 def _text(value: Any) -> str:

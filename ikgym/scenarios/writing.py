@@ -108,10 +108,25 @@ def _task(task: Task) -> str:
 def _trajectory(trajectory: Trajectory) -> dict[str, Any]:
     for kind, known in KINDS.items():
         if type(trajectory) is known:
-            return {"kind": kind, **_parameters("trajectory", trajectory, known)}
+            parameters = _parameters("trajectory", trajectory, known)
+            for name, kinds in trajectory.parts.items():
+                if parameters[name] is not None:
+                    parameters[name] = _part(name, parameters[name], kinds)
+            return {"kind": kind, **parameters}
     raise InvalidInputError(
         f"trajectory: expected one of {', '.join(k.__name__ for k in KINDS.values())}, which a file can hold, got a "
         f"{type(trajectory).__name__}. A scenario in Python is named by 'package.module:attribute'."
+    )
+
+
+def _part(name: str, part: Any, kinds: Mapping[str, type]) -> dict[str, Any]:
+    """A part of a trajectory, with the name of its kind."""
+    for kind, known in kinds.items():
+        if type(part) is known:
+            return {"kind": kind, **_parameters(name, part, known)}
+    raise InvalidInputError(
+        f"{name} of the trajectory: expected one of {', '.join(k.__name__ for k in kinds.values())}, which a file can "
+        f"hold, got a {type(part).__name__}."
     )
 
 

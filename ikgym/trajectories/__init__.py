@@ -6,18 +6,52 @@ one of them, and gives a fixed trajectory back as it is.
 
 from __future__ import annotations
 
-from ikgym.trajectories.batch import frames_of
+from ikgym.trajectories import paths
+from ikgym.trajectories.batch import first_joints_of, frames_of
 from ikgym.trajectories.helix import Helix
+from ikgym.trajectories.joint_spline import JointSpline
+from ikgym.trajectories.orientations import AlongPath, FixedOrientation, OrientationThrough, Turning
+from ikgym.trajectories.path_trajectory import PathTrajectory
+from ikgym.trajectories.random_joint_spline import RandomJointSpline
 from ikgym.trajectories.sinusoid import RandomSinusoid, Sinusoid
 from ikgym.trajectories.straight_line import StraightLine
+from ikgym.trajectories.time_laws import Quintic, Trapezoidal
+from ikgym.trajectories.timed_waypoints import TimedWaypoints
 from ikgym.trajectories.trajectory import Trajectory
+from ikgym.trajectories.waypoints import from_csv, through
 
-__all__ = ["KINDS", "Helix", "RandomSinusoid", "Sinusoid", "StraightLine", "Trajectory", "frames_of"]
+__all__ = [
+    "KINDS",
+    "AlongPath",
+    "FixedOrientation",
+    "Helix",
+    "JointSpline",
+    "OrientationThrough",
+    "PathTrajectory",
+    "Quintic",
+    "RandomJointSpline",
+    "RandomSinusoid",
+    "Sinusoid",
+    "StraightLine",
+    "TimedWaypoints",
+    "Trajectory",
+    "Trapezoidal",
+    "Turning",
+    "first_joints_of",
+    "frames_of",
+    "from_csv",
+    "paths",
+    "through",
+]
 
 #: The trajectories of this package by their names in scenario files.
 KINDS: dict[str, type[Trajectory]] = {
     "sinusoid": Sinusoid,
     "random_sinusoid": RandomSinusoid,
+    "joint_spline": JointSpline,
+    "random_joint_spline": RandomJointSpline,
     "helix": Helix,
     "straight_line": StraightLine,
+    "path": PathTrajectory,
+    "timed_waypoints": TimedWaypoints,
 }

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ikgym.arms import Arm
+from ikgym.trajectories.joint_spline import JointSpline, splines_at
 from ikgym.trajectories.sinusoid import Sinusoid, frames_along, waves
 from ikgym.trajectories.trajectory import Trajectory
 from ikgym.validation import FloatArray
@@ -24,10 +25,35 @@ def frames_of(trajectories: Sequence[Trajectory], times: FloatArray, model: Arm)
     Returns:
         Bit for bit what :meth:`Trajectory.frames` gives row by row. Shape (k, t, 12) or (k, t, 3).
     """
-    # What random scenarios draw by the thousands is computed at once.
-    if all(type(trajectory) is Sinusoid and trajectory.sigmoid is None for trajectory in trajectories):
+    path = _paths(trajectories, times)
+    if path is not None:
+        return frames_along(path, model)
+    return np.stack([t.frames(row, model) for t, row in zip(trajectories, times, strict=True)])
+
+
+def first_joints_of(trajectories: Sequence[Trajectory]) -> FloatArray | None:
+    """The joint coordinates at the time 0 of several trajectories; None where one is a path in Cartesian space.
+
+    Returns:
+        Joint coordinates in [rad] or [m], bit for bit those of :meth:`Trajectory.joint_path`. Shape (k, n).
+    """
+    path = _paths(trajectories, np.zeros((len(trajectories), 1)))
+    if path is not None:
+        return path[:, 0]
+    rows = [trajectory.joint_path(np.zeros(1)) for trajectory in trajectories]
+    return None if any(row is None for row in rows) else np.concatenate(typing.cast(list[FloatArray], rows))
+
+
+def _paths(trajectories: Sequence[Trajectory], times: FloatArray) -> FloatArray | None:
+    """Joint paths of shape (k, t, n), where all are of a kind that random scenarios draw by the thousands."""
+    kinds = set(map(type, trajectories))
+    if kinds == {Sinusoid} and all(s.sigmoid is None for s in typing.cast(Sequence[Sinusoid], trajectories)):
         sinusoids = typing.cast(Sequence[Sinusoid], trajectories)
         motions = np.array([(s.amplitude, s.frequency, s.phase, s.offset) for s in sinusoids])
         amplitude, frequency, phase, offset = motions.swapaxes(0, 1)[:, :, None]
-        return frames_along(waves(times[..., None], amplitude, frequency, phase, offset, None), model)
-    return np.stack([t.frames(row, model) for t, row in zip(trajectories, times, strict=True)])
+        return waves(times[..., None], amplitude, frequency, phase, offset, None)
+    splines = typing.cast(Sequence[JointSpline], trajectories)
+    if kinds == {JointSpline} and len({s.control.shape for s in splines}) == 1:
+        durations = np.array([[s.duration] for s in splines])
+        return splines_at(np.array([s.control for s in splines]), times, durations)
+    return None

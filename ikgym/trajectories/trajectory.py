@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import abc
 import typing
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -19,6 +20,8 @@ class Trajectory(Frozen, abc.ABC):
     random: typing.ClassVar[bool] = False
     #: Whether the trajectory prescribes orientations.
     has_orientation: typing.ClassVar[bool] = True
+    #: Fields that are parts with a kind of their own: their classes by the names of these kinds in scenario files.
+    parts: typing.ClassVar[Mapping[str, Mapping[str, type]]] = {}
 
     def sample(self, rng: np.random.Generator) -> Trajectory:
         """The trajectory of one episode.
@@ -28,6 +31,14 @@ class Trajectory(Frozen, abc.ABC):
         """
         del rng
         return self
+
+    def samples(self, generators: Sequence[np.random.Generator]) -> Sequence[Trajectory]:
+        """The trajectories of several episodes, the same as :meth:`sample` draws one by one.
+
+        Args:
+            generators: One an episode.
+        """
+        return [self.sample(rng) for rng in generators]
 
     def joint_path(self, times: FloatArray) -> FloatArray | None:
         """The nominal joint coordinates in [rad] or [m], or None for a path in Cartesian space.

@@ -32,9 +32,13 @@ from tests.comparison import identical
 STEPS = 6
 
 
+#: A task that no scenario of the catalogue has.
+AXIS = ikgym.scenarios.get("zhang6-lspb").replace(name="zhang6-axis", task=ikgym.tasks.get("axis"))
+
+
 @functools.cache
 def scenario(name):
-    return ikgym.scenarios.get(name).replace(steps=STEPS)
+    return (AXIS if name == AXIS.name else ikgym.scenarios.get(name)).replace(steps=STEPS)
 
 
 # Policies that are handed the nominal joint path: they need a seed on random scenarios, and suit no Cartesian one.
@@ -59,7 +63,7 @@ def policy_for(name, on):
         return None
 
 
-PAIRS = [(name, on) for name in baselines.names() for on in ikgym.scenarios.names()]
+PAIRS = [(name, on) for name in baselines.names() for on in [*ikgym.scenarios.names(), AXIS.name]]
 contract = pytest.mark.parametrize(("name", "on"), PAIRS)
 
 

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 import ikgym
 from baselines.fingerprints import fingerprint
@@ -20,7 +21,20 @@ from ikgym.arms import Arm, from_urdf
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 from ikgym.scenarios import Disturbance, Scenario, load
 from ikgym.scenarios.toml import document
-from ikgym.trajectories import KINDS, Helix, Sinusoid, Trajectory
+from ikgym.trajectories import (
+    KINDS,
+    AlongPath,
+    FixedOrientation,
+    Helix,
+    PathTrajectory,
+    Quintic,
+    RandomJointSpline,
+    Sinusoid,
+    Trajectory,
+    Turning,
+    paths,
+    through,
+)
 from tests.arms.test_urdf import LIMIT, joint, robot
 from tests.comparison import identical
 
@@ -86,11 +100,49 @@ def test_nothing_is_lost(tmp_path):
     assert (tmp_path / "y.toml").read_bytes() == (tmp_path / "x.toml").read_bytes()
 
 
+RANDOM_SPLINE = RandomJointSpline(np.full(7, -2.0), np.full(7, 2.5), 2.0, 1 / 3, 2.0, spans=5, margin=0.2)
+POINTS, QUATERNIONS = np.random.default_rng(2).normal(size=(2, 4, 4))
+QUATERNIONS /= np.linalg.norm(QUATERNIONS, axis=1)[:, None]
+SOMEWHERE = {"center": np.array([0.1, 0.2, 1 / 3]), "rotation": Rotation.from_rotvec([1.0, 2.0, 3.0]).as_matrix()}
+#: What stands in no scenario of the catalogue.
+TRAJECTORIES = {
+    "random spline": RANDOM_SPLINE,
+    "spline": RANDOM_SPLINE.sample(np.random.default_rng(3)),
+    "timed": through(POINTS[:, :3], QUATERNIONS, times=[0.1, 0.2, 1 / 3, 4]),
+    "smooth": through(POINTS[:, :3], QUATERNIONS, speed=0.1, acceleration=1 / 3),
+    "corners": through(POINTS[:, :3], speed=0.1, acceleration=1 / 3, corner_radius=0.01, time_law="trapezoidal"),
+    "circle": PathTrajectory(paths.Circle(radius=0.1, turns=1.5, **SOMEWHERE), Quintic(0.1, 1.0, 60.0), AlongPath()),
+    "raster": PathTrajectory(paths.Raster(SOMEWHERE["center"], 0.3, 0.2, 4, 0.01), Quintic(1, 1)),
+    "square": PathTrajectory(
+        paths.Square(side=0.3, corner_radius=0.01, **SOMEWHERE), Quintic(1, 1), Turning(np.eye(3), [0.0, 0.0, 7.0])
+    ),
+    "lemniscate": PathTrajectory(paths.Lemniscate(radius=0.3, **SOMEWHERE), Quintic(1, 1), FixedOrientation(np.eye(3))),
+    "helix": PathTrajectory(paths.CircularHelix(radius=0.3, pitch=-0.1, **SOMEWHERE), Quintic(1, 1)),
+    "line": PathTrajectory(paths.Line([0, 0, 0], [1, 2, 3]), Quintic(1, 1)),
+}
+
+
+@pytest.mark.parametrize("trajectory", TRAJECTORIES.values(), ids=TRAJECTORIES)
+def test_every_trajectory_survives_its_file(trajectory, tmp_path):
+    task, file = ikgym.tasks.get("pose" if trajectory.has_orientation else "position"), tmp_path / "x.toml"
+    scenario = FAST.replace(task=task, trajectory=trajectory, start=np.zeros(7))
+    scenario.save(file)
+    read = load(file)
+    assert identical(fields(read), fields(scenario))
+    assert fingerprint(read) == fingerprint(scenario)
+    assert identical(read.nominal(0), scenario.nominal(0))
+
+
 def test_every_kind_of_trajectory_has_its_name():
     module = ikgym.trajectories
-    kinds = [k for k in map(module.__dict__.get, module.__all__) if isinstance(k, type) and k is not Trajectory]
-    assert set(KINDS.values()) == set(kinds)
-    assert {type(scenarios.get(name).trajectory) for name in scenarios.names()} == set(kinds), "one is not tested"
+    kinds = {k for k in map(module.__dict__.get, module.__all__) if isinstance(k, type) and issubclass(k, Trajectory)}
+    kinds -= {Trajectory}
+    assert set(KINDS.values()) == kinds
+    tested = [*TRAJECTORIES.values(), *(scenarios.get(name).trajectory for name in scenarios.names())]
+    assert set(map(type, tested)) == kinds, "one is not tested"
+    for name, parts in PathTrajectory.parts.items():
+        used = {type(getattr(one, name)) for one in tested if isinstance(one, PathTrajectory)}
+        assert used >= set(parts.values()), "one is not tested"
 
 
 VALUES = st.one_of(st.booleans(), st.integers(), st.floats(allow_nan=False), st.text(), st.lists(st.floats(-1, 1)))
@@ -200,7 +252,7 @@ HELIX = scenarios.get("zhang3-helix")
         (FAST.replace(arm=OwnArm(**FAST.arm._fields())), "arm 'varga7': expected Arm itself, got OwnArm"),
         (
             FAST.replace(task=FAST.task.replace(name="mine")),
-            "task: expected one of position, skew, matrix, pose, which a file can name, got Task",
+            "task: expected one of position, skew, matrix, pose, axis, which a file can name, got Task",
         ),
         (FAST.replace(name="\ud800"), "cannot be written: .* surrogates not allowed"),
         (OwnScenario(**FAST._fields()), "expected a Scenario itself, got a OwnScenario"),
@@ -262,7 +314,18 @@ def test_what_has_a_default_may_be_left_out(tmp_path):
     assert identical(fields(read), fields(made))
 
 
+ROUND = "{kind = 'circle', center = [0, 0, 0], radius = 'x'}"
+PATH = "{kind = 'line', start = [0, 0, 0], end = [0, 0, 1]}"
+LAW = "{kind = 'quintic', speed = 1, acceleration = 1}"
 UNKNOWN = {
+    "kind of path": (
+        {"trajectory": f"{{kind = 'path', path = {{kind = 'lime'}}, time_law = {LAW}}}"},
+        r"no kind of \[trajectory.path\] in .*mine\.toml 'lime'\. Did you mean 'line'\?",
+    ),
+    "key of a law": (
+        {"trajectory": f"{{kind = 'path', path = {PATH}, time_law = {{kind = 'quintic', sped = 1}}}}"},
+        r"no key of \[trajectory.time_law\] in .*mine\.toml 'sped'\. Did you mean 'speed'\?",
+    ),
     "key": ({"stepps": "3"}, r"no key in .*mine\.toml 'stepps'\. Did you mean 'steps'\?"),
     "arm": ({"arm": "'varga8'"}, r"no arm in .*mine\.toml 'varga8'\. Did you mean 'varga7'\?"),
     "task": ({"task": "'skwe'"}, r"no task in .*mine\.toml 'skwe'\. Did you mean 'skew'\?"),
@@ -323,6 +386,34 @@ BAD = {
     "joints": (
         {"trajectory": "{kind = 'sinusoid', amplitude = [1, 1]}"},
         "expected 7 joints, as arm 'varga7' has, got 2",
+    ),
+    "no law": (
+        {"trajectory": f"{{kind = 'path', path = {PATH}}}"},
+        r"\[trajectory\] time_law: expected a table, got no such key",
+    ),
+    "law": (
+        {"trajectory": f"{{kind = 'path', path = {PATH}, time_law = 'quintic'}}"},
+        r"\[trajectory\] time_law: expected a table, got 'quintic'",
+    ),
+    "no speed": (
+        {"trajectory": f"{{kind = 'path', path = {PATH}, time_law = {{kind = 'quintic', acceleration = 1}}}}"},
+        r"\[trajectory.time_law\] speed: expected numbers, got no such key",
+    ),
+    "radius": (
+        {"trajectory": f"{{kind = 'path', path = {ROUND}, time_law = {LAW}}}"},
+        r"\[trajectory.path\] radius: expected numbers, got 'x'",
+    ),
+    "no csv": (
+        {"trajectory": "{kind = 'csv'}"},
+        r"\[trajectory\] file: expected a CSV file, relative to this file, got no such key",
+    ),
+    "missing csv": (
+        {"trajectory": "{kind = 'csv', file = 'missing.csv'}"},
+        r"\[trajectory\] .*missing\.csv: expected a CSV file, got none that can be read",
+    ),
+    "speed": (
+        {"trajectory": "{kind = 'csv', file = 'missing.csv', speed = 'fast'}"},
+        r"\[trajectory\] speed: expected numbers, got 'fast'",
     ),
     "range of scale": (
         {"trajectory": f"{{kind = 'random_sinusoid', amplitude = {SEVEN}, scale = [1, 0]}}"},

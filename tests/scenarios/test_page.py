@@ -11,14 +11,15 @@ import numpy as np
 import pytest
 
 import ikgym
+from baselines.fingerprints import fingerprint
 from ikgym.scenarios import Scenario
-from ikgym.scenarios.reading import URDF_NUMBERS, URDF_TEXTS
+from ikgym.scenarios.reading import CSV_NUMBERS, CSV_TEXTS, URDF_NUMBERS, URDF_TEXTS
 from tests.arms.test_urdf import joint, robot
 
 ROOT = Path(__file__).parents[2]
 TEXT = (ROOT / "docs" / "scenarios.md").read_text(encoding="utf-8").split("## A scenario of your own")[1]
-WHOLE, ON_URDF = re.findall(r"```toml\n(.*?)```", TEXT, re.DOTALL)
-(SNIPPET,) = re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL)
+WHOLE, ON_URDF, FROM_CSV = re.findall(r"```toml\n(.*?)```", TEXT, re.DOTALL)
+PATH, SNIPPET = re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL)
 
 
 @pytest.fixture
@@ -68,3 +69,29 @@ def test_the_arm_from_a_urdf_is_read(tmp_path):
 
 def test_the_kinds_of_trajectories_are_named():
     assert all(f"`{kind}`" in TEXT for kind in ikgym.trajectories.KINDS)
+
+
+def test_the_waypoints_of_a_csv_file_are_read(tmp_path):
+    points = [[0.3, 0.0, 0.0], [0.4, 0.2, 0.0], [0.3, 0.4, 0.0]]
+    lines = [",".join(map(str, point)) for point in [["x", "y", "z"], *points]]
+    (tmp_path / "points.csv").write_text("\n".join(lines))
+    head = (
+        WHOLE.split("[trajectory]")[0].replace('"pose"', '"position"').replace("[arm]", "start = [0, 0, 0, 0]\n[arm]")
+    )
+    (tmp_path / "x.toml").write_text(head + FROM_CSV, encoding="utf-8")
+    scenario = ikgym.scenarios.load(tmp_path / "x.toml")
+    given = {"speed": 0.1, "acceleration": 0.5, "corner_radius": 0.01, "time_law": "trapezoidal"}
+    wanted = ikgym.trajectories.through(points, **given)
+    np.testing.assert_array_equal(scenario.nominal(), scenario.replace(trajectory=wanted).nominal())
+    assert set(tomllib.loads(FROM_CSV)["trajectory"]) == {"kind", *CSV_TEXTS, *CSV_NUMBERS}
+    scenario.save(tmp_path / "y.toml")
+    assert fingerprint(ikgym.scenarios.load(tmp_path / "y.toml")) == fingerprint(scenario)
+
+
+def test_the_path_is_one_and_its_kinds_are_named():
+    found = {}
+    exec(PATH.replace("PathTrajectory(\n", "trajectory = PathTrajectory(\n"), found)
+    assert found["trajectory"].duration > 0.0
+    for name, kinds in ikgym.trajectories.PathTrajectory.parts.items():
+        row = re.search(rf"^\| `{name}`.*\|$", TEXT, re.MULTILINE).group()
+        assert all(f"`{kind}`" in row for kind in kinds)

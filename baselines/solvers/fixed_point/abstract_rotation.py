@@ -214,8 +214,6 @@ def turn_rows(arm_task, rule, observed, memory, goal, status):
         status: Receives values of :class:`Status`. Shape (B,).
     """
     (chain, kind), method, (q, pose, target) = arm_task_of(arm_task), RotationRule(*rule), observed
-    # The coordinates of `pose` are those of `matrix`, and the method knows no other error than a difference.
-    kind = task_kernels.MATRIX if kind == task_kernels.POSE else kind
     direction, angles, point, held = memory
     n, m, turned = q.shape[1], pose.shape[1], direction.shape[1]
     rotation, position, geometric, _ = pose_arrays(n, m)
@@ -226,7 +224,8 @@ def turn_rows(arm_task, rule, observed, memory, goal, status):
         forward_and_jacobian(
             chain, _configuration(q[row], target[row], point, held, row), rotation, position, geometric
         )
-        task_kernels.jacobian(kind, rotation, geometric, jacobian)
+        # The method knows no other error than a difference of coordinates.
+        task_kernels.coordinate_jacobian(kind, rotation, geometric, jacobian)
         for i in range(m):
             error[i] = target[row, i] - pose[row, i]
             missing[i] = method.task_weights[i] * error[i]

@@ -22,7 +22,13 @@ from ikgym.kinematics import Chain
 from ikgym.validation import FloatArray, known_name, number, whole_number
 
 # ‖∂x/∂q‖² of the orientation's numbers for a joint that turns at 1 rad/s, at most.
-_TURNING = {task_kernels.POSITION: 0.0, task_kernels.SKEW: 1.0, task_kernels.MATRIX: 2.0, task_kernels.POSE: 1.0}
+_TURNING = {
+    task_kernels.POSITION: 0.0,
+    task_kernels.SKEW: 1.0,
+    task_kernels.MATRIX: 2.0,
+    task_kernels.POSE: 1.0,
+    task_kernels.AXIS: 1.0,
+}
 
 
 class DirectionMemory(NamedTuple):

@@ -74,7 +74,7 @@ def iterate_rows(arm_task, extension, method, target, previous, q, status):
     transformation, numbers, a, iterations, tolerance, longest, components = method
     function = Contraction(*numbers)
     n, m, joints = q.shape[1], target.shape[1], chain_to_point.axes.shape[0]
-    e = 6 if kind == task_kernels.POSE else m
+    e = task_kernels.error_size(kind, m)
     rotation, position, geometric, pose = pose_arrays(n, m)
     error, jacobian, partial = np.empty(e), np.empty((e, n)), np.empty((6, joints))
     h, start, missing = np.empty(n), np.empty(n), np.empty(3)

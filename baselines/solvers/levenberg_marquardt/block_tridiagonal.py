@@ -29,20 +29,21 @@ def damped_horizon_step(jacobians, differences, damping, scratch, out):
         out: Receives ΔQ. Shape (n, joints).
 
     Returns:
-        False where a Jacobian has lost rank and λ is too small to count; ``out`` is of no use then.
+        How many blocks could be factorised: n, or fewer where a Jacobian has lost rank and λ is too small to count;
+        ``out`` is of no use then.
     """
     _, gains, x = scratch
     n = x.shape[0]
     for j in range(n - 1, -1, -1):
         if not _eliminate(j, jacobians[j], differences[j], damping, scratch):
-            return False
+            return n - 1 - j
     for j in range(n):
         if damping > 0.0 and j > 0:
             for a in range(x.shape[1]):
                 for b in range(x.shape[1]):
                     x[j, a] += gains[j, a, b] * x[j - 1, b]
         transposed_product(jacobians[j], x[j], out[j])
-    return True
+    return n
 
 
 @inlined

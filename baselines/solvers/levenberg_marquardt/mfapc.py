@@ -185,8 +185,9 @@ def iterate_horizon_rows(arm_task, law, limits, ahead, observed, memory, found):
                     factorised[row] += 1
             damping[row] = damping_now(rule, norm, condition, damping[row])  # (37)
             _difference(residuals, differences)
-            factorised[row] += horizon
-            if not damped_horizon_step(jacobians, differences, damping[row], blocks, steps):  # (36)
+            solved = damped_horizon_step(jacobians, differences, damping[row], blocks, steps)  # (36)
+            factorised[row] += min(solved + 1, horizon)  # the one that failed, too
+            if solved < horizon:
                 pseudoinverse_rows(jacobians, differences, RANK_TOLERANCE, rank, steps, lost)  # (38)
                 factorised[row] += horizon
                 if lost.any():

@@ -91,7 +91,7 @@ def _roll(data, here, nominal, qdot, first, stages, workspace):
 def frame_workspace(kind, nominal):
     """Orientation (3, 3), position (3,), task coordinates (m,) and error (e,) of a grid point."""
     m = nominal.shape[1]
-    return np.empty((3, 3)), np.empty(3), np.empty(m), np.empty(6 if kind == task_kernels.POSE else m)
+    return np.empty((3, 3)), np.empty(3), np.empty(m), np.empty(task_kernels.error_size(kind, m))
 
 
 @kernel
@@ -215,7 +215,9 @@ def linearise(kind, nominal, workspace):
     task_kernels.coordinates(kind, workspace.rotation, workspace.position, workspace.pose)
     task_kernels.error(kind, nominal, workspace.pose, workspace.error)
     task_kernels.jacobian(kind, workspace.rotation, workspace.geometric, workspace.jacobian)
-    task_kernels.error_jacobian(kind, workspace.error, workspace.jacobian, workspace.error_jacobian)
+    task_kernels.error_jacobian(
+        kind, nominal, workspace.pose, workspace.error, workspace.jacobian, workspace.error_jacobian
+    )
 
 
 @kernel

@@ -125,4 +125,4 @@ def error_rows(chain, kind, q, nominal, error, jacobian):
         task_kernels.coordinates(kind, rotation, position, pose)
         task_kernels.jacobian(kind, rotation, geometric, task_jacobian)
         task_kernels.error(kind, nominal[row], pose, error[row])
-        task_kernels.error_jacobian(kind, error[row], task_jacobian, jacobian[row])
+        task_kernels.error_jacobian(kind, nominal[row], pose, error[row], task_jacobian, jacobian[row])

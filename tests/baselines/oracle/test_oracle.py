@@ -46,6 +46,7 @@ CASES = {
     "position": (short("faitli3-regular"), 0),
     "pose": (short("zhang6-lspb"), 0),
     "random pose": (short("varga7-pose-random"), 1_000_003),
+    "axis": (short("zhang6-lspb", task=ikgym.tasks.get("axis")), 0),
     "narrow limits": (short(velocity_limit=np.full(7, 5.0)), 0),
     "one step": (short(steps=1), 0),
 }
@@ -166,12 +167,13 @@ def test_what_is_said_of_the_starts():
         "worst": 900.0,
         "polished": 4,
         "polished_within_1e-6": 3,
+        "without_search": 10.0 * (1.0 + 1e-7),
     }
     assert optimum.record().spread == optimum.spread
     # Where nothing costs, all that is left is rounding.
     free = optimum.replace(cost=1e-16, starts=(Start("nominal joint path", cost=1e-16), Start("roll-out", cost=1e-12)))
     assert free.found_by == "nominal joint path; roll-out"
-    assert free.spread == {"polished": 2, "polished_within_1e-6": 2}
+    assert free.spread == {"polished": 2, "polished_within_1e-6": 2, "without_search": 1e-16}
 
 
 @pytest.fixture(scope="module")

@@ -17,8 +17,13 @@ from ikgym.scenarios import Disturbance
 from ikgym.simulator import Simulator
 
 OFFSETS = (1, 2, 7, 20)
-NAMES = ["varga7-random", "faitli3-stretched", "zhang6-lspb", "khan8-q7q8"]
+AXIS = scenarios.get("zhang6-lspb").replace(name="zhang6-axis", task=tasks.get("axis"))
+NAMES = ["varga7-random", "faitli3-stretched", "zhang6-lspb", "khan8-q7q8", AXIS.name]
 ROWS = 5
+
+
+def known(name):
+    return AXIS if name == AXIS.name else scenarios.get(name)
 
 
 def place(scenario, seed=0):
@@ -55,7 +60,7 @@ def batch_of(scenario, q, qdot, shown, remaining):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_errors_and_their_gradients(name):
-    scenario = scenarios.get(name)
+    scenario = known(name)
     q, _, shown, rng = place(scenario)
     arm, nominal = DifferentiableArm(scenario), shown[:, 0]
     error = arm.error(q, nominal)
@@ -68,17 +73,17 @@ def test_errors_and_their_gradients(name):
 
 def limited(name):
     """The scenario with limits that random actions run into."""
-    scenario = scenarios.get(name)
+    scenario = known(name)
     q, speed = scenario.nominal_joint_path(0)[0], scenario.velocity_limit
     way = 2.0 * scenario.dt * speed
     limits = {"lower": q - way, "upper": q + way, "velocity_limit": 0.8 * speed, "acceleration_limit": 3e2 * speed}
     return scenario.replace(arm=scenario.arm.replace(**limits), start=q)
 
 
-@pytest.mark.parametrize("make", [scenarios.get, limited])
+@pytest.mark.parametrize("make", [known, limited])
 @pytest.mark.parametrize("name", NAMES)
 def test_steps_and_costs_are_those_of_the_environment(name, make):
-    if make is limited and scenarios.get(name).nominal_joint_path(0) is None:
+    if make is limited and known(name).nominal_joint_path(0) is None:
         pytest.skip("no joint path to put limits around")
     scenario = make(name).replace(steps=12, iterations_per_point=1)
     rng, arm = np.random.default_rng(0), DifferentiableArm(scenario)
@@ -116,7 +121,7 @@ def test_gradients_of_costs(exponents):
 @pytest.mark.parametrize("null_space", [None, 1e-2])
 @pytest.mark.parametrize("name", NAMES)
 def test_features_and_actions_are_those_of_the_processing(name, null_space):
-    scenario = scenarios.get(name)
+    scenario = known(name)
     q, qdot, shown, rng = place(scenario)
     problem, arm = Problem.of(scenario), DifferentiableArm(scenario)
     remaining = rng.integers(0, 40, (ROWS, 1)).astype(float)
@@ -136,7 +141,7 @@ def test_features_and_actions_are_those_of_the_processing(name, null_space):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_gradients_of_features_and_actions(name):
-    scenario = scenarios.get(name)
+    scenario = known(name)
     q, qdot, shown, rng = place(scenario)
     arm, remaining = DifferentiableArm(scenario), np.full((ROWS, 1), 3.0)
     processing = Processing(OFFSETS, 2.0, "dls", 1e-2)
@@ -192,4 +197,4 @@ def test_scenarios_that_cannot_be_differentiated_are_refused():
 
 
 def test_tasks_are_all_covered():
-    assert {scenarios.get(name).task.name for name in NAMES} == set(tasks.names())
+    assert {known(name).task.name for name in NAMES} == set(tasks.names())

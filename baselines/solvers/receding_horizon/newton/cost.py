@@ -166,7 +166,7 @@ def linearise(problem, path, multipliers, advance, exact, workspace):
             task_kernels.coordinates(kind, rotation, position, pose)
             task_kernels.error(kind, nominal[at[k] - 1], pose, error)
             task_kernels.jacobian(kind, rotation, geometric, jacobian)
-            task_kernels.error_jacobian(kind, error, jacobian, error_jacobian)
+            task_kernels.error_jacobian(kind, nominal[at[k] - 1], pose, error, jacobian, error_jacobian)
             for i in range(e):
                 if advance:
                     multipliers[k, i] = tracking_term(cost, error[i], multipliers[k, i]).multiplier

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from ikgym import task_kernels
+from ikgym.axis_kernels import across
 from ikgym.jit import inlined, kernel
 
 
 @kernel
 def second_order(kind, workspace, out):
-    """Σ gradient_i ∂²error_i / ∂q², the lower triangle; for POSE as if the rotation error were small.
+    """Σ gradient_i ∂²error_i / ∂q², the lower triangle; for POSE and AXIS as if the rotation error were small.
 
     With the geometric columns (v_j, w_j) and joint b not behind joint a: ∂v_a / ∂q_b = w_b × v_a, and for the rotation
-    R the second derivative is w_b × (w_a × R).
+    R, and so for its axis z, the second derivative is w_b × (w_a × R).
 
     Args:
         kind: The kind of task coordinates.
@@ -21,11 +22,20 @@ def second_order(kind, workspace, out):
     g, rotation, gradient, moment = workspace.geometric, workspace.rotation, workspace.gradient, workspace.moment
     n, e = out.shape[0], gradient.shape[0]
     # The error falls as the coordinates rise: forces are minus the gradient.
-    where = 0 if kind == task_kernels.POSE else e - 3
+    where = 0 if kind in (task_kernels.POSE, task_kernels.AXIS) else e - 3
     fx, fy, fz = -gradient[where], -gradient[where + 1], -gradient[where + 2]
-    tx = ty = tz = 0.0
+    tx = ty = tz = zx = zy = zz = 0.0
     if kind == task_kernels.POSE:
         tx, ty, tz = -0.5 * gradient[3], -0.5 * gradient[4], -0.5 * gradient[5]
+    elif kind == task_kernels.AXIS:
+        # The error of the direction is (z · b, -z · a) with the two directions a and b across z*.
+        zx, zy, zz = rotation[0, 2], rotation[1, 2], rotation[2, 2]
+        ax, ay, az, bx, by, bz = across(zx, zy, zz)
+        tx, ty, tz = (
+            gradient[3] * bx - gradient[4] * ax,
+            gradient[3] * by - gradient[4] * ay,
+            gradient[3] * bz - gradient[4] * az,
+        )
     by_rotation = kind in (task_kernels.SKEW, task_kernels.MATRIX)
     if by_rotation:
         set_moment(kind, gradient, rotation, moment)
@@ -43,6 +53,12 @@ def second_order(kind, workspace, out):
             ux += wy * tz - wz * ty
             uy += wz * tx - wx * tz
             uz += wx * ty - wy * tx
+        elif kind == task_kernels.AXIS:
+            # t · (w_b × (w_a × z)) = w_b · ((w_a × z) × t)
+            sx, sy, sz = wy * zz - wz * zy, wz * zx - wx * zz, wx * zy - wy * zx
+            ux += sy * tz - sz * ty
+            uy += sz * tx - sx * tz
+            uz += sx * ty - sy * tx
         for b in range(a + 1):
             out[a, b] = g[3, b] * ux + g[4, b] * uy + g[5, b] * uz
 

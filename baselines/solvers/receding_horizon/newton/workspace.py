@@ -118,15 +118,9 @@ class NewtonWorkspace(NamedTuple):
 
 
 @kernel
-def error_size(kind, m):
-    """e, the components of the tracking error, for a kind of task with ``m`` coordinates."""
-    return 6 if kind == task_kernels.POSE else m
-
-
-@kernel
 def knot_workspace(kind, m, n):
     """The workspace of one knot, for task coordinates of ``m`` numbers and ``n`` joints."""
-    e = error_size(kind, m)
+    e = task_kernels.error_size(kind, m)
     return KnotWorkspace(
         np.empty((3, 3)),
         np.empty(3),
@@ -162,7 +156,7 @@ def newton_workspace(kind, m, knots, n):
     """The workspace for paths of up to ``knots`` knots, task coordinates of ``m`` numbers and ``n`` joints."""
     return NewtonWorkspace(
         knot_workspace(kind, m, n),
-        np.empty((knots, error_size(kind, m))),
+        np.empty((knots, task_kernels.error_size(kind, m))),
         quadratic_model(knots, n),
         np.empty((knots, n, n)),
         np.empty((n, n)),

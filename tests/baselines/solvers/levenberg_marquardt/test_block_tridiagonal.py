@@ -27,7 +27,7 @@ def by_blocks(jacobians, residuals, damping):
     differences = np.diff(residuals, axis=0, prepend=np.zeros((1, e)))
     out, scratch = np.empty((n, joints)), (np.empty((e, e)), np.empty((n, e, e)), np.empty((n, e)))
     solved = damped_horizon_step(jacobians, differences, damping, scratch, out)
-    return out if solved else None
+    return out if solved == n else None
 
 
 @pytest.mark.parametrize("damping", [1e-3, 0.5, 20.0])
@@ -69,6 +69,9 @@ def test_says_where_rank_is_lost():
     jacobians[1, 2] = jacobians[1, 0]
     assert by_blocks(jacobians, residuals, 0.0) is None
     assert by_blocks(jacobians, residuals, 1e-18) is None
+    # From the end of the horizon the last block can be factorised, and the second cannot.
+    scratch = np.empty((3, 3)), np.empty((3, 3, 3)), np.empty((3, 3))
+    assert damped_horizon_step(jacobians, residuals, 0.0, scratch, np.empty((3, 4))) == 1
     wanted = printed(jacobians, residuals, 1e-4)
     np.testing.assert_allclose(by_blocks(jacobians, residuals, 1e-4), wanted, atol=1e-9 * abs(wanted).max())
 

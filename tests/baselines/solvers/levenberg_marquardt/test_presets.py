@@ -37,7 +37,7 @@ def test_a_preset_tracks_its_example(name):
     assert row.policy == name
     # The transient of example 1 is 18 m long at first; without it the bounds are those of the ledger.
     assert row.position_error_rms < {"mfac_helix": 1.5, "mfapc_helix": 1.5, "mfapc_line": 1e-9}[name]
-    assert row.status in ("converged", "iteration_limit")
+    assert row.status in ("converged", "applied", "iteration_limit")
 
 
 @presets

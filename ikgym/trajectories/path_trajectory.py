@@ -1,0 +1,67 @@
+"""A path in space, followed from rest to rest."""
+
+from __future__ import annotations
+
+import dataclasses
+import typing
+from collections.abc import Mapping
+
+import numpy as np
+
+from ikgym.arms import Arm
+from ikgym.exceptions import InvalidInputError
+from ikgym.trajectories.orientations import ORIENTATIONS, Orientation
+from ikgym.trajectories.paths import PATHS, Path
+from ikgym.trajectories.time_laws import TIME_LAWS, TimeLaw
+from ikgym.trajectories.trajectory import Trajectory
+from ikgym.validation import FloatArray
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class PathTrajectory(Trajectory):
+    """A path, the time law by which it is followed, and the orientation of the tool on the way.
+
+    It begins at rest and ends at rest, where it stays.
+
+    Args:
+        path: Where the tool goes.
+        time_law: How fast.
+        orientation: How the tool is turned; None for a path of positions alone.
+
+    Raises:
+        InvalidInputError: A part is something else, the duration of the time law too short, or the orientation does
+            not suit the path.
+    """
+
+    path: Path
+    time_law: TimeLaw
+    orientation: Orientation | None = None
+    parts: typing.ClassVar[Mapping[str, Mapping[str, type]]] = {
+        "path": PATHS,
+        "time_law": TIME_LAWS,
+        "orientation": ORIENTATIONS,
+    }
+
+    def __post_init__(self) -> None:
+        for name, kind in {"path": Path, "time_law": TimeLaw, "orientation": Orientation}.items():
+            part = getattr(self, name)
+            if not isinstance(part, kind) and not (name == "orientation" and part is None):
+                raise InvalidInputError(f"{name}: expected a {kind.__name__}, got {part!r}.")
+        self.time_law.time(self.path)
+        if self.orientation is not None:
+            self.orientation.check(self.path)
+        object.__setattr__(self, "has_orientation", self.orientation is not None)
+
+    @property
+    def duration(self) -> float:
+        """The time from rest to rest, in [s]."""
+        return self.time_law.time(self.path)
+
+    def frames(self, times: FloatArray, model: Arm) -> FloatArray:
+        """See :meth:`Trajectory.frames`."""
+        del model
+        s = self.time_law.travelled(times, self.path)
+        points = self.path.along(s)[0]
+        if self.orientation is None:
+            return points
+        return np.hstack([self.orientation.rotations(self.path, s).reshape(-1, 9), points])

@@ -1,0 +1,47 @@
+"""A straight line."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from ikgym.trajectories.paths.path import Path, points_of
+from ikgym.validation import LARGEST, FloatArray, frozen_array
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Line(Path):
+    """A straight line.
+
+    Args:
+        start: In [m]. Shape (3,).
+        end: In [m]. Shape (3,).
+
+    Raises:
+        InvalidInputError: A shape is wrong, or both are the same.
+    """
+
+    start: FloatArray
+    end: FloatArray
+
+    def __post_init__(self) -> None:
+        for name in ("start", "end"):
+            object.__setattr__(self, name, frozen_array(name, getattr(self, name), (3,), at_most=LARGEST))
+        points_of("start and end", [self.start, self.end])
+
+    @property
+    def length(self) -> float:
+        """See :attr:`Path.length`."""
+        return float(np.linalg.norm(self.end - self.start))
+
+    @property
+    def curvature(self) -> float:
+        """See :attr:`Path.curvature`."""
+        return 0.0
+
+    def along(self, s: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """See :meth:`Path.along`."""
+        share = (s / self.length)[:, None]
+        direction = (self.end - self.start) / self.length
+        return (1.0 - share) * self.start + share * self.end, np.tile(direction, (len(s), 1))

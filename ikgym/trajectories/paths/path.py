@@ -1,0 +1,103 @@
+"""What all paths have in common."""
+
+from __future__ import annotations
+
+import abc
+
+import numpy as np
+import numpy.typing as npt
+
+from ikgym.exceptions import InvalidInputError
+from ikgym.validation import LARGEST, FloatArray, Frozen, frozen_array, rotation_matrix
+
+
+class Path(Frozen, abc.ABC):
+    """A curve in space without time: points as a function of the arc length s, from 0 to ``length``.
+
+    Its direction is continuous, so that a tool can run along it without a stop.
+    """
+
+    @property
+    @abc.abstractmethod
+    def length(self) -> float:
+        """The length of the path in [m]."""
+
+    @property
+    @abc.abstractmethod
+    def curvature(self) -> float:
+        """The largest curvature in [1/m], 0 for a straight line."""
+
+    @property
+    def stations(self) -> FloatArray:
+        """Arc lengths of the waypoints in [m]; start and end where there are no others. Shape (k,)."""
+        return np.array([0.0, self.length])
+
+    @abc.abstractmethod
+    def along(self, s: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Where the path is, and where it leads.
+
+        Args:
+            s: Arc lengths in [m], from 0 to ``length``. Shape (k,).
+
+        Returns:
+            Points in [m], and unit tangents. Shapes (k, 3).
+        """
+
+
+class Outline(Path):
+    """A path that runs along another one."""
+
+    @property
+    @abc.abstractmethod
+    def outline(self) -> Path:
+        """The other path."""
+
+    @property
+    def length(self) -> float:
+        """See :attr:`Path.length`."""
+        return self.outline.length
+
+    @property
+    def curvature(self) -> float:
+        """See :attr:`Path.curvature`."""
+        return self.outline.curvature
+
+    def along(self, s: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """See :meth:`Path.along`."""
+        return self.outline.along(s)
+
+
+def settle_placement(path: Path) -> None:
+    """Checks the center and the rotation that place a plane figure.
+
+    Raises:
+        InvalidInputError: The center is no point, or the rotation none.
+    """
+    for name, value in {
+        "center": frozen_array("center", getattr(path, "center"), (3,), at_most=LARGEST),  # noqa: B009
+        "rotation": rotation_matrix("rotation", getattr(path, "rotation")),  # noqa: B009
+    }.items():
+        object.__setattr__(path, name, value)
+
+
+def points_of(name: str, value: npt.ArrayLike) -> FloatArray:
+    """Two points or more, of which no two that follow each other are the same. Shape (k, 3).
+
+    Raises:
+        InvalidInputError: There are fewer, or one is repeated; the message says which.
+    """
+    points = frozen_array(name, value, (None, 3), at_most=LARGEST)
+    if len(points) < 2:
+        raise InvalidInputError(f"{name}: expected at least 2 points, got {len(points)}.")
+    gaps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    if (gaps < SHORTEST).any():
+        i = int(np.argmin(gaps))
+        raise InvalidInputError(
+            f"{name}: expected points at least {SHORTEST:g} m apart, got {points[i].tolist()} and "
+            f"{points[i + 1].tolist()} as numbers {i} and {i + 1}."
+        )
+    return points
+
+
+#: Points that follow each other are at least this far apart, in [m].
+SHORTEST = 1e-9

@@ -1,0 +1,217 @@
+"""Straight lines joined by arcs: through points nearly, around a square, in a raster."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from typing import NamedTuple
+
+import numpy as np
+
+from ikgym.exceptions import InvalidInputError
+from ikgym.trajectories.paths.path import Outline, Path, points_of, settle_placement
+from ikgym.validation import LARGEST, SMALLEST, FloatArray, number, whole_number
+
+# Corners that turn by less than this, in [rad], are none.
+STRAIGHT = 1e-9
+
+
+class Pieces(NamedTuple):
+    """Lines and arcs that follow each other.
+
+    Attributes:
+        begin: Arc lengths at which they begin, and the whole length, in [m]. Shape (p + 1,).
+        start: First points in [m]. Shape (p, 3).
+        tangent: Directions at the first points. Shape (p, 3).
+        normal: Directions to the centers of the arcs. Shape (p, 3).
+        curvature: In [1/m], 0 for a line. Shape (p,).
+        corner: Arc lengths in the middle of all corners in [m]. Shape (k - 2,).
+    """
+
+    begin: FloatArray
+    start: FloatArray
+    tangent: FloatArray
+    normal: FloatArray
+    curvature: FloatArray
+    corner: FloatArray
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Polyline(Path):
+    """Straight lines from point to point, with arcs in place of the corners: through the ends, near the others.
+
+    Args:
+        points: In [m]. Shape (k, 3).
+        corner_radius: Radius of the arcs, in [m].
+
+    Raises:
+        InvalidInputError: There are fewer than two points, two that follow each other are the same, a corner turns
+            back, or an arc does not fit in between the points around it; the message says which and how much does.
+    """
+
+    points: FloatArray
+    corner_radius: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "points", points_of("points", self.points))
+        radius = number("corner_radius", self.corner_radius, at_least=SMALLEST, at_most=LARGEST)
+        object.__setattr__(self, "corner_radius", radius)
+        self._check_corners()
+
+    @property
+    def length(self) -> float:
+        """See :attr:`Path.length`."""
+        return float(self._pieces.begin[-1])
+
+    @property
+    def curvature(self) -> float:
+        """See :attr:`Path.curvature`."""
+        return float(self._pieces.curvature.max())
+
+    @property
+    def stations(self) -> FloatArray:
+        """The ends, and the middles of the arcs. See :attr:`Path.stations`."""
+        return np.concatenate([[0.0], self._pieces.corner, [self.length]])
+
+    def along(self, s: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """See :meth:`Path.along`."""
+        p = self._pieces
+        i = np.clip(np.searchsorted(p.begin, s, side="right") - 1, 0, len(p.start) - 1)
+        run = (s - p.begin[i])[:, None]
+        angle = p.curvature[i][:, None] * run
+        tangent, normal = p.tangent[i], p.normal[i]
+        # sin(κ s) / κ and (1 - cos(κ s)) / κ, good for κ = 0 as well.
+        half = np.sinc(angle / (2.0 * np.pi))
+        ahead, aside = run * np.sinc(angle / np.pi), 0.5 * run * angle * half**2
+        return p.start[i] + ahead * tangent + aside * normal, np.cos(angle) * tangent + np.sin(angle) * normal
+
+    @functools.cached_property
+    def _turns(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Lengths and directions of the sides; the angles of the corners and what an arc takes of either side."""
+        sides = np.diff(self.points, axis=0)
+        lengths = np.linalg.norm(sides, axis=1)
+        directions = sides / lengths[:, None]
+        before, after = directions[:-1], directions[1:]
+        across = np.linalg.norm(np.cross(before, after), axis=1)
+        angles = np.arctan2(across, np.sum(before * after, axis=1))
+        angles[angles < STRAIGHT] = 0.0
+        return lengths, directions, angles, self.corner_radius * np.tan(0.5 * angles)
+
+    def _check_corners(self) -> None:
+        lengths, _, angles, taken = self._turns
+        if (angles > np.pi - 1e-6).any():
+            i = int(np.argmax(angles)) + 1
+            raise InvalidInputError(
+                f"points: expected no corner that turns straight back, got one at number {i}, "
+                f"{self.points[i].tolist()}; an arc cannot round it."
+            )
+        left = lengths - np.concatenate([[0.0], taken]) - np.concatenate([taken, [0.0]])
+        if (left < -1e-12 * lengths).any():
+            i = int(np.argmin(left))
+            most = self.corner_radius * float(lengths[i] / (lengths[i] - left[i]))
+            raise InvalidInputError(
+                f"corner_radius: expected at most {most:.6g} m, so that the arcs fit between the points number {i} and "
+                f"{i + 1}, got {self.corner_radius:g} m."
+            )
+
+    @functools.cached_property
+    def _pieces(self) -> Pieces:
+        lengths, directions, angles, taken = self._turns
+        begin, starts, tangents, normals, curvatures, corners = [0.0], [], [], [], [], []
+
+        def add(start: FloatArray, tangent: FloatArray, normal: FloatArray, curvature: float, length: float) -> None:
+            starts.append(start)
+            tangents.append(tangent)
+            normals.append(normal)
+            curvatures.append(curvature)
+            begin.append(begin[-1] + length)
+
+        before = 0.0
+        for i, direction in enumerate(directions):
+            after = float(taken[i]) if i < len(taken) else 0.0
+            straight = max(float(lengths[i]) - before - after, 0.0)
+            add(self.points[i] + before * direction, direction, np.zeros(3), 0.0, straight)
+            if i < len(taken):
+                bend = float(angles[i]) * self.corner_radius
+                corners.append(begin[-1] + 0.5 * bend)
+                if bend > 0.0:
+                    inward = directions[i + 1] - np.cos(angles[i]) * direction
+                    inward /= np.linalg.norm(inward)
+                    add(self.points[i + 1] - after * direction, direction, inward, 1.0 / self.corner_radius, bend)
+            before = after
+        return Pieces(*map(np.array, (begin, starts, tangents, normals, curvatures, corners)))
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Square(Outline):
+    """Once around a square with rounded corners, from the middle of a side.
+
+    Args:
+        center: In [m]. Shape (3,).
+        side: In [m].
+        corner_radius: In [m], at most half of the side.
+        rotation: Its columns are the directions of the sides, and the normal about which the path turns to the left.
+            Shape (3, 3).
+
+    Raises:
+        InvalidInputError: A number is out of its range, or the rotation none.
+    """
+
+    center: FloatArray
+    side: float
+    corner_radius: float
+    rotation: FloatArray = dataclasses.field(default_factory=lambda: np.eye(3))
+
+    def __post_init__(self) -> None:
+        settle_placement(self)
+        object.__setattr__(self, "side", number("side", self.side, at_least=SMALLEST, at_most=LARGEST))
+        radius = number("corner_radius", self.corner_radius, at_least=SMALLEST, at_most=0.5 * self.side)
+        object.__setattr__(self, "corner_radius", radius)
+
+    @functools.cached_property
+    def outline(self) -> Polyline:
+        """See :attr:`Outline.outline`."""
+        corners = np.array([[0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0], [-1, -1, 0], [0, -1, 0]])
+        return Polyline(self.center + 0.5 * self.side * corners @ self.rotation.T, self.corner_radius)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Raster(Outline):
+    """To and fro over a rectangle, line by line, as a tool does that sweeps it.
+
+    Args:
+        center: Of the rectangle, in [m]. Shape (3,).
+        width: Length of the lines, in [m].
+        height: From the first line to the last, in [m].
+        lines: How many.
+        corner_radius: In [m], at most half of the distance of two lines and half of their length.
+        rotation: Its columns are the direction of the first line, the direction in which the lines follow each other,
+            and the normal. Shape (3, 3).
+
+    Raises:
+        InvalidInputError: A number is out of its range, or the rotation none.
+    """
+
+    center: FloatArray
+    width: float
+    height: float
+    lines: int
+    corner_radius: float
+    rotation: FloatArray = dataclasses.field(default_factory=lambda: np.eye(3))
+
+    def __post_init__(self) -> None:
+        settle_placement(self)
+        object.__setattr__(self, "lines", whole_number("lines", self.lines, at_least=2))
+        for name in ("width", "height"):
+            object.__setattr__(self, name, number(name, getattr(self, name), at_least=SMALLEST, at_most=LARGEST))
+        most = 0.5 * min(self.height / (self.lines - 1), self.width)
+        radius = number("corner_radius", self.corner_radius, at_least=SMALLEST, at_most=most)
+        object.__setattr__(self, "corner_radius", radius)
+
+    @functools.cached_property
+    def outline(self) -> Polyline:
+        """See :attr:`Outline.outline`."""
+        rows = np.repeat(np.linspace(-0.5, 0.5, self.lines) * self.height, 2)
+        ends = np.resize([-0.5, 0.5, 0.5, -0.5], 2 * self.lines) * self.width
+        corners = np.column_stack([ends, rows, np.zeros(2 * self.lines)])
+        return Polyline(self.center + corners @ self.rotation.T, self.corner_radius)

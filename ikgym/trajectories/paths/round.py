@@ -1,0 +1,129 @@
+"""Round paths: circle, helix and lemniscate."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+
+import numpy as np
+
+from ikgym.splines import ArcLength
+from ikgym.trajectories.paths.path import Path, settle_placement
+from ikgym.validation import LARGEST, SMALLEST, FloatArray, number, signed
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class CircularHelix(Path):
+    """A helix, ``x = r cos φ, y = r sin φ, z = c φ / 2π`` in a frame of its own, from φ = 0.
+
+    Args:
+        center: Where the axis begins, in [m]. Shape (3,).
+        radius: r in [m].
+        pitch: c in [m] a turn, of either sign.
+        turns: How often it goes around.
+        rotation: Its columns are the directions of x, y and z. Shape (3, 3).
+
+    Raises:
+        InvalidInputError: A number is out of its range, or the rotation none.
+    """
+
+    center: FloatArray
+    radius: float
+    pitch: float
+    turns: float = 1.0
+    rotation: FloatArray = dataclasses.field(default_factory=lambda: np.eye(3))
+
+    def __post_init__(self) -> None:
+        settle_placement(self)
+        for name in ("radius", "turns"):
+            object.__setattr__(self, name, number(name, getattr(self, name), at_least=SMALLEST, at_most=LARGEST))
+        object.__setattr__(self, "pitch", signed("pitch", self.pitch))
+
+    @property
+    def length(self) -> float:
+        """See :attr:`Path.length`."""
+        return 2.0 * math.pi * self.turns * self._rate
+
+    @property
+    def curvature(self) -> float:
+        """See :attr:`Path.curvature`."""
+        return self.radius / self._rate**2
+
+    def along(self, s: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """See :meth:`Path.along`."""
+        climb = self.pitch / (2.0 * math.pi)
+        angle = s / self._rate
+        x, y = self.radius * np.cos(angle), self.radius * np.sin(angle)
+        points = np.column_stack([x, y, climb * angle]) @ self.rotation.T
+        tangents = np.column_stack([-y, x, np.full(len(s), climb)]) @ self.rotation.T
+        return self.center + points, tangents / self._rate
+
+    @property
+    def _rate(self) -> float:
+        """The length of the path in [m] a radian, ds / dφ."""
+        return math.hypot(self.radius, self.pitch / (2.0 * math.pi))
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Circle(CircularHelix):
+    """A circle, ``x = r cos φ, y = r sin φ`` in a frame of its own, from φ = 0.
+
+    Args:
+        center: In [m]. Shape (3,).
+        radius: r in [m].
+        turns: How often it goes around; 0.5 is half a circle.
+        rotation: Its columns are the directions of x and y, and the axis. Shape (3, 3).
+
+    Raises:
+        InvalidInputError: A number is out of its range, or the rotation none.
+    """
+
+    pitch: float = dataclasses.field(init=False, default=0.0)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Lemniscate(Path):
+    """Bernoulli's lemniscate, ``(x, y) = a cos φ (1, sin φ) / (1 + sin² φ)`` in a frame of its own, from its right end.
+
+    Args:
+        center: Where it crosses itself, in [m]. Shape (3,).
+        radius: a, from the center to either end, in [m].
+        rotation: Its columns are the directions of x and y, and the normal. Shape (3, 3).
+
+    Raises:
+        InvalidInputError: A number is out of its range, or the rotation none.
+    """
+
+    center: FloatArray
+    radius: float
+    rotation: FloatArray = dataclasses.field(default_factory=lambda: np.eye(3))
+
+    def __post_init__(self) -> None:
+        settle_placement(self)
+        object.__setattr__(self, "radius", number("radius", self.radius, at_least=SMALLEST, at_most=LARGEST))
+
+    @property
+    def length(self) -> float:
+        """See :attr:`Path.length`."""
+        return float(self._arc.lengths[-1])
+
+    @property
+    def curvature(self) -> float:
+        """At both ends. See :attr:`Path.curvature`."""
+        return 3.0 / self.radius
+
+    def along(self, s: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """See :meth:`Path.along`."""
+        angle = self._arc.parameter(s)
+        sine, cosine = np.sin(angle), np.cos(angle)
+        below = 1.0 + sine**2
+        figure = np.column_stack([cosine, sine * cosine, np.zeros(len(s))]) * (self.radius / below)[:, None]
+        # The derivative of (cos φ, sin φ cos φ) / (1 + sin² φ), whose length is 1 / sqrt(1 + sin² φ).
+        tangents = np.column_stack([-sine * (3.0 - sine**2), 1.0 - 3.0 * sine**2, np.zeros(len(s))])
+        tangents /= below[:, None] ** 1.5
+        return self.center + figure @ self.rotation.T, tangents @ self.rotation.T
+
+    @functools.cached_property
+    def _arc(self) -> ArcLength:
+        return ArcLength(lambda angle: self.radius / np.sqrt(1.0 + np.sin(angle) ** 2), np.linspace(0, 2 * np.pi, 65))

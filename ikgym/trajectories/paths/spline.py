@@ -1,0 +1,82 @@
+"""A smooth curve through points."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+
+import numpy as np
+
+from ikgym.exceptions import InvalidInputError
+from ikgym.splines import ArcLength, CubicSpline
+from ikgym.trajectories.paths.path import Path, points_of
+from ikgym.validation import FloatArray
+
+# Pieces of each interval for its length, and for its largest curvature and its least speed.
+PIECES, SAMPLES = 8, 128
+# The speed of the curve by its parameter is about 1; one that turns back where it came from stops on the way.
+LEAST_SPEED = 0.02
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class SplinePath(Path):
+    """A cubic spline through points, its parameter the length of the chords, with curvature 0 at its ends.
+
+    Args:
+        points: In [m]. Shape (k, 3).
+
+    Raises:
+        InvalidInputError: There are fewer than two points, two that follow each other are the same, or the curve
+            would turn straight back; the message says where.
+    """
+
+    points: FloatArray
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "points", points_of("points", self.points))
+        speed = np.linalg.norm(self._spline(_refined(self._spline.knots, SAMPLES), 1), axis=1)
+        if speed.min() < LEAST_SPEED:
+            i = round(int(np.argmin(speed)) / SAMPLES)
+            raise InvalidInputError(
+                f"points: expected a curve that nowhere turns straight back, got one that does near number {i}, "
+                f"{self.points[i].tolist()}."
+            )
+
+    @property
+    def length(self) -> float:
+        """See :attr:`Path.length`."""
+        return float(self._arc.lengths[-1])
+
+    @functools.cached_property
+    def curvature(self) -> float:
+        """The largest of 128 samples between two points. See :attr:`Path.curvature`."""
+        u = _refined(self._spline.knots, SAMPLES)
+        first, second = self._spline(u, 1), self._spline(u, 2)
+        return float((np.linalg.norm(np.cross(first, second), axis=1) / np.linalg.norm(first, axis=1) ** 3).max())
+
+    @property
+    def stations(self) -> FloatArray:
+        """See :attr:`Path.stations`."""
+        return self._arc.lengths[::PIECES]
+
+    def along(self, s: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """See :meth:`Path.along`."""
+        u = self._arc.parameter(s)
+        tangents = self._spline(u, 1)
+        return self._spline(u), tangents / np.linalg.norm(tangents, axis=1)[:, None]
+
+    @functools.cached_property
+    def _spline(self) -> CubicSpline:
+        chords = np.linalg.norm(np.diff(self.points, axis=0), axis=1)
+        return CubicSpline.through(np.concatenate([[0.0], np.cumsum(chords)]), self.points, at_rest=False)
+
+    @functools.cached_property
+    def _arc(self) -> ArcLength:
+        spline = self._spline
+        return ArcLength(lambda u: np.linalg.norm(spline(u, 1), axis=-1), _refined(spline.knots, PIECES))
+
+
+def _refined(knots: FloatArray, pieces: int) -> FloatArray:
+    """The same knots with ``pieces - 1`` more in between. Shape ((k - 1) pieces + 1,)."""
+    at = np.arange((len(knots) - 1) * pieces + 1) / pieces
+    return np.interp(at, np.arange(len(knots)), knots)

@@ -1,0 +1,180 @@
+"""Random smooth joint motions that keep the limits of an arm."""
+
+from __future__ import annotations
+
+import dataclasses
+import typing
+from collections.abc import Sequence
+from typing import Self
+
+import numpy as np
+import numpy.typing as npt
+
+from ikgym.arms import Arm
+from ikgym.exceptions import InvalidInputError
+from ikgym.trajectories.joint_spline import JointSpline
+from ikgym.trajectories.trajectory import Trajectory
+from ikgym.validation import LARGEST, SMALLEST, FloatArray, frozen_array, number, per_joint, whole_number
+
+# Moves of less than this share of the largest count as none, so that nothing is divided by 0.
+TINY = 1e-12
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class RandomJointSpline(Trajectory):
+    """A distribution over :class:`JointSpline` that keep limits: what is drawn can be followed exactly.
+
+    Each joint starts uniformly within its range, makes random moves from control point to control point, and these are
+    scaled down until position, velocity and acceleration are within the limits, by a margin. So the draw itself is the
+    certificate that the path of the tool is feasible from the first joint coordinates of the motion. Sampled at any Δt,
+    differences of the path keep the limits of velocity and acceleration, too. Collisions are not looked at.
+
+    Args:
+        lower: Lower limits in [rad] or [m]. Shape (n,).
+        upper: Upper limits in [rad] or [m]. Shape (n,).
+        velocity_limit: Largest speeds in [rad/s] or [m/s]. A number, or shape (n,).
+        acceleration_limit: Largest accelerations in [rad/s²] or [m/s²]. A number, or shape (n,).
+        duration: From rest to rest, in [s].
+        spans: Pieces of the spline; more of them make a livelier and a slower motion.
+        margin: The share of every limit that is not used, of positions at either end of half of the range.
+        scale: Each joint moves by U(scale) of what its limits allow.
+
+    Raises:
+        InvalidInputError: A shape is wrong, a number out of its range, or a range the wrong way round.
+    """
+
+    lower: FloatArray
+    upper: FloatArray
+    velocity_limit: FloatArray
+    acceleration_limit: FloatArray
+    duration: float
+    spans: int = 8
+    margin: float = 0.1
+    scale: tuple[float, float] = (0.2, 1.0)
+    random: typing.ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        lower = frozen_array("lower", self.lower, (None,), at_most=LARGEST)
+        n = len(lower)
+        upper = frozen_array("upper", self.upper, (n,), at_most=LARGEST)
+        if (lower >= upper).any():
+            i = int(np.argmax(lower >= upper))
+            raise InvalidInputError(
+                f"lower, upper: expected lower < upper, got {lower[i]:g} and {upper[i]:g} at joint {i}."
+            )
+        low, high = frozen_array("scale", self.scale, (2,)).tolist()
+        if not 0.0 <= low <= high <= 1.0:
+            raise InvalidInputError(f"scale: expected a range (low, high) within 0 and 1, got ({low:g}, {high:g}).")
+        for name, value in {
+            "lower": lower,
+            "upper": upper,
+            "velocity_limit": _positive("velocity_limit", self.velocity_limit, n),
+            "acceleration_limit": _positive("acceleration_limit", self.acceleration_limit, n),
+            "duration": number("duration", self.duration, at_least=SMALLEST, at_most=LARGEST),
+            "spans": whole_number("spans", self.spans, at_least=3),
+            "margin": number("margin", self.margin, at_least=0.0, at_most=0.99),
+            "scale": (low, high),
+        }.items():
+            object.__setattr__(self, name, value)
+
+    @classmethod
+    def within(cls, arm: Arm, duration: float, **parameters: typing.Any) -> Self:
+        """The distribution within the limits of an arm.
+
+        Args:
+            arm: The arm. A joint without a limit has to be given one: position and velocity limits of all joints are
+                finite, or among the parameters.
+            duration: From rest to rest, in [s].
+            parameters: Other fields of the class, which take precedence over the arm's.
+
+        Raises:
+            InvalidInputError: A joint has no limit; the message says which, and how to give one.
+        """
+        limits = ("lower", "upper", "velocity_limit", "acceleration_limit")
+        own = {name: getattr(arm, name) for name in limits if name not in parameters}
+        for name, value in own.items():
+            if without := np.flatnonzero(~np.isfinite(value)).tolist():
+                raise InvalidInputError(
+                    f"{name}: expected one for every joint, since arm {arm.name!r} has none at joint "
+                    f"{', '.join(map(str, without))}; give {name} as a parameter."
+                )
+        return cls(**own, duration=duration, **parameters)
+
+    def sample(self, rng: np.random.Generator) -> JointSpline:
+        """See :meth:`Trajectory.sample`. Draws starts, then scales, then moves, joint by joint each."""
+        return self.samples([rng])[0]
+
+    def samples(self, generators: Sequence[np.random.Generator]) -> list[JointSpline]:
+        """See :meth:`Trajectory.samples`; all of them are computed at once."""
+        n = len(self.lower)
+        drawn = np.array([rng.random((self.spans, n)) for rng in generators])
+        controls = self._controls(drawn[:, 0], drawn[:, 1], 2.0 * drawn[:, 2:] - 1.0)
+        return [JointSpline(control, self.duration) for control in controls]
+
+    def frames(self, times: FloatArray, model: Arm) -> FloatArray:
+        """A distribution has no path.
+
+        Raises:
+            InvalidInputError: Always; :meth:`sample` first.
+        """
+        raise InvalidInputError("A random trajectory has no path of its own: sample one first.")
+
+    def joint_bound(self) -> FloatArray:
+        """See :meth:`Trajectory.joint_bound`; true for all that may be drawn."""
+        return np.maximum(np.abs(self.lower), np.abs(self.upper))
+
+    def check(self, model: Arm) -> None:
+        """See :meth:`Trajectory.check`; the model keeps the limits that the draws do."""
+        super().check(model)
+        for name, within in {
+            "lower": self.lower >= model.lower,
+            "upper": self.upper <= model.upper,
+            "velocity_limit": self.velocity_limit <= model.velocity_limit,
+            "acceleration_limit": self.acceleration_limit <= model.acceleration_limit,
+        }.items():
+            if not within.all():
+                i = int(np.argmin(within))
+                raise InvalidInputError(
+                    f"Trajectory: expected {name} of joint {i} within that of arm {model.name!r}, "
+                    f"{getattr(model, name)[i]:g}, so that what is drawn is feasible, got {getattr(self, name)[i]:g}."
+                )
+
+    def _controls(self, start: FloatArray, share: FloatArray, moves: FloatArray) -> FloatArray:
+        """Control points from numbers that are uniform in (0, 1), or (-1, 1) for the moves.
+
+        Args:
+            start: Shape (k, n).
+            share: Shape (k, n).
+            moves: Shape (k, spans - 2, n).
+
+        Returns:
+            Shape (k, spans + 3, n).
+        """
+        step, usable = self.duration / self.spans, 1.0 - self.margin
+        room = 0.5 * self.margin * (self.upper - self.lower)
+        lower, upper = self.lower + room, self.upper - room
+        first = lower + start * (upper - lower)
+        # The first two moves and the last two are none: rest, with no acceleration, at both ends.
+        steps = np.pad(moves, ((0, 0), (2, 2), (0, 0)))
+        away = np.cumsum(np.pad(steps, ((0, 0), (1, 0), (0, 0))), axis=1)
+        fastest, hardest = usable * step * self.velocity_limit, usable * step**2 * self.acceleration_limit
+        largest = np.minimum.reduce(
+            [
+                (upper - first) / np.maximum(away.max(axis=1), TINY),
+                (first - lower) / np.maximum(-away.min(axis=1), TINY),
+                fastest / np.maximum(np.abs(steps).max(axis=1), TINY),
+                hardest / np.maximum(np.abs(np.diff(steps, axis=1)).max(axis=1), TINY),
+            ]
+        )
+        low, high = self.scale
+        size = (low + share * (high - low)) * largest
+        control = first[:, None] + size[:, None] * away
+        out: FloatArray = np.clip(control, lower, upper)  # rounding
+        return out
+
+
+def _positive(name: str, value: npt.ArrayLike, n: int) -> FloatArray:
+    limits = per_joint(name, value, n, at_most=LARGEST)
+    if (limits < SMALLEST).any():
+        raise InvalidInputError(f"{name}: expected numbers above 0, got {limits.tolist()}.")
+    return limits
