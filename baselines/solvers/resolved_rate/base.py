@@ -108,7 +108,7 @@ def task_shifts(arm_task, gain, q, pose, nominal, before, known):
     """
     chain, kind = arm_task_of(arm_task)
     rows, n = q.shape
-    size = 6 if kind == task_kernels.POSE else pose.shape[1]
+    size = task_kernels.error_size(kind, pose.shape[1])
     jacobian, shift, error = np.empty((rows, size, n)), np.empty((rows, size)), np.empty(size)
     rotation, position, geometric, _ = pose_arrays(n, pose.shape[1])
     for row in range(rows):
