@@ -13,7 +13,7 @@ from baselines import registry
 from baselines.agents import files, untrusted
 from baselines.agents.policy import LearnedPolicy
 from baselines.agents.shipped import ShippedAgent
-from baselines.evaluation.pages.sets import MAIN
+from baselines.evaluation.pages.sets import MAIN, get
 from baselines.files import ResultsError, json_files
 from baselines.solvers.receding_horizon.rhc import RecedingHorizon
 from baselines.spec import parse_policy
@@ -145,18 +145,17 @@ def solver(spec: str, settings: Mapping[str, Any] = MappingProxyType({}), *, tim
     name, parameters = parse_policy(spec)
     given, kind = {**parameters, **settings}, registry.get(name)
     draws = issubclass(kind, RecedingHorizon) and (kind.starts > 1 or kind.restart_steps > 0)
-    share = FEWER if issubclass(kind, RecedingHorizon) and _costly(kind, given) else 1.0
+    share = FEWER if issubclass(kind, RecedingHorizon) and _costly(kind.for_scenario(get(MAIN), **given)) else 1.0
     if not draws:
         return Entry(spec, ((name, given),), settings=dict(settings), timed=timed, share=share)
     seeded = tuple((name, {**given, "seed": seed}) for seed in SEEDS)
     return Entry(spec, seeded, SEEDS, dict(settings), timed=timed, share=share)
 
 
-def _costly(kind: type[RecedingHorizon], given: Mapping[str, Any]) -> bool:
+def _costly(policy: RecedingHorizon) -> bool:
     """Whether a receding horizon takes so long that it plays fewer episodes."""
-    horizon, blocks = given.get("horizon", kind.horizon), given.get("move_blocks", kind.move_blocks)
-    to_the_optimum = given.get("iterations", kind.iterations) is None
-    return bool((to_the_optimum and horizon > COSTLY_HORIZON) or (blocks or horizon - 1) > COSTLY_KNOTS)
+    to_the_optimum = policy.iterations is None and policy.horizon > COSTLY_HORIZON
+    return to_the_optimum or len(policy.offsets) > COSTLY_KNOTS
 
 
 def playing(name: str, entries: Sequence[Entry], main: str = MAIN) -> list[Entry]:
