@@ -116,7 +116,7 @@ def measured(options: Options, command: str) -> dict[str, Measurement]:
             raise InvalidInputError("--agents are played: expected --out, where the results go.")
         return {page: _read(_file(options.write, page).with_suffix(".json")) for page in options.pages}
     entered = _entered(options)
-    found: dict[str, list[Section]] = {page: [] for page in options.pages}
+    found: dict[str, dict[str, Section]] = {page: {} for page in options.pages}
     for name in dict.fromkeys(name for by_set in entered.values() for name in by_set):
         sections = measure(
             name,
@@ -129,8 +129,10 @@ def measured(options: Options, command: str) -> dict[str, Measurement]:
             progress=True,
         )
         for page, section in sections.items():
-            found[page].append(section)
-    return {page: Measurement(command, _today(), describe(), tuple(sections)) for page, sections in found.items()}
+            found[page][name] = section
+    # What several pages need was played with the first of them; each page keeps its own order.
+    ordered = {page: tuple(found[page][name] for name in by_set) for page, by_set in entered.items()}
+    return {page: Measurement(command, _today(), describe(), sections) for page, sections in ordered.items()}
 
 
 def draw_up(measurement: Measurement, page: str, folder: pathlib.Path) -> None:

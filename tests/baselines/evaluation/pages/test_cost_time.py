@@ -152,7 +152,7 @@ class TestTree:
                         assert cost >= known[i] * (1.0 - 2e-6), (one.name, line.label, i, UPDATE)
 
     def test_it_is_lean(self):
-        assert (DOCS / "cost_time.json").stat().st_size < 200_000
+        assert (DOCS / "cost_time.json").stat().st_size < 500_000  # costs, errors and angles of 256 episodes a line
 
     @pytest.mark.parametrize(
         ("name", "spec"), [(NAME, "dls"), (NAME, "rhc:horizon=10,iterations=1"), ("varga7-fast", "rhc:horizon=30")]
