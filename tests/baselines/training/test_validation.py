@@ -86,13 +86,13 @@ def test_the_record_is_of_the_scenario_as_it_is(recorded):
 @pytest.mark.slow
 def test_the_record_holds_what_the_reference_costs(recorded):
     scenario, record = recorded
-    (episode,) = rollouts(scenario, baselines.make(validation.POLICY, scenario), scenarios.seeds("validation", 1))
+    (episode,) = rollouts(scenario, validation.reference_policy(scenario), scenarios.seeds("validation", 1))
     assert float(np.sum(episode.tracking_cost + episode.velocity_cost)) == pytest.approx(record["costs"][0], rel=1e-6)
 
 
 def test_command_line(capsys, monkeypatch, tmp_path):
     assert validation.main([]) == 0
-    assert "rhc_foresight on varga7-random (skew): geometric mean of 64 costs" in capsys.readouterr().out
+    assert f"{validation.POLICY} on varga7-random (skew): geometric mean of 64 costs" in capsys.readouterr().out
     monkeypatch.setattr(validation, "FILE", tmp_path / "record.json")
     monkeypatch.setattr(validation, "POLICY", "dls")
     monkeypatch.setattr(validation, "EPISODES", 2)
