@@ -23,14 +23,9 @@ def newton_step(model, exact, damping, inverse, factor, step):
         False where the matrix is not positive definite; the step is of no use then.
     """
     knots, n = step.shape
-    gradient, coupling = model.gradient, model.coupling
+    coupling = model.coupling
     for k in range(knots):
-        diagonal, second = model.diagonal[k], model.second[k]
-        for a in range(n):
-            for b in range(a + 1):
-                factor[a, b] = diagonal[a, b] + second[a, b] if exact else diagonal[a, b]
-            factor[a, a] += damping
-            step[k, a] = -gradient[k, a]
+        pivot_of(model, exact, damping, k, factor, step[k])
         if k > 0:
             _eliminate(coupling[k], inverse[k - 1], step[k - 1], factor, step[k])
         if not cholesky(factor):
@@ -40,14 +35,7 @@ def newton_step(model, exact, damping, inverse, factor, step):
         if k + 1 < knots:
             for a in range(n):
                 step[k, a] += coupling[k + 1, a] * step[k + 1, a]
-        # factor's first row holds the result while the right-hand side is still needed
-        for a in range(n):
-            total = 0.0
-            for b in range(n):
-                total += inverse[k, a, b] * step[k, b]
-            factor[0, a] = total
-        for a in range(n):
-            step[k, a] = factor[0, a]
+        multiply(inverse[k], factor, step[k])
     return True
 
 
@@ -70,3 +58,36 @@ def _eliminate(coupling, inverse, rhs_before, pivot, rhs):
         rhs[a] += coupling[a] * carried
         for b in range(a + 1):
             pivot[a, b] -= coupling[a] * inverse[a, b] * coupling[b]
+
+
+@inlined
+def pivot_of(model, exact, damping, k, pivot, rhs):
+    """Knot ``k`` before anything is eliminated from it: its block of the Hessian, damped, and minus its gradient.
+
+    Args:
+        model: The :class:`workspace.QuadraticModel`.
+        exact: Whether to take the Hessian itself instead of its Gauss–Newton part.
+        damping: Added to the diagonal.
+        k: Which knot.
+        pivot: Receives the block's lower triangle. Shape (n, n).
+        rhs: Receives minus the gradient. Shape (n,).
+    """
+    diagonal, second, gradient = model.diagonal[k], model.second[k], model.gradient[k]
+    for a in range(rhs.shape[0]):
+        for b in range(a + 1):
+            pivot[a, b] = diagonal[a, b] + second[a, b] if exact else diagonal[a, b]
+        pivot[a, a] += damping
+        rhs[a] = -gradient[a]
+
+
+@inlined
+def multiply(matrix, scratch, vector):
+    """The product of a matrix (n, n) and a vector (n,), in its place; ``scratch`` (n, n) holds it meanwhile."""
+    n = vector.shape[0]
+    for a in range(n):
+        total = 0.0
+        for b in range(n):
+            total += matrix[a, b] * vector[b]
+        scratch[0, a] = total
+    for a in range(n):
+        vector[a] = scratch[0, a]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from baselines.solvers.linear_algebra import inverse_of_factor
+from baselines.solvers.receding_horizon.newton.newton_step import multiply, pivot_of
 from ikgym.jit import inlined, kernel
 from ikgym.linear_algebra import cholesky
 
@@ -25,14 +26,9 @@ def pentadiagonal_step(model, exact, damping, inverse, factor, step):
         False where the matrix is not positive definite; the step is of no use then.
     """
     knots, n = step.shape
-    gradient, far, beside = model.gradient, model.far, model.beside
+    far, beside = model.far, model.beside
     for k in range(knots):
-        diagonal, second = model.diagonal[k], model.second[k]
-        for a in range(n):
-            for b in range(a + 1):
-                factor[a, b] = diagonal[a, b] + second[a, b] if exact else diagonal[a, b]
-            factor[a, a] += damping
-            step[k, a] = -gradient[k, a]
+        pivot_of(model, exact, damping, k, factor, step[k])
         if k > 0:
             _fill(model, inverse, k)
             _eliminate(beside[k], inverse[k - 1], step[k - 1], model.product, factor, step[k])
@@ -48,14 +44,7 @@ def pentadiagonal_step(model, exact, damping, inverse, factor, step):
                     step[k, a] -= beside[k + 1, b, a] * step[k + 1, b]
             if k + 2 < knots:
                 step[k, a] -= far[k + 2, a] * step[k + 2, a]
-        # factor's first row holds the result while the right-hand side is still needed
-        for a in range(n):
-            total = 0.0
-            for b in range(n):
-                total += inverse[k, a, b] * step[k, b]
-            factor[0, a] = total
-        for a in range(n):
-            step[k, a] = factor[0, a]
+        multiply(inverse[k], factor, step[k])
     return True
 
 

@@ -12,7 +12,7 @@ from baselines.solvers.receding_horizon.newton.grid import shift_multipliers, sh
 from baselines.solvers.receding_horizon.newton.guess import DAMPING, STREAM, draw, initial_guess, slow_down, uniform
 from baselines.solvers.receding_horizon.newton.minimise import NewtonSettings, minimise
 from baselines.solvers.receding_horizon.newton.workspace import NewtonWorkspace, newton_workspace
-from ikgym.jit import kernel
+from ikgym.jit import inlined, kernel
 
 Floats = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
@@ -21,6 +21,7 @@ Integers = npt.NDArray[np.int64]
 STEPS_OF_A_START, TOLERANCE_OF_A_START = 30, 1e-4
 # A restart candidate that is still so many times more costly than the plan after so many Newton steps is given up.
 HOPELESS, TRIED = 10.0, 5
+# Likewise after `start_steps` of them, where initial guesses are tried one after the other as candidates.
 UNPROMISING = 2.0
 # A restart candidate replaces the plan only for a gain that is worth the jump.
 GAIN = 1e-3
@@ -139,10 +140,8 @@ def initial_plan(problem, settings, plan, workspace):
         workspace.drift[:] = 0.0
         if trial > 0:
             damping = draw(settings.seed, trial, workspace.drift)
-        initial_guess(problem, 0, workspace.drift, damping, plan.path, newton.knot)
+        _guess(problem, settings, 0, damping, plan.path, workspace)
         plan.multipliers[:] = 0.0
-        if settings.recovery_steps > 0:
-            slow_down(problem, plan.path)
         if trials == 1:
             return 0
         coarse = NewtonSettings(False, STEPS_OF_A_START, TOLERANCE_OF_A_START)
@@ -155,6 +154,14 @@ def initial_plan(problem, settings, plan, workspace):
     if best < np.inf:
         _copy(kept, plan)
     return made
+
+
+@inlined
+def _guess(problem, settings, first, damping, path, workspace):
+    """An initial guess from knot ``first`` on, with the drift in the workspace; slowed down where plans may recover."""
+    initial_guess(problem, first, workspace.drift, damping, path, workspace.newton.knot)
+    if settings.recovery_steps > 0:
+        slow_down(problem, path)
 
 
 @kernel
@@ -175,10 +182,8 @@ def try_start(problem, settings, steps, plan, cost, number, workspace):
     """
     guess, newton = first_part(workspace.kept, plan.path.shape[0]), workspace.newton
     damping = draw(settings.seed, number, workspace.drift)
-    initial_guess(problem, 0, workspace.drift, damping, guess.path, newton.knot)
+    _guess(problem, settings, 0, damping, guess.path, workspace)
     guess.multipliers[:] = 0.0
-    if settings.recovery_steps > 0:
-        slow_down(problem, guess.path)
     few = NewtonSettings(False, steps, TOLERANCE_OF_A_START)
     minimum = minimise(problem, guess.path, guess.multipliers, few, newton)
     if max(minimum.cost, true_cost(problem, guess.path, newton)) < (1.0 - GAIN) * cost:
@@ -205,9 +210,7 @@ def branch_off(problem, settings, plan, anew, number, candidate, workspace):
     candidate.multipliers[:branch] = plan.multipliers[:branch]
     candidate.multipliers[branch:] = 0.0
     damping = draw(settings.seed, number, workspace.drift)
-    initial_guess(problem, branch, workspace.drift, damping, candidate.path[:knots], workspace.newton.knot)
-    if settings.recovery_steps > 0:
-        slow_down(problem, candidate.path[:knots])
+    _guess(problem, settings, branch, damping, candidate.path[:knots], workspace)
 
 
 @kernel
