@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from baselines.policy import Memory
 from baselines.policy.compiled import CompiledPolicy
-from baselines.policy_kernels import cut_rows
+from baselines.policy_kernels import answer_parts, as_rows, cut_rows
 from baselines.solvers.arm_task import arm_task_of, period_of, plain_arm_task, pose_arrays, task_shift
 from baselines.status import Status
 from ikgym import task_kernels
@@ -94,19 +94,25 @@ class ResolvedRate(CompiledPolicy, abc.ABC):
 
 
 @inlined
-def task_shifts(arm_task, gain, q, pose, nominal, before, known):
-    """Task Jacobians (B, e, n) and the task shifts asked for (B, e).
+def asked(arm_task, gain, q, pose, nominal, before, known, answer):
+    """Begins a kernel of one iteration: what is asked for, and where the answer goes.
 
     Args:
         arm_task: See :func:`plain_arm_task`.
         gain: Share of the present error to take back.
-        q: Joint coordinates in [rad] or [m]. Shape (B, n).
-        pose: Measured task coordinates. Shape (B, m).
-        nominal: Nominal task coordinates ahead. Shape (B, p, m).
+        q: Joint coordinates in [rad] or [m]. Shape (B n,).
+        pose: Measured task coordinates. Shape (B m,).
+        nominal: Nominal task coordinates ahead. Shape (B p, m).
         before: X^N(k), where known; becomes X^N(k+1). Shape (B, m).
         known: Whether there was a step before; becomes True. Shape (B,).
+        answer: See :class:`CompiledPolicy`.
+
+    Returns:
+        Joint coordinates (B, n), task Jacobians (B, e, n), the task shifts asked for (B, e), and the answer's parts:
+        joint shifts (B, n), status and iterations (B,), to be filled in.
     """
     chain, kind = arm_task_of(arm_task)
+    q, pose, nominal = as_rows(int(arm_task[0]), q, pose, nominal)
     rows, n = q.shape
     size = task_kernels.error_size(kind, pose.shape[1])
     jacobian, shift, error = np.empty((rows, size, n)), np.empty((rows, size)), np.empty(size)
@@ -118,7 +124,7 @@ def task_shifts(arm_task, gain, q, pose, nominal, before, known):
         task_shift(kind, gain, pose[row], nominal[row, 0], present, error, shift[row])
         before[row] = nominal[row, 0]
         known[row] = True
-    return jacobian, shift
+    return q, jacobian, shift, answer_parts(answer, rows, n)
 
 
 @inlined

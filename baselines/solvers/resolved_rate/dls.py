@@ -9,9 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.policy import statuses
-from baselines.policy_kernels import REFUSED, all_finite, answer_parts, as_rows
+from baselines.policy_kernels import REFUSED, all_finite
 from baselines.solvers.linear_algebra import damped_gram, transposed_product
-from baselines.solvers.resolved_rate.base import APPLIED, ResolvedRate, answered, task_shifts
+from baselines.solvers.resolved_rate.base import APPLIED, ResolvedRate, answered, asked
 from ikgym.jit import kernel
 from ikgym.linear_algebra import cholesky, cholesky_solve
 from ikgym.validation import FloatArray, number
@@ -75,12 +75,11 @@ def dls_rows(
     """One step of :class:`DampedLeastSquares`; see :class:`CompiledPolicy` for the arguments."""
     if checking and not all_finite(q, qdot_before, pose, nominal, remaining):
         return REFUSED
-    q, pose, nominal = as_rows(int(arm_task[0]), q, pose, nominal)
-    qdot, status, iterations = answer_parts(answer, q.shape[0], q.shape[1])
-    jacobian, shift = task_shifts(arm_task, gain, q, pose, nominal, before, known)
+    q, jacobian, shift, parts = asked(arm_task, gain, q, pose, nominal, before, known, answer)
+    qdot, status, _ = parts
     status[:] = APPLIED
     damped_rows(jacobian, shift, damping, qdot)
-    return answered(arm_task, (qdot, status, iterations), action)
+    return answered(arm_task, parts, action)
 
 
 @kernel

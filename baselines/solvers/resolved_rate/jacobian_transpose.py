@@ -8,14 +8,14 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from baselines.policy_kernels import REFUSED, all_finite, answer_parts, as_rows
+from baselines.policy_kernels import REFUSED, all_finite
 from baselines.solvers.resolved_rate.base import (
     APPLIED,
     ResolvedRate,
     answered,
+    asked,
     say_deficient,
     status_of,
-    task_shifts,
 )
 from ikgym.jit import kernel
 from ikgym.validation import FloatArray, number
@@ -92,15 +92,14 @@ def jacobian_transpose_rows(
     """One step of :class:`JacobianTranspose`; see :class:`CompiledPolicy` for the arguments."""
     if checking and not all_finite(q, qdot_before, pose, nominal, remaining):
         return REFUSED
-    q, pose, nominal = as_rows(int(arm_task[0]), q, pose, nominal)
-    qdot, status, iterations = answer_parts(answer, q.shape[0], q.shape[1])
-    jacobian, shift = task_shifts(arm_task, gain, q, pose, nominal, before, known)
+    q, jacobian, shift, parts = asked(arm_task, gain, q, pose, nominal, before, known, answer)
+    qdot, status, _ = parts
     stuck = np.empty(q.shape[0], np.bool_)
     transpose_rows(jacobian, shift, tolerance, qdot, stuck)
     say_deficient(stuck, status)
     if shift.shape[1] != full_rank:
         status[:] = APPLIED
-    return answered(arm_task, (qdot, status, iterations), action)
+    return answered(arm_task, parts, action)
 
 
 @kernel

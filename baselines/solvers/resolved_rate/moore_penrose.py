@@ -8,9 +8,9 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from baselines.policy_kernels import REFUSED, all_finite, answer_parts, as_rows
+from baselines.policy_kernels import REFUSED, all_finite
 from baselines.solvers.linear_algebra import pseudoinverse_rows
-from baselines.solvers.resolved_rate.base import ResolvedRate, answered, say_deficient, status_of, task_shifts
+from baselines.solvers.resolved_rate.base import ResolvedRate, answered, asked, say_deficient, status_of
 from ikgym.exceptions import InvalidInputError
 from ikgym.jit import kernel
 from ikgym.validation import FloatArray, number
@@ -80,13 +80,12 @@ def pseudoinverse_step_rows(
     """One step by the pseudoinverse, the columns of J divided by ``root`` (n,); else see :class:`CompiledPolicy`."""
     if checking and not all_finite(q, qdot_before, pose, nominal, remaining):
         return REFUSED
-    q, pose, nominal = as_rows(int(arm_task[0]), q, pose, nominal)
-    qdot, status, iterations = answer_parts(answer, q.shape[0], q.shape[1])
-    jacobian, shift = task_shifts(arm_task, gain, q, pose, nominal, before, known)
+    q, jacobian, shift, parts = asked(arm_task, gain, q, pose, nominal, before, known, answer)
+    qdot, status, _ = parts
     deficient = np.empty(q.shape[0], np.bool_)
     pseudoinverse_rows(jacobian / root, shift, tolerance, full_rank, qdot, deficient)
     say_deficient(deficient, status)
     for row in range(q.shape[0]):
         for j in range(q.shape[1]):
             qdot[row, j] /= root[j]
-    return answered(arm_task, (qdot, status, iterations), action)
+    return answered(arm_task, parts, action)

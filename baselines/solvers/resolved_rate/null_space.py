@@ -9,10 +9,10 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from baselines.policy_kernels import REFUSED, all_finite, answer_parts, as_rows
+from baselines.policy_kernels import REFUSED, all_finite
 from baselines.solvers.arm_task import arm_task_of, plain_arm_task
 from baselines.solvers.linear_algebra import pseudoinverse_rows
-from baselines.solvers.resolved_rate.base import APPLIED, answered, say_deficient, task_shifts
+from baselines.solvers.resolved_rate.base import APPLIED, answered, asked, say_deficient
 from baselines.solvers.resolved_rate.dls import damped_rows
 from baselines.solvers.resolved_rate.moore_penrose import MoorePenrose
 from ikgym.arms import Arm
@@ -170,12 +170,11 @@ def null_space_rows(
     """One step of :class:`NullSpace`; see :class:`CompiledPolicy` for the arguments."""
     if checking and not all_finite(q, qdot_before, pose, nominal, remaining):
         return REFUSED
-    q, pose, nominal = as_rows(int(arm_task[0]), q, pose, nominal)
-    qdot, status, iterations = answer_parts(answer, q.shape[0], q.shape[1])
-    jacobian, shift = task_shifts(arm_task, gain, q, pose, nominal, before, known)
+    q, jacobian, shift, parts = asked(arm_task, gain, q, pose, nominal, before, known, answer)
+    qdot, status, _ = parts
     rule = rank_tolerance, full_rank, damping, lines, secondary_gain, reach, joint_gain, goal
     move_rows(arm_task, rule, q, (jacobian, shift), qdot, status)
-    return answered(arm_task, (qdot, status, iterations), action)
+    return answered(arm_task, parts, action)
 
 
 @kernel
