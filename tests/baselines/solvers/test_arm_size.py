@@ -1,0 +1,86 @@
+"""What is chosen by an arm's size: measures, weights, and motions that do not depend on the unit of length."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import baselines
+import ikgym
+from baselines.evaluation.runner import play_episodes
+from baselines.solvers import arm_size
+from ikgym.trajectories import Sinusoid
+
+PANDA = ikgym.arms.get("panda")
+STEPS = 150
+
+
+def scaled(arm, factor):
+    return arm.replace(name=f"{arm.name} x {factor}", offsets=factor * arm.offsets, tool=factor * arm.tool)
+
+
+def sway(arm, task="position", **changes):
+    """A motion around the home posture of the Panda; the reference goes with the arm's size."""
+    n = arm.joints
+    trajectory = Sinusoid(np.linspace(0.1, 0.3, n), np.linspace(2.0, 4.0, n), np.zeros(n), np.asarray(arm.home))
+    return ikgym.scenarios.Scenario(
+        "sway", arm, ikgym.tasks.get(task), trajectory, **{"steps": STEPS, "velocity_limit": 20.0, **changes}
+    )
+
+
+def test_lengths_begin_at_the_first_joint():
+    assert arm_size.length(ikgym.arms.get("faitli3")) == 1.3  # and so the paper's A stays as it is
+    links = 0.316 + 2 * 0.0825 + 0.384 + 0.088 + 0.107
+    offsets = np.linalg.norm(PANDA.offsets, axis=1)
+    assert arm_size.length(PANDA) == pytest.approx(offsets[1:].sum() + 0.107)
+    assert arm_size.length(PANDA) < links
+    assert arm_size.length(scaled(PANDA, 4)) == 4 * arm_size.length(PANDA)
+
+
+def test_a_radian_counts_as_the_root_of_the_length():
+    assert arm_size.radian(PANDA) == pytest.approx(np.sqrt(0.28 * arm_size.length(PANDA)))
+    assert arm_size.radian(scaled(PANDA, 4)) == 2 * arm_size.radian(PANDA)
+    assert arm_size.radian(ikgym.arms.Arm("wrist", np.zeros((2, 3)), np.eye(3)[:2])) == 1.0
+
+
+@pytest.mark.parametrize("task", ikgym.tasks.names())
+def test_weights_are_those_of_the_components(task):
+    """A shift of the tool changes just the components of weight 1."""
+    which = ikgym.tasks.get(task)
+    rotation, position = PANDA.forward(PANDA.home)
+    here, there = (which.coordinates(rotation, position + by) for by in (0.0, 0.1))
+    weights = arm_size.error_weights(which, 0.5)
+    np.testing.assert_array_equal(weights == 1.0, which.error(there, here) != 0.0)
+    assert set(weights[weights != 1.0]) <= {0.25}
+
+
+SCALE_FREE = [
+    ("jacobian_transpose", {}),
+    ("fixed_point", {}),
+    ("abstract_rotation", {"deformation": "contraction", "counter_rotation": "none"}),
+]
+
+
+def path(scenario, policy, parameters):
+    made = baselines.make(policy, scenario, **parameters)
+    return play_episodes(scenario, made, [0], made.preview, timed=False)[0].q
+
+
+@pytest.mark.parametrize(("policy", "parameters"), SCALE_FREE)
+def test_an_arm_three_times_as_large_makes_the_same_joint_motion(policy, parameters):
+    small, large = (path(sway(arm), policy, parameters) for arm in (PANDA, scaled(PANDA, 3.0)))
+    assert np.ptp(small, axis=0).max() > 0.05
+    np.testing.assert_allclose(large, small, rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("policy", "parameters"),
+    [("fixed_point", {"a": -1.0}), ("abstract_rotation", {**SCALE_FREE[2][1], "lambda_a": 0.05})],
+)
+def test_with_a_parameter_given_it_does_not(policy, parameters):
+    small, large = (path(sway(arm), policy, parameters) for arm in (PANDA, scaled(PANDA, 3.0)))
+    assert abs(large - small).max() > 1e-3
+
+
+#: Sums of tracking and of velocity costs as they were before defaults depended on the arm, and what was the default.
+BEFORE: dict = {}
