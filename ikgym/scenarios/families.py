@@ -37,6 +37,8 @@ TENTH = 0.1
 KNOT, BETWEEN = 0.12, 20
 # Knots before the first of the postures and after the second.
 BEFORE, AFTER = 5, 3
+# So far from home are random motions at most, in [rad].
+AROUND_HOME = 1.0
 
 
 def _even(place: Workplace) -> TimeLaw:
@@ -146,13 +148,16 @@ def _family(name: str, place: Workplace) -> Scenario:
     )
 
 
-def _random(arm: Arm, acceleration_limit: FloatArray | float) -> Scenario:
-    """Motions from rest to rest that every arm can follow: the limits are kept by a tenth."""
+def _random(name: str, **limits: float) -> Scenario:
+    """Motions from rest to rest near home, where the elbow stays bent and the wrist is not aligned."""
+    arm = arms.get(name)
+    home: FloatArray = arm.home  # type: ignore[assignment]  # arms of makers have one
+    lower, upper = np.maximum(arm.lower, home - AROUND_HOME), np.minimum(arm.upper, home + AROUND_HOME)
     return Scenario(
-        f"{arm.name}-random",
+        f"{name}-random",
         arm,
         tasks.get("pose"),
-        RandomJointSpline.within(arm, 2.0, acceleration_limit=acceleration_limit),
+        RandomJointSpline.within(arm, 2.0, lower=lower, upper=upper, **limits),
         cost=_cost(arm, p_x=2.0),
         dt=2e-3,
         steps=1000,
@@ -169,6 +174,6 @@ def _cost(arm: Arm, p_x: float = 3.0) -> TrackingCost:
 SCENARIOS: dict[str, Callable[[], Scenario]] = {
     f"{place.arm}-{name}": functools.partial(_family, name, place) for place in WORKPLACES for name in FAMILIES
 }
-SCENARIOS["panda-random"] = lambda: _random(arms.get("panda"), arms.get("panda").acceleration_limit)
+SCENARIOS["panda-random"] = functools.partial(_random, "panda")
 # KUKA publishes no accelerations; the least of the Panda's is 7.5 rad/s².
-SCENARIOS["iiwa14-random"] = lambda: _random(arms.get("iiwa14"), 7.5)
+SCENARIOS["iiwa14-random"] = functools.partial(_random, "iiwa14", acceleration_limit=7.5)

@@ -310,7 +310,7 @@ class Scenario(Frozen):
 
     @functools.cached_property
     def _start(self) -> FloatArray:
-        """The one start of all episodes: the one that is given, or one at the first pose of the Cartesian trajectory."""
+        """The start of all episodes: the one that is given, or one at the first pose of a Cartesian trajectory."""
         if self.start is not None:
             return self.start
         return starts.found(self.name, self.arm, self.frames(self.trajectory, 1)[0])
