@@ -301,7 +301,8 @@ def test_bounds_are_true_at_the_worst(name):
     env = make(scenario, disable_env_checker=True)
     bound = scenario.start_bound()
     for sign in (-1, 1):
-        observation, _ = env.reset(seed=0, options={"q": sign * bound})
+        start = np.clip(sign * bound, scenario.arm.lower, scenario.arm.upper)
+        observation, _ = env.reset(seed=0, options={"q": start})
         assert env.observation_space.contains(observation)
         for _ in range(scenario.steps):
             observation = env.step(np.full(scenario.joints, 2.0 * sign, dtype=np.float32))[0]
