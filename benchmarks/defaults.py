@@ -26,9 +26,12 @@ BEFORE: dict[str, dict[str, Any]] = {
     "fixed_point": {"length": 1.0},
     "abstract_rotation": {"lambda_a": 5e-4},
 }
+WEIGHED = ("jacobian_transpose", "fixed_point")
 DAMPINGS = (1e-5, 1e-4, 1e-3, 3e-3, 1e-2, 1e-1)
 SHARES = (0.25, 0.5, 1.0, 2.0, 4.0)
-#: Of arms that have none, in [rad], [rad/s] and [rad/s²].
+#: Of arms that have no limits: what an action of 1 means in [rad/s], and the limits of motions in [rad], [rad/s] and
+#: [rad/s²].
+ACTION = 10.0
 LIMITS = {"position": 2.9, "velocity": 2.0, "acceleration": 10.0}
 CONDITIONS = (
     "Whole poses of smooth random joint motions within the limits, the same for all solvers, {episodes} an arm and "
@@ -56,10 +59,7 @@ def tables(effort: Effort = FULL) -> list[Table]:
     return [
         _changes(effort, conditions),
         _grid("dls", "damping", [(f"{value:g}", value) for value in DAMPINGS], effort),
-        *(
-            _grid(policy, "length", [(f"× {share:g}", share) for share in SHARES], effort)
-            for policy in list(BEFORE)[:2]
-        ),
+        *(_grid(policy, "length", [(f"× {share:g}", share) for share in SHARES], effort) for policy in WEIGHED),
     ]
 
 
@@ -67,12 +67,13 @@ def tables(effort: Effort = FULL) -> list[Table]:
 def scenario(name: str, steps: int) -> Scenario:
     """Random smooth joint motions of an arm, given as poses."""
     arm, dt = ikgym.arms.get(name), ARMS[name]
+    missing = missing_limits(arm)
     return Scenario(
         f"{name}-defaults",
         arm,
         ikgym.tasks.get("pose"),
-        RandomJointSpline.within(arm, steps * dt, spans=4, margin=0.05, **missing_limits(arm)),
-        velocity_limit=None if np.isfinite(arm.velocity_limit).all() else 10.0,
+        RandomJointSpline.within(arm, steps * dt, spans=4, margin=0.05, **missing),
+        velocity_limit=np.full(arm.joints, ACTION) if "velocity_limit" in missing else arm.velocity_limit,
         dt=dt,
         steps=steps,
     )

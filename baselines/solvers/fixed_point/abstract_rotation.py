@@ -119,9 +119,9 @@ class AbstractRotation(SolverPolicy):
     Args:
         problem: What the policy is told of the scenario.
         r_a: R_a, the common length of the extended vectors. In the mixed units of J̃ᵀ f, like all that is turned.
-        lambda_a: λ_a, the share of the rotation that is applied; with ``"contraction"`` -A F'(ξ*). Above 0. If left out,
-            the paper's 5e-4 on the paper's arm, and on others as much as makes λ_a ‖J̃‖² the same, by a bound of ‖J̃‖²
-            from the lengths of the links.
+        lambda_a: λ_a, the share of the rotation that is applied; with ``"contraction"`` -A F'(ξ*). Above 0. If left
+            out, the paper's 5e-4, more on arms shorter than the paper's, so that λ_a ‖J̃‖² is the same, and no more than
+            2 / ‖J̃‖², by a bound of ‖J̃‖² from the lengths of the links.
         epsa: What the listing adds to a norm before it divides by it. Above 0; not printed.
         q_pp_max: Where the listing limits joint coordinates, by a tanh, in [rad] or [m]; not printed.
         task_weights: The diagonal of ℱ, a number or one a task coordinate. Above 0, at most 1.
@@ -295,7 +295,8 @@ def _transposed(jacobian, vector, out):
 
 def _share(problem: Problem) -> float:
     """λ_a for an arm of any size."""
-    return PAPERS_SHARE * (_papers_bound() / jacobian_bound(problem.model, problem.task))
+    bound = jacobian_bound(problem.model, problem.task)
+    return min(PAPERS_SHARE * max(1.0, _papers_bound() / bound), 2.0 / bound)
 
 
 @functools.cache

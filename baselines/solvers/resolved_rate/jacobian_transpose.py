@@ -26,10 +26,11 @@ from ikgym.validation import FloatArray, number, read_only
 class JacobianTranspose(ResolvedRate):
     """Goes down the gradient of ½ ‖W (Δx − J Δq)‖²: Δq = α Jᵀ W² Δx, with the α that goes furthest down.
 
-    W weighs position and orientation against each other: 1 for positions, a length ℓ for orientations. The direction is that of Wolovich and Elliott 1984 and of Balestrino, De Maria and Sciavicco 1984; the step
+    W weighs position and orientation against each other: 1 for positions, a length ℓ for orientations. The direction
+    is that of Wolovich and Elliott 1984 and of Balestrino, De Maria and Sciavicco 1984; the step
     α = ΔxᵀJJᵀΔx / ‖JJᵀΔx‖² is the one that Buss 2004 prints, here of W J and W Δx. In one step an arm makes all of Δx
-    only where W J has equal singular values; elsewhere it lags behind, the more so the more they differ, and what is missing comes
-    back through the measured error.
+    only where W J has equal singular values; elsewhere it lags behind, the more so the more they differ, and what is
+    missing comes back through the measured error.
 
     Joint velocities are not bounded: where Δx lies along a direction that is nearly lost, with a singular value σ,
     the step is Δx / σ like that of the pseudoinverse. Where JᵀΔx is 0 the arm stands still; the status then says

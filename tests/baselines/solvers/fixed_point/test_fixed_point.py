@@ -9,7 +9,7 @@ import pytest
 import baselines
 import ikgym
 from baselines.policy import Batch
-from baselines.solvers.arm_size import error_weights, jacobian_bound, length, radian
+from baselines.solvers.arm_size import error_weights, jacobian_bound
 from baselines.solvers.fixed_point import fixed_point, iteration
 from baselines.solvers.fixed_point.contraction import contraction, evaluate
 from baselines.status import Status
