@@ -82,5 +82,60 @@ def test_with_a_parameter_given_it_does_not(policy, parameters):
     assert abs(large - small).max() > 1e-3
 
 
-#: Sums of tracking and of velocity costs as they were before defaults depended on the arm, and what was the default.
-BEFORE: dict = {}
+@pytest.mark.parametrize("policy", ["fixed_point", "abstract_rotation"])
+def test_on_the_papers_arms_the_papers_numbers_stay(policy):
+    name, parameter, value = {
+        "fixed_point": ("faitli3-regular", "a", -1.0),
+        "abstract_rotation": ("khan8-q1", "lambda_a", 5e-4),
+    }[policy]
+    assert baselines.make(policy, name).parameters[parameter] == value
+
+
+def test_shares_of_rotations_go_against_the_square_of_the_length():
+    def share(arm, task="pose"):
+        return baselines.make("abstract_rotation", sway(arm, task)).lambda_a
+
+    assert share(scaled(PANDA, 3.0), "position") == pytest.approx(share(PANDA, "position") / 9.0)
+    # Little longer than the paper's arm its number is kept, and where that may not contract it is left.
+    long, longer = scaled(PANDA, 25.0), scaled(PANDA, 100.0)
+    assert share(long) == 5e-4
+    assert share(longer) == pytest.approx(2.0 / arm_size.jacobian_bound(longer, ikgym.tasks.get("pose")))
+    assert share(longer) < 5e-4
+
+
+def test_a_grows_on_arms_shorter_than_the_papers():
+    tiny = scaled(ikgym.arms.get("faitli3"), 0.5).replace(home=np.array([0.1, 0.4, 1.0]))
+    assert baselines.make("fixed_point", sway(tiny)).a == pytest.approx(-4.0)
+    assert baselines.make("fixed_point", sway(PANDA)).a < -1.0
+
+
+#: What was the default for all arms.
+BEFORE = {
+    "jacobian_transpose": {"length": 1.0},
+    "fixed_point": {"length": 1.0},
+    "abstract_rotation": {"lambda_a": 5e-4},
+}
+#: Tracking and velocity costs of 150 steps with it, before there were others.
+COSTS = {
+    ("varga7-fast", "jacobian_transpose"): (67231778.67518784, 27848903.96351546),
+    ("khan8-q1", "jacobian_transpose"): (126250461.26640134, 2197.138279847826),
+    ("zhang6-lspb", "jacobian_transpose"): (188.4403440901819, 3.2611424692457858),
+    ("varga7-fast", "fixed_point"): (40743305.778034255, 807699.716067913),
+    ("khan8-q7q8", "fixed_point"): (10517536660.377666, 2.3720112227117263e-08),
+    ("zhang6-lspb", "fixed_point"): (50.846141087661834, 0.696956362074195),
+    ("varga7-fast", "abstract_rotation"): (117101865873.3636, 11481.238054259115),
+    ("zhang6-lspb", "abstract_rotation"): (203465.95159799824, 2.0524239627998737e-05),
+}
+
+
+@pytest.mark.parametrize(("name", "policy"), COSTS)
+def test_with_the_old_parameters_costs_are_those_of_before(name, policy):
+    scenario = ikgym.scenarios.get(name).replace(steps=STEPS)
+
+    def costs(**parameters):
+        made = baselines.make(policy, scenario, **parameters)
+        (episode,) = play_episodes(scenario, made, [0], made.preview, timed=False)
+        return float(episode.tracking_cost.sum()), float(episode.velocity_cost.sum())
+
+    assert costs(**BEFORE[policy]) == pytest.approx(COSTS[name, policy], rel=1e-12)
+    assert costs()[0] != pytest.approx(COSTS[name, policy][0], rel=1e-3)
