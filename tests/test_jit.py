@@ -10,10 +10,11 @@ import sys
 import threading
 
 import numba.core.dispatcher
+import numpy as np
 import pytest
 
 from ikgym import compilation, jit
-from ikgym.jit import kernel
+from ikgym.jit import kernel, uncounted
 
 CALLEE = "from {jit}\nSCALE = {scale}\n@kernel\ndef scaled(x):\n    return SCALE * x\n"
 CALLER = (
@@ -79,6 +80,29 @@ def test_without_a_folder_to_write_to(monkeypatch, caplog):
         threading.Event().wait(0.2)
     assert "Compiling the test; this happens once in each process, since there is no folder" in caplog.text
     assert "kept on disk" not in caplog.text
+
+
+def test_an_uncounted_kernel_allocates_nothing_itself():
+    @uncounted
+    def allocating(n):
+        return np.empty(n).sum()
+
+    with pytest.raises(numba.core.errors.NumbaError, match="NRT required but not enabled"):
+        allocating(3)
+
+
+def test_what_an_uncounted_kernel_calls_may_allocate():
+    """Without a word of its own a kernel would be compiled as its first caller is."""
+
+    @kernel
+    def allocating(n):
+        return np.ones(n).sum()
+
+    @uncounted
+    def calling(n):
+        return allocating(n)
+
+    assert calling(3) == 3.0
 
 
 CACHE = """
