@@ -60,12 +60,18 @@ def test_numba_alone_would_not_notice(tmp_path):
     assert answer(tmp_path, NUMBAS, scale=3.0, shift=10.0) == 2.0
 
 
-def test_without_a_folder_to_write_to(monkeypatch, caplog):
+@pytest.fixture
+def no_folder(monkeypatch):
+    """Kernels that are defined in the test are compiled in it."""
+
     def no_locator(self, function):
         raise RuntimeError("cannot cache function: no locator available")
 
     monkeypatch.setattr(numba.core.dispatcher.FunctionCache, "__init__", no_locator)
     monkeypatch.setattr(jit, "_not_kept", set())
+
+
+def test_without_a_folder_to_write_to(no_folder, caplog):
     assert jit.kept_on_disk()
     with caplog.at_level(logging.INFO, logger="ikgym"):
 
@@ -91,7 +97,7 @@ def test_an_uncounted_kernel_allocates_nothing_itself():
         allocating(3)
 
 
-def test_what_an_uncounted_kernel_calls_may_allocate():
+def test_what_an_uncounted_kernel_calls_may_allocate(no_folder):
     """Without a word of its own a kernel would be compiled as its first caller is."""
 
     @kernel
