@@ -11,7 +11,7 @@ from numba import njit
 
 import baselines
 import ikgym
-from baselines.policy import Batch
+from baselines.policy import Batch, Memory
 from baselines.solvers.linear_algebra import damped_step
 from benchmarks.effort import FULL, Effort
 from benchmarks.table import Column, Table
@@ -125,7 +125,9 @@ def _beside(effort: Effort) -> Table:
 def _stretch(scenario: str, name: str, kwargs: dict[str, object], steps: int) -> Callable[[], object]:
     policy = baselines.make(name, scenario, **kwargs)
     env = gym.make("RedundantIK-v0", scenario=scenario, preview=policy.preview)
-    (observation, _), state, seen = env.reset(seed=0), None, []
+    observation, _ = env.reset(seed=0)
+    state: Memory | None = None
+    seen = []
     for _ in range(50 + steps):
         seen.append((observation, state))
         action, state = policy.predict(observation, state)

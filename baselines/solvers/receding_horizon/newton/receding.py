@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from baselines.policy.problem import Batch, Solution
 from baselines.policy_kernels import REFUSED, all_finite, answer_parts, as_rows, cut_rows
 from baselines.solvers.arm_task import arm_task_of, joint_limits_of, period_of
 from baselines.solvers.receding_horizon.newton.grid import cut, first_knots
@@ -57,6 +56,36 @@ class HorizonMemory(NamedTuple):
 PERIODS, CANDIDATE_STEPS, TRIED, FAR = range(4)
 
 
+class Observations(NamedTuple):
+    """What is seen of B arms, and what lies ahead of them.
+
+    Attributes:
+        q: Joint coordinates in [rad] or [m]. Shape (B, n).
+        qdot: Joint velocities last applied, in [rad/s] or [m/s]. Shape (B, n).
+        nominal: Nominal task coordinates 1, 2, … steps ahead. Shape (B, p, m).
+        remaining: Steps left. Shape (B,).
+    """
+
+    q: npt.NDArray[np.float64]
+    qdot: npt.NDArray[np.float64]
+    nominal: npt.NDArray[np.float64]
+    remaining: npt.NDArray[np.float64]
+
+
+class Answers(NamedTuple):
+    """What B arms are to do.
+
+    Attributes:
+        qdot: Joint velocities in [rad/s] or [m/s]. Shape (B, n).
+        status: Values of :class:`Status`. Shape (B,).
+        iterations: Newton steps made. Shape (B,).
+    """
+
+    qdot: npt.NDArray[np.float64]
+    status: npt.NDArray[np.int64]
+    iterations: npt.NDArray[np.int64]
+
+
 @kernel
 def plan_rows(
     arm_task,
@@ -86,41 +115,43 @@ def plan_rows(
     n = action_scale.shape[0]
     q, pose, nominal = as_rows(n, q, pose, nominal)
     qdot, status, iterations = answer_parts(answer, q.shape[0], n)
+    observations = Observations(q, qdot_before.reshape(q.shape), nominal, remaining)
     (offsets, axes, _, tool, tool_rotation), kind = arm_task_of(arm_task)
     chain = Chain(offsets, axes, prismatic, tool, tool_rotation)  # read-only, as others have compiled for
     cost, settings = settings_of(numbers, integers)
     data = ProblemData(chain, kind, cost, dt, lower, upper, velocity_limit)
-    batch = Batch(q, qdot_before.reshape(q.shape), pose, nominal, remaining)
     knots = settings.at.shape[0]
     workspace = plan_workspace(kind, nominal.shape[2], knots, n, plans.shape[2] // knots - n)
-    plan_batch(data, settings, batch, Solution(qdot, HorizonMemory(plans, counts), status, iterations), workspace)
+    memory, answers = HorizonMemory(plans, counts), Answers(qdot, status, iterations)
+    plan_batch(data, settings, observations, memory, answers, workspace)
     return cut_rows(qdot, action_scale, action.reshape(qdot.shape), status)
 
 
 @uncounted
-def plan_batch(data, settings, batch, solution, workspace):
+def plan_batch(data, settings, observations, memory, answers, workspace):
     """Plans one period for each of B arms.
 
     Args:
         data: The :class:`ProblemData`.
         settings: :class:`settings.PlanSettings`.
-        batch: The :class:`Batch`, with ``remaining`` of shape (B,).
-        solution: The :class:`Solution`, whose memory is a :class:`HorizonMemory` so far; all of it is set.
+        observations: The :class:`Observations`.
+        memory: The :class:`HorizonMemory`, turned into the next one in place.
+        answers: Receives the :class:`Answers`.
         workspace: A :class:`plan.PlanWorkspace`.
     """
-    plans, counts = solution.memory
-    for row in range(batch.q.shape[0]):
-        q, qdot_before, count = batch.q[row], batch.qdot[row], counts[row]
-        grid, old_grid = _grids(settings, batch.remaining[row], workspace)
-        problem = PathProblem(data, grid, q, batch.nominal[row], qdot_before, settings.rate_weight)
+    plans, counts = memory
+    for row in range(observations.q.shape[0]):
+        q, qdot_before, count = observations.q[row], observations.qdot[row], counts[row]
+        grid, old_grid = _grids(settings, observations.remaining[row], workspace)
+        problem = PathProblem(data, grid, q, observations.nominal[row], qdot_before, settings.rate_weight)
         for j in range(q.shape[0]):
             workspace.passed[j] = qdot_before[j] * data.dt
         minimum, made = _plan_row(problem, settings, old_grid, plans[row], count, workspace)
         count[PERIODS] += 1
-        kept = _first_velocity(data, q, plans[row, 0], grid.length[0], solution.qdot[row])
+        kept = _first_velocity(data, q, plans[row, 0], grid.length[0], answers.qdot[row])
         count[FAR] = 0 if kept or settings.recovery_steps == 0 else count[FAR] + 1
-        solution.status[row] = (_CONVERGED if minimum.outcome == CONVERGED else _LIMIT) if kept else _SATURATED
-        solution.iterations[row] = made
+        answers.status[row] = (_CONVERGED if minimum.outcome == CONVERGED else _LIMIT) if kept else _SATURATED
+        answers.iterations[row] = made
 
 
 @inlined
@@ -148,13 +179,13 @@ def _plan_row(problem, settings, old_grid, plans, counts, workspace):
     Returns:
         The :class:`minimise.Minimum` of the plan, and Newton steps made.
     """
-    most, n, knots, period = settings.at.shape[0], problem.start.shape[0], problem.grid.at.shape[0], counts[PERIODS]
-    far, age = counts[FAR], counts[CANDIDATE_STEPS : CANDIDATE_STEPS + 1]
+    all_knots, knots, n = settings.at.shape[0], problem.grid.at.shape[0], problem.start.shape[0]
+    period, far, age = counts[PERIODS], counts[FAR], counts[CANDIDATE_STEPS : CANDIDATE_STEPS + 1]
     starting = settings.start_steps > 0 and period > 0 and counts[TRIED] + 1 < settings.starts
     retried = far > 0 and far % RETRY == 0
     hurried = far > 0 and not (starting or retried or settings.iterations < 0)
     steps = max(settings.recovery_steps, settings.iterations) if hurried else settings.iterations
-    whole = plan_in(plans[0], most, n)
+    whole = plan_in(plans[0], all_knots, n)
     minimum, made = _plan(problem, settings, steps, period, old_grid, whole, workspace)
     plan, number = first_part(whole, knots), settings.starts + period
     if far > 0 and not starting:
@@ -162,15 +193,13 @@ def _plan_row(problem, settings, old_grid, plans, counts, workspace):
         if retried:
             made += try_start(problem, settings, settings.recovery_steps, plan, minimum.cost, number, workspace)
     elif settings.restart_steps > 0 and period > 0:
-        whole_candidate = plan_in(plans[1], most, n)
+        whole_candidate = plan_in(plans[1], all_knots, n)
         if age[0] == 0:
             branch_off(problem, settings, plan, starting, number, whole_candidate, workspace)
         else:
             shift_plan(old_grid, whole_candidate, problem.grid, workspace)
-        rate, candidate = (
-            settings.start_steps if starting else settings.restart_rate,
-            first_part(whole_candidate, knots),
-        )
+        candidate = first_part(whole_candidate, knots)
+        rate = settings.start_steps if starting else settings.restart_rate
         counts[TRIED] += starting
         made += improve_candidate(problem, settings, rate, plan, minimum.cost, candidate, age, workspace)
     return minimum, made
