@@ -10,8 +10,8 @@ from baselines.solvers.quadratic_program.velocity_box import braking_speed
 from ikgym.jit import kernel
 from ikgym.linear_algebra import cholesky, cholesky_solve
 
-# What a task velocity of another length weighs beside one of another direction.
-SCALING_WEIGHT = 1e-3
+# What a task shift of another length weighs beside one of another direction.
+SCALING_WEIGHT = 1e-4
 
 
 @kernel

@@ -45,9 +45,10 @@ class QuadraticProgram(TaskFeedback):
     The share of the present error that is taken back is made smaller where the joints could not brake in time once it
     is gone. Without that an arm with acceleration limits swings about a reference that it has lost.
 
-    With `task_scaling` the task velocity is scaled by an s between 0 and 1: ‖J q̇ Δt − s Δx‖² + w (1 − s)² ‖Δx‖² +
-    w ρ Σ ((q̇ − z) / v)² is minimised over q̇ and s, with w = 0.001, so that the direction of Δx comes before its
-    length, up to a thousandth, and that before the joint motion.
+    With `task_scaling` the task shift is scaled by an s between 0 and 1: ‖J q̇ Δt − s Δx‖² + w (1 − s)² ‖Δx‖² +
+    w ρ Σ ((q̇ − z) / v)² is minimised over q̇ and s, with w = 10⁻⁴, so that direction comes before length, and length
+    before joint motion. Where the bounds allow any s, what is made misses s Δx by less than (1 − s) ‖Δx‖ / 100, but
+    for the joint motion.
 
     Such programs are the standard of differential inverse kinematics; with these limits in Flacco, De Luca and
     Khatib 2015 and in Pink. The status is ``saturated`` where a joint stands at a bound and the task error that is left
@@ -80,16 +81,11 @@ class QuadraticProgram(TaskFeedback):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        gain = number("secondary_gain", self.secondary_gain, at_least=0.0)
-        if gain * self.problem.dt >= 2.0:
-            raise InvalidInputError(
-                f"secondary_gain: expected a number below 2/Δt = {2.0 / self.problem.dt:g}, got {gain:g}."
-            )
         if not isinstance(self.task_scaling, (bool, np.bool_)):
             raise InvalidInputError(f"task_scaling: expected True or False, got {self.task_scaling!r}.")
         for field, value in {
             "damping": number("damping", self.damping, above=0.0),
-            "secondary_gain": gain,
+            "secondary_gain": self.checked_secondary_gain(self.secondary_gain),
             "braking_share": number("braking_share", self.braking_share, at_least=0.0, at_most=1.0),
             "task_scaling": bool(self.task_scaling),
         }.items():
