@@ -16,7 +16,6 @@ from baselines.solvers.quadratic_program.velocity_box import velocity_box
 from baselines.solvers.resolved_rate.base import APPLIED, TaskFeedback, asked
 from baselines.status import Status
 from ikgym.jit import kernel
-from ikgym.limit_kernels import FASTEST
 from ikgym.validation import number
 
 SATURATED = int(Status.SATURATED)
@@ -36,16 +35,14 @@ class SaturationInNullSpace(TaskFeedback):
     the task velocity, and need not find the largest factor, unlike :class:`QuadraticProgram` with `task_scaling`. The
     status is ``saturated`` where the task velocity was scaled down.
 
-    Joint velocities are measured in terms of their limits, and the pseudoinverse is damped, since the arm would stop in
-    every singularity: neither is part of the source. A task that has lost rank in all joints is scaled only where
-    it loses more.
+    The pseudoinverse is damped, since the arm would stop in every singularity; that is no part of the source. A task
+    that has lost rank in all joints is scaled only where it loses more.
 
     Args:
         problem: What the policy is told of the scenario, limits of the model among it.
         gain: Share of the present error that is taken back in one step; see :class:`TaskFeedback`.
-        damping: Added to the squared singular values of J, as a share of the mean of ‖J_j v_j Δt‖² over the joints j
-            with the largest velocities v. Smaller squares count as lost rank. At least 0; then those below rounding
-            do, and are left out.
+        damping: Added to the squared singular values of J, as a share of the mean of ‖J_j‖² over the joints j. Smaller
+            squares count as lost rank. At least 0; then those below rounding do, and are left out.
 
     Raises:
         InvalidInputError: A number is out of its range.
@@ -94,19 +91,14 @@ def sns_rows(
         return REFUSED
     q, jacobian, shift, (qdot, status, iterations) = asked(arm_task, gain, q, pose, nominal, before, known, answer)
     dt, action_scale = period_of(arm_task)
-    n, fastest = q.shape[1], limits[FASTEST]
+    n = q.shape[1]
     lower, upper = np.empty(n), np.empty(n)
     for row in range(q.shape[0]):
         velocity_box(limits, dt, q[row], qdot_before[row * n : (row + 1) * n], lower, upper)
-        for j in range(n):
-            lower[j] /= fastest[j]
-            upper[j] /= fastest[j]
-            for a in range(shift.shape[1]):
-                jacobian[row, a, j] *= dt * fastest[j]
-        iterations[row], scaled = saturate(jacobian[row], shift[row], damping, lower, upper, qdot[row])
+        jac = jacobian[row]
+        jac *= dt
+        iterations[row], scaled = saturate(jac, shift[row], damping, lower, upper, qdot[row])
         status[row] = SATURATED if scaled else APPLIED
-        for j in range(n):
-            qdot[row, j] *= fastest[j]
     return cut_rows(qdot, action_scale, action.reshape(qdot.shape), status)
 
 
