@@ -40,6 +40,7 @@ class JacobianTranspose(ResolvedRate):
     Args:
         problem: What the policy is told of the scenario.
         gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
+        saturation: What is done about joint velocities beyond their limits; see :class:`ResolvedRate`.
         rank_tolerance: ‖JᵀΔx‖ below this share of ‖J‖ ‖Δx‖ (Frobenius, weighed) counts as zero. At least 0.
         length: ℓ, what 1 rad counts as, or 1 in a rotation matrix, in [m]. Above 0. If left out, chosen for the model,
             see :func:`baselines.solvers.arm_size.radian`.
@@ -86,6 +87,7 @@ class JacobianTranspose(ResolvedRate):
 def jacobian_transpose_rows(
     arm_task,
     gain,
+    scaling,
     tolerance,
     full_rank,
     weights,
@@ -110,7 +112,7 @@ def jacobian_transpose_rows(
     say_deficient(stuck, status)
     if shift.shape[1] != full_rank:
         status[:] = APPLIED
-    return answered(arm_task, parts, action)
+    return answered(arm_task, scaling, parts, action)
 
 
 @kernel
