@@ -8,7 +8,7 @@ import pytest
 
 import ikgym
 from benchmarks import effort, pose_solvers, poses
-from benchmarks.rivals.arm_urdf import BASE, TIP, arm_urdf, roll_pitch_yaw
+from baselines.solvers.rivals.model_files import BASE, TIP, urdf, roll_pitch_yaw
 from ikgym import arms
 from ikgym.rotations import rodrigues
 
@@ -62,7 +62,7 @@ def test_tables_say_what_is_left_out():
 @pytest.mark.parametrize("name", [n for n in arms.names() if np.isfinite(arms.get(n).upper).all()])
 def test_the_urdf_of_an_arm_is_that_arm(name):
     arm = arms.get(name)
-    model = pin.buildModelFromXML(arm_urdf(arm))
+    model = pin.buildModelFromXML(urdf(arm))
     data = model.createData()
     for q in np.random.default_rng(0).uniform(arm.lower, arm.upper, (3, arm.joints)):
         pin.framesForwardKinematics(model, data, q)
