@@ -25,8 +25,9 @@ from baselines.registry import get
 from baselines.status import Status
 from baselines.wrapper import Wrapper
 from ikgym import parallel
-from ikgym.exceptions import InvalidInputError, MissingDependencyError, UnknownNameError
+from ikgym.exceptions import InvalidInputError, UnknownNameError
 from ikgym.simulator import Simulator
+from tests.baselines.making import made, usual
 from tests.comparison import identical
 
 STEPS = 6
@@ -47,20 +48,6 @@ HANDED_THE_PATH = {"follow_nominal", "fixed_point_extended", "oracle"}
 # Pairs that do not suit for another reason: the smoothing of 300 1/s is unstable at a sample time of 1 s; with 2 joints
 # the tool is the end of link 2.
 UNSUITED = {("smoothed", "zhang3-helix"), ("fixed_point_extended", "planar2-bent")}
-
-
-def usual(name):
-    """A scenario that suits a policy: rivals know no skew coordinates."""
-    return "zhang6-lspb" if get(name).rival else "varga7-fast"
-
-
-def made(name, on, **parameters):
-    """The policy, where its package is installed; else the test is skipped and says why."""
-    try:
-        return baselines.make(name, on, **parameters)
-    except MissingDependencyError as e:
-        assert get(name).rival
-        pytest.skip(str(e))
 
 
 def policy_for(name, on):

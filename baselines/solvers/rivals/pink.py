@@ -18,8 +18,11 @@ class Pink(TaskProgram):
     """Pink (Caron et al., `pin-pink`): weighted tasks under limits; for the parameters see :class:`TaskProgram`.
 
     The model is handed over as URDF. Limits are those of position, velocity and, where all joints have them,
-    acceleration with the braking distance that it needs (`AccelerationLimit`).
+    acceleration with the braking distance that it needs (`AccelerationLimit`). quadprog is the solver of its README;
+    it keeps limits to rounding, where DAQP keeps them to 1e-6 rad a step.
     """
+
+    solver: str = "quadprog"
 
     name: ClassVar[str] = "pink"
     package: ClassVar[str] = "pink"

@@ -18,8 +18,8 @@ class TaskProgram(Rival, abc.ABC):
 
     ‖W (J Δq − gain · e)‖² + μ ‖Δq‖² + posture_cost² ‖Δq − posture_rate Δt (q* − q)‖² + damping ‖Δq‖², with W of
     `position_cost` and `orientation_cost`, and μ of `lm_damping`. q* is the model's home, or the middle of its
-    limits where it has none. Costs are those of the projects' examples of arms. There the posture task goes the whole way
-    in one step; here it is given 1 s for it, since at 1 kHz the other makes the errors some 30 times as large.
+    limits where it has none. Costs are those of Pink's example of an arm. There the posture task asks for the
+    whole way in one step; here it is given 1 s for it, since the other makes errors several times as large.
 
     Args:
         problem: What the policy is told of the scenario.
