@@ -17,32 +17,12 @@ from baselines.solvers.rivals.task_program import TaskProgram
 from baselines.status import Status
 from ikgym.exceptions import InvalidInputError, MissingDependencyError, UnknownNameError
 from ikgym.rotations import rodrigues
-from ikgym.trajectories import FixedOrientation, PathTrajectory, Quintic
-from ikgym.trajectories.paths import Circle
-from tests.baselines.making import made, usual
+from tests.baselines.making import circle, made, usual
 
 RIVALS = [name for name in baselines.names() if get(name).rival]
 every_rival = pytest.mark.parametrize("name", RIVALS)
 #: Those that keep limits of velocity.
 LIMITED = ["pink", "mink", "ssik"]
-
-
-def circle(arm="panda", dt=2e-3, task="pose", speed=0.25, **changes):
-    """A circle of 10 cm in front of an arm, from its home."""
-    arm = ikgym.arms.get(arm).replace(**changes)
-    rotation, position = arm.forward(arm.home)
-    across = np.eye(3)[[1, 2, 0]].T
-    path = Circle(center=position - [0.0, 0.1, 0.0], radius=0.1, rotation=across)
-    trajectory = PathTrajectory(path, Quintic(speed, 2.0), FixedOrientation(rotation))
-    return ikgym.Scenario(
-        name=f"circle-{task}",
-        arm=arm,
-        trajectory=trajectory,
-        task=ikgym.tasks.get(task),
-        dt=dt,
-        steps=400,
-        start=arm.home,
-    )
 
 
 def observation(scenario, policy, q=None):
