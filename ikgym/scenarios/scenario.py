@@ -88,7 +88,7 @@ class Scenario(Frozen):
         settle("steps", bounds.step_count("steps", self.steps, n))
         if self.start is not None:
             settle("start", frozen_array("start", self.start, (n,), at_most=LARGEST))
-        elif self.trajectory.joint_bound() is None:
+        elif self.trajectory.first_joints_bound() is None:
             raise InvalidInputError(f"Scenario {self.name!r}: a Cartesian trajectory needs a start.")
         if self.initial_pose is not None:
             settle("initial_pose", frozen_array("initial_pose", self.initial_pose, (self.task.size,), at_most=LARGEST))
@@ -296,7 +296,7 @@ class Scenario(Frozen):
 
     def start_bound(self) -> FloatArray:
         """Absolute joint coordinates that no start exceeds, in [rad] or [m]. Shape (n,)."""
-        known = self.trajectory.joint_bound() if self.start is None else np.abs(self.start)
+        known = self.trajectory.first_joints_bound() if self.start is None else np.abs(self.start)
         usual = np.full(self.joints, START_RANGE)
         reachable = np.maximum(usual, 0.0 if known is None else known)
         within = farthest(self.arm)
