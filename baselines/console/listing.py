@@ -177,7 +177,7 @@ def _filled(part: str, width: int) -> str:
 ARMS = Catalogue("arm", arms.names, ("arm", "joints", "prismatic", "limits"), _arm_row, _arm)
 SCENARIOS = Catalogue(
     "scenario",
-    scenarios.names,
+    lambda: (*scenarios.names(), *scenarios.problems_from_elsewhere()),
     ("scenario", "arm", "task", "steps", "source"),
     _scenario_row,
     _scenario,

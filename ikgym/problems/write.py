@@ -22,8 +22,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ikgym.problems import COARSE, DRAWN, FINE, NAMES, RANDOM, TRAJECTORIES, TRAJECTORIES_ORDER, WAYPOINTS
-from ikgym.problems import WAYPOINTS_ORDER, packing
+from ikgym.problems import (
+    COARSE,
+    DRAWN,
+    FINE,
+    NAMES,
+    RANDOM,
+    TRAJECTORIES,
+    TRAJECTORIES_ORDER,
+    WAYPOINTS,
+    WAYPOINTS_ORDER,
+    packing,
+)
 from ikgym.validation import FloatArray
 
 TORSO_LIFT_LINK = np.array([-0.086875, 0.0, 0.37743])

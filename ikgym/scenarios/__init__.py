@@ -68,7 +68,7 @@ def names() -> tuple[str, ...]:
 
 
 def problems_from_elsewhere() -> tuple[str, ...]:
-    """The names of the scenarios that others published; the hundred of ``rlitg-random`` have names of their own, too."""
+    """The scenarios that others published; the hundred paths of ``rlitg-random`` have names of their own, too."""
     return elsewhere.names()
 
 

@@ -12,6 +12,7 @@ import functools
 from collections.abc import Callable
 
 import numpy as np
+import numpy.typing as npt
 
 from ikgym import arms, problems, tasks
 from ikgym.arms import Arm
@@ -53,6 +54,20 @@ def make_random() -> Scenario:
     """One of the hundred random paths of RL-ITG by seed; shorter ones end at rest."""
     longest = max(len(problems.waypoints(name).positions) for name in problems.names(RANDOM))
     return _scenario(RANDOM, _arm("fetch_arm"), RandomPublishedPath(f"{RANDOM}-", PERIOD), longest, None)
+
+
+@functools.cache
+def unreached(problem: str, restarts: int = 300) -> npt.NDArray[np.int64]:
+    """Waypoints of a problem at which no joint coordinates within the limits were found, counted from 0.
+
+    Args:
+        problem: Its name.
+        restarts: Random postures from which each is looked for.
+    """
+    scenario = make(problem)
+    frames = scenario.frames(scenario.trajectory, scenario.steps + 1)[::STEPS]
+    rotations, positions = frames[:, :9].reshape(-1, 3, 3), frames[:, 9:]
+    return np.flatnonzero(~scenario.arm.inverse(rotations, positions, restarts=restarts)[1])
 
 
 def _scenario(name: str, arm: Arm, trajectory: Trajectory, waypoints: int, start: FloatArray | None) -> Scenario:

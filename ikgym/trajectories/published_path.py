@@ -61,7 +61,7 @@ class PublishedPath(Trajectory):
     @functools.cached_property
     def _timed(self) -> TimedWaypoints:
         positions, quaternions, _ = self.waypoints
-        return TimedWaypoints(self.period * np.arange(len(positions)), positions, quaternions)
+        return TimedWaypoints(self.period * np.arange(len(positions), dtype=np.float64), positions, quaternions)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

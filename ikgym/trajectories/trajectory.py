@@ -85,7 +85,7 @@ class Trajectory(Frozen, abc.ABC):
         return None if path is None else path[0]
 
     def first_joints_bound(self) -> FloatArray | None:
-        """Absolute joint coordinates that :meth:`first_joints` do not exceed, in [rad] or [m]; None where there are none.
+        """Bounds of the absolute values of :meth:`first_joints`, in [rad] or [m]; None where there are none.
 
         Returns:
             The bounds. Shape (n,).

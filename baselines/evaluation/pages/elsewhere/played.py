@@ -19,7 +19,7 @@ from baselines.fingerprints import fingerprint
 from baselines.status import Status
 from ikgym import problems, scenarios
 from ikgym.exceptions import IkgymError
-from ikgym.scenarios.elsewhere import waypoint_steps
+from ikgym.scenarios.elsewhere import RANDOM, waypoint_steps
 
 #: Who plays.
 POLICIES = ("dls", "null_space", "rhc", "rhc_foresight")
@@ -91,11 +91,9 @@ class Measured:
 
 
 def everybody() -> Iterator[tuple[str, str]]:
-    """Paths, and who is on each of them; what takes longest comes last."""
-    for name in problems.NAMES:
-        yield from ((name, method) for method in problems.published(name))
-    for policy in POLICIES:
-        yield from ((name, policy) for name in problems.NAMES)
+    """Paths, and who is on each of them; the many random paths come last."""
+    for name in sorted(problems.NAMES, key=lambda name: name.startswith(RANDOM)):
+        yield from ((name, who) for who in (*problems.published(name), *POLICIES))
 
 
 def run(problem: str, who: str) -> Run:
