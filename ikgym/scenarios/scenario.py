@@ -45,7 +45,7 @@ class Scenario(Frozen):
         model: The arm that solvers know, and through which nominal joint paths are mapped; the arm itself if it
             is left out.
         start: Joint coordinates at the start in [rad] or [m], within the limits of the arm; the nominal ones if left
-            out. Shape (n,).
+            out, or the published ones of a published path. Shape (n,).
         initial_pose: What is measured at the start, where it is not the arm's pose. Shape (m,).
         iterations_per_point: Steps for which the nominal point 1, 2, … is held; the last number goes on. Errors
             and costs of a point count at its last step.
