@@ -15,8 +15,7 @@ from collections.abc import Callable
 from ikgym.exceptions import InvalidInputError
 from ikgym.preview import Preview
 from ikgym.registry import Registry
-from ikgym.scenarios import elsewhere
-from ikgym.scenarios.catalogue import SCENARIOS
+from ikgym.scenarios import catalogue, elsewhere, families
 from ikgym.scenarios.disturbance import Disturbance
 from ikgym.scenarios.importing import imported
 from ikgym.scenarios.reading import load
@@ -46,8 +45,9 @@ SPLITS = {
 }
 
 _registry: Registry[Scenario] = Registry("scenario", Scenario)
-for _name, _make in SCENARIOS.items():
-    _registry.register(_name, _make)
+for _scenarios in (catalogue.SCENARIOS, families.SCENARIOS):
+    for _name, _make in _scenarios.items():
+        _registry.register(_name, _make)
 for _name, _make in elsewhere.SCENARIOS.items():
     _registry.register(_name, _make, listed=False)
 

@@ -6,7 +6,6 @@ import dataclasses
 from typing import Any, ClassVar, Self
 
 import numpy as np
-from gymnasium.utils import seeding
 
 from baselines.policy import Problem
 from baselines.solvers.references.follow_nominal import FollowNominal
@@ -56,11 +55,7 @@ class Published(FollowNominal):
 
 
 def _path(scenario: Scenario, seed: int | None) -> PublishedPath:
-    trajectory = scenario.trajectory
-    if scenario.random:
-        if seed is None:
-            raise InvalidInputError(f"Scenario {scenario.name!r} is random: a seed says which episode is meant.")
-        trajectory = trajectory.sample(seeding.np_random(whole_number("seed", seed, at_least=0))[0])
+    trajectory = scenario.episode(None if seed is None else whole_number("seed", seed, at_least=0))
     if not isinstance(trajectory, PublishedPath):
         raise InvalidInputError(f"published: expected a scenario with a published path, got {scenario.name!r}.")
     return trajectory
