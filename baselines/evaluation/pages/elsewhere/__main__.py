@@ -17,6 +17,8 @@ from baselines.evaluation.pages.elsewhere.page import page
 from baselines.evaluation.pages.elsewhere.played import Measured, everybody, run
 from baselines.files import write
 from baselines.files.locks import locked
+from ikgym import problems
+from ikgym.validation import whole_number
 
 PROGRAM = "python -m baselines.evaluation.pages.elsewhere"
 MANUAL = "Plays policies on the problems that others published, and writes docs/elsewhere.md and docs/elsewhere.json."
@@ -32,6 +34,8 @@ class Options:
     """Folder of the page, such as docs."""
     measure: bool = False
     """Play; if left out the page is written anew from what lies beside it."""
+    paths: Annotated[int, tyro.conf.arg(metavar="N")] = problems.RANDOM
+    """Random paths for policies that take long, the first ones; everybody else plays all of them."""
     resume: bool = False
     """Keep what was measured already."""
 
@@ -45,21 +49,22 @@ def work(options: Options) -> int:
     file = options.out / "elsewhere.json"
     with locked(options.out):
         if options.measure:
-            _measure(file, resume=options.resume)
+            _measure(file, whole_number("paths", options.paths, at_least=0), resume=options.resume)
         write(file.with_suffix(".md"), page(Measured.load(file)).encode())
     print(f"written to {file.with_suffix('.md')}")
     return 0
 
 
-def _measure(file: pathlib.Path, *, resume: bool) -> None:
+def _measure(file: pathlib.Path, paths: int, *, resume: bool) -> None:
     found = {(one.problem, one.who): one for one in (Measured.load(file).runs if resume else ())}
-    todo = [both for both in everybody() if both not in found]
+    wanted = list(everybody(paths))
+    todo = [both for both in wanted if both not in found]
+    command = f"{PROGRAM} --out docs --measure" + ("" if paths == problems.RANDOM else f" --paths {paths}")
     today = datetime.datetime.now(datetime.UTC).date().isoformat()
     for number, both in enumerate(tqdm(todo, unit="run"), 1):
         found[both] = run(*both)
         if number % KEPT == 0 or number == len(todo):
-            runs = tuple(found[key] for key in everybody() if key in found)
-            Measured(f"{PROGRAM} --out docs --measure", today, describe(), runs).save(file)
+            Measured(command, today, describe(), tuple(found[key] for key in wanted if key in found)).save(file)
 
 
 if __name__ == "__main__":

@@ -30,11 +30,13 @@ no arm was moved, no limit acted. **Policies** are no planners: they see a few s
 arm moves, within its position and velocity limits.
 
 **Passes** are CppFlow's thresholds at all waypoints, the first one included: less than {1e3 * POSITION:g} mm and
-{math.degrees(ORIENTATION):g}° away, less than {math.degrees(TURN):g}° in a revolute and {1e2 * SLIDE:g} cm in a
-prismatic joint from waypoint to waypoint, and within the limits. CppFlow asks for no collisions besides, and chooses
-its start; neither is done here. **Length** adds up the changes of all revolute joints from waypoint to waypoint.
-**Stop** and **velocity** count the control steps, {elsewhere.STEPS} a waypoint, in which such a limit held a joint
-back.
+{math.degrees(ORIENTATION):g}° away, less than {math.degrees(TURN):g}° in a revolute and {1e2 * SLIDE:g} cm in a prismatic joint from
+waypoint to waypoint, and within the limits. CppFlow asks for no collisions besides, and chooses its start; neither is
+done here. **Length** adds up the changes of all revolute joints from waypoint to waypoint. **Stop** and **velocity**
+count the control steps, {elsewhere.STEPS} a waypoint, in which such a limit held a joint back.
+
+Of the paths that each has followed:
+
 """
 CAVEATS = """\
 - A waypoint every {period:g} s, {steps} control steps from one to the next, the thresholds at the waypoints only.
@@ -158,8 +160,8 @@ def _note(name: str) -> str:
     if not len(reached):
         return ""
     return (
-        f" Waypoints {reached[0]} to {reached[-1]} of them are out of reach of `{out.name}`, within its limits, as far "
-        "as `Arm.inverse` finds: nobody can pass."
+        f" As far as `Arm.inverse` finds, {len(reached)} of them, {reached[0]} to {reached[-1]} counted from 0, are out of "
+        f"reach of `{out.name}` within its limits: nobody can pass."
     )
 
 

@@ -21,8 +21,9 @@ from ikgym import problems, scenarios
 from ikgym.exceptions import IkgymError
 from ikgym.scenarios.elsewhere import RANDOM, waypoint_steps
 
-#: Who plays.
+#: Who plays, and which of them take so long that they may be given fewer random paths.
 POLICIES = ("dls", "null_space", "rhc", "rhc_foresight")
+COSTLY = ("rhc", "rhc_foresight")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -90,10 +91,16 @@ class Measured:
             raise ResultsError(f"Cannot read what was measured from {file}: {reason}.") from None
 
 
-def everybody() -> Iterator[tuple[str, str]]:
-    """Paths, and who is on each of them; the many random paths come last."""
-    for name in sorted(problems.NAMES, key=lambda name: name.startswith(RANDOM)):
-        yield from ((name, who) for who in (*problems.published(name), *POLICIES))
+def everybody(paths: int = problems.RANDOM) -> Iterator[tuple[str, str]]:
+    """Paths, and who is on each of them; the many random paths come last.
+
+    Args:
+        paths: The first so many random ones are for those that take long, too.
+    """
+    random = problems.names(RANDOM)
+    for name in (*(name for name in problems.NAMES if name not in random), *random):
+        policies = [who for who in POLICIES if who not in COSTLY or name not in random[paths:]]
+        yield from ((name, who) for who in (*problems.published(name), *policies))
 
 
 def run(problem: str, who: str) -> Run:
