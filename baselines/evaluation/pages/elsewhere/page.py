@@ -26,17 +26,17 @@ without its torso, Panda). [How they became scenarios](scenarios.md#problems-fro
 
 An **initial trajectory** is what RL-ITG hands to an optimiser (TORM) to begin with: greedy IK, behaviour cloning or
 reinforcement learning. None of them claims to be a solution. They are scored as published, by our kinematics alone:
-no arm was moved, no limit acted. **Policies** are no planners: they see a few steps of the path ahead, once, while the
+no arm was moved, no limit acted. **Policies** are no planners: they see a stretch of the path ahead, once, while the
 arm moves, within its position and velocity limits.
 
 **Passes** are CppFlow's thresholds at all waypoints, the first one included: less than {1e3 * POSITION:g} mm and
-{math.degrees(ORIENTATION):g}° away, less than {math.degrees(TURN):g}° in a revolute and {1e2 * SLIDE:g} cm in a prismatic joint from
-waypoint to waypoint, and within the limits. CppFlow asks for no collisions besides, and chooses its start; neither is
-done here. **Length** adds up the changes of all revolute joints from waypoint to waypoint. **Stop** and **velocity**
-count the control steps, {elsewhere.STEPS} a waypoint, in which such a limit held a joint back.
+{math.degrees(ORIENTATION):g}° away, less than {math.degrees(TURN):g}° in a revolute and {1e2 * SLIDE:g} cm in a
+prismatic joint from waypoint to waypoint, and within the limits. CppFlow asks for no collisions besides, and chooses
+its start; neither is done here. **Length** adds up the changes of all revolute joints from waypoint to waypoint.
+**Stop** and **velocity** count the control steps, {elsewhere.STEPS} a waypoint, in which one
+held a joint back.
 
 Of the paths that each has followed:
-
 """
 CAVEATS = """\
 - A waypoint every {period:g} s, {steps} control steps from one to the next, the thresholds at the waypoints only.
@@ -159,9 +159,9 @@ def _note(name: str) -> str:
     reached = elsewhere.unreached(name)
     if not len(reached):
         return ""
+    which = f"{len(reached)} of them, {reached[0]} to {reached[-1]} counted from 0"
     return (
-        f" As far as `Arm.inverse` finds, {len(reached)} of them, {reached[0]} to {reached[-1]} counted from 0, are out of "
-        f"reach of `{out.name}` within its limits: nobody can pass."
+        f" As far as `Arm.inverse` finds, {which}, are out of reach of `{out.name}` within its limits: nobody can pass."
     )
 
 

@@ -104,7 +104,7 @@ class TestRun:
 
 @pytest.mark.skipif(not (DOCS / "elsewhere.json").exists(), reason="it has not been measured yet")
 class TestTree:
-    @pytest.fixture(scope="class")
+    @pytest.fixture
     def written(self):
         return Measured.load(DOCS / "elsewhere.json")
 
