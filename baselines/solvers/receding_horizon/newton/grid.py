@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ikgym.jit import kernel
+from ikgym.jit import inlined, kernel, uncounted
 
 Floats = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
@@ -77,7 +77,7 @@ def evenly_growing_offsets(steps: int, growth: float, longest: float) -> Integer
     return before_the_end
 
 
-@kernel
+@uncounted
 def cut(at, steps, terminal, grid):
     """The grid of the knots ``at``, cut so that none lies more than ``steps`` ahead.
 
@@ -113,7 +113,7 @@ def cut(at, steps, terminal, grid):
     return knots
 
 
-@kernel
+@inlined
 def first_knots(grid, knots):
     """The first so many knots of a grid."""
     return Grid(grid.at[:knots], grid.length[:knots], grid.tracking[:knots], grid.velocity[:knots])
@@ -122,10 +122,11 @@ def first_knots(grid, knots):
 @kernel
 def empty_grid(knots):
     """A grid to be filled by :func:`cut`."""
-    return Grid(np.empty(knots, np.int64), np.empty(knots), np.empty(knots), np.empty(knots))
+    weights = np.empty((3, knots))
+    return Grid(np.empty(knots, np.int64), weights[0], weights[1], weights[2])
 
 
-@kernel
+@uncounted
 def shift_path(old, path, qdot, new, out):
     """What is left of a path one step later, at the knots of a new grid; past its end it goes on as it ended.
 
@@ -148,7 +149,7 @@ def shift_path(old, path, qdot, new, out):
             out[k, j] = path[block, j] + share * moved
 
 
-@kernel
+@uncounted
 def shift_multipliers(old, multipliers, new):
     """Multipliers one step later, in place: each knot takes over those of the old knot at its time or next after it.
 
