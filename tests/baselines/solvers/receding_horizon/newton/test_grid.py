@@ -7,7 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from baselines.solvers.receding_horizon.newton.grid import evenly_growing_offsets, offsets, shift_multipliers, shift_path
+from baselines.solvers.receding_horizon.newton.grid import (
+    evenly_growing_offsets,
+    offsets,
+    shift_multipliers,
+    shift_path,
+)
 from tests.baselines.solvers.receding_horizon.newton.problems import grid_of
 
 horizons = st.integers(1, 3000).flatmap(lambda steps: st.tuples(st.just(steps), st.integers(1, steps)))
