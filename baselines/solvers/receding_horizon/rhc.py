@@ -114,7 +114,7 @@ class RecedingHorizon(CompiledPolicy):
             raise InvalidInputError(f"start_steps: expected 0 where restart_steps is 0, got {self.start_steps}.")
         rate_weight = number("rate_weight", self.rate_weight, at_least=0.0)
         tolerance = number("tolerance", self.tolerance, above=0.0)
-        knots = offsets(self.horizon - 1, self.move_blocks)
+        knots = self._knots()
         knots.flags.writeable = False
         object.__setattr__(self, "offsets", knots)
         problem, model = self.problem, self.problem.model
@@ -145,6 +145,10 @@ class RecedingHorizon(CompiledPolicy):
         width = self.problem.task.error_size + 3 * self.problem.model.joints
         plans = np.zeros((rows, 2 if self.restart_steps else 1, len(self.offsets) * width))
         return HorizonMemory(plans, np.zeros((rows, 4), dtype=np.int64))
+
+    def _knots(self) -> npt.NDArray[np.int64]:
+        """Steps from now to the knots. Shape (K,)."""
+        return offsets(self.horizon - 1, self.move_blocks)
 
     def kernel(self) -> Any:
         """See :meth:`CompiledPolicy.kernel`."""
