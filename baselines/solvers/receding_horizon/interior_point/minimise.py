@@ -1,0 +1,111 @@
+"""Kernel: the minimum of a joint path under limits of acceleration, by following the barrier parameter to 0."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from baselines.solvers.receding_horizon.interior_point.merit import ANEW, KEPT, Barrier, linearise, merit
+from baselines.solvers.receding_horizon.interior_point.workspace import BARRIER_SIZE, GRADIENT
+from baselines.solvers.receding_horizon.newton.cost import true_cost
+from baselines.solvers.receding_horizon.newton.minimise import (
+    CONVERGED,
+    MOST_DAMPING,
+    RAN_OUT,
+    STALLED,
+    SUFFICIENT,
+    Minimum,
+    damped_newton_step,
+    more_damping,
+    next_damping,
+    scalar_product,
+)
+from ikgym.jit import inlined, kernel
+
+# μ at the beginning, and w of the limits, in units of the cost for each knot, and the least cost that counts.
+FIRST_MU, LIMIT_WEIGHT, LEAST_COST = 0.1, 100.0, 1e-6
+# μ falls by the first factor, and later to its power (Wächter and Biegler 2006, eq. 7), down to a share of the cost.
+FALL, POWER, LEAST_MU = 0.2, 1.25, 1e-11
+# μ falls where less than so many μ are left to gain, or this share of the barrier function, which is rounding.
+NEAR, ROUNDING = 1.0, 1e-13
+# w of the limits grows where a multiplier takes more than half of it: a limit is left then.
+GROWTH, LARGEST_GROWTH = 10.0, 1e5
+# Lengths of a step tried one after the other.
+SHORTENING, TRIALS = 0.5, 16
+
+
+@kernel
+def minimise_limited(problem, path, settings, workspace):
+    """Damped Newton steps on the barrier function, until the path is a minimum or they run out.
+
+    Args:
+        problem: A :class:`newton.workspace.PathProblem` of K knots with limits of acceleration.
+        path: Joint coordinates at the knots in [rad] or [m], changed in place. Shape (K, n).
+        settings: :class:`newton.minimise.NewtonSettings`.
+        workspace: An :class:`InteriorWorkspace`.
+
+    Returns:
+        A :class:`newton.minimise.Minimum`.
+    """
+    newton, knots, bounds = workspace.newton, path.shape[0], workspace.barriers[: path.shape[0]].size // BARRIER_SIZE
+    gradient, step, trial = newton.model.gradient[:knots], newton.step[:knots], newton.trial[:knots]
+    unit = 1.0 / (problem.data.dt * problem.data.cost.delta_qdot) ** 2
+    cost = max(true_cost(problem, path, newton), LEAST_COST)
+    mu, growth = FIRST_MU * cost / knots, 1.0
+    barrier = Barrier(mu, LIMIT_WEIGHT * cost / knots)
+    value = linearise(problem, path, barrier, ANEW, settings.exact, workspace)
+    made, outcome, damping, last = 0, RAN_OUT, 0.0, 0.0
+    while made < settings.steps:
+        damping = damped_newton_step(problem, settings.exact, damping, unit, newton, step)
+        derivative = scalar_product(gradient, step)
+        if not (np.isfinite(derivative) and damping <= MOST_DAMPING):
+            outcome = STALLED
+            break
+        enough = settings.tolerance * cost if mu <= last else NEAR * mu
+        if -0.5 * derivative <= max(enough, ROUNDING * abs(value)):
+            cost = max(true_cost(problem, path, newton), LEAST_COST)
+            last = max(settings.tolerance / bounds, LEAST_MU) * cost
+            left = limits_left(workspace, knots, barrier)
+            if mu <= last and not (left and growth < LARGEST_GROWTH):
+                outcome = STALLED if left else CONVERGED
+                break
+            growth = min(GROWTH * growth, LARGEST_GROWTH) if left else growth
+            mu = max(last, min(FALL * mu, cost * (mu / cost) ** POWER))
+            barrier = Barrier(mu, growth * LIMIT_WEIGHT * cost / knots)
+            value = linearise(problem, path, barrier, KEPT, settings.exact, workspace)
+            continue
+        made += 1
+        length = _line_search(problem, path, barrier, value, derivative, step, trial, workspace)
+        if length == 0.0:
+            damping = more_damping(damping)
+            continue
+        path[:] = trial
+        damping = next_damping(damping, length)
+        value = linearise(problem, path, barrier, length, settings.exact, workspace)
+    return Minimum(outcome, made, true_cost(problem, path, newton), np.sqrt(scalar_product(gradient, gradient)))
+
+
+@kernel
+def limits_left(workspace, knots, barrier):
+    """Whether the path of so many knots leaves a limit: its multiplier takes more than half of what it may."""
+    barriers, e = workspace.barriers, workspace.newton.knot.error.shape[0]
+    for k in range(knots):
+        for i in range(e, barriers.shape[1]):
+            for side in range(2):
+                if barriers[k, i, side, GRADIENT] > 0.5 * barrier.limit_weight:
+                    return True
+    return False
+
+
+@inlined
+def _line_search(problem, path, barrier, value, derivative, step, trial, workspace):
+    """Shortens a step until the barrier function decreases enough (Armijo): its length, 0 for none."""
+    length = 1.0
+    for _ in range(TRIALS):
+        for k in range(path.shape[0]):
+            for a in range(path.shape[1]):
+                trial[k, a] = path[k, a] + length * step[k, a]
+        reached = merit(problem, trial, barrier, workspace)
+        if reached <= value + SUFFICIENT * length * derivative + ROUNDING * abs(value):
+            return length
+        length *= SHORTENING
+    return 0.0
