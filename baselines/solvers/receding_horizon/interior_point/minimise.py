@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from baselines.solvers.receding_horizon.interior_point.merit import ANEW, KEPT, Barrier, linearise, merit
-from baselines.solvers.receding_horizon.interior_point.workspace import BARRIER_SIZE, GRADIENT
+from baselines.solvers.receding_horizon.interior_point.workspace import BARRIER_SIZE, BEYOND
 from baselines.solvers.receding_horizon.newton.cost import true_cost
 from baselines.solvers.receding_horizon.newton.minimise import (
     CONVERGED,
     MOST_DAMPING,
+    NEGLIGIBLE,
     RAN_OUT,
     STALLED,
     SUFFICIENT,
@@ -21,14 +22,15 @@ from baselines.solvers.receding_horizon.newton.minimise import (
 )
 from ikgym.jit import inlined, kernel
 
-# μ at the beginning, and w of the limits, in units of the cost for each knot, and the least cost that counts.
-FIRST_MU, LIMIT_WEIGHT, LEAST_COST = 0.1, 100.0, 1e-6
+# μ at the beginning, and w of the limits, in units of the cost for each knot, or of this where that is less.
+FIRST_MU, LIMIT_WEIGHT, LEAST_UNIT = 0.1, 100.0, 1e-2
 # μ falls by the first factor, and later to its power (Wächter and Biegler 2006, eq. 7), down to a share of the cost.
 FALL, POWER, LEAST_MU = 0.2, 1.25, 1e-11
 # μ falls where less than so many μ are left to gain, or this share of the barrier function, which is rounding.
 NEAR, ROUNDING = 1.0, 1e-13
-# w of the limits grows where a multiplier takes more than half of it: a limit is left then.
-GROWTH, LARGEST_GROWTH = 10.0, 1e5
+# w of the limits grows where one is left by more than this share of its scale, which is where its multiplier would be
+# above w; where that does not help no path keeps them.
+LEFT, GROWTH, LARGEST_GROWTH = 1e-6, 10.0, 1e3
 # Lengths of a step tried one after the other.
 SHORTENING, TRIALS = 0.5, 16
 
@@ -44,14 +46,14 @@ def minimise_limited(problem, path, settings, workspace):
         workspace: An :class:`InteriorWorkspace`.
 
     Returns:
-        A :class:`newton.minimise.Minimum`.
+        A :class:`newton.minimise.Minimum`; STALLED where no path keeps the limits, too.
     """
     newton, knots, bounds = workspace.newton, path.shape[0], workspace.barriers[: path.shape[0]].size // BARRIER_SIZE
     gradient, step, trial = newton.model.gradient[:knots], newton.step[:knots], newton.trial[:knots]
     unit = 1.0 / (problem.data.dt * problem.data.cost.delta_qdot) ** 2
-    cost = max(true_cost(problem, path, newton), LEAST_COST)
-    mu, growth = FIRST_MU * cost / knots, 1.0
-    barrier = Barrier(mu, LIMIT_WEIGHT * cost / knots)
+    cost = max(true_cost(problem, path, newton), NEGLIGIBLE)
+    mu, growth = FIRST_MU * max(cost / knots, LEAST_UNIT), 1.0
+    barrier = Barrier(mu, LIMIT_WEIGHT * max(cost / knots, LEAST_UNIT))
     value = linearise(problem, path, barrier, ANEW, settings.exact, workspace)
     made, outcome, damping, last = 0, RAN_OUT, 0.0, 0.0
     while made < settings.steps:
@@ -62,15 +64,18 @@ def minimise_limited(problem, path, settings, workspace):
             break
         enough = settings.tolerance * cost if mu <= last else NEAR * mu
         if -0.5 * derivative <= max(enough, ROUNDING * abs(value)):
-            cost = max(true_cost(problem, path, newton), LEAST_COST)
+            cost = max(true_cost(problem, path, newton), NEGLIGIBLE)
             last = max(settings.tolerance / bounds, LEAST_MU) * cost
-            left = limits_left(workspace, knots, barrier)
-            if mu <= last and not (left and growth < LARGEST_GROWTH):
-                outcome = STALLED if left else CONVERGED
+            left = limits_left(workspace, knots)
+            if left and growth >= LARGEST_GROWTH:
+                outcome = STALLED
                 break
-            growth = min(GROWTH * growth, LARGEST_GROWTH) if left else growth
-            mu = max(last, min(FALL * mu, cost * (mu / cost) ** POWER))
-            barrier = Barrier(mu, growth * LIMIT_WEIGHT * cost / knots)
+            if mu <= last and not left:
+                outcome = CONVERGED
+                break
+            growth *= GROWTH if left else 1.0
+            mu = max(last, min(FALL * mu, mu * (mu / cost) ** (POWER - 1.0)))
+            barrier = Barrier(mu, growth * LIMIT_WEIGHT * max(cost / knots, LEAST_UNIT))
             value = linearise(problem, path, barrier, KEPT, settings.exact, workspace)
             continue
         made += 1
@@ -85,14 +90,13 @@ def minimise_limited(problem, path, settings, workspace):
 
 
 @kernel
-def limits_left(workspace, knots, barrier):
-    """Whether the path of so many knots leaves a limit: its multiplier takes more than half of what it may."""
+def limits_left(workspace, knots):
+    """Whether the path of so many knots leaves a limit."""
     barriers, e = workspace.barriers, workspace.newton.knot.error.shape[0]
     for k in range(knots):
         for i in range(e, barriers.shape[1]):
-            for side in range(2):
-                if barriers[k, i, side, GRADIENT] > 0.5 * barrier.limit_weight:
-                    return True
+            if barriers[k, i, 0, BEYOND] > LEFT or barriers[k, i, 1, BEYOND] > LEFT:
+                return True
     return False
 
 

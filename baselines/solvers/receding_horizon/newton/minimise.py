@@ -223,6 +223,7 @@ def next_damping(damping, length):
 
 @inlined
 def more_damping(damping):
+    """The damping after a step that was of no use."""
     return max(MORE * damping, LEAST_DAMPING)
 
 

@@ -36,9 +36,8 @@ def test_derivatives_against_central_differences(at, task, braking):
     model = workspace.newton.model
     value = linearise(problem, path, BARRIER, ANEW, False, workspace)
     assert value == pytest.approx(merit(problem, path, BARRIER, workspace), rel=1e-12)
-    gradient, hessian = model.gradient.copy(), whole(model_without_second(model))
     central = differences(lambda x: merit(problem, x, BARRIER, workspace), path, 1e-8).reshape(path.shape)
-    np.testing.assert_allclose(gradient, central, atol=1e-5 * abs(central).max())
+    np.testing.assert_allclose(model.gradient, central, atol=1e-5 * abs(central).max())
 
     def slope(x):
         linearise(problem, x, BARRIER, ANEW, True, workspace)
@@ -46,14 +45,15 @@ def test_derivatives_against_central_differences(at, task, braking):
 
     central = differences(slope, path, 1e-7)
     linearise(problem, path, BARRIER, ANEW, True, workspace)
-    # The Hessian leaves out where braking is concave, and second derivatives of large rotations.
-    np.testing.assert_allclose(whole(model), central, atol=2e-2 * abs(central).max())
-    assert np.abs(whole(model) - central).max() <= np.abs(hessian - central).max() * (1.0 + 1e-9)
-
-
-def model_without_second(model):
-    """A copy of the quadratic model, its Gauss–Newton part alone."""
-    return model._replace(second=np.zeros_like(model.second), **{k: getattr(model, k).copy() for k in ("diagonal",)})
+    wrong = whole(model) - central
+    if braking:  # left out where it is concave: between the last two knots, joint by joint
+        for rows in (slice(-7, None), slice(-14, -7))[: len(at)]:
+            for columns in (slice(-7, None), slice(-14, -7))[: len(at)]:
+                left_out = np.diagonal(wrong[rows, columns])
+                assert (left_out * (1.0 if rows == columns else -1.0) >= -1e-4 * abs(central).max()).all()
+                wrong[rows, columns] -= np.diag(left_out)
+    # The second derivatives of a pose are those of small rotations.
+    np.testing.assert_allclose(wrong, 0.0, atol=(1e-5 if task == "position" else 1e-2) * abs(central).max())
 
 
 def test_changes_of_velocity_cost_what_they_do_elsewhere():
