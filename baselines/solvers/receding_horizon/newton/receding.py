@@ -142,7 +142,8 @@ def plan_rows(  # the first arguments are described where they come from
         left = int(min(max(remaining[row], 1.0), at[-1] + 1.0)) if stop_at_end else at[-1]
         grid = first_knots(new_grid, cut(at, left, terminal_weight, new_grid))
         old = first_knots(old_grid, cut(at, left + 1 if stop_at_end else left, terminal_weight, old_grid))
-        problem = PathProblem(data, grid, q[row], nominal[row], qdot_before[row * n : (row + 1) * n], rate_weight)
+        before, unlimited = qdot_before[row * n : (row + 1) * n], velocity_limit[:0]
+        problem = PathProblem(data, grid, q[row], nominal[row], before, rate_weight, unlimited, False)
         for j in range(n):
             workspace.passed[j] = qdot_before[row * n + j] * dt
         plan = Plan(plans[row], multipliers[row])

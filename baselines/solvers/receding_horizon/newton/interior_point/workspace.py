@@ -39,3 +39,11 @@ def interior_workspace(kind, m, knots, n):
     """The workspace for paths of up to ``knots`` knots, task coordinates of ``m`` numbers and ``n`` joints."""
     barriers = np.zeros((knots, task_kernels.error_size(kind, m) + 3 * n, 2, BARRIER_SIZE))
     return InteriorWorkspace(newton_workspace(kind, m, knots, n), barriers, np.empty(n))
+
+
+@kernel
+def path_workspace(problem, knots):
+    """The workspace for paths of up to ``knots`` knots of a problem, without barriers where it needs none."""
+    kind, m, n = problem.data.kind, problem.nominal.shape[1], problem.start.shape[0]
+    workspace = interior_workspace(kind, m, knots if problem.change_limit.shape[0] > 0 else 0, n)
+    return InteriorWorkspace(newton_workspace(kind, m, knots, n), workspace.barriers, workspace.before)

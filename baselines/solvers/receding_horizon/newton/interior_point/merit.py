@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from baselines.solvers.receding_horizon.interior_point.barrier import primal_dual_curvature, smoothed, trusted
-from baselines.solvers.receding_horizon.interior_point.workspace import BEYOND, CURVATURE, GRADIENT, MULTIPLIER
 from baselines.solvers.receding_horizon.newton.cost import tracking_errors
+from baselines.solvers.receding_horizon.newton.interior_point.barrier import primal_dual_curvature, smoothed, trusted
+from baselines.solvers.receding_horizon.newton.interior_point.workspace import BEYOND, CURVATURE, GRADIENT, MULTIPLIER
 from baselines.solvers.receding_horizon.newton.rate import add_rate_cost, rate_cost
 from baselines.solvers.receding_horizon.newton.second_order import second_order
 from baselines.solvers.receding_horizon.newton.terms import velocity_cost, velocity_derivatives

@@ -8,8 +8,8 @@ import numpy as np
 
 import ikgym
 from baselines.policy import Problem
-from baselines.solvers.receding_horizon.interior_point.minimise import minimise_limited
-from baselines.solvers.receding_horizon.interior_point.workspace import interior_workspace
+from baselines.solvers.receding_horizon.newton.interior_point.minimise import minimise_limited
+from baselines.solvers.receding_horizon.newton.interior_point.workspace import interior_workspace
 from baselines.solvers.receding_horizon.newton.minimise import NewtonSettings
 from baselines.solvers.receding_horizon.newton.workspace import PathProblem
 from baselines.solvers.receding_horizon.problem_data import ProblemData

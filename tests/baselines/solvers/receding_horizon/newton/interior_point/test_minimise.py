@@ -11,7 +11,7 @@ import pytest
 import ikgym
 from baselines.solvers.receding_horizon.newton.minimise import CONVERGED, RAN_OUT, STALLED
 from benchmarks.rivals.numpy_horizon import Horizon, beyond_limits, plan_cost
-from tests.baselines.solvers.receding_horizon.interior_point.states import (
+from tests.baselines.solvers.receding_horizon.newton.interior_point.states import (
     State,
     draw,
     horizon_of,

@@ -5,11 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from baselines.solvers.receding_horizon.interior_point.merit import ANEW, KEPT, Barrier, linearise, merit
-from baselines.solvers.receding_horizon.interior_point.workspace import GRADIENT, MULTIPLIER, interior_workspace
 from baselines.solvers.receding_horizon.newton.cost import true_cost
+from baselines.solvers.receding_horizon.newton.interior_point.merit import ANEW, KEPT, Barrier, linearise, merit
+from baselines.solvers.receding_horizon.newton.interior_point.workspace import GRADIENT, MULTIPLIER, interior_workspace
 from benchmarks.rivals.numpy_horizon import beyond_limits
-from tests.baselines.solvers.receding_horizon.interior_point.states import draw, horizon_of, path_problem, problem_of
+from tests.baselines.solvers.receding_horizon.newton.interior_point.states import (
+    draw,
+    horizon_of,
+    path_problem,
+    problem_of,
+)
 from tests.baselines.solvers.receding_horizon.newton.test_cost import differences
 from tests.baselines.solvers.receding_horizon.newton.test_rate import whole
 

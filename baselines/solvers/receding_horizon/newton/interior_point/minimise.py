@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from baselines.solvers.receding_horizon.interior_point.merit import ANEW, KEPT, Barrier, linearise, merit
-from baselines.solvers.receding_horizon.interior_point.workspace import BARRIER_SIZE, BEYOND
 from baselines.solvers.receding_horizon.newton.cost import true_cost
+from baselines.solvers.receding_horizon.newton.interior_point.merit import ANEW, KEPT, Barrier, linearise, merit
+from baselines.solvers.receding_horizon.newton.interior_point.workspace import BARRIER_SIZE, BEYOND
 from baselines.solvers.receding_horizon.newton.minimise import (
     CONVERGED,
     MOST_DAMPING,
@@ -16,6 +16,7 @@ from baselines.solvers.receding_horizon.newton.minimise import (
     SUFFICIENT,
     Minimum,
     damped_newton_step,
+    minimise,
     more_damping,
     next_damping,
     scalar_product,
@@ -28,6 +29,8 @@ FIRST_MU, LIMIT_WEIGHT, LEAST_UNIT = 0.1, 100.0, 1e-2
 FALL, POWER, LEAST_MU = 0.2, 1.25, 1e-11
 # μ falls where less than so many μ are left to gain, or this share of the barrier function, which is rounding.
 NEAR, ROUNDING = 1.0, 1e-13
+# The finest relative precision of the cost: below it the slacks of active limits are rounding.
+FINEST = 1e-9
 # w of the limits grows where one is left by more than this share of its scale, which is where its multiplier would be
 # above w; where that does not help no path keeps them.
 LEFT, GROWTH, LARGEST_GROWTH = 1e-6, 10.0, 1e3
@@ -55,17 +58,17 @@ def minimise_limited(problem, path, settings, workspace):
     mu, growth = FIRST_MU * max(cost / knots, LEAST_UNIT), 1.0
     barrier = Barrier(mu, LIMIT_WEIGHT * max(cost / knots, LEAST_UNIT))
     value = linearise(problem, path, barrier, ANEW, settings.exact, workspace)
-    made, outcome, damping, last = 0, RAN_OUT, 0.0, 0.0
+    made, outcome, damping, last, tolerance = 0, RAN_OUT, 0.0, 0.0, max(settings.tolerance, FINEST)
     while made < settings.steps:
         damping = damped_newton_step(problem, settings.exact, damping, unit, newton, step)
         derivative = scalar_product(gradient, step)
         if not (np.isfinite(derivative) and damping <= MOST_DAMPING):
             outcome = STALLED
             break
-        enough = settings.tolerance * cost if mu <= last else NEAR * mu
+        enough = tolerance * cost if mu <= last else NEAR * mu
         if -0.5 * derivative <= max(enough, ROUNDING * abs(value)):
             cost = max(true_cost(problem, path, newton), NEGLIGIBLE)
-            last = max(settings.tolerance / bounds, LEAST_MU) * cost
+            last = max(tolerance / bounds, LEAST_MU) * cost
             left = limits_left(workspace, knots)
             if left and growth >= LARGEST_GROWTH:
                 outcome = STALLED
@@ -87,6 +90,25 @@ def minimise_limited(problem, path, settings, workspace):
         damping = next_damping(damping, length)
         value = linearise(problem, path, barrier, length, settings.exact, workspace)
     return Minimum(outcome, made, true_cost(problem, path, newton), np.sqrt(scalar_product(gradient, gradient)))
+
+
+@kernel
+def minimise_path(problem, path, multipliers, settings, workspace):
+    """The minimum of a joint path by the method that its limits ask for.
+
+    Args:
+        problem: A :class:`newton.workspace.PathProblem` of K knots.
+        path: Joint coordinates at the knots in [rad] or [m], changed in place. Shape (K, n).
+        multipliers: As of :func:`newton.minimise.minimise`; of no use where accelerations are limited.
+        settings: :class:`newton.minimise.NewtonSettings`.
+        workspace: Of :func:`workspace.path_workspace`.
+
+    Returns:
+        A :class:`newton.minimise.Minimum`.
+    """
+    if problem.change_limit.shape[0] > 0:
+        return minimise_limited(problem, path, settings, workspace)
+    return minimise(problem, path, multipliers, settings, workspace.newton)
 
 
 @kernel
