@@ -16,9 +16,8 @@ from baselines.solvers.receding_horizon.newton.cost import true_cost
 from baselines.solvers.receding_horizon.newton.guess import DAMPING, STREAM, draw, initial_guess, uniform
 from baselines.solvers.receding_horizon.newton.interior_point.excess import excess
 from baselines.solvers.receding_horizon.newton.interior_point.minimise import LEFT, minimise_path
-from baselines.solvers.receding_horizon.newton.interior_point.workspace import path_workspace
 from baselines.solvers.receding_horizon.newton.minimise import NewtonSettings
-from baselines.solvers.receding_horizon.newton.workspace import knot_workspace
+from baselines.solvers.receding_horizon.newton.workspace import knot_workspace, newton_workspace
 from ikgym import task_kernels
 from ikgym.jit import inlined, kernel
 
@@ -87,7 +86,7 @@ def improve(problem, settings, paths, improved, first, last):
         before[:] = path
         worst = _cost_within(problem, path, workspace)
         multipliers[:] = 0.0
-        minimum = minimise_path(problem, path, multipliers, settings, workspace)
+        minimum = minimise_path(problem, path, multipliers, settings, 0.0, workspace)
         improved.steps[s], improved.gradients[s] = minimum.steps, minimum.gradient_norm
         costs[s] = _cost_within(problem, path, workspace)
         if not costs[s] <= worst:
@@ -118,9 +117,9 @@ def iterated_local_search(problem, seed, rounds, partners, paths, costs, first, 
     for s in range(first, last):
         path = paths[s]
         for r in range(rounds):
-            branch_off(problem, (seed + s, r), path, partners, drift, branch, workspace.newton.knot)
+            branch_off(problem, (seed + s, r), path, partners, drift, branch, workspace.knot)
             multipliers[:] = 0.0
-            minimise_path(problem, branch, multipliers, settings, workspace)
+            minimise_path(problem, branch, multipliers, settings, 0.0, workspace)
             cost = _cost_within(problem, branch, workspace)
             if cost < (1.0 - GAIN) * costs[s]:
                 path[:] = branch
@@ -178,12 +177,13 @@ def _blend(a, b, middle, width, out):
 def _newton(problem, knots, n):
     """Workspace and multipliers of Newton's method."""
     kind, m = problem.data.kind, problem.nominal.shape[1]
-    return path_workspace(problem, knots), np.empty((knots, task_kernels.error_size(kind, m) + 2 * n))
+    workspace = newton_workspace(kind, m, knots, n, problem.change_limit.shape[0] > 0)
+    return workspace, np.empty((knots, task_kernels.error_size(kind, m) + 2 * n))
 
 
 @inlined
 def _cost_within(problem, path, workspace):
     """What a path costs; infinitely much where it leaves a limit of acceleration, which is no path of the arm."""
-    if problem.change_limit.shape[0] > 0 and excess(problem, path) > 10.0 * LEFT:
+    if problem.change_limit.shape[0] > 0 and excess(problem, path, workspace.before) > 10.0 * LEFT:
         return np.inf
-    return true_cost(problem, path, workspace.newton)
+    return true_cost(problem, path, workspace)

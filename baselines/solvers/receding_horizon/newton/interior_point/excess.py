@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from baselines.solvers.receding_horizon.newton.interior_point.merit import change_steps
-from ikgym.jit import kernel
+from ikgym.jit import uncounted
 
 
-@kernel
-def excess(problem, path):
+@uncounted
+def excess(problem, path, before):
     """By how much a path leaves its limits, at most: a share of them, and of positions in units of the largest step.
 
     Braking behind the last knot is not looked at.
@@ -17,11 +17,12 @@ def excess(problem, path):
     Args:
         problem: A :class:`newton.workspace.PathProblem` of K knots.
         path: Joint coordinates at the knots in [rad] or [m]. Shape (K, n).
+        before: Scratch. Shape (n,).
 
     Returns:
         The largest excess, not above 0 where all limits are kept.
     """
-    data, lengths, before, start = problem.data, problem.grid.length, np.empty(path.shape[1]), problem.start
+    data, lengths, start = problem.data, problem.grid.length, problem.start
     limits, lower, upper, changes = data.velocity_limit, data.lower, data.upper, problem.change_limit
     limited, dt, most = changes.shape[0] > 0, data.dt, -np.inf
     for k in range(path.shape[0]):
