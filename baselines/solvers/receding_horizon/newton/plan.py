@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from baselines.solvers.receding_horizon.newton.cost import true_cost
 from baselines.solvers.receding_horizon.newton.grid import Grid, empty_grid, shift_multipliers, shift_path
 from baselines.solvers.receding_horizon.newton.guess import DAMPING, STREAM, draw, initial_guess, slow_down, uniform
+from baselines.solvers.receding_horizon.newton.interior_point.excess import cost_within
 from baselines.solvers.receding_horizon.newton.interior_point.minimise import minimise_path
 from baselines.solvers.receding_horizon.newton.minimise import NewtonSettings
 from baselines.solvers.receding_horizon.newton.workspace import NewtonWorkspace, newton_workspace
@@ -25,6 +25,8 @@ HOPELESS, TRIED = 10.0, 5
 UNPROMISING = 2.0
 # μ of a plan under limits of acceleration that has few Newton steps a period, in units of the cost for each knot.
 SMOOTHING = 1e-2
+# By which share such a plan may leave a limit and replace another one.
+LOOSE = 1e-3
 # A restart candidate replaces the plan only for a gain that is worth the jump.
 GAIN = 1e-3
 
@@ -129,7 +131,7 @@ def initial_plan(problem, settings, plan, workspace):
         coarse = NewtonSettings(False, STEPS_OF_A_START, TOLERANCE_OF_A_START)
         minimum = minimise_path(problem, plan.path, plan.multipliers, coarse, 0.0, newton)
         made += minimum.steps
-        value = max(minimum.cost, true_cost(problem, plan.path, newton))
+        value = max(minimum.cost, cost_within(problem, plan.path, LOOSE, newton))
         if value < best:
             best = value
             _copy(plan, kept)
@@ -168,7 +170,7 @@ def try_start(problem, settings, steps, plan, cost, number, workspace):
     guess.multipliers[:] = 0.0
     few = NewtonSettings(False, steps, TOLERANCE_OF_A_START)
     minimum = minimise_path(problem, guess.path, guess.multipliers, few, 0.0, newton)
-    if max(minimum.cost, true_cost(problem, guess.path, newton)) < (1.0 - GAIN) * cost:
+    if max(minimum.cost, cost_within(problem, guess.path, LOOSE, newton)) < (1.0 - GAIN) * cost:
         _copy(guess, plan)
     return minimum.steps
 
@@ -218,7 +220,7 @@ def improve_candidate(problem, settings, rate, plan, cost, candidate, age, works
     age[0] += rate
     last, tried = age[0] >= settings.restart_steps, settings.start_steps if early else TRIED
     if (early or last) and minimum.cost < (1.0 - GAIN) * cost:
-        true = true_cost(problem, candidate.path, newton)
+        true = cost_within(problem, candidate.path, LOOSE, newton)
         if true < (1.0 - GAIN) * cost:
             age[0] = 0
             _copy(candidate, plan)

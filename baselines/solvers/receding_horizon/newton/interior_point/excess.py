@@ -1,9 +1,10 @@
-"""Kernel: by how much a joint path leaves its limits."""
+"""Kernels: by how much a joint path leaves its limits, and what it costs within them."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from baselines.solvers.receding_horizon.newton.cost import true_cost
 from baselines.solvers.receding_horizon.newton.interior_point.merit import change_steps
 from ikgym.jit import uncounted
 
@@ -36,3 +37,18 @@ def excess(problem, path, before):
                 most = max(most, abs(change) / (span * changes[j]) - 1.0)
             before[j] = velocity
     return most
+
+
+@uncounted
+def cost_within(problem, path, slack, workspace):
+    """What a path costs; infinitely much where it leaves limits and accelerations are among them.
+
+    Args:
+        problem: A :class:`newton.workspace.PathProblem` of K knots.
+        path: Joint coordinates at the knots in [rad] or [m]. Shape (K, n).
+        slack: By which share limits may be left.
+        workspace: A :class:`newton.workspace.NewtonWorkspace`.
+    """
+    if problem.change_limit.shape[0] > 0 and excess(problem, path, workspace.before) > slack:
+        return np.inf
+    return true_cost(problem, path, workspace)

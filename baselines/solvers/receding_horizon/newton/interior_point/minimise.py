@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from baselines.solvers.receding_horizon.newton.cost import true_cost
-from baselines.solvers.receding_horizon.newton.interior_point.excess import excess
 from baselines.solvers.receding_horizon.newton.interior_point.merit import ANEW, KEPT, Barrier, linearise, merit
 from baselines.solvers.receding_horizon.newton.minimise import (
     CONVERGED,
@@ -35,8 +34,6 @@ FINEST = 1e-9
 # w of the limits grows where one is left by more than this share of its scale, which is where its multiplier would be
 # above w; where that does not help no path keeps them.
 LEFT, GROWTH, LARGEST_GROWTH = 1e-6, 10.0, 1e3
-# What leaving a limit by all of it adds to the cost of a path that is compared with others, as a share of the cost.
-EXCESS_COST = 100.0
 # Lengths of a step tried one after the other.
 SHORTENING, TRIALS = 0.5, 16
 
@@ -54,8 +51,7 @@ def minimise_limited(problem, path, settings, smoothing, workspace):
         workspace: A :class:`newton.workspace.NewtonWorkspace`.
 
     Returns:
-        A :class:`newton.minimise.Minimum`; STALLED where no path keeps the limits, too. Its cost is raised where the
-        path leaves them.
+        A :class:`newton.minimise.Minimum`; STALLED where no path keeps the limits, too.
     """
     knots, bounds = path.shape[0], workspace.barriers[: path.shape[0]].size // BARRIER_SIZE
     gradient, step, trial = workspace.model.gradient[:knots], workspace.step[:knots], workspace.trial[:knots]
@@ -99,9 +95,7 @@ def minimise_limited(problem, path, settings, smoothing, workspace):
                 path[k, a] = trial[k, a]
         damping = next_damping(damping, length)
         value = linearise(problem, path, barrier, length, settings.exact, workspace)
-    more = EXCESS_COST * max(excess(problem, path, workspace.before) - LEFT, 0.0)
-    cost = (1.0 + more) * true_cost(problem, path, workspace)
-    return Minimum(outcome, made, cost, np.sqrt(scalar_product(gradient, gradient)))
+    return Minimum(outcome, made, true_cost(problem, path, workspace), np.sqrt(scalar_product(gradient, gradient)))
 
 
 @uncounted
