@@ -207,7 +207,9 @@ def _plan_row(problem, settings, old_grid, plans, counts, workspace):
         else:
             shift_plan(old_grid, whole_candidate, problem.grid, workspace)
         candidate = first_part(whole_candidate, knots)
-        rate = settings.start_steps if starting else settings.restart_rate
+        # Newton steps under limits of acceleration take three times as long: no period has time for several of a guess.
+        hasty = starting and problem.change_limit.shape[0] == 0
+        rate = settings.start_steps if hasty else settings.restart_rate
         counts[TRIED] += starting
         made += improve_candidate(problem, settings, rate, plan, minimum.cost, candidate, age, workspace)
     return minimum, made
