@@ -37,7 +37,13 @@ class RecedingHorizon(CompiledPolicy):
     before, which at 1 kHz is close (the real-time iteration). A long horizon has many local minima, some
     of them very costly: several ``starts`` and restart candidates are for that.
 
-    The joint limits of the arm and the velocity limit of the scenario are constraints of the plan.
+    The limits of the arm and the velocity limit of the scenario are constraints of the plan. Between blocks of a and b
+    steps the velocity changes by at most q̈_max Δt (a + b) / 2, and from the velocity last applied by q̈_max Δt. Where
+    the horizon ends before the episode does, the last knot leaves the way that a stop takes, so that no plan runs into
+    a joint limit that it does not see yet; with ``stop_at_end`` nothing comes behind the episode's end. Arms with
+    limits of acceleration are planned for by an interior point method, see :mod:`newton.interior_point`: to
+    convergence to the optimum, with a number of iterations with a barrier parameter that stays, and without limits
+    nothing changes.
 
     Args:
         problem: What the policy is told of the scenario.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from baselines.solvers.receding_horizon.newton.cost import true_cost
+from baselines.solvers.receding_horizon.newton.interior_point.excess import excess
 from baselines.solvers.receding_horizon.newton.interior_point.merit import ANEW, KEPT, Barrier, linearise, merit
 from baselines.solvers.receding_horizon.newton.minimise import (
     CONVERGED,
@@ -23,17 +24,19 @@ from baselines.solvers.receding_horizon.newton.minimise import (
 from baselines.solvers.receding_horizon.newton.workspace import BARRIER_SIZE, BEYOND
 from ikgym.jit import inlined, uncounted
 
-# μ at the beginning, and w of the limits, in units of the cost for each knot, or of this where that is less.
+# μ at the beginning, and w of the limits, in units of the cost for each knot, or of this where that is less. Where the
+# path leaves limits μ is larger by how much it does, up to a bound: else the barrier function has a kink in its way.
 FIRST_MU, LIMIT_WEIGHT, LEAST_UNIT = 0.1, 100.0, 1e-2
+EXCESS_MU, LARGEST_MU = 1.0, 100.0
 # μ falls by the first factor, and later to its power (Wächter and Biegler 2006, eq. 7), down to a share of the cost.
 FALL, POWER, LEAST_MU = 0.2, 1.25, 1e-11
 # μ falls where less than so many μ are left to gain, or this share of the barrier function, which is rounding.
 NEAR, ROUNDING = 1.0, 1e-13
 # The finest relative precision of the cost: below it the slacks of active limits are rounding.
 FINEST = 1e-9
-# w of the limits grows where one is left by more than this share of its scale, which is where its multiplier would be
-# above w; where that does not help no path keeps them.
-LEFT, GROWTH, LARGEST_GROWTH = 1e-6, 10.0, 1e3
+# w of the limits grows where one is left by more than this share of its scale, and by more than so many μ / w, which is
+# what μ alone may do: its multiplier would be above w. Where that does not help no path keeps them.
+LEFT, BY_MU, GROWTH, LARGEST_GROWTH = 1e-6, 10.0, 10.0, 1e3
 # Lengths of a step tried one after the other.
 SHORTENING, TRIALS = 0.5, 16
 
@@ -58,7 +61,8 @@ def minimise_limited(problem, path, settings, smoothing, workspace):
     unit = 1.0 / (problem.data.dt * problem.data.cost.delta_qdot) ** 2
     cost = max(true_cost(problem, path, workspace), NEGLIGIBLE)
     share, growth = max(cost / knots, LEAST_UNIT), 1.0
-    mu = (smoothing if smoothing > 0.0 else FIRST_MU) * share
+    left = excess(problem, path, workspace.before)
+    mu = (smoothing if smoothing > 0.0 else min(max(FIRST_MU, EXCESS_MU * left), LARGEST_MU)) * share
     barrier, smooth = Barrier(mu, LIMIT_WEIGHT * share), smoothing > 0.0
     value = linearise(problem, path, barrier, ANEW, settings.exact, workspace)
     made, outcome, damping, tolerance = 0, RAN_OUT, 0.0, max(settings.tolerance, FINEST)
@@ -73,7 +77,7 @@ def minimise_limited(problem, path, settings, smoothing, workspace):
         if -0.5 * derivative <= max(enough, ROUNDING * abs(value)):
             cost = max(true_cost(problem, path, workspace), NEGLIGIBLE)
             last = mu if smooth else max(tolerance / bounds, LEAST_MU) * cost
-            left = limits_left(workspace, knots)
+            left = limits_left(workspace, knots, max(LEFT, BY_MU * mu / barrier.limit_weight))
             if left and (smooth or growth >= LARGEST_GROWTH):
                 outcome = STALLED
                 break
@@ -119,12 +123,12 @@ def minimise_path(problem, path, multipliers, settings, smoothing, workspace):
 
 
 @uncounted
-def limits_left(workspace, knots):
-    """Whether the path of so many knots leaves a limit."""
+def limits_left(workspace, knots, slack):
+    """Whether the path of so many knots leaves a limit by more than a share of its scale."""
     barriers, e = workspace.barriers, workspace.knot.error.shape[0]
     for k in range(knots):
         for i in range(e, barriers.shape[1]):
-            if barriers[k, i, 0, BEYOND] > LEFT or barriers[k, i, 1, BEYOND] > LEFT:
+            if barriers[k, i, 0, BEYOND] > slack or barriers[k, i, 1, BEYOND] > slack:
                 return True
     return False
 
