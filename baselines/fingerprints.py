@@ -27,6 +27,8 @@ def fingerprint(scenario: Scenario) -> str:
     parts = {
         f.name: getattr(scenario, f.name) for f in dataclasses.fields(scenario) if f.name not in {"name", "source"}
     }
+    if scenario.start is None and not scenario.starts_nominally:
+        parts["start"] = ["near home", scenario.arm.home]
     return _digest(cost_kernels.COST_VERSION, _canonical(parts))
 
 

@@ -18,20 +18,19 @@ import ikgym
 from ikgym.env import OBSERVED, REPORTED
 from ikgym.exceptions import InvalidInputError, ResetNeededError, UnknownNameError
 from tests.comparison import identical
-
-ALL = ikgym.scenarios.names()
+from tests.every_scenario import every_scenario
 
 
 def make(scenario="varga7-fast", **kwargs):
     return gym.make("RedundantIK-v0", scenario=scenario, **kwargs)
 
 
-@pytest.mark.parametrize("scenario", ALL)
+@pytest.mark.parametrize("scenario", every_scenario())
 def test_gymnasium_check_env(scenario):
     check_env(make(scenario).unwrapped)
 
 
-@pytest.mark.parametrize("scenario", ALL)
+@pytest.mark.parametrize("scenario", every_scenario())
 def test_stable_baselines3_check_env(scenario):
     """The contract's `nominal` of shape (p, m) earns one advice to flatten; flattened there is no warning at all."""
     with warnings.catch_warnings(record=True) as caught:
@@ -41,7 +40,7 @@ def test_stable_baselines3_check_env(scenario):
     sb3_check_env(gym.wrappers.FlattenObservation(make(scenario)))
 
 
-@pytest.mark.parametrize("scenario", ALL)
+@pytest.mark.parametrize("scenario", every_scenario())
 def test_docstring_tables_are_the_spaces(scenario):
     env = make(scenario, preview=(1, 4, 9)).unwrapped
     rows = dict(re.findall(r"\| `(\w+)` \| \(([^)]*)\) \|", ikgym.RedundantIKEnv.__doc__))
@@ -64,10 +63,14 @@ def test_docstring_tables_are_the_spaces(scenario):
 def by_hand(scenario, actions, seed):
     """The specification, written with the public parts alone."""
     q = scenario.first_q(scenario.trajectory) if not scenario.random else scenario.nominal_joint_path(seed)[0]
-    nominal = scenario.nominal(seed, 2)
+    nominal, qdot, arm = scenario.nominal(seed, 2), np.zeros(scenario.joints), scenario.arm
     for k, action in enumerate(actions):
-        qdot = np.clip(action.astype(np.float64), -1, 1) * scenario.velocity_limit
-        q = q + scenario.dt * qdot
+        command = np.clip(action.astype(np.float64), -1, 1) * scenario.velocity_limit
+        command = np.clip(command, -arm.velocity_limit, arm.velocity_limit)
+        change = scenario.dt * arm.acceleration_limit
+        qdot, before = np.clip(command, qdot - change, qdot + change), q
+        q = np.clip(before + scenario.dt * qdot, arm.lower, arm.upper)
+        qdot = np.where(q == before + scenario.dt * qdot, qdot, (q - before) / scenario.dt)
         coordinates = scenario.task.coordinates(*scenario.arm.forward(q))
         error = scenario.task.error(nominal[k + 1], coordinates)
         yield (
@@ -85,10 +88,13 @@ def by_hand(scenario, actions, seed):
 
 
 AXIS = ikgym.scenarios.get("zhang6-lspb").replace(name="zhang6-axis", task=ikgym.tasks.get("axis"))
-STEPPED = [*(ikgym.scenarios.get(name) for name in ALL if ikgym.scenarios.get(name).iterations_per_point == (1,)), AXIS]
+STEPPED = [
+    *(one for one in every_scenario(ikgym.scenarios.get) if one.values[0].iterations_per_point == (1,)),
+    pytest.param(AXIS, id=AXIS.name),
+]
 
 
-@pytest.mark.parametrize("scenario", STEPPED, ids=[scenario.name for scenario in STEPPED])
+@pytest.mark.parametrize("scenario", STEPPED)
 def test_steps_are_what_the_specification_says(scenario):
     scenario = scenario.replace(steps=12)
     env = make(scenario)
@@ -287,7 +293,7 @@ def test_nominal_goes_on_past_the_end():
     np.testing.assert_array_equal(observation["nominal"], scenario.nominal()[5:10])
 
 
-@pytest.mark.parametrize("name", ALL)
+@pytest.mark.parametrize("name", every_scenario())
 def test_bounds_are_true_at_the_worst(name):
     """Full speed from the farthest start, for the whole episode."""
     scenario = ikgym.scenarios.get(name)
@@ -295,7 +301,8 @@ def test_bounds_are_true_at_the_worst(name):
     env = make(scenario, disable_env_checker=True)
     bound = scenario.start_bound()
     for sign in (-1, 1):
-        observation, _ = env.reset(seed=0, options={"q": sign * bound})
+        start = np.clip(sign * bound, scenario.arm.lower, scenario.arm.upper)
+        observation, _ = env.reset(seed=0, options={"q": start})
         assert env.observation_space.contains(observation)
         for _ in range(scenario.steps):
             observation = env.step(np.full(scenario.joints, 2.0 * sign, dtype=np.float32))[0]

@@ -17,6 +17,7 @@ from ikgym import arms
 from ikgym.exceptions import InvalidInputError, ResetNeededError
 from ikgym.rendering import Renderer, renderer, scene, style
 from ikgym.rendering.renderer import HEIGHT, WIDTH
+from tests.every_scenario import every_scenario
 
 STEPS = 8
 
@@ -66,7 +67,7 @@ def count_paintings(monkeypatch):
     return painted
 
 
-@pytest.mark.parametrize("name", ikgym.scenarios.names())
+@pytest.mark.parametrize("name", every_scenario())
 def test_every_scenario_gives_a_picture_of_the_same_even_size(name):
     env = environment(name)
     for _ in range(2):

@@ -12,16 +12,15 @@ import ikgym
 from ikgym import compilation, parallel, scenarios
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 from ikgym.random_numbers import uniform as _uniform
-from ikgym.scenarios import Disturbance, Scenario
-
-ALL = scenarios.names()
+from ikgym.scenarios import Disturbance, Scenario, catalogue
+from tests.every_scenario import every_scenario
 
 
 def test_catalogue():
-    """Arm, model, task, Δt, steps and velocity limit of each."""
+    """Arm, model, task, Δt, steps and velocity limit of each in the papers."""
     table = {
         s.name: (s.arm.name, s.model.name, s.task.name, s.dt, s.steps, s.velocity_limit[0])
-        for s in map(scenarios.get, ALL)
+        for s in map(scenarios.get, catalogue.SCENARIOS)
     }
     varga, literal = ("varga7", "varga7", "skew", 1e-3), ("varga7_literal", "varga7_literal", "skew", 1e-3)
     pose = ("varga7", "varga7", "pose", 1e-3)
@@ -47,7 +46,7 @@ def test_catalogue():
     }
 
 
-@pytest.mark.parametrize("name", ALL)
+@pytest.mark.parametrize("name", every_scenario())
 def test_nominal_is_the_model_on_the_nominal_joint_path(name):
     scenario = scenarios.get(name).replace(steps=40)
     nominal = scenario.nominal(seed=3, preview=5)
@@ -78,7 +77,7 @@ def test_the_literal_reading_is_another_arm():
     assert abs(fast - literal).max() > 0.1
 
 
-@pytest.mark.parametrize("name", ALL)
+@pytest.mark.parametrize("name", every_scenario())
 def test_pickling_keeps_everything(name):
     scenario = scenarios.get(name)
     copy = pickle.loads(pickle.dumps(scenario))
@@ -145,11 +144,6 @@ def test_seed_ranges_are_disjoint_and_documented():
 def test_bad_scenarios(change, message):
     with pytest.raises(InvalidInputError, match=message):
         scenarios.get("varga7-fast").replace(**change)
-
-
-def test_a_cartesian_trajectory_needs_a_start():
-    with pytest.raises(InvalidInputError, match="a Cartesian trajectory needs a start"):
-        scenarios.get("zhang3-helix").replace(start=None)
 
 
 def test_a_bias_may_be_negative_but_no_matrix():

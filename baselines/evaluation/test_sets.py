@@ -49,6 +49,9 @@ SETS = {
         TestSet("varga7-pose-random-long", episodes=32, digest="fe2dfbb641c8"),
         TestSet("varga7-random", episodes=64, digest="f18d6765c034"),
         TestSet("varga7-random-long", episodes=16, digest="f6956633fa43"),
+        # Half of the episodes of the first: each needs a search of its own for its best known cost.
+        TestSet("panda-random", episodes=128, digest="f4492864d6be"),
+        TestSet("iiwa14-random", episodes=128, digest="4b2efa43deaa"),
     )
 }
 

@@ -15,7 +15,7 @@ from collections.abc import Callable
 from ikgym.exceptions import InvalidInputError
 from ikgym.preview import Preview
 from ikgym.registry import Registry
-from ikgym.scenarios.catalogue import SCENARIOS
+from ikgym.scenarios import catalogue, families
 from ikgym.scenarios.disturbance import Disturbance
 from ikgym.scenarios.importing import imported
 from ikgym.scenarios.reading import load
@@ -33,8 +33,9 @@ SPLITS = {
 }
 
 _registry: Registry[Scenario] = Registry("scenario", Scenario)
-for _name, _make in SCENARIOS.items():
-    _registry.register(_name, _make)
+for _scenarios in (catalogue.SCENARIOS, families.SCENARIOS):
+    for _name, _make in _scenarios.items():
+        _registry.register(_name, _make)
 
 
 def get(name: str) -> Scenario:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import os
 from collections.abc import Sequence
 from typing import Any, Self
@@ -17,7 +18,7 @@ from ikgym.arms.posture import within_limits
 from ikgym.cost import TrackingCost
 from ikgym.exceptions import InvalidInputError
 from ikgym.preview import Preview, furthest
-from ikgym.scenarios import bounds, parts, writing
+from ikgym.scenarios import bounds, parts, starts, writing
 from ikgym.scenarios.disturbance import Disturbance
 from ikgym.simulation import nominal_rows
 from ikgym.tasks import Task
@@ -44,8 +45,8 @@ class Scenario(Frozen):
         steps: Steps of an episode, 100,000,000 at most.
         model: The arm that solvers know, and through which nominal joint paths are mapped; the arm itself if it
             is left out.
-        start: Joint coordinates at the start in [rad] or [m], within the limits of the arm; the nominal ones if left
-            out. Shape (n,).
+        start: Joint coordinates at the start in [rad] or [m], within the limits of the arm. If left out, the nominal
+            ones, or for a Cartesian trajectory those at which :meth:`Arm.inverse` finds its first pose. Shape (n,).
         initial_pose: What is measured at the start, where it is not the arm's pose. Shape (m,).
         iterations_per_point: Steps for which the nominal point 1, 2, … is held; the last number goes on. Errors
             and costs of a point count at its last step.
@@ -88,8 +89,8 @@ class Scenario(Frozen):
         settle("steps", bounds.step_count("steps", self.steps, n))
         if self.start is not None:
             settle("start", frozen_array("start", self.start, (n,), at_most=LARGEST))
-        elif self.trajectory.joint_bound() is None:
-            raise InvalidInputError(f"Scenario {self.name!r}: a Cartesian trajectory needs a start.")
+        elif self.random and not self.starts_nominally:
+            raise InvalidInputError(f"Scenario {self.name!r}: a random Cartesian trajectory needs a start.")
         if self.initial_pose is not None:
             settle("initial_pose", frozen_array("initial_pose", self.initial_pose, (self.task.size,), at_most=LARGEST))
         held = self._held()
@@ -99,7 +100,7 @@ class Scenario(Frozen):
         settle("iterations_per_point", held)
         for name in ("bias", "noise"):
             per_joint(name, getattr(self.disturbance, name), n)
-        if self.arm.limited and (self.start is not None or not self.random):
+        if not self.starts_nominally or (self.arm.limited and not self.random):
             self.first_q(self.trajectory)  # says whether the arm can be there
         bounds.check_cost(self.name, self.largest_step_cost(), self.steps)
 
@@ -266,12 +267,12 @@ class Scenario(Frozen):
         Raises:
             InvalidInputError: The arm cannot be at one of them; the message names the joint.
         """
-        starts = first_joints_of(episodes) if self.start is None else np.tile(self.start, (len(episodes), 1))
-        if starts is None:
-            raise InvalidInputError(f"Scenario {self.name!r}: a Cartesian trajectory needs a start.")
+        first = first_joints_of(episodes) if self.starts_nominally else None
+        if first is None:
+            first = np.tile(self._start, (len(episodes), 1))
         if self.arm.limited:
-            within_limits(f"Start of scenario {self.name!r}", starts, self.arm)
-        return starts
+            within_limits(f"Start of scenario {self.name!r}", first, self.arm)
+        return first
 
     def joint_bound(self) -> FloatArray:
         """Absolute joint coordinates that no arm exceeds in an episode, in [rad] or [m]. Shape (n,)."""
@@ -296,11 +297,23 @@ class Scenario(Frozen):
 
     def start_bound(self) -> FloatArray:
         """Absolute joint coordinates that no start exceeds, in [rad] or [m]. Shape (n,)."""
-        known = self.trajectory.joint_bound() if self.start is None else np.abs(self.start)
+        known = self.trajectory.joint_bound() if self.starts_nominally else np.abs(self._start)
         usual = np.full(self.joints, START_RANGE)
         reachable = np.maximum(usual, 0.0 if known is None else known)
         within = farthest(self.arm)
         return np.where(np.isfinite(within), within, reachable)
+
+    @property
+    def starts_nominally(self) -> bool:
+        """Whether episodes begin at the first joint coordinates of a nominal joint path."""
+        return self.start is None and self.trajectory.joint_bound() is not None
+
+    @functools.cached_property
+    def _start(self) -> FloatArray:
+        """The start of all episodes: the one that is given, or one at the first pose of a Cartesian trajectory."""
+        if self.start is not None:
+            return self.start
+        return starts.found(self.name, self.arm, self.frames(self.trajectory, 1)[0])
 
     def _held(self) -> tuple[int, ...]:
         held = self.iterations_per_point

@@ -15,7 +15,7 @@ from ikgym.trajectories.path_trajectory import PathTrajectory
 from ikgym.trajectories.random_joint_spline import RandomJointSpline
 from ikgym.trajectories.sinusoid import RandomSinusoid, Sinusoid
 from ikgym.trajectories.straight_line import StraightLine
-from ikgym.trajectories.time_laws import Quintic, Trapezoidal
+from ikgym.trajectories.time_laws import Quintic, TimeLaw, Trapezoidal
 from ikgym.trajectories.timed_waypoints import TimedWaypoints
 from ikgym.trajectories.trajectory import Trajectory
 from ikgym.trajectories.waypoints import from_csv, through
@@ -33,6 +33,7 @@ __all__ = [
     "RandomSinusoid",
     "Sinusoid",
     "StraightLine",
+    "TimeLaw",
     "TimedWaypoints",
     "Trajectory",
     "Trapezoidal",

@@ -37,6 +37,7 @@ from ikgym.trajectories import (
 )
 from tests.arms.test_urdf import LIMIT, joint, robot
 from tests.comparison import identical
+from tests.every_scenario import every_scenario
 
 PAIR = robot(joint("j1", "a", "b"), joint("j2", "b", "c", inside='<axis xyz="0 0 1"/>' + LIMIT))
 FAST = scenarios.get("varga7-fast")
@@ -81,7 +82,7 @@ def fields(part):
     return "None" if part is None else part
 
 
-@pytest.mark.parametrize("name", scenarios.names())
+@pytest.mark.parametrize("name", every_scenario())
 def test_every_scenario_survives_its_file(name, tmp_path):
     scenario, file = scenarios.get(name), tmp_path / "x.toml"
     scenario.save(file)

@@ -22,6 +22,8 @@ def test_the_sets_are_the_published_ones():
         "varga7-pose-random-long": (32, "test", 3000),
         "varga7-random": (64, "test", 1000),
         "varga7-random-long": (16, "test", 3000),
+        "panda-random": (128, "test", 1000),
+        "iiwa14-random": (128, "test", 1000),
     }
 
 
@@ -34,6 +36,10 @@ def test_the_sets_are_the_published_ones():
         ("varga7-random", 2_000_063, (0.409194226944, -0.488632498827, 0.058888695021, -0.4727872721)),
         ("varga7-random-long", 2_000_000, (-0.331498392441, -0.187385693911, -0.554270485681, 0.227408558174)),
         ("varga7-random-long", 2_000_015, (-0.320635318762, 0.603603897137, 0.978702510455, -0.630827291228)),
+        ("panda-random", 2_000_000, (-0.229776896407, -1.194726659585, 0.121878139386, -2.554467587124)),
+        ("panda-random", 2_000_127, (0.782552705425, -1.422801591503, 0.798453720653, -2.931062047715)),
+        ("iiwa14-random", 2_000_000, (-0.313736681668, 0.09933127704, 0.079239047267, -1.455366509301)),
+        ("iiwa14-random", 2_000_127, (0.782552705425, -0.132054177127, 0.798453720653, -1.969408227173)),
     ],
 )
 def test_seeds_draw_what_they_drew(name, seed, last):
@@ -61,7 +67,7 @@ def test_a_frozen_set_is_played_as_it_is():
         ("varga7-random", 1000, test_sets.SETS["varga7-random"].digest)
     }
     both = make_plan((), ["dls", "follow_nominal"], test_sets=test_sets.names()).jobs
-    assert len(both) == 2 * (256 + 32 + 64 + 16)
+    assert len(both) == 2 * (256 + 32 + 64 + 16 + 2 * 128)
     assert all(job.test_set is None for job in make_plan("varga7-random", "dls").jobs)
 
 

@@ -1,0 +1,42 @@
+"""Where an arm stands at the beginning of a path in space."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ikgym.arms import Arm
+from ikgym.exceptions import InvalidInputError
+from ikgym.rotations import geodesic_angle
+from ikgym.validation import FloatArray, read_only
+
+
+def found(name: str, arm: Arm, frame: FloatArray) -> FloatArray:
+    """Joint coordinates within the limits of an arm at a pose, near to its home posture if there are some.
+
+    Args:
+        name: Of the scenario.
+        arm: The arm that moves.
+        frame: The 9 numbers of the rotation, row by row, and the 3 of the position in [m]; the position alone where
+            there is no orientation. Shape (12,) or (3,).
+
+    Returns:
+        Joint coordinates in [rad] or [m], read-only. Shape (n,).
+
+    Raises:
+        InvalidInputError: None were found; the message says how far the nearest are from the pose.
+    """
+    rotation, position = (frame[:9].reshape(3, 3) if len(frame) == 12 else None), frame[-3:]
+    q, converged = arm.inverse(rotation, position)
+    if not converged:
+        raise InvalidInputError(
+            f"Scenario {name!r}: expected a trajectory that begins where arm {arm.name!r} can be, got one that begins "
+            f"{_gap(arm, q, rotation, position)} from the nearest joint coordinates that were found within its limits; "
+            "give a start, or another trajectory."
+        )
+    return read_only(q)
+
+
+def _gap(arm: Arm, q: FloatArray, rotation: FloatArray | None, position: FloatArray) -> str:
+    there = arm.forward(q)
+    distance = f"{np.linalg.norm(there[1] - position):.3g} m"
+    return distance if rotation is None else f"{distance} and {geodesic_angle(rotation, there[0]):.3g} rad"

@@ -1,0 +1,22 @@
+"""Every scenario, as parameters of tests: those that differ in kind in the fast run, all of them in the slow one."""
+
+from __future__ import annotations
+
+import pytest
+
+import ikgym
+from ikgym.scenarios import catalogue
+
+#: One of each kind among the scenarios that several arms have: task, trajectory, Δt, prismatic joint, random.
+KINDS = ("panda-circle", "panda-glue", "panda-singular", "tiago-raster", "iiwa14-random")
+
+
+def every_scenario(make=lambda name: name):
+    """Parameters for :func:`pytest.mark.parametrize`.
+
+    Args:
+        make: What a name is turned into.
+    """
+    fast = {*catalogue.SCENARIOS, *KINDS}
+    names = ikgym.scenarios.names()
+    return [pytest.param(make(name), id=name, marks=() if name in fast else pytest.mark.slow) for name in names]

@@ -1,0 +1,152 @@
+"""The same paths for several arms: each demands what its name says, and no more."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import linprog
+
+from baselines.evaluate import evaluate
+from ikgym import scenarios
+from ikgym.scenarios.families import AROUND_HOME, BEFORE, BETWEEN, FAMILIES, KNOT
+from ikgym.scenarios.workplaces import WORKPLACES
+from tests.box_tracking import track
+
+ARMS = [place.arm for place in WORKPLACES]
+PLACES = {place.arm: place for place in WORKPLACES}
+FEASIBLE = ("circle", "lemniscate", "square", "raster", "line", "glue")
+each_arm = pytest.mark.parametrize("arm", ARMS)
+
+
+def dls(name):
+    (row,) = evaluate([name], ["dls"])
+    return row
+
+
+@each_arm
+def test_every_arm_has_every_path(arm):
+    for name in FAMILIES:
+        scenario = scenarios.get(f"{arm}-{name}")
+        assert scenario.arm.name == scenario.model.name == arm
+        assert scenario.task.name == ("axis" if name == "glue" else "pose")
+        assert scenario.dt == (4e-3 if arm == "tiago" else 1e-3)
+        np.testing.assert_array_equal(scenario.velocity_limit, scenario.arm.velocity_limit)
+        slowest = scenario.arm.velocity_limit[~np.array(scenario.arm.prismatic)].min()
+        assert scenario.cost.delta_qdot == pytest.approx(0.5 * slowest, abs=0.01)
+        assert -1e-9 <= scenario.steps * scenario.dt - scenario.trajectory.duration < 0.1 + 1e-9
+
+
+@pytest.mark.parametrize("arm", ["panda", "iiwa14"])
+@pytest.mark.parametrize("name", FEASIBLE)
+def test_damped_least_squares_follows_within_all_limits(arm, name):
+    row = dls(f"{arm}-{name}")
+    assert row.steps_at_joint_limit == row.steps_at_velocity_limit == row.steps_at_acceleration_limit == 0
+    assert row.position_error_max < 1e-4
+    assert row.orientation_error_max < 1e-4
+    assert row.cost_ratio is None
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=() if name == "line" else pytest.mark.slow) for name in FEASIBLE]
+)
+def test_tiago_can_follow_within_all_limits(name):
+    """Damped least squares asks too much of its torso; what knows the limits does not."""
+    scenario = scenarios.get(f"tiago-{name}")
+    position, orientation = track(scenario)
+    assert position < 1e-4
+    assert orientation < 1e-4
+    assert dls(scenario.name).position_error_max > 1e-4
+
+
+@each_arm
+def test_a_stop_stands_in_the_way_of_a_turn(arm):
+    scenario = scenarios.get(f"{arm}-turn")
+    row = dls(scenario.name)
+    assert row.steps_at_joint_limit > 20
+    assert row.joint_limit_margin_min == 0.0
+    assert row.position_error_max > 1e-3
+
+
+@each_arm
+def test_the_edge_is_a_few_centimetres_out_of_reach(arm):
+    scenario = scenarios.get(f"{arm}-edge")
+    frames = scenario.frames(scenario.trajectory, scenario.steps + 1)[:: scenario.steps // 40]
+    rotations, positions = frames[:, :9].reshape(-1, 3, 3), frames[:, 9:]
+    q, converged = scenario.arm.inverse(rotations, positions)
+    away = np.linalg.norm(scenario.arm.forward(q)[1] - positions, axis=1)
+    assert 0.1 < np.mean(~converged) < 0.6
+    assert converged[[0, 1, -2, -1]].all()
+    assert 0.01 < away.max() < 0.06
+    back = positions[np.argmax(away)] - [0.05, 0.0, 0.0]
+    assert scenario.arm.inverse(rotations[0], back)[1]
+
+
+@each_arm
+def test_no_posture_is_fast_enough(arm):
+    """At the fastest point, no joint velocity within the limits moves the tool as the path does."""
+    scenario = scenarios.get(f"{arm}-fast")
+    frames = scenario.frames(scenario.trajectory, scenario.steps + 1)
+    twists = np.gradient(frames[:, 9:], scenario.dt, axis=0)
+    k = int(np.argmax(np.linalg.norm(twists, axis=1)))
+    rotation, position = frames[k, :9].reshape(3, 3), frames[k, 9:]
+    limit, rng, tried = scenario.arm.velocity_limit, np.random.default_rng(0), 0
+    for start in rng.uniform(scenario.arm.lower, scenario.arm.upper, (40, scenario.joints)):
+        q, converged = scenario.arm.inverse(rotation, position, start)
+        if converged:
+            jacobian, twist = scenario.arm.jacobian(q), np.concatenate([twists[k], np.zeros(3)])
+            bounds = np.column_stack([-limit, limit])
+            assert linprog(np.zeros(len(limit)), A_eq=jacobian, b_eq=twist, bounds=bounds).status == 2
+            assert linprog(np.zeros(len(limit)), A_eq=jacobian, b_eq=0.05 * twist, bounds=bounds).status == 0
+            tried += 1
+    assert tried > 20
+
+
+@each_arm
+def test_the_singular_path_passes_both_postures(arm):
+    scenario, place = scenarios.get(f"{arm}-singular"), PLACES[arm]
+    path = scenario.nominal_joint_path()
+    smallest = np.linalg.svd(scenario.arm.jacobian(path), compute_uv=False)[:, -1]
+    # The k-th control point stands at the knot k, and the ones before the first posture are one more than its number.
+    at = [round((BEFORE + 1 + between) * KNOT / scenario.dt) for between in (0, BETWEEN)]
+    for k, posture in zip(at, (place.stretched, place.aligned), strict=True):
+        np.testing.assert_allclose(path[k], posture, atol=1e-9)
+        assert smallest[k] < 1e-5
+        assert smallest[k - 30] > 1e-3 < smallest[k + 30]
+    moved = np.abs(np.diff(path, axis=0)) / scenario.dt
+    assert (moved.max(axis=0) < scenario.arm.velocity_limit).all()
+    assert (np.abs(np.diff(path, 2, axis=0)).max(axis=0) / scenario.dt**2 < scenario.arm.acceleration_limit).all()
+    assert ((path > scenario.arm.lower) & (path < scenario.arm.upper)).all()
+
+
+@each_arm
+def test_the_elbow_is_stretched_and_the_wrist_aligned(arm):
+    """The elbow bent a little brings the wrist nearer to the shoulder; at the aligned wrist the elbow is bent."""
+    scenario, place = scenarios.get(f"{arm}-singular"), PLACES[arm]
+    shoulder, elbow, wrist = {"panda": (1, 3, 5), "iiwa14": (1, 3, 5), "tiago": (3, 4, 6)}[arm]
+
+    def apart(bend, posture):
+        q = posture.copy()
+        q[elbow] += bend
+        points = scenario.arm.joint_points(q)[:, 1]
+        return np.linalg.norm(points[wrist] - points[shoulder])
+
+    stretched = [apart(bend, place.stretched) for bend in (-0.05, 0.0, 0.05)]
+    assert stretched[1] == pytest.approx(max(apart(b, place.stretched) for b in np.linspace(-1, 1, 2001)), rel=1e-3)
+    assert apart(0.0, place.aligned) < 0.97 * stretched[1]
+
+
+@pytest.mark.parametrize("arm", ["panda", "iiwa14"])
+def test_random_motions_are_feasible_and_cost_about_1_a_step(arm):
+    scenario = scenarios.get(f"{arm}-random")
+    usual = []
+    for seed in scenarios.seeds("validation", 16):
+        path = scenario.nominal_joint_path(seed)
+        qdot = np.diff(path, axis=0) / scenario.dt
+        assert (np.abs(path - scenario.arm.home) <= AROUND_HOME).all()
+        assert ((path > scenario.arm.lower) & (path < scenario.arm.upper)).all()
+        assert (np.abs(qdot) <= 0.9 * scenario.arm.velocity_limit * (1 + 1e-9)).all()
+        assert (np.abs(np.diff(qdot, axis=0)) <= 0.9 * scenario.dt * scenario.arm.acceleration_limit + 1e-9).all()
+        assert np.abs(qdot[[0, -1]]).max() < 1e-3
+        usual.append(scenario.cost.velocity(qdot).mean())
+    assert 0.1 < np.median(usual) < 5.0
+    assert (scenario.steps, scenario.dt, scenario.task.name) == (1000, 2e-3, "pose")

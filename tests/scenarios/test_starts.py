@@ -1,0 +1,104 @@
+"""Where episodes begin on paths in space: the scenario finds joint coordinates for the first pose."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+import ikgym
+from baselines.fingerprints import fingerprint
+from ikgym import scenarios
+from ikgym.exceptions import InvalidInputError
+from ikgym.scenarios import Scenario
+from ikgym.trajectories import FixedOrientation, PathTrajectory, Quintic, Trajectory, paths
+
+PANDA = ikgym.arms.get("panda")
+DOWN = np.diag([1.0, -1.0, -1.0])
+
+
+def line(*, begin=(0.5, 0.0, 0.3), orientation=True):
+    path = paths.Line(np.array(begin), np.array([0.5, 0.2, 0.4]))
+    return PathTrajectory(path, Quintic(0.2, 1.0), FixedOrientation(DOWN) if orientation else None)
+
+
+def scenario(**changes):
+    given = {"arm": PANDA, "task": ikgym.tasks.get("pose"), "trajectory": line(), "steps": 5}
+    return Scenario("line", **{**given, **changes})
+
+
+@pytest.mark.parametrize("task", ["pose", "axis", "position"])
+def test_the_arm_begins_at_the_first_pose_within_its_limits(task):
+    one = scenario(task=ikgym.tasks.get(task), trajectory=line(orientation=task != "position"))
+    q = one.first_q(one.trajectory)
+    error = one.task.error(one.nominal()[0], one.task.coordinates(*PANDA.forward(q)))
+    assert abs(error).max() < 1e-8
+    assert ((q >= PANDA.lower) & (q <= PANDA.upper)).all()
+    np.testing.assert_array_equal(q, PANDA.inverse(DOWN if task != "position" else None, [0.5, 0.0, 0.3])[0])
+    observation = ikgym.RedundantIKEnv(one).reset(seed=3)[0]
+    np.testing.assert_array_equal(observation["q"], q)
+    rows = gym.make_vec("RedundantIK-v0", num_envs=3, scenario=one).reset(seed=3)[0]
+    np.testing.assert_array_equal(rows["q"], [q] * 3)
+
+
+def test_another_path_has_another_start():
+    one = scenario()
+    assert one.start is None
+    other = one.replace(trajectory=line(begin=(0.4, 0.1, 0.3)))
+    assert abs(other.first_q(other.trajectory) - one.first_q(one.trajectory)).max() > 0.1
+
+
+def test_a_start_that_is_given_is_kept():
+    one = scenario(start=PANDA.home)
+    np.testing.assert_array_equal(one.first_q(one.trajectory), PANDA.home)
+
+
+def test_a_file_leaves_the_start_out(tmp_path):
+    one, file = scenario(), tmp_path / "x.toml"
+    one.save(file)
+    whole, _ = file.read_text().split("[trajectory]")
+    assert "start" not in whole
+    read = scenarios.load(file)
+    assert fingerprint(read) == fingerprint(one)
+    np.testing.assert_array_equal(read.first_q(read.trajectory), one.first_q(one.trajectory))
+
+
+def test_a_path_that_begins_out_of_reach_is_refused():
+    message = (
+        r"Scenario 'line': expected a trajectory that begins where arm 'panda' can be, got one that begins "
+        r"0\.\d+ m and \S+ rad from the nearest joint coordinates that were found within its limits; give a start"
+    )
+    with pytest.raises(InvalidInputError, match=message):
+        scenario(trajectory=line(begin=(1.2, 0.0, 0.3)))
+    with pytest.raises(InvalidInputError, match=r"begins 0\.\d+ m from the nearest"):
+        scenario(trajectory=line(begin=(1.2, 0.0, 0.3), orientation=False), task=ikgym.tasks.get("position"))
+
+
+def test_an_arm_without_limits_finds_its_start_too():
+    one = scenarios.get("zhang3-helix").replace(start=None, initial_pose=None)
+    q = one.first_q(one.trajectory)
+    np.testing.assert_allclose(one.arm.forward(q)[1], one.nominal()[0], atol=1e-8)
+    assert (one.start_bound() >= abs(q)).all()
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Somewhere(Trajectory):
+    """A distribution over paths in space."""
+
+    random = True
+
+    def frames(self, times, model):
+        raise NotImplementedError
+
+
+def test_random_paths_in_space_need_a_start():
+    with pytest.raises(InvalidInputError, match="a random Cartesian trajectory needs a start"):
+        scenario(trajectory=Somewhere())
+
+
+def test_what_the_start_is_found_from_belongs_to_the_digest():
+    moved = PANDA.replace(home=PANDA.home + 0.1)
+    assert fingerprint(scenario()) != fingerprint(scenario(arm=moved))
+    assert fingerprint(scenario(start=PANDA.home)) == fingerprint(scenario(start=PANDA.home, arm=moved))
