@@ -12,6 +12,7 @@ from gymnasium.utils import seeding
 from baselines.episode import added_up, play
 from baselines.policy import Batch, Memory, SolverPolicy
 from baselines.solvers.receding_horizon.newton.grid import Grid
+from baselines.solvers.receding_horizon.newton.settings import change_limit
 from baselines.solvers.receding_horizon.newton.workspace import PathProblem
 from baselines.solvers.receding_horizon.problem_data import ProblemData
 from ikgym.exceptions import InvalidInputError
@@ -86,10 +87,8 @@ class EpisodeProblem:
 
     def on(self, grid: Grid) -> PathProblem:
         """The problem on a grid, as the kernels see it."""
-        at_rest, limit = np.zeros_like(self.start), self.scenario.arm.acceleration_limit
-        if not np.isfinite(limit).any():
-            return PathProblem(self.data, grid, self.start, self.nominal)
-        return PathProblem(self.data, grid, self.start, self.nominal, at_rest, 0.0, self.scenario.dt * limit)
+        change = change_limit(self.scenario.arm.acceleration_limit, self.scenario.dt)
+        return PathProblem(self.data, grid, self.start, self.nominal, np.zeros_like(self.start), 0.0, change)
 
     @property
     def knots(self) -> int:

@@ -14,6 +14,10 @@ from ikgym.jit import kernel
 
 Floats = npt.NDArray[np.float64]
 
+# What is kept of a barrier: λ; and φ', what was taken for φ'', and u at the path before.
+MULTIPLIER, GRADIENT, CURVATURE, BEYOND = range(4)
+BARRIER_SIZE = 4
+
 # Of problems in which changes of velocity cost nothing.
 NO_VELOCITY: Floats = np.zeros(0)
 
@@ -112,6 +116,10 @@ class NewtonWorkspace(NamedTuple):
         factor: A pivot and its factor. Shape (n, n).
         step: The Newton step. Shape (K, n).
         trial: The path at a trial step length. Shape (K, n).
+        before: Velocities of the block before, in [rad/s] or [m/s]. Shape (n,).
+        barriers: Where accelerations are limited, the barriers (see :mod:`interior_point`) of the knots' errors, then
+            of their velocities, changes of velocity and positions, at the upper and at the lower bound.
+            Shape (K or 0, e + 3 n, 2, 4).
     """
 
     knot: KnotWorkspace
@@ -121,51 +129,55 @@ class NewtonWorkspace(NamedTuple):
     factor: Floats
     step: Floats
     trial: Floats
+    before: Floats
+    barriers: Floats
+
+
+# Arrays of the same shape are parts of one: an allocation takes 40 ns, and all of them once took 0.9 µs of a `predict`.
 
 
 @kernel
 def knot_workspace(kind, m, n):
     """The workspace of one knot, for task coordinates of ``m`` numbers and ``n`` joints."""
     e = task_kernels.error_size(kind, m)
+    rotations, vectors, jacobians = np.empty((2, 3, 3)), np.empty((3, e)), np.empty((2, e, n))
     return KnotWorkspace(
-        np.empty((3, 3)),
+        rotations[0],
         np.empty(3),
         np.empty((6, n)),
         np.empty(m),
-        np.empty(e),
-        np.empty((e, n)),
-        np.empty((e, n)),
-        np.empty(e),
-        np.empty((3, 3)),
+        vectors[0],
+        jacobians[0],
+        jacobians[1],
+        vectors[1],
+        rotations[1],
         np.ones(1),
         np.empty((e, e)),
-        np.empty(e),
+        vectors[2],
     )
 
 
 @kernel
-def quadratic_model(knots, n):
-    """Arrays for the quadratic model at a path of ``knots`` knots and ``n`` joints."""
-    return QuadraticModel(
-        np.empty((knots, n)),
-        np.empty((knots, n, n)),
-        np.empty((knots, n, n)),
-        np.empty((knots, n)),
-        np.empty((knots, n)),
-        np.empty((knots, n, n)),
-        np.empty((n, n)),
-    )
+def newton_workspace(kind, m, knots, n, limited=False):
+    """The workspace for paths of up to ``knots`` knots, task coordinates of ``m`` numbers and ``n`` joints.
 
-
-@kernel
-def newton_workspace(kind, m, knots, n):
-    """The workspace for paths of up to ``knots`` knots, task coordinates of ``m`` numbers and ``n`` joints."""
+    Args:
+        kind: The kind of task coordinates.
+        m: Their number.
+        knots: K.
+        n: Joints.
+        limited: Whether accelerations are limited.
+    """
+    e = task_kernels.error_size(kind, m)
+    vectors, blocks, squares = np.empty((5, knots, n)), np.empty((4, knots, n, n)), np.empty((2, n, n))
     return NewtonWorkspace(
         knot_workspace(kind, m, n),
-        np.empty((knots, task_kernels.error_size(kind, m))),
-        quadratic_model(knots, n),
-        np.empty((knots, n, n)),
-        np.empty((n, n)),
-        np.empty((knots, n)),
-        np.empty((knots, n)),
+        np.empty((knots, e)),
+        QuadraticModel(vectors[0], blocks[0], blocks[1], vectors[1], vectors[2], blocks[2], squares[0]),
+        blocks[3],
+        squares[1],
+        vectors[3],
+        vectors[4],
+        np.empty(n),
+        np.zeros((knots if limited else 0, e + 3 * n, 2, BARRIER_SIZE)),
     )

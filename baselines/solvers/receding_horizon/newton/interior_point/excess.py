@@ -1,15 +1,16 @@
-"""Kernel: by how much a joint path leaves its limits."""
+"""Kernels: by how much a joint path leaves its limits, and what it costs within them."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from baselines.solvers.receding_horizon.newton.cost import true_cost
 from baselines.solvers.receding_horizon.newton.interior_point.merit import change_steps
-from ikgym.jit import kernel
+from ikgym.jit import uncounted
 
 
-@kernel
-def excess(problem, path):
+@uncounted
+def excess(problem, path, before):
     """By how much a path leaves its limits, at most: a share of them, and of positions in units of the largest step.
 
     Braking behind the last knot is not looked at.
@@ -17,11 +18,12 @@ def excess(problem, path):
     Args:
         problem: A :class:`newton.workspace.PathProblem` of K knots.
         path: Joint coordinates at the knots in [rad] or [m]. Shape (K, n).
+        before: Scratch. Shape (n,).
 
     Returns:
         The largest excess, not above 0 where all limits are kept.
     """
-    data, lengths, before, start = problem.data, problem.grid.length, np.empty(path.shape[1]), problem.start
+    data, lengths, start = problem.data, problem.grid.length, problem.start
     limits, lower, upper, changes = data.velocity_limit, data.lower, data.upper, problem.change_limit
     limited, dt, most = changes.shape[0] > 0, data.dt, -np.inf
     for k in range(path.shape[0]):
@@ -35,3 +37,18 @@ def excess(problem, path):
                 most = max(most, abs(change) / (span * changes[j]) - 1.0)
             before[j] = velocity
     return most
+
+
+@uncounted
+def cost_within(problem, path, slack, workspace):
+    """What a path costs; infinitely much where it leaves limits and accelerations are among them.
+
+    Args:
+        problem: A :class:`newton.workspace.PathProblem` of K knots.
+        path: Joint coordinates at the knots in [rad] or [m]. Shape (K, n).
+        slack: By which share limits may be left.
+        workspace: A :class:`newton.workspace.NewtonWorkspace`.
+    """
+    if problem.change_limit.shape[0] > 0 and excess(problem, path, workspace.before) > slack:
+        return np.inf
+    return true_cost(problem, path, workspace)

@@ -11,13 +11,13 @@ from typing import NamedTuple
 
 from baselines.solvers.receding_horizon.newton.cost import tracking_errors
 from baselines.solvers.receding_horizon.newton.interior_point.barrier import primal_dual_curvature, smoothed, trusted
-from baselines.solvers.receding_horizon.newton.interior_point.workspace import BEYOND, CURVATURE, GRADIENT, MULTIPLIER
 from baselines.solvers.receding_horizon.newton.rate import add_rate_cost, rate_cost
 from baselines.solvers.receding_horizon.newton.second_order import second_order
 from baselines.solvers.receding_horizon.newton.terms import velocity_cost, velocity_derivatives
+from baselines.solvers.receding_horizon.newton.workspace import BEYOND, CURVATURE, GRADIENT, MULTIPLIER
 from ikgym import cost_kernels, task_kernels
 from ikgym.cost_kernels import P_X_INSIDE
-from ikgym.jit import inlined, kernel
+from ikgym.jit import inlined, uncounted
 from ikgym.kinematics import forward_and_jacobian
 
 # How multipliers come about: from the gradients of the barriers, as they are, or by a step of this length at most.
@@ -50,7 +50,7 @@ class Bounded(NamedTuple):
     curvature: float
 
 
-@kernel
+@uncounted
 def merit(problem, path, barrier, workspace):
     """The barrier function.
 
@@ -58,13 +58,13 @@ def merit(problem, path, barrier, workspace):
         problem: A :class:`newton.workspace.PathProblem` of K knots with limits of acceleration.
         path: Joint coordinates at the knots in [rad] or [m]. Shape (K, n).
         barrier: :class:`Barrier`.
-        workspace: An :class:`InteriorWorkspace`.
+        workspace: A :class:`newton.workspace.NewtonWorkspace`.
     """
     data, grid, start = problem.data, problem.grid, problem.start
     cost, dt, mu, weight = data.cost, data.dt, barrier.mu, barrier.limit_weight
     lengths, tracking, velocities = grid.length, grid.tracking, grid.velocity
     limits, lower, upper, changes = data.velocity_limit, data.lower, data.upper, problem.change_limit
-    errors, before = tracking_errors(problem, path, workspace.newton), workspace.before
+    errors, before = tracking_errors(problem, path, workspace), workspace.before
     (knots, n), e, steepness = path.shape, errors.shape[1], kink_steepness(cost)
     total = 0.0
     for k in range(knots):
@@ -91,7 +91,7 @@ def merit(problem, path, barrier, workspace):
     return total
 
 
-@kernel
+@uncounted
 def linearise(problem, path, barrier, advance, exact, workspace):
     """:func:`merit`, its gradient and its Hessian.
 
@@ -102,12 +102,12 @@ def linearise(problem, path, barrier, advance, exact, workspace):
         advance: Length of the step that led here, by which the multipliers change; KEPT to leave them, ANEW to set
             them.
         exact: Whether the second derivatives of the error are wanted, too.
-        workspace: An :class:`InteriorWorkspace`, whose barriers and quadratic model are set.
+        workspace: A :class:`newton.workspace.NewtonWorkspace`, whose barriers and quadratic model are set.
 
     Returns:
         The barrier function.
     """
-    knots, model, total = path.shape[0], workspace.newton.model, 0.0
+    knots, model, total = path.shape[0], workspace.model, 0.0
     for array in (model.gradient, model.coupling, model.far):
         array[:knots] = 0.0
     model.diagonal[:knots] = 0.0
@@ -117,12 +117,12 @@ def linearise(problem, path, barrier, advance, exact, workspace):
     return total + _add_motion(problem, path, barrier, advance, workspace)
 
 
-@kernel
+@uncounted
 def _add_tracking(problem, path, barrier, advance, exact, workspace):
     """Adds the tracking costs to the quadratic model; gives their value with the kinks smoothed."""
     data, nominal, at, tracking = problem.data, problem.nominal, problem.grid.at, problem.grid.tracking
     cost, kind, chain, mu = data.cost, data.kind, data.chain, barrier.mu
-    knot, model, barriers = workspace.newton.knot, workspace.newton.model, workspace.barriers
+    knot, model, barriers = workspace.knot, workspace.model, workspace.barriers
     rotation, position, geometric, pose = knot.rotation, knot.position, knot.geometric, knot.pose
     error, jacobian, error_jacobian, by_error = knot.error, knot.jacobian, knot.error_jacobian, knot.gradient
     gradient, diagonal, second = model.gradient, model.diagonal, model.second
@@ -157,16 +157,16 @@ def _add_tracking(problem, path, barrier, advance, exact, workspace):
     return total
 
 
-@kernel
+@uncounted
 def _add_motion(problem, path, barrier, advance, workspace):
     """Adds the velocity costs and the limits of velocity, acceleration and position; gives their value."""
     data, start, cost, dt = problem.data, problem.start, problem.data.cost, problem.data.dt
     lengths, velocities, braking = problem.grid.length, problem.grid.velocity, problem.braking
     limits, lower, upper, changes = data.velocity_limit, data.lower, data.upper, problem.change_limit
-    model, barriers, before = workspace.newton.model, workspace.barriers, workspace.before
+    model, barriers, before = workspace.model, workspace.barriers, workspace.before
     gradient, diagonal, coupling, far = model.gradient, model.diagonal, model.coupling, model.far
     weight, mu = barrier.limit_weight, barrier.mu
-    (knots, n), e, total = path.shape, workspace.newton.knot.error.shape[0], 0.0
+    (knots, n), e, total = path.shape, workspace.knot.error.shape[0], 0.0
     rate_before = 0.0
     for k in range(knots):
         rate, span, ends = 1.0 / (lengths[k] * dt), change_steps(lengths, k), braking and k == knots - 1

@@ -6,7 +6,6 @@ import numpy as np
 
 from baselines.solvers.receding_horizon.newton.cost import true_cost
 from baselines.solvers.receding_horizon.newton.interior_point.merit import ANEW, KEPT, Barrier, linearise, merit
-from baselines.solvers.receding_horizon.newton.interior_point.workspace import BARRIER_SIZE, BEYOND
 from baselines.solvers.receding_horizon.newton.minimise import (
     CONVERGED,
     MOST_DAMPING,
@@ -21,7 +20,8 @@ from baselines.solvers.receding_horizon.newton.minimise import (
     next_damping,
     scalar_product,
 )
-from ikgym.jit import inlined, kernel
+from baselines.solvers.receding_horizon.newton.workspace import BARRIER_SIZE, BEYOND
+from ikgym.jit import inlined, uncounted
 
 # μ at the beginning, and w of the limits, in units of the cost for each knot, or of this where that is less.
 FIRST_MU, LIMIT_WEIGHT, LEAST_UNIT = 0.1, 100.0, 1e-2
@@ -38,39 +38,43 @@ LEFT, GROWTH, LARGEST_GROWTH = 1e-6, 10.0, 1e3
 SHORTENING, TRIALS = 0.5, 16
 
 
-@kernel
-def minimise_limited(problem, path, settings, workspace):
+@uncounted
+def minimise_limited(problem, path, settings, smoothing, workspace):
     """Damped Newton steps on the barrier function, until the path is a minimum or they run out.
 
     Args:
         problem: A :class:`newton.workspace.PathProblem` of K knots with limits of acceleration.
         path: Joint coordinates at the knots in [rad] or [m], changed in place. Shape (K, n).
         settings: :class:`newton.minimise.NewtonSettings`.
-        workspace: An :class:`InteriorWorkspace`.
+        smoothing: μ throughout, in units of the cost for each knot, for few steps from a path that is almost a minimum;
+            0 to follow it to what the tolerance asks for.
+        workspace: A :class:`newton.workspace.NewtonWorkspace`.
 
     Returns:
         A :class:`newton.minimise.Minimum`; STALLED where no path keeps the limits, too.
     """
-    newton, knots, bounds = workspace.newton, path.shape[0], workspace.barriers[: path.shape[0]].size // BARRIER_SIZE
-    gradient, step, trial = newton.model.gradient[:knots], newton.step[:knots], newton.trial[:knots]
+    knots, bounds = path.shape[0], workspace.barriers[: path.shape[0]].size // BARRIER_SIZE
+    gradient, step, trial = workspace.model.gradient[:knots], workspace.step[:knots], workspace.trial[:knots]
     unit = 1.0 / (problem.data.dt * problem.data.cost.delta_qdot) ** 2
-    cost = max(true_cost(problem, path, newton), NEGLIGIBLE)
-    mu, growth = FIRST_MU * max(cost / knots, LEAST_UNIT), 1.0
-    barrier = Barrier(mu, LIMIT_WEIGHT * max(cost / knots, LEAST_UNIT))
+    cost = max(true_cost(problem, path, workspace), NEGLIGIBLE)
+    share, growth = max(cost / knots, LEAST_UNIT), 1.0
+    mu = (smoothing if smoothing > 0.0 else FIRST_MU) * share
+    barrier, smooth = Barrier(mu, LIMIT_WEIGHT * share), smoothing > 0.0
     value = linearise(problem, path, barrier, ANEW, settings.exact, workspace)
-    made, outcome, damping, last, tolerance = 0, RAN_OUT, 0.0, 0.0, max(settings.tolerance, FINEST)
+    made, outcome, damping, tolerance = 0, RAN_OUT, 0.0, max(settings.tolerance, FINEST)
+    last = mu if smooth else 0.0
     while made < settings.steps:
-        damping = damped_newton_step(problem, settings.exact, damping, unit, newton, step)
+        damping = damped_newton_step(problem, settings.exact, damping, unit, workspace, step)
         derivative = scalar_product(gradient, step)
         if not (np.isfinite(derivative) and damping <= MOST_DAMPING):
             outcome = STALLED
             break
         enough = tolerance * cost if mu <= last else NEAR * mu
         if -0.5 * derivative <= max(enough, ROUNDING * abs(value)):
-            cost = max(true_cost(problem, path, newton), NEGLIGIBLE)
-            last = max(tolerance / bounds, LEAST_MU) * cost
+            cost = max(true_cost(problem, path, workspace), NEGLIGIBLE)
+            last = mu if smooth else max(tolerance / bounds, LEAST_MU) * cost
             left = limits_left(workspace, knots)
-            if left and growth >= LARGEST_GROWTH:
+            if left and (smooth or growth >= LARGEST_GROWTH):
                 outcome = STALLED
                 break
             if mu <= last and not left:
@@ -86,14 +90,16 @@ def minimise_limited(problem, path, settings, workspace):
         if length == 0.0:
             damping = more_damping(damping)
             continue
-        path[:] = trial
+        for k in range(knots):
+            for a in range(path.shape[1]):
+                path[k, a] = trial[k, a]
         damping = next_damping(damping, length)
         value = linearise(problem, path, barrier, length, settings.exact, workspace)
-    return Minimum(outcome, made, true_cost(problem, path, newton), np.sqrt(scalar_product(gradient, gradient)))
+    return Minimum(outcome, made, true_cost(problem, path, workspace), np.sqrt(scalar_product(gradient, gradient)))
 
 
-@kernel
-def minimise_path(problem, path, multipliers, settings, workspace):
+@uncounted
+def minimise_path(problem, path, multipliers, settings, smoothing, workspace):
     """The minimum of a joint path by the method that its limits ask for.
 
     Args:
@@ -101,20 +107,21 @@ def minimise_path(problem, path, multipliers, settings, workspace):
         path: Joint coordinates at the knots in [rad] or [m], changed in place. Shape (K, n).
         multipliers: As of :func:`newton.minimise.minimise`; of no use where accelerations are limited.
         settings: :class:`newton.minimise.NewtonSettings`.
-        workspace: Of :func:`workspace.path_workspace`.
+        smoothing: As of :func:`minimise_limited`; of no use where accelerations are not limited.
+        workspace: A :class:`newton.workspace.NewtonWorkspace`.
 
     Returns:
         A :class:`newton.minimise.Minimum`.
     """
     if problem.change_limit.shape[0] > 0:
-        return minimise_limited(problem, path, settings, workspace)
-    return minimise(problem, path, multipliers, settings, workspace.newton)
+        return minimise_limited(problem, path, settings, smoothing, workspace)
+    return minimise(problem, path, multipliers, settings, workspace)
 
 
-@kernel
+@uncounted
 def limits_left(workspace, knots):
     """Whether the path of so many knots leaves a limit."""
-    barriers, e = workspace.barriers, workspace.newton.knot.error.shape[0]
+    barriers, e = workspace.barriers, workspace.knot.error.shape[0]
     for k in range(knots):
         for i in range(e, barriers.shape[1]):
             if barriers[k, i, 0, BEYOND] > LEFT or barriers[k, i, 1, BEYOND] > LEFT:

@@ -9,9 +9,8 @@ import numpy as np
 import ikgym
 from baselines.policy import Problem
 from baselines.solvers.receding_horizon.newton.interior_point.minimise import minimise_limited
-from baselines.solvers.receding_horizon.newton.interior_point.workspace import interior_workspace
 from baselines.solvers.receding_horizon.newton.minimise import NewtonSettings
-from baselines.solvers.receding_horizon.newton.workspace import PathProblem
+from baselines.solvers.receding_horizon.newton.workspace import PathProblem, newton_workspace
 from baselines.solvers.receding_horizon.problem_data import ProblemData
 from benchmarks.rivals.numpy_horizon import Horizon
 from tests.baselines.solvers.receding_horizon.newton.problems import grid_of
@@ -82,6 +81,6 @@ def path_problem(problem: Problem, horizon: Horizon, braking=True) -> PathProble
 def solved(problem: Problem, horizon: Horizon, path=None, braking=True, exact=True, steps=300, tolerance=1e-8):
     """What :func:`minimise_limited` makes of a path, of rest if none is given: its minimum, and the path."""
     path = np.tile(horizon.q, (horizon.knots, 1)) if path is None else path.copy()
-    workspace = interior_workspace(problem.task.kind, problem.task.size, *path.shape)
+    workspace = newton_workspace(problem.task.kind, problem.task.size, *path.shape, True)
     settings = NewtonSettings(exact, steps, tolerance)
-    return minimise_limited(path_problem(problem, horizon, braking), path, settings, workspace), path
+    return minimise_limited(path_problem(problem, horizon, braking), path, settings, 0.0, workspace), path

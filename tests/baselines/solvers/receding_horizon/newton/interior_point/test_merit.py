@@ -7,7 +7,7 @@ import pytest
 
 from baselines.solvers.receding_horizon.newton.cost import true_cost
 from baselines.solvers.receding_horizon.newton.interior_point.merit import ANEW, KEPT, Barrier, linearise, merit
-from baselines.solvers.receding_horizon.newton.interior_point.workspace import GRADIENT, MULTIPLIER, interior_workspace
+from baselines.solvers.receding_horizon.newton.workspace import GRADIENT, MULTIPLIER, newton_workspace
 from benchmarks.rivals.numpy_horizon import beyond_limits
 from tests.baselines.solvers.receding_horizon.newton.interior_point.states import (
     draw,
@@ -30,7 +30,7 @@ def place(at=(1, 2, 4, 7), task="pose", braking=True, **changes):
     change = here.change_limit * np.array([1, 1, np.inf, 1, 1, 1, 1])  # a joint without a limit of acceleration
     here = here._replace(change_limit=change, **changes)
     path = horizon.q + np.cumsum(rng.normal(size=(len(at), 7)) * 2e-3 * here.grid.length[:, None], axis=0)
-    return here, path, interior_workspace(here.data.kind, here.nominal.shape[1], *path.shape)
+    return here, path, newton_workspace(here.data.kind, here.nominal.shape[1], *path.shape, True)
 
 
 @pytest.mark.parametrize("braking", [False, True])
@@ -38,7 +38,7 @@ def place(at=(1, 2, 4, 7), task="pose", braking=True, **changes):
 @pytest.mark.parametrize("task", ["pose", "position"])
 def test_derivatives_against_central_differences(at, task, braking):
     problem, path, workspace = place(at, task, braking)
-    model = workspace.newton.model
+    model = workspace.model
     value = linearise(problem, path, BARRIER, ANEW, False, workspace)
     assert value == pytest.approx(merit(problem, path, BARRIER, workspace), rel=1e-12)
     central = differences(lambda x: merit(problem, x, BARRIER, workspace), path, 1e-8).reshape(path.shape)
@@ -65,13 +65,13 @@ def test_changes_of_velocity_cost_what_they_do_elsewhere():
     problem, path, workspace = place(rate_weight=0.0)
     more = problem._replace(rate_weight=3.0)
     extra = merit(more, path, BARRIER, workspace) - merit(problem, path, BARRIER, workspace)
-    newton = workspace.newton
+    newton = workspace
     assert extra == pytest.approx(true_cost(more, path, newton) - true_cost(problem, path, newton), rel=1e-9)
     linearise(problem, path, BARRIER, ANEW, False, workspace)
-    without = workspace.newton.model.gradient.copy()
+    without = workspace.model.gradient.copy()
     linearise(more, path, BARRIER, ANEW, False, workspace)
     central = differences(lambda x: merit(more, x, BARRIER, workspace), path, 1e-8).reshape(path.shape)
-    np.testing.assert_allclose(workspace.newton.model.gradient, central, atol=1e-5 * abs(central).max())
+    np.testing.assert_allclose(workspace.model.gradient, central, atol=1e-5 * abs(central).max())
     assert not np.allclose(without, central, rtol=1e-3)
 
 
@@ -80,7 +80,7 @@ def test_it_tends_to_the_cost_and_the_weighted_excess(at):
     """With μ to 0 what is left is the cost and w times all that is beyond a limit."""
     problem, path, workspace = place(at, braking=False)
     barrier = Barrier(1e-12, 50.0)
-    excess = (merit(problem, path, barrier, workspace) - true_cost(problem, path, workspace.newton)) / 50.0
+    excess = (merit(problem, path, barrier, workspace) - true_cost(problem, path, workspace)) / 50.0
     arm, h = problem_of().model, problem.grid.length[:, None] * problem.data.dt
     qdot = np.diff(np.vstack([problem.start, path]), axis=0) / h
     spans = np.vstack([[problem.data.dt], 0.5 * (h[:-1] + h[1:])])
@@ -124,6 +124,6 @@ def test_braking_counts_at_the_last_knot():
     values = []
     for braking in (False, True):
         here = path_problem(narrow, from_there, braking)
-        workspace = interior_workspace(here.data.kind, here.nominal.shape[1], *path.shape)
+        workspace = newton_workspace(here.data.kind, here.nominal.shape[1], *path.shape, True)
         values.append(merit(here, path, Barrier(1e-9, 100.0), workspace))
     assert values[1] > values[0] + 100.0
