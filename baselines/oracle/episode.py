@@ -12,7 +12,6 @@ from gymnasium.utils import seeding
 from baselines.episode import added_up, play
 from baselines.policy import Batch, Memory, SolverPolicy
 from baselines.solvers.receding_horizon.newton.grid import Grid
-from baselines.solvers.receding_horizon.newton.settings import change_limit
 from baselines.solvers.receding_horizon.newton.workspace import PathProblem
 from baselines.solvers.receding_horizon.problem_data import ProblemData
 from ikgym.exceptions import InvalidInputError
@@ -87,8 +86,13 @@ class EpisodeProblem:
 
     def on(self, grid: Grid) -> PathProblem:
         """The problem on a grid, as the kernels see it."""
-        change = change_limit(self.scenario.arm.acceleration_limit, self.scenario.dt)
+        change = self.scenario.dt * self.scenario.arm.acceleration_limit if self._by_interior_point else np.zeros(0)
         return PathProblem(self.data, grid, self.start, self.nominal, np.zeros_like(self.start), 0.0, change)
+
+    @property
+    def _by_interior_point(self) -> bool:
+        """Whether paths are improved by the interior point method, which finds its way between limits of any kind."""
+        return self.scenario.arm.limited and bool(self.scenario.counted()[1:].all())
 
     @property
     def knots(self) -> int:
