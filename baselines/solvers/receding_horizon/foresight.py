@@ -13,6 +13,8 @@ from baselines.solvers.receding_horizon.rhc import RecedingHorizon
 
 # Each block of the plan is so many steps longer than the one before, up to a length.
 GROWTH, LONGEST = 1.5, 100.0
+# What the preset has under limits of acceleration.
+LIMITED = {"iterations": 3, "starts": 1, "restart_steps": 0, "start_steps": 0}
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -28,6 +30,11 @@ class RecedingHorizonForesight(RecedingHorizon):
     reach that far without skipping an oscillation. Those that grow geometrically do: of 57 knots in 1,500 steps, half
     lie in the first tenth, and the last block has 127 steps.
 
+    Under limits of acceleration, where control periods are 2 ms and more, three Newton steps for the plan alone are
+    worth more than candidates: with one the plan is lost on 2 of 12 validation episodes of `panda-random`, with three
+    the cost ratio is 1.019 in the geometric mean and 1.07 at most. So ``iterations``, ``starts``, ``restart_steps`` and
+    ``start_steps``, where all four are the preset's own, become 3, 1, 0 and 0 there.
+
     Args:
         move_blocks: As in ``rhc``, but None for blocks that are each 1.5 steps longer than the one before, up to 100.
     """
@@ -41,6 +48,14 @@ class RecedingHorizonForesight(RecedingHorizon):
     recovery_steps: int = 4
 
     name: ClassVar[str] = "rhc_foresight"
+
+    def __post_init__(self) -> None:
+        """Takes other settings where accelerations are limited."""
+        limited = np.isfinite(self.problem.model.acceleration_limit).any()
+        if limited and all(getattr(self, name) == getattr(type(self), name) for name in LIMITED):
+            for name, value in LIMITED.items():
+                object.__setattr__(self, name, value)
+        super().__post_init__()
 
     def _knots(self) -> npt.NDArray[np.int64]:
         """Steps from now to the knots. Shape (K,)."""

@@ -125,3 +125,20 @@ def test_without_a_limit_there_are_no_barriers():
     unlimited = ikgym.scenarios.get("varga7-fast").arm.acceleration_limit
     assert change_limit(unlimited, DT).shape == (0,)
     np.testing.assert_array_equal(change_limit(np.array([10.0, np.inf]), DT), [10.0 * DT, np.inf])
+
+
+def test_foresight_has_no_candidates_under_limits_of_acceleration():
+    alone = baselines.make("rhc_foresight", panda())
+    assert (alone.iterations, alone.starts, alone.restart_steps, alone.start_steps) == (3, 1, 0, 0)
+    asked = baselines.make("rhc_foresight", panda(), restart_steps=10)
+    assert (asked.iterations, asked.starts, asked.restart_steps, asked.start_steps) == (1, 28, 10, 10)
+    assert baselines.make("rhc_foresight", ikgym.scenarios.get("varga7-fast")).restart_steps == 20
+
+
+@pytest.mark.slow
+def test_foresight_stays_with_a_whole_random_motion():
+    """Its errors stay below a millimetre and no limit is run into; one Newton step a period loses this one."""
+    scenario = ikgym.scenarios.get("panda-random")
+    (episode,) = rollouts(scenario, baselines.make("rhc_foresight", scenario), [SEEDS[1]])
+    assert not episode.at_limit.any()
+    assert episode.position_error.max() < 1e-3
