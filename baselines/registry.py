@@ -36,6 +36,8 @@ _places: dict[str, str] = {
     "null_space": f"{_SOLVERS}.resolved_rate.null_space:NullSpace",
     "truncated_svd": f"{_SOLVERS}.resolved_rate.truncated_svd:TruncatedSVD",
     "gram_schmidt": f"{_SOLVERS}.resolved_rate.gram_schmidt:GramSchmidt",
+    "qp": f"{_SOLVERS}.quadratic_program.qp:QuadraticProgram",
+    "sns": f"{_SOLVERS}.quadratic_program.sns:SaturationInNullSpace",
     "broyden": f"{_SOLVERS}.adaptive.broyden:Broyden",
     "rhc_gradient": f"{_SOLVERS}.receding_horizon.gradient:RecedingHorizonGradient",
     "rhc_lagrange": f"{_SOLVERS}.receding_horizon.lagrange:RecedingHorizonLagrange",
@@ -53,12 +55,19 @@ _places: dict[str, str] = {
     "agent_alone": "baselines.agents.shipped:AgentAlone",
     "agent_residual": "baselines.agents.shipped:AgentResidual",
     "fixed_point_extended": f"{_SOLVERS}.fixed_point.extended:FixedPointExtended",
+    "pink": f"{_SOLVERS}.rivals.pink:Pink",
+    "mink": f"{_SOLVERS}.rivals.mink:Mink",
+    "roboticstoolbox": f"{_SOLVERS}.rivals.roboticstoolbox:RoboticsToolbox",
+    "ssik": f"{_SOLVERS}.rivals.ssik:Ssik",
     "follow_nominal": f"{_SOLVERS}.references.follow_nominal:FollowNominal",
     "oracle": "baselines.oracle.policy:Oracle",
 }
 
-#: Those that are nothing by their name alone, and so are no part of "all policies".
-_incomplete: dict[str, str] = {"agent": "baselines.agents.policy:Agent"}
+#: Those that are nothing by their name alone, or but for some scenarios, and so are no part of "all policies".
+_incomplete: dict[str, str] = {
+    "agent": "baselines.agents.policy:Agent",
+    "published": f"{_SOLVERS}.references.published:Published",
+}
 
 
 def names() -> tuple[str, ...]:

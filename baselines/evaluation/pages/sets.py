@@ -12,6 +12,8 @@ from ikgym.trajectories import RandomSinusoid
 
 #: The test set that scores are published on, the long one beside it, and the one in the papers' own skew coordinates.
 MAIN, LONG, SKEW = "varga7-pose-random", "varga7-pose-random-long", "varga7-random"
+#: The arms of the page of rivals.
+RIVAL_ARMS = ("panda", "iiwa14", "tiago")
 #: Episodes of a random scenario that is no test set: the first of the test split.
 EPISODES = 32
 
@@ -58,6 +60,12 @@ def cost_time() -> tuple[str, ...]:
 def foresight() -> tuple[str, ...]:
     """What the foresight page plays."""
     return MAIN, LONG
+
+
+def rivals() -> tuple[str, ...]:
+    """What the page of rivals plays: the paths of real arms that are the same at every reset."""
+    every = map(scenarios.get, scenarios.names())
+    return tuple(s.name for s in every if s.name.startswith(tuple(f"{arm}-" for arm in RIVAL_ARMS)) and not s.random)
 
 
 def get(name: str) -> Scenario:

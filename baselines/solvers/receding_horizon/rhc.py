@@ -13,7 +13,7 @@ from baselines.policy.compiled import CompiledPolicy
 from baselines.solvers.arm_task import plain_arm_task
 from baselines.solvers.receding_horizon.newton.grid import offsets
 from baselines.solvers.receding_horizon.newton.receding import HorizonMemory, plan_rows
-from baselines.solvers.receding_horizon.newton.settings import PlanSettings, plain_settings
+from baselines.solvers.receding_horizon.newton.settings import PlanSettings, change_limit, plain_settings
 from ikgym.exceptions import InvalidInputError
 from ikgym.preview import FARTHEST
 from ikgym.validation import FloatArray, number, whole_number
@@ -37,7 +37,13 @@ class RecedingHorizon(CompiledPolicy):
     before, which at 1 kHz is close (the real-time iteration). A long horizon has many local minima, some
     of them very costly: several ``starts`` and restart candidates are for that.
 
-    The joint limits of the arm and the velocity limit of the scenario are constraints of the plan.
+    The limits of the arm and the velocity limit of the scenario are constraints of the plan. Between blocks of a and b
+    steps the velocity changes by at most q̈_max Δt (a + b) / 2, and from the velocity last applied by q̈_max Δt. Where
+    the horizon ends before the episode does, the last knot leaves the way that a stop takes, so that no plan runs into
+    a joint limit that it does not see yet; with ``stop_at_end`` nothing comes behind the episode's end. Arms with
+    limits of acceleration are planned for by an interior point method, see :mod:`newton.interior_point`: to
+    convergence to the optimum, with a number of iterations with a barrier parameter that stays, and without limits
+    nothing changes.
 
     Args:
         problem: What the policy is told of the scenario.
@@ -131,6 +137,7 @@ class RecedingHorizon(CompiledPolicy):
             self.start_steps,
             self.recovery_steps,
             rate_weight,
+            change_limit(model.acceleration_limit, problem.dt),
         )
         blocks = plain_arm_task(problem), model.chain.prismatic, *plain_settings(problem.cost.parameters, settings)
         object.__setattr__(self, "_constants", blocks)
