@@ -99,7 +99,7 @@ def long_costs(seeds, **parameters):
 
 def test_1500_steps_of_foresight_are_too_few_in_a_long_episode():
     """How the arm moves in its null space from the first step on decides what the last 300 of 3,000 steps cost."""
-    assert 1.2 * long_costs([1_000_038]) < long_costs([1_000_038], horizon=1501, move_blocks=57)
+    assert 2.0 * long_costs([1_000_038]) < long_costs([1_000_038], horizon=1501, move_blocks=57)
 
 
 @pytest.mark.slow
