@@ -281,7 +281,7 @@ class Scenario(Frozen):
         Raises:
             InvalidInputError: The scenario is random and there is no seed, or the arm cannot be there.
         """
-        return self.first_q(self._episode(seed))
+        return self.first_q(self.episode(seed))
 
     def first_q_of(self, episodes: Sequence[Trajectory]) -> FloatArray:
         """The joint coordinates at the start of several episodes, as :meth:`first_q` gives them. Shape (k, n).

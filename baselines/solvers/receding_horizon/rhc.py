@@ -103,8 +103,6 @@ class RecedingHorizon(CompiledPolicy):
     def __post_init__(self) -> None:
         if whole_number("horizon", self.horizon, at_least=2) > FARTHEST:
             raise InvalidInputError(f"horizon: expected at most {FARTHEST}, got {self.horizon}.")
-        if self.iterations is not None:
-            whole_number("iterations", self.iterations, at_least=1)
         if self.move_blocks is not None and whole_number("move_blocks", self.move_blocks, at_least=1) >= self.horizon:
             raise InvalidInputError(
                 f"move_blocks: expected at most horizon - 1 = {self.horizon - 1}, a knot at each step, got "
@@ -113,7 +111,7 @@ class RecedingHorizon(CompiledPolicy):
         if not isinstance(self.stop_at_end, (bool, np.bool_)):
             raise InvalidInputError(f"stop_at_end: expected True or False, got {self.stop_at_end!r}.")
         terminal_weight = number("terminal_weight", self.terminal_weight, at_least=0.0)
-        for name, least in LEAST.items():
+        for name, least in {**LEAST, **({} if self.iterations is None else {"iterations": 1})}.items():
             if whole_number(name, getattr(self, name), at_least=least) > MOST:
                 raise InvalidInputError(f"{name}: expected at most {MOST}, got {getattr(self, name)}.")
         if self.start_steps and not self.restart_steps:
