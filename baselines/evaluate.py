@@ -22,6 +22,7 @@ import tyro
 from baselines import command
 from baselines.evaluation import report
 from baselines.evaluation.entrants import ALL, AnyPolicy, Wrap
+from baselines.evaluation.export import formats
 from baselines.evaluation.machine import describe
 from baselines.evaluation.manual import manual
 from baselines.evaluation.plan import EvaluationPlan, make_plan
@@ -29,6 +30,7 @@ from baselines.evaluation.results import Results, Rows
 from baselines.evaluation.runner import run
 from baselines.files import write
 from baselines.files.locks import locked
+from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Preview, Scenario
 from ikgym.validation import whole_number
 
@@ -50,6 +52,7 @@ def evaluate(
     resume: bool = False,
     overwrite: bool = False,
     plots: bool = True,
+    export: str | Iterable[str] = (),
     progress: bool = False,
 ) -> Rows:
     """Plays all policies on all scenarios, and measures them.
@@ -86,6 +89,8 @@ def evaluate(
         resume: Goes on with what is in `out`.
         overwrite: Overwrites what is in `out`.
         plots: Whether to draw plots; needs `out`.
+        export: What the joint motion of each episode is written as: ``"csv"``, ``"joint-trajectory"`` or both, see
+            :mod:`baselines.evaluation.export`; needs `out`.
         progress: Whether to show a bar on stderr.
 
     Returns:
@@ -93,14 +98,15 @@ def evaluate(
         not suit a scenario.
 
     Raises:
-        UnknownNameError: There is no such scenario, policy, parameter, split or test set.
+        UnknownNameError: There is no such scenario, policy, parameter, split, test set or format.
         InvalidInputError: A value is out of range, a policy cannot be imported, refuses what it is shown, is shown
             nothing, cannot go to a worker or chooses no action; nothing suits any scenario; a test set has drifted or
-            is to be changed.
+            is to be changed; something is to be exported, and there is no `out`.
         ResultsError: `out` cannot be read or written, or is not to be gone on with; the file of an agent cannot be
             used.
         WorkerError: A worker process has died.
     """
+    written = _formats(export, out)
     plan = make_plan(
         scenarios,
         policies,
@@ -112,6 +118,7 @@ def evaluate(
         wrap=wrap,
         timed=timed,
         trust=trust,
+        exported=bool(written),
     )
     folder = None if out is None else pathlib.Path(out)
     return _carry_out(
@@ -121,6 +128,7 @@ def evaluate(
         resume=resume,
         overwrite=overwrite,
         plots=plots,
+        export=written,
         progress=progress,
         command="baselines.evaluate.evaluate(…)",
     )
@@ -134,13 +142,16 @@ def _carry_out(
     resume: bool,
     overwrite: bool,
     plots: bool,
+    export: Sequence[str],
     progress: bool,
     command: str,
     show: Callable[[Rows], None] | None = None,
 ) -> Rows:
     whole_number("workers", workers, at_least=1)
     with contextlib.nullcontext() if out is None else locked(out):
-        results = None if out is None else Results(out, plan, describe(), resume=resume, overwrite=overwrite)
+        results = None
+        if out is not None:
+            results = Results(out, plan, describe(), resume=resume, overwrite=overwrite, export=export)
         left = [job for job in plan.jobs if results is None or not results.done(job)]
         rows = {} if results is None else {row.key: row for row in results.rows}
         with contextlib.closing(run(left, workers=workers, progress=progress)) as batches:
@@ -154,6 +165,14 @@ def _carry_out(
         if results is not None:
             _finish(results, plan, plots=plots, progress=progress, command=command)
         return of_all
+
+
+def _formats(names: str | Iterable[str], out: object) -> tuple[str, ...]:
+    """What is exported, checked before anything is played."""
+    found = formats(names)
+    if found and out is None:
+        raise InvalidInputError("export: expected a folder, `out` or --out, that receives the files; got none.")
+    return found
 
 
 def _finish(results: Results, plan: EvaluationPlan, *, plots: bool, progress: bool, command: str) -> None:
@@ -208,6 +227,9 @@ class Options:
     fewer processes there are."""
     plots: bool = True
     """Draw plots into the folder."""
+    export: Annotated[tuple[str, ...], tyro.conf.arg(metavar="FORMAT …")] = ()
+    """Write the joint motion of each episode into the folder: csv for times, joint coordinates and velocities as a
+    table, joint-trajectory for a message of ROS 2 as JSON, or both."""
     operations: bool = False
     """Print what a step costs in evaluations of the kinematics, factorisations and measured poses, too."""
 
@@ -230,6 +252,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         out = options.out
         if (here := str(pathlib.Path.cwd())) not in sys.path:
             sys.path.append(here)  # for modules of the user, where a console command does not look
+        written = _formats(options.export, out)
         plan = make_plan(
             options.scenarios or (() if options.test_sets else ("varga7-fast",)),
             options.policies,
@@ -240,6 +263,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             preview=options.preview,
             timed=options.timed,
             trust=options.trust,
+            exported=bool(written),
         )
         _carry_out(
             plan,
@@ -248,6 +272,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             resume=options.resume,
             overwrite=options.overwrite,
             plots=options.plots,
+            export=written,
             progress=True,
             command=shlex.join([*_program().split(), *arguments]),
             show=lambda rows: print(

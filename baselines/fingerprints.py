@@ -60,8 +60,8 @@ def _canonical(value: Any) -> Any:
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         fields = {f.name: _canonical(getattr(value, f.name)) for f in dataclasses.fields(value) if f.init}
         if isinstance(value, Arm):
-            # A posture to start from moves nothing by itself.
-            del fields["home"]
+            # A posture to start from moves nothing by itself, nor does what joints are called.
+            del fields["home"], fields["joint_names"]
         if isinstance(value, Arm) and not value.limited:
             # Without any limit the plant moves as it did before it knew limits, and its digest is the one of then.
             del fields["acceleration_limit"]

@@ -53,6 +53,10 @@ _places: dict[str, str] = {
     "agent_alone": "baselines.agents.shipped:AgentAlone",
     "agent_residual": "baselines.agents.shipped:AgentResidual",
     "fixed_point_extended": f"{_SOLVERS}.fixed_point.extended:FixedPointExtended",
+    "pink": f"{_SOLVERS}.rivals.pink:Pink",
+    "mink": f"{_SOLVERS}.rivals.mink:Mink",
+    "roboticstoolbox": f"{_SOLVERS}.rivals.roboticstoolbox:RoboticsToolbox",
+    "ssik": f"{_SOLVERS}.rivals.ssik:Ssik",
     "follow_nominal": f"{_SOLVERS}.references.follow_nominal:FollowNominal",
     "oracle": "baselines.oracle.policy:Oracle",
 }

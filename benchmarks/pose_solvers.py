@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.rivals.arm_urdf import BASE, TIP, arm_urdf
+from baselines.solvers.rivals.model_files import BASE, TIP, urdf
 from ikgym.arms import Arm
 from ikgym.validation import FloatArray
 
@@ -95,7 +95,7 @@ def ssik(arm: Arm) -> Solve:
 
 def _file(arm: Arm, folder: str) -> Path:
     file = Path(folder) / f"{arm.name}.urdf"
-    file.write_text(arm_urdf(arm), encoding="utf-8")
+    file.write_text(urdf(arm), encoding="utf-8")
     return file
 
 

@@ -30,6 +30,7 @@ Examples:
   {prog} --scenarios varga7-random --episodes 50 --out results/random --resume
   {prog} --test-sets varga7-pose-random --policies rhc_gradient --out results/test
   {prog} --scenarios varga7-random --policies agent:runs/mine.safetensors dls
+  {prog} --scenarios lab.toml --policies dls --out results/lab --export csv joint-trajectory
   {prog} --scenarios lab.toml my_module:scenario --policies my_module:MyPolicy dls
 
 Files in the folder of --out, each replaced in one go, so that a run may be stopped at any time:
@@ -38,6 +39,7 @@ Files in the folder of --out, each replaced in one go, so that a run may be stop
   README.md     tables, plots and conditions
   plots/        for each scenario: tracking and errors, joint velocities, joint paths, cost against time
   series/       what the plots show, as .npz
+  export/       with --export, the joint motion of each episode
 
 Columns:
   scenario, policy, parameters, seed, steps      which episode it is

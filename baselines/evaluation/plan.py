@@ -38,6 +38,7 @@ class Job:
         preview: Steps ahead that the policy is shown, or which ones.
         fingerprint: Of the scenario.
         test_set: The digest of the test set that it belongs to, None where to none.
+        exported: Whether its joint motion is kept.
     """
 
     scenario: Scenario
@@ -51,6 +52,7 @@ class Job:
     preview: Preview
     fingerprint: str
     test_set: str | None
+    exported: bool = False
 
     @property
     def key(self) -> tuple[str, str, str, int, int]:
@@ -99,6 +101,7 @@ def make_plan(
     wrap: Wrap | None = None,
     timed: int | Literal["all"] = 1,
     trust: bool = False,
+    exported: bool = False,
 ) -> EvaluationPlan:
     """All episodes of an evaluation, policy by policy within each scenario.
 
@@ -113,6 +116,7 @@ def make_plan(
         wrap: Wraps the environment for those that are no :class:`baselines.SolverPolicy`.
         timed: Episodes of each policy in each scenario that are timed, ``"all"`` for all of them.
         trust: Whether the files of all agents given are trusted, see :class:`baselines.agents.policy.Agent`.
+        exported: Whether the joint motions of all episodes are kept.
 
     Raises:
         UnknownNameError: There is no such scenario, policy, parameter, split or test set.
@@ -144,7 +148,7 @@ def make_plan(
             for number, seed in enumerate(seeds):
                 given = one.for_episode(scenario, seed)
                 first, alone = number == 0, number < clocked
-                job = Job(scenario, one.name, one, given, own, seed, first, alone, shown, digest, label)
+                job = Job(scenario, one.name, one, given, own, seed, first, alone, shown, digest, label, exported)
                 jobs.setdefault(job.key, job)
     if not jobs:
         raise InvalidInputError(

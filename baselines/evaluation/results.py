@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 import ikgym
 from baselines.canonical import canonical
+from baselines.evaluation.export import FORMATS, Format
 from baselines.evaluation.metrics import Row
 from baselines.evaluation.plan import EvaluationPlan, Job, Skipped
 from baselines.evaluation.runner import Played
@@ -46,7 +47,8 @@ class Results:
     """The folder of an evaluation.
 
     `results.json` holds all rows and is written anew after each batch of episodes; the trajectory logs of the first
-    episodes lie in `series/SCENARIO/POLICY-….npz`. Every file is replaced in one go, so that none is ever half written.
+    episodes lie in `series/SCENARIO/POLICY-….npz`, joint motions in `export/SCENARIO/POLICY-…-seed-N.csv` and `.json`.
+    Every file is replaced in one go, so that none is ever half written.
 
     Args:
         directory: The folder; made if it is not there.
@@ -54,6 +56,7 @@ class Results:
         machine: What it is done on, see :func:`baselines.evaluation.machine.describe`.
         resume: Goes on with what is there.
         overwrite: Overwrites what is there.
+        export: What joint motions are written as, names of :data:`baselines.evaluation.export.FORMATS`.
 
     Raises:
         ResultsError: The folder cannot be written; has results, and neither flag is given; is to be gone on with
@@ -68,7 +71,9 @@ class Results:
         *,
         resume: bool = False,
         overwrite: bool = False,
+        export: Sequence[str] = (),
     ) -> None:
+        self._export = [FORMATS[name] for name in export]
         if resume and overwrite:
             raise ResultsError("--resume keeps the results that are there, --overwrite replaces them: choose one.")
         self.directory = directory
@@ -102,10 +107,12 @@ class Results:
         return besides + [self._rows[key] for key in self._order if key in self._rows]
 
     def done(self, job: Job) -> bool:
-        """Whether an episode has been played, timed if it is to be, and its trajectory log kept where it is to be."""
+        """Whether an episode has been played, timed if it is to be, and its trajectory log and motion kept."""
         row = self._rows.get(job.key)
         untimed = job.timed and (row is None or row.time_first_us is None)
-        return row is not None and not untimed and not (job.first and not self.series_file(job).exists())
+        wanted = [self.series_file(job)] if job.first else []
+        wanted += [self.export_file(job, kind) for kind in self._export]
+        return row is not None and not untimed and all(file.exists() for file in wanted)
 
     def add(self, played: Iterable[Played]) -> None:
         """Keeps results.
@@ -116,11 +123,14 @@ class Results:
         Raises:
             ResultsError: The folder cannot be written.
         """
-        for job, row, log in played:
+        for job, row, log, motion in played:
             if log is not None:
                 file = io.BytesIO()
                 np.savez_compressed(file, allow_pickle=False, **log)
                 write(self.series_file(job), file.getvalue())
+            if motion is not None:
+                for kind in self._export:
+                    write(self.export_file(job, kind), kind.content(motion))
             self._rows[row.key] = row
         self.save()
 
@@ -149,9 +159,16 @@ class Results:
 
     def series_file(self, of: Job | Row) -> pathlib.Path:
         """Where the trajectory log of the first episode of a policy in a scenario is kept."""
+        return self._file_of(of, "series", ".npz")
+
+    def export_file(self, of: Job | Row, kind: Format) -> pathlib.Path:
+        """Where the joint motion of an episode is written."""
+        return self._file_of(of, "export", f"-seed-{of.seed}{kind.suffix}")
+
+    def _file_of(self, of: Job | Row, folder: str, ending: str) -> pathlib.Path:
         scenario = of.scenario if isinstance(of, Row) else of.scenario.name
         digest = hashlib.sha256(canonical(of.parameters).encode()).hexdigest()[:8]
-        return self.directory / "series" / slug(scenario) / f"{slug(of.policy)}-{digest}.npz"
+        return self.directory / folder / slug(scenario) / f"{slug(of.policy)}-{digest}{ending}"
 
     def series(self, row: Row) -> dict[str, npt.NDArray[Any]]:
         """The trajectory log of the first episode of a row's policy in its scenario.
@@ -170,6 +187,7 @@ class Results:
         stale = [self._file, self.directory / "results.csv", self.directory / "README.md"]
         stale += self.directory.glob("series/*/*.npz")
         stale += self.directory.glob("plots/*/*.png")
+        stale += [file for kind in FORMATS.values() for file in self.directory.glob(f"export/*/*{kind.suffix}")]
         try:
             for file in stale:
                 file.unlink(missing_ok=True)

@@ -18,6 +18,7 @@ from tqdm import tqdm
 
 from baselines.canonical import canonical, jsonable
 from baselines.evaluation.entrants import ForeignPolicy, check_sendable, play_wrapped
+from baselines.evaluation.export import Motion
 from baselines.evaluation.machine import describe
 from baselines.evaluation.metrics import Row, measure
 from baselines.evaluation.plan import Job
@@ -45,11 +46,13 @@ class Played(NamedTuple):
         job: What was to be done.
         row: What came out.
         log: The trajectory log of the episode if the job is a first one.
+        motion: The joint motion if it is to be kept.
     """
 
     job: Job
     row: Row
     log: TrajectoryLog | None
+    motion: Motion | None
 
 
 def run(jobs: Sequence[Job], *, workers: int, progress: bool) -> Generator[list[Played], None, None]:
@@ -178,10 +181,13 @@ def play(batch: Sequence[Job], tick: Tick | None = None) -> list[Played]:
     # would be heeded only by libraries that are not loaded yet, and NumPy is.
     with threadpool_limits(limits=1):
         episodes = play_episodes(first.scenario, first.make(), seeds, first.preview, timed=first.timed, tick=tick)
-    return [
-        Played(job, _row(job, one), trajectory_log(job.scenario, job.seed, one) if job.first else None)
-        for job, one in zip(batch, episodes, strict=True)
-    ]
+    return [_played(job, one) for job, one in zip(batch, episodes, strict=True)]
+
+
+def _played(job: Job, episode: Episode) -> Played:
+    about = job.scenario, job.seed, episode
+    log = trajectory_log(*about) if job.first else None
+    return Played(job, _row(job, episode), log, Motion.of(*about) if job.exported else None)
 
 
 def play_episodes(

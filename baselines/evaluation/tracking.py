@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import csv
 import dataclasses
-import io
 import os
 import pathlib
 from typing import Any
@@ -16,6 +14,7 @@ from threadpoolctl import threadpool_limits
 
 from baselines.episode import added_up
 from baselines.evaluation.entrants import AnyPolicy, Wrap, entrant
+from baselines.evaluation.export import Motion, message, table
 from baselines.evaluation.plots import tracking as picture
 from baselines.evaluation.rollout import Episode
 from baselines.evaluation.runner import play_episodes
@@ -48,6 +47,7 @@ class Tracking:
         velocity_cost: Φ^U, 0 where the step does not count. Shape (steps,).
         statuses: Values of :class:`baselines.Status`. Shape (steps,).
         prismatic: Which joints are prismatic. Shape (n,).
+        motion: The joint motion from the start on, with the names of the joints.
     """
 
     scenario: str
@@ -65,6 +65,7 @@ class Tracking:
     velocity_cost: FloatArray
     statuses: npt.NDArray[np.int64]
     prismatic: npt.NDArray[np.bool_]
+    motion: Motion = dataclasses.field(repr=False)
     _log: dict[str, npt.NDArray[Any]] = dataclasses.field(repr=False)
 
     @property
@@ -100,13 +101,15 @@ class Tracking:
         Raises:
             ResultsError: The file cannot be written.
         """
-        columns = self.columns()
-        text = io.StringIO(newline="")
-        table = csv.writer(text, lineterminator="\n")
-        table.writerow(columns)
-        for cells in zip(*(values.tolist() for values in columns.values()), strict=True):
-            table.writerow(["" if cell != cell else cell for cell in cells])
-        write(pathlib.Path(file), text.getvalue().encode())
+        write(pathlib.Path(file), table(self.columns()))
+
+    def to_joint_trajectory(self, file: str | os.PathLike[str]) -> None:
+        """Writes the joint motion, from the start, as a ROS 2 `JointTrajectory` in JSON; see :class:`Motion`.
+
+        Raises:
+            ResultsError: The file cannot be written.
+        """
+        write(pathlib.Path(file), message(self.motion))
 
     def plot(self) -> Figure:
         """Task coordinates with those of the reference, and errors, over time, at the steps that count."""
@@ -167,5 +170,5 @@ def _tracking(scenario: Scenario, policy: str, parameters: dict[str, Any], seed:
         },
     }  # fmt: skip
     kept: dict[str, Any] = {name: read_only(np.array(values)) for name, values in arrays.items()}
-    log = trajectory_log(scenario, seed, episode)
-    return Tracking(scenario.name, policy, parameters, seed, **kept, _log=log)
+    log, motion = trajectory_log(scenario, seed, episode), Motion.of(scenario, seed, episode)
+    return Tracking(scenario.name, policy, parameters, seed, **kept, motion=motion, _log=log)

@@ -26,7 +26,8 @@ def trajectory_log(scenario: Scenario, seed: int, episode: Episode) -> Trajector
         ``time`` in [s], of shape (k,), and over it ``nominal`` and ``pose`` (k, m), ``q`` and ``qdot`` (k, n),
         ``position_error`` and, where there is one, ``orientation_error`` (k,); ``nominal_q`` (k, n) where there is a
         nominal joint path; ``prismatic`` says which joints are prismatic, ``lower``, ``upper`` and ``velocity_limit``
-        what the arm is limited to, infinite where it is not, all of shape (n,).
+        what the arm is limited to, infinite where it is not, all of shape (n,). Where it has limits of acceleration,
+        ``acceleration_limit`` (n,), and ``qddot`` (k, n): the change of q̇ in the step by Δt, from rest at the start.
     """
     after = np.flatnonzero(scenario.counted())
     kept = after - 1
@@ -44,6 +45,10 @@ def trajectory_log(scenario: Scenario, seed: int, episode: Episode) -> Trajector
     }
     if scenario.task.has_orientation:
         log["orientation_error"] = episode.orientation_error[kept]
+    if np.isfinite(scenario.arm.acceleration_limit).any():
+        start = np.zeros((1, scenario.joints))
+        log["qddot"] = (np.diff(episode.qdot, axis=0, prepend=start) / scenario.dt)[kept]
+        log["acceleration_limit"] = scenario.arm.acceleration_limit
     path = scenario.nominal_joint_path(seed)
     if path is not None:
         log["nominal_q"] = path[after]

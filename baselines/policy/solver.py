@@ -50,6 +50,8 @@ class SolverPolicy(Frozen, abc.ABC):
     reference: ClassVar[bool] = False
     #: Whether its numbers are those of one scenario: an example of a paper, no contender elsewhere.
     example: ClassVar[bool] = False
+    #: Whether it is a solver of another project, whose package is installed with the extra `rivals`.
+    rival: ClassVar[bool] = False
     #: Rows that are worth a thread of their own: the fewer, the longer a row takes.
     grain: ClassVar[int] = 256
     #: Whether the policy is read from a file, as learned agents are.

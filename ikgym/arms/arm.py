@@ -73,10 +73,12 @@ class Arm(Frozen):
         acceleration_limit: Largest accelerations of the joints in [rad/s²] or [m/s²], inf where there is none.
             Shape (n,).
         home: A posture away from limits and singularities in [rad] or [m], None where none is stated. Shape (n,).
+        joint_names: What the joints are called where their coordinates are handed on, n different texts; ``joint_1``,
+            ``joint_2``, … if they are left out.
 
     Raises:
-        InvalidInputError: A shape, an axis, an orientation or a limit is wrong, home is outside the limits, or a
-            length beyond 1e12.
+        InvalidInputError: A shape, an axis, an orientation, a limit or a joint's name is wrong, home is outside the
+            limits, or a length beyond 1e12.
     """
 
     name: str
@@ -90,6 +92,7 @@ class Arm(Frozen):
     velocity_limit: FloatArray = None  # type: ignore[assignment]  # none
     acceleration_limit: FloatArray = None  # type: ignore[assignment]  # none
     home: FloatArray | None = None
+    joint_names: Sequence[str] = ()
     chain: Chain = dataclasses.field(init=False, repr=False)
     #: The URDF file that the arm was read from, None for all other arms and for changed copies.
     urdf: UrdfReference | None = dataclasses.field(init=False, repr=False, default=None)
@@ -128,6 +131,7 @@ class Arm(Frozen):
             "upper": upper,
             "velocity_limit": velocity_limit,
             "acceleration_limit": acceleration_limit,
+            "joint_names": _joint_names(self.name, self.joint_names, n),
             "chain": chain,
         }.items():
             object.__setattr__(self, field, value)
@@ -279,6 +283,19 @@ def _unit_axes(name: str, axes: FloatArray) -> FloatArray:
     # A unit vector divided by its rounded length again may change in the last bit: a copy of an arm is that arm.
     exact = np.abs(lengths - 1.0) <= ROUNDING
     return np.where(exact[:, None], axes, axes / lengths[:, None])
+
+
+def numbered_joints(n: int) -> tuple[str, ...]:
+    """What joints without names of their own are called."""
+    return tuple(f"joint_{i + 1}" for i in range(n))
+
+
+def _joint_names(name: str, given: Sequence[str], n: int) -> tuple[str, ...]:
+    names = (tuple(given) or numbered_joints(n)) if isinstance(given, (tuple, list)) else ()
+    texts = [one for one in names if isinstance(one, str) and one]
+    if not len(texts) == len(set(texts)) == len(names) == n:
+        raise InvalidInputError(f"joint_names of arm {name!r}: expected {n} different texts, got {given!r}.")
+    return names
 
 
 def _limits(

@@ -18,6 +18,13 @@ UPPER = np.array([0.38615, 1.6056, 1.518, np.inf, 2.251, np.inf, 2.16, np.inf])
 VELOCITY = np.array([0.1, 1.256, 1.454, 1.571, 1.521, 1.571, 2.268, 2.268])
 ACCELERATION = np.array([0.5, 1.5, 1.0, 1.5, 1.5, 1.5, 2.5, 2.5])
 HOME = np.array([0.2, 0, -0.5, 0, 1.5, 0, -1, 0])
+NAMES = tuple(
+    f"{part}_joint"
+    for part in (
+        *("torso_lift", "shoulder_pan", "shoulder_lift", "upperarm_roll"),
+        *("elbow_flex", "forearm_roll", "wrist_flex", "wrist_roll"),
+    )
+)
 
 
 def fetch() -> Arm:
@@ -38,6 +45,7 @@ def fetch() -> Arm:
         velocity_limit=VELOCITY,
         acceleration_limit=ACCELERATION,
         home=HOME,
+        joint_names=NAMES,
     )
 
 
@@ -53,6 +61,7 @@ def fetch_arm() -> Arm:
         velocity_limit=VELOCITY[1:],
         acceleration_limit=ACCELERATION[1:],
         home=HOME[1:],
+        joint_names=NAMES[1:],
     )
 
 

@@ -33,6 +33,7 @@ def rizon4() -> Arm:
         upper=np.array([2.7925, 2.2689, 2.9671, 2.6878, 2.9671, 4.5379, 2.9671]),
         velocity_limit=np.array([2.0944, 2.0944, 2.4435, 2.4435, 4.8869, 4.8869, 4.8869]),
         home=np.radians([0.0, -40.0, 0.0, 90.0, 0.0, 40.0, 0.0]),
+        joint_names=[f"joint{i}" for i in range(1, 8)],
     )
 
 

@@ -18,7 +18,9 @@ FLANGE = np.array([0, 0, -0.107])
 FLANGE_ROTATION = np.diag([1.0, -1.0, -1.0])
 #: The posture that both arms are delivered and started in.
 READY = np.pi * np.array([0, -1 / 4, 0, -3 / 4, 0, 1 / 2, 1 / 4])
-PANDA_LIMITS: dict[str, Any] = {
+#: What the calibrated Pandas share with the nominal one.
+PANDA: dict[str, Any] = {
+    "joint_names": [f"panda_joint{i}" for i in range(1, 8)],
     "lower": np.array([-2.8973, -1.7628, -2.8973, -3.0718, -2.8973, -0.0175, -2.8973]),
     "upper": np.array([2.8973, 1.7628, 2.8973, -0.0698, 2.8973, 3.7525, 2.8973]),
     "velocity_limit": np.array([2.175, 2.175, 2.175, 2.175, 2.61, 2.61, 2.61]),
@@ -33,7 +35,7 @@ def panda() -> Arm:
     `robosuite`. Accelerations: libfranka 0.9 (Apache-2.0) and the FCI documentation. MoveIt's quarters of these
     accelerations are a planner's caution, and were not taken.
     """
-    return Arm("panda", OFFSETS, AXES, tool=FLANGE, tool_rotation=FLANGE_ROTATION, home=READY, **PANDA_LIMITS)
+    return Arm("panda", OFFSETS, AXES, tool=FLANGE, tool_rotation=FLANGE_ROTATION, home=READY, **PANDA)
 
 
 def fr3() -> Arm:
@@ -54,6 +56,7 @@ def fr3() -> Arm:
         velocity_limit=np.array([2.62, 2.62, 2.62, 2.62, 5.26, 4.18, 5.26]),
         acceleration_limit=np.full(7, 10.0),
         home=READY,
+        joint_names=[f"fr3_joint{i}" for i in range(1, 8)],
     )
 
 

@@ -23,6 +23,7 @@ def from_home(
     upper: npt.ArrayLike | None = None,
     velocity_limit: npt.ArrayLike | None = None,
     acceleration_limit: npt.ArrayLike | None = None,
+    joint_names: Sequence[str] = (),
 ) -> Arm:
     """An arm from the home pose of its joints and of its tool, all in the base frame.
 
@@ -40,6 +41,7 @@ def from_home(
         upper: Upper limits of the joints in [rad] or [m]. Shape (n,).
         velocity_limit: Largest speeds of the joints in [rad/s] or [m/s]. Shape (n,).
         acceleration_limit: Largest accelerations of the joints in [rad/s²] or [m/s²]. Shape (n,).
+        joint_names: What the joints are called, n different texts.
 
     Returns:
         The arm.
@@ -58,4 +60,5 @@ def from_home(
         upper=upper,  # type: ignore[arg-type]
         velocity_limit=velocity_limit,  # type: ignore[arg-type]
         acceleration_limit=acceleration_limit,  # type: ignore[arg-type]
+        joint_names=joint_names,
     )

@@ -25,6 +25,7 @@ def iiwa14() -> Arm:
         upper=upper,
         velocity_limit=np.radians([85.0, 85.0, 100.0, 75.0, 130.0, 135.0, 135.0]),
         home=np.radians([0.0, 30.0, 0.0, -90.0, 0.0, 60.0, 0.0]),
+        joint_names=[f"joint_a{i}" for i in range(1, 8)],
     )
 
 

@@ -38,6 +38,7 @@ def tiago() -> Arm:
         upper=np.array([0.35, 7 * turn, 1.0908307825, 4 * turn, 6 * turn, 2 * np.pi / 3, 3.6 * turn, 2 * np.pi / 3]),
         velocity_limit=np.array([0.07, 2.7, 3.66, 4.58, 4.58, 1.95, 1.76, 1.76]),
         home=np.array([0.1, 1, 0.5, -2, 1.5, -0.75, -0.5, -0.75]),
+        joint_names=["torso_lift_joint", *(f"arm_{i}_joint" for i in range(1, 8))],
     )
 
 

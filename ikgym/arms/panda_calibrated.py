@@ -11,7 +11,7 @@ from functools import partial
 import numpy as np
 
 from ikgym.arms.arm import Arm
-from ikgym.arms.franka import PANDA_LIMITS, READY
+from ikgym.arms.franka import PANDA, READY
 from ikgym.arms.home import from_home
 from ikgym.rotations import rodrigues
 
@@ -82,7 +82,7 @@ def calibrated(name: str) -> Arm:
         roll, pitch, yaw = origin[3:]
         rotation = rotation @ rodrigues(z, yaw) @ rodrigues(y, pitch) @ rodrigues(x, roll)
         axes[i], points[i] = rotation[:, 2], position
-    return from_home(name, axes, points, 7 * (False,), rotation, position + rotation @ FLANGE, **PANDA_LIMITS).replace(
+    return from_home(name, axes, points, 7 * (False,), rotation, position + rotation @ FLANGE, **PANDA).replace(
         home=READY
     )
 

@@ -35,6 +35,7 @@ def xarm7() -> Arm:
         upper=np.array([turn, 2.0944, turn, 3.927, turn, np.pi, turn]),
         velocity_limit=np.full(7, 3.14),
         home=np.array([0, -0.25, 0, 1.25, 0, 1.5, 0]),
+        joint_names=[f"joint{i}" for i in range(1, 8)],
     )
 
 

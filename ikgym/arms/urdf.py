@@ -42,9 +42,10 @@ def from_urdf(
 ) -> Arm:
     """An arm from the chain between two links of a URDF file.
 
-    Revolute, continuous, prismatic and fixed joints are read, with their limits of position and velocity; a continuous
-    joint has none of position. A URDF has no limits of acceleration: ``arm.replace(acceleration_limit=…)`` adds them.
-    Joints off the chain, a gripper's for example, have no coordinate in the arm. Meshes are never opened.
+    Revolute, continuous, prismatic and fixed joints are read, with their names and their limits of position and
+    velocity; a continuous joint has none of position. A URDF has no limits of acceleration:
+    ``arm.replace(acceleration_limit=…)`` adds them. Joints off the chain, a gripper's for example, have no coordinate
+    in the arm. Meshes are never opened.
 
     An axis whose length differs from 1 by more than 1e-2 is an error; within that it is taken to be rounded,
     and is scaled to unit length. Files with a DOCTYPE, of more than 16 MiB, or with more than 128 joints
@@ -88,6 +89,7 @@ def from_urdf(
             lower=[joint.lower for joint in moving],
             upper=[joint.upper for joint in moving],
             velocity_limit=[joint.velocity for joint in moving],
+            joint_names=[joint.name for joint in moving],
         )
         object.__setattr__(arm, "urdf", UrdfReference(Path(path).resolve(), base, tip, tool, tool_rotation))
         return arm

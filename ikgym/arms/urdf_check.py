@@ -31,6 +31,7 @@ class UrdfJoint(NamedTuple):
     """A joint of the chain, its numbers checked.
 
     Attributes:
+        name: What the file calls it.
         kind: One of ``READABLE``.
         xyz: Where the joint is in the frame of the joint before, in [m]. Three numbers.
         rpy: Roll, pitch and yaw of its frame in [rad]. Three numbers.
@@ -40,6 +41,7 @@ class UrdfJoint(NamedTuple):
         velocity: Largest speed in [rad/s] or [m/s], inf where there is none.
     """
 
+    name: str
     kind: str
     xyz: tuple[float, ...]
     rpy: tuple[float, ...]
@@ -168,7 +170,7 @@ class _Tree:
 
 
 def _joint(element: Element) -> UrdfJoint:
-    where, kind = _label(element), element.get("type", "")
+    where, kind, name = _label(element), element.get("type", ""), element.get("name", "")
     if kind not in READABLE:
         raise InvalidInputError(f"{where}: expected one of {_listing(READABLE)} on the way to the tip, got {kind!r}.")
     if element.find("mimic") is not None:
@@ -193,7 +195,7 @@ def _joint(element: Element) -> UrdfJoint:
             (lower,), (upper,) = (_numbers(where, limit, key, 1) for key in ("lower", "upper"))
             if lower >= upper:
                 raise InvalidInputError(f"{where}: expected limits lower < upper, got {lower:g} and {upper:g}.")
-    return UrdfJoint(kind, xyz, rpy, axis, lower, upper, velocity)
+    return UrdfJoint(name, kind, xyz, rpy, axis, lower, upper, velocity)
 
 
 def _named(robot: Element, tag: str) -> dict[str, Element]:

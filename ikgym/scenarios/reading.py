@@ -98,7 +98,8 @@ def _arm(table: Table, key: str, folder: pathlib.Path) -> Arm:
         return arms.get(value)
     arm = checked(table, key, dict, "the name of an arm or a table")
     if "urdf" not in arm:
-        return _made(key, Arm, arm, texts=("name",), truths=("prismatic",))  # type: ignore[no-any-return]
+        # Both are checked by the arm.
+        return _made(key, Arm, arm, texts=("name",), truths=("prismatic", "joint_names"))  # type: ignore[no-any-return]
     with _named(f"[{key}] ", f" of [{key}]"):
         known_names("key", arm, (*URDF_TEXTS, *URDF_NUMBERS))
         for name in set(arm).intersection(URDF_NUMBERS):

@@ -258,6 +258,17 @@ class Scenario(Frozen):
         start: FloatArray = self.first_q_of([trajectory])[0]
         return start
 
+    def start_of(self, seed: int | None = None) -> FloatArray:
+        """The joint coordinates at the start of an episode in [rad] or [m]. Shape (n,).
+
+        Args:
+            seed: The reset seed; needed where the scenario is random.
+
+        Raises:
+            InvalidInputError: The scenario is random and there is no seed, or the arm cannot be there.
+        """
+        return self.first_q(self._episode(seed))
+
     def first_q_of(self, episodes: Sequence[Trajectory]) -> FloatArray:
         """The joint coordinates at the start of several episodes, as :meth:`first_q` gives them. Shape (k, n).
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from ikgym import arms, files, tasks
 from ikgym.arms import Arm
+from ikgym.arms.arm import numbered_joints
 from ikgym.cost import TrackingCost
 from ikgym.exceptions import IkgymError, InvalidInputError
 from ikgym.scenarios.disturbance import Disturbance
@@ -69,6 +70,8 @@ def _arm(arm: Arm, folder: pathlib.Path) -> str | dict[str, Any]:
         raise InvalidInputError(f"name of the arm: expected a text, got {arm.name!r}.")
     if arm.name in arms.SHIPPED and _same(arm, arms.get(arm.name)):
         return arm.name
+    if arm.joint_names == numbered_joints(arm.joints):
+        del numbers["joint_names"]
     return _urdf(arm, folder) or numbers
 
 

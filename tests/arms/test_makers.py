@@ -48,6 +48,11 @@ def test_limits_are_those_of_the_file(entry):
         np.testing.assert_allclose(np.where(np.isfinite(limit), limit, np.nan), there, atol=tolerance)
 
 
+@pytest.mark.parametrize("entry", [entry for entry in MAKERS if entry != "iiwa14"])  # by the driver's description
+def test_joints_are_called_what_the_file_calls_them(entry):
+    assert list(arms.get(entry.split("@")[0]).joint_names) == MAKERS[entry]["joints"]
+
+
 def test_every_maker_is_in_the_table():
     papers = {"varga7", "varga7_literal", "faitli3", "khan8", "khan8_approximate", "zhang3", "puma560"}
     with_limits = {name for name in arms.names() if arms.get(name).limited} - papers

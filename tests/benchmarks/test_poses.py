@@ -3,14 +3,10 @@
 import dataclasses
 
 import numpy as np
-import pinocchio as pin
 import pytest
 
 import ikgym
 from benchmarks import effort, pose_solvers, poses
-from benchmarks.rivals.arm_urdf import BASE, TIP, arm_urdf, roll_pitch_yaw
-from ikgym import arms
-from ikgym.rotations import rodrigues
 
 PANDA = ikgym.arms.get("panda")
 
@@ -44,7 +40,7 @@ def test_time_is_shared_by_the_poses_that_are_met():
 @pytest.mark.parametrize("label", [*pose_solvers.OURS, *pose_solvers.RIVALS])
 @pytest.mark.parametrize("name", poses.ARMS)
 def test_every_solver_meets_poses_of_the_very_arm(name, label):
-    arm = arms.get(name)
+    arm = ikgym.arms.get(name)
     try:
         solve = {**pose_solvers.OURS, **pose_solvers.RIVALS}[label](arm)
     except ImportError:
@@ -57,27 +53,3 @@ def test_tables_say_what_is_left_out():
     for table in poses.tables(dataclasses.replace(effort.QUICK)):
         assert set(pose_solvers.OURS) <= set(table.rows)
         assert len(table.rows) + len(table.skipped) == len(pose_solvers.OURS) + len(pose_solvers.RIVALS)
-
-
-@pytest.mark.parametrize("name", [n for n in arms.names() if np.isfinite(arms.get(n).upper).all()])
-def test_the_urdf_of_an_arm_is_that_arm(name):
-    arm = arms.get(name)
-    model = pin.buildModelFromXML(arm_urdf(arm))
-    data = model.createData()
-    for q in np.random.default_rng(0).uniform(arm.lower, arm.upper, (3, arm.joints)):
-        pin.framesForwardKinematics(model, data, q)
-        there = data.oMf[model.getFrameId(BASE)].actInv(data.oMf[model.getFrameId(TIP)])
-        rotation, position = arm.forward(q)
-        np.testing.assert_allclose(there.rotation, rotation, atol=1e-12)
-        np.testing.assert_allclose(there.translation, position, atol=1e-12)
-    np.testing.assert_array_equal(model.velocityLimit, arm.velocity_limit)
-    np.testing.assert_array_equal(model.upperPositionLimit, arm.upper)
-
-
-@pytest.mark.parametrize("pitch", [0.3, -1.2, np.pi / 2, -np.pi / 2])
-def test_roll_pitch_yaw_are_those_of_the_rotation(pitch):
-    x, y, z = np.eye(3)
-    rotation = rodrigues(z, 0.7) @ rodrigues(y, pitch) @ rodrigues(x, -0.4)
-    roll, tilt, yaw = roll_pitch_yaw(rotation)
-    again = rodrigues(z, yaw) @ rodrigues(y, tilt) @ rodrigues(x, roll)
-    np.testing.assert_allclose(again, rotation, atol=1e-9)

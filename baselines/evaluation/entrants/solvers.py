@@ -11,7 +11,7 @@ from baselines.evaluation.entrants.base import Entrant, covering
 from baselines.evaluation.rollout import Player
 from baselines.fingerprints import same
 from baselines.policy import Problem, SolverPolicy
-from ikgym.exceptions import InvalidInputError
+from ikgym.exceptions import InvalidInputError, MissingDependencyError
 from ikgym.scenarios import Preview, Scenario
 
 
@@ -44,11 +44,14 @@ class SolverEntrant(Entrant):
         return {name: jsonable(value) for name, value in player.parameters.items() if name not in hidden}
 
     def unsuited(self, scenario: Scenario, seed: int, preview: Preview | None) -> str | None:
-        """See :meth:`Entrant.unsuited`; a policy that is refused with other parameters only is not unsuited."""
+        """See :meth:`Entrant.unsuited`; a policy that is refused with other parameters only is not unsuited.
+
+        One whose package is not installed suits no scenario here.
+        """
         decisive = {key: self.given[key] for key in self.kind.decisive if key in self.given}
         try:
             self.make(scenario, {**self._seeded(scenario, seed), **decisive}, preview)
-        except InvalidInputError as e:
+        except (InvalidInputError, MissingDependencyError) as e:
             return str(e)
         return None
 

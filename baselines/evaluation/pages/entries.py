@@ -121,14 +121,18 @@ def short(name: str) -> str:
 def solvers(tuned: Mapping[str, Mapping[str, Any]] = MappingProxyType({})) -> tuple[Entry, ...]:
     """All registered solvers as they are, some receding horizons, and what tuning made of them.
 
-    References, which have privileged information, are left out, and so are examples for one scenario, and agents, see
-    :func:`shipped` and :func:`agents`.
+    References, which have privileged information, are left out, and so are examples for one scenario, solvers of other
+    projects, and agents, see :func:`shipped` and :func:`agents`.
 
     Args:
         tuned: The best settings of solvers, by their specs; one that they do not change is not listed twice.
     """
     classes = {name: registry.get(name) for name in registry.names()}
-    left_out = {n for n, kind in classes.items() if kind.reference or kind.example or issubclass(kind, LearnedPolicy)}
+    left_out = {
+        name
+        for name, kind in classes.items()
+        if kind.reference or kind.example or kind.rival or issubclass(kind, LearnedPolicy)
+    }
     names = [name for name in classes if name not in left_out]
     better = (solver(spec, settings) for spec, settings in tuned.items() if settings)
     return (*map(solver, (*names, *HORIZONS)), *better)

@@ -29,15 +29,19 @@ FAMILIES = (OPTIMUM, OPTIMUM_BLOCKS, REAL_TIME, BLOCKS)
 def entries(horizons: Iterable[int] = HORIZONS) -> tuple[Entry, ...]:
     """All that are compared; references, which have privileged information, are nobody's choice and left out.
 
-    So are examples for one scenario, and what is on the leaderboard: agents, and policies that are shown other
-    coordinates than the scenario's.
+    So are examples for one scenario, solvers of other projects, and what is on the leaderboard: agents, and policies
+    that are shown other coordinates than the scenario's.
 
     Args:
         horizons: Those of the families.
     """
     classes = {name: registry.get(name) for name in registry.names()}
     elsewhere = (RecedingHorizon, LearnedPolicy, FullOrientation)
-    left_out = {n for n, kind in classes.items() if kind.reference or kind.example or issubclass(kind, elsewhere)}
+    left_out = {
+        name
+        for name, kind in classes.items()
+        if kind.reference or kind.example or kind.rival or issubclass(kind, elsewhere)
+    }
     specs = [name for name in classes if name not in left_out]
     specs += [spec for family in FAMILIES for horizon in horizons if (spec := _spec(family, horizon))]
     looks = [f"{name}:stop_at_end={flag}" for name in presets() for flag in (True, False)]

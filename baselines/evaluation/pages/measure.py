@@ -118,7 +118,7 @@ def _played(
         part = [job for job in left if job.timed == timed]
         with contextlib.closing(run(part, workers=1 if timed else workers, progress=progress)) as batches:
             for outcomes in batches:
-                rows |= {row.key: row for _, row, _ in outcomes}
+                rows |= {row.key: row for _, row, *_ in outcomes}
                 if results is not None:
                     results.add(outcomes)
     return rows

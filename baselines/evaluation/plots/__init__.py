@@ -6,7 +6,6 @@ import pathlib
 import sys
 from collections.abc import Iterator
 
-import numpy as np
 from matplotlib.figure import Figure
 from tqdm import tqdm
 
@@ -20,11 +19,15 @@ from baselines.files import write
 
 __all__ = ["draw"]
 
+#: The group of plots that show one policy each.
+JOINTS = "Joint velocities, joint paths and joint accelerations"
+
 
 def draw(results: Results, *, progress: bool = False) -> dict[str, Pictures]:
     """Draws all plots of a folder into its `plots/SCENARIO/`.
 
-    Tracking, joint velocities and joint paths are those of the first episode of each policy.
+    All plots over time are those of the first episode of each policy. There are joint accelerations where the arm has
+    limits of them.
 
     Args:
         results: The folder.
@@ -89,15 +92,21 @@ def _figures(
         held = len(log["time"]) < summary.steps
         episode_of = f"{episode}, last step of each nominal point" if held else episode
         yield (
-            "Joint velocities and joint paths",
+            JOINTS,
             f"velocities-{slug(plain[id(summary)])}",
             f"Joint velocities of {name} in {episode}",
             joints.draw_velocities(f"{episode_of}: joint velocities of {name}", log),
         )
-        if "nominal_q" in log or np.isfinite([log["lower"], log["upper"]]).any():
+        yield (
+            JOINTS,
+            f"joints-{slug(plain[id(summary)])}",
+            f"Joint paths of {name} in {episode}",
+            joints.draw_paths(f"{episode}: joint paths of {name}", log),
+        )
+        if "qddot" in log:
             yield (
-                "Joint velocities and joint paths",
-                f"joints-{slug(plain[id(summary)])}",
-                f"Joint paths of {name} in {episode}",
-                joints.draw_paths(f"{episode}: joint paths of {name}", log),
+                JOINTS,
+                f"accelerations-{slug(plain[id(summary)])}",
+                f"Joint accelerations of {name} in {episode}",
+                joints.draw_accelerations(f"{episode_of}: joint accelerations of {name}", log),
             )

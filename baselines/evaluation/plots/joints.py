@@ -1,9 +1,9 @@
-"""Joint velocities and joint paths of one policy."""
+"""Joint velocities, joint paths and joint accelerations of one policy."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -53,23 +53,51 @@ def _draw_limits(axes: Axes, fastest: FloatArray) -> list[Artist]:
 
 def draw_paths(title: str, log: Series) -> Figure:
     """Joint coordinates over the episode, one panel a joint: actual, nominal where there are, and limits as bands."""
-    time, q, nominal = log["time"], log["q"], log.get("nominal_q")
+    limits = log["lower"], log["upper"]
+    return _draw_joints(title, log, log["q"], limits, _Label("q", "[rad]", "[m]"), log.get("nominal_q"))
+
+
+def draw_accelerations(title: str, log: Series) -> Figure:
+    """Joint accelerations over the episode, one panel a joint, and limits as bands."""
+    limits = -log["acceleration_limit"], log["acceleration_limit"]
+    return _draw_joints(title, log, log["qddot"], limits, _Label(r"\ddot q", "[rad/s²]", "[m/s²]"))
+
+
+class _Label(NamedTuple):
+    """What is drawn of a joint: its symbol, and its units where the joint turns and where it is prismatic."""
+
+    symbol: str
+    turning: str
+    prismatic: str
+
+
+def _draw_joints(
+    title: str,
+    log: Series,
+    actual: FloatArray,
+    limits: tuple[FloatArray, FloatArray],
+    label: _Label,
+    nominal: FloatArray | None = None,
+) -> Figure:
+    """One panel a joint; values of shape (k, n), limits of shape (n,)."""
     lines: dict[str, Artist] = {}
-    joints = q.shape[1]
+    joints = actual.shape[1]
     columns = 2 if joints > 3 else 1
     rows = -(-joints // columns)
     drawn = style.figure(0.9 + 1.25 * rows)
     grid = drawn.add_gridspec(rows, columns)
     for joint in range(joints):
         axes = drawn.add_subplot(grid[joint // columns, joint % columns])
-        (lines["actual"],) = axes.plot(time, q[:, joint], color=style.COLOURS[0], lw=1.4)
+        (lines["actual"],) = axes.plot(log["time"], actual[:, joint], color=style.COLOURS[0], lw=1.4)
         if nominal is not None:
-            (lines["nominal"],) = axes.plot(time, nominal[:, joint], color=style.COLOURS[1], lw=1.2, ls=(0, (4, 3)))
-        unit = "[m]" if log["prismatic"][joint] else "[rad]"
+            dashed: dict[str, Any] = {"color": style.COLOURS[1], "lw": 1.2, "ls": (0, (4, 3))}
+            (lines["nominal"],) = axes.plot(log["time"], nominal[:, joint], **dashed)
+        unit = label.prismatic if log["prismatic"][joint] else label.turning
         last = joint + columns >= joints
-        style.dress(axes, ylabel=rf"$q_{{{joint + 1}}}$ {unit}", xlabel="time [s]" if last else "", ticks=12 // columns)
+        axis = {"ylabel": rf"${label.symbol}_{{{joint + 1}}}$ {unit}", "xlabel": "time [s]" if last else ""}
+        style.dress(axes, **axis, ticks=12 // columns)
         axes.margins(x=0.01)
-        for band in bands.shade(axes, log["lower"][joint], log["upper"][joint]):
+        for band in bands.shade(axes, limits[0][joint], limits[1][joint]):
             lines[bands.NAME] = band
     drawn.align_ylabels()
     style.legend(drawn, title, list(lines.values()), list(lines))

@@ -4,8 +4,9 @@
     git clone the repositories below into FOLDER, each into a folder of its own name
     python -m tests.arms.golden.write FOLDER
 
-A line an arm, or another source of one, `arm@source`: where it was read, four random postures (q), the orientations
-and positions of its tip at each, and the limits of the file (lower, upper, velocity; null where there is none).
+A line an arm, or another source of one, `arm@source`: where it was read, what its joints are called, four random
+postures (q), the orientations and positions of its tip at each, and the limits of the file (lower, upper, velocity;
+null where there is none).
 """
 
 from __future__ import annotations
@@ -78,6 +79,7 @@ def record(folder: Path, source: Source) -> dict[str, object]:
     limits = [[None if np.isnan(x) else float(x) for x in limit] for limit in (lower, upper, speeds)]
     return {
         **source._asdict(),
+        "joints": [model.names[i] for i in joints],
         "q": draws.tolist(),
         "rotation": rotations,
         "position": positions,

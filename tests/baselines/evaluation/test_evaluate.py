@@ -223,7 +223,7 @@ def test_episodes_that_are_to_be_timed_after_all_are_played_again(tmp_path):
 
 def test_a_job_played_elsewhere_gives_the_same_row():
     (job,) = make_plan("varga7-fast", "dls", steps=STEPS).jobs
-    ((_, row, series),) = play([pickle.loads(pickle.dumps(job))])
+    ((_, row, series, _),) = play([pickle.loads(pickle.dumps(job))])
     assert timeless([row]) == timeless([play([job])[0][1]])
     assert set(series) >= {"time", "pose", "nominal", "q", "qdot", "nominal_q", "position_error", "prismatic"}
 

@@ -7,13 +7,18 @@ import numpy as np
 import pytest
 from matplotlib.text import Text
 
+import baselines
+import ikgym
 from baselines.evaluate import evaluate
 from baselines.evaluation import report
 from baselines.evaluation.metrics import Row
 from baselines.evaluation.plan import Skipped
 from baselines.evaluation.plots import bands, cost_time, joints, style, tracking
+from baselines.evaluation.runner import play_episodes
 from baselines.evaluation.summary import summarise
+from baselines.evaluation.trajectory_log import trajectory_log
 from baselines.files import ResultsError
+from tests.baselines.making import circle
 
 BASE = Row(
     scenario="varga7-fast",
@@ -226,6 +231,7 @@ def test_plots_of_a_small_run(tmp_path):
         "faitli3-regular/velocities-dls.png",
         "faitli3-regular/velocities-follow_nominal.png",
         "zhang3-helix/cost-time.png",
+        "zhang3-helix/joints-dls.png",
         "zhang3-helix/tracking.png",
         "zhang3-helix/velocities-dls.png",
     ]
@@ -233,6 +239,23 @@ def test_plots_of_a_small_run(tmp_path):
     linked = re.findall(r"!\[.*?\]\((.*?)\)", readme)
     assert sorted(linked) == [f"plots/{name}" for name in made]
     assert all((tmp_path / name).read_bytes().startswith(b"\x89PNG") for name in linked)
+
+
+def test_accelerations_are_drawn_where_they_have_limits(tmp_path):
+    evaluate(circle(steps=8), "dls", out=tmp_path)
+    made = sorted(file.name for file in tmp_path.glob("plots/*/*"))
+    assert made == ["accelerations-dls.png", "cost-time.png", "joints-dls.png", "tracking.png", "velocities-dls.png"]
+    assert "Joint accelerations of dls in circle" in (tmp_path / "README.md").read_text(encoding="utf-8")
+
+
+def test_the_log_has_the_accelerations_of_the_steps_from_rest():
+    scenario = circle(steps=8)
+    (episode,) = play_episodes(scenario, baselines.make("dls", scenario), [0], 1, timed=True)
+    log = trajectory_log(scenario, 0, episode)
+    np.testing.assert_allclose(log["qddot"][0], episode.qdot[0] / scenario.dt)
+    np.testing.assert_allclose(log["qddot"][1:], np.diff(episode.qdot, axis=0) / scenario.dt)
+    np.testing.assert_array_equal(log["acceleration_limit"], scenario.arm.acceleration_limit)
+    assert "qddot" not in trajectory_log(ikgym.scenarios.get("varga7-fast").replace(steps=8), 0, episode)
 
 
 def test_a_damaged_course_is_named(tmp_path):
@@ -269,6 +292,7 @@ def test_every_axis_has_a_label_and_a_unit(coordinates):
         tracking.draw("t", [("a", one), ("b *", one)]),
         joints.draw_velocities("v", one),
         joints.draw_paths("p", one),
+        joints.draw_accelerations("a", {**one, "qddot": one["qdot"], "acceleration_limit": np.full(7, 9.0)}),
     ]
     for figure in figures:
         figure.draw_without_rendering()
@@ -307,6 +331,19 @@ def test_limits_that_are_near_are_shaded():
     dotted = [line.get_ydata()[0] for line in figure.axes[0].get_lines() if line.get_linestyle() == ":"]
     assert sorted(dotted) == [-2.0, -2.0, -1.1, 1.1, 2.0, 2.0]
     assert bands_of(joints.draw_velocities("v", course()).axes[0]) == []
+
+
+def test_accelerations_and_their_limits():
+    qddot = np.sin(np.linspace(0.0, 6.3, 60))[:, None] * [10.0, 5.0, 20.0]
+    one = course(joints=3, qddot=qddot, acceleration_limit=np.array([10.5, np.inf, 80.0]))
+    figure = joints.draw_accelerations("a", one)
+    first, second, third = figure.axes
+    below, above = bands_of(first)
+    assert (below[1], above[0]) == (-10.5, 10.5)
+    assert bands_of(second) == bands_of(third) == []
+    assert [axes.get_ylabel().split()[-1] for axes in figure.axes] == ["[rad/s²]", "[rad/s²]", "[m/s²]"]
+    np.testing.assert_array_equal(first.get_lines()[0].get_ydata(), qddot[:, 0])
+    assert [text.get_text() for text in figure.legends[0].texts] == ["actual", bands.NAME]
 
 
 def test_a_reference_below_the_errors_of_the_others_is_named():

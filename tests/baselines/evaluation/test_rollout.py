@@ -11,6 +11,7 @@ from baselines.registry import get
 from baselines.status import Status
 from baselines.wrapper import Wrapper
 from ikgym.exceptions import InvalidInputError
+from tests.baselines.making import made
 from tests.comparison import identical
 
 SEEDS = [2_000_000, 2_000_001, 5]
@@ -33,9 +34,10 @@ def assert_same(together, alone):
 def test_together_as_alone(name, on):
     scenario = ikgym.scenarios.get(on).replace(steps=STEPS, disturbance=ikgym.Disturbance(noise=0.1))
     try:
-        policy = baselines.make(name, scenario)
+        policy = made(name, scenario)
     except InvalidInputError:
-        assert issubclass(get(name), Wrapper)  # agents suit arms of their size
+        # Agents suit arms of their size, and rivals know no skew coordinates.
+        assert issubclass(get(name), Wrapper) or get(name).rival
         return
     together = rollouts(scenario, policy, SEEDS)
     for seed, episode in zip(SEEDS, together, strict=True):

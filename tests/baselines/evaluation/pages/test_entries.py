@@ -21,7 +21,8 @@ class TestEntries:
         assert there == {
             name
             for name in registry.names()
-            if not (registry.get(name).reference or issubclass(registry.get(name), LearnedPolicy))
+            if not (registry.get(name).reference or registry.get(name).rival)
+            and not issubclass(registry.get(name), LearnedPolicy)
         } - {"mfac_helix", "mfapc_helix", "mfapc_line"}
         assert {"rhc:horizon=3", "rhc:horizon=3,iterations=1", "rhc:horizon=200,iterations=1,move_blocks=27"} <= set(
             names

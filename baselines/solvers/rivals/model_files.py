@@ -1,0 +1,96 @@
+"""An arm as a URDF or an MJCF file, for programs that read nothing else."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ikgym.arms import Arm
+from ikgym.validation import FloatArray
+
+BASE, TIP = "base", "tool"
+#: Stands in a URDF for a limit that is none: readers take what is beyond 1e20 for infinite.
+NO_LIMIT = 1e21
+
+
+def joint_name(i: int) -> str:
+    """What the files call joint i, counted from 0."""
+    return f"joint{i + 1}"
+
+
+def urdf(arm: Arm) -> str:
+    """The chain of an arm from link ``base`` to link ``tool``, with its limits of position and velocity."""
+    n = arm.joints
+    links = [f'<link name="{name}"/>' for name in (BASE, *(f"link{i}" for i in range(1, n + 1)), TIP)]
+    lower, upper = np.maximum(arm.lower, -NO_LIMIT), np.minimum(arm.upper, NO_LIMIT)
+    velocity = np.minimum(arm.velocity_limit, NO_LIMIT)
+    joints = [
+        f'<joint name="{joint_name(i)}" type="{"prismatic" if arm.prismatic[i] else "revolute"}">'
+        f'<parent link="{f"link{i}" if i else BASE}"/><child link="link{i + 1}"/>'
+        f'<origin xyz="{_text(arm.offsets[i])}" rpy="0 0 0"/><axis xyz="{_text(arm.axes[i])}"/>'
+        f'<limit lower="{float(lower[i])!r}" upper="{float(upper[i])!r}" '
+        f'velocity="{float(velocity[i])!r}" effort="1"/></joint>'
+        for i in range(n)
+    ]
+    tool = (
+        f'<joint name="tool_joint" type="fixed"><parent link="link{n}"/><child link="{TIP}"/>'
+        f'<origin xyz="{_text(arm.tool)}" rpy="{_text(roll_pitch_yaw(arm.tool_rotation))}"/></joint>'
+    )
+    return f'<robot name="{arm.name}">{"".join([*links, *joints, tool])}</robot>'
+
+
+def mjcf(arm: Arm) -> str:
+    """The chain of an arm from body ``base`` to body ``tool``, with its limits of position: MJCF has no others."""
+    body = f'<body name="{TIP}" pos="{_text(arm.tool)}" quat="{_text(quaternion(arm.tool_rotation))}">{_MASS}</body>'
+    for i in reversed(range(arm.joints)):
+        # A joint with one limit alone is limited, too, and the other one is out of reach.
+        low, high = max(arm.lower[i], -_FAR), min(arm.upper[i], _FAR)
+        limited = bool(np.isfinite([arm.lower[i], arm.upper[i]]).any())
+        reach = f'limited="true" range="{_text((low, high))}"' if limited else 'limited="false"'
+        body = (
+            f'<body name="link{i + 1}" pos="{_text(arm.offsets[i])}">{_MASS}'
+            f'<joint name="{joint_name(i)}" type="{"slide" if arm.prismatic[i] else "hinge"}" '
+            f'axis="{_text(arm.axes[i])}" {reach}/>{body}</body>'
+        )
+    return (
+        f'<mujoco model="{arm.name}"><compiler angle="radian"/>'
+        f'<worldbody><body name="{BASE}">{body}</body></worldbody></mujoco>'
+    )
+
+
+#: MuJoCo refuses bodies that move and have no mass; kinematics take no notice of it.
+_MASS = '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
+#: Farther than a joint goes, and less than what MuJoCo takes for too large a number.
+_FAR = 1e9
+
+
+def roll_pitch_yaw(rotation: FloatArray) -> tuple[float, float, float]:
+    """Roll, pitch and yaw of a rotation in [rad], R = Rz(yaw) Ry(pitch) Rx(roll)."""
+    pitch = math.atan2(-rotation[2, 0], math.hypot(rotation[0, 0], rotation[1, 0]))
+    if math.hypot(rotation[0, 0], rotation[1, 0]) < 1e-9:  # straight up or down: roll and yaw turn about one axis
+        return math.copysign(1.0, -rotation[2, 0]) * math.atan2(rotation[0, 1], rotation[1, 1]), pitch, 0.0
+    return math.atan2(rotation[2, 1], rotation[2, 2]), pitch, math.atan2(rotation[1, 0], rotation[0, 0])
+
+
+def quaternion(rotation: FloatArray) -> FloatArray:
+    """The unit quaternion (w, x, y, z) of a rotation: the eigenvector of Bar-Itzhack's matrix (2000).
+
+    Args:
+        rotation: A rotation matrix. Shape (3, 3).
+    """
+    r = rotation
+    matrix = np.array(
+        [
+            [r[0, 0] + r[1, 1] + r[2, 2], r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]],
+            [r[2, 1] - r[1, 2], r[0, 0] - r[1, 1] - r[2, 2], r[0, 1] + r[1, 0], r[0, 2] + r[2, 0]],
+            [r[0, 2] - r[2, 0], r[0, 1] + r[1, 0], r[1, 1] - r[0, 0] - r[2, 2], r[1, 2] + r[2, 1]],
+            [r[1, 0] - r[0, 1], r[0, 2] + r[2, 0], r[1, 2] + r[2, 1], r[2, 2] - r[0, 0] - r[1, 1]],
+        ]
+    )
+    found: FloatArray = np.linalg.eigh(matrix)[1][:, -1]
+    return found
+
+
+def _text(numbers: FloatArray | tuple[float, ...]) -> str:
+    return " ".join(repr(float(x)) for x in numbers)

@@ -1,0 +1,84 @@
+"""What Pink and mink have in common: weighted tasks under limits, one quadratic program a step."""
+
+from __future__ import annotations
+
+import abc
+import dataclasses
+
+import numpy as np
+
+from baselines.solvers.rivals.base import Rival
+from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.validation import FloatArray, number
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class TaskProgram(Rival, abc.ABC):
+    """Minimises a frame task and a posture task under the limits of position and velocity.
+
+    ‖W (J Δq − gain · e)‖² + μ ‖Δq‖² + posture_cost² ‖Δq − posture_rate Δt (q* − q)‖² + damping ‖Δq‖², with W of
+    `position_cost` and `orientation_cost`, and μ of `lm_damping`. q* is the model's home, or the middle of its
+    limits where it has none. Costs are those of Pink's example of an arm. There the posture task asks for the
+    whole way in one step; here it is given 1 s for it, since the other makes errors several times as large.
+
+    Args:
+        problem: What the policy is told of the scenario.
+        gain: Of the frame task. Above 0, at most 1; 1 is deadbeat control.
+        position_cost: Of the frame task, in [1/m].
+        orientation_cost: Of the frame task, in [1/rad].
+        lm_damping: μ by the squared cost of the error: Levenberg–Marquardt damping of the frame task.
+        posture_cost: In [1/rad]; 0 for no posture task.
+        posture_rate: Share of the way to the posture that is asked for in a second, in [1/s].
+        damping: Of the whole program.
+        limit_gain: Share of the distance to a position limit that a step may take. Above 0, at most 1.
+        solver: Of the program, a name of `qpsolvers`.
+
+    Raises:
+        InvalidInputError: See :class:`Rival`; or a parameter is out of its range.
+        UnknownNameError: There is no such solver, or it is not installed.
+        MissingDependencyError: The package, or `qpsolvers`, is not installed.
+    """
+
+    gain: float = 1.0
+    position_cost: float = 1.0
+    orientation_cost: float = 1.0
+    lm_damping: float = 1.0
+    posture_cost: float = 1e-3
+    posture_rate: float = 1.0
+    damping: float = 1e-12
+    limit_gain: float = 0.5
+    solver: str = "daqp"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in ("gain", "limit_gain", "position_cost"):
+            object.__setattr__(self, name, number(name, getattr(self, name), above=0.0))
+        for name in ("orientation_cost", "lm_damping", "posture_cost", "posture_rate", "damping"):
+            object.__setattr__(self, name, number(name, getattr(self, name), at_least=0.0))
+        for name, share in {"gain": self.gain, "limit_gain": self.limit_gain, "posture_rate · Δt": self._share}.items():
+            if share > 1.0:
+                raise InvalidInputError(f"{name}: expected at most 1, got {share:g}.")
+        known = self.imported("qpsolvers").available_solvers
+        if self.solver not in known:
+            raise UnknownNameError("solver of quadratic programs", self.solver, tuple(known))
+
+    @property
+    def frame_costs(self) -> tuple[list[float], list[float]]:
+        """Costs of the frame task along the tool's axes, of its position and of its orientation."""
+        turns = {"position": [0.0] * 3, "axis": [self.orientation_cost, self.orientation_cost, 0.0]}
+        return [self.position_cost] * 3, turns.get(self.problem.task.name, [self.orientation_cost] * 3)
+
+    @property
+    def posture(self) -> FloatArray:
+        """Where the posture task goes: the home, or the middle of the limits as far as there are any. Shape (n,)."""
+        model = self.problem.model
+        if model.home is not None:
+            return np.array(model.home)
+        limited = np.isfinite(model.lower) & np.isfinite(model.upper)
+        middle: FloatArray = 0.5 * (np.where(limited, model.lower, 0.0) + np.where(limited, model.upper, 0.0))
+        return middle
+
+    @property
+    def _share(self) -> float:
+        """Of the way to the posture that is asked for in one step."""
+        return self.posture_rate * self.problem.dt

@@ -1,0 +1,171 @@
+"""Joint motions as files: what is written is what was played, and what ROS 2 takes for a message."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+
+import numpy as np
+import pytest
+
+import baselines
+import ikgym
+from baselines import evaluate as command
+from baselines.evaluate import evaluate
+from baselines.evaluation.export import FORMATS
+from baselines.files import ResultsError
+from ikgym.exceptions import InvalidInputError, UnknownNameError
+from tests.baselines.making import circle
+
+STEPS = 12
+#: Fields of trajectory_msgs/msg/JointTrajectory and JointTrajectoryPoint, and of what they are made of, with types.
+POINT = {
+    "positions": [float],
+    "velocities": [float],
+    "accelerations": [float],
+    "effort": [float],
+    "time_from_start": {"sec": int, "nanosec": int},
+}
+MESSAGE = {
+    "header": {"stamp": {"sec": int, "nanosec": int}, "frame_id": str},
+    "joint_names": [str],
+    "points": [POINT],
+}
+
+
+def check(value, shape, where="message"):
+    """Whether a value has the fields of a message, all of them and no others."""
+    if isinstance(shape, dict):
+        assert list(value) == list(shape), where
+        for key, inner in shape.items():
+            check(value[key], inner, f"{where}.{key}")
+    elif isinstance(shape, list):
+        assert isinstance(value, list), where
+        for i, part in enumerate(value):
+            check(part, shape[0], f"{where}[{i}]")
+    else:
+        assert type(value) is shape, where
+
+
+def named(**changes):
+    """A path of an arm whose joints have names."""
+    scenario = ikgym.scenarios.get("zhang6-lspb")
+    names = [f"slider_{i}" for i in range(6)]
+    return scenario.replace(arm=scenario.arm.replace(joint_names=names), steps=STEPS, **changes)
+
+
+def files(folder):
+    return sorted(file.relative_to(folder / "export").as_posix() for file in (folder / "export").rglob("*.*"))
+
+
+def read_csv(file):
+    with file.open(newline="", encoding="utf-8") as stream:
+        head, *rows = csv.reader(stream)
+    return head, np.array(rows, dtype=float)
+
+
+def test_csv_holds_the_episode_from_its_start_to_the_last_digit(tmp_path):
+    scenario = named()
+    evaluate(scenario, "dls", out=tmp_path, export="csv", plots=False)
+    (file,) = (tmp_path / "export" / "zhang6-lspb").iterdir()
+    head, table = read_csv(file)
+    names = [f"slider_{i}" for i in range(6)]
+    assert head == ["time [s]", *(f"{n} [rad]" for n in names), *(f"{n} [rad/s]" for n in names)]
+    track = baselines.track(scenario, "dls")
+    assert table.shape == (STEPS + 1, 13)
+    np.testing.assert_array_equal(table[:, 0], scenario.dt * np.arange(STEPS + 1))
+    np.testing.assert_array_equal(table[0, 1:], [*scenario.start, *np.zeros(6)])
+    np.testing.assert_array_equal(table[1:, 1:7], track.q)
+    np.testing.assert_array_equal(table[1:, 7:], track.qdot)
+    np.testing.assert_allclose(np.diff(table[:, 1:7], axis=0), scenario.dt * table[1:, 7:], atol=1e-15)
+
+
+def test_units_of_prismatic_joints(tmp_path):
+    scenario = circle("tiago", steps=3)
+    baselines.track(scenario, "dls").to_joint_trajectory(tmp_path / "motion.json")
+    evaluate(scenario, "dls", out=tmp_path, export=["csv", "csv"], plots=False)
+    (name,) = files(tmp_path)
+    head, _ = read_csv(tmp_path / "export" / name)
+    assert head[1:3] == ["torso_lift_joint [m]", "arm_1_joint [rad]"]
+    assert head[9] == "torso_lift_joint [m/s]"
+    written = json.loads((tmp_path / "motion.json").read_text(encoding="utf-8"))
+    assert written["joint_names"] == list(scenario.arm.joint_names)
+
+
+def test_joint_trajectory_is_a_whole_message(tmp_path):
+    scenario = named(dt=0.3)
+    evaluate(scenario, "dls", out=tmp_path, export="joint-trajectory", plots=False)
+    (name,) = files(tmp_path)
+    text = (tmp_path / "export" / name).read_text(encoding="utf-8")
+    content = json.loads(text)
+    check(content, MESSAGE)
+    assert content["joint_names"] == [f"slider_{i}" for i in range(6)]
+    track = baselines.track(scenario, "dls")
+    points = content["points"]
+    np.testing.assert_array_equal([point["positions"] for point in points], np.vstack([scenario.start, track.q]))
+    np.testing.assert_array_equal([point["velocities"] for point in points], np.vstack([np.zeros(6), track.qdot]))
+    times = [point["time_from_start"] for point in points]
+    assert times[0] == {"sec": 0, "nanosec": 0}
+    assert times[4] == {"sec": 1, "nanosec": 200_000_000}
+    assert all(0 <= time["nanosec"] < 10**9 for time in times)
+    seconds = [time["sec"] + 1e-9 * time["nanosec"] for time in times]
+    np.testing.assert_allclose(seconds, 0.3 * np.arange(STEPS + 1), atol=1e-9)
+    track.to_joint_trajectory(tmp_path / "again.json")
+    assert (tmp_path / "again.json").read_text(encoding="utf-8") == text
+
+
+@pytest.mark.parametrize("workers", [1, pytest.param(2, marks=pytest.mark.slow)])
+def test_every_episode_in_every_format_and_from_workers(tmp_path, workers):
+    rows = evaluate(
+        "varga7-random", ["dls", "dls:damping=1e-2"], episodes=2, steps=STEPS, out=tmp_path, export=list(FORMATS),
+        plots=False, workers=workers,
+    )  # fmt: skip
+    found = files(tmp_path)
+    assert len(found) == len(rows) * len(FORMATS) == 8
+    pattern = re.compile(r"varga7-random/dls-[0-9a-f]{8}-seed-200000[01]\.(csv|json)")
+    assert all(map(pattern.fullmatch, found))
+    scenario = ikgym.scenarios.get("varga7-random")
+    for seed in (2_000_000, 2_000_001):
+        file = next((tmp_path / "export").glob(f"*/*seed-{seed}.csv"))
+        np.testing.assert_array_equal(read_csv(file)[1][0, 1:8], scenario.nominal_joint_path(seed)[0])
+
+
+def test_nothing_is_exported_unasked(tmp_path):
+    evaluate("varga7-fast", "dls", steps=3, out=tmp_path, plots=False)
+    assert not (tmp_path / "export").exists()
+
+
+def test_resuming_plays_what_is_not_exported_yet_and_overwriting_removes_it(tmp_path, monkeypatch):
+    given = {"steps": 3, "out": tmp_path, "plots": False}
+    evaluate("varga7-fast", "dls", **given, export="csv")
+    played = []
+    monkeypatch.setattr(command, "run", lambda jobs, **_: played.append(len(jobs)) or iter(()))
+    monkeypatch.setattr(command.contextlib, "closing", lambda batches: command.contextlib.nullcontext(batches))
+    evaluate("varga7-fast", "dls", **given, export="csv", resume=True)
+    evaluate("varga7-fast", "dls", **given, export=["csv", "joint-trajectory"], resume=True)
+    assert played == [0, 1]
+    monkeypatch.undo()
+    evaluate("varga7-fast", "dls", **given, overwrite=True)
+    assert files(tmp_path) == []
+
+
+def test_faults():
+    with pytest.raises(UnknownNameError, match=r"no format of export 'cvs'\. Did you mean 'csv'\?"):
+        evaluate("varga7-fast", "dls", export="cvs")
+    with pytest.raises(InvalidInputError, match="export: expected a folder, `out` or --out"):
+        evaluate("varga7-fast", "dls", export="csv")
+
+
+def test_faults_on_the_command_line(capsys, tmp_path):
+    assert command.main(["--policies", "dls", "--export", "ros", "--out", str(tmp_path)]) == 2
+    assert "Available: csv, joint-trajectory." in capsys.readouterr().err
+    assert command.main(["--policies", "dls", "--export", "csv"]) == 2
+    assert "expected a folder" in capsys.readouterr().err
+
+
+def test_a_file_that_cannot_be_written(tmp_path):
+    track = baselines.track("varga7-fast", "dls", steps=3)
+    (tmp_path / "file").write_text("")
+    with pytest.raises(ResultsError, match="Cannot write"):
+        track.to_joint_trajectory(tmp_path / "file" / "motion.json")

@@ -1,0 +1,45 @@
+"""Policies whose package may be missing, and scenarios of real arms that suit them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import baselines
+import ikgym
+from baselines.registry import get
+from ikgym.exceptions import MissingDependencyError
+from ikgym.trajectories import FixedOrientation, PathTrajectory, Quintic
+from ikgym.trajectories.paths import Circle
+
+
+def usual(name):
+    """A scenario that suits a policy: solvers of other projects know no skew coordinates."""
+    return "zhang6-lspb" if get(name).rival else "varga7-fast"
+
+
+def made(name, on, **parameters):
+    """The policy; where its package is not installed the test is skipped and says so."""
+    try:
+        return baselines.make(name, on, **parameters)
+    except MissingDependencyError as e:
+        assert get(name).rival
+        pytest.skip(str(e))
+
+
+def circle(arm="panda", dt=2e-3, task="pose", speed=0.25, steps=400, **changes):
+    """A circle of 10 cm in front of an arm, from its home; changes are those of the arm."""
+    arm = ikgym.arms.get(arm).replace(**changes)
+    rotation, position = arm.forward(arm.home)
+    across = np.eye(3)[[1, 2, 0]].T
+    path = Circle(center=position - [0.0, 0.1, 0.0], radius=0.1, rotation=across)
+    trajectory = PathTrajectory(path, Quintic(speed, 2.0), FixedOrientation(rotation))
+    return ikgym.Scenario(
+        name=f"circle-{task}",
+        arm=arm,
+        trajectory=trajectory,
+        task=ikgym.tasks.get(task),
+        dt=dt,
+        steps=400,
+        start=arm.home,
+    )

@@ -1,0 +1,75 @@
+"""The files that an arm is written to are that arm: MuJoCo and Pinocchio say where its tool is."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import ikgym
+from baselines.solvers.rivals.model_files import TIP, mjcf, quaternion, roll_pitch_yaw, urdf
+from ikgym.rotations import rodrigues
+from tests.limited import limited
+
+ARMS = [*map(ikgym.arms.get, ("panda", "iiwa14", "tiago", "gen3", "varga7", "puma560", "panda-3")), limited().arm]
+every_arm = pytest.mark.parametrize("arm", ARMS, ids=[arm.name for arm in ARMS])
+
+
+def postures(arm, number=5):
+    low, high = np.maximum(arm.lower, -3.0), np.minimum(arm.upper, 3.0)
+    return np.random.default_rng(0).uniform(low, high, (number, arm.joints))
+
+
+@every_arm
+def test_mjcf_has_the_kinematics_and_the_position_limits(arm):
+    model = mujoco.MjModel.from_xml_string(mjcf(arm))
+    data = mujoco.MjData(model)
+    for q in postures(arm):
+        data.qpos = q
+        mujoco.mj_kinematics(model, data)
+        rotation, position = arm.forward(q)
+        np.testing.assert_allclose(data.body(TIP).xpos, position, atol=1e-12)
+        np.testing.assert_allclose(data.body(TIP).xmat.reshape(3, 3), rotation, atol=1e-12)
+    limited = np.isfinite(arm.lower) | np.isfinite(arm.upper)
+    assert model.jnt_limited.astype(bool).tolist() == limited.tolist()
+    for finite, column in zip((np.isfinite(arm.lower), np.isfinite(arm.upper)), (0, 1), strict=True):
+        given = (arm.lower, arm.upper)[column][finite]
+        np.testing.assert_array_equal(model.jnt_range[finite, column], given)
+    assert (model.jnt_type == np.where(arm.prismatic, mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE)).all()
+
+
+@every_arm
+def test_urdf_has_the_kinematics_and_the_limits(arm):
+    model = pin.buildModelFromXML(urdf(arm))
+    data = model.createData()
+    for q in postures(arm):
+        pin.framesForwardKinematics(model, data, q)
+        tool = data.oMf[model.getFrameId(TIP)]
+        rotation, position = arm.forward(q)
+        np.testing.assert_allclose(tool.translation, position, atol=1e-12)
+        np.testing.assert_allclose(tool.rotation, rotation, atol=1e-12)
+    for mine, theirs in ((arm.lower, model.lowerPositionLimit), (arm.upper, model.upperPositionLimit)):
+        np.testing.assert_array_equal(theirs[np.isfinite(mine)], mine[np.isfinite(mine)])
+        assert (np.abs(theirs[~np.isfinite(mine)]) > 1e20).all()
+    finite = np.isfinite(arm.velocity_limit)
+    np.testing.assert_array_equal(model.velocityLimit[finite], arm.velocity_limit[finite])
+    assert (model.velocityLimit[~finite] > 1e20).all()
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-9, 1.0, 3.0, np.pi])
+def test_quaternion(angle):
+    for axis in np.vstack([np.eye(3), np.random.default_rng(1).normal(size=(5, 3))]):
+        axis = axis / np.linalg.norm(axis)
+        found = quaternion(rodrigues(axis, angle))
+        wanted = np.concatenate([[np.cos(0.5 * angle)], np.sin(0.5 * angle) * axis])
+        assert abs(found @ wanted) == pytest.approx(1.0, abs=1e-15)
+
+
+@pytest.mark.parametrize("pitch", [0.3, -1.2, np.pi / 2, -np.pi / 2])
+def test_roll_pitch_yaw_are_those_of_the_rotation(pitch):
+    x, y, z = np.eye(3)
+    rotation = rodrigues(z, 0.7) @ rodrigues(y, pitch) @ rodrigues(x, -0.4)
+    roll, tilt, yaw = roll_pitch_yaw(rotation)
+    again = rodrigues(z, yaw) @ rodrigues(y, tilt) @ rodrigues(x, roll)
+    np.testing.assert_allclose(again, rotation, atol=1e-9)

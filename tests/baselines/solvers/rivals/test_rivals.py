@@ -1,0 +1,231 @@
+"""Solvers of other projects: what they are told, what they keep, and what they say when they cannot."""
+
+from __future__ import annotations
+
+import builtins
+import importlib
+
+import numpy as np
+import pytest
+
+import baselines
+import ikgym
+from baselines.evaluate import evaluate
+from baselines.registry import get
+from baselines.solvers.rivals.base import Rival, turned
+from baselines.solvers.rivals.task_program import TaskProgram
+from baselines.status import Status
+from ikgym.exceptions import InvalidInputError, MissingDependencyError, UnknownNameError
+from ikgym.rotations import rodrigues
+from tests.baselines.making import circle, made, usual
+
+RIVALS = [name for name in baselines.names() if get(name).rival]
+every_rival = pytest.mark.parametrize("name", RIVALS)
+#: Those that keep limits of velocity.
+LIMITED = ["pink", "mink", "ssik"]
+
+
+def observation(scenario, policy, q=None):
+    env = ikgym.RedundantIKEnv(scenario, preview=policy.preview)
+    return env.reset(seed=0, options=None if q is None else {"q": q})[0]
+
+
+def test_rivals_are_those_of_the_extra():
+    assert RIVALS == ["pink", "mink", "roboticstoolbox", "ssik"]
+    assert all(issubclass(get(name), Rival) for name in RIVALS)
+
+
+@every_rival
+@pytest.mark.parametrize("task", ["pose", "matrix", "position", "axis"])
+def test_a_gentle_path_is_tracked_to_rounding(name, task):
+    scenario = circle(task=task)
+    if task not in get(name).tasks:
+        with pytest.raises(InvalidInputError, match=rf"{name}: expected a scenario of the task .*'{task}'"):
+            baselines.make(name, scenario)
+        return
+    made(name, scenario)
+    (row,) = evaluate(scenario, name)
+    assert row.position_error_max < 1e-6
+    assert row.orientation_error_max is None or row.orientation_error_max < 1e-6
+    assert row.steps_at_joint_limit == row.steps_at_velocity_limit == row.steps_at_acceleration_limit == 0
+
+
+@pytest.mark.parametrize("name", ["pink", "mink"])
+def test_programs_wait_for_a_slow_joint_and_the_pseudoinverse_does_not(name):
+    """TIAGo's torso is slow: who knows of it lets the arm do the work."""
+    scenario = circle("tiago", dt=4e-3)
+    made(name, scenario)
+    made("roboticstoolbox", scenario)
+    program, inverse = evaluate(scenario, [name, "roboticstoolbox"])
+    assert program.position_error_max < 2e-5
+    assert program.steps_at_velocity_limit == 0
+    assert inverse.position_error_max > 1e-2
+    assert inverse.status == "saturated"
+
+
+@pytest.mark.parametrize("name", LIMITED)
+def test_limits_of_velocity_are_the_smaller_of_the_arms_and_the_actions(name):
+    scenario = circle(speed=2.0).replace(velocity_limit=0.1)
+    policy = made(name, scenario)
+    np.testing.assert_array_equal(policy.model.velocity_limit, 0.1)
+    (row,) = evaluate(scenario, name)
+    assert row.qdot_peak == pytest.approx(0.1, rel=1e-6)
+    assert row.position_error_max > 1e-3
+
+
+@pytest.mark.parametrize("name", LIMITED)
+def test_stops_are_kept(name):
+    """No joint may turn by more than 0.03 rad, which is not enough for the circle."""
+    home = ikgym.arms.get("panda").home
+    scenario = circle(lower=home - 0.03, upper=home + 0.03)
+    made(name, scenario)
+    row, unaware = evaluate(scenario, [name, "dls"])
+    assert row.steps_at_joint_limit <= 2  # by the tolerance of DAQP
+    assert row.position_error_max > 1e-3
+    assert 0.0 <= row.joint_limit_margin_min < 5e-3
+    assert unaware.steps_at_joint_limit > 10
+
+
+def test_pink_keeps_the_acceleration_limit_and_mink_knows_none():
+    scenario = circle(speed=1.0, acceleration_limit=np.full(7, 0.4))
+    made("pink", scenario)
+    made("mink", scenario)
+    with_limit, without = evaluate(scenario, ["pink", "mink"])
+    assert with_limit.steps_at_acceleration_limit == 0
+    assert with_limit.qddot_peak == pytest.approx(0.4, rel=1e-3)
+    assert without.steps_at_acceleration_limit > 10
+
+
+@every_rival
+def test_a_solver_without_a_solution_stops_the_arm_and_says_so(name, monkeypatch):
+    scenario = circle()
+    policy = made(name, scenario)
+    monkeypatch.setattr(type(policy), "make_step", lambda self: lambda q, qdot, target: None)
+    policy = baselines.make(name, scenario)
+    action, state = policy.predict(observation(scenario, policy))
+    assert not action.any()
+    assert policy.report(state).status[0] == Status.DIVERGED
+
+
+def test_pink_without_a_solution():
+    """Too fast towards a stop: no acceleration that is allowed leaves it in time."""
+    scenario = circle(acceleration_limit=np.full(7, 0.1))
+    policy = made("pink", scenario)
+    seen = observation(scenario, policy, np.array(scenario.arm.upper) - 1e-4)
+    _, state = policy.predict({**seen, "qdot": np.array(scenario.arm.velocity_limit)})
+    assert policy.report(state).status[0] == Status.DIVERGED
+
+
+def test_ssik_holds_what_it_cannot_reach():
+    scenario = circle()
+    policy = made("ssik", scenario)
+    seen = observation(scenario, policy)
+    far = seen["nominal"].copy()
+    far[:, -3:] += 3.0
+    action, state = policy.predict({**seen, "nominal": far})
+    assert not action.any()
+    assert policy.report(state).status[0] == Status.DIVERGED
+
+
+@pytest.mark.parametrize(
+    ("arm", "message"),
+    [
+        ("tiago", "expected an arm of 6 or 7 revolute joints, got 7 revolute and 1 prismatic"),
+        ("fetch_arm", "expected an arm that it has a closed form for, got 'fetch_arm'"),
+    ],
+)
+def test_ssik_says_which_arms_it_has(arm, message):
+    pytest.importorskip("ssik", reason='pip install "ikgym[rivals]"')
+    with pytest.raises(InvalidInputError, match=message):
+        baselines.make("ssik", circle(arm))
+
+
+@every_rival
+def test_a_missing_package_is_one_clear_error(name, monkeypatch):
+    package, imports = get(name).package, importlib.import_module
+
+    def missing(module, *arguments):
+        if module == package:
+            raise ModuleNotFoundError(f"No module named {module!r}")
+        return imports(module, *arguments)
+
+    monkeypatch.setattr(importlib, "import_module", missing)
+    wanted = rf'The policy {name!r} needs {get(name).distribution}: pip install "ikgym\[rivals\]"'
+    with pytest.raises(MissingDependencyError, match=wanted):
+        baselines.make(name, circle())
+    # One of all is no reason to leave the others out.
+    rows = evaluate(circle().replace(steps=3), ["dls", name])
+    assert [row.policy for row in rows] == ["dls"]
+    assert [one.policy for one in rows.skipped] == [name]
+    assert "ikgym[rivals]" in rows.skipped[0].reason
+    with pytest.raises(InvalidInputError, match=wanted):
+        evaluate(circle(), name)
+
+
+def test_names_and_classes_are_to_be_had_without_the_packages(monkeypatch):
+    real = builtins.__import__
+
+    def refuse(name, *arguments, **options):
+        assert name.partition(".")[0] not in {get(rival).package for rival in RIVALS}
+        return real(name, *arguments, **options)
+
+    monkeypatch.setattr(builtins, "__import__", refuse)
+    for name in RIVALS:
+        importlib.reload(importlib.import_module(get(name).__module__))
+
+
+@pytest.mark.parametrize("name", [name for name in RIVALS if issubclass(get(name), TaskProgram)])
+@pytest.mark.parametrize(
+    ("parameters", "message"),
+    [
+        ({"gain": 0.0}, "gain: expected a finite number above 0"),
+        ({"gain": 1.5}, "gain: expected at most 1, got 1.5"),
+        ({"limit_gain": 2.0}, "limit_gain: expected at most 1, got 2"),
+        ({"posture_rate": 1e4}, r"posture_rate · Δt: expected at most 1, got 20"),
+        ({"damping": -1.0}, "damping: expected a finite number"),
+    ],
+)
+def test_bad_parameters(name, parameters, message):
+    made(name, circle())
+    with pytest.raises(InvalidInputError, match=message):
+        baselines.make(name, circle(), **parameters)
+
+
+@pytest.mark.parametrize("name", [name for name in RIVALS if issubclass(get(name), TaskProgram)])
+def test_an_unknown_program_solver(name):
+    made(name, circle())
+    with pytest.raises(UnknownNameError, match=r"no solver of quadratic programs 'dapq'\. Did you mean 'daqp'\?"):
+        baselines.make(name, circle(), solver="dapq")
+
+
+def test_two_threads_do_not_share_objects(monkeypatch):
+    """Of the packages: what they hold changes at each call."""
+    import threading
+
+    scenario = circle()
+    policy = made("pink", scenario)
+    number, make_step = [], type(policy).make_step
+    monkeypatch.setattr(type(policy), "make_step", lambda self: number.append(self) or make_step(self))
+    seen = observation(scenario, policy)
+    for _ in range(2):
+        policy.predict(seen)
+    assert len(number) == 1
+    other = threading.Thread(target=policy.predict, args=(seen,))
+    other.start()
+    other.join()
+    assert len(number) == 2
+
+
+def test_turned_by_the_shortest_way():
+    rotation = rodrigues(np.array([0.6, 0.0, 0.8]), 1.0)
+    for angle in (0.0, 1e-8, 0.3, 2.0):
+        axis = rodrigues(rotation[:, 0].copy(), angle) @ rotation[:, 2]
+        found = turned(rotation, axis)
+        np.testing.assert_allclose(found[:, 2], axis, atol=1e-14)
+        np.testing.assert_allclose(found @ found.T, np.eye(3), atol=1e-14)
+        assert np.trace(found @ rotation.T) == pytest.approx(1.0 + 2.0 * np.cos(angle), abs=1e-14)
+
+
+@every_rival
+def test_usual_scenarios_suit(name):
+    made(name, usual(name))
