@@ -36,6 +36,8 @@ _places: dict[str, str] = {
     "null_space": f"{_SOLVERS}.resolved_rate.null_space:NullSpace",
     "truncated_svd": f"{_SOLVERS}.resolved_rate.truncated_svd:TruncatedSVD",
     "gram_schmidt": f"{_SOLVERS}.resolved_rate.gram_schmidt:GramSchmidt",
+    "qp": f"{_SOLVERS}.quadratic_program.qp:QuadraticProgram",
+    "sns": f"{_SOLVERS}.quadratic_program.sns:SaturationInNullSpace",
     "broyden": f"{_SOLVERS}.adaptive.broyden:Broyden",
     "rhc_gradient": f"{_SOLVERS}.receding_horizon.gradient:RecedingHorizonGradient",
     "rhc_lagrange": f"{_SOLVERS}.receding_horizon.lagrange:RecedingHorizonLagrange",

@@ -25,7 +25,7 @@ class Status(enum.IntEnum):
     ITERATION_LIMIT = 2
     #: The Jacobian had lost rank, and the directions lost were left out.
     RANK_DEFICIENT = 3
-    #: More was asked for than the velocity limit allows; each joint was cut to its limit by itself.
+    #: More was asked for than limits allow: joints were cut to theirs, or the task is not served as asked for.
     SATURATED = 4
     #: A vector was too long for the rotation that was to turn it; the arm was stopped for this step.
     NOT_A_ROTATION = 5

@@ -60,6 +60,7 @@ class Broyden(DampedLeastSquares):
     Args:
         problem: What the policy is told of the scenario.
         gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
+        saturation: What is done about joint velocities beyond their limits; see :class:`ResolvedRate`.
         damping: λ, see :class:`DampedLeastSquares`.
         learns: ``"correction"`` or ``"jacobian"``.
         motion: ε, the length of a joint shift from which half is learnt, in [rad] or [m]; shorter ones say little,
@@ -105,6 +106,7 @@ class Broyden(DampedLeastSquares):
 def broyden_rows(
     arm_task,
     gain,
+    scaling,
     damping,
     motion,
     correcting,
@@ -133,7 +135,7 @@ def broyden_rows(
     learn_rows(arm_task, (gain, motion, correcting), (q, pose, target), memory, estimate, shift)
     damped_rows(estimate, shift, damping, qdot)
     status[:] = APPLIED
-    code = answered(arm_task, (qdot, status, iterations), action)
+    code = answered(arm_task, scaling, (qdot, status, iterations), action)
     for row in range(q.shape[0]):
         iterations[row] = known[row]
     before[:], known[:], q_before[:], pose_before[:] = target, True, q, pose

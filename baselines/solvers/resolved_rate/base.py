@@ -11,16 +11,17 @@ import numpy.typing as npt
 
 from baselines.policy import Memory
 from baselines.policy.compiled import CompiledPolicy
-from baselines.policy_kernels import answer_parts, as_rows, cut_rows
-from baselines.solvers.arm_task import arm_task_of, period_of, plain_arm_task, pose_arrays, task_shift
+from baselines.policy_kernels import answer_parts, as_rows, cut_rows, scale_rows
+from baselines.solvers.arm_task import arm_task_of, joint_limits_of, period_of, plain_arm_task, pose_arrays
 from baselines.status import Status
 from ikgym import task_kernels
 from ikgym.exceptions import InvalidInputError
 from ikgym.jit import inlined
 from ikgym.kinematics import forward_and_jacobian
-from ikgym.validation import FloatArray, number
+from ikgym.validation import FloatArray, known_name, number
 
 APPLIED, DEFICIENT = int(Status.APPLIED), int(Status.RANK_DEFICIENT)
+SATURATIONS = ("clip", "scale")
 
 
 class NominalMemory(NamedTuple):
@@ -36,12 +37,12 @@ class NominalMemory(NamedTuple):
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class ResolvedRate(CompiledPolicy, abc.ABC):
-    """Follows the nominal motion of the next step, and takes back a share of the present error.
+class TaskFeedback(CompiledPolicy, abc.ABC):
+    """Asks for the nominal motion of the next step and for a share of the present error, and remembers the former.
 
     The shift asked for in one step is ``Δx = (X^N(k+1) - X^N(k)) + gain (X^N(k) - x(k))``, where X^N(k) is
-    remembered from the step before (at the first step it is taken to be the measured pose). It is turned into
-    ``q̇ Δt`` with the task Jacobian of the model at q(k), by a subclass.
+    remembered from the step before (at the first step it is taken to be the measured pose). What becomes of it is left
+    to subclasses.
 
     Args:
         problem: What the policy is told of the scenario.
@@ -80,6 +81,35 @@ class ResolvedRate(CompiledPolicy, abc.ABC):
         """The rank that the task Jacobian has where nothing is lost: redundant coordinates add none."""
         return min(self.problem.task.error_size, self.problem.model.joints, 6)
 
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class ResolvedRate(TaskFeedback, abc.ABC):
+    """Follows the nominal motion of the next step, and takes back a share of the present error; see the base.
+
+    The task shift is turned into ``q̇ Δt`` with the task Jacobian of the model at q(k), by a subclass.
+
+    Args:
+        problem: What the policy is told of the scenario.
+        gain: Share of the present error that is taken back in one step; see :class:`TaskFeedback`.
+        saturation: What is done about joint velocities beyond their limits: ``clip`` cuts each joint to its own,
+            ``scale`` slows down all of them alike, which keeps the direction of the task velocity.
+
+    Raises:
+        InvalidInputError: The gain is not between 0 and 2.
+        UnknownNameError: There is no such saturation.
+    """
+
+    saturation: str = "clip"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        known_name("saturation", self.saturation, SATURATIONS)
+
+    def constants(self) -> tuple[Any, ...]:
+        """See :meth:`TaskFeedback.constants`; behind the gain, whether all joints are slowed down alike."""
+        arm_task, gain, *numbers = super().constants()
+        return arm_task, gain, self.saturation == "scale", *numbers
+
     @abc.abstractmethod
     def invert(self, jacobian: FloatArray, shift: FloatArray) -> tuple[FloatArray, npt.NDArray[np.int64]]:
         """The joint shifts for task shifts.
@@ -111,28 +141,40 @@ def asked(arm_task, gain, q, pose, nominal, before, known, answer):
         Joint coordinates (B, n), task Jacobians (B, e, n), the task shifts asked for (B, e), and the answer's parts:
         joint shifts (B, n), status and iterations (B,), to be filled in.
     """
+    q, jacobian, shift, error, parts = asked_apart(arm_task, q, pose, nominal, before, known, answer)
+    for row in range(shift.shape[0]):
+        for i in range(shift.shape[1]):
+            shift[row, i] += gain * error[row, i]
+    return q, jacobian, shift, parts
+
+
+@inlined
+def asked_apart(arm_task, q, pose, nominal, before, known, answer):
+    """The same with X^N(k+1) - X^N(k) and X^N(k) - x(k) in place of the task shifts, of shapes (B, e)."""
     chain, kind = arm_task_of(arm_task)
     q, pose, nominal = as_rows(int(arm_task[0]), q, pose, nominal)
     rows, n = q.shape
     size = task_kernels.error_size(kind, pose.shape[1])
-    jacobian, shift, error = np.empty((rows, size, n)), np.empty((rows, size)), np.empty(size)
+    jacobian, motion, error = np.empty((rows, size, n)), np.empty((rows, size)), np.empty((rows, size))
     rotation, position, geometric, _ = pose_arrays(n, pose.shape[1])
     for row in range(rows):
         forward_and_jacobian(chain, q[row], rotation, position, geometric)
         task_kernels.jacobian(kind, rotation, geometric, jacobian[row])
         present = before[row] if known[row] else pose[row]
-        task_shift(kind, gain, pose[row], nominal[row, 0], present, error, shift[row])
+        task_kernels.error(kind, nominal[row, 0], present, motion[row])
+        task_kernels.error(kind, present, pose[row], error[row])
         before[row] = nominal[row, 0]
         known[row] = True
-    return q, jacobian, shift, answer_parts(answer, rows, n)
+    return q, jacobian, motion, error, answer_parts(answer, rows, n)
 
 
 @inlined
-def answered(arm_task, answer, action):
+def answered(arm_task, scaling, answer, action):
     """Ends a kernel of one iteration: joint shifts become velocities and actions.
 
     Args:
         arm_task: See :func:`plain_arm_task`.
+        scaling: Whether joints beyond their velocity limits slow down all others, see :func:`scale_rows`.
         answer: Joint shifts (B, n), which become joint velocities; status, and iterations, which become 1. Shape (B,).
         action: Receives the actions. Shape (B n,).
     """
@@ -141,6 +183,8 @@ def answered(arm_task, answer, action):
         iterations[row] = 1
         for j in range(qdot.shape[1]):
             qdot[row, j] /= dt
+    if scaling:
+        scale_rows(qdot, joint_limits_of(arm_task)[2], status)
     return cut_rows(qdot, limit, action.reshape(qdot.shape), status)
 
 

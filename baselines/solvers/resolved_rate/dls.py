@@ -27,6 +27,7 @@ class DampedLeastSquares(ResolvedRate):
     Args:
         problem: What the policy is told of the scenario.
         gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
+        saturation: What is done about joint velocities beyond their limits; see :class:`ResolvedRate`.
         damping: λ, added to J Jᵀ as it is, not squared. In the square of the Jacobian's units, [m²] and [1]. Above 0.
 
     Raises:
@@ -60,6 +61,7 @@ class DampedLeastSquares(ResolvedRate):
 def dls_rows(
     arm_task,
     gain,
+    scaling,
     damping,
     checking,
     q,
@@ -79,7 +81,7 @@ def dls_rows(
     qdot, status, _ = parts
     status[:] = APPLIED
     damped_rows(jacobian, shift, damping, qdot)
-    return answered(arm_task, parts, action)
+    return answered(arm_task, scaling, parts, action)
 
 
 @kernel

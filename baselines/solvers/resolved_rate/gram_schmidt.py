@@ -37,6 +37,7 @@ class GramSchmidt(ResolvedRate):
     Args:
         problem: What the policy is told of the scenario.
         gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
+        saturation: What is done about joint velocities beyond their limits; see :class:`ResolvedRate`.
         truncation: Rows whose remainder is shorter than this share of the longest row are left out. At least 0 and
             below 1. Rows of positions and of orientations are compared as they are, in [m] and [1].
 
@@ -76,6 +77,7 @@ class GramSchmidt(ResolvedRate):
 def gram_schmidt_rows(
     arm_task,
     gain,
+    scaling,
     truncation,
     full_rank,
     checking,
@@ -97,7 +99,7 @@ def gram_schmidt_rows(
     deficient = np.empty(q.shape[0], np.bool_)
     orthonormal_rows(jacobian, shift, truncation, full_rank, qdot, deficient)
     say_deficient(deficient, status)
-    return answered(arm_task, parts, action)
+    return answered(arm_task, scaling, parts, action)
 
 
 @kernel

@@ -38,6 +38,7 @@ class JacobianTranspose(ResolvedRate):
     Args:
         problem: What the policy is told of the scenario.
         gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
+        saturation: What is done about joint velocities beyond their limits; see :class:`ResolvedRate`.
         rank_tolerance: ‖JᵀΔx‖ below this share of ‖J‖ ‖Δx‖ (Frobenius) counts as zero. At least 0.
 
     Raises:
@@ -76,6 +77,7 @@ class JacobianTranspose(ResolvedRate):
 def jacobian_transpose_rows(
     arm_task,
     gain,
+    scaling,
     tolerance,
     full_rank,
     checking,
@@ -99,7 +101,7 @@ def jacobian_transpose_rows(
     say_deficient(stuck, status)
     if shift.shape[1] != full_rank:
         status[:] = APPLIED
-    return answered(arm_task, parts, action)
+    return answered(arm_task, scaling, parts, action)
 
 
 @kernel

@@ -27,6 +27,7 @@ class MoorePenrose(ResolvedRate):
     Args:
         problem: What the policy is told of the scenario.
         gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
+        saturation: What is done about joint velocities beyond their limits; see :class:`ResolvedRate`.
         rank_tolerance: Singular values below this share of the largest count as zero. At least 0, below 1.
 
     Raises:
@@ -63,6 +64,7 @@ class MoorePenrose(ResolvedRate):
 def pseudoinverse_step_rows(
     arm_task,
     gain,
+    scaling,
     tolerance,
     full_rank,
     root,
@@ -88,4 +90,4 @@ def pseudoinverse_step_rows(
     for row in range(q.shape[0]):
         for j in range(q.shape[1]):
             qdot[row, j] /= root[j]
-    return answered(arm_task, parts, action)
+    return answered(arm_task, scaling, parts, action)

@@ -48,8 +48,10 @@ class NullSpace(MoorePenrose):
     Args:
         problem: What the policy is told of the scenario.
         gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
+        saturation: What is done about joint velocities beyond their limits; see :class:`ResolvedRate`.
         rank_tolerance: Singular values below this share of the largest count as zero. At least 0.
-        objective: One of ``posture``, ``joint_centring`` and ``manipulability``.
+        objective: One of ``posture``, ``joint_centring`` and ``manipulability``. If left out, the joints are centred
+            where the model has limits of both sides in any joint; else they go to the posture.
         secondary_gain: K in [1/s], at least 0 and below 2/Δt; for the manipulability in [rad²/s] or [m²/s].
         posture: q_posture in [rad] or [m]; one number, or one a joint. It counts for ``posture`` only.
         damping: λ of the first part, as in :class:`DampedLeastSquares`; 0 stands for Moore–Penrose.
@@ -60,7 +62,7 @@ class NullSpace(MoorePenrose):
         UnknownNameError: There is no such objective.
     """
 
-    objective: str = "posture"
+    objective: str | None = None
     secondary_gain: float = 1.0
     posture: float | Sequence[float] = 0.0
     damping: float = 1e-3
@@ -71,8 +73,10 @@ class NullSpace(MoorePenrose):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        known_name("objective", self.objective, OBJECTIVES)
         model = self.problem.model
+        if self.objective is None:
+            object.__setattr__(self, "objective", "joint_centring" if _limited(model).any() else "posture")
+        known_name("objective", self.objective, OBJECTIVES)
         gain = number("secondary_gain", self.secondary_gain, at_least=0.0)
         if gain * self.problem.dt >= 2.0:
             raise InvalidInputError(
@@ -128,10 +132,14 @@ class NullSpace(MoorePenrose):
         return 0, 1 + manipulability, 1 + manipulability + damped, 1
 
 
+def _limited(model: Arm) -> npt.NDArray[np.bool_]:
+    """Which joints have limits of both sides. Shape (n,)."""
+    return np.isfinite(model.lower) & np.isfinite(model.upper)
+
+
 def _centre(model: Arm) -> tuple[FloatArray, FloatArray]:
     """The middles between the limits and how strongly to go there, 0 for joints without limits; shapes (n,)."""
-    lower, upper = np.asarray(model.lower), np.asarray(model.upper)
-    limited = np.isfinite(lower) & np.isfinite(upper)
+    lower, upper, limited = np.asarray(model.lower), np.asarray(model.upper), _limited(model)
     if not limited.any():
         raise InvalidInputError(
             f"objective 'joint_centring': expected an arm with joint limits, {model.name!r} has none; "
@@ -148,6 +156,7 @@ def _centre(model: Arm) -> tuple[FloatArray, FloatArray]:
 def null_space_rows(
     arm_task,
     gain,
+    scaling,
     rank_tolerance,
     full_rank,
     damping,
@@ -174,7 +183,7 @@ def null_space_rows(
     qdot, status, _ = parts
     rule = rank_tolerance, full_rank, damping, lines, secondary_gain, reach, joint_gain, goal
     move_rows(arm_task, rule, q, (jacobian, shift), qdot, status)
-    return answered(arm_task, parts, action)
+    return answered(arm_task, scaling, parts, action)
 
 
 @kernel

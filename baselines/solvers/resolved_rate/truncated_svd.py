@@ -27,6 +27,7 @@ class TruncatedSVD(ResolvedRate):
     Args:
         problem: What the policy is told of the scenario.
         gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
+        saturation: What is done about joint velocities beyond their limits; see :class:`ResolvedRate`.
         threshold: Singular values of the task Jacobian below this share of the largest are left out. Between 0
             and 1.
 

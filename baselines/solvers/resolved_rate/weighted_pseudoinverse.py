@@ -9,9 +9,10 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
+from baselines.policy import Problem
 from baselines.solvers.resolved_rate.moore_penrose import MoorePenrose
 from ikgym.exceptions import InvalidInputError
-from ikgym.validation import FloatArray, per_joint
+from ikgym.validation import FloatArray, per_joint, read_only
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -25,34 +26,45 @@ class WeightedPseudoinverse(MoorePenrose):
     Args:
         problem: What the policy is told of the scenario.
         gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
+        saturation: What is done about joint velocities beyond their limits; see :class:`ResolvedRate`.
         rank_tolerance: Singular values below this share of the largest count as zero. At least 0.
         weights: w, above 0; only their ratios count. One number, or one a joint; between revolute and prismatic
-            joints it holds a unit, [m²] per [rad²].
+            joints it holds a unit, [m²] per [rad²]. If left out, 1 / v² of the largest joint velocities v where the
+            model has velocity limits, so that each joint moves in terms of its own; equal ones where it has none.
 
     Raises:
         InvalidInputError: The gain, the tolerance or a weight is out of its range, or the weights are too few or
             too many.
     """
 
-    weights: float | Sequence[float] = 1.0
+    weights: float | Sequence[float] | None = None
+    _root: FloatArray = dataclasses.field(init=False, repr=False)
 
     name: ClassVar[str] = "weighted_pseudoinverse"
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        weights = per_joint("weights", self.weights, self.problem.model.joints)
+        given = _by_velocity(self.problem) if self.weights is None else self.weights
+        weights = per_joint("weights", given, self.problem.model.joints)
         if not (weights > 0.0).all():
             raise InvalidInputError(f"weights: expected numbers above 0, got {weights.tolist()}.")
-        scalar = np.ndim(self.weights) == 0
+        scalar = np.ndim(given) == 0
         object.__setattr__(self, "weights", float(weights[0]) if scalar else tuple(weights.tolist()))
+        object.__setattr__(self, "_root", read_only(np.sqrt(weights)))
 
     def numbers(self) -> tuple[Any, ...]:
         """See :meth:`ResolvedRate.numbers`."""
-        root = np.sqrt(np.broadcast_to(np.asarray(self.weights), self.problem.model.joints))
-        return self.rank_tolerance, self.full_rank, root
+        return self.rank_tolerance, self.full_rank, self._root
 
     def invert(self, jacobian: FloatArray, shift: FloatArray) -> tuple[FloatArray, npt.NDArray[np.int64]]:
         """See :meth:`ResolvedRate.invert`."""
-        root = np.sqrt(self.weights)
-        step, status = super().invert(jacobian / root, shift)
-        return step / root, status
+        step, status = super().invert(jacobian / self._root, shift)
+        return step / self._root, status
+
+
+def _by_velocity(problem: Problem) -> float | tuple[float, ...]:
+    """Weights by the velocity limits of a model, the fastest joint's being 1; 1 for all where it has no limits."""
+    if not np.isfinite(problem.model.velocity_limit).any():
+        return 1.0
+    fastest = problem.largest_qdot
+    return tuple(((fastest.max() / fastest) ** 2).tolist())

@@ -1,0 +1,134 @@
+"""Kernels: the quadratic program of one arm and one step, ½ q̇ᵀ H q̇ - gᵀ q̇."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from baselines.solvers.quadratic_program.velocity_box import braking_speed
+from ikgym.jit import kernel
+from ikgym.linear_algebra import cholesky, cholesky_solve
+
+# What a task velocity of another length weighs beside one of another direction.
+SCALING_WEIGHT = 1e-3
+
+
+@kernel
+def motion_weights(jacobian, damping, fastest, out):
+    """What the squares of the joint velocities weigh beside those of the task shift.
+
+    Args:
+        jacobian: J Δt. Shape (e, n).
+        damping: The weight of a joint at its largest velocity, as a share of the squared task shift that such joints
+            make in the mean.
+        fastest: Largest velocities in [rad/s] or [m/s]. Shape (n,).
+        out: Receives the weights. Shape (n,).
+    """
+    e, n = jacobian.shape
+    total = 0.0
+    for a in range(e):
+        for j in range(n):
+            total += (jacobian[a, j] * fastest[j]) ** 2
+    for j in range(n):
+        out[j] = damping * total / n / fastest[j] ** 2
+
+
+@kernel
+def curvature(jacobian, weights, hessian):
+    """H = (J Δt)ᵀ J Δt + diag(weights), in the upper left corner: shapes (e, n), (n,), (n, n) or more."""
+    e, n = jacobian.shape
+    for i in range(n):
+        for j in range(i + 1):
+            total = 0.0
+            for a in range(e):
+                total += jacobian[a, i] * jacobian[a, j]
+            hessian[i, j] = hessian[j, i] = total
+        hessian[i, i] += weights[i]
+
+
+@kernel
+def feedback_share(hessian, jacobian, error, change):
+    """The share of an error that can be taken back at once, if the joints are to brake in time when it is gone.
+
+    What a joint moves too fast for that, all of them are slowed down by, which keeps the direction.
+
+    Args:
+        hessian: H, see :func:`curvature`.
+        jacobian: J Δt. Shape (e, n).
+        error: What would be taken back. Shape (e,).
+        change: The changes of the velocity in one step to reckon with, in [rad/s] or [m/s]. Shape (n,).
+    """
+    e, n = jacobian.shape
+    factor, qdot, share = np.empty((n, n)), np.empty(n), 1.0
+    for i in range(n):
+        qdot[i] = 0.0
+        for a in range(e):
+            qdot[i] += jacobian[a, i] * error[a]
+        for j in range(i + 1):
+            factor[i, j] = hessian[i, j]
+    if not cholesky(factor):
+        return share
+    cholesky_solve(factor, qdot)
+    for j in range(n):
+        speed = abs(qdot[j])
+        if speed > change[j]:
+            share = min(share, braking_speed(speed, change[j]) / speed)
+    return share
+
+
+@kernel
+def goal(jacobian, shift, weights, preferred, linear):
+    """The vector g = (J Δt)ᵀ Δx + weights · preferred velocities: shapes (e, n), (e,), (n,), (n,), (n,)."""
+    e, n = jacobian.shape
+    for j in range(n):
+        linear[j] = weights[j] * preferred[j]
+        for a in range(e):
+            linear[j] += jacobian[a, j] * shift[a]
+
+
+@kernel
+def goal_to_scale(jacobian, shift, weights, preferred, hessian, linear):
+    """The same where the task shift is s Δx: s ‖Δx‖, between 0 and ‖Δx‖, is one more variable, the last.
+
+    Args:
+        jacobian: J Δt. Shape (e, n).
+        shift: Δx. Shape (e,).
+        weights: See :func:`motion_weights`. Shape (n,).
+        preferred: Preferred joint velocities. Shape (n,).
+        hessian: H of the joints, which receives the last row and column. Shape (n + 1, n + 1).
+        linear: Receives g. Shape (n + 1,).
+
+    Returns:
+        ‖Δx‖.
+    """
+    e, n = jacobian.shape
+    length = 0.0
+    for a in range(e):
+        length += shift[a] * shift[a]
+    length = math.sqrt(length)
+    for j in range(n):
+        linear[j] = weights[j] * preferred[j]
+        along = 0.0
+        for a in range(e):
+            along += jacobian[a, j] * shift[a]
+        hessian[n, j] = hessian[j, n] = -along / length if length > 0.0 else 0.0
+    hessian[n, n] = 1.0 + SCALING_WEIGHT
+    linear[n] = SCALING_WEIGHT * length
+    return length
+
+
+@kernel
+def held_back(jacobian, shift, weights, preferred, qdot, lower, upper):
+    """Whether a joint stands at a bound, and the task error that is left weighs more than the joint motion."""
+    e, n = jacobian.shape
+    bound, left, motion = False, 0.0, 0.0
+    for a in range(e):
+        missing = shift[a]
+        for j in range(n):
+            missing -= jacobian[a, j] * qdot[j]
+        left += missing * missing
+    for j in range(n):
+        bound |= qdot[j] == lower[j] or qdot[j] == upper[j]
+        motion += weights[j] * (qdot[j] - preferred[j]) ** 2
+    return bound and left > motion

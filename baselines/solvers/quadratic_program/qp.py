@@ -1,0 +1,185 @@
+"""The quadratic program: at each step the joint velocity that serves the task best within all limits."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+import numpy.typing as npt
+
+from baselines.policy_kernels import REFUSED, all_finite, cut_rows
+from baselines.solvers.arm_task import period_of
+from baselines.solvers.quadratic_program.box_minimum import box_minimum
+from baselines.solvers.quadratic_program.limits import limit_rows
+from baselines.solvers.quadratic_program.program import (
+    SCALING_WEIGHT,
+    curvature,
+    feedback_share,
+    goal,
+    goal_to_scale,
+    held_back,
+    motion_weights,
+)
+from baselines.solvers.quadratic_program.velocity_box import velocity_box
+from baselines.solvers.resolved_rate.base import APPLIED, TaskFeedback, asked_apart
+from baselines.status import Status
+from ikgym.exceptions import InvalidInputError
+from ikgym.jit import kernel
+from ikgym.limit_kernels import CHANGE, FASTEST
+from ikgym.validation import FloatArray, number, per_joint, read_only
+
+LIMIT, SATURATED = int(Status.ITERATION_LIMIT), int(Status.SATURATED)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class QuadraticProgram(TaskFeedback):
+    """Minimises task error and joint motion under the limits of position, velocity and acceleration, at each step.
+
+    The joint velocity is the minimum of ‖J q̇ Δt − Δx‖² + ρ Σ ((q̇ − z) / v)², joint by joint over the largest
+    velocities v, where z = K (q* − q) leads to a posture. All limits are bounds of q̇, see :func:`velocity_box`: those
+    of velocity, of the change of the velocity, and the velocity towards a stop from which the joint can still brake.
+    The program in n variables with bounds is solved by an active set, exactly (:func:`box_minimum`).
+
+    The share of the present error that is taken back is made smaller where the joints could not brake in time once it
+    is gone. Without that an arm with acceleration limits swings about a reference that it has lost.
+
+    With `task_scaling` the task velocity is scaled by an s between 0 and 1: ‖J q̇ Δt − s Δx‖² + w (1 − s)² ‖Δx‖² +
+    w ρ Σ ((q̇ − z) / v)² is minimised over q̇ and s, with w = 0.001, so that the direction of Δx comes before its
+    length, up to a thousandth, and that before the joint motion.
+
+    Such programs are the standard of differential inverse kinematics; with these limits in Flacco, De Luca and
+    Khatib 2015 and in Pink. The status is ``saturated`` where a joint stands at a bound and the task error that is left
+    weighs more than the motion.
+
+    Args:
+        problem: What the policy is told of the scenario, limits of the model among it.
+        gain: Share of the present error that is taken back in one step; see :class:`TaskFeedback`.
+        damping: ρ as a share of the mean of ‖J_j v_j Δt‖² over the joints j, which makes it a number for arms of any
+            size. Above 0.
+        secondary_gain: K in [1/s], at least 0 and below 2/Δt; 0 for the smallest joint velocity.
+        posture: q* in [rad] or [m]; one number, or one a joint. If left out, the model's home; where it has none, the
+            middle of the limits, and joints without limits are left alone.
+        braking_share: Share of the acceleration limits that braking at the reference reckons with. At most 1; 0 takes
+            back the same share of all errors.
+        task_scaling: Whether to keep the direction of the task velocity.
+
+    Raises:
+        InvalidInputError: A number is out of its range.
+    """
+
+    damping: float = 3e-5
+    secondary_gain: float = 1.0
+    posture: float | Sequence[float] | None = None
+    braking_share: float = 0.5
+    task_scaling: bool = False
+    _pull: FloatArray = dataclasses.field(init=False, repr=False)
+
+    name: ClassVar[str] = "qp"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        gain = number("secondary_gain", self.secondary_gain, at_least=0.0)
+        if gain * self.problem.dt >= 2.0:
+            raise InvalidInputError(
+                f"secondary_gain: expected a number below 2/Δt = {2.0 / self.problem.dt:g}, got {gain:g}."
+            )
+        if not isinstance(self.task_scaling, (bool, np.bool_)):
+            raise InvalidInputError(f"task_scaling: expected True or False, got {self.task_scaling!r}.")
+        for field, value in {
+            "damping": number("damping", self.damping, above=0.0),
+            "secondary_gain": gain,
+            "braking_share": number("braking_share", self.braking_share, at_least=0.0, at_most=1.0),
+            "task_scaling": bool(self.task_scaling),
+        }.items():
+            object.__setattr__(self, field, value)
+        target, gains = self._posture()
+        object.__setattr__(self, "_pull", read_only(np.array([gains, target])))
+
+    def _posture(self) -> tuple[FloatArray, FloatArray]:
+        """Where the joints are led to, and how strongly in [1/s]. Shapes (n,)."""
+        model = self.problem.model
+        everywhere = np.full(model.joints, self.secondary_gain)
+        if self.posture is not None:
+            posture = per_joint("posture", self.posture, model.joints)
+            scalar = np.ndim(self.posture) == 0
+            object.__setattr__(self, "posture", float(posture[0]) if scalar else tuple(posture.tolist()))
+            return posture, everywhere
+        if model.home is not None:
+            return model.home, everywhere
+        limited = np.isfinite(model.lower) & np.isfinite(model.upper)
+        middle = 0.5 * (np.where(limited, model.lower, 0.0) + np.where(limited, model.upper, 0.0))
+        return middle, np.where(limited, everywhere, 0.0)
+
+    @property
+    def _brakes(self) -> bool:
+        """Whether the feedback is made smaller far from the reference."""
+        return self.braking_share > 0.0 and bool(np.isfinite(self.problem.model.acceleration_limit).any())
+
+    def kernel(self) -> Any:
+        """See :meth:`CompiledPolicy.kernel`."""
+        return qp_rows
+
+    def numbers(self) -> tuple[Any, ...]:
+        """See :meth:`TaskFeedback.numbers`."""
+        share = self.braking_share if self._brakes else 0.0
+        return self.damping, share, self.task_scaling, self._pull, limit_rows(self.problem)
+
+    def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
+        """A factorisation for each active set, which are the iterations, and one for the braking, where used."""
+        return 0, 1, iterations + self._brakes, 1
+
+
+@kernel
+def qp_rows(
+    arm_task,
+    gain,
+    damping,
+    braking_share,
+    scaling,
+    pull,
+    limits,
+    checking,
+    q,
+    qdot_before,
+    pose,
+    nominal,
+    remaining,
+    before,
+    known,
+    action,
+    answer,
+):
+    """One step of :class:`QuadraticProgram`; see :class:`CompiledPolicy` for the arguments."""
+    if checking and not all_finite(q, qdot_before, pose, nominal, remaining):
+        return REFUSED
+    q, jacobian, motion, error, (qdot, status, iterations) = asked_apart(
+        arm_task, q, pose, nominal, before, known, answer
+    )
+    dt, action_scale = period_of(arm_task)
+    n, size = q.shape[1], q.shape[1] + scaling
+    hessian, linear, lower, upper = np.empty((size, size)), np.empty(size), np.zeros(size), np.zeros(size)
+    weights, preferred, x = np.empty(n), np.empty(n), np.empty(size)
+    for row in range(q.shape[0]):
+        velocity_box(limits, dt, q[row], qdot_before[row * n : (row + 1) * n], lower, upper)
+        for j in range(n):
+            preferred[j] = pull[0, j] * (pull[1, j] - q[row, j])
+        jac, shift, missing = jacobian[row], motion[row], error[row]
+        jac *= dt
+        missing *= gain
+        motion_weights(jac, SCALING_WEIGHT * damping if scaling else damping, limits[FASTEST], weights)
+        curvature(jac, weights, hessian)
+        if braking_share > 0.0:
+            missing *= feedback_share(hessian, jac, missing, braking_share * limits[CHANGE])
+        shift += missing
+        if scaling:
+            upper[n] = goal_to_scale(jac, shift, weights, preferred, hessian, linear)
+        else:
+            goal(jac, shift, weights, preferred, linear)
+        iterations[row], found = box_minimum(hessian, linear, lower, upper, x)
+        qdot[row] = x[:n]
+        status[row] = APPLIED if found else LIMIT
+        if found and held_back(jac, shift, weights, preferred, qdot[row], lower, upper):
+            status[row] = SATURATED
+    return cut_rows(qdot, action_scale, action.reshape(qdot.shape), status)

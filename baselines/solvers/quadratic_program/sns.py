@@ -1,0 +1,217 @@
+"""Saturation in the null space: joints at their limits drop out, and the others make up for them."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any, ClassVar
+
+import numpy as np
+import numpy.typing as npt
+
+from baselines.policy_kernels import REFUSED, all_finite, cut_rows
+from baselines.solvers.arm_task import period_of
+from baselines.solvers.linear_algebra import orthogonal_columns
+from baselines.solvers.quadratic_program.limits import limit_rows
+from baselines.solvers.quadratic_program.velocity_box import velocity_box
+from baselines.solvers.resolved_rate.base import APPLIED, TaskFeedback, asked
+from baselines.status import Status
+from ikgym.jit import kernel
+from ikgym.limit_kernels import FASTEST
+from ikgym.validation import number
+
+SATURATED = int(Status.SATURATED)
+NONE = -1
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class SaturationInNullSpace(TaskFeedback):
+    """The smallest joint velocity that makes the task velocity; joints beyond their limits are set to them, one by one.
+
+    Each time the joint that would have to be slowed down the most is set to its bound, and what it makes is taken off
+    the task for the others: q̇ = q̇_N + (J W)⁺ (ẋ − J q̇_N). Where too few joints are left, the task velocity is scaled
+    down instead, by the largest factor that was met on the way: the basic algorithm at velocity level (Flacco, De Luca
+    and Khatib 2012, algorithm 1; 2015, section III), with the bounds of :func:`velocity_box`. It keeps the direction of
+    the task velocity, and need not find the largest factor, unlike :class:`QuadraticProgram` with `task_scaling`. The
+    status is ``saturated`` where the task velocity was scaled down.
+
+    Joint velocities are measured in terms of their limits, and the pseudoinverse is damped, since the arm would stop in
+    every singularity: neither is part of the source. A task that has lost rank in all joints is scaled only where
+    it loses more.
+
+    Args:
+        problem: What the policy is told of the scenario, limits of the model among it.
+        gain: Share of the present error that is taken back in one step; see :class:`TaskFeedback`.
+        damping: Added to the squared singular values of J, as a share of the mean of ‖J_j v_j Δt‖² over the joints j
+            with the largest velocities v. Smaller squares count as lost rank. At least 0.
+
+    Raises:
+        InvalidInputError: A number is out of its range.
+    """
+
+    damping: float = 3e-5
+
+    name: ClassVar[str] = "sns"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "damping", number("damping", self.damping, at_least=0.0))
+
+    def kernel(self) -> Any:
+        """See :meth:`CompiledPolicy.kernel`."""
+        return sns_rows
+
+    def numbers(self) -> tuple[Any, ...]:
+        """See :meth:`TaskFeedback.numbers`."""
+        return self.damping, limit_rows(self.problem)
+
+    def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
+        """A decomposition for each set of saturated joints, which are the iterations."""
+        return 0, 1, iterations, 1
+
+
+@kernel
+def sns_rows(
+    arm_task,
+    gain,
+    damping,
+    limits,
+    checking,
+    q,
+    qdot_before,
+    pose,
+    nominal,
+    remaining,
+    before,
+    known,
+    action,
+    answer,
+):
+    """One step of :class:`SaturationInNullSpace`; see :class:`CompiledPolicy` for the arguments."""
+    if checking and not all_finite(q, qdot_before, pose, nominal, remaining):
+        return REFUSED
+    q, jacobian, shift, (qdot, status, iterations) = asked(arm_task, gain, q, pose, nominal, before, known, answer)
+    dt, action_scale = period_of(arm_task)
+    n, fastest = q.shape[1], limits[FASTEST]
+    lower, upper = np.empty(n), np.empty(n)
+    for row in range(q.shape[0]):
+        velocity_box(limits, dt, q[row], qdot_before[row * n : (row + 1) * n], lower, upper)
+        for j in range(n):
+            lower[j] /= fastest[j]
+            upper[j] /= fastest[j]
+            for a in range(shift.shape[1]):
+                jacobian[row, a, j] *= dt * fastest[j]
+        iterations[row], scaled = saturate(jacobian[row], shift[row], damping, lower, upper, qdot[row])
+        status[row] = SATURATED if scaled else APPLIED
+        for j in range(n):
+            qdot[row, j] *= fastest[j]
+    return cut_rows(qdot, action_scale, action.reshape(qdot.shape), status)
+
+
+@kernel
+def saturate(jacobian, shift, damping, lower, upper, qdot):
+    """The algorithm for one arm.
+
+    Args:
+        jacobian: J. Shape (e, n).
+        shift: The task velocity. Shape (e,).
+        damping: See :class:`SaturationInNullSpace`.
+        lower: Least velocities. Shape (n,).
+        upper: Largest velocities, not below the least ones. Shape (n,).
+        qdot: Receives the joint velocities, within bounds. Shape (n,).
+
+    Returns:
+        The number of decompositions, and whether the task velocity was scaled down.
+    """
+    e, n = jacobian.shape
+    free, fixed, rest = np.ones(n, np.bool_), np.zeros(n), np.empty(e)
+    columns, left, squares = np.empty((n, e)), np.empty((e, e)), np.empty(e)
+    # The joint velocity is s · along + base.
+    along, base, best, full = np.empty(n), np.empty(n), -1.0, 0
+    square = damping * np.sum(jacobian * jacobian) / n
+    for made in range(1, n + 2):
+        rank = decompose(jacobian, free, square, columns, left, squares)
+        full = rank if made == 1 else full
+        if rank < full:
+            break
+        for a in range(e):
+            rest[a] = 0.0
+            for j in range(n):
+                rest[a] -= jacobian[a, j] * fixed[j]
+        solve(columns, left, squares, square, shift, along)
+        solve(columns, left, squares, square, rest, base)
+        base += fixed
+        scale, critical = scaling(along, base, lower, upper)
+        if scale > best:
+            best = scale
+            for j in range(n):
+                qdot[j] = min(max(scale * along[j] + base[j], lower[j]), upper[j])
+        if critical == NONE:
+            break
+        free[critical] = False
+        fixed[critical] = upper[critical] if along[critical] + base[critical] > upper[critical] else lower[critical]
+    return made, best < 1.0
+
+
+@kernel
+def decompose(jacobian, free, square, columns, left, squares):
+    """Singular values of J without the joints that are not free, squared, (J W)ᵀ = (V Σ) Uᵀ, and its rank.
+
+    Args:
+        jacobian: J. Shape (e, n).
+        free: Which joints are free. Shape (n,).
+        square: Squared singular values up to here count as 0.
+        columns: Receives V Σ. Shape (n, e).
+        left: Receives U. Shape (e, e).
+        squares: Receives Σ². Shape (e,).
+    """
+    e, n = jacobian.shape
+    for a in range(e):
+        for j in range(n):
+            columns[j, a] = jacobian[a, j] if free[j] else 0.0
+    orthogonal_columns(columns, left)
+    rank = 0
+    for a in range(e):
+        squares[a] = 0.0
+        for j in range(n):
+            squares[a] += columns[j, a] * columns[j, a]
+        rank += squares[a] > square
+    return rank
+
+
+@kernel
+def solve(columns, left, squares, square, shift, out):
+    """(J W)⁺ Δx with damping, from the decomposition: shapes (n, e), (e, e), (e,), a number, (e,), (n,)."""
+    out[:] = 0.0
+    for a in range(squares.shape[0]):
+        if squares[a] + square == 0.0:
+            continue
+        amount = 0.0
+        for b in range(squares.shape[0]):
+            amount += left[b, a] * shift[b]
+        amount /= squares[a] + square
+        for j in range(out.shape[0]):
+            out[j] += amount * columns[j, a]
+
+
+@kernel
+def scaling(along, base, lower, upper):
+    """The largest s from 0 to 1 at which s · along + base is within bounds, 0 if there is none.
+
+    Returns:
+        s, and the joint beyond its bounds at s = 1 that allows the least; NONE where all are within.
+    """
+    least, most, critical, allowed = 0.0, 1.0, NONE, 0.0
+    for j in range(along.shape[0]):
+        first, last = 0.0, 1.0
+        if along[j] > 0.0:
+            first, last = (lower[j] - base[j]) / along[j], (upper[j] - base[j]) / along[j]
+        elif along[j] < 0.0:
+            first, last = (upper[j] - base[j]) / along[j], (lower[j] - base[j]) / along[j]
+        elif not lower[j] <= base[j] <= upper[j]:
+            last = -1.0
+        least, most = max(least, first), min(most, last)
+        if not lower[j] <= along[j] + base[j] <= upper[j] and (critical == NONE or last < allowed):
+            critical, allowed = j, last
+    if critical == NONE:
+        return 1.0, NONE
+    return (most if least <= most else 0.0), critical
