@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 
 from baselines import command as shared
 from baselines.evaluation.machine import describe
-from baselines.evaluation.pages import cost_time, families, foresight, leaderboard, sets, tuning
+from baselines.evaluation.pages import choosing, cost_time, families, foresight, leaderboard, sets, tuning
 from baselines.evaluation.pages.entries import FORESIGHT, HORIZONS, Entry, agents, playing, shipped, solvers
 from baselines.evaluation.pages.markdown import table
 from baselines.evaluation.pages.measure import measure
@@ -30,10 +30,11 @@ from ikgym.exceptions import InvalidInputError
 from ikgym.validation import whole_number
 
 #: The names of the pages on the command line.
-Page = Literal["leaderboard", "cost-time", "foresight", "leaderboard-skew"]
+Page = Literal["leaderboard", "cost-time", "foresight", "choosing", "leaderboard-skew"]
 LEADERBOARD: Final = "leaderboard"
 COST_TIME: Final = "cost-time"
 FORESIGHT_PAGE: Final = "foresight"
+CHOOSING: Final = "choosing"
 #: The leaderboards, and the main test set of each.
 LEADERBOARDS: Final = {LEADERBOARD: sets.MAIN, "leaderboard-skew": sets.SKEW}
 
@@ -43,8 +44,9 @@ class Options:
     """What the command line takes."""
 
     pages: Annotated[tuple[Page, ...], tyro.conf.arg(metavar="PAGE …")] = (LEADERBOARD, COST_TIME, FORESIGHT_PAGE)
-    """The pages: leaderboard, cost-time, foresight, leaderboard-skew. What several need is played once. If left out
-    all but the last, which stands on the papers' own skew coordinates."""
+    """The pages: leaderboard, cost-time, foresight, choosing, leaderboard-skew. What several need is played once. If
+    left out all but the last two: choosing needs the extra rivals, and the other one stands on the papers' own skew
+    coordinates."""
     out: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="DIR")] = None
     """Folder for the results. If left out nothing is played, and --write writes the pages anew from what lies beside
     them."""
@@ -55,7 +57,7 @@ class Options:
     """Agents for the leaderboard besides those that come with the package: what to call each, and the folder of its
     training seeds, with DIR/seed-N/agent.safetensors and DIR/seed-N/run.json."""
     sets: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME …")] = ()
-    """Test sets and scenarios of the cost-time page. If left out the test sets of whole poses, and the fixed scenarios
+    """Test sets and scenarios of the cost-time page, or of the choosing page. If left out the test sets of whole poses, and the fixed scenarios
     but for those that hold their points. With --tune the scenario whose validation episodes are played."""
     tune: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None
     """Search the settings of all solvers on validation episodes, and write them here; nothing else is done. The
@@ -154,6 +156,8 @@ def pictures(measurement: Measurement, page: str) -> Iterator[tuple[pathlib.Pure
     """The plots of a page, and where they lie, seen from it."""
     if page in LEADERBOARDS:
         return leaderboard.pictures(measurement, page)
+    if page == CHOOSING:
+        return iter(())
     return foresight.pictures(measurement) if page == FORESIGHT_PAGE else cost_time.pictures(measurement)
 
 
@@ -166,6 +170,8 @@ def text(measurement: Measurement, page: str) -> str:
     """
     if page in LEADERBOARDS:
         return leaderboard.page(measurement, tuning.of(LEADERBOARDS[page]), page)
+    if page == CHOOSING:
+        return choosing.page(measurement)
     return foresight.page(measurement) if page == FORESIGHT_PAGE else cost_time.page(measurement)
 
 
@@ -209,6 +215,8 @@ def _entered(options: Options) -> dict[str, dict[str, list[Entry]]]:
         out[COST_TIME] = {name: first if options.quick else list(compared) for name in names}
     if FORESIGHT_PAGE in options.pages:
         out[FORESIGHT_PAGE] = {name: list(foresight.entries()) for name in sets.foresight()}
+    if CHOOSING in options.pages:
+        out[CHOOSING] = {name: list(choosing.entries()) for name in options.sets or choosing.played()}
     return out
 
 

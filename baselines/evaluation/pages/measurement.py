@@ -50,6 +50,8 @@ class Line:
         training: What it has cost to train; None for solvers.
         angle: Largest geodesic angle to the nominal orientation in [rad], like the error; None where the scenario has
             no orientation, and in what was measured when arms were lost by their position alone.
+        held_back: In how many steps of all runs a stop, a velocity limit and an acceleration limit held a joint back;
+            None in what was measured before arms had limits.
     """
 
     name: str
@@ -65,6 +67,7 @@ class Line:
     time_first_us: float | None
     training: Training | None
     angle: Runs | None = None
+    held_back: tuple[int, int, int] | None = None
 
     @classmethod
     def of(cls, entry: Entry, rows: Sequence[Row]) -> Self:
@@ -86,6 +89,11 @@ class Line:
             time_first_us=first,
             training=entry.training,
             angle=_by_seed(entry, map(rounded, angles)) if angles else None,
+            held_back=(
+                sum(row.steps_at_joint_limit for row in rows),
+                sum(row.steps_at_velocity_limit for row in rows),
+                sum(row.steps_at_acceleration_limit for row in rows),
+            ),
         )
 
     @property
