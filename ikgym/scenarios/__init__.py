@@ -18,11 +18,25 @@ from ikgym.registry import Registry
 from ikgym.scenarios import catalogue, families
 from ikgym.scenarios.disturbance import Disturbance
 from ikgym.scenarios.importing import imported
+from ikgym.scenarios.reachability import Gap, gaps
 from ikgym.scenarios.reading import load
 from ikgym.scenarios.scenario import Scenario
 from ikgym.validation import known_name, shortened, whole_number
 
-__all__ = ["SPLITS", "Disturbance", "Preview", "Scenario", "find", "get", "load", "names", "register", "seeds"]
+__all__ = [
+    "SPLITS",
+    "Disturbance",
+    "Gap",
+    "Preview",
+    "Scenario",
+    "find",
+    "gaps",
+    "get",
+    "load",
+    "names",
+    "register",
+    "seeds",
+]
 
 #: Reset seeds of the random scenarios, by what they are for. Scores are published on the test seeds, counted from
 #: their first; nothing may be trained or tuned on them, nor on those for validation.
