@@ -199,6 +199,42 @@ def test_tool_target_and_paths_are_where_they_should_be():
     np.testing.assert_allclose(actual[-1], tool)
 
 
+def test_the_tool_frame_is_turned_with_the_tool():
+    env = environment()
+    ends = []
+    for _ in range(3):
+        observation, *_ = move(env)
+        env.render()
+        rotation, position = env.scenario.arm.forward(observation["q"])
+        for name, axis in zip("xyz", rotation.T, strict=True):
+            begin, end = np.transpose(artist(env, f"tool {name}").get_data_3d())
+            np.testing.assert_allclose(begin, position)
+            np.testing.assert_allclose((end - begin) / np.linalg.norm(end - begin), axis, atol=1e-12)
+            ends.append(np.linalg.norm(end - begin))
+    np.testing.assert_allclose(ends, ends[0])
+    env.render()  # the same state again
+    np.testing.assert_allclose(np.transpose(artist(env, "tool z").get_data_3d())[0], position)
+
+
+@pytest.mark.parametrize(("name", "shown"), [("varga7-fast", True), ("zhang3-helix", False)])
+def test_a_tool_frame_is_there_where_the_task_has_an_orientation(name, shown):
+    env = environment(name)
+    env.render()
+    (legend,) = renderer_of(env).figure.legends
+    assert ("tool x, y, z" in [text.get_text() for text in legend.get_texts()]) == shown
+    assert (len(artist(env, "tool x").get_data_3d()[0]) == 2) == shown
+
+
+def test_both_paths_are_seen_where_one_lies_on_the_other():
+    """The actual path is narrower, drawn later, and of another colour."""
+    env = environment()
+    env.render()
+    nominal, actual = artist(env, "nominal path"), artist(env, "actual path")
+    assert nominal.get_linewidth() > 2.0 * actual.get_linewidth()
+    assert nominal.get_zorder() < actual.get_zorder()
+    assert len({nominal.get_color(), actual.get_color(), *scene.AXES.values()}) == 5
+
+
 @pytest.mark.parametrize(("name", "panels"), [("varga7-fast", 2), ("zhang3-helix", 1)])
 def test_the_orientation_error_is_shown_where_the_task_has_one(name, panels):
     env = environment(name)

@@ -96,13 +96,14 @@ class Renderer:
             self._scene = Scene(figure, self._arm, self._title, self._has_orientation)
             self._staged = False
         scene, k = self._scene, self._states
-        self._tool[self._tools : k] = self._arm.forward(self._q[self._tools : k])[1]
+        new = min(self._tools, k - 1)
+        rotations, self._tool[new:k] = self._arm.forward(self._q[new:k])
         self._tools = k
         if anew := not self._staged:
             start = np.vstack([self._arm.joint_points(self._q[0]).reshape(-1, 3), self._tool[:1]])
             scene.set_stage(self._nominal, start, margin=0.08 * self._arm.reach(self._q[0]), duration=self._duration)
             self._staged = True
-        scene.set_arm(self._arm.joint_points(self._q[k - 1]), self._tool[:k], self._nominal)
+        scene.set_arm(self._arm.joint_points(self._q[k - 1]), rotations[-1], self._tool[:k], self._nominal)
         anew |= scene.set_errors(self._time[:k], self._errors[:k], len(self._time) - 1)
         scene.paint(anew=anew)
         if self._human:

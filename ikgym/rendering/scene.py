@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.artist import Artist
 from matplotlib.figure import Figure
+from matplotlib.legend_handler import HandlerTuple
 from matplotlib.ticker import MaxNLocator
 
 from ikgym.arms import Arm
@@ -25,6 +26,8 @@ from ikgym.rendering.style import (
     MIST,
     ORANGE,
     PALE,
+    PALE_GREEN,
+    PURPLE,
     SMALL,
     STEEL,
     VERMILION,
@@ -32,6 +35,11 @@ from ikgym.rendering.style import (
     thinned,
 )
 from ikgym.validation import FloatArray
+
+#: Colours of the tool's axes.
+AXES = {"x": VERMILION, "y": GREEN, "z": PURPLE}
+#: Their length, as a share of the longest side of what is seen.
+FRAME = 0.14
 
 
 class Scene:
@@ -52,9 +60,9 @@ class Scene:
         self._moving: list[Artist] = []
         self._space: Any = figure.add_axes((0.01, 0.165, 0.55, 0.78), projection="3d", proj_type="ortho")
         self._dress_space()
-        # Drawn in this order, so that the thin nominal path stays visible on the actual one.
-        self._actual = self._line("actual path", color=BLUE, lw=2.6)
-        self._nominal = self._line("nominal path", color=INK, lw=0.9)
+        # Drawn in this order: the thin actual path is seen on the wide nominal one, and both where they part.
+        self._nominal = self._line("nominal path", color=PALE_GREEN, lw=4.0, solid_capstyle="butt")
+        self._actual = self._line("actual path", color=BLUE, lw=1.3)
         self._links = self._line("links", color=STEEL, lw=4.0, solid_capstyle="round", solid_joinstyle="round")
         self._base = self._line("base", ls="", marker="^", ms=11, mfc=INK, mec=INK)
         # The dashes are the way that a prismatic joint has moved, the square (point 1 of each 3) is where it stands.
@@ -71,6 +79,8 @@ class Scene:
         self._revolute = self._line("revolute joint", ls="", marker="o", ms=6, mfc="white", mec=INK, mew=1.3)
         self._tool = self._line("tool", ls="", marker="D", ms=5.5, mfc=VERMILION, mec=INK, mew=0.8)
         self._target = self._line("target", ls="", marker="o", ms=11, mfc="none", mec=GREEN, mew=1.6)
+        self._frame = [self._line(f"tool {name}", color=colour, lw=2.0) for name, colour in AXES.items()]
+        self._has_orientation, self._frame_length = has_orientation, 0.0
         self._base.set_data_3d(np.zeros((3, 1)))
         self._curves = self._error_curves(has_orientation)
         self._heading = figure.text(0.02, 0.945, "", size=LARGE, weight="bold", parse_math=False)
@@ -94,6 +104,7 @@ class Scene:
         self._nominal.set_data_3d(thinned(nominal, stride(len(nominal))).T)
         points = np.vstack([np.zeros(3), start, nominal])
         low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
+        self._frame_length = FRAME * float((high - low).max())
         # In a flat box nothing can be read.
         sides = np.maximum(high - low, 0.6 * (high - low).max())
         low, high = 0.5 * (low + high - sides), 0.5 * (low + high + sides)
@@ -107,11 +118,12 @@ class Scene:
         for curve in self._curves:
             curve.begin(duration)
 
-    def set_arm(self, joints: FloatArray, tool: FloatArray, nominal: FloatArray) -> None:
+    def set_arm(self, joints: FloatArray, rotation: FloatArray, tool: FloatArray, nominal: FloatArray) -> None:
         """Moves the arm.
 
         Args:
             joints: Where each joint begins and ends in [m]. Shape (n, 2, 3).
+            rotation: How the tool is turned now. Shape (3, 3).
             tool: The tool points so far in [m]. Shape (k, 3).
             nominal: The nominal positions in [m]. Shape (steps + 1, 3).
         """
@@ -126,6 +138,9 @@ class Scene:
         self._actual.set_data_3d(path.T)
         self._tool.set_data_3d(path[-1:].T)
         self._target.set_data_3d(nominal[len(tool) - 1, :, None])
+        if self._has_orientation:
+            for line, axis in zip(self._frame, rotation.T, strict=True):
+                line.set_data_3d(np.vstack([path[-1], path[-1] + self._frame_length * axis]).T)
 
     def set_errors(self, time: FloatArray, errors: FloatArray, steps: int) -> bool:
         """Moves the error curves on, and the time in the heading.
@@ -204,8 +219,14 @@ class Scene:
         joints = [self._revolute, self._rails] if self._prismatic.any() else [self._revolute]
         if self._prismatic.all():
             joints = [self._rails]
+        handles: list[Any] = [self._base, *joints, self._tool, self._target, self._nominal, self._actual]
+        labels = [handle.get_label() for handle in handles]
+        if self._has_orientation:
+            handles, labels = [*handles, tuple(self._frame)], [*labels, "tool x, y, z"]
         self.figure.legend(
-            handles=[self._base, *joints, self._tool, self._target, self._nominal, self._actual],
+            handles,
+            labels,
+            handler_map={tuple: HandlerTuple(ndivide=None, pad=0.3)},
             loc="lower left",
             bbox_to_anchor=(0.01, 0.0),
             ncols=4,

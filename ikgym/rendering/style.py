@@ -10,6 +10,7 @@ MOST_POINTS = 1000  # of a curve: more cannot be told apart in so few pixels
 
 # Okabe and Ito's colours, which the colour-blind can tell apart, and greys.
 BLUE, ORANGE, VERMILION, GREEN = "#0072B2", "#E69F00", "#D55E00", "#009E73"
+PALE_GREEN, PURPLE = "#97d8c4", "#CC79A7"
 INK, STEEL, MIST, PALE = "#222222", "#808080", "#d9d9d9", "#f7f7f7"
 SMALL, MEDIUM, LARGE = 8.5, 9.5, 11.0  # letters, in [pt]
 

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 
 from baselines import command as shared
 from baselines.evaluation.machine import describe
-from baselines.evaluation.pages import choosing, cost_time, families, foresight, leaderboard, sets, tuning
+from baselines.evaluation.pages import choosing, cost_time, families, foresight, leaderboard, rivals, sets, tuning
 from baselines.evaluation.pages.entries import FORESIGHT, HORIZONS, Entry, agents, playing, shipped, solvers
 from baselines.evaluation.pages.markdown import table
 from baselines.evaluation.pages.measure import measure
@@ -30,11 +30,14 @@ from ikgym.exceptions import InvalidInputError
 from ikgym.validation import whole_number
 
 #: The names of the pages on the command line.
-Page = Literal["leaderboard", "cost-time", "foresight", "choosing", "leaderboard-skew"]
+Page = Literal["leaderboard", "cost-time", "foresight", "leaderboard-skew", "rivals", "choosing"]
 LEADERBOARD: Final = "leaderboard"
 COST_TIME: Final = "cost-time"
 FORESIGHT_PAGE: Final = "foresight"
+RIVALS: Final = "rivals"
 CHOOSING: Final = "choosing"
+#: The pages that need the extra `rivals`, and have no plots.
+REAL_ARMS: Final = {RIVALS: rivals.page, CHOOSING: choosing.page}
 #: The leaderboards, and the main test set of each.
 LEADERBOARDS: Final = {LEADERBOARD: sets.MAIN, "leaderboard-skew": sets.SKEW}
 
@@ -44,9 +47,9 @@ class Options:
     """What the command line takes."""
 
     pages: Annotated[tuple[Page, ...], tyro.conf.arg(metavar="PAGE …")] = (LEADERBOARD, COST_TIME, FORESIGHT_PAGE)
-    """The pages: leaderboard, cost-time, foresight, choosing, leaderboard-skew. What several need is played once. If
-    left out all but the last two: choosing needs the extra rivals, and the other one stands on the papers' own skew
-    coordinates."""
+    """The pages: leaderboard, cost-time, foresight, leaderboard-skew, rivals, choosing. What several need is played
+    once. If left out the first three: leaderboard-skew stands on the papers' own skew coordinates, the last two need
+    the extra rivals."""
     out: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="DIR")] = None
     """Folder for the results. If left out nothing is played, and --write writes the pages anew from what lies beside
     them."""
@@ -57,8 +60,9 @@ class Options:
     """Agents for the leaderboard besides those that come with the package: what to call each, and the folder of its
     training seeds, with DIR/seed-N/agent.safetensors and DIR/seed-N/run.json."""
     sets: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME …")] = ()
-    """Test sets and scenarios of the cost-time page, or of the choosing page. If left out the test sets of whole poses, and the fixed scenarios
-    but for those that hold their points. With --tune the scenario whose validation episodes are played."""
+    """Test sets and scenarios of the cost-time page. If left out the test sets of whole poses, and the fixed scenarios
+    but for those that hold their points. Those of the last two pages likewise, all paths of real arms if left out. With
+    --tune the scenario whose validation episodes are played."""
     tune: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None
     """Search the settings of all solvers on validation episodes, and write them here; nothing else is done. The
     leaderboards read baselines/data/tuned/SCENARIO.json."""
@@ -88,6 +92,7 @@ Examples:
   {prog} --tune baselines/data/tuned/{sets.MAIN}.json --sets {sets.MAIN}
   {prog} --out results/pages --agents "PPO=results/ppo" --write docs
   {prog} --pages cost-time --out results/quick --quick
+  {prog} --pages rivals choosing --out results/arms --write docs
   {prog} --write docs
 
 Files:
@@ -134,7 +139,7 @@ def measured(options: Options, command: str) -> dict[str, Measurement]:
             found[page][name] = section
     # What several pages need was played with the first of them; each page keeps its own order.
     ordered = {page: tuple(found[page][name] for name in by_set) for page, by_set in entered.items()}
-    return {page: Measurement(command, _today(), describe(), sections) for page, sections in ordered.items()}
+    return {page: Measurement(command, _today(), _machine(page), sections) for page, sections in ordered.items()}
 
 
 def draw_up(measurement: Measurement, page: str, folder: pathlib.Path) -> None:
@@ -156,7 +161,7 @@ def pictures(measurement: Measurement, page: str) -> Iterator[tuple[pathlib.Pure
     """The plots of a page, and where they lie, seen from it."""
     if page in LEADERBOARDS:
         return leaderboard.pictures(measurement, page)
-    if page == CHOOSING:
+    if page in REAL_ARMS:
         return iter(())
     return foresight.pictures(measurement) if page == FORESIGHT_PAGE else cost_time.pictures(measurement)
 
@@ -170,8 +175,8 @@ def text(measurement: Measurement, page: str) -> str:
     """
     if page in LEADERBOARDS:
         return leaderboard.page(measurement, tuning.of(LEADERBOARDS[page]), page)
-    if page == CHOOSING:
-        return choosing.page(measurement)
+    if page in REAL_ARMS:
+        return REAL_ARMS[page](measurement)
     return foresight.page(measurement) if page == FORESIGHT_PAGE else cost_time.page(measurement)
 
 
@@ -215,9 +220,18 @@ def _entered(options: Options) -> dict[str, dict[str, list[Entry]]]:
         out[COST_TIME] = {name: first if options.quick else list(compared) for name in names}
     if FORESIGHT_PAGE in options.pages:
         out[FORESIGHT_PAGE] = {name: list(foresight.entries()) for name in sets.foresight()}
+    if RIVALS in options.pages:
+        names = options.sets or (rivals.QUICK_SETS if options.quick else sets.rivals())
+        out[RIVALS] = {name: list(rivals.entries()) for name in names}
     if CHOOSING in options.pages:
-        out[CHOOSING] = {name: list(choosing.entries()) for name in options.sets or choosing.played()}
+        names = options.sets or (rivals.QUICK_SETS if options.quick else choosing.played())
+        out[CHOOSING] = {name: list(choosing.entries()) for name in names}
     return out
+
+
+def _machine(page: str) -> dict[str, object]:
+    """What a page was measured on and with."""
+    return describe() | (rivals.versions() if page in REAL_ARMS else {})
 
 
 def _quick(options: Options, everyone: Sequence[Entry]) -> list[Entry]:

@@ -17,6 +17,7 @@ from baselines.evaluation.summary import Spread, times
 from baselines.files import ResultsError, json_files, write
 from baselines.fingerprints import fingerprint
 from baselines.oracle import best_known
+from baselines.status import Status
 from ikgym.exceptions import IkgymError, InvalidInputError
 from ikgym.validation import FloatArray
 
@@ -50,8 +51,9 @@ class Line:
         training: What it has cost to train; None for solvers.
         angle: Largest geodesic angle to the nominal orientation in [rad], like the error; None where the scenario has
             no orientation, and in what was measured when arms were lost by their position alone.
-        held_back: In how many steps of all runs a stop, a velocity limit and an acceleration limit held a joint back;
-            None in what was measured before arms had limits.
+        held: Steps in which a stop, the velocity and the acceleration limit held a joint back, over all runs; None in
+            what was measured when they were not kept.
+        unsolved: Steps in which the solver found nothing and the arm was stopped, likewise.
     """
 
     name: str
@@ -67,7 +69,8 @@ class Line:
     time_first_us: float | None
     training: Training | None
     angle: Runs | None = None
-    held_back: tuple[int, int, int] | None = None
+    held: tuple[int, int, int] | None = None
+    unsolved: int | None = None
 
     @classmethod
     def of(cls, entry: Entry, rows: Sequence[Row]) -> Self:
@@ -89,11 +92,12 @@ class Line:
             time_first_us=first,
             training=entry.training,
             angle=_by_seed(entry, map(rounded, angles)) if angles else None,
-            held_back=(
+            held=(
                 sum(row.steps_at_joint_limit for row in rows),
                 sum(row.steps_at_velocity_limit for row in rows),
                 sum(row.steps_at_acceleration_limit for row in rows),
             ),
+            unsolved=sum(row.status_counts.get(Status.DIVERGED.label, 0) for row in rows),
         )
 
     @property

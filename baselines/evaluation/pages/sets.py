@@ -14,6 +14,8 @@ from ikgym.trajectories import RandomSinusoid
 
 #: The test set that scores are published on, the long one beside it, and the one in the papers' own skew coordinates.
 MAIN, LONG, SKEW = "varga7-pose-random", "varga7-pose-random-long", "varga7-random"
+#: The arms of the pages of rivals and of choosing.
+RIVAL_ARMS = ("panda", "iiwa14", "tiago")
 #: Episodes of a random scenario that is no test set: the first of the test split.
 EPISODES = 32
 
@@ -41,14 +43,13 @@ CHANGED: Mapping[str, tuple[Callable[[], Scenario], str]] = {
     )
 }
 
-#: The arms whose families of scenarios are compared, and the Pandas whose kinematics were measured.
-REAL_ARMS = ("panda", "iiwa14", "tiago")
+#: The Pandas whose kinematics were measured.
 CALIBRATED = ("panda-2", "panda-3", "panda-4", "panda-6", "panda-7")
 #: A tool that solvers are not told of: so much longer in [m], and turned by so much about the z axis in [rad].
 LONGER, TURNED = 0.2, np.pi / 6.0
 #: The share of the Panda's acceleration limits that a gentle one has, and the paths that it follows: what the paths
 #: demand of it by itself is less.
-GENTLE = 0.25
+GENTLE = 0.5
 GENTLE_PATHS = ("panda-gentle-square", "panda-gentle-raster", "panda-gentle-line")
 
 
@@ -82,9 +83,9 @@ OTHER_ARMS: Mapping[str, Callable[[], Scenario]] = {
 }
 
 
-def families(*paths: str) -> tuple[str, ...]:
-    """The scenarios with these paths, of all real arms."""
-    return tuple(f"{arm}-{path}" for arm in REAL_ARMS for path in paths)
+def paths(*names: str, of: tuple[str, ...] = RIVAL_ARMS) -> tuple[str, ...]:
+    """The scenarios in which these arms follow these paths."""
+    return tuple(f"{arm}-{name}" for arm in of for name in names)
 
 
 def leaderboard(main: str = MAIN) -> tuple[str, ...]:
@@ -105,6 +106,12 @@ def cost_time() -> tuple[str, ...]:
 def foresight() -> tuple[str, ...]:
     """What the foresight page plays."""
     return MAIN, LONG
+
+
+def rivals() -> tuple[str, ...]:
+    """What the page of rivals plays: the paths of real arms that are the same at every reset."""
+    every = map(scenarios.get, scenarios.names())
+    return tuple(s.name for s in every if s.name.startswith(tuple(f"{arm}-" for arm in RIVAL_ARMS)) and not s.random)
 
 
 def get(name: str) -> Scenario:

@@ -47,37 +47,37 @@ SITUATIONS = (
     Situation(
         "nothing stands in the way",
         "Circle, lemniscate, square, raster and line of `panda` and `iiwa14`, which can be followed within all limits.",
-        tuple(name for name in sets.families(*FEASIBLE) if not name.startswith("tiago")),
+        sets.paths(*FEASIBLE, of=("panda", "iiwa14")),
     ),
     Situation(
         "one joint is much slower than the others",
         "The same paths of `tiago`, whose torso moves at 0.07 m/s at most and must be spared.",
-        tuple(name for name in sets.families(*FEASIBLE) if name.startswith("tiago")),
+        sets.paths(*FEASIBLE, of=("tiago",)),
     ),
     Situation(
         "the rotation about the tool's axis is free",
         "A square with the tool upright, in task `axis`.",
-        sets.families("glue"),
+        sets.paths("glue"),
     ),
     Situation(
         "a joint limit stands in the way",
         "The tool turns by more than the last joint has left: no solver can follow, and the error that remains counts.",
-        sets.families("turn"),
+        sets.paths("turn"),
     ),
     Situation(
         "the path is faster than the joints",
         "The circle, seven to thirteen times as fast: no solver can follow.",
-        sets.families("fast"),
+        sets.paths("fast"),
     ),
     Situation(
         "singular postures",
         "Through a posture with a stretched elbow and one with an aligned wrist.",
-        sets.families("singular"),
+        sets.paths("singular"),
     ),
     Situation(
         "the path leads beyond the reach",
         "A circle whose farthest point is 4 % of the reach beyond it.",
-        sets.families("edge"),
+        sets.paths("edge"),
     ),
     Situation(
         "acceleration limits are tight",
@@ -170,7 +170,7 @@ def _standing(label: str, played: Sequence[Section]) -> Standing:
     worst = [largest_error(line) for line in lines]
     least = [min(map(largest_error, one.lines)) for one in played]
     steps = sum(line.runs * sets.get(one.name).steps for line, one in zip(lines, played, strict=True))
-    held = np.sum([line.held_back or (0, 0, 0) for line in lines], axis=0) / steps
+    held = np.sum([line.held or (0, 0, 0) for line in lines], axis=0) / steps
     costs = [cost for line, one in zip(lines, played, strict=True) for cost in relative_cost(line, one).ravel()]
     return Standing(
         label,

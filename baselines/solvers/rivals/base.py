@@ -37,9 +37,36 @@ class Target(NamedTuple):
     position: FloatArray
 
 
-#: One step: joint coordinates and the velocities last applied, of shape (n,), and a target in; joint velocities out,
-#: or None where the solver finds none.
-Step = Callable[[FloatArray, FloatArray, Target], FloatArray | None]
+class Seen(NamedTuple):
+    """What a solver is shown of one arm.
+
+    Attributes:
+        q: Joint coordinates in [rad] or [m]. Shape (n,).
+        qdot: Joint velocities last applied, in [rad/s] or [m/s]. Shape (n,).
+        start: Joint coordinates at the start of the episode. Shape (n,).
+        target: Where the tool is to be.
+    """
+
+    q: FloatArray
+    qdot: FloatArray
+    start: FloatArray
+    target: Target
+
+
+class StartMemory(NamedTuple):
+    """Where the episode began.
+
+    Attributes:
+        start: Joint coordinates in [rad] or [m]. Shape (B, n).
+        known: Whether there was a step before. Shape (B,).
+    """
+
+    start: FloatArray
+    known: npt.NDArray[np.bool_]
+
+
+#: One step: joint velocities, or None where the solver finds none.
+Step = Callable[[Seen], FloatArray | None]
 
 #: What the policies have made of the packages' objects, for each thread: those change from call to call.
 _made = threading.local()
@@ -101,17 +128,25 @@ class Rival(SolverPolicy, abc.ABC):
     def make_step(self) -> Step:
         """The solver, made anew: its objects are used by one thread alone."""
 
+    def memory(self, rows: int) -> Memory:
+        """A :class:`StartMemory` without a step before."""
+        return StartMemory(np.zeros((rows, self.problem.model.joints)), np.zeros(rows, dtype=np.bool_))
+
     def solve(self, batch: Batch, memory: Memory) -> Solution:
         """See :meth:`SolverPolicy.solve`; row by row."""
+        start, known = memory
         step, rows = self._step(), len(batch.q)
+        start = np.where(known[:, None], start, batch.q)
         qdot, status = np.zeros(batch.q.shape), statuses(rows)
         for row in range(rows):
-            found = step(batch.q[row], batch.qdot[row], self._target(batch.nominal[row, 0], batch.q[row]))
+            target = self._target(batch.nominal[row, 0], batch.q[row])
+            found = step(Seen(batch.q[row], batch.qdot[row], start[row], target))
             if found is None:
                 status[row] = Status.DIVERGED
             else:
                 qdot[row] = found
-        return Solution(qdot, memory, status, np.ones(rows, dtype=np.int64))
+        kept = StartMemory(start, np.ones(rows, dtype=np.bool_))
+        return Solution(qdot, kept, status, np.ones(rows, dtype=np.int64))
 
     @property
     def stated(self) -> bool:

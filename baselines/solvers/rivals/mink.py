@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
-from baselines.solvers.rivals.base import Step, Target
+from baselines.solvers.rivals.base import Seen, Step
 from baselines.solvers.rivals.model_files import TIP, joint_name, mjcf
 from baselines.solvers.rivals.task_program import TaskProgram
 from ikgym.validation import FloatArray
@@ -32,16 +32,18 @@ class Mink(TaskProgram):
         model = mujoco.MjModel.from_xml_string(mjcf(self.model))
         configuration = mink.Configuration(model)
         frame = mink.FrameTask(TIP, "body", *self.frame_costs, gain=self.gain, lm_damping=self.lm_damping)
-        tasks = [frame, *self._posture_tasks(mink, model)]
+        posture = [mink.PostureTask(model, self.posture_cost, gain=self.share)] if self.posture_cost else []
+        tasks = [frame, *posture]
         speeds = {joint_name(i): limit for i, limit in enumerate(self.model.velocity_limit) if np.isfinite(limit)}
         limits = [mink.ConfigurationLimit(model, self.limit_gain), mink.VelocityLimit(model, speeds)]
         dt, options = self.problem.dt, {"solver": self.solver, "damping": self.damping}
         pose = np.eye(4)
 
-        def step(q: FloatArray, qdot: FloatArray, target: Target) -> FloatArray | None:
-            del qdot
-            configuration.update(q)
-            pose[:3, :3], pose[:3, 3] = target
+        def step(seen: Seen) -> FloatArray | None:
+            configuration.update(seen.q)
+            pose[:3, :3], pose[:3, 3] = seen.target
+            for task in posture:
+                task.set_target(seen.start)
             frame.set_target(mink.SE3.from_matrix(pose))
             try:
                 found: FloatArray = mink.solve_ik(configuration, tasks, dt, limits=limits, **options)
@@ -50,10 +52,3 @@ class Mink(TaskProgram):
             return found
 
         return step
-
-    def _posture_tasks(self, mink: Any, model: Any) -> list[Any]:
-        if not self.posture_cost:
-            return []
-        task = mink.PostureTask(model, self.posture_cost, gain=self._share)
-        task.set_target(self.posture)
-        return [task]

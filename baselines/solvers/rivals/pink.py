@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from baselines.solvers.rivals.base import Step, Target
+from baselines.solvers.rivals.base import Seen, Step
 from baselines.solvers.rivals.model_files import TIP, urdf
 from baselines.solvers.rivals.task_program import TaskProgram
 from ikgym.validation import FloatArray
@@ -32,19 +32,22 @@ class Pink(TaskProgram):
         """See :meth:`Rival.make_step`."""
         pink, pinocchio = self.imported(), self.imported("pinocchio")
         model = pinocchio.buildModelFromXML(urdf(self.model))
-        configuration = pink.Configuration(model, model.createData(), self.posture)
+        configuration = pink.Configuration(model, model.createData(), np.zeros(model.nq))
         frame = pink.tasks.FrameTask(TIP, *self.frame_costs, lm_damping=self.lm_damping, gain=self.gain)
-        tasks = [frame, *self._posture_tasks(pink)]
+        posture = [pink.tasks.PostureTask(self.posture_cost, gain=self.share)] if self.posture_cost else []
+        tasks = [frame, *posture]
         limits = [pink.limits.ConfigurationLimit(model, self.limit_gain), pink.limits.VelocityLimit(model)]
         acceleration = self._acceleration(pink, model)
         limits += acceleration
         dt, options = self.problem.dt, {"solver": self.solver, "damping": self.damping, "safety_break": False}
 
-        def step(q: FloatArray, qdot: FloatArray, target: Target) -> FloatArray | None:
-            configuration.update(q)
-            frame.set_target(pinocchio.SE3(target.rotation, target.position))
+        def step(seen: Seen) -> FloatArray | None:
+            configuration.update(seen.q)
+            frame.set_target(pinocchio.SE3(*seen.target))
+            for task in posture:
+                task.set_target(seen.start)
             for limit in acceleration:
-                limit.set_last_integration(qdot, dt)
+                limit.set_last_integration(seen.qdot, dt)
             try:
                 found: FloatArray = pink.solve_ik(configuration, tasks, dt, limits=limits, **options)
             except pink.exceptions.NoSolutionFound:
@@ -52,13 +55,6 @@ class Pink(TaskProgram):
             return found
 
         return step
-
-    def _posture_tasks(self, pink: Any) -> list[Any]:
-        if not self.posture_cost:
-            return []
-        task = pink.tasks.PostureTask(self.posture_cost, gain=self._share)
-        task.set_target(self.posture)
-        return [task]
 
     def _acceleration(self, pink: Any, model: Any) -> list[Any]:
         limit = np.array(self.problem.model.acceleration_limit)

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from baselines.solvers.rivals.base import Rival, Step, Target
+from baselines.solvers.rivals.base import Rival, Seen, Step
 from ikgym.exceptions import InvalidInputError
 from ikgym.validation import FloatArray, number
 
@@ -48,11 +48,10 @@ class RoboticsToolbox(Rival):
         rows = {"position": 3, "axis": 5}.get(self.problem.task.name, 6)  # z of the angular velocity comes last
         rate, goal = self.gain / self.problem.dt, np.eye(4)
 
-        def step(q: FloatArray, qdot: FloatArray, target: Target) -> FloatArray | None:
-            del qdot
-            goal[:3, :3], goal[:3, 3] = target
-            velocity, _ = toolbox.p_servo(chain.eval(q), goal, rate)
-            found: FloatArray = np.linalg.pinv(chain.jacobe(q)[:rows]) @ velocity[:rows]
+        def step(seen: Seen) -> FloatArray | None:
+            goal[:3, :3], goal[:3, 3] = seen.target
+            velocity, _ = toolbox.p_servo(chain.eval(seen.q), goal, rate)
+            found: FloatArray = np.linalg.pinv(chain.jacobe(seen.q)[:rows]) @ velocity[:rows]
             return found
 
         return step

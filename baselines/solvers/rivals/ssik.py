@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from baselines.solvers.rivals.base import WHOLE_POSES, Rival, Step, Target
+from baselines.solvers.rivals.base import WHOLE_POSES, Rival, Seen, Step
 from baselines.solvers.rivals.model_files import BASE, TIP, mjcf
 from ikgym.exceptions import InvalidInputError
 from ikgym.validation import FloatArray, number
@@ -63,17 +63,16 @@ class Ssik(Rival):
         start = np.clip(0.0, model.lower, model.upper) if model.home is None else np.array(model.home)
         tracker = self._manipulator().tracker(start, max_joint_speed=speed, jump_threshold=self.jump_threshold)
 
-        def step(q: FloatArray, qdot: FloatArray, target: Target) -> FloatArray | None:
-            del qdot
-            pose[:3, :3], pose[:3, 3] = target
-            tracker.reset(q, t=0.0)
+        def step(seen: Seen) -> FloatArray | None:
+            pose[:3, :3], pose[:3, 3] = seen.target
+            tracker.reset(seen.q, t=0.0)
             try:
                 found = tracker.update(pose, dt)
             except ValueError:  # what it is shown is no rotation
                 return None
             if found.status is held:
                 return None
-            rate: FloatArray = (found.q - q) / dt
+            rate: FloatArray = (found.q - seen.q) / dt
             return rate
 
         return step

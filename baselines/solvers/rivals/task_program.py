@@ -5,11 +5,9 @@ from __future__ import annotations
 import abc
 import dataclasses
 
-import numpy as np
-
 from baselines.solvers.rivals.base import Rival
 from ikgym.exceptions import InvalidInputError, UnknownNameError
-from ikgym.validation import FloatArray, number
+from ikgym.validation import number
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -17,9 +15,9 @@ class TaskProgram(Rival, abc.ABC):
     """Minimises a frame task and a posture task under the limits of position and velocity.
 
     ‖W (J Δq − gain · e)‖² + μ ‖Δq‖² + posture_cost² ‖Δq − posture_rate Δt (q* − q)‖² + damping ‖Δq‖², with W of
-    `position_cost` and `orientation_cost`, and μ of `lm_damping`. q* is the model's home, or the middle of its
-    limits where it has none. Costs are those of Pink's example of an arm. There the posture task asks for the
-    whole way in one step; here it is given 1 s for it, since the other makes errors several times as large.
+    `position_cost` and `orientation_cost`, and μ of `lm_damping`. q* is the posture at the start. Costs and damping are
+    those of Pink's example of an arm. There the posture task asks for the whole way back in one step; here for that
+    share of it which takes a second, since the other loses the arm on `panda-singular`.
 
     Args:
         problem: What the policy is told of the scenario.
@@ -55,7 +53,7 @@ class TaskProgram(Rival, abc.ABC):
             object.__setattr__(self, name, number(name, getattr(self, name), above=0.0))
         for name in ("orientation_cost", "lm_damping", "posture_cost", "posture_rate", "damping"):
             object.__setattr__(self, name, number(name, getattr(self, name), at_least=0.0))
-        for name, share in {"gain": self.gain, "limit_gain": self.limit_gain, "posture_rate · Δt": self._share}.items():
+        for name, share in {"gain": self.gain, "limit_gain": self.limit_gain, "posture_rate · Δt": self.share}.items():
             if share > 1.0:
                 raise InvalidInputError(f"{name}: expected at most 1, got {share:g}.")
         known = self.imported("qpsolvers").available_solvers
@@ -69,16 +67,6 @@ class TaskProgram(Rival, abc.ABC):
         return [self.position_cost] * 3, turns.get(self.problem.task.name, [self.orientation_cost] * 3)
 
     @property
-    def posture(self) -> FloatArray:
-        """Where the posture task goes: the home, or the middle of the limits as far as there are any. Shape (n,)."""
-        model = self.problem.model
-        if model.home is not None:
-            return np.array(model.home)
-        limited = np.isfinite(model.lower) & np.isfinite(model.upper)
-        middle: FloatArray = 0.5 * (np.where(limited, model.lower, 0.0) + np.where(limited, model.upper, 0.0))
-        return middle
-
-    @property
-    def _share(self) -> float:
+    def share(self) -> float:
         """Of the way to the posture that is asked for in one step."""
         return self.posture_rate * self.problem.dt

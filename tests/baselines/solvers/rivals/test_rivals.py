@@ -100,7 +100,7 @@ def test_pink_keeps_the_acceleration_limit_and_mink_knows_none():
 def test_a_solver_without_a_solution_stops_the_arm_and_says_so(name, monkeypatch):
     scenario = circle()
     policy = made(name, scenario)
-    monkeypatch.setattr(type(policy), "make_step", lambda self: lambda q, qdot, target: None)
+    monkeypatch.setattr(type(policy), "make_step", lambda self: lambda seen: None)
     policy = baselines.make(name, scenario)
     action, state = policy.predict(observation(scenario, policy))
     assert not action.any()
