@@ -9,13 +9,13 @@ import textwrap
 from collections.abc import Callable, Sequence
 
 import numpy as np
-import numpy.typing as npt
 
 from baselines import registry
 from ikgym import arms, scenarios
 from ikgym.arms import Arm
 from ikgym.exceptions import UnknownNameError
 from ikgym.scenarios import Scenario
+from ikgym.validation import FloatArray
 
 
 @dataclasses.dataclass(frozen=True)
@@ -109,8 +109,8 @@ def _arm(name: str) -> str:
     return f"{title}\n\n{aligned(rows, 80)}"
 
 
-def _numbers(values: npt.ArrayLike) -> str:
-    return ", ".join(f"{x:.4g}" for x in np.round(values, 9) + 0.0)
+def _numbers(values: Sequence[float] | FloatArray) -> str:
+    return ", ".join(f"{x:.4g}" for x in np.round(np.array(values), 9) + 0.0)
 
 
 def _scenario_row(name: str) -> tuple[str, ...]:
@@ -154,10 +154,9 @@ def _reach(scenario: Scenario) -> str:
     if not missed:
         return "all poses that were looked at"
     worst = max(missed, key=lambda gap: (gap.distance, gap.angle))
-    return (
-        f"not all poses: missed from {missed[0].time:.3g} s to {missed[-1].time:.3g} s, at ({_numbers(worst.position)}) "
-        f"m by {worst.distance:.3g} m and {worst.angle:.3g} rad"
-    )
+    first, last = (f"{gap.time:.3g} s" for gap in (missed[0], missed[-1]))
+    far = f"{worst.distance:.3g} m and {worst.angle:.3g} rad"
+    return f"not all poses: missed from {first} to {last}, at ({_numbers(worst.position)}) m by {far}"
 
 
 def _policy_row(name: str) -> tuple[str, ...]:

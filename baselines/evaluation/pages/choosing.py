@@ -6,7 +6,6 @@ import dataclasses
 from collections.abc import Iterable, Sequence
 
 from baselines import registry
-from baselines.evaluation.pages import sets
 from baselines.evaluation.pages.entries import FORESIGHT, Entry, solver
 from baselines.evaluation.pages.markdown import conditions, table, time
 from baselines.evaluation.pages.measurement import Measurement, Section
@@ -52,8 +51,8 @@ roboticstoolbox, ssik) where they take such a scenario.
   acceleration limit. Many real controllers stop the arm then.
 - **p50, p99** are of single calls, in µs: the largest of the scenarios.
 - **Named** is the solver with the lowest *× least* of those that never ran into a stop, or of all if each of them did;
-  of those within {100.0 * (EQUAL - 1.0):.0f} % of it the one with the lowest p50. Where the cost is compared, that takes the
-  place of *× least*.
+  of those within {100.0 * (EQUAL - 1.0):.0f} % of it the one with the lowest p50. Where costs are compared, the cost
+  takes the place of *× least*.
 """
 
 _HELD = ("stop", "velocity", "acceleration")
