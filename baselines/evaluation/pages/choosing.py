@@ -6,6 +6,7 @@ import dataclasses
 from collections.abc import Iterable, Sequence
 
 from baselines import registry
+from baselines.evaluation.pages import sets
 from baselines.evaluation.pages.entries import FORESIGHT, Entry, solver
 from baselines.evaluation.pages.markdown import conditions, table, time
 from baselines.evaluation.pages.measurement import Measurement, Section
@@ -29,6 +30,8 @@ OWN = (
     *("dls", "null_space", "weighted_pseudoinverse", "qp", "qp:task_scaling=True", "sns", "broyden", "mfac"),
     *("rhc:horizon=100,iterations=1,move_blocks=23", "rhc", FORESIGHT),
 )
+#: Who takes milliseconds a step where a path cannot be followed, and plays nothing but the paths of real arms.
+SLOW = ("rhc", "ssik")
 #: Who is shown beside the one that is named: what is plain and widely used.
 PLAIN = "dls"
 #: The share of each test set's episodes, the first ones, that is played.
@@ -58,10 +61,15 @@ roboticstoolbox, ssik) where they take such a scenario.
 _HELD = ("stop", "velocity", "acceleration")
 
 
-def entries() -> tuple[Entry, ...]:
-    """All that are compared, each with one seed of the policy, in a part of the random episodes."""
+def entries(name: str | None = None) -> tuple[Entry, ...]:
+    """All that are compared, each with one seed of the policy, in a part of the random episodes.
+
+    Args:
+        name: Of a set of episodes, for those that play it.
+    """
     rivals = tuple(name for name in registry.names() if registry.get(name).rival)
-    entered = (solver(spec, timed=1) for spec in (*OWN, *rivals))
+    left_out = SLOW if name is not None and name not in sets.rivals() else ()
+    entered = (solver(spec, timed=1) for spec in (*OWN, *rivals) if spec not in left_out)
     return tuple(dataclasses.replace(one, variants=one.variants[:1], seeds=(), share=SHARE) for one in entered)
 
 
@@ -155,12 +163,14 @@ def _details(one: Situation, stand: Sequence[Standing], sections: Sequence[Secti
 
 
 def _absent(sections: Iterable[Section], stand: Sequence[Standing]) -> list[str]:
-    """Who does not suit all scenarios of a situation."""
+    """Who has not played all scenarios of a situation."""
     shown = {one.label for one in stand}
     everyone = dict.fromkeys(line.label for one in sections for line in one.lines)
     wanted = dict.fromkeys((*everyone, *(entry.label for entry in entries())))
     absent = [f"`{label}`" for label in wanted if label not in shown]
-    return [f"Not for these scenarios, or not installed: {', '.join(absent)}."] if absent else []
+    if not absent:
+        return []
+    return [f"Not played there, since they are not made for it, not installed, or too slow: {', '.join(absent)}."]
 
 
 def _anchor(title: str) -> str:

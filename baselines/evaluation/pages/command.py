@@ -225,7 +225,7 @@ def _entered(options: Options) -> dict[str, dict[str, list[Entry]]]:
         out[RIVALS] = {name: list(rivals.entries()) for name in names}
     if CHOOSING in options.pages:
         names = options.sets or (rivals.QUICK_SETS if options.quick else choosing.played())
-        out[CHOOSING] = {name: list(choosing.entries()) for name in names}
+        out[CHOOSING] = {name: list(choosing.entries(name)) for name in names}
     return out
 
 

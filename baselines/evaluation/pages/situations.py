@@ -91,8 +91,8 @@ SITUATIONS = (
     ),
     Situation(
         "the tool is not known",
-        f"The circle with a tool that is {sets.LONGER:g} m longer and turned by {np.degrees(sets.TURNED):.0f}°. Solvers do "
-        "not know it, and the pose that they measure is that of the tool.",
+        f"The circle with a tool {sets.LONGER:g} m longer and turned by {np.degrees(sets.TURNED):.0f}°. Solvers "
+        "do not know it, and the pose that they measure is that of the tool.",
         ("panda-tool-circle",),
     ),
     Situation(
