@@ -11,7 +11,7 @@ from numba import njit
 
 import baselines
 import ikgym
-from baselines.policy import Batch
+from baselines.policy import Batch, Memory
 from baselines.solvers.linear_algebra import damped_step
 from benchmarks.effort import FULL, Effort
 from benchmarks.table import Column, Table
@@ -43,9 +43,13 @@ POLICIES: dict[str, dict[str, tuple[str, dict[str, object]]]] = {
 }
 
 
+#: Of varga7-fast, beside the first of them.
+BESIDE = "dls", "rhc, HL = 3, one iteration", "rhc, HL = 3", "rhc_foresight"
+
+
 def tables(effort: Effort = FULL) -> list[Table]:
-    """Times of `predict` in its scenarios, and of the iteration that most solvers share."""
-    return [*(_predicting(scenario, effort) for scenario in POLICIES), _iterations(effort)]
+    """Times of `predict` in its scenarios, beside `dls`, and of the iteration that most solvers share."""
+    return [*(_predicting(scenario, effort) for scenario in POLICIES), _beside(effort), _iterations(effort)]
 
 
 def predict_times(scenario: str = "varga7-fast", steps: int = FULL.steps) -> dict[str, tuple[float, float, float]]:
@@ -54,6 +58,11 @@ def predict_times(scenario: str = "varga7-fast", steps: int = FULL.steps) -> dic
     The step is that of an environment through `gym.make`, made in turn with the call of `predict`.
     """
     return {label: _episode(scenario, name, kwargs, steps) for label, (name, kwargs) in POLICIES[scenario].items()}
+
+
+def stretches(steps: int = 5, scenario: str = "varga7-fast") -> dict[str, Callable[[], object]]:
+    """So many calls of `predict` by each policy of :data:`BESIDE`, again and again the same ones of its own episode."""
+    return {label: _stretch(scenario, *POLICIES[scenario][label], steps) for label in BESIDE}
 
 
 def damped_iterations(rows: int = 100, iterations: int = 100) -> dict[str, tuple[Callable[[], object], int]]:
@@ -99,6 +108,38 @@ def _predicting(scenario: str, effort: Effort) -> Table:
         (Column("p50_us", "median", "µs"), Column("p99_us", "99th percentile", "µs"), Column("ratio", "× env.step")),
         {name: (1e6 * a, 1e6 * b, ratio) for name, (a, b, ratio) in predict_times(scenario, effort.steps).items()},
     )
+
+
+def _beside(effort: Effort) -> Table:
+    steps, calls = min(effort.steps, 5), stretches(min(effort.steps, 5))
+    times = np.empty((20 * effort.rounds, len(calls)))
+    for turn in times:
+        for k, call in enumerate(calls.values()):
+            begin = time.perf_counter()
+            call()
+            turn[k] = (time.perf_counter() - begin) / steps
+    low = np.quantile(times, 0.1, axis=0)
+    return Table(
+        "predict_beside_dls",
+        "One predict in varga7-fast, in turn with dls",
+        f"The mean of {steps} calls behind the 50th of an episode, again and again, all policies in turn. 10th "
+        "percentiles: what else runs on the machine only adds.",
+        (Column("predict_us", "10th percentile", "µs"), Column("ratio", f"× {BESIDE[0]}")),
+        {label: (1e6 * t, t / low[0]) for label, t in zip(calls, low, strict=True)},
+    )
+
+
+def _stretch(scenario: str, name: str, kwargs: dict[str, object], steps: int) -> Callable[[], object]:
+    policy = baselines.make(name, scenario, **kwargs)
+    env = gym.make("RedundantIK-v0", scenario=scenario, preview=policy.preview)
+    observation, _ = env.reset(seed=0)
+    state: Memory | None = None
+    seen = []
+    for _ in range(50 + steps):
+        seen.append((observation, state))
+        action, state = policy.predict(observation, state)
+        observation, *_ = env.step(action)
+    return lambda: [policy.predict(*one) for one in seen[-steps:]]
 
 
 def _iterations(effort: Effort) -> Table:

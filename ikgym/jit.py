@@ -35,7 +35,20 @@ def kernel(function: Any) -> Any:
     Args:
         function: Takes and gives arrays, numbers and tuples of them.
     """
-    return _cached(function)
+    return _cached(function, _nrt=True)  # else taken over from a caller that is uncounted
+
+
+def uncounted(function: Any) -> Any:
+    """Like :func:`kernel`, without counting references: for inner loops that are handed arrays in named tuples.
+
+    numba counts the references of all arrays of a tuple, atomically, wherever it is passed on or a field is read: for
+    paths of 2 knots this took half the time of a Newton step. An uncounted kernel allocates nothing, which numba
+    refuses, and returns no array, nor calls what returns one, which the tests look for: its references would be lost.
+
+    Args:
+        function: Takes arrays, numbers and tuples of them, and returns numbers.
+    """
+    return _cached(function, _nrt=False)
 
 
 def inlined(function: Any) -> Any:

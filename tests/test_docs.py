@@ -246,7 +246,7 @@ def test_evaluation_snippets_run(capsys, tmp_path, monkeypatch):
     assert "('dls', 0.01, " in printed
     assert "(200, 7)" in printed
     assert "Still unknown 2" in printed
-    assert {file.name for file in tmp_path.iterdir()} == {"dls.csv", "dls.png"}
+    assert {file.name for file in tmp_path.iterdir()} == {"dls.csv", "dls.json", "dls.png"}
 
 
 def test_policies_snippets_run(monkeypatch):

@@ -10,10 +10,11 @@ import sys
 import threading
 
 import numba.core.dispatcher
+import numpy as np
 import pytest
 
 from ikgym import compilation, jit
-from ikgym.jit import kernel
+from ikgym.jit import kernel, uncounted
 
 CALLEE = "from {jit}\nSCALE = {scale}\n@kernel\ndef scaled(x):\n    return SCALE * x\n"
 CALLER = (
@@ -59,12 +60,18 @@ def test_numba_alone_would_not_notice(tmp_path):
     assert answer(tmp_path, NUMBAS, scale=3.0, shift=10.0) == 2.0
 
 
-def test_without_a_folder_to_write_to(monkeypatch, caplog):
+@pytest.fixture
+def no_folder(monkeypatch):
+    """Kernels that are defined in the test are compiled in it."""
+
     def no_locator(self, function):
         raise RuntimeError("cannot cache function: no locator available")
 
     monkeypatch.setattr(numba.core.dispatcher.FunctionCache, "__init__", no_locator)
     monkeypatch.setattr(jit, "_not_kept", set())
+
+
+def test_without_a_folder_to_write_to(no_folder, caplog):
     assert jit.kept_on_disk()
     with caplog.at_level(logging.INFO, logger="ikgym"):
 
@@ -79,6 +86,29 @@ def test_without_a_folder_to_write_to(monkeypatch, caplog):
         threading.Event().wait(0.2)
     assert "Compiling the test; this happens once in each process, since there is no folder" in caplog.text
     assert "kept on disk" not in caplog.text
+
+
+def test_an_uncounted_kernel_allocates_nothing_itself():
+    @uncounted
+    def allocating(n):
+        return np.empty(n).sum()
+
+    with pytest.raises(numba.core.errors.NumbaError, match="Only accept returning of array passed into the function"):
+        allocating(3)
+
+
+def test_what_an_uncounted_kernel_calls_may_allocate(no_folder):
+    """Without a word of its own a kernel would be compiled as its first caller is."""
+
+    @kernel
+    def allocating(n):
+        return np.ones(n).sum()
+
+    @uncounted
+    def calling(n):
+        return allocating(n)
+
+    assert calling(3) == 3.0
 
 
 CACHE = """

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import gc
+
 import numpy as np
 import pytest
+from numba.core.runtime import _nrt_python, rtsys
 
 import baselines
 import ikgym
@@ -64,3 +67,31 @@ def test_no_rows_are_a_batch(name):
     action, state = policy.predict(nothing)
     assert action.shape == (0, 7)
     assert all(len(array) == 0 for array in policy.predict(nothing, state)[1])
+
+
+@pytest.fixture
+def blocks_held():
+    """How many blocks of memory compiled code has allocated and not freed; counted in this test."""
+    _nrt_python.memsys_enable_stats()
+    yield lambda: rtsys.get_allocation_stats().mi_alloc - rtsys.get_allocation_stats().mi_free
+    _nrt_python.memsys_disable_stats()
+
+
+@pytest.mark.parametrize(
+    ("name", "parameters"),
+    [
+        ("rhc", {"horizon": 3, "rate_weight": 1e-3}),
+        ("rhc", {"horizon": 4, "starts": 2, "restart_steps": 3, "iterations": 1, "recovery_steps": 2}),
+        ("rhc_foresight", {"horizon": 41}),
+    ],
+)
+def test_nothing_is_left_behind(blocks_held, name, parameters):
+    """Kernels that do not count references would lose those of arrays that others give them."""
+    policy = baselines.make(name, "varga7-fast", **parameters)
+    observation = shown(policy.preview)
+    state = policy.predict(observation)[1]
+    before = blocks_held()
+    for _ in range(12):
+        state = policy.predict(observation, state)[1]
+    gc.collect()
+    assert blocks_held() <= before

@@ -12,8 +12,8 @@ from baselines.policy import Memory
 from baselines.policy.compiled import CompiledPolicy
 from baselines.solvers.arm_task import plain_arm_task
 from baselines.solvers.receding_horizon.newton.grid import offsets
-from baselines.solvers.receding_horizon.newton.plan import PlanSettings
 from baselines.solvers.receding_horizon.newton.receding import HorizonMemory, plan_rows
+from baselines.solvers.receding_horizon.newton.settings import PlanSettings, plain_settings
 from ikgym.exceptions import InvalidInputError
 from ikgym.preview import FARTHEST
 from ikgym.validation import FloatArray, number, whole_number
@@ -132,8 +132,8 @@ class RecedingHorizon(CompiledPolicy):
             self.recovery_steps,
             rate_weight,
         )
-        data = plain_arm_task(problem), model.chain.prismatic, *problem.cost.parameters
-        object.__setattr__(self, "_constants", (*data, *settings))
+        blocks = plain_arm_task(problem), model.chain.prismatic, *plain_settings(problem.cost.parameters, settings)
+        object.__setattr__(self, "_constants", blocks)
 
     @property
     def preview(self) -> int:
@@ -142,18 +142,9 @@ class RecedingHorizon(CompiledPolicy):
 
     def memory(self, rows: int) -> HorizonMemory:
         """An empty plan and restart candidate; see :class:`HorizonMemory`."""
-        knots, n = len(self.offsets), self.problem.model.joints
-        candidate, width = knots if self.restart_steps else 0, self.problem.task.error_size + 2 * n
-        return HorizonMemory(
-            plan=np.zeros((rows, knots, n)),
-            multipliers=np.zeros((rows, knots, width)),
-            candidate=np.zeros((rows, candidate, n)),
-            candidate_multipliers=np.zeros((rows, candidate, width)),
-            periods=np.zeros(rows, dtype=np.int64),
-            candidate_steps=np.zeros(rows, dtype=np.int64),
-            tried=np.zeros(rows, dtype=np.int64),
-            far=np.zeros(rows, dtype=np.int64),
-        )
+        width = self.problem.task.error_size + 3 * self.problem.model.joints
+        plans = np.zeros((rows, 2 if self.restart_steps else 1, len(self.offsets) * width))
+        return HorizonMemory(plans, np.zeros((rows, 4), dtype=np.int64))
 
     def kernel(self) -> Any:
         """See :meth:`CompiledPolicy.kernel`."""
@@ -171,7 +162,8 @@ class RecedingHorizon(CompiledPolicy):
         Returns:
             Joint coordinates in [rad] or [m]. Shape (B, K, n).
         """
-        return HorizonMemory(*self.memory_of(state)).plan.copy()
+        plans, n = HorizonMemory(*self.memory_of(state)).plans, self.problem.model.joints
+        return plans[:, 0, : len(self.offsets) * n].reshape(len(plans), -1, n).copy()
 
     def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
         """Jacobians and a factorisation a knot in each Newton step, and forward kinematics for one length tried.

@@ -20,7 +20,7 @@ from baselines.solvers.receding_horizon.newton.terms import (
 )
 from ikgym import cost_kernels, task_kernels
 from ikgym.cost_kernels import P_X_INSIDE
-from ikgym.jit import inlined, kernel
+from ikgym.jit import inlined, uncounted
 from ikgym.kinematics import forward, forward_and_jacobian
 
 # All loops take their arrays out of the tuples first: numba counts references at each access, which costs more than the
@@ -66,7 +66,7 @@ def tracking_errors(problem, path, workspace):
     return errors
 
 
-@kernel
+@uncounted
 def true_cost(problem, path, workspace):
     """The cost of a path, from the same kernels as the environment's; limits apart.
 
@@ -91,7 +91,7 @@ def true_cost(problem, path, workspace):
     return total
 
 
-@kernel
+@uncounted
 def merit(problem, path, multipliers, workspace):
     """The smooth function that Newton's method minimises: the cost with its kinks and limits held by multipliers.
 
@@ -129,7 +129,7 @@ def merit(problem, path, multipliers, workspace):
     return total
 
 
-@kernel
+@uncounted
 def linearise(problem, path, multipliers, advance, exact, workspace):
     """:func:`merit`, its gradient and its Hessian.
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ikgym.jit import kernel
+from ikgym.jit import inlined, kernel, uncounted
 
 Floats = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
@@ -57,7 +57,7 @@ def offsets(steps: int, move_blocks: int | None) -> Integers:
     return cut_off
 
 
-@kernel
+@uncounted
 def cut(at, steps, terminal, grid):
     """The grid of the knots ``at``, cut so that none lies more than ``steps`` ahead.
 
@@ -93,7 +93,7 @@ def cut(at, steps, terminal, grid):
     return knots
 
 
-@kernel
+@inlined
 def first_knots(grid, knots):
     """The first so many knots of a grid."""
     return Grid(grid.at[:knots], grid.length[:knots], grid.tracking[:knots], grid.velocity[:knots])
@@ -102,10 +102,11 @@ def first_knots(grid, knots):
 @kernel
 def empty_grid(knots):
     """A grid to be filled by :func:`cut`."""
-    return Grid(np.empty(knots, np.int64), np.empty(knots), np.empty(knots), np.empty(knots))
+    weights = np.empty((3, knots))
+    return Grid(np.empty(knots, np.int64), weights[0], weights[1], weights[2])
 
 
-@kernel
+@uncounted
 def shift_path(old, path, qdot, new, out):
     """What is left of a path one step later, at the knots of a new grid; past its end it goes on as it ended.
 
@@ -128,7 +129,7 @@ def shift_path(old, path, qdot, new, out):
             out[k, j] = path[block, j] + share * moved
 
 
-@kernel
+@uncounted
 def shift_multipliers(old, multipliers, new):
     """Multipliers one step later, in place: each knot takes over those of the old knot at its time or next after it.
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from baselines.solvers.linear_algebra import damped_step, dot
 from ikgym import task_kernels
-from ikgym.jit import inlined, kernel
+from ikgym.jit import inlined, kernel, uncounted
 from ikgym.kinematics import forward_and_jacobian
 
 # Damped steps that bring the arm from one knot to the next.
@@ -60,7 +60,7 @@ def initial_guess(problem, first, drift, damping, path, workspace):
                 here[j] = min(max(moved, data.lower[j]), data.upper[j])
 
 
-@kernel
+@uncounted
 def slow_down(problem, path):
     """Makes a path follow itself within the velocity limits, and so later where it was too fast; in place.
 

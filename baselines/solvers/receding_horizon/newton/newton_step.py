@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from baselines.solvers.linear_algebra import inverse_of_factor
-from ikgym.jit import inlined, kernel
+from ikgym.jit import inlined, uncounted
 from ikgym.linear_algebra import cholesky
 
 
-@kernel
+@uncounted
 def newton_step(model, exact, damping, inverse, factor, step):
     """Solves (H + damping I) step = -gradient by blocks, from the first knot to the last and back.
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from baselines.solvers.linear_algebra import inverse_of_factor
 from baselines.solvers.receding_horizon.newton.newton_step import multiply, pivot_of
-from ikgym.jit import inlined, kernel
+from ikgym.jit import inlined, uncounted
 from ikgym.linear_algebra import cholesky
 
 
-@kernel
+@uncounted
 def pentadiagonal_step(model, exact, damping, inverse, factor, step):
     """Solves (H + damping I) step = -gradient as :func:`newton_step.newton_step`, where ``model.far`` is not zero.
 

@@ -8,14 +8,13 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.solvers.receding_horizon.newton.cost import true_cost
-from baselines.solvers.receding_horizon.newton.grid import shift_multipliers, shift_path
+from baselines.solvers.receding_horizon.newton.grid import Grid, empty_grid, shift_multipliers, shift_path
 from baselines.solvers.receding_horizon.newton.guess import DAMPING, STREAM, draw, initial_guess, slow_down, uniform
 from baselines.solvers.receding_horizon.newton.minimise import NewtonSettings, minimise
 from baselines.solvers.receding_horizon.newton.workspace import NewtonWorkspace, newton_workspace
-from ikgym.jit import inlined, kernel
+from ikgym.jit import inlined, kernel, uncounted
 
 Floats = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
 
 # Newton steps of each of several initial guesses, and how exactly they are minimised before they are compared.
 STEPS_OF_A_START, TOLERANCE_OF_A_START = 30, 1e-4
@@ -25,38 +24,6 @@ HOPELESS, TRIED = 10.0, 5
 UNPROMISING = 2.0
 # A restart candidate replaces the plan only for a gain that is worth the jump.
 GAIN = 1e-3
-
-
-class PlanSettings(NamedTuple):
-    """What the parameters of :class:`baselines.solvers.receding_horizon.rhc.RecedingHorizon` say to the kernels.
-
-    Attributes:
-        at: Steps from now to the knots. Shape (K,).
-        terminal_weight: Factor of the tracking cost of the last knot.
-        stop_at_end: Whether the horizon ends with the episode.
-        iterations: Newton steps in one period; -1 to the optimum.
-        tolerance: Relative precision of the optimum.
-        starts: Initial guesses to choose from.
-        restart_steps: Newton steps of a restart candidate, 0 for none.
-        restart_rate: Of them in one period.
-        seed: Of the random guesses.
-        start_steps: Newton steps of an initial guess that has a period of its own; 0 where all share the first.
-        recovery_steps: Newton steps behind a period that ended beyond the velocity limits; 0 for as many as in others.
-        rate_weight: What changes of velocity cost, see :mod:`rate`.
-    """
-
-    at: Integers
-    terminal_weight: float
-    stop_at_end: bool
-    iterations: int
-    tolerance: float
-    starts: int
-    restart_steps: int
-    restart_rate: int
-    seed: int
-    start_steps: int
-    recovery_steps: int
-    rate_weight: float
 
 
 class Plan(NamedTuple):
@@ -79,28 +46,40 @@ class PlanWorkspace(NamedTuple):
         kept: The best plan so far.
         drift: Drift of a random guess, in [rad/s] or [m/s]. Shape (n,).
         passed: q̇ Δt of the step that has passed. Shape (n,).
+        grid: Of the plan.
+        old_grid: Of the plan of the period before.
     """
 
     newton: NewtonWorkspace
     kept: Plan
     drift: Floats
     passed: Floats
+    grid: Grid
+    old_grid: Grid
 
 
 @kernel
 def plan_workspace(kind, m, knots, n, width):
     """The workspace for plans of up to ``knots`` knots, ``n`` joints and ``width`` multipliers a knot."""
-    kept = Plan(np.empty((knots, n)), np.empty((knots, width)))
-    return PlanWorkspace(newton_workspace(kind, m, knots, n), kept, np.empty(n), np.empty(n))
+    kept = plan_in(np.empty(knots * (n + width)), knots, n)
+    newton, vectors = newton_workspace(kind, m, knots, n), np.empty((2, n))
+    return PlanWorkspace(newton, kept, vectors[0], vectors[1], empty_grid(knots), empty_grid(knots))
 
 
-@kernel
+@inlined
+def plan_in(block, knots, n):
+    """The plan that a block of numbers holds: the path of ``knots`` knots and ``n`` joints, then the multipliers."""
+    end = knots * n
+    return Plan(block[:end].reshape(knots, n), block[end:].reshape(knots, block.shape[0] // knots - n))
+
+
+@inlined
 def first_part(plan, knots):
     """The first so many knots of a plan, as views."""
     return Plan(plan.path[:knots], plan.multipliers[:knots])
 
 
-@kernel
+@uncounted
 def shift_plan(old_grid, plan, grid, workspace):
     """Turns a plan into what is left of it one step later, in place.
 
@@ -124,7 +103,7 @@ def initial_plan(problem, settings, plan, workspace):
 
     Args:
         problem: A :class:`workspace.PathProblem` of K knots.
-        settings: :class:`PlanSettings`.
+        settings: :class:`settings.PlanSettings`.
         plan: Receives the :class:`Plan`.
         workspace: A :class:`PlanWorkspace`.
 
@@ -170,7 +149,7 @@ def try_start(problem, settings, steps, plan, cost, number, workspace):
 
     Args:
         problem: A :class:`workspace.PathProblem` of K knots.
-        settings: :class:`PlanSettings`.
+        settings: :class:`settings.PlanSettings`.
         steps: Newton steps.
         plan: The :class:`Plan`.
         cost: What the plan costs.
@@ -197,7 +176,7 @@ def branch_off(problem, settings, plan, anew, number, candidate, workspace):
 
     Args:
         problem: A :class:`workspace.PathProblem` of K knots.
-        settings: :class:`PlanSettings`.
+        settings: :class:`settings.PlanSettings`.
         plan: The :class:`Plan`.
         anew: Whether to branch off at once.
         number: Which random guess of the seed.
@@ -219,7 +198,7 @@ def improve_candidate(problem, settings, rate, plan, cost, candidate, age, works
 
     Args:
         problem: A :class:`workspace.PathProblem` of K knots.
-        settings: :class:`PlanSettings`.
+        settings: :class:`settings.PlanSettings`.
         rate: Newton steps.
         plan: The :class:`Plan`.
         cost: What the plan costs.

@@ -7,7 +7,7 @@ is the step that has passed.
 
 from __future__ import annotations
 
-from ikgym.jit import inlined, kernel
+from ikgym.jit import inlined, uncounted
 
 
 @inlined
@@ -29,7 +29,7 @@ def change(problem, path, k, j):
     return (path[k, j] - here) * by_end - velocity, by_end, by_beginning, weight
 
 
-@kernel
+@uncounted
 def rate_cost(problem, path):
     """The cost of a path's changes of velocity. Shape (K, n)."""
     total = 0.0
@@ -40,7 +40,7 @@ def rate_cost(problem, path):
     return total
 
 
-@kernel
+@uncounted
 def add_rate_cost(problem, path, model):
     """Adds gradient and Hessian of :func:`rate_cost` to a quadratic model.
 

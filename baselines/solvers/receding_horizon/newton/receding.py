@@ -10,24 +10,23 @@ import numpy.typing as npt
 
 from baselines.policy_kernels import REFUSED, all_finite, answer_parts, as_rows, cut_rows
 from baselines.solvers.arm_task import arm_task_of, joint_limits_of, period_of
-from baselines.solvers.receding_horizon.newton.grid import cut, empty_grid, first_knots
+from baselines.solvers.receding_horizon.newton.grid import cut, first_knots
 from baselines.solvers.receding_horizon.newton.minimise import CONVERGED, NewtonSettings, minimise
 from baselines.solvers.receding_horizon.newton.plan import (
-    Plan,
-    PlanSettings,
     branch_off,
     first_part,
     improve_candidate,
     initial_plan,
+    plan_in,
     plan_workspace,
     shift_plan,
     try_start,
 )
+from baselines.solvers.receding_horizon.newton.settings import settings_of
 from baselines.solvers.receding_horizon.newton.workspace import PathProblem
 from baselines.solvers.receding_horizon.problem_data import ProblemData
 from baselines.status import Status
-from ikgym.cost_kernels import CostParameters
-from ikgym.jit import inlined, kernel
+from ikgym.jit import inlined, kernel, uncounted
 from ikgym.kinematics import Chain
 
 _CONVERGED, _LIMIT, _SATURATED = int(Status.CONVERGED), int(Status.ITERATION_LIMIT), int(Status.SATURATED)
@@ -41,50 +40,58 @@ RETRY = 4
 
 
 class HorizonMemory(NamedTuple):
-    """What a receding horizon remembers of each of B arms.
+    """What a receding horizon remembers of each of B arms, in two blocks.
 
     Attributes:
-        plan: Joint coordinates at the knots in [rad] or [m]. Shape (B, K, n).
-        multipliers: λ of the plan's kinks and limits. Shape (B, K, e + 2 n).
-        candidate: The restart candidate, likewise. Shape (B, K or 0, n).
-        candidate_multipliers: Likewise. Shape (B, K or 0, e + 2 n).
-        periods: Periods planned so far. Shape (B,).
-        candidate_steps: Newton steps that the candidates have had. Shape (B,).
-        tried: Initial guesses tried so far. Shape (B,).
-        far: How many periods in a row have ended beyond the velocity limits. Shape (B,).
+        plans: The plan and, where there is one, the restart candidate, see :func:`plan.plan_in`: joint coordinates at
+            the K knots in [rad] or [m], then e + 2 n multipliers a knot. Shape (B, 1 or 2, K (e + 3 n)).
+        counts: PERIODS planned so far, CANDIDATE_STEPS that the candidate has had, initial guesses TRIED so far, and
+            how many periods in a row have ended FAR beyond the velocity limits. Shape (B, 4).
     """
 
-    plan: npt.NDArray[np.float64]
-    multipliers: npt.NDArray[np.float64]
-    candidate: npt.NDArray[np.float64]
-    candidate_multipliers: npt.NDArray[np.float64]
-    periods: npt.NDArray[np.int64]
-    candidate_steps: npt.NDArray[np.int64]
-    tried: npt.NDArray[np.int64]
-    far: npt.NDArray[np.int64]
+    plans: npt.NDArray[np.float64]
+    counts: npt.NDArray[np.int64]
+
+
+PERIODS, CANDIDATE_STEPS, TRIED, FAR = range(4)
+
+
+class Observations(NamedTuple):
+    """What is seen of B arms, and what lies ahead of them.
+
+    Attributes:
+        q: Joint coordinates in [rad] or [m]. Shape (B, n).
+        qdot: Joint velocities last applied, in [rad/s] or [m/s]. Shape (B, n).
+        nominal: Nominal task coordinates 1, 2, … steps ahead. Shape (B, p, m).
+        remaining: Steps left. Shape (B,).
+    """
+
+    q: npt.NDArray[np.float64]
+    qdot: npt.NDArray[np.float64]
+    nominal: npt.NDArray[np.float64]
+    remaining: npt.NDArray[np.float64]
+
+
+class Answers(NamedTuple):
+    """What B arms are to do.
+
+    Attributes:
+        qdot: Joint velocities in [rad/s] or [m/s]. Shape (B, n).
+        status: Values of :class:`Status`. Shape (B,).
+        iterations: Newton steps made. Shape (B,).
+    """
+
+    qdot: npt.NDArray[np.float64]
+    status: npt.NDArray[np.int64]
+    iterations: npt.NDArray[np.int64]
 
 
 @kernel
-def plan_rows(  # the first arguments are described where they come from
+def plan_rows(
     arm_task,
     prismatic,
-    delta_x,
-    p_x,
-    delta_qdot,
-    p_out,
-    p_in,
-    at,
-    terminal_weight,
-    stop_at_end,
-    max_steps,
-    tolerance,
-    starts,
-    restart_steps,
-    restart_rate,
-    seed,
-    start_steps,
-    recovery_steps,
-    rate_weight,
+    numbers,
+    integers,
     checking,
     q,
     qdot_before,
@@ -92,88 +99,110 @@ def plan_rows(  # the first arguments are described where they come from
     nominal,
     remaining,
     plans,
-    multipliers,
-    candidates,
-    candidate_multipliers,
-    periods,
-    candidate_steps,
-    tried,
-    far,
+    counts,
     action,
     answer,
 ):
     """Plans one period for each of B arms.
 
-    Flat arguments, since this is entered at each `predict`: numba unpacks them in 2.5 µs, and the same as five named
-    tuples in 11 µs, which is half of what a `predict` with a horizon of 3 takes in all.
-
-    The arguments are arm and task (see :func:`plain_arm_task`), which joints are prismatic, those of
-    :class:`CostParameters` and :class:`PlanSettings`, then those of :class:`CompiledPolicy` with the memory of
-    :class:`HorizonMemory`, its plans and candidates in the plural. The iterations are the Newton steps made, those of
-    initial guesses and candidates among them.
+    The arguments are arm and task (see :func:`plain_arm_task`), which joints are prismatic, cost and settings (see
+    :func:`plain_settings`), then those of :class:`CompiledPolicy` with the memory of :class:`HorizonMemory`. The
+    iterations are the Newton steps made, those of initial guesses and candidates among them.
     """
     if checking and not all_finite(q, qdot_before, pose, nominal, remaining):
         return REFUSED
     (dt, action_scale), (lower, upper, velocity_limit) = period_of(arm_task), joint_limits_of(arm_task)
-    n, knots = action_scale.shape[0], at.shape[0]
+    n = action_scale.shape[0]
     q, pose, nominal = as_rows(n, q, pose, nominal)
     qdot, status, iterations = answer_parts(answer, q.shape[0], n)
+    observations = Observations(q, qdot_before.reshape(q.shape), nominal, remaining)
     (offsets, axes, _, tool, tool_rotation), kind = arm_task_of(arm_task)
     chain = Chain(offsets, axes, prismatic, tool, tool_rotation)  # read-only, as others have compiled for
-    cost = CostParameters(delta_x, p_x, delta_qdot, p_out, p_in)
+    cost, settings = settings_of(numbers, integers)
     data = ProblemData(chain, kind, cost, dt, lower, upper, velocity_limit)
-    settings = PlanSettings(
-        at,
-        terminal_weight,
-        stop_at_end,
-        max_steps,
-        tolerance,
-        starts,
-        restart_steps,
-        restart_rate,
-        seed,
-        start_steps,
-        recovery_steps,
-        rate_weight,
-    )
-    workspace = plan_workspace(kind, nominal.shape[2], knots, n, multipliers.shape[2])
-    new_grid, old_grid = empty_grid(knots), empty_grid(knots)
-    for row in range(q.shape[0]):
-        left = int(min(max(remaining[row], 1.0), at[-1] + 1.0)) if stop_at_end else at[-1]
-        grid = first_knots(new_grid, cut(at, left, terminal_weight, new_grid))
-        old = first_knots(old_grid, cut(at, left + 1 if stop_at_end else left, terminal_weight, old_grid))
-        problem = PathProblem(data, grid, q[row], nominal[row], qdot_before[row * n : (row + 1) * n], rate_weight)
-        for j in range(n):
-            workspace.passed[j] = qdot_before[row * n + j] * dt
-        plan = Plan(plans[row], multipliers[row])
-        starting = start_steps > 0 and periods[row] > 0 and tried[row] + 1 < starts
-        retried = far[row] > 0 and far[row] % RETRY == 0
-        hurried = far[row] > 0 and not (starting or retried or max_steps < 0)
-        steps = max(recovery_steps, max_steps) if hurried else max_steps
-        minimum, made = _plan(problem, settings, steps, periods[row], old, plan, workspace)
-        value, age = minimum.cost, candidate_steps[row : row + 1]
-        plan = first_part(plan, grid.at.shape[0])
-        if far[row] > 0 and not starting:
-            age[0] = 0  # no time for the candidate, which is left behind
-            if retried:
-                number = starts + periods[row]
-                made += try_start(problem, settings, recovery_steps, plan, value, number, workspace)
-        elif restart_steps > 0 and periods[row] > 0:
-            candidate = Plan(candidates[row], candidate_multipliers[row])
-            if age[0] == 0:
-                branch_off(problem, settings, plan, starting, starts + periods[row], candidate, workspace)
-            else:
-                shift_plan(old, candidate, grid, workspace)
-            candidate = first_part(candidate, grid.at.shape[0])
-            rate = start_steps if starting else restart_rate
-            tried[row] += starting
-            made += improve_candidate(problem, settings, rate, plan, value, candidate, age, workspace)
-        periods[row] += 1
-        kept = _first_velocity(data, q[row], plans[row, 0], grid.length[0], qdot[row])
-        status[row] = (_CONVERGED if minimum.outcome == CONVERGED else _LIMIT) if kept else _SATURATED
-        far[row] = 0 if kept or recovery_steps == 0 else far[row] + 1
-        iterations[row] = made
+    knots = settings.at.shape[0]
+    workspace = plan_workspace(kind, nominal.shape[2], knots, n, plans.shape[2] // knots - n)
+    memory, answers = HorizonMemory(plans, counts), Answers(qdot, status, iterations)
+    plan_batch(data, settings, observations, memory, answers, workspace)
     return cut_rows(qdot, action_scale, action.reshape(qdot.shape), status)
+
+
+@uncounted
+def plan_batch(data, settings, observations, memory, answers, workspace):
+    """Plans one period for each of B arms.
+
+    Args:
+        data: The :class:`ProblemData`.
+        settings: :class:`settings.PlanSettings`.
+        observations: The :class:`Observations`.
+        memory: The :class:`HorizonMemory`, turned into the next one in place.
+        answers: Receives the :class:`Answers`.
+        workspace: A :class:`plan.PlanWorkspace`.
+    """
+    plans, counts = memory
+    for row in range(observations.q.shape[0]):
+        q, qdot_before, count = observations.q[row], observations.qdot[row], counts[row]
+        grid, old_grid = _grids(settings, observations.remaining[row], workspace)
+        problem = PathProblem(data, grid, q, observations.nominal[row], qdot_before, settings.rate_weight)
+        for j in range(q.shape[0]):
+            workspace.passed[j] = qdot_before[j] * data.dt
+        minimum, made = _plan_row(problem, settings, old_grid, plans[row], count, workspace)
+        count[PERIODS] += 1
+        kept = _first_velocity(data, q, plans[row, 0], grid.length[0], answers.qdot[row])
+        count[FAR] = 0 if kept or settings.recovery_steps == 0 else count[FAR] + 1
+        answers.status[row] = (_CONVERGED if minimum.outcome == CONVERGED else _LIMIT) if kept else _SATURATED
+        answers.iterations[row] = made
+
+
+@inlined
+def _grids(settings, remaining, workspace):
+    """The grid of this period, and that of the period before, which began one step earlier."""
+    at, stop, weight = settings.at, settings.stop_at_end, settings.terminal_weight
+    grid, old_grid, last = workspace.grid, workspace.old_grid, at[-1]
+    left = int(min(max(remaining, 1.0), last + 1.0)) if stop else last
+    old_knots = cut(at, left + 1 if stop else left, weight, old_grid)
+    return first_knots(grid, cut(at, left, weight, grid)), first_knots(old_grid, old_knots)
+
+
+@inlined
+def _plan_row(problem, settings, old_grid, plans, counts, workspace):
+    """Plans a period of one arm, and goes on with its restart candidate.
+
+    Args:
+        problem: A :class:`PathProblem`.
+        settings: :class:`settings.PlanSettings`.
+        old_grid: The grid of the plans, those of the period before.
+        plans: Of :class:`HorizonMemory`, changed in place. Shape (1 or 2, K (e + 3 n)).
+        counts: Likewise. Shape (4,).
+        workspace: A :class:`plan.PlanWorkspace`.
+
+    Returns:
+        The :class:`minimise.Minimum` of the plan, and Newton steps made.
+    """
+    all_knots, knots, n = settings.at.shape[0], problem.grid.at.shape[0], problem.start.shape[0]
+    period, far, age = counts[PERIODS], counts[FAR], counts[CANDIDATE_STEPS : CANDIDATE_STEPS + 1]
+    starting = settings.start_steps > 0 and period > 0 and counts[TRIED] + 1 < settings.starts
+    retried = far > 0 and far % RETRY == 0
+    hurried = far > 0 and not (starting or retried or settings.iterations < 0)
+    steps = max(settings.recovery_steps, settings.iterations) if hurried else settings.iterations
+    whole = plan_in(plans[0], all_knots, n)
+    minimum, made = _plan(problem, settings, steps, period, old_grid, whole, workspace)
+    plan, number = first_part(whole, knots), settings.starts + period
+    if far > 0 and not starting:
+        age[0] = 0  # no time for the candidate, which is left behind
+        if retried:
+            made += try_start(problem, settings, settings.recovery_steps, plan, minimum.cost, number, workspace)
+    elif settings.restart_steps > 0 and period > 0:
+        whole_candidate = plan_in(plans[1], all_knots, n)
+        if age[0] == 0:
+            branch_off(problem, settings, plan, starting, number, whole_candidate, workspace)
+        else:
+            shift_plan(old_grid, whole_candidate, problem.grid, workspace)
+        candidate = first_part(whole_candidate, knots)
+        rate = settings.start_steps if starting else settings.restart_rate
+        counts[TRIED] += starting
+        made += improve_candidate(problem, settings, rate, plan, minimum.cost, candidate, age, workspace)
+    return minimum, made
 
 
 @inlined
@@ -182,7 +211,7 @@ def _plan(problem, settings, most, period, old_grid, plan, workspace):
 
     Args:
         problem: A :class:`PathProblem`.
-        settings: :class:`PlanSettings`.
+        settings: :class:`settings.PlanSettings`.
         most: Newton steps in this period; -1 to the optimum.
         period: Periods planned before.
         old_grid: The grid of the plan before.

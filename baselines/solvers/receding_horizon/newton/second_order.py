@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from ikgym import task_kernels
 from ikgym.axis_kernels import across
-from ikgym.jit import inlined, kernel
+from ikgym.jit import inlined, uncounted
 
 
-@kernel
+@uncounted
 def second_order(kind, workspace, out):
     """Σ gradient_i ∂²error_i / ∂q², the lower triangle; for POSE and AXIS as if the rotation error were small.
 

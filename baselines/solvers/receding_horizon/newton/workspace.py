@@ -117,49 +117,40 @@ class NewtonWorkspace(NamedTuple):
     trial: Floats
 
 
+# Arrays of the same shape are parts of one: an allocation takes 40 ns, and all of them once took 0.9 µs of a `predict`.
+
+
 @kernel
 def knot_workspace(kind, m, n):
     """The workspace of one knot, for task coordinates of ``m`` numbers and ``n`` joints."""
     e = task_kernels.error_size(kind, m)
+    rotations, vectors, jacobians = np.empty((2, 3, 3)), np.empty((3, e)), np.empty((2, e, n))
     return KnotWorkspace(
-        np.empty((3, 3)),
+        rotations[0],
         np.empty(3),
         np.empty((6, n)),
         np.empty(m),
-        np.empty(e),
-        np.empty((e, n)),
-        np.empty((e, n)),
-        np.empty(e),
-        np.empty((3, 3)),
+        vectors[0],
+        jacobians[0],
+        jacobians[1],
+        vectors[1],
+        rotations[1],
         np.ones(1),
         np.empty((e, e)),
-        np.empty(e),
-    )
-
-
-@kernel
-def quadratic_model(knots, n):
-    """Arrays for the quadratic model at a path of ``knots`` knots and ``n`` joints."""
-    return QuadraticModel(
-        np.empty((knots, n)),
-        np.empty((knots, n, n)),
-        np.empty((knots, n, n)),
-        np.empty((knots, n)),
-        np.empty((knots, n)),
-        np.empty((knots, n, n)),
-        np.empty((n, n)),
+        vectors[2],
     )
 
 
 @kernel
 def newton_workspace(kind, m, knots, n):
     """The workspace for paths of up to ``knots`` knots, task coordinates of ``m`` numbers and ``n`` joints."""
+    vectors, blocks, squares = np.empty((5, knots, n)), np.empty((4, knots, n, n)), np.empty((2, n, n))
     return NewtonWorkspace(
         knot_workspace(kind, m, n),
         np.empty((knots, task_kernels.error_size(kind, m))),
-        quadratic_model(knots, n),
-        np.empty((knots, n, n)),
-        np.empty((n, n)),
-        np.empty((knots, n)),
-        np.empty((knots, n)),
+        QuadraticModel(vectors[0], blocks[0], blocks[1], vectors[1], vectors[2], blocks[2], squares[0]),
+        blocks[3],
+        squares[1],
+        vectors[3],
+        vectors[4],
     )

@@ -100,7 +100,7 @@ def test_the_seed_chooses_the_initial_guesses(seed, same):
         observation, _ = env.reset(seed=1_000_000)
         _, state = policy.predict(observation)
         _, state = policy.predict(observation, state)
-        candidates.append(policy.memory_of(state).candidate)
+        candidates.append(policy.memory_of(state).plans[:, 1])
     assert np.array_equal(*candidates) == same
 
 

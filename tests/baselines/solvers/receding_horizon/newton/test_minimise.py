@@ -12,9 +12,9 @@ from baselines.solvers.linear_algebra import inverse_of_factor
 from baselines.solvers.receding_horizon.newton.cost import true_cost
 from baselines.solvers.receding_horizon.newton.minimise import CONVERGED, RAN_OUT, NewtonSettings, minimise
 from baselines.solvers.receding_horizon.newton.newton_step import newton_step
-from baselines.solvers.receding_horizon.newton.workspace import PathProblem, newton_workspace, quadratic_model
+from baselines.solvers.receding_horizon.newton.workspace import PathProblem, newton_workspace
 from baselines.solvers.receding_horizon.problem_data import ProblemData
-from ikgym import TrackingCost
+from ikgym import TrackingCost, task_kernels
 from ikgym.arms import Arm
 from ikgym.linear_algebra import cholesky
 from tests.baselines.solvers.receding_horizon.newton.problems import grid_of, place
@@ -22,7 +22,7 @@ from tests.baselines.solvers.receding_horizon.newton.test_cost import dense
 
 
 def random_blocks(knots, n, rng, convex=True):
-    blocks = quadratic_model(knots, n)
+    blocks = newton_workspace(task_kernels.POSITION, 3, knots, n).model
     blocks.gradient[:] = rng.normal(size=(knots, n))
     half = rng.normal(size=(2, knots, n, n))
     blocks.diagonal[:] = half[0] @ half[0].swapaxes(1, 2)

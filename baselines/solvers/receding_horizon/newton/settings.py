@@ -1,0 +1,81 @@
+"""What the parameters of a receding horizon say to its kernels, and the two blocks of numbers that take it there."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from ikgym.cost_kernels import CostParameters
+from ikgym.jit import inlined
+
+Floats = npt.NDArray[np.float64]
+Integers = npt.NDArray[np.int64]
+
+
+class PlanSettings(NamedTuple):
+    """What the parameters of :class:`baselines.solvers.receding_horizon.rhc.RecedingHorizon` say to the kernels.
+
+    Attributes:
+        at: Steps from now to the knots. Shape (K,).
+        terminal_weight: Factor of the tracking cost of the last knot.
+        stop_at_end: Whether the horizon ends with the episode.
+        iterations: Newton steps in one period; -1 to the optimum.
+        tolerance: Relative precision of the optimum.
+        starts: Initial guesses to choose from.
+        restart_steps: Newton steps of a restart candidate, 0 for none.
+        restart_rate: Of them in one period.
+        seed: Of the random guesses.
+        start_steps: Newton steps of an initial guess that has a period of its own; 0 where all share the first.
+        recovery_steps: Newton steps behind a period that ended beyond the velocity limits; 0 for as many as in others.
+        rate_weight: What changes of velocity cost, see :mod:`rate`.
+    """
+
+    at: Integers
+    terminal_weight: float
+    stop_at_end: bool
+    iterations: int
+    tolerance: float
+    starts: int
+    restart_steps: int
+    restart_rate: int
+    seed: int
+    start_steps: int
+    recovery_steps: int
+    rate_weight: float
+
+
+def plain_settings(cost: CostParameters, settings: PlanSettings) -> tuple[Floats, Integers]:
+    """The numbers and the whole numbers of cost and settings, each as one read-only block, for :func:`settings_of`.
+
+    A `predict` takes arguments apart at 0.1 µs each, which for all of them one by one is longer than a Newton step.
+    """
+    s = settings
+    numbers = np.array([*cost, s.terminal_weight, s.tolerance, s.rate_weight])
+    steps = s.iterations, s.starts, s.restart_steps, s.restart_rate, s.seed, s.start_steps, s.recovery_steps
+    integers = np.array([s.stop_at_end, *steps, *s.at], dtype=np.int64)
+    for block in (numbers, integers):
+        block.flags.writeable = False
+    return numbers, integers
+
+
+@inlined
+def settings_of(numbers, integers):
+    """The :class:`CostParameters` and :class:`PlanSettings` that :func:`plain_settings` took apart."""
+    cost = CostParameters(numbers[0], numbers[1], numbers[2], numbers[3], numbers[4])
+    terminal_weight, tolerance, rate_weight = numbers[5], numbers[6], numbers[7]
+    return cost, PlanSettings(
+        integers[8:],
+        terminal_weight,
+        integers[0] != 0,
+        integers[1],
+        tolerance,
+        integers[2],
+        integers[3],
+        integers[4],
+        integers[5],
+        integers[6],
+        integers[7],
+        rate_weight,
+    )
