@@ -10,33 +10,35 @@ from baselines.solvers.quadratic_program.velocity_box import braking_speed
 from ikgym.jit import kernel
 from ikgym.linear_algebra import cholesky, cholesky_solve
 
-# What a task velocity of another length weighs beside one of another direction.
-SCALING_WEIGHT = 1e-3
+# What a task shift of another length weighs beside one of another direction, and joint motion beside that.
+SCALING_WEIGHT = 1e-2
 
 
 @kernel
-def motion_weights(jacobian, damping, fastest, out):
+def motion_weight(jacobian, error, damping, lm_damping, fastest):
     """What the squares of the joint velocities weigh beside those of the task shift.
 
     Args:
         jacobian: J Δt. Shape (e, n).
-        damping: The weight of a joint at its largest velocity, as a share of the squared task shift that such joints
-            make in the mean.
+        error: The present error. Shape (e,).
+        damping: Share of the mean squared length of the columns of J Δt.
+        lm_damping: Share of the squared error, in terms of the fastest joint.
         fastest: Largest velocities in [rad/s] or [m/s]. Shape (n,).
-        out: Receives the weights. Shape (n,).
     """
     e, n = jacobian.shape
-    total = 0.0
+    columns, square, most = 0.0, 0.0, 0.0
     for a in range(e):
+        square += error[a] * error[a]
         for j in range(n):
-            total += (jacobian[a, j] * fastest[j]) ** 2
+            columns += jacobian[a, j] * jacobian[a, j]
     for j in range(n):
-        out[j] = damping * total / n / fastest[j] ** 2
+        most = max(most, fastest[j])
+    return damping * columns / n + lm_damping * square / (most * most)
 
 
 @kernel
-def curvature(jacobian, weights, hessian):
-    """H = (J Δt)ᵀ J Δt + diag(weights), in the upper left corner: shapes (e, n), (n,), (n, n) or more."""
+def curvature(jacobian, weight, hessian):
+    """H = (J Δt)ᵀ J Δt + weight · I, in the upper left corner: shapes (e, n), a number, (n, n) or more."""
     e, n = jacobian.shape
     for i in range(n):
         for j in range(i + 1):
@@ -44,7 +46,7 @@ def curvature(jacobian, weights, hessian):
             for a in range(e):
                 total += jacobian[a, i] * jacobian[a, j]
             hessian[i, j] = hessian[j, i] = total
-        hessian[i, i] += weights[i]
+        hessian[i, i] += weight
 
 
 @kernel
@@ -78,23 +80,23 @@ def feedback_share(hessian, jacobian, error, change):
 
 
 @kernel
-def goal(jacobian, shift, weights, preferred, linear):
-    """The vector g = (J Δt)ᵀ Δx + weights · preferred velocities: shapes (e, n), (e,), (n,), (n,), (n,)."""
+def goal(jacobian, shift, weight, preferred, linear):
+    """The vector g = (J Δt)ᵀ Δx + weight · preferred velocities: shapes (e, n), (e,), a number, (n,), (n,)."""
     e, n = jacobian.shape
     for j in range(n):
-        linear[j] = weights[j] * preferred[j]
+        linear[j] = weight * preferred[j]
         for a in range(e):
             linear[j] += jacobian[a, j] * shift[a]
 
 
 @kernel
-def goal_to_scale(jacobian, shift, weights, preferred, hessian, linear):
+def goal_to_scale(jacobian, shift, weight, preferred, hessian, linear):
     """The same where the task shift is s Δx: s ‖Δx‖, between 0 and ‖Δx‖, is one more variable, the last.
 
     Args:
         jacobian: J Δt. Shape (e, n).
         shift: Δx. Shape (e,).
-        weights: See :func:`motion_weights`. Shape (n,).
+        weight: See :func:`motion_weight`.
         preferred: Preferred joint velocities. Shape (n,).
         hessian: H of the joints, which receives the last row and column. Shape (n + 1, n + 1).
         linear: Receives g. Shape (n + 1,).
@@ -108,7 +110,7 @@ def goal_to_scale(jacobian, shift, weights, preferred, hessian, linear):
         length += shift[a] * shift[a]
     length = math.sqrt(length)
     for j in range(n):
-        linear[j] = weights[j] * preferred[j]
+        linear[j] = weight * preferred[j]
         along = 0.0
         for a in range(e):
             along += jacobian[a, j] * shift[a]
@@ -119,7 +121,7 @@ def goal_to_scale(jacobian, shift, weights, preferred, hessian, linear):
 
 
 @kernel
-def held_back(jacobian, shift, weights, preferred, qdot, lower, upper):
+def held_back(jacobian, shift, weight, preferred, qdot, lower, upper):
     """Whether a joint stands at a bound, and the task error that is left weighs more than the joint motion."""
     e, n = jacobian.shape
     bound, left, motion = False, 0.0, 0.0
@@ -130,5 +132,5 @@ def held_back(jacobian, shift, weights, preferred, qdot, lower, upper):
         left += missing * missing
     for j in range(n):
         bound |= qdot[j] == lower[j] or qdot[j] == upper[j]
-        motion += weights[j] * (qdot[j] - preferred[j]) ** 2
+        motion += weight * (qdot[j] - preferred[j]) ** 2
     return bound and left > motion

@@ -20,7 +20,7 @@ from baselines.solvers.quadratic_program.program import (
     goal,
     goal_to_scale,
     held_back,
-    motion_weights,
+    motion_weight,
 )
 from baselines.solvers.quadratic_program.velocity_box import velocity_box
 from baselines.solvers.resolved_rate.base import APPLIED, TaskFeedback, asked_apart
@@ -37,17 +37,23 @@ LIMIT, SATURATED = int(Status.ITERATION_LIMIT), int(Status.SATURATED)
 class QuadraticProgram(TaskFeedback):
     """Minimises task error and joint motion under the limits of position, velocity and acceleration, at each step.
 
-    The joint velocity is the minimum of ‖J q̇ Δt − Δx‖² + ρ Σ ((q̇ − z) / v)², joint by joint over the largest
-    velocities v, where z = K (q* − q) leads to a posture. All limits are bounds of q̇, see :func:`velocity_box`: those
-    of velocity, of the change of the velocity, and the velocity towards a stop from which the joint can still brake.
-    The program in n variables with bounds is solved by an active set, exactly (:func:`box_minimum`).
+    The joint velocity is the minimum of ‖J q̇ Δt − Δx‖² + ρ ‖q̇ − z‖², where z = K (q* − q) leads to a posture. All
+    limits are bounds of q̇, see :func:`velocity_box`: those of velocity, of the change of the velocity, and the velocity
+    towards a stop from which the joint can still brake. The program in n variables with bounds is solved by an active
+    set, exactly (:func:`box_minimum`).
+
+    ρ = damping · mean ‖J_j Δt‖² + lm_damping · ‖e‖² / v², with the columns J_j, the present error e and the largest
+    joint velocity v: numbers that suit arms of any size. The second part is the damping of Levenberg and Marquardt
+    (Sugihara 2011), next to nothing on the path; without it an arm that was led out of its reach swings through the
+    stretched posture, and may come back with its elbow bent the other way.
 
     The share of the present error that is taken back is made smaller where the joints could not brake in time once it
     is gone. Without that an arm with acceleration limits swings about a reference that it has lost.
 
-    With `task_scaling` the task velocity is scaled by an s between 0 and 1: ‖J q̇ Δt − s Δx‖² + w (1 − s)² ‖Δx‖² +
-    w ρ Σ ((q̇ − z) / v)² is minimised over q̇ and s, with w = 0.001, so that the direction of Δx comes before its
-    length, up to a thousandth, and that before the joint motion.
+    With `task_scaling` the task shift is scaled by an s between 0 and 1: ‖J q̇ Δt − s Δx‖² + w (1 − s)² ‖Δx‖² +
+    w ρ ‖q̇ − z‖² is minimised over q̇ and s, with w = 0.01, so that direction comes before length, and length before
+    joint motion. Where the bounds allow s Δx, what is made is off its line by (1 − s) ‖Δx‖ / 10 at most, mostly by much
+    less. The price is singularities, where the arm may stand still or lead its joints astray.
 
     Such programs are the standard of differential inverse kinematics; with these limits in Flacco, De Luca and
     Khatib 2015 and in Pink. The status is ``saturated`` where a joint stands at a bound and the task error that is left
@@ -56,8 +62,8 @@ class QuadraticProgram(TaskFeedback):
     Args:
         problem: What the policy is told of the scenario, limits of the model among it.
         gain: Share of the present error that is taken back in one step; see :class:`TaskFeedback`.
-        damping: ρ as a share of the mean of ‖J_j v_j Δt‖² over the joints j, which makes it a number for arms of any
-            size. Above 0.
+        damping: Weight of the joint motion as a share of that of the task. Above 0.
+        lm_damping: How much that grows with the error. At least 0.
         secondary_gain: K in [1/s], at least 0 and below 2/Δt; 0 for the smallest joint velocity.
         posture: q* in [rad] or [m]; one number, or one a joint. If left out, the model's home; where it has none, the
             middle of the limits, and joints without limits are left alone.
@@ -70,6 +76,7 @@ class QuadraticProgram(TaskFeedback):
     """
 
     damping: float = 3e-5
+    lm_damping: float = 1e-5
     secondary_gain: float = 1.0
     posture: float | Sequence[float] | None = None
     braking_share: float = 0.5
@@ -80,16 +87,12 @@ class QuadraticProgram(TaskFeedback):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        gain = number("secondary_gain", self.secondary_gain, at_least=0.0)
-        if gain * self.problem.dt >= 2.0:
-            raise InvalidInputError(
-                f"secondary_gain: expected a number below 2/Δt = {2.0 / self.problem.dt:g}, got {gain:g}."
-            )
         if not isinstance(self.task_scaling, (bool, np.bool_)):
             raise InvalidInputError(f"task_scaling: expected True or False, got {self.task_scaling!r}.")
         for field, value in {
             "damping": number("damping", self.damping, above=0.0),
-            "secondary_gain": gain,
+            "lm_damping": number("lm_damping", self.lm_damping, at_least=0.0),
+            "secondary_gain": self.checked_secondary_gain(self.secondary_gain),
             "braking_share": number("braking_share", self.braking_share, at_least=0.0, at_most=1.0),
             "task_scaling": bool(self.task_scaling),
         }.items():
@@ -124,7 +127,7 @@ class QuadraticProgram(TaskFeedback):
     def numbers(self) -> tuple[Any, ...]:
         """See :meth:`TaskFeedback.numbers`."""
         share = self.braking_share if self._brakes else 0.0
-        return self.damping, share, self.task_scaling, self._pull, limit_rows(self.problem)
+        return self.damping, self.lm_damping, share, self.task_scaling, self._pull, limit_rows(self.problem)
 
     def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
         """A factorisation for each active set, which are the iterations, and one for the braking, where used."""
@@ -136,6 +139,7 @@ def qp_rows(
     arm_task,
     gain,
     damping,
+    lm_damping,
     braking_share,
     scaling,
     pull,
@@ -160,7 +164,7 @@ def qp_rows(
     dt, action_scale = period_of(arm_task)
     n, size = q.shape[1], q.shape[1] + scaling
     hessian, linear, lower, upper = np.empty((size, size)), np.empty(size), np.zeros(size), np.zeros(size)
-    weights, preferred, x = np.empty(n), np.empty(n), np.empty(size)
+    preferred, x = np.empty(n), np.empty(size)
     for row in range(q.shape[0]):
         velocity_box(limits, dt, q[row], qdot_before[row * n : (row + 1) * n], lower, upper)
         for j in range(n):
@@ -168,18 +172,19 @@ def qp_rows(
         jac, shift, missing = jacobian[row], motion[row], error[row]
         jac *= dt
         missing *= gain
-        motion_weights(jac, SCALING_WEIGHT * damping if scaling else damping, limits[FASTEST], weights)
-        curvature(jac, weights, hessian)
+        weight = motion_weight(jac, missing, damping, lm_damping, limits[FASTEST])
+        weight *= SCALING_WEIGHT if scaling else 1.0
+        curvature(jac, weight, hessian)
         if braking_share > 0.0:
             missing *= feedback_share(hessian, jac, missing, braking_share * limits[CHANGE])
         shift += missing
         if scaling:
-            upper[n] = goal_to_scale(jac, shift, weights, preferred, hessian, linear)
+            upper[n] = goal_to_scale(jac, shift, weight, preferred, hessian, linear)
         else:
-            goal(jac, shift, weights, preferred, linear)
+            goal(jac, shift, weight, preferred, linear)
         iterations[row], found = box_minimum(hessian, linear, lower, upper, x)
         qdot[row] = x[:n]
         status[row] = APPLIED if found else LIMIT
-        if found and held_back(jac, shift, weights, preferred, qdot[row], lower, upper):
+        if found and held_back(jac, shift, weight, preferred, qdot[row], lower, upper):
             status[row] = SATURATED
     return cut_rows(qdot, action_scale, action.reshape(qdot.shape), status)

@@ -16,11 +16,12 @@ from baselines.solvers.quadratic_program.velocity_box import velocity_box
 from baselines.solvers.resolved_rate.base import APPLIED, TaskFeedback, asked
 from baselines.status import Status
 from ikgym.jit import kernel
-from ikgym.limit_kernels import FASTEST
 from ikgym.validation import number
 
 SATURATED = int(Status.SATURATED)
 NONE = -1
+# Singular values below this share of the length of J, all of its elements together, are rounding.
+ROUNDING = 1e-12
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -34,15 +35,14 @@ class SaturationInNullSpace(TaskFeedback):
     the task velocity, and need not find the largest factor, unlike :class:`QuadraticProgram` with `task_scaling`. The
     status is ``saturated`` where the task velocity was scaled down.
 
-    Joint velocities are measured in terms of their limits, and the pseudoinverse is damped, since the arm would stop in
-    every singularity: neither is part of the source. A task that has lost rank in all joints is scaled only where
-    it loses more.
+    The pseudoinverse is damped, since the arm would stop in every singularity; that is no part of the source. A task
+    that has lost rank in all joints is scaled only where it loses more.
 
     Args:
         problem: What the policy is told of the scenario, limits of the model among it.
         gain: Share of the present error that is taken back in one step; see :class:`TaskFeedback`.
-        damping: Added to the squared singular values of J, as a share of the mean of ‖J_j v_j Δt‖² over the joints j
-            with the largest velocities v. Smaller squares count as lost rank. At least 0.
+        damping: Added to the squared singular values of J, as a share of the mean of ‖J_j‖² over the joints j. Smaller
+            squares count as lost rank. At least 0; then those below rounding do, and are left out.
 
     Raises:
         InvalidInputError: A number is out of its range.
@@ -91,19 +91,14 @@ def sns_rows(
         return REFUSED
     q, jacobian, shift, (qdot, status, iterations) = asked(arm_task, gain, q, pose, nominal, before, known, answer)
     dt, action_scale = period_of(arm_task)
-    n, fastest = q.shape[1], limits[FASTEST]
+    n = q.shape[1]
     lower, upper = np.empty(n), np.empty(n)
     for row in range(q.shape[0]):
         velocity_box(limits, dt, q[row], qdot_before[row * n : (row + 1) * n], lower, upper)
-        for j in range(n):
-            lower[j] /= fastest[j]
-            upper[j] /= fastest[j]
-            for a in range(shift.shape[1]):
-                jacobian[row, a, j] *= dt * fastest[j]
-        iterations[row], scaled = saturate(jacobian[row], shift[row], damping, lower, upper, qdot[row])
+        jac = jacobian[row]
+        jac *= dt
+        iterations[row], scaled = saturate(jac, shift[row], damping, lower, upper, qdot[row])
         status[row] = SATURATED if scaled else APPLIED
-        for j in range(n):
-            qdot[row, j] *= fastest[j]
     return cut_rows(qdot, action_scale, action.reshape(qdot.shape), status)
 
 
@@ -127,9 +122,10 @@ def saturate(jacobian, shift, damping, lower, upper, qdot):
     columns, left, squares = np.empty((n, e)), np.empty((e, e)), np.empty(e)
     # The joint velocity is s · along + base.
     along, base, best, full = np.empty(n), np.empty(n), -1.0, 0
-    square = damping * np.sum(jacobian * jacobian) / n
+    size = np.sum(jacobian * jacobian)
+    square, smallest = damping * size / n, ROUNDING * ROUNDING * size
     for made in range(1, n + 2):
-        rank = decompose(jacobian, free, square, columns, left, squares)
+        rank = decompose(jacobian, free, max(square, smallest), columns, left, squares)
         full = rank if made == 1 else full
         if rank < full:
             break
@@ -137,8 +133,8 @@ def saturate(jacobian, shift, damping, lower, upper, qdot):
             rest[a] = 0.0
             for j in range(n):
                 rest[a] -= jacobian[a, j] * fixed[j]
-        solve(columns, left, squares, square, shift, along)
-        solve(columns, left, squares, square, rest, base)
+        solve(columns, left, squares, (square, smallest), shift, along)
+        solve(columns, left, squares, (square, smallest), rest, base)
         base += fixed
         scale, critical = scaling(along, base, lower, upper)
         if scale > best:
@@ -179,11 +175,20 @@ def decompose(jacobian, free, square, columns, left, squares):
 
 
 @kernel
-def solve(columns, left, squares, square, shift, out):
-    """(J W)⁺ Δx with damping, from the decomposition: shapes (n, e), (e, e), (e,), a number, (e,), (n,)."""
-    out[:] = 0.0
+def solve(columns, left, squares, added, shift, out):
+    """(J W)⁺ Δx from the decomposition, see :func:`decompose`.
+
+    Args:
+        columns: V Σ. Shape (n, e).
+        left: U. Shape (e, e).
+        squares: Σ². Shape (e,).
+        added: What is added to Σ², and up to where it is left out.
+        shift: Δx. Shape (e,).
+        out: Receives the joint velocities. Shape (n,).
+    """
+    (square, smallest), out[:] = added, 0.0
     for a in range(squares.shape[0]):
-        if squares[a] + square == 0.0:
+        if squares[a] <= smallest:
             continue
         amount = 0.0
         for b in range(squares.shape[0]):

@@ -19,10 +19,10 @@ def braking_speed(room, change):
     down to 0. That is m v - c m (m - 1) / 2 for m steps of motion, (m - 1) c < v <= m c.
 
     Args:
-        room: The way to the stop, divided by Δt, in [rad/s] or [m/s]; at least 0.
+        room: The way to the stop, divided by Δt, in [rad/s] or [m/s]; at least 0, inf where there is none.
         change: c, the largest change of the velocity in one step, in [rad/s] or [m/s]; inf where there is no limit.
     """
-    if room <= change:
+    if room <= change or math.isinf(room):
         return room
     steps = math.ceil(0.5 * (math.sqrt(1.0 + 8.0 * room / change) - 1.0))
     return (room + 0.5 * change * steps * (steps - 1.0)) / steps

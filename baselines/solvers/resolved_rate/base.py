@@ -60,6 +60,18 @@ class TaskFeedback(CompiledPolicy, abc.ABC):
         if self.gain >= 2.0:
             raise InvalidInputError(f"gain: expected a number above 0 and below 2, got {self.gain:g}.")
 
+    def checked_secondary_gain(self, gain: float) -> float:
+        """The gain of a secondary objective in [1/s].
+
+        Raises:
+            InvalidInputError: It is not at least 0 and below 2/Δt.
+        """
+        checked = number("secondary_gain", gain, at_least=0.0)
+        if checked * self.problem.dt >= 2.0:
+            limit = 2.0 / self.problem.dt
+            raise InvalidInputError(f"secondary_gain: expected a number below 2/Δt = {limit:g}, got {checked:g}.")
+        return checked
+
     def memory(self, rows: int) -> Memory:
         """A :class:`NominalMemory` without a step before."""
         return NominalMemory(np.zeros((rows, self.problem.task.size)), np.zeros(rows, dtype=np.bool_))
@@ -92,7 +104,8 @@ class ResolvedRate(TaskFeedback, abc.ABC):
         problem: What the policy is told of the scenario.
         gain: Share of the present error that is taken back in one step; see :class:`TaskFeedback`.
         saturation: What is done about joint velocities beyond their limits: ``clip`` cuts each joint to its own,
-            ``scale`` slows down all of them alike, which keeps the direction of the task velocity.
+            ``scale`` slows down all of them alike, which keeps the direction of the task velocity. That is not the
+            default, since a single slow joint, such as the torso of TIAGo, holds up all others then.
 
     Raises:
         InvalidInputError: The gain is not between 0 and 2.

@@ -50,10 +50,10 @@ class NullSpace(MoorePenrose):
         gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
         saturation: What is done about joint velocities beyond their limits; see :class:`ResolvedRate`.
         rank_tolerance: Singular values below this share of the largest count as zero. At least 0.
-        objective: One of ``posture``, ``joint_centring`` and ``manipulability``. If left out, the joints are centred
-            where the model has limits of both sides in any joint; else they go to the posture.
+        objective: One of ``posture``, ``joint_centring`` and ``manipulability``. If left out, ``joint_centring`` where
+            the model has joint limits and no posture is given, else ``posture``.
         secondary_gain: K in [1/s], at least 0 and below 2/Δt; for the manipulability in [rad²/s] or [m²/s].
-        posture: q_posture in [rad] or [m]; one number, or one a joint. It counts for ``posture`` only.
+        posture: q_posture in [rad] or [m], 0 if left out; one number, or one a joint. For ``posture`` only.
         damping: λ of the first part, as in :class:`DampedLeastSquares`; 0 stands for Moore–Penrose.
 
     Raises:
@@ -64,7 +64,7 @@ class NullSpace(MoorePenrose):
 
     objective: str | None = None
     secondary_gain: float = 1.0
-    posture: float | Sequence[float] = 0.0
+    posture: float | Sequence[float] | None = None
     damping: float = 1e-3
     _target: FloatArray = dataclasses.field(init=False, repr=False)
     _joint_gain: FloatArray = dataclasses.field(init=False, repr=False)
@@ -74,20 +74,16 @@ class NullSpace(MoorePenrose):
     def __post_init__(self) -> None:
         super().__post_init__()
         model = self.problem.model
-        if self.objective is None:
-            object.__setattr__(self, "objective", "joint_centring" if _limited(model).any() else "posture")
-        known_name("objective", self.objective, OBJECTIVES)
-        gain = number("secondary_gain", self.secondary_gain, at_least=0.0)
-        if gain * self.problem.dt >= 2.0:
-            raise InvalidInputError(
-                f"secondary_gain: expected a number below 2/Δt = {2.0 / self.problem.dt:g}, got {gain:g}."
-            )
-        posture = per_joint("posture", self.posture, model.joints)
-        centring = self.objective == "joint_centring"
-        target, gains = _centre(model) if centring else (posture, np.ones(model.joints))
+        default = "joint_centring" if self.posture is None and _limited(model).any() else "posture"
+        objective = default if self.objective is None else self.objective
+        known_name("objective", objective, OBJECTIVES)
+        given = 0.0 if self.posture is None else self.posture
+        posture = per_joint("posture", given, model.joints)
+        target, gains = _centre(model) if objective == "joint_centring" else (posture, np.ones(model.joints))
         for field, value in {
-            "secondary_gain": gain,
-            "posture": float(posture[0]) if np.ndim(self.posture) == 0 else tuple(posture.tolist()),
+            "objective": objective,
+            "secondary_gain": self.checked_secondary_gain(self.secondary_gain),
+            "posture": float(posture[0]) if np.ndim(given) == 0 else tuple(posture.tolist()),
             "damping": number("damping", self.damping, at_least=0.0),
             "_target": read_only(target),
             "_joint_gain": read_only(gains),

@@ -129,6 +129,22 @@ def test_centring_leaves_joints_without_limits_alone():
     np.testing.assert_allclose(policy.objective_gradient(np.full((1, 7), 0.5))[0], [0, 0.5 * 0.25, 0, 0, 0.5, 0, 0])
 
 
+def test_by_default_joints_with_limits_are_centred_and_others_go_to_0():
+    free = ikgym.scenarios.get("varga7-fast")
+    bounded = with_limits(free)
+    half = free.replace(arm=free.arm.replace(lower=np.full(7, -np.inf), upper=np.full(7, 1.0)))
+    q = np.random.default_rng(0).uniform(-1, 1, (3, 7))
+    for scenario, parameters, old in [
+        (free, {}, {"objective": "posture", "posture": 0.0}),
+        (half, {}, {"objective": "posture", "posture": 0.0}),  # the other side is open
+        (bounded, {}, {"objective": "joint_centring"}),
+        (bounded, {"posture": 0.5}, {"objective": "posture", "posture": 0.5}),
+    ]:
+        new, wanted = (baselines.make("null_space", scenario, **given) for given in (parameters, old))
+        assert new.parameters == wanted.parameters
+        np.testing.assert_array_equal(new.objective_gradient(q), wanted.objective_gradient(q))
+
+
 @pytest.mark.parametrize(
     ("change", "error", "message"),
     [

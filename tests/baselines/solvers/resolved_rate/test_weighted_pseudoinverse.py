@@ -9,7 +9,9 @@ import baselines
 import ikgym
 from baselines.status import Status
 from ikgym.exceptions import InvalidInputError
+from tests.baselines.solvers.quadratic_program.paths import circle
 from tests.baselines.solvers.resolved_rate.test_base import jacobians
+from tests.limited import limited
 
 
 def weighted(scenario, **parameters):
@@ -65,6 +67,20 @@ def test_a_heavy_joint_moves_little():
     plain, _ = weighted(scenario).invert(jacobian, shift)
     heavy, _ = weighted(scenario, weights=tuple(weights)).invert(jacobian, shift)
     assert (abs(heavy[:, 3]) < 1e-3 * abs(plain[:, 3])).all()
+
+
+def test_by_default_joints_weigh_by_their_velocity_limits():
+    free = ikgym.scenarios.get("varga7-fast")
+    assert weighted(free).weights == 1.0
+    panda = circle()
+    limit = panda.arm.velocity_limit
+    np.testing.assert_allclose(weighted(panda).weights, (limit.max() / limit) ** 2, rtol=1e-15)
+    assert weighted(panda, weights=1.0).weights == 1.0
+    # A joint without a limit is as fast as an action can make it.
+    some = limited()
+    np.testing.assert_allclose(weighted(some).weights, (20.0 / np.array([5, 20, 8, 20, 20, 10, 10])) ** 2, rtol=1e-15)
+    equal = free.replace(arm=free.arm.replace(velocity_limit=np.full(7, 3.0)))
+    assert weighted(equal).weights == (1.0,) * 7
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,53 @@
+"""Paths of arms with limits, short ones."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+
+import ikgym
+from ikgym.trajectories import PathTrajectory
+from ikgym.trajectories.orientations import FixedOrientation
+from ikgym.trajectories.paths.line import Line
+from ikgym.trajectories.paths.round import Circle
+from ikgym.trajectories.time_laws import Quintic
+
+
+@functools.cache
+def circle(arm="panda", dt=1e-3, radius=0.05, speed=0.25, acceleration=1.0, wait=0.0, **changes):
+    """A circle around the tool's home, as fast as the time law allows, and some time at rest behind it."""
+    arm = ikgym.arms.get(arm)
+    position = arm.forward(arm.home)[1]
+    path = Circle(position - [radius, 0, 0], radius)
+    return _scenario(arm, path, Quintic(speed, acceleration), dt, wait, **changes)
+
+
+@functools.cache
+def beyond_reach(dt=1e-3):
+    """A line that leads the Panda out of its reach."""
+    arm = ikgym.arms.get("panda")
+    position = arm.forward(arm.home)[1]
+    return _scenario(arm, Line(position, position + np.array([0.5, 0, 0.1])), Quintic(0.5, 2.0), dt, 0.2)
+
+
+def _scenario(arm, path, law, dt, wait, **changes):
+    trajectory = PathTrajectory(path, law, FixedOrientation(arm.forward(arm.home)[0]))
+    steps = int(np.ceil((trajectory.duration + wait) / dt))
+    given = {"task": ikgym.tasks.get("pose"), "dt": dt, "steps": steps, "start": arm.home, **changes}
+    return ikgym.Scenario("path", arm, trajectory=trajectory, **given)
+
+
+def played(scenario, policy, q=None):
+    """Position errors in [m], joint velocities, joints held back in all, and statuses."""
+    env = ikgym.RedundantIKEnv(scenario, preview=policy.preview)
+    seen, _ = env.reset(seed=0, options=None if q is None else {"q": q})
+    state, errors, qdot, held, statuses = None, [], [], np.zeros(3, int), []
+    for _ in range(scenario.steps):
+        action, state = policy.predict(seen, state)
+        seen, *_, info = env.step(action)
+        errors.append(info["position_error"])
+        qdot.append(seen["qdot"])
+        held += info["at_limit"]
+        statuses.append(policy.report(state).status[0])
+    return np.array(errors), np.array(qdot), held.tolist(), np.array(statuses)

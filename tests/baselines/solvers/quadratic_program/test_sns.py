@@ -1,0 +1,107 @@
+"""Saturation in the null space against its source, a linear program, and in motion."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import linprog
+
+import baselines
+from baselines.solvers.quadratic_program.sns import saturate
+from baselines.status import Status
+from ikgym.exceptions import InvalidInputError
+from tests.baselines.solvers.quadratic_program.paths import beyond_reach, circle, played
+
+
+def saturated(jacobian, shift, lower, upper, damping=0.0):
+    qdot = np.empty(jacobian.shape[1])
+    return qdot, *saturate(jacobian, shift, damping, lower, upper, qdot)
+
+
+def most_possible(jacobian, shift, lower, upper):
+    """The largest s from 0 to 1 for which the bounds allow s Δx."""
+    n = jacobian.shape[1]
+    bounds = [*zip(lower, upper, strict=True), (0.0, 1.0)]
+    found = linprog(-np.eye(n + 1)[n], A_eq=np.hstack([jacobian, -shift[:, None]]), b_eq=shift * 0, bounds=bounds)
+    return found.x[n]
+
+
+def test_the_others_make_up_for_a_joint_at_its_bound():
+    """One task coordinate, two joints: each should make half of it, and the first may make a tenth."""
+    jacobian, shift, bound = np.array([[1.0, 1.0]]), np.array([1.0]), np.array([0.1, 2.0])
+    qdot, made, scaled = saturated(jacobian, shift, -bound, bound)
+    np.testing.assert_allclose(qdot, [0.1, 0.9], rtol=1e-12)
+    assert (made, scaled) == (2, False)
+    # With 0.1 + 0.5 at most, the whole is scaled down.
+    qdot, _, scaled = saturated(jacobian, shift, -np.array([0.1, 0.5]), np.array([0.1, 0.5]))
+    np.testing.assert_allclose(qdot, [0.1, 0.5], rtol=1e-12)
+    assert scaled
+
+
+def test_is_the_pseudoinverse_within_bounds():
+    rng = np.random.default_rng(0)
+    jacobian, shift = rng.normal(size=(6, 7)), rng.normal(size=6)
+    bound = np.full(7, 1e3)
+    qdot, made, scaled = saturated(jacobian, shift, -bound, bound)
+    np.testing.assert_allclose(qdot, np.linalg.pinv(jacobian) @ shift, rtol=1e-9)
+    assert (made, scaled) == (1, False)
+
+
+def test_keeps_the_direction_and_never_makes_more_than_possible():
+    rng, whole, scaled_down, best = np.random.default_rng(1), 0, 0, 0
+    for _ in range(150):
+        e, n = rng.integers(1, 7), 7
+        jacobian, shift = rng.normal(size=(e, n)), rng.normal(size=e)
+        shift *= rng.uniform(0.2, 3)
+        lower, upper = -rng.uniform(0.1, 1, n), rng.uniform(0.1, 1, n)
+        qdot, made, scaled = saturated(jacobian, shift, lower, upper)
+        assert ((lower <= qdot) & (qdot <= upper)).all()
+        assert made <= n + 1
+        s, most = jacobian @ qdot @ shift / (shift @ shift), most_possible(jacobian, shift, lower, upper)
+        np.testing.assert_allclose(jacobian @ qdot, s * shift, atol=1e-9)
+        assert 0.0 < s <= most + 1e-9
+        assert scaled == (s < 1.0 - 1e-9)
+        # Cut as a whole, the pseudoinverse never makes more.
+        plain = np.linalg.pinv(jacobian) @ shift
+        factor = min(1.0, np.min(np.where(plain > 0, upper, lower) / plain))
+        assert s >= factor - 1e-9
+        whole += made > 1 and not scaled
+        scaled_down += scaled
+        best += s > most - 1e-6
+    assert min(whole, scaled_down) > 25
+    assert best > 100  # the basic algorithm is not optimal, though mostly it is
+
+
+def test_bounds_that_leave_out_0_are_kept():
+    jacobian, shift = np.array([[1.0, 1.0, 0.5]]), np.array([0.3])
+    lower, upper = np.array([0.5, -1.0, -1.0]), np.array([0.6, 1.0, 1.0])
+    qdot, _, scaled = saturated(jacobian, shift, lower, upper)
+    np.testing.assert_allclose(jacobian @ qdot, shift, rtol=1e-12)
+    assert qdot[0] == 0.5
+    assert not scaled
+    # Nothing can be made of it: within bounds all the same.
+    qdot, _, scaled = saturated(jacobian[:, :1], shift, lower[:1], upper[:1])
+    assert (qdot[0], scaled) == (0.5, True)
+    assert saturated(np.zeros((2, 3)), np.ones(2), lower, upper)[0].tolist() == [0.5, 0.0, 0.0]
+
+
+@pytest.mark.parametrize(("arm", "dt", "bar"), [("panda", 1e-3, 1e-5), ("tiago", 4e-3, 5e-5)])
+def test_stays_on_a_path_within_all_limits(arm, dt, bar):
+    scenario = circle(arm, dt)
+    errors, _, held, statuses = played(scenario, baselines.make("sns", scenario))
+    assert errors.max() < bar
+    assert held == [0, 0, 0]
+    assert (statuses == Status.APPLIED).all()
+
+
+def test_no_limit_is_met_off_the_path():
+    errors, _, held, statuses = played(beyond_reach(), baselines.make("sns", beyond_reach()))
+    assert errors.max() > 0.02
+    assert held == [0, 0, 0]
+    assert set(statuses) == {Status.APPLIED, Status.SATURATED}
+
+
+@pytest.mark.parametrize("change", [{"damping": -1.0}, {"damping": np.nan}, {"gain": 0.0}])
+def test_bad_parameters(change):
+    with pytest.raises(InvalidInputError, match=f"{next(iter(change))}: expected"):
+        baselines.make("sns", "varga7-fast", **change)
