@@ -144,8 +144,8 @@ def _by_period(sections: Sequence[Section]) -> list[str]:
         cells = [NOTHING] * 9 if best is None else [f"`{best.label}`", *_cells(best)]
         lines.append([f"{period:,}", *cells])
     text = (
-        f"Over all {len(paths)} paths of real arms together, of the solvers whose p99 fits into the period on each of them "
-        "the one with the lowest cost:"
+        f"Over all {len(paths)} paths of real arms together, of the solvers whose p99 fits into the period on each of "
+        "them the one with the lowest cost:"
     )
     head = ["control period [µs]", "take", "error", "× least", "cost", *_heads()]
     return [text, "", *table(head, lines, text=(1,))]
