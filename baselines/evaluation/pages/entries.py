@@ -41,6 +41,8 @@ GENERAL = (
     *("dls", "full_orientation", "null_space", "mfac", "rhc_gradient"),
     *(*HORIZONS[:2], *BLOCKED, *FULL_ORIENTATION, FORESIGHT),
 )
+#: Solvers that are damped least squares where an arm has no limits, as those of the pages.
+WITHIN_LIMITS = ("qp", "sns")
 #: Training seeds below which a mean over them is no benchmark.
 ENOUGH = 5
 #: Episodes of each policy that are played with the clock.
@@ -122,7 +124,7 @@ def solvers(tuned: Mapping[str, Mapping[str, Any]] = MappingProxyType({})) -> tu
     """All registered solvers as they are, some receding horizons, and what tuning made of them.
 
     References, which have privileged information, are left out, and so are examples for one scenario, solvers of other
-    projects, and agents, see :func:`shipped` and :func:`agents`.
+    projects, and agents, see :func:`shipped` and :func:`agents`; and so are :data:`WITHIN_LIMITS`.
 
     Args:
         tuned: The best settings of solvers, by their specs; one that they do not change is not listed twice.
@@ -133,7 +135,7 @@ def solvers(tuned: Mapping[str, Mapping[str, Any]] = MappingProxyType({})) -> tu
         for name, kind in classes.items()
         if kind.reference or kind.example or kind.rival or issubclass(kind, LearnedPolicy)
     }
-    names = [name for name in classes if name not in left_out]
+    names = [name for name in classes if name not in {*left_out, *WITHIN_LIMITS}]
     better = (solver(spec, settings) for spec, settings in tuned.items() if settings)
     return (*map(solver, (*names, *HORIZONS)), *better)
 

@@ -23,7 +23,7 @@ class TestEntries:
             for name in registry.names()
             if not (registry.get(name).reference or registry.get(name).rival)
             and not issubclass(registry.get(name), LearnedPolicy)
-        } - {"mfac_helix", "mfapc_helix", "mfapc_line"}
+        } - {"mfac_helix", "mfapc_helix", "mfapc_line", "qp", "sns"}
         assert {"rhc:horizon=3", "rhc:horizon=3,iterations=1", "rhc:horizon=200,iterations=1,move_blocks=27"} <= set(
             names
         )

@@ -63,6 +63,21 @@ def test_out_of_reach_and_back_with_the_same_elbow(off):
     assert without[-1] > 0.1
 
 
+def test_what_the_defaults_of_other_solvers_are_chosen_for():
+    """The figures of docs/policies.md: TIAGo's torso is too slow for its share of a circle."""
+
+    def error(name, **parameters):
+        return played(scenario, baselines.make(name, scenario, **parameters))[0].max()
+
+    scenario = ikgym.scenarios.get("tiago-circle")
+    assert error("dls") == pytest.approx(8.7e-3, rel=0.05)
+    assert error("dls", saturation="scale") == pytest.approx(0.118, rel=0.05)
+    assert error("weighted_pseudoinverse") < 1e-6
+    assert error("weighted_pseudoinverse", weights=1.0) == pytest.approx(8.7e-3, rel=0.05)
+    assert error("null_space") == pytest.approx(9.5e-3, rel=0.05)
+    assert error("null_space", objective="posture") == pytest.approx(0.09, rel=0.05)
+
+
 def test_takes_little_longer_than_damped_least_squares():
     """Calls in turn, medians; the bar is that of 30 µs where `dls` takes 9."""
     scenario = ikgym.scenarios.get("panda-fast")
