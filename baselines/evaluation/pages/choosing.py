@@ -50,15 +50,14 @@ roboticstoolbox, ssik) where they take such a scenario.
   them alike. **× least** is that divided by the lowest error of all solvers in the same scenario, both at least
   {SMALL:g}; where several scenarios are put together, the largest.
 - **Cost** is the total cost divided by the lowest of all solvers in the same episode, in the geometric mean.
-- **Held back** is the share of the steps in which a joint was held back by its stop, by its velocity or by its
-  acceleration limit.
+- **Held back** is the share of the steps in which a joint was held back by its stop, by its velocity and by its
+  acceleration limit, in this order.
 - **p50, p99** are of single calls, in µs: the largest of the scenarios.
 - **Named** is the solver with the lowest *× least* of those that never ran into a stop, or of all if each of them did;
   of those within {100.0 * (EQUAL - 1.0):.0f} % of it the one with the lowest p50. Where costs are compared, the cost
-  takes the place of *× least*.
+  takes the place of *× least*. **Beside it** is who would be named of the other projects, or of this package where one
+  of them is named.
 """
-
-_HELD = ("stop", "velocity", "acceleration")
 
 
 def entries(name: str | None = None) -> tuple[Entry, ...]:
@@ -82,12 +81,20 @@ def page(measurement: Measurement) -> str:
     """The page as Markdown."""
     sections = measurement.sections
     found = {one: standings(one, sections) for one in SITUATIONS if one.among(sections)}
-    out = ["# Which solver for my arm?", "", INTRODUCTION]
+    out = ["# Which solver for my arm?", "", INTRODUCTION, *_trial(sections)]
     out += ["## By what the task demands", "", *_decisions(found), "", *_sentences(found), ""]
     out += ["## By the control period", "", *_by_period(sections), ""]
     for one, stand in found.items():
         out += _details(one, stand, one.among(sections))
     return "\n".join([*out, *conditions(measurement)]) + "\n"
+
+
+def _trial(sections: Sequence[Section]) -> list[str]:
+    """What has to be said where not everything was played."""
+    there, wanted = {one.name for one in sections}, played()
+    if there >= set(wanted):
+        return []
+    return [f"**A trial**: {len(there)} of {len(wanted)} scenarios were played.", ""]
 
 
 def rival(label: str) -> bool:
@@ -96,28 +103,30 @@ def rival(label: str) -> bool:
 
 
 def _decisions(found: dict[Situation, list[Standing]]) -> list[str]:
-    head = ["what is known of the task", "take", "error", "× least", "cost", *_heads()]
-    head += [f"error of `{PLAIN}`", "of other projects: error, × least"]
+    head = ["what is known of the task", "take", "error [mm, mrad]", "× least", "cost", *_heads()]
+    head += [f"error of `{PLAIN}`", "beside it: error, × least, p50"]
     return table(head, (_decision(one, stand) for one, stand in found.items()), text=(0, 1))
 
 
 def _decision(one: Situation, stand: Sequence[Standing]) -> list[str]:
     best = chosen(stand, one.by)
     plain = next((number(s.error) for s in stand if s.label == PLAIN), NOTHING)
-    others = [s for s in stand if rival(s.label)]
+    others = [s for s in stand if rival(s.label) != rival(best.label)]
     other = chosen(others, one.by) if others else None
-    words = NOTHING if other is None else f"`{other.label}`: {number(other.error)}, {number(other.above)}"
+    words = NOTHING
+    if other is not None:
+        words = f"`{other.label}`: {number(other.error)}, {number(other.above)}, {time(other.p50)}"
     return [f"[{one.name}](#{_anchor(one.name)})", f"`{best.label}`", *_cells(best), plain, words]
 
 
 def _heads() -> list[str]:
-    return [*(f"held back: {what}" for what in _HELD), "p50 [µs]", "p99 [µs]"]
+    return ["held back [%]", "p50 [µs]", "p99 [µs]"]
 
 
 def _cells(one: Standing) -> list[str]:
     """The cells of a solver."""
-    held = (f"{100.0 * share:.3g} %" if share else "0" for share in one.held_back)
-    return [*map(number, (one.error, one.above, one.cost)), *held, *map(time, (one.p50, one.p99))]
+    held = ", ".join(f"{100.0 * share:.3g}" for share in one.held_back)
+    return [*map(number, (one.error, one.above, one.cost)), held, *map(time, (one.p50, one.p99))]
 
 
 def _sentences(found: dict[Situation, list[Standing]]) -> list[str]:
@@ -141,13 +150,13 @@ def _by_period(sections: Sequence[Section]) -> list[str]:
     lines = []
     for period in PERIODS:
         best = next((one for one in stand if one.p99 <= period), None)
-        cells = [NOTHING] * 9 if best is None else [f"`{best.label}`", *_cells(best)]
+        cells = [NOTHING] * 7 if best is None else [f"`{best.label}`", *_cells(best)]
         lines.append([f"{period:,}", *cells])
     text = (
         f"Over all {len(paths)} paths of real arms together, of the solvers whose p99 fits into the period on each of "
         "them the one with the lowest cost:"
     )
-    head = ["control period [µs]", "take", "error", "× least", "cost", *_heads()]
+    head = ["control period [µs]", "take", "error [mm, mrad]", "× least", "cost", *_heads()]
     return [text, "", *table(head, lines, text=(1,))]
 
 
@@ -155,7 +164,7 @@ def _details(one: Situation, stand: Sequence[Standing], sections: Sequence[Secti
     """All solvers in a situation."""
     scenarios = ", ".join(f"`{s.name}`" for s in sections)
     lines = [[f"`{s.label}`", *_cells(s)] for s in stand]
-    head = ["solver", "error", "× least", "cost", *_heads()]
+    head = ["solver", "error [mm, mrad]", "× least", "cost", *_heads()]
     by = "lowest × least" if one.by == ERROR else "lowest cost"
     out = [f"## {one.name[0].upper()}{one.name[1:]}", "", f"{one.meaning} Played: {scenarios}. The {by} first."]
     return [*out, "", *table(head, lines, text=(0,)), "", *_absent(sections, stand), ""]

@@ -148,16 +148,20 @@ class TestPage:
     def test_the_decision(self, text):
         (row,) = re.findall(r"^\| \[a joint limit stands in the way\]\((#\S+)\) \| (.*) \|$", text, re.MULTILINE)
         assert row[0] == "#a-joint-limit-stands-in-the-way"
-        cells = "`qp` | 10.00 | 1.000 | 1.000 | 0 | 0 | 0 | 20 | 40 | 20.00 | `pink`: 10.20, 1.020"
+        cells = "`qp` | 10.00 | 1.000 | 1.000 | 0, 0, 0 | 20 | 40 | 20.00 | `pink`: 10.20, 1.020, 200"
         assert row[1] == cells
         assert "- Times named: `qp` 1." in text
+
+    def test_ours_stands_beside_one_of_theirs(self):
+        text = page(a_measurement(*sections(TURN, line("dls", 0.02), line("pink", 0.01, 200.0))))
+        assert "| `pink` | 10.00 | 1.000 | 1.000 | 0, 0, 0 | 200 | 400 | 20.00 | `dls`: 20.00, 2.000, 10 |" in text
 
     def test_the_details(self, text):
         assert "## A joint limit stands in the way" in text
         table = text.split("## A joint limit stands in the way")[1]
         assert re.findall(r"^\| `(\w+)` ", table, re.MULTILINE) == ["qp", "pink", "dls"]
         steps = sum(sets.get(name).steps for name in TURN.sets)
-        assert f"| `dls` | 20.00 | 2.000 | 3.000 | {100 * 87 / steps:.3g} % | 0 | 0 | 10 | 20 |" in table
+        assert f"| `dls` | 20.00 | 2.000 | 3.000 | {100 * 87 / steps:.3g}, 0, 0 | 10 | 20 |" in table
         assert "Not played there, since they are not made for it, not installed, or too slow: `null_space`" in table
 
     def test_by_the_control_period(self, text):
@@ -170,6 +174,9 @@ class TestPage:
         assert "- Every solver ran into a stop where a joint limit stands in the way." in text
 
     def test_what_was_not_played_is_not_on_it(self, text):
+        assert f"**A trial**: 3 of {len(played())} scenarios were played." in text
+        everything = a_measurement(*(a_section(line("dls", 0.1), name=name, seeds=(0,)) for name in played()))
+        assert "trial" not in page(everything)
         assert "singular" not in text.split("## Conditions")[0].split("## By what")[1]
 
 
@@ -186,7 +193,7 @@ def test_it_is_measured(tmp_path):
 
 @pytest.mark.skipif(not (DOCS / "choosing.json").exists(), reason="it has not been measured yet")
 class TestTree:
-    @pytest.fixture(scope="class")
+    @pytest.fixture
     def written(self):
         return Measurement.load(DOCS / "choosing.json")
 
