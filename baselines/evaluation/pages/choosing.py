@@ -55,8 +55,8 @@ roboticstoolbox, ssik) where they take such a scenario.
 - **p50, p99** are of single calls, in µs: the largest of the scenarios.
 - **Named** is the solver with the lowest *× least* of those that never ran into a stop, or of all if each of them did;
   of those within {100.0 * (EQUAL - 1.0):.0f} % of it the one with the lowest p50. Where costs are compared, the cost
-  takes the place of *× least*. **Beside it** is who would be named of the other projects, or of this package where one
-  of them is named.
+  takes the place of *× least*.
+- **Beside it** is who would be named of the other projects, or of this package where one of them is named.
 """
 
 

@@ -51,7 +51,7 @@ SITUATIONS = (
     ),
     Situation(
         "one joint is much slower than the others",
-        "The same paths of `tiago`, whose torso moves at 0.07 m/s at most and must be spared.",
+        "The same paths of `tiago`, whose torso is slow and must be spared.",
         sets.paths(*FEASIBLE, of=("tiago",)),
     ),
     Situation(
@@ -66,7 +66,7 @@ SITUATIONS = (
     ),
     Situation(
         "the path is faster than the joints",
-        "The circle, seven to thirteen times as fast: no solver can follow.",
+        "The circle, faster than any posture allows within the velocity limits: no solver can follow.",
         sets.paths("fast"),
     ),
     Situation(
@@ -76,7 +76,7 @@ SITUATIONS = (
     ),
     Situation(
         "the path leads beyond the reach",
-        "A circle whose farthest point is 4 % of the reach beyond it.",
+        "A circle whose farthest point is out of reach.",
         sets.paths("edge"),
     ),
     Situation(
@@ -85,7 +85,7 @@ SITUATIONS = (
         sets.GENTLE_PATHS,
     ),
     Situation(
-        "the model is that of the data sheet",
+        "the model is nominal, the arm as it was built",
         "The circle with five Pandas whose kinematics were measured; solvers know the nominal ones.",
         tuple(f"{arm}-circle" for arm in sets.CALIBRATED),
     ),
