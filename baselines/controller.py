@@ -8,7 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.policy import Memory, Report, SolverPolicy
+from ikgym.arms.limits import limit_rows
 from ikgym.exceptions import InvalidInputError
+from ikgym.limit_kernels import applied
 from ikgym.preview import furthest
 from ikgym.validation import FloatArray, float_array, whole_number
 
@@ -21,6 +23,9 @@ ENDLESS = 1_000_000
 
 class Controller:
     """Calls a policy once in each control period, and keeps what it wants to remember.
+
+    Where the model of the arm has limits, what the policy asks for is kept within them, as the environment does: first
+    the velocity, then the change from the velocity before, then the stops. The policy sees what was applied.
 
     >>> controller = Controller(policy)
     >>> while running:
@@ -41,6 +46,8 @@ class Controller:
             raise InvalidInputError(f"{policy.name} has privileged information on one episode: give its steps.")
         self.policy = policy
         self._steps = None if steps is None else whole_number("steps", steps, at_least=1)
+        problem = policy.problem
+        self._limits = limit_rows(problem.model, problem.largest_qdot, problem.dt)
         self.reset()
 
     def reset(self) -> None:
@@ -68,7 +75,8 @@ class Controller:
             qdot: Measured joint velocities in [rad/s] or [m/s]; what was returned last if left out. Shape (n,).
 
         Returns:
-            Joint velocities in [rad/s] or [m/s], none above the velocity limit. Shape (n,).
+            Joint velocities in [rad/s] or [m/s], within the limits of the model and no faster than actions allow.
+            Shape (n,).
 
         Raises:
             InvalidInputError: Something has a wrong shape, is not finite, or is too short.
@@ -76,17 +84,18 @@ class Controller:
         problem = self.policy.problem
         n, m = problem.model.joints, problem.task.size
         measured = float_array("q", q, (n,))
+        last = self._qdot if qdot is None else float_array("qdot", qdot, (n,))
         left = ENDLESS if self._steps is None else max(self._steps - self._made, 0)
         observation = {
             "q": measured,
-            "qdot": self._qdot if qdot is None else float_array("qdot", qdot, (n,)),
+            "qdot": last,
             "pose": self._coordinates("pose", problem.model.forward(measured) if pose is None else pose, (m,)),
             "nominal": self._coordinates("reference", reference, (None, m)),
             "remaining": np.array([float(left)]),
         }
         action, self._state = self.policy.predict(observation, self._state)
         self._made += 1
-        self._qdot = np.asarray(action, dtype=np.float64) * problem.velocity_limit
+        self._qdot = self._applied(measured, np.asarray(action, dtype=np.float64) * problem.velocity_limit, last)
         return self._qdot.copy()
 
     @property
@@ -104,6 +113,14 @@ class Controller:
         if self._state is None:
             raise InvalidInputError("report: expected a step to be made first.")
         return self.policy.report(self._state)
+
+    def _applied(self, q: FloatArray, command: FloatArray, last: FloatArray) -> FloatArray:
+        """What the limits of the model make of a command. Shapes (n,)."""
+        if not len(self._limits):
+            return command
+        out = np.empty_like(command)
+        applied(self._limits, q, command, last, self.policy.problem.dt, out)
+        return out
 
     def _coordinates(self, name: str, pose: Any, shape: tuple[int | None, ...]) -> FloatArray:
         """Task coordinates of what is given as such, or as rotation and position."""

@@ -10,7 +10,7 @@ import sys
 
 import tyro
 
-from benchmarks import collection, environments, growth, horizons, kernels, policies, poses, report
+from benchmarks import collection, defaults, environments, growth, horizons, kernels, policies, poses, report
 from benchmarks.effort import FULL, QUICK, Effort
 from benchmarks.table import Column, Table
 
@@ -23,6 +23,7 @@ SECTIONS = {
     "policies": policies.tables,
     "horizons": horizons.tables,
     "growth": growth.tables,
+    "defaults": defaults.tables,
 }
 
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 
-from ikgym.jit import inlined
+import numpy as np
+
+from ikgym.jit import inlined, kernel
 
 # The rows of an arm's limits, see :func:`ikgym.arms.limits.limit_rows`.
 LOWER, UPPER, FASTEST, CHANGE = range(4)
@@ -38,3 +40,41 @@ def driven(limits, j, command, last, slack, at_limit, row):
     at_limit[row, 1] += abs(command - allowed) > slack
     at_limit[row, 2] += abs(allowed - velocity) > slack
     return velocity
+
+
+@inlined
+def stopped(limits, j, here, reached, dt):
+    """Where joint ``j``, which would pass a stop, comes to stand, and the velocity that takes it there.
+
+    Args:
+        limits: Shape (4, n).
+        j: The joint.
+        here: Its coordinate in [rad] or [m].
+        reached: Where it would get to, beyond a stop.
+        dt: Δt in [s].
+
+    Returns:
+        The stop in [rad] or [m], and the velocity in [rad/s] or [m/s].
+    """
+    stop = limits[LOWER, j] if reached < limits[LOWER, j] else limits[UPPER, j]
+    return stop, within((stop - here) / dt, limits[FASTEST, j])
+
+
+@kernel
+def applied(limits, q, command, last, dt, out):
+    """The joint velocities that limits make of a command, as in a step of the environment.
+
+    Args:
+        limits: What :func:`ikgym.arms.limits.limit_rows` gives for an arm that has some. Shape (4, n).
+        q: Joint coordinates in [rad] or [m]. Shape (n,).
+        command: Joint velocities in [rad/s] or [m/s]. Shape (n,).
+        last: What was applied in the step before. Shape (n,).
+        dt: Δt in [s].
+        out: Receives what is applied in this one. Shape (n,).
+    """
+    held = np.zeros((1, 3))
+    for j in range(q.shape[0]):
+        out[j] = driven(limits, j, command[j], last[j], 0.0, held, 0)
+        reached = q[j] + dt * out[j]
+        if not limits[LOWER, j] <= reached <= limits[UPPER, j]:
+            _, out[j] = stopped(limits, j, q[j], reached, dt)

@@ -17,7 +17,7 @@ from ikgym.axis_kernels import angle_between
 from ikgym.cost_kernels import CostParameters
 from ikgym.jit import inlined, kernel
 from ikgym.kinematics import Chain, forward
-from ikgym.limit_kernels import FASTEST, LOWER, SLACK, UPPER, driven, within
+from ikgym.limit_kernels import LOWER, SLACK, UPPER, driven, stopped
 from ikgym.random_numbers import uniform
 from ikgym.rotations import geodesic_angle
 
@@ -245,8 +245,7 @@ def step(
                     velocity += disturbance[NOISE, j] * uniform(noise_key[row], np.uint64(made[row] * n + j))
                 reached = q[row, j] + dt * velocity  # Varga 2021, eq. 5
                 if limited and not limits[LOWER, j] <= reached <= limits[UPPER, j]:
-                    reached = limits[LOWER, j] if reached < limits[LOWER, j] else limits[UPPER, j]
-                    applied = within((reached - q[row, j]) / dt, limits[FASTEST, j])
+                    reached, applied = stopped(limits, j, q[row, j], reached, dt)
                     at_limit[row, 0] += abs(velocity - applied) > slack
                 q[row, j], qdot[row, j] = reached, applied
             made[row] += 1

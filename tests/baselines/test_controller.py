@@ -9,6 +9,7 @@ import baselines
 import ikgym
 from baselines.controller import Controller
 from ikgym.exceptions import InvalidInputError
+from tests.limited import limited
 
 STEPS = 25
 
@@ -80,6 +81,34 @@ def test_joint_velocities_stay_within_their_limit_and_are_our_own():
     qdot[:] = 99.0
     controller.step(which.first_q(which.trajectory), None, which.nominal(0)[-1:])
     assert controller._qdot.max() <= 0.01 + 1e-9
+
+
+@pytest.mark.parametrize(("name", "parameters"), [("dls", {}), ("rhc", {"horizon": 8, "rate_weight": 10.0})])
+def test_an_arm_with_limits_is_driven_within_them_and_the_policy_sees_how(name, parameters):
+    """The environment, step by step: what it applies is what the controller returns, and remembers."""
+    which = limited(steps=40)
+    policy = baselines.make(name, which, **parameters)
+    env = ikgym.RedundantIKEnv(which, preview=policy.preview)
+    controller, state = Controller(policy), None
+    seen, _ = env.reset(seed=4)
+    held = np.zeros(3)
+    for _ in range(which.steps):
+        qdot = controller.step(seen["q"], seen["pose"], seen["nominal"])
+        action, state = policy.predict({**seen, "remaining": np.array([1e6])}, state)
+        seen, *_, info = env.step(action)
+        np.testing.assert_array_equal(qdot, seen["qdot"])
+        held += info["at_limit"]
+    assert (held > 0).all() if name == "dls" else held[2] > 0  # limits had their say
+
+
+def test_a_measured_velocity_is_what_the_acceleration_starts_from():
+    which = limited()
+    most = which.dt * which.arm.acceleration_limit[0]
+    q, there = np.zeros(7), which.nominal(0)[1:] + 0.5
+    for measured in (0.0, 2.0, -3.0):
+        controller = Controller(baselines.make("dls", which))
+        qdot = controller.step(q, None, there, qdot=np.full(7, measured))
+        assert abs(qdot[0] - measured) <= most + 1e-12
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ import pytest
 import baselines
 import ikgym
 from baselines.policy import Problem
-from benchmarks import effort, environments, horizon_solvers, horizons, kernels, policies, states, timing
+from benchmarks import defaults, effort, environments, horizon_solvers, horizons, kernels, policies, states, timing
 from benchmarks.rivals.numpy_horizon import Horizon, plan_cost
 
 
@@ -127,3 +127,22 @@ def test_nobody_is_below_the_best():
         keys = [column.key for column in table.columns]
         excesses = [row[keys.index("worst_excess")] for row in table.rows.values()]
         assert min(value for value in excesses if value is not None) == 0.0
+
+
+def test_defaults_are_compared_on_motions_within_the_limits():
+    """All arms, those without limits of their own included; the certificate is that the path can be followed."""
+    for arm in defaults.ARMS:
+        which = defaults.scenario(arm, 30)
+        path = which.nominal_joint_path(seed=0)
+        assert (np.abs(np.diff(path, axis=0)) <= which.dt * which.largest_qdot + 1e-12).all()
+        assert ((path >= which.arm.lower) & (path <= which.arm.upper)).all()
+
+
+def test_tables_of_defaults_say_what_changed_and_what_is_best(monkeypatch):
+    monkeypatch.setattr(defaults, "ARMS", {"panda": 1e-3})
+    changes, *grids = defaults.tables(effort.QUICK)
+    assert set(changes.rows) == {f"{policy}, panda" for policy in defaults.BEFORE}
+    for *_, before, after, ratio in changes.rows.values():
+        assert ratio == pytest.approx(after / before)
+    for grid in grids:
+        assert [min(row) for row in grid.rows.values()] == [1.0]

@@ -11,12 +11,13 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from baselines.policy import Batch, Memory, Solution, SolverPolicy
+from baselines.policy import Batch, Memory, Problem, Solution, SolverPolicy
+from baselines.solvers.arm_size import jacobian_bound
 from baselines.solvers.arm_task import arm_task_of, plain_arm_task, pose_arrays
 from baselines.solvers.fixed_point.rotations import adaptive_deform, plane, turn
 from baselines.solvers.linear_algebra import dot
 from baselines.status import Status
-from ikgym import task_kernels
+from ikgym import arms, task_kernels, tasks
 from ikgym.exceptions import InvalidInputError
 from ikgym.jit import kernel
 from ikgym.kinematics import forward_and_jacobian
@@ -28,6 +29,8 @@ COUNTER_ROTATIONS = {"none": 0, "joints": 1, "task": 2}
 DEFORMATIONS = {"rotation": 0, "contraction": 1}
 #: When the model's Jacobian is worked out anew.
 JACOBIANS = ("step", "point")
+#: The paper's λ_a, and what it belongs to.
+PAPERS_SHARE, PAPERS_MODEL, PAPERS_TASK = 5e-4, "khan8_approximate", "matrix"
 _JOINTS, _TASK, _CONTRACTION = COUNTER_ROTATIONS["joints"], COUNTER_ROTATIONS["task"], DEFORMATIONS["contraction"]
 _CONVERGED, _LIMIT, _NO_ROTATION = int(Status.CONVERGED), int(Status.ITERATION_LIMIT), int(Status.NOT_A_ROTATION)
 
@@ -107,16 +110,18 @@ class AbstractRotation(SolverPolicy):
     f: q(n+1) = q + [F(A ‖h‖ + ξ*) - ξ*] h/‖h‖ with h = 𝒩 J̃ᵀ (f - xᴺ). Of an affine F only the product of A and its
     slope acts, which is -λ_a here: q + λ_a 𝒲 𝒩 J̃ᵀ ℱ (xᴺ - f).
 
-    Slow where the arm is short, since λ_a σ² goes with the square of its length and there is one iteration a step; and
-    along the directions of small σ, in which an error takes 1 / (λ_a σ²) steps: some 25,000 on the paper's arm, where
-    σ² reaches from 0.08 to 340. Fails where the model's Jacobian points away from the arm's: then the error stays or
-    grows, and the status never says ``converged`` of that. Where a vector is not shorter than R_a the status is
-    ``not_a_rotation``, and the arm stands still until the target has come nearer.
+    λ_a σ² goes with the square of the arm's length, and λ_a, where it is left out, against it. With one iteration a
+    step the method is slow along the directions of small σ, in which an error takes 1 / (λ_a σ²) steps: some 25,000 on
+    the paper's arm, where σ² reaches from 0.08 to 340. Fails where the model's Jacobian points away from the arm's:
+    then the error stays or grows, and the status never says ``converged`` of that. Where a vector is not shorter than
+    R_a the status is ``not_a_rotation``, and the arm stands still until the target has come nearer.
 
     Args:
         problem: What the policy is told of the scenario.
         r_a: R_a, the common length of the extended vectors. In the mixed units of J̃ᵀ f, like all that is turned.
-        lambda_a: λ_a, the share of the rotation that is applied; with ``"contraction"`` -A F'(ξ*). Above 0.
+        lambda_a: λ_a, the share of the rotation that is applied; with ``"contraction"`` -A F'(ξ*). Above 0. If left
+            out, the paper's 5e-4, more on arms shorter than the paper's, so that λ_a ‖J̃‖² is the same, and no more than
+            2 / ‖J̃‖², by a bound of ‖J̃‖² from the lengths of the links.
         epsa: What the listing adds to a norm before it divides by it. Above 0; not printed.
         q_pp_max: Where the listing limits joint coordinates, by a tanh, in [rad] or [m]; not printed.
         task_weights: The diagonal of ℱ, a number or one a task coordinate. Above 0, at most 1.
@@ -134,7 +139,7 @@ class AbstractRotation(SolverPolicy):
     """
 
     r_a: float = 100.0
-    lambda_a: float = 5e-4
+    lambda_a: float | None = None
     epsa: float = 1e-12
     q_pp_max: float = 1e3
     task_weights: float | Sequence[float] = 1.0
@@ -148,6 +153,8 @@ class AbstractRotation(SolverPolicy):
     name: ClassVar[str] = "abstract_rotation"
 
     def __post_init__(self) -> None:
+        if self.lambda_a is None:
+            object.__setattr__(self, "lambda_a", _share(self.problem))
         for name in ("r_a", "lambda_a", "epsa", "q_pp_max"):
             object.__setattr__(self, name, number(name, getattr(self, name), above=0.0))
         object.__setattr__(self, "tolerance", number("tolerance", self.tolerance, at_least=0.0))
@@ -284,6 +291,17 @@ def _transposed(jacobian, vector, out):
     for i in range(vector.shape[0]):
         for j in range(out.shape[0]):
             out[j] += jacobian[i, j] * vector[i]
+
+
+def _share(problem: Problem) -> float:
+    """λ_a for an arm of any size."""
+    bound = jacobian_bound(problem.model, problem.task)
+    return min(PAPERS_SHARE * max(1.0, _papers_bound() / bound), 2.0 / bound)
+
+
+@functools.cache
+def _papers_bound() -> float:
+    return jacobian_bound(arms.get(PAPERS_MODEL), tasks.get(PAPERS_TASK))
 
 
 def _checked_weights(name: str, value: float | Sequence[float], size: int) -> FloatArray:

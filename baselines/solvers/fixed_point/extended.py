@@ -9,7 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.policy import Batch
-from baselines.solvers.fixed_point.fixed_point import FixedPoint, jacobian_bound
+from baselines.solvers.arm_size import jacobian_bound
+from baselines.solvers.fixed_point.fixed_point import FixedPoint
 from baselines.solvers.references.privileged_path import PrivilegedPath
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
@@ -36,6 +37,7 @@ class FixedPointExtended(PrivilegedPath, FixedPoint):
         iterations: Iterations in one step.
         tolerance: Norm of both errors together after the last up to which the status is ``converged``.
         components: None, see :class:`FixedPoint`.
+        length: ℓ, what 1 rad counts as, in [m]; the link's end point counts as the tool point does.
         seed: Which episode of a random scenario is played.
         link: ℓ, whose end point, the place of joint ℓ + 1, x is extended by. From 1 to n - 1; of use where that point
             moves, unlike the end of link 2 of ``varga7``.
@@ -86,4 +88,4 @@ class FixedPointExtended(PrivilegedPath, FixedPoint):
         return self._branch.chain, self._points[self.next_rows(batch)]
 
     def _jacobian_bound(self) -> float:
-        return super()._jacobian_bound() + jacobian_bound(self._branch, 0.0)
+        return super()._jacobian_bound() + jacobian_bound(self._branch, None)

@@ -12,23 +12,16 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.policy import Batch, Memory, Solution, SolverPolicy
+from baselines.solvers.arm_size import error_weights, jacobian_bound, length, radian
 from baselines.solvers.arm_task import plain_arm_task
 from baselines.solvers.fixed_point.contraction import Contraction, contraction
 from baselines.solvers.fixed_point.iteration import TRANSFORMATIONS, iterate_rows
-from ikgym import task_kernels
-from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 from ikgym.kinematics import Chain
 from ikgym.validation import FloatArray, known_name, number, whole_number
 
-# ‖∂x/∂q‖² of the orientation's numbers for a joint that turns at 1 rad/s, at most.
-_TURNING = {
-    task_kernels.POSITION: 0.0,
-    task_kernels.SKEW: 1.0,
-    task_kernels.MATRIX: 2.0,
-    task_kernels.POSE: 1.0,
-    task_kernels.AXIS: 1.0,
-}
+# The length in [m] of the paper's arm, to which its A belongs; on a shorter one it grows with 1/length².
+PAPERS_LENGTH = 1.3
 
 
 class DirectionMemory(NamedTuple):
@@ -63,7 +56,9 @@ class FixedPoint(SolverPolicy):
     method's good behaviour at singularities, and why it leaves a path there that goes on along them.
 
     The iterations of a step use the model alone: a pose is never measured, so that a wrong model's error stays.
-    Where f - x is a rotation error (task ``pose``) it stands for f(q) - x.
+    Where f - x is a rotation error (task ``pose``) it stands for f(q) - x. Position and orientation are weighed against
+    each other: h is Jᵀ W² (f(q) - x), and σ_max that of W J, with 1 in W for positions and a length ℓ for
+    orientations; the paper, where there are positions only, has none.
 
     Args:
         problem: What the policy is told of the scenario.
@@ -77,13 +72,15 @@ class FixedPoint(SolverPolicy):
         family: The family of F, ``"affine"`` or ``"sigmoid"``.
         slope: The factor in F; ½ in the paper.
         a: A, negative with a rising F and ``"transpose"``. If left out, the paper's -1 where 2/σ_max² allows it, and
-            -2/(|F'(ξ*)| ‖J‖²) where it may not, from a bound of ‖J‖² by the lengths of the links, with prismatic
-            joints at home.
+            -2/(|F'(ξ*)| ‖W J‖²) where it may not, from a bound of ‖W J‖² by the lengths of the links, with prismatic
+            joints at home. On arms below the 1.3 m of the paper's, -1 becomes -(1.3 m / length)².
         d: D.
         iterations: Iterations in one step; all of them are made.
         tolerance: ‖f(q) - x‖ after the last up to which the status is ``converged``, in [m] and [rad] or [1].
         components: Where no Jacobian is used, the number of the error's component, from 0, that corrects each joint;
             all in their order if left out. An arm with 2 joints in a plane has (0, 1).
+        length: ℓ, what 1 rad counts as, or 1 in a rotation matrix, in [m]; only with ``"transpose"``. Above 0. If left
+            out, chosen for the model, see :func:`baselines.solvers.arm_size.radian`.
 
     Raises:
         InvalidInputError: A parameter is out of its range, or the transformation does not suit the task.
@@ -98,6 +95,7 @@ class FixedPoint(SolverPolicy):
     iterations: int = 10
     tolerance: float = 1e-6
     components: Sequence[int] | None = None
+    length: float | None = None
     #: F.
     function: Contraction = dataclasses.field(init=False, repr=False)
 
@@ -106,6 +104,7 @@ class FixedPoint(SolverPolicy):
     def __post_init__(self) -> None:
         known_name("transformation", self.transformation, TRANSFORMATIONS)
         object.__setattr__(self, "components", self._checked_components())
+        object.__setattr__(self, "length", self._checked_length())
         object.__setattr__(self, "function", contraction(self.family, self.slope, self.d))
         object.__setattr__(self, "a", self._contracting() if self.a is None else number("a", self.a))
         if self.a == 0.0:
@@ -151,7 +150,8 @@ class FixedPoint(SolverPolicy):
         """A plain :class:`FixedPointRule`."""
         longest = self.problem.velocity_limit * self.problem.dt
         components = np.array(self.components or range(self.problem.model.joints))
-        numbers = self.a, self.iterations, self.tolerance, longest, components
+        weights = error_weights(self.problem.task, self._metres)
+        numbers = self.a, self.iterations, self.tolerance, longest, components, weights
         return TRANSFORMATIONS[self.transformation], tuple(self.function), *numbers
 
     def _checked_components(self) -> tuple[int, ...] | None:
@@ -174,27 +174,30 @@ class FixedPoint(SolverPolicy):
             )
         return given
 
+    def _checked_length(self) -> float | None:
+        if self.transformation == "transpose":
+            return radian(self.problem.model) if self.length is None else number("length", self.length, above=0.0)
+        if self.length is not None:
+            raise InvalidInputError("length: expected none but with transformation 'transpose', which weighs errors.")
+        return None
+
+    @property
+    def _metres(self) -> float:
+        """ℓ; 1 m where nothing is weighed."""
+        return 1.0 if self.length is None else self.length
+
     def _extension(self, batch: Batch) -> tuple[Chain, FloatArray]:
         """What x is extended by: the chain to another point of the arm, and its nominal position; here nothing."""
         return self.problem.model.chain, np.empty((len(batch.q), 0))
 
     def _jacobian_bound(self) -> float:
-        """A number that ‖J‖² does not exceed, with prismatic joints at home."""
-        return jacobian_bound(self.problem.model, _TURNING[self.problem.task.kind])
+        """A number that ‖W J‖² does not exceed, with prismatic joints at home."""
+        return jacobian_bound(self.problem.model, self.problem.task, self._metres)
 
     def _contracting(self) -> float:
         """The paper's A, or as much of it as is sure to contract with the transposed Jacobian."""
-        size = min(1.0, 2.0 / (abs(self.function.derivative) * self._jacobian_bound()))
+        papers = 1.0
+        if self.transformation == "transpose":  # an arm without length has nothing but turns
+            papers = max(1.0, (PAPERS_LENGTH / (length(self.problem.model) or PAPERS_LENGTH)) ** 2)
+        size = min(papers, 2.0 / (abs(self.function.derivative) * self._jacobian_bound()))
         return -math.copysign(size, self.function.derivative)
-
-
-def jacobian_bound(arm: Arm, turning: float) -> float:
-    """The sum over the joints of the largest ‖∂x/∂q_j‖², by the lengths of the links.
-
-    Args:
-        arm: The arm; its prismatic joints are taken to be at home.
-        turning: What the orientation's numbers add for a joint that turns.
-    """
-    links = np.append(np.linalg.norm(arm.offsets[1:], axis=1), np.linalg.norm(arm.tool))
-    reach = np.cumsum(links[::-1])[::-1]
-    return float(np.where(arm.prismatic, 1.0, reach**2 + turning).sum())

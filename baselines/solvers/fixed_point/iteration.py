@@ -34,6 +34,7 @@ class FixedPointRule(NamedTuple):
         tolerance: ‖f - x‖ up to which they have converged.
         longest: How far the joints can go in one step, in [rad] or [m]. Shape (n,).
         components: Which component of f - x corrects each joint where there is no Jacobian. Shape (n,).
+        weights: What the squares of the components of f - x count where there is one. Shape (e,).
     """
 
     transformation: int
@@ -43,6 +44,7 @@ class FixedPointRule(NamedTuple):
     tolerance: float
     longest: FloatArray
     components: npt.NDArray[np.int64]
+    weights: FloatArray
 
 
 class Extension(NamedTuple):
@@ -71,13 +73,13 @@ def iterate_rows(arm_task, extension, method, target, previous, q, status):
         status: Receives values of :class:`Status`. Shape (B,).
     """
     (chain, kind), chain_to_point, points = arm_task_of(arm_task), Chain(*extension[0]), extension[1]
-    transformation, numbers, a, iterations, tolerance, longest, components = method
+    transformation, numbers, a, iterations, tolerance, longest, components, weights = method
     function = Contraction(*numbers)
     n, m, joints = q.shape[1], target.shape[1], chain_to_point.axes.shape[0]
     e = task_kernels.error_size(kind, m)
     rotation, position, geometric, pose = pose_arrays(n, m)
     error, jacobian, partial = np.empty(e), np.empty((e, n)), np.empty((6, joints))
-    h, start, missing = np.empty(n), np.empty(n), np.empty(3)
+    h, start, weighted, missing = np.empty(n), np.empty(n), np.empty(e), np.empty(3)
     for row in range(q.shape[0]):
         here = q[row]
         start[:] = here
@@ -94,7 +96,9 @@ def iterate_rows(arm_task, extension, method, target, previous, q, status):
             square = dot(error, error)
             h[:] = 0.0
             if transformation == _TRANSPOSE:
-                _add_transposed(jacobian, error, h)
+                for i in range(e):
+                    weighted[i] = weights[i] * error[i]
+                _add_transposed(jacobian, weighted, h)
             else:
                 for j in range(n):
                     h[j] = -error[components[j]]

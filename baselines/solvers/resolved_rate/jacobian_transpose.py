@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.policy_kernels import REFUSED, all_finite
+from baselines.solvers.arm_size import error_weights, radian
 from baselines.solvers.resolved_rate.base import (
     APPLIED,
     ResolvedRate,
@@ -18,17 +19,18 @@ from baselines.solvers.resolved_rate.base import (
     status_of,
 )
 from ikgym.jit import kernel
-from ikgym.validation import FloatArray, number
+from ikgym.validation import FloatArray, number, read_only
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class JacobianTranspose(ResolvedRate):
-    """Goes down the gradient of ½ ‖Δx − J Δq‖²: Δq = α Jᵀ Δx, with the α that goes furthest down.
+    """Goes down the gradient of ½ ‖W (Δx − J Δq)‖²: Δq = α Jᵀ W² Δx, with the α that goes furthest down.
 
-    The direction is that of Wolovich and Elliott 1984 and of Balestrino, De Maria and Sciavicco 1984; the step
-    α = ΔxᵀJJᵀΔx / ‖JJᵀΔx‖² is the one that Buss 2004 prints. In one step an arm makes all of Δx only where J has
-    equal singular values; elsewhere it lags behind, the more so the more they differ, and what is missing comes
-    back through the measured error.
+    W weighs position and orientation against each other: 1 for positions, a length ℓ for orientations. The direction
+    is that of Wolovich and Elliott 1984 and of Balestrino, De Maria and Sciavicco 1984; the step
+    α = ΔxᵀJJᵀΔx / ‖JJᵀΔx‖² is the one that Buss 2004 prints, here of W J and W Δx. In one step an arm makes all of Δx
+    only where W J has equal singular values; elsewhere it lags behind, the more so the more they differ, and what is
+    missing comes back through the measured error.
 
     Joint velocities are not bounded: where Δx lies along a direction that is nearly lost, with a singular value σ,
     the step is Δx / σ like that of the pseudoinverse. Where JᵀΔx is 0 the arm stands still; the status then says
@@ -39,19 +41,27 @@ class JacobianTranspose(ResolvedRate):
         problem: What the policy is told of the scenario.
         gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
         saturation: What is done about joint velocities beyond their limits; see :class:`ResolvedRate`.
-        rank_tolerance: ‖JᵀΔx‖ below this share of ‖J‖ ‖Δx‖ (Frobenius) counts as zero. At least 0.
+        rank_tolerance: ‖JᵀΔx‖ below this share of ‖J‖ ‖Δx‖ (Frobenius, weighed) counts as zero. At least 0.
+        length: ℓ, what 1 rad counts as, or 1 in a rotation matrix, in [m]. Above 0. If left out, chosen for the model,
+            see :func:`baselines.solvers.arm_size.radian`.
 
     Raises:
-        InvalidInputError: The gain or the tolerance is out of its range.
+        InvalidInputError: The gain, the tolerance or the length is out of its range.
     """
 
     rank_tolerance: float = 1e-12
+    length: float | None = None
+
+    _weights: FloatArray = dataclasses.field(init=False, repr=False)
 
     name: ClassVar[str] = "jacobian_transpose"
 
     def __post_init__(self) -> None:
         super().__post_init__()
         object.__setattr__(self, "rank_tolerance", number("rank_tolerance", self.rank_tolerance, at_least=0.0))
+        length = radian(self.problem.model) if self.length is None else number("length", self.length, above=0.0)
+        object.__setattr__(self, "length", length)
+        object.__setattr__(self, "_weights", read_only(error_weights(self.problem.task, length)))
 
     def kernel(self) -> Any:
         """See :meth:`CompiledPolicy.kernel`."""
@@ -59,13 +69,13 @@ class JacobianTranspose(ResolvedRate):
 
     def numbers(self) -> tuple[Any, ...]:
         """See :meth:`ResolvedRate.numbers`."""
-        return self.rank_tolerance, self.full_rank
+        return self.rank_tolerance, self.full_rank, self._weights
 
     def invert(self, jacobian: FloatArray, shift: FloatArray) -> tuple[FloatArray, npt.NDArray[np.int64]]:
         """See :meth:`ResolvedRate.invert`."""
         rows, size, n = jacobian.shape
         out, stuck = np.empty((rows, n)), np.empty(rows, dtype=np.bool_)
-        transpose_rows(jacobian, shift, self.rank_tolerance, out, stuck)
+        transpose_rows(jacobian, shift, self._weights, self.rank_tolerance, out, stuck)
         return out, status_of(stuck & (size == self.full_rank))
 
     def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
@@ -80,6 +90,7 @@ def jacobian_transpose_rows(
     scaling,
     tolerance,
     full_rank,
+    weights,
     checking,
     q,
     qdot_before,
@@ -97,7 +108,7 @@ def jacobian_transpose_rows(
     q, jacobian, shift, parts = asked(arm_task, gain, q, pose, nominal, before, known, answer)
     qdot, status, _ = parts
     stuck = np.empty(q.shape[0], np.bool_)
-    transpose_rows(jacobian, shift, tolerance, qdot, stuck)
+    transpose_rows(jacobian, shift, weights, tolerance, qdot, stuck)
     say_deficient(stuck, status)
     if shift.shape[1] != full_rank:
         status[:] = APPLIED
@@ -105,8 +116,17 @@ def jacobian_transpose_rows(
 
 
 @kernel
-def transpose_rows(jacobian, shift, tolerance, out, stuck):
-    """Δq = α Jᵀ Δx row by row, and whether Jᵀ Δx is 0: shapes (B, e, n), (B, e), a number, (B, n), (B,)."""
+def transpose_rows(jacobian, shift, weights, tolerance, out, stuck):
+    """Δq = α Jᵀ W² Δx row by row, and whether that is 0.
+
+    Args:
+        jacobian: J. Shape (B, e, n).
+        shift: Δx. Shape (B, e).
+        weights: The diagonal of W². Shape (e,).
+        tolerance: Below which share of ‖W J‖ ‖W Δx‖ a gradient counts as zero.
+        out: Receives Δq. Shape (B, n).
+        stuck: Receives whether it is 0 though Δx is not. Shape (B,).
+    """
     e, n = jacobian.shape[1], jacobian.shape[2]
     for row in range(jacobian.shape[0]):
         j, dx, dq = jacobian[row], shift[row], out[row]
@@ -114,15 +134,15 @@ def transpose_rows(jacobian, shift, tolerance, out, stuck):
         for k in range(n):
             dq[k] = 0.0
             for a in range(e):
-                dq[k] += j[a, k] * dx[a]
-                size += j[a, k] * j[a, k]
+                dq[k] += j[a, k] * (weights[a] * dx[a])
+                size += weights[a] * j[a, k] * j[a, k]
             squared += dq[k] * dq[k]
         for a in range(e):
-            wanted += dx[a] * dx[a]
+            wanted += weights[a] * dx[a] * dx[a]
             made = 0.0
             for k in range(n):
                 made += j[a, k] * dq[k]
-            length += made * made
+            length += weights[a] * made * made
         none = squared <= tolerance * tolerance * size * wanted or length == 0.0
         stuck[row] = none and wanted > 0.0
         alpha = 0.0 if none else squared / length

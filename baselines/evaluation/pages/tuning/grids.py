@@ -47,7 +47,7 @@ GRIDS: Mapping[str, tuple[Stage, ...]] = {
     ),
     "truncated_svd": (product(gain=GAINS, threshold=decades(-4, -1)), product(gain=FINE_GAINS)),
     "gram_schmidt": (product(gain=GAINS, truncation=decades(-5, -1)), product(gain=FINE_GAINS)),
-    "jacobian_transpose": (product(gain=GAINS + FINE_GAINS),),
+    "jacobian_transpose:length=1.0": (product(gain=GAINS + FINE_GAINS),),
     "dls": (product(gain=GAINS, damping=decades(-6, 0)), product(gain=FINE_GAINS)),
     "full_orientation:policy=rhc,options={'horizon': 3, 'iterations': 1}": (
         [

@@ -54,6 +54,7 @@ def test_is_what_the_paper_prints(name, task_weights, joint_weights, counter):
     policy = baselines.make(
         "abstract_rotation",
         scenario,
+        lambda_a=5e-4,
         task_weights=task_weights,
         joint_weights=joint_weights,
         counter_rotation="joints" if counter else "none",

@@ -1,0 +1,79 @@
+"""How large an arm is: what parameters with a length in their unit are chosen by where they are left out."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ikgym import task_kernels
+from ikgym.arms import Arm
+from ikgym.tasks import Task
+from ikgym.validation import FloatArray
+
+# What a length in [m] is multiplied by for the square of :func:`radian`, in [m]: measured, see there.
+RADIAN = 0.28
+# ‖∂x/∂q‖² of the orientation's numbers for a joint that turns at 1 rad/s, at most.
+_TURNING = {
+    task_kernels.POSITION: 0.0,
+    task_kernels.SKEW: 1.0,
+    task_kernels.MATRIX: 2.0,
+    task_kernels.POSE: 1.0,
+    task_kernels.AXIS: 1.0,
+}
+
+
+def length(arm: Arm) -> float:
+    """The arm's length from its first joint to the tool in [m]: that of all links, prismatic joints at home."""
+    return float(_levers(arm)[0])
+
+
+def radian(arm: Arm) -> float:
+    """What an error of 1 rad counts as beside one of position, in [m], for steps along Jᵀ.
+
+    The square root of length times 0.28 m. Joints turn positions by 0.3 times the length or so, and with that much for
+    1 rad both parts of the error would go back equally fast; but in the cost 1 m counts as much as 1 rad, whatever the
+    size. The geometric mean of both is within a third of the best on arms of 1 to 21 m, see
+    ``python -m benchmarks --sections defaults``. An arm without length has 1 m.
+    """
+    return math.sqrt(RADIAN * length(arm)) or 1.0
+
+
+def error_weights(task: Task, metres: float) -> FloatArray:
+    """What the squares of the error's components count, in [m²] of the position's.
+
+    Args:
+        task: The task coordinates.
+        metres: What 1 rad, or 1 in a rotation matrix, counts as, in [m].
+
+    Returns:
+        1 for components of the position, the square of ``metres`` for others. Shape (e,).
+    """
+    weights = np.full(task.error_size, metres * metres)
+    weights[position_rows(task)] = 1.0
+    return weights
+
+
+def position_rows(task: Task) -> slice:
+    """Where the position is in an error: first for rotation vectors and axes, last behind parts of a matrix."""
+    first = task.kind in (task_kernels.POSE, task_kernels.AXIS)
+    return slice(0, 3) if first else slice(task.error_size - 3, task.error_size)
+
+
+def jacobian_bound(arm: Arm, task: Task | None, metres: float = 1.0) -> float:
+    """A number that ‖∂x/∂q‖² does not exceed: the sum over the joints of the largest ‖∂x/∂q_j‖², by the links' lengths.
+
+    Args:
+        arm: The arm; its prismatic joints are taken to be at home.
+        task: The task coordinates x; None for a position alone.
+        metres: What 1 rad counts as, in [m].
+    """
+    turning = 0.0 if task is None else _TURNING[task.kind] * metres * metres
+    return float(np.where(arm.prismatic, 1.0, _levers(arm) ** 2 + turning).sum())
+
+
+def _levers(arm: Arm) -> FloatArray:
+    """How far the tool can be from each joint, in [m]. Shape (n,)."""
+    links = np.append(np.linalg.norm(arm.offsets[1:], axis=1), np.linalg.norm(arm.tool))
+    levers: FloatArray = np.cumsum(links[::-1])[::-1]
+    return levers

@@ -1,0 +1,141 @@
+"""What is chosen by an arm's size: measures, weights, and motions that do not depend on the unit of length."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import baselines
+import ikgym
+from baselines.evaluation.runner import play_episodes
+from baselines.solvers import arm_size
+from ikgym.trajectories import Sinusoid
+
+PANDA = ikgym.arms.get("panda")
+STEPS = 150
+
+
+def scaled(arm, factor):
+    return arm.replace(name=f"{arm.name} x {factor}", offsets=factor * arm.offsets, tool=factor * arm.tool)
+
+
+def sway(arm, task="position", **changes):
+    """A motion around the home posture of the Panda; the reference goes with the arm's size."""
+    n = arm.joints
+    trajectory = Sinusoid(np.linspace(0.1, 0.3, n), np.linspace(2.0, 4.0, n), np.zeros(n), np.asarray(arm.home))
+    return ikgym.scenarios.Scenario(
+        "sway", arm, ikgym.tasks.get(task), trajectory, **{"steps": STEPS, "velocity_limit": 20.0, **changes}
+    )
+
+
+def test_lengths_begin_at_the_first_joint():
+    assert arm_size.length(ikgym.arms.get("faitli3")) == 1.3  # and so the paper's A stays as it is
+    links = 0.316 + 2 * 0.0825 + 0.384 + 0.088 + 0.107
+    offsets = np.linalg.norm(PANDA.offsets, axis=1)
+    assert arm_size.length(PANDA) == pytest.approx(offsets[1:].sum() + 0.107)
+    assert arm_size.length(PANDA) < links
+    assert arm_size.length(scaled(PANDA, 4)) == 4 * arm_size.length(PANDA)
+
+
+def test_a_radian_counts_as_the_root_of_the_length():
+    assert arm_size.radian(PANDA) == pytest.approx(np.sqrt(0.28 * arm_size.length(PANDA)))
+    assert arm_size.radian(scaled(PANDA, 4)) == 2 * arm_size.radian(PANDA)
+    assert arm_size.radian(ikgym.arms.Arm("wrist", np.zeros((2, 3)), np.eye(3)[:2])) == 1.0
+
+
+@pytest.mark.parametrize("task", ikgym.tasks.names())
+def test_weights_are_those_of_the_components(task):
+    """A shift of the tool changes just the components of weight 1."""
+    which = ikgym.tasks.get(task)
+    rotation, position = PANDA.forward(PANDA.home)
+    here, there = (which.coordinates(rotation, position + by) for by in (0.0, 0.1))
+    weights = arm_size.error_weights(which, 0.5)
+    np.testing.assert_array_equal(weights == 1.0, which.error(there, here) != 0.0)
+    assert set(weights[weights != 1.0]) <= {0.25}
+
+
+SCALE_FREE = [
+    ("jacobian_transpose", {}),
+    ("fixed_point", {}),
+    ("abstract_rotation", {"deformation": "contraction", "counter_rotation": "none"}),
+]
+
+
+def path(scenario, policy, parameters):
+    made = baselines.make(policy, scenario, **parameters)
+    return play_episodes(scenario, made, [0], made.preview, timed=False)[0].q
+
+
+@pytest.mark.parametrize(("policy", "parameters"), SCALE_FREE)
+def test_an_arm_three_times_as_large_makes_the_same_joint_motion(policy, parameters):
+    small, large = (path(sway(arm), policy, parameters) for arm in (PANDA, scaled(PANDA, 3.0)))
+    assert np.ptp(small, axis=0).max() > 0.05
+    np.testing.assert_allclose(large, small, rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("policy", "parameters"),
+    [("fixed_point", {"a": -1.0}), ("abstract_rotation", {**SCALE_FREE[2][1], "lambda_a": 0.05})],
+)
+def test_with_a_parameter_given_it_does_not(policy, parameters):
+    small, large = (path(sway(arm), policy, parameters) for arm in (PANDA, scaled(PANDA, 3.0)))
+    assert abs(large - small).max() > 1e-3
+
+
+@pytest.mark.parametrize("policy", ["fixed_point", "abstract_rotation"])
+def test_on_the_papers_arms_the_papers_numbers_stay(policy):
+    name, parameter, value = {
+        "fixed_point": ("faitli3-regular", "a", -1.0),
+        "abstract_rotation": ("khan8-q1", "lambda_a", 5e-4),
+    }[policy]
+    assert baselines.make(policy, name).parameters[parameter] == value
+
+
+def test_shares_of_rotations_go_against_the_square_of_the_length():
+    def share(arm, task="pose"):
+        return baselines.make("abstract_rotation", sway(arm, task)).lambda_a
+
+    assert share(scaled(PANDA, 3.0), "position") == pytest.approx(share(PANDA, "position") / 9.0)
+    # Little longer than the paper's arm its number is kept, and where that may not contract it is left.
+    long, longer = scaled(PANDA, 25.0), scaled(PANDA, 100.0)
+    assert share(long) == 5e-4
+    assert share(longer) == pytest.approx(2.0 / arm_size.jacobian_bound(longer, ikgym.tasks.get("pose")))
+    assert share(longer) < 5e-4
+
+
+def test_a_grows_on_arms_shorter_than_the_papers():
+    tiny = scaled(ikgym.arms.get("faitli3"), 0.5).replace(home=np.array([0.1, 0.4, 1.0]))
+    assert baselines.make("fixed_point", sway(tiny)).a == pytest.approx(-4.0)
+    assert baselines.make("fixed_point", sway(PANDA)).a < -1.0
+
+
+#: What was the default for all arms.
+BEFORE = {
+    "jacobian_transpose": {"length": 1.0},
+    "fixed_point": {"length": 1.0},
+    "abstract_rotation": {"lambda_a": 5e-4},
+}
+#: Tracking and velocity costs of 150 steps with it, before there were others.
+COSTS = {
+    ("varga7-fast", "jacobian_transpose"): (67231778.67518784, 27848903.96351546),
+    ("khan8-q1", "jacobian_transpose"): (126250461.26640134, 2197.138279847826),
+    ("zhang6-lspb", "jacobian_transpose"): (188.4403440901819, 3.2611424692457858),
+    ("varga7-fast", "fixed_point"): (40743305.778034255, 807699.716067913),
+    ("khan8-q7q8", "fixed_point"): (10517536660.377666, 2.3720112227117263e-08),
+    ("zhang6-lspb", "fixed_point"): (50.846141087661834, 0.696956362074195),
+    ("varga7-fast", "abstract_rotation"): (117101865873.3636, 11481.238054259115),
+    ("zhang6-lspb", "abstract_rotation"): (203465.95159799824, 2.0524239627998737e-05),
+}
+
+
+@pytest.mark.parametrize(("name", "policy"), COSTS)
+def test_with_the_old_parameters_costs_are_those_of_before(name, policy):
+    scenario = ikgym.scenarios.get(name).replace(steps=STEPS)
+
+    def costs(**parameters):
+        made = baselines.make(policy, scenario, **parameters)
+        (episode,) = play_episodes(scenario, made, [0], made.preview, timed=False)
+        return float(episode.tracking_cost.sum()), float(episode.velocity_cost.sum())
+
+    assert costs(**BEFORE[policy]) == pytest.approx(COSTS[name, policy], rel=1e-12)
+    assert costs() != costs(**BEFORE[policy])
