@@ -22,6 +22,9 @@ class TestOfRows:
                 total_cost=1.23456789,
                 position_error_max=0.0501,
                 orientation_error_max=0.1,
+                steps_at_joint_limit=3,
+                steps_at_acceleration_limit=5,
+                status_counts={"applied": 2, "diverged": 1},
                 time_p50_us=1.0,
                 time_p99_us=7.0,
             ),
@@ -30,6 +33,8 @@ class TestOfRows:
                 total_cost=2.0,
                 position_error_max=0.0499,
                 orientation_error_max=0.301,
+                steps_at_joint_limit=4,
+                status_counts={"diverged": 2},
                 time_p50_us=3.0,
                 time_p99_us=5.0,
             ),
@@ -46,7 +51,7 @@ class TestOfRows:
         first = pytest.approx(max(one.time_first_us for one in rows[:2]), rel=1e-3)
         costs, errors = ((1.234568, 2.0, 3.0),), ((0.0501, 0.0499, 0.0),)
         angles = ((0.1, 0.301, 0.299),)
-        expected = Line("dls", {}, 1, (), costs, errors, 2, 2, 2.0, 7.0, first, None, angles)
+        expected = Line("dls", {}, 1, (), costs, errors, 2, 2, 2.0, 7.0, first, None, angles, (7, 0, 5), 3)
         assert Line.of(solver("dls"), rows) == expected
 
 
