@@ -50,6 +50,7 @@ def test_a_free_orientation_is_not_looked_for():
     edge = 0.83  # farther out than with the tool downwards
     assert gaps(out_to(edge))
     assert not gaps(out_to(edge, task="position"))
+    assert not gaps(out_to(edge, task="axis"))
     assert all(gap.angle == 0.0 for gap in gaps(out_to(1.2, task="position")))
 
 
