@@ -63,8 +63,11 @@ _places: dict[str, str] = {
     "oracle": "baselines.oracle.policy:Oracle",
 }
 
-#: Those that are nothing by their name alone, and so are no part of "all policies".
-_incomplete: dict[str, str] = {"agent": "baselines.agents.policy:Agent"}
+#: Those that are nothing by their name alone, or but for some scenarios, and so are no part of "all policies".
+_incomplete: dict[str, str] = {
+    "agent": "baselines.agents.policy:Agent",
+    "published": f"{_SOLVERS}.references.published:Published",
+}
 
 
 def names() -> tuple[str, ...]:

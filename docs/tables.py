@@ -56,6 +56,25 @@ def scenarios() -> list[tuple[str, ...]]:
     return rows
 
 
+def problems() -> list[tuple[str, ...]]:
+    """One line a problem from elsewhere."""
+    rows = [
+        ("scenario", "arm", "waypoints", "starts", "trajectories", "Δt [s]", "steps", "longest [mm]", "largest [°]")
+    ]
+    for name in ikgym.scenarios.problems_from_elsewhere():
+        scenario = ikgym.scenarios.get(name)
+        members = ikgym.problems.names(f"{name}-") if scenario.random else (name,)
+        found = [ikgym.problems.waypoints(member) for member in members]
+        counts = sorted({len(one.positions) for one in found})
+        longest = max(np.linalg.norm(np.diff(one.positions, axis=0), axis=1).max() for one in found)
+        cosines = min(np.abs((one.quaternions[1:] * one.quaternions[:-1]).sum(axis=1)).min() for one in found)
+        cells = ["–".join(f"{counts[i]}" for i in sorted({0, len(counts) - 1})), str(len(found[0].starts) or NOTHING)]
+        cells += [str(len(ikgym.problems.published(members[0])) or NOTHING), f"{scenario.dt:g}", f"{scenario.steps:,}"]
+        turn = np.degrees(2.0 * np.arccos(min(cosines, 1.0)))
+        rows.append((f"`{name}`", f"`{scenario.arm.name}`", *cells, f"{1e3 * longest:.1f}", f"{turn:.1f}"))
+    return rows
+
+
 def splits() -> list[tuple[str, ...]]:
     """One line a split."""
     rows = [("split", "seeds")]
@@ -131,6 +150,7 @@ TABLES = {
     "arms": arms,
     "tasks": tasks,
     "scenarios": scenarios,
+    "problems": problems,
     "splits": splits,
     "policies": policies,
     "statuses": statuses,

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import gymnasium as gym
 
-from ikgym import arms, exceptions, rotations, scenarios, tasks, trajectories
+from ikgym import arms, exceptions, problems, rotations, scenarios, tasks, trajectories
 from ikgym.arms import Arm
 from ikgym.cost import TrackingCost
 from ikgym.env import RedundantIKEnv
@@ -27,6 +27,7 @@ __all__ = [
     "TrackingCost",
     "arms",
     "exceptions",
+    "problems",
     "rotations",
     "scenarios",
     "tasks",

@@ -21,14 +21,16 @@ class Registry(Generic[Member]):
     def __init__(self, kind: str, member: type[Member]) -> None:
         self.kind, self._member = kind, member
         self._makers: dict[str, Callable[[], Member]] = {}
+        self._unlisted: set[str] = set()
         self._made: dict[str, Member] = {}
 
-    def register(self, name: str, make: Callable[[], Member]) -> None:
+    def register(self, name: str, make: Callable[[], Member], *, listed: bool = True) -> None:
         """Adds a member.
 
         Args:
             name: The new name.
             make: Called without arguments, once, when the member is first asked for.
+            listed: Whether :meth:`names` has it.
 
         Raises:
             InvalidInputError: The name is taken, or no text; or the maker cannot be called.
@@ -42,10 +44,16 @@ class Registry(Generic[Member]):
         if name in self._makers:
             raise InvalidInputError(f"The {self.kind} {name!r} is registered already.")
         self._makers[name] = make
+        if not listed:
+            self._unlisted.add(name)
+
+    def __contains__(self, name: object) -> bool:
+        """Whether there is a member of that name, listed or not."""
+        return isinstance(name, str) and name in self._makers
 
     def names(self) -> tuple[str, ...]:
-        """All names, in the order of their registration."""
-        return tuple(self._makers)
+        """All names that are listed, in the order of their registration."""
+        return tuple(name for name in self._makers if name not in self._unlisted)
 
     def get(self, name: str) -> Member:
         """The member of a name; the same object at every call.
@@ -54,8 +62,8 @@ class Registry(Generic[Member]):
             UnknownNameError: There is no such name; the message has the nearest one.
             InvalidInputError: Its maker fails, or makes something else; all others can be had nevertheless.
         """
-        if not isinstance(name, str) or name not in self._makers:
-            raise UnknownNameError(self.kind, name, self._makers)
+        if name not in self:
+            raise UnknownNameError(self.kind, name, self.names())
         if name not in self._made:
             self._made[name] = self._make(name)
         return self._made[name]

@@ -18,7 +18,7 @@ from hatchling.builders.wheel import WheelBuilder
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("ikgym", "baselines")
 #: What commands read: data, and the files that say how agents are trained.
-DATA = (".json", ".toml", ".safetensors", ".typed")
+DATA = (".json", ".toml", ".safetensors", ".typed", ".npz", ".txt")
 
 
 @pytest.fixture(scope="module")
@@ -40,6 +40,9 @@ def test_it_holds_every_module_and_all_data(content):
     ):
         assert f"baselines/data/{file}" in content
     assert "baselines/training/presets/smoke.toml" in content
+    # The problems of others, and the notices that their licences ask for.
+    for file in ("waypoints.npz", "trajectories.npz", "LICENSE-RL-ITG.txt", "LICENSE-CppFlow.txt"):
+        assert f"ikgym/problems/{file}" in content
 
 
 def test_it_holds_nothing_else(content):

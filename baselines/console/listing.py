@@ -76,7 +76,7 @@ def aligned(rows: Sequence[Sequence[str]], width: int) -> str:
     start = sum(sizes) + 2 * len(sizes)
     lines = []
     for row in rows:
-        wrapped = textwrap.wrap(row[-1], max(width - start, 20), break_on_hyphens=False) or [""]
+        wrapped = textwrap.wrap(row[-1], max(width - start, 16), break_on_hyphens=False) or [""]
         cells = "  ".join(f"{cell:{size}}" for cell, size in zip(row[:-1], sizes, strict=True))
         lines += [f"{cells}  {wrapped[0]}".rstrip(), *(" " * start + line for line in wrapped[1:])]
     return "\n".join([*lines[:1], "-" * min(max(map(len, lines)), width), *lines[1:]])
@@ -207,7 +207,7 @@ def _filled(part: str, width: int) -> str:
 ARMS = Catalogue("arm", arms.names, ("arm", "joints", "prismatic", "limits"), _arm_row, _arm, ".urdf")
 SCENARIOS = Catalogue(
     "scenario",
-    scenarios.names,
+    lambda: (*scenarios.names(), *scenarios.problems_from_elsewhere()),
     ("scenario", "arm", "task", "steps", "source"),
     _scenario_row,
     _scenario,

@@ -51,8 +51,8 @@ class EpisodeProblem:
         """The episode that a reset with the seed begins.
 
         Raises:
-            InvalidInputError: The seed is no whole number of at least 0, or the scenario has a disturbance or limits of
-                acceleration.
+            InvalidInputError: The seed is no whole number of at least 0, or the scenario has a disturbance, or both
+                limits of acceleration and points that are held.
         """
         whole_number("seed", seed, at_least=0)
         disturbance = scenario.disturbance
@@ -61,11 +61,12 @@ class EpisodeProblem:
                 "The best cost of an episode is that of a joint path, which knows of no disturbance; scenario "
                 f"{scenario.name!r}: expected noise=0 and bias=0, got {disturbance}."
             )
-        if np.isfinite(scenario.arm.acceleration_limit).any():
+        limited = bool(np.isfinite(scenario.arm.acceleration_limit).any())
+        if limited and not scenario.counted()[1:].all():
             raise InvalidInputError(
-                "The search for the best cost of an episode keeps limits of position and velocity; scenario "
-                f"{scenario.name!r}: expected an arm without limits of acceleration, got "
-                f"{scenario.arm.acceleration_limit.tolist()} of arm {scenario.arm.name!r}."
+                "Between held points the search does not look at how the arm gets from one to the next; scenario "
+                f"{scenario.name!r}: expected iterations_per_point=1 with the limits of acceleration of arm "
+                f"{scenario.arm.name!r}, got {scenario.iterations_per_point}."
             )
         data = ProblemData(
             scenario.arm.chain,
@@ -85,7 +86,13 @@ class EpisodeProblem:
 
     def on(self, grid: Grid) -> PathProblem:
         """The problem on a grid, as the kernels see it."""
-        return PathProblem(self.data, grid, self.start, self.nominal)
+        change = self.scenario.dt * self.scenario.arm.acceleration_limit if self._by_interior_point else np.zeros(0)
+        return PathProblem(self.data, grid, self.start, self.nominal, np.zeros_like(self.start), 0.0, change)
+
+    @property
+    def _by_interior_point(self) -> bool:
+        """Whether paths are improved by the interior point method, which finds its way between limits of any kind."""
+        return self.scenario.arm.limited and bool(self.scenario.counted()[1:].all())
 
     @property
     def knots(self) -> int:
@@ -114,7 +121,7 @@ class EpisodeProblem:
         return np.stack([np.interp(fine, knots, column) for column in q.T], axis=1)
 
     def feasible(self, path: FloatArray) -> FloatArray:
-        """A path within the limits: the nearest that the arm gets to each knot from the one before.
+        """A path within the limits of position and velocity: the nearest that the arm gets to each knot from the last.
 
         Args:
             path: Joint coordinates at the knots, in [rad] or [m]. Shape (K, n).

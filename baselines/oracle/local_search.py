@@ -12,15 +12,18 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from baselines.solvers.receding_horizon.newton.cost import true_cost
 from baselines.solvers.receding_horizon.newton.guess import DAMPING, STREAM, draw, initial_guess, uniform
-from baselines.solvers.receding_horizon.newton.minimise import NewtonSettings, minimise
+from baselines.solvers.receding_horizon.newton.interior_point.excess import cost_within
+from baselines.solvers.receding_horizon.newton.interior_point.minimise import LEFT, minimise_path
+from baselines.solvers.receding_horizon.newton.minimise import NewtonSettings
 from baselines.solvers.receding_horizon.newton.workspace import knot_workspace, newton_workspace
 from ikgym import task_kernels
 from ikgym.jit import inlined, kernel
 
 # Newton steps of a branch, and the relative precision that ends them before.
 STEPS, PRECISION = 50, 1e-4
+# By which share a path may leave limits, where accelerations are limited.
+SLACK = 10.0 * LEFT
 # A branch that gains less than this share is the same path.
 GAIN = 1e-4
 # How often a branch is blended with another path, and how often it comes back to its own; else it goes its own way.
@@ -60,7 +63,7 @@ def random_paths(problem, seed, paths, first, last):
     for s in range(first, last):
         drift[:] = 0.0
         damping = DAMPING if s == 0 else draw(seed, s, drift)
-        initial_guess(problem, 0, drift, damping, paths[s], workspace)
+        initial_guess(problem, 0, paths.shape[1], drift, damping, paths[s], workspace)
 
 
 @kernel
@@ -82,11 +85,11 @@ def improve(problem, settings, paths, improved, first, last):
     for s in range(first, last):
         path = paths[s]
         before[:] = path
-        worst = true_cost(problem, path, workspace)
+        worst = cost_within(problem, path, SLACK, workspace)
         multipliers[:] = 0.0
-        minimum = minimise(problem, path, multipliers, settings, workspace)
+        minimum = minimise_path(problem, path, multipliers, settings, 0.0, workspace)
         improved.steps[s], improved.gradients[s] = minimum.steps, minimum.gradient_norm
-        costs[s] = true_cost(problem, path, workspace)
+        costs[s] = cost_within(problem, path, SLACK, workspace)
         if not costs[s] <= worst:
             path[:] = before
             costs[s] = worst
@@ -117,8 +120,8 @@ def iterated_local_search(problem, seed, rounds, partners, paths, costs, first, 
         for r in range(rounds):
             branch_off(problem, (seed + s, r), path, partners, drift, branch, workspace.knot)
             multipliers[:] = 0.0
-            minimise(problem, branch, multipliers, settings, workspace)
-            cost = true_cost(problem, branch, workspace)
+            minimise_path(problem, branch, multipliers, settings, 0.0, workspace)
+            cost = cost_within(problem, branch, SLACK, workspace)
             if cost < (1.0 - GAIN) * costs[s]:
                 path[:] = branch
                 costs[s] = cost
@@ -155,7 +158,7 @@ def branch_off(problem, draws, path, partners, drift, branch, workspace):
             _blend(other, path, off, width, branch)
     else:
         branch[:off] = path[:off]
-        initial_guess(problem, off, drift, damping, branch, workspace)
+        initial_guess(problem, off, knots, drift, damping, branch, workspace)
         if kind < BLENDED + BACK:
             # as far as it went off, so long it takes to come back
             length = max(uniform(key, own + 3) * (knots - off), 1.0)
@@ -175,4 +178,5 @@ def _blend(a, b, middle, width, out):
 def _newton(problem, knots, n):
     """Workspace and multipliers of Newton's method."""
     kind, m = problem.data.kind, problem.nominal.shape[1]
-    return newton_workspace(kind, m, knots, n), np.empty((knots, task_kernels.error_size(kind, m) + 2 * n))
+    workspace = newton_workspace(kind, m, knots, n, problem.change_limit.shape[0] > 0)
+    return workspace, np.empty((knots, task_kernels.error_size(kind, m) + 2 * n))

@@ -39,7 +39,7 @@ from ikgym.validation import FloatArray
 #: Where the reference costs are kept, those of which policy, and of which scenario, tasks, and how many episodes.
 FILE = pathlib.Path(__file__).with_name("validation_reference.json")
 #: All initial guesses are tried in the first call, which takes longer there than real time, and costs less.
-POLICY = "rhc_foresight:move_blocks=48,starts=64,start_steps=0,recovery_steps=0"
+POLICY = "rhc_foresight:horizon=1501,move_blocks=48,starts=64,start_steps=0,recovery_steps=0"
 SCENARIO, TASKS, EPISODES = "varga7-random", ("skew", "pose"), 64
 #: Digits of a cost that are kept.
 DIGITS = 7

@@ -45,6 +45,8 @@ class CasadiHorizon:
     Args:
         problem: Arm, task, cost and Δt.
         knots: K, the number of knots.
+        limited: Whether the limits of position, velocity and acceleration count.
+        braking: Whether the arm has to be able to stop within its joint limits behind the last knot, too.
         options: Of CasADi's `nlpsol`, over those of :data:`OPTIONS`.
 
     Raises:
@@ -54,6 +56,8 @@ class CasadiHorizon:
 
     problem: Problem
     knots: int
+    limited: bool = False
+    braking: bool = False
     options: dict[str, Any] = dataclasses.field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -68,12 +72,12 @@ class CasadiHorizon:
 
     @functools.cached_property
     def solver(self) -> Any:
-        """The compiled problem, made once: variables y, t; parameters q_0, the nominal coordinates, h, w."""
+        """The compiled problem, made once: variables y, t; parameters q_0, the nominal coordinates, h, w, q̇ before."""
         problem, knots = self.problem, self.knots
         n, m, e = problem.model.joints, problem.task.size, problem.task.error_size
         y, t = casadi.SX.sym("y", n, knots), casadi.SX.sym("t", e, knots)
         start, nominal = casadi.SX.sym("q", n), casadi.SX.sym("nominal", m, knots)
-        h, w = casadi.SX.sym("h", knots), casadi.SX.sym("w", knots)
+        h, w, before = casadi.SX.sym("h", knots), casadi.SX.sym("w", knots), casadi.SX.sym("qdot", n)
         residual = self._residual
         cost, power = casadi.SX(0), int(problem.cost.p_x)
         above = []
@@ -85,13 +89,30 @@ class CasadiHorizon:
             above.append(t[:, k] - r**2)
             if power > 2:
                 above += [t[:, k] - r**power, t[:, k] + r**power] if power % 2 else [t[:, k] - r**power]
+        if self.limited:
+            above += self._room(start, y, h, before)
         nlp = {
             "x": casadi.vertcat(casadi.vec(y), casadi.vec(t)),
-            "p": casadi.vertcat(start, casadi.vec(nominal), h, w),
+            "p": casadi.vertcat(start, casadi.vec(nominal), h, w, before),
             "f": cost,
             "g": casadi.vertcat(*above),
         }
         return casadi.nlpsol("horizon", "ipopt", nlp, {**OPTIONS, **self.options})
+
+    def _room(self, start: Any, y: Any, h: Any, before: Any) -> list[Any]:
+        """What must not be negative within the limits; see :func:`numpy_horizon.beyond_limits`."""
+        problem, arm, knots = self.problem, self.problem.model, self.knots
+        out, fastest, here = [], casadi.DM(problem.largest_qdot), casadi.SX.zeros(arm.joints)
+        for k in range(knots):
+            qdot, q = (y[:, k] - here) / h[k], start + problem.dt * y[:, k]
+            most = problem.dt * casadi.DM(arm.acceleration_limit) * (0.5 * (h[k - 1] + h[k]) if k else 1.0)
+            change = qdot - before
+            out += [fastest - qdot, fastest + qdot, most - change, most + change]
+            if self.braking and k == knots - 1:
+                q += qdot * casadi.fabs(qdot) / (2.0 * casadi.DM(arm.acceleration_limit))
+            out += [(arm.upper - q) / problem.dt, (q - arm.lower) / problem.dt]
+            before, here = qdot, y[:, k]
+        return out
 
     @functools.cached_property
     def _residual(self) -> Any:
@@ -116,7 +137,9 @@ class CasadiHorizon:
         t = np.maximum(r**2, np.abs(r) ** problem.cost.p_x)
         answer = self.solver(
             x0=np.concatenate([y.ravel(), t.T.ravel()]),
-            p=np.concatenate([horizon.q, horizon.nominal.ravel(), horizon.lengths, horizon.tracking_weights]),
+            p=np.concatenate(
+                [horizon.q, horizon.nominal.ravel(), horizon.lengths, horizon.tracking_weights, horizon.qdot_before]
+            ),
             lbg=0.0,
             ubg=np.inf,
         )

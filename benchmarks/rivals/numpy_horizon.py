@@ -27,12 +27,15 @@ class Horizon:
         nominal: Nominal task coordinates at the knots. Shape (K, m).
         steps: Lengths h of the intervals that end at the knots, in time steps; all 1 if left out. Shape (K,).
         weights: Weights w of the tracking costs; all 1 if left out. Shape (K,).
+        qdot: Joint velocities of the step that has passed, in [rad/s] or [m/s], where accelerations are limited; at
+            rest if left out. Shape (n,).
     """
 
     q: FloatArray
     nominal: FloatArray
     steps: FloatArray | None = None
     weights: FloatArray | None = None
+    qdot: FloatArray | None = None
 
     @property
     def knots(self) -> int:
@@ -48,6 +51,11 @@ class Horizon:
     def tracking_weights(self) -> FloatArray:
         """w, with the default filled in. Shape (K,)."""
         return np.ones(self.knots) if self.weights is None else np.asarray(self.weights, dtype=np.float64)
+
+    @property
+    def qdot_before(self) -> FloatArray:
+        """The joint velocities before, with the default filled in. Shape (n,)."""
+        return np.zeros_like(self.q) if self.qdot is None else np.asarray(self.qdot, dtype=np.float64)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -84,6 +92,32 @@ def plan_cost(problem: Problem, horizon: Horizon, q: FloatArray) -> float:
     velocity = _powers(qdot / cost.delta_qdot, cost.p_in, cost.p_out)
     tracking = _powers(np.array(errors) / cost.delta_x, 2.0, cost.p_x)
     return float(h @ velocity + horizon.tracking_weights @ tracking)
+
+
+def beyond_limits(problem: Problem, horizon: Horizon, q: FloatArray, braking: bool = False) -> dict[str, float]:
+    """By how much a plan leaves the limits of the model, at most; below 0 where it keeps them.
+
+    Args:
+        problem: Arm, task, cost and Δt.
+        horizon: Start, lengths and velocities before.
+        q: Joint coordinates at the knots, in [rad] or [m]. Shape (K, n).
+        braking: Whether the arm has to be able to stop within its joint limits behind the last knot.
+
+    Returns:
+        Of positions in [rad] or [m], of velocities in [rad/s] or [m/s], and of accelerations, of which a change of
+        velocity between blocks of a and b steps takes (a + b) / 2, and the first one a step, in [rad/s²] or [m/s²].
+    """
+    arm, h = problem.model, horizon.lengths[:, None]
+    qdot = np.diff(np.vstack([horizon.q, q]), axis=0) / (h * problem.dt)
+    spans = np.vstack([np.ones((1, 1)), 0.5 * (h[:-1] + h[1:])])
+    qddot = np.diff(np.vstack([horizon.qdot_before, qdot]), axis=0) / (spans * problem.dt)
+    if braking:
+        q = np.vstack([q, q[-1] + qdot[-1] * np.abs(qdot[-1]) / (2.0 * arm.acceleration_limit)])
+    return {
+        "position": float(np.max([q - arm.upper, arm.lower - q])),
+        "velocity": float(np.max(np.abs(qdot) - problem.largest_qdot)),
+        "acceleration": float(np.max(np.abs(qddot) - arm.acceleration_limit)),
+    }
 
 
 def forward(arm: Arm, q: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -15,7 +15,7 @@ from collections.abc import Callable
 from ikgym.exceptions import InvalidInputError
 from ikgym.preview import Preview
 from ikgym.registry import Registry
-from ikgym.scenarios import catalogue, families
+from ikgym.scenarios import catalogue, elsewhere, families
 from ikgym.scenarios.disturbance import Disturbance
 from ikgym.scenarios.importing import imported
 from ikgym.scenarios.reachability import Gap, gaps
@@ -34,6 +34,7 @@ __all__ = [
     "get",
     "load",
     "names",
+    "problems_from_elsewhere",
     "register",
     "seeds",
 ]
@@ -50,6 +51,8 @@ _registry: Registry[Scenario] = Registry("scenario", Scenario)
 for _scenarios in (catalogue.SCENARIOS, families.SCENARIOS):
     for _name, _make in _scenarios.items():
         _registry.register(_name, _make)
+for _name, _make in elsewhere.SCENARIOS.items():
+    _registry.register(_name, _make, listed=False)
 
 
 def get(name: str) -> Scenario:
@@ -63,8 +66,13 @@ def get(name: str) -> Scenario:
 
 
 def names() -> tuple[str, ...]:
-    """The names of all scenarios."""
+    """The names of all scenarios but :func:`problems_from_elsewhere`, which "all" does not stand for."""
     return _registry.names()
+
+
+def problems_from_elsewhere() -> tuple[str, ...]:
+    """The scenarios that others published; the hundred paths of ``rlitg-random`` have names of their own, too."""
+    return elsewhere.names()
 
 
 def register(scenario: Scenario | str, make: Callable[[], Scenario] | None = None) -> None:
@@ -106,7 +114,7 @@ def find(item: Scenario | str | os.PathLike[str]) -> Scenario:
             "scenario: expected a Scenario, a name of one, a file ending in .toml or 'package.module:attribute', got "
             f"{shortened(item)}."
         )
-    if item not in names():
+    if item not in _registry:
         if item.endswith(".toml"):
             return load(item)
         if ":" in item:

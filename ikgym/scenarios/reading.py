@@ -121,7 +121,7 @@ def _trajectory(table: Table, folder: pathlib.Path) -> Trajectory:
     for name, kinds in kind.parts.items():
         if name in values:
             values[name] = _part(name, values, kinds)
-    return _made("trajectory", kind, values, made=tuple(kind.parts))  # type: ignore[no-any-return]
+    return _made("trajectory", kind, values, texts=kind.texts, made=tuple(kind.parts))  # type: ignore[no-any-return]
 
 
 def _waypoints(table: Table, folder: pathlib.Path) -> Trajectory:

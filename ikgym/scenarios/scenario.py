@@ -46,7 +46,8 @@ class Scenario(Frozen):
         model: The arm that solvers know, and through which nominal joint paths are mapped; the arm itself if it
             is left out.
         start: Joint coordinates at the start in [rad] or [m], within the limits of the arm. If left out, the nominal
-            ones, or for a Cartesian trajectory those at which :meth:`Arm.inverse` finds its first pose. Shape (n,).
+            or published ones, or for other Cartesian trajectories those at which :meth:`Arm.inverse` finds the first
+            pose. Shape (n,).
         initial_pose: What is measured at the start, where it is not the arm's pose. Shape (m,).
         iterations_per_point: Steps for which the nominal point 1, 2, … is held; the last number goes on. Errors
             and costs of a point count at its last step.
@@ -164,7 +165,7 @@ class Scenario(Frozen):
         """
         points = self.points(preview)
         out = np.empty((points[-1] + 1, self.task.size))
-        nominal_rows(self.task.kind, self.frames(self._episode(seed), len(out)), out)
+        nominal_rows(self.task.kind, self.frames(self.episode(seed), len(out)), out)
         return out[points]
 
     def nominal_joint_path(self, seed: int | None = None, preview: Preview = 0) -> FloatArray | None:
@@ -181,8 +182,21 @@ class Scenario(Frozen):
             InvalidInputError: The scenario is random and there is no seed.
         """
         points = self.points(preview)
-        path = self._episode(seed).joint_path(self.times(int(points[-1]) + 1))
+        path = self.episode(seed).joint_path(self.times(int(points[-1]) + 1))
         return None if path is None else path[points]
+
+    def episode(self, seed: int | None = None) -> Trajectory:
+        """The reference trajectory of an episode.
+
+        Args:
+            seed: The reset seed; needed where the scenario is random.
+
+        Raises:
+            InvalidInputError: The scenario is random and there is no seed.
+        """
+        if self.random and seed is None:
+            raise InvalidInputError(f"Scenario {self.name!r} is random: a seed says which episode is meant.")
+        return self.trajectory.sample(seeding.np_random(seed)[0]) if self.random else self.trajectory
 
     def points(self, preview: Preview = 0) -> npt.NDArray[np.int64]:
         """Which nominal point is the target after k steps.
@@ -267,7 +281,7 @@ class Scenario(Frozen):
         Raises:
             InvalidInputError: The scenario is random and there is no seed, or the arm cannot be there.
         """
-        return self.first_q(self._episode(seed))
+        return self.first_q(self.episode(seed))
 
     def first_q_of(self, episodes: Sequence[Trajectory]) -> FloatArray:
         """The joint coordinates at the start of several episodes, as :meth:`first_q` gives them. Shape (k, n).
@@ -308,7 +322,7 @@ class Scenario(Frozen):
 
     def start_bound(self) -> FloatArray:
         """Absolute joint coordinates that no start exceeds, in [rad] or [m]. Shape (n,)."""
-        known = self.trajectory.joint_bound() if self.starts_nominally else np.abs(self._start)
+        known = self.trajectory.first_joints_bound() if self.starts_nominally else np.abs(self._start)
         usual = np.full(self.joints, START_RANGE)
         reachable = np.maximum(usual, 0.0 if known is None else known)
         within = farthest(self.arm)
@@ -316,8 +330,8 @@ class Scenario(Frozen):
 
     @property
     def starts_nominally(self) -> bool:
-        """Whether episodes begin at the first joint coordinates of a nominal joint path."""
-        return self.start is None and self.trajectory.joint_bound() is not None
+        """Whether the trajectory says where episodes begin: on its joint path, or at a published start."""
+        return self.start is None and self.trajectory.first_joints_bound() is not None
 
     @functools.cached_property
     def _start(self) -> FloatArray:
@@ -329,8 +343,3 @@ class Scenario(Frozen):
     def _held(self) -> tuple[int, ...]:
         held = self.iterations_per_point
         return tuple(held) if isinstance(held, (tuple, list)) else (held,)
-
-    def _episode(self, seed: int | None) -> Trajectory:
-        if self.random and seed is None:
-            raise InvalidInputError(f"Scenario {self.name!r} is random: a seed says which episode is meant.")
-        return self.trajectory.sample(seeding.np_random(seed)[0]) if self.random else self.trajectory

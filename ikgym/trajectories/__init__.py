@@ -12,6 +12,7 @@ from ikgym.trajectories.helix import Helix
 from ikgym.trajectories.joint_spline import JointSpline
 from ikgym.trajectories.orientations import AlongPath, FixedOrientation, OrientationThrough, Turning
 from ikgym.trajectories.path_trajectory import PathTrajectory
+from ikgym.trajectories.published_path import PublishedPath, RandomPublishedPath
 from ikgym.trajectories.random_joint_spline import RandomJointSpline
 from ikgym.trajectories.sinusoid import RandomSinusoid, Sinusoid
 from ikgym.trajectories.straight_line import StraightLine
@@ -28,8 +29,10 @@ __all__ = [
     "JointSpline",
     "OrientationThrough",
     "PathTrajectory",
+    "PublishedPath",
     "Quintic",
     "RandomJointSpline",
+    "RandomPublishedPath",
     "RandomSinusoid",
     "Sinusoid",
     "StraightLine",
@@ -55,4 +58,6 @@ KINDS: dict[str, type[Trajectory]] = {
     "straight_line": StraightLine,
     "path": PathTrajectory,
     "timed_waypoints": TimedWaypoints,
+    "published_path": PublishedPath,
+    "random_published_path": RandomPublishedPath,
 }

@@ -32,16 +32,16 @@ def frames_of(trajectories: Sequence[Trajectory], times: FloatArray, model: Arm)
 
 
 def first_joints_of(trajectories: Sequence[Trajectory]) -> FloatArray | None:
-    """The joint coordinates at the time 0 of several trajectories; None where one is a path in Cartesian space.
+    """Where episodes of several trajectories begin; None where one does not say so.
 
     Returns:
-        Joint coordinates in [rad] or [m], bit for bit those of :meth:`Trajectory.joint_path`. Shape (k, n).
+        Joint coordinates in [rad] or [m], bit for bit those of :meth:`Trajectory.first_joints`. Shape (k, n).
     """
     path = _paths(trajectories, np.zeros((len(trajectories), 1)))
     if path is not None:
         return path[:, 0]
-    rows = [trajectory.joint_path(np.zeros(1)) for trajectory in trajectories]
-    return None if any(row is None for row in rows) else np.concatenate(typing.cast(list[FloatArray], rows))
+    rows = [trajectory.first_joints() for trajectory in trajectories]
+    return None if any(row is None for row in rows) else np.stack(typing.cast(list[FloatArray], rows))
 
 
 def _paths(trajectories: Sequence[Trajectory], times: FloatArray) -> FloatArray | None:

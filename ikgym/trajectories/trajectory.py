@@ -22,6 +22,8 @@ class Trajectory(Frozen, abc.ABC):
     has_orientation: typing.ClassVar[bool] = True
     #: Fields that are parts with a kind of their own: their classes by the names of these kinds in scenario files.
     parts: typing.ClassVar[Mapping[str, Mapping[str, type]]] = {}
+    #: Fields that are texts.
+    texts: typing.ClassVar[tuple[str, ...]] = ()
 
     def sample(self, rng: np.random.Generator) -> Trajectory:
         """The trajectory of one episode.
@@ -73,6 +75,23 @@ class Trajectory(Frozen, abc.ABC):
         """
         return None
 
+    def first_joints(self) -> FloatArray | None:
+        """Where episodes begin, in [rad] or [m]: on the nominal joint path; None where only a scenario can say.
+
+        Returns:
+            Joint coordinates. Shape (n,).
+        """
+        path = self.joint_path(np.zeros(1))
+        return None if path is None else path[0]
+
+    def first_joints_bound(self) -> FloatArray | None:
+        """Bounds of the absolute values of :meth:`first_joints`, in [rad] or [m]; None where there are none.
+
+        Returns:
+            The bounds. Shape (n,).
+        """
+        return self.joint_bound()
+
     def reach(self, times: FloatArray, model: Arm) -> float:
         """A radius around the base that the nominal positions do not leave, in [m].
 
@@ -91,7 +110,7 @@ class Trajectory(Frozen, abc.ABC):
         Raises:
             InvalidInputError: It has another number of joints.
         """
-        bound = self.joint_bound()
+        bound = self.first_joints_bound()
         if bound is not None and len(bound) != model.joints:
             raise InvalidInputError(
                 f"Trajectory: expected {model.joints} joints, as arm {model.name!r} has, got {len(bound)}."

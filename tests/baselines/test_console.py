@@ -108,9 +108,12 @@ def test_options_that_cannot_be_read(arguments, message, capsys):
     assert error.count("\n") == 1
 
 
+SCENARIOS = (*ikgym.scenarios.names(), *ikgym.scenarios.problems_from_elsewhere())
+
+
 @pytest.mark.parametrize(
     ("word", "names"),
-    [("arms", ikgym.arms.names()), ("scenarios", ikgym.scenarios.names()), ("policies", baselines.names())],
+    [("arms", ikgym.arms.names()), ("scenarios", SCENARIOS), ("policies", baselines.names())],
 )
 def test_lists_are_complete_and_fit(word, names, capsys):
     assert main([word]) == 0
@@ -124,7 +127,7 @@ def test_lists_are_complete_and_fit(word, names, capsys):
 
 @pytest.mark.parametrize("word", ["arms", "scenarios", "policies"])
 def test_every_member_is_shown_in_full(word, capsys):
-    known = {"arms": ikgym.arms.names(), "scenarios": ikgym.scenarios.names(), "policies": baselines.names()}[word]
+    known = {"arms": ikgym.arms.names(), "scenarios": SCENARIOS, "policies": baselines.names()}[word]
     assert main([word, *known]) == 0
     text = capsys.readouterr().out
     assert all(re.search(rf"^{name}\b.*:", text, re.MULTILINE) for name in known)

@@ -27,8 +27,10 @@ from ikgym.trajectories import (
     FixedOrientation,
     Helix,
     PathTrajectory,
+    PublishedPath,
     Quintic,
     RandomJointSpline,
+    RandomPublishedPath,
     Sinusoid,
     Trajectory,
     Turning,
@@ -119,6 +121,8 @@ TRAJECTORIES = {
     ),
     "lemniscate": PathTrajectory(paths.Lemniscate(radius=0.3, **SOMEWHERE), Quintic(1, 1), FixedOrientation(np.eye(3))),
     "helix": PathTrajectory(paths.CircularHelix(radius=0.3, pitch=-0.1, **SOMEWHERE), Quintic(1, 1)),
+    "published": PublishedPath("rlitg-zig", 1 / 3),
+    "random published": RandomPublishedPath("rlitg-random-00", 1 / 3),
     "line": PathTrajectory(paths.Line([0, 0, 0], [1, 2, 3]), Quintic(1, 1)),
 }
 

@@ -127,6 +127,13 @@ def short(name: str) -> str:
     return f"{outer} {inner}" + (":" + ",".join(f"{key}={value}" for key, value in options.items()) if options else "")
 
 
+def compared(*besides: type) -> list[str]:
+    """Specs of the registered policies that pages compare, but for references, examples, rivals and these classes."""
+    classes = {name: registry.get(name) for name in registry.names() if name not in WITHIN_LIMITS}
+    special = {name for name, kind in classes.items() if kind.reference or kind.example or kind.rival}
+    return [RECORDED.get(n, n) for n, kind in classes.items() if n not in special and not issubclass(kind, besides)]
+
+
 def solvers(tuned: Mapping[str, Mapping[str, Any]] = MappingProxyType({})) -> tuple[Entry, ...]:
     """All registered solvers as they are, some receding horizons, and what tuning made of them.
 
@@ -136,13 +143,7 @@ def solvers(tuned: Mapping[str, Mapping[str, Any]] = MappingProxyType({})) -> tu
     Args:
         tuned: The best settings of solvers, by their specs; one that they do not change is not listed twice.
     """
-    classes = {name: registry.get(name) for name in registry.names()}
-    left_out = {
-        name
-        for name, kind in classes.items()
-        if kind.reference or kind.example or kind.rival or issubclass(kind, LearnedPolicy)
-    }
-    names = [RECORDED.get(name, name) for name in classes if name not in {*left_out, *WITHIN_LIMITS}]
+    names = compared(LearnedPolicy)
     better = (solver(spec, settings) for spec, settings in tuned.items() if settings)
     return (*map(solver, (*names, *HORIZONS)), *better)
 

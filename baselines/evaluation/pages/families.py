@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 
 from baselines import registry
 from baselines.agents.policy import LearnedPolicy
-from baselines.evaluation.pages.entries import RECORDED, WITHIN_LIMITS, Entry, solver
+from baselines.evaluation.pages.entries import Entry, compared, solver
 from baselines.solvers.receding_horizon.rhc import RecedingHorizon
 from baselines.solvers.wrappers.full_orientation import FullOrientation
 from baselines.spec import parse_policy
@@ -35,14 +35,7 @@ def entries(horizons: Iterable[int] = HORIZONS) -> tuple[Entry, ...]:
     Args:
         horizons: Those of the families.
     """
-    classes = {name: registry.get(name) for name in registry.names()}
-    elsewhere = (RecedingHorizon, LearnedPolicy, FullOrientation)
-    left_out = {
-        name
-        for name, kind in classes.items()
-        if kind.reference or kind.example or kind.rival or issubclass(kind, elsewhere)
-    }
-    specs = [RECORDED.get(name, name) for name in classes if name not in {*left_out, *WITHIN_LIMITS}]
+    specs = compared(RecedingHorizon, LearnedPolicy, FullOrientation)
     specs += [spec for family in FAMILIES for horizon in horizons if (spec := _spec(family, horizon))]
     looks = [f"{name}:stop_at_end={flag}" for name in presets() for flag in (True, False)]
     return (*(solver(spec, timed=1) for spec in specs), *(solver(spec, timed=TIMED) for spec in looks))

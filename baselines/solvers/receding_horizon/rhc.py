@@ -13,7 +13,7 @@ from baselines.policy.compiled import CompiledPolicy
 from baselines.solvers.arm_task import plain_arm_task
 from baselines.solvers.receding_horizon.newton.grid import offsets
 from baselines.solvers.receding_horizon.newton.receding import HorizonMemory, plan_rows
-from baselines.solvers.receding_horizon.newton.settings import PlanSettings, plain_settings
+from baselines.solvers.receding_horizon.newton.settings import PlanSettings, change_limit, plain_settings
 from ikgym.exceptions import InvalidInputError
 from ikgym.preview import FARTHEST
 from ikgym.validation import FloatArray, number, whole_number
@@ -37,7 +37,13 @@ class RecedingHorizon(CompiledPolicy):
     before, which at 1 kHz is close (the real-time iteration). A long horizon has many local minima, some
     of them very costly: several ``starts`` and restart candidates are for that.
 
-    The joint limits of the arm and the velocity limit of the scenario are constraints of the plan.
+    The limits of the arm and the velocity limit of the scenario are constraints of the plan. Between blocks of a and b
+    steps the velocity changes by at most q̈_max Δt (a + b) / 2, and from the velocity last applied by q̈_max Δt. Where
+    the horizon ends before the episode does, the last knot leaves the way that a stop takes, so that no plan runs into
+    a joint limit that it does not see yet; with ``stop_at_end`` nothing comes behind the episode's end. Arms with
+    limits of acceleration are planned for by an interior point method, see :mod:`newton.interior_point`: to
+    convergence to the optimum, with a number of iterations with a barrier parameter that stays, and without limits
+    nothing changes.
 
     Args:
         problem: What the policy is told of the scenario.
@@ -97,8 +103,6 @@ class RecedingHorizon(CompiledPolicy):
     def __post_init__(self) -> None:
         if whole_number("horizon", self.horizon, at_least=2) > FARTHEST:
             raise InvalidInputError(f"horizon: expected at most {FARTHEST}, got {self.horizon}.")
-        if self.iterations is not None:
-            whole_number("iterations", self.iterations, at_least=1)
         if self.move_blocks is not None and whole_number("move_blocks", self.move_blocks, at_least=1) >= self.horizon:
             raise InvalidInputError(
                 f"move_blocks: expected at most horizon - 1 = {self.horizon - 1}, a knot at each step, got "
@@ -107,14 +111,14 @@ class RecedingHorizon(CompiledPolicy):
         if not isinstance(self.stop_at_end, (bool, np.bool_)):
             raise InvalidInputError(f"stop_at_end: expected True or False, got {self.stop_at_end!r}.")
         terminal_weight = number("terminal_weight", self.terminal_weight, at_least=0.0)
-        for name, least in LEAST.items():
+        for name, least in {**LEAST, **({} if self.iterations is None else {"iterations": 1})}.items():
             if whole_number(name, getattr(self, name), at_least=least) > MOST:
                 raise InvalidInputError(f"{name}: expected at most {MOST}, got {getattr(self, name)}.")
         if self.start_steps and not self.restart_steps:
             raise InvalidInputError(f"start_steps: expected 0 where restart_steps is 0, got {self.start_steps}.")
         rate_weight = number("rate_weight", self.rate_weight, at_least=0.0)
         tolerance = number("tolerance", self.tolerance, above=0.0)
-        knots = offsets(self.horizon - 1, self.move_blocks)
+        knots = self._knots()
         knots.flags.writeable = False
         object.__setattr__(self, "offsets", knots)
         problem, model = self.problem, self.problem.model
@@ -131,6 +135,7 @@ class RecedingHorizon(CompiledPolicy):
             self.start_steps,
             self.recovery_steps,
             rate_weight,
+            change_limit(model.acceleration_limit, problem.dt),
         )
         blocks = plain_arm_task(problem), model.chain.prismatic, *plain_settings(problem.cost.parameters, settings)
         object.__setattr__(self, "_constants", blocks)
@@ -145,6 +150,10 @@ class RecedingHorizon(CompiledPolicy):
         width = self.problem.task.error_size + 3 * self.problem.model.joints
         plans = np.zeros((rows, 2 if self.restart_steps else 1, len(self.offsets) * width))
         return HorizonMemory(plans, np.zeros((rows, 4), dtype=np.int64))
+
+    def _knots(self) -> npt.NDArray[np.int64]:
+        """Steps from now to the knots. Shape (K,)."""
+        return offsets(self.horizon - 1, self.move_blocks)
 
     def kernel(self) -> Any:
         """See :meth:`CompiledPolicy.kernel`."""

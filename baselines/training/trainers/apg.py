@@ -85,8 +85,8 @@ class _Arms:
         else:
             usual = scenario.cost.velocity(np.diff(path, axis=0) / scenario.dt)
             self.usual[row] = float(np.mean(usual)) + 1e-3
-        if k == 0 and not scenario.starts_nominally:
-            return scenario.first_q(scenario.trajectory)
+        if k == 0 and (path is None or not scenario.starts_nominally):
+            return scenario.first_q(scenario.episode(seed))
         if path is None:
             raise InvalidInputError(f"Scenario {scenario.name!r}: without a joint path, episodes begin at its start.")
         at: FloatArray = path[k]

@@ -17,9 +17,12 @@ from baselines.oracle.episode import EpisodeProblem
 from baselines.oracle.optimum import LOCAL_SEARCH, RANDOM
 from baselines.policy import Problem
 from baselines.solvers.receding_horizon.newton.minimise import NewtonSettings
+from benchmarks.rivals.casadi_horizon import CasadiHorizon
+from benchmarks.rivals.numpy_horizon import Horizon
 from ikgym import parallel
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 from ikgym.scenarios import Disturbance
+from ikgym.trajectories import RandomJointSpline
 from tests.comparison import identical
 
 QUICK = Search(starts=12, chains=2, generations=1, rounds=4, polished=2, knots=20)
@@ -284,11 +287,35 @@ def test_limits_are_kept_and_cost_what_they_must():
             assert optimum.cost <= rolled(scenario, 0, name)[1] * (1.0 + 1e-9), (names, name)
 
 
-def test_limits_of_acceleration_are_refused():
-    arm = short().arm
-    scenario = short(arm=arm.replace(acceleration_limit=np.full(7, 10.0)))
-    with pytest.raises(InvalidInputError, match=r"expected an arm without limits of acceleration, got \[10.0, "):
-        solve(scenario, 0, QUICK)
+def panda_spline(steps=100, **changes):
+    """A lively motion of a Panda from rest to rest."""
+    arm = ikgym.arms.get("panda")
+    motion = RandomJointSpline.within(arm, steps * 2e-3, margin=0.0, scale=(0.8, 1.0)).sample(np.random.default_rng(3))
+    fields = {"arm": arm, "task": ikgym.tasks.get("pose"), "trajectory": motion, "dt": 2e-3, "steps": steps}
+    return ikgym.Scenario("spline", **(fields | changes))
+
+
+def test_limits_of_acceleration_are_kept():
+    """No cheaper path is known to IPOPT, and the plant holds nothing back."""
+    scenario = panda_spline()
+    optimum = solve(scenario, 0, QUICK)
+    policy = baselines.make("oracle", scenario, starts=0, generations=0)
+    assert not rollout(scenario, policy, 0).at_limit.any()
+    changes = np.diff(optimum.qdot, axis=0, prepend=0.0) / scenario.dt
+    assert (abs(changes) <= (1.0 + 1e-6) * scenario.arm.acceleration_limit).all()
+    assert (abs(changes) >= (1.0 - 1e-4) * scenario.arm.acceleration_limit).any()  # a limit in the way
+    for name in ("dls", "rhc", "follow_nominal"):
+        assert optimum.cost <= rolled(scenario, 0, name)[1] * (1.0 + 1e-9), name
+    problem, nominal = Problem.of(scenario), scenario.nominal(0)[1:]
+    horizon = Horizon(scenario.first_q(scenario.trajectory), nominal[: scenario.steps])
+    best = CasadiHorizon(problem, scenario.steps, limited=True).solve(horizon, optimum.q)
+    assert best.converged
+    assert optimum.cost <= best.cost * (1.0 + 1e-6)
+
+
+def test_limits_of_acceleration_and_held_points_are_refused():
+    with pytest.raises(InvalidInputError, match="expected iterations_per_point=1 with the limits of acceleration"):
+        solve(panda_spline(iterations_per_point=3), 0, QUICK)
 
 
 class TestCache:

@@ -57,6 +57,26 @@ def offsets(steps: int, move_blocks: int | None) -> Integers:
     return cut_off
 
 
+def evenly_growing_offsets(steps: int, growth: float, longest: float) -> Integers:
+    """Steps from now to the knots of a horizon: each block is longer than the one before by the same number of steps.
+
+    A horizon of some seconds needs fewer knots than with geometric growth, whose last blocks skip whole oscillations
+    while most of its knots lie in the first tenth.
+
+    Args:
+        steps: Steps of the horizon.
+        growth: By how many steps a block is longer than the one before, behind two blocks of one step.
+        longest: Steps of a block at most.
+
+    Returns:
+        Whole numbers, rising by at least 1, the last one ``steps``. Shape (K,).
+    """
+    lengths = np.minimum(1.0 + growth * np.arange(steps), longest)
+    out = 1 + np.rint(np.cumsum(np.append(0.0, lengths))).astype(np.int64)
+    before_the_end: Integers = np.append(out[out < steps], steps)
+    return before_the_end
+
+
 @uncounted
 def cut(at, steps, terminal, grid):
     """The grid of the knots ``at``, cut so that none lies more than ``steps`` ahead.

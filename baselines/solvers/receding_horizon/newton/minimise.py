@@ -102,7 +102,7 @@ def minimise(problem, path, multipliers, settings, workspace):
     made, outcome, updated, damping = 0, RAN_OUT, True, 0.0
     while True:
         damping = damped_newton_step(problem, exact, damping, unit, workspace, step)
-        derivative = _dot(gradient, step)
+        derivative = scalar_product(gradient, step)
         if not (np.isfinite(derivative) and damping <= MOST_DAMPING):
             outcome = STALLED
             break
@@ -129,7 +129,7 @@ def minimise(problem, path, multipliers, settings, workspace):
                 # Rounding hides what is left to gain.
                 outcome = CONVERGED if gap <= 10.0 * tolerance * true else STALLED
                 break
-            damping = _more(damping)
+            damping = more_damping(damping)
             continue
         for k in range(knots):
             for a in range(path.shape[1]):
@@ -137,9 +137,9 @@ def minimise(problem, path, multipliers, settings, workspace):
         true, updated = search.reached, False
         if made == settings.steps:
             break
-        damping = _next_damping(damping, search.length)
+        damping = next_damping(damping, search.length)
         value, true, gap = linearise(problem, path, multipliers, False, exact, workspace)
-    return Minimum(outcome, made, true, np.sqrt(_dot(gradient, gradient)))
+    return Minimum(outcome, made, true, np.sqrt(scalar_product(gradient, gradient)))
 
 
 @inlined
@@ -162,7 +162,7 @@ def damped_newton_step(problem, exact, damping, unit, workspace, step):
     model, inverse, factor = workspace.model, workspace.inverse, workspace.factor
     second = exact
     while True:
-        if problem.rate_weight > 0.0:
+        if problem.rate_weight > 0.0 or problem.change_limit.shape[0] > 0:
             done = pentadiagonal_step(model, second, damping * unit, inverse, factor, step)
         else:
             done = newton_step(model, second, damping * unit, inverse, factor, step)
@@ -171,7 +171,7 @@ def damped_newton_step(problem, exact, damping, unit, workspace, step):
         if second:
             second = False
         else:
-            damping = _more(damping)
+            damping = more_damping(damping)
             if damping > MOST_DAMPING:
                 break
     return damping
@@ -214,20 +214,21 @@ def _penalty_factor(factor, gap, left_open):
 
 
 @inlined
-def _next_damping(damping, length):
+def next_damping(damping, length):
     """The damping after an accepted step: less after a full one, more after one shortened more than once."""
     if length == 1.0:
         return damping * LESS if damping > LEAST_DAMPING else 0.0
-    return _more(damping) if length < SHORTENING else damping
+    return more_damping(damping) if length < SHORTENING else damping
 
 
 @inlined
-def _more(damping):
+def more_damping(damping):
+    """The damping after a step that was of no use."""
     return max(MORE * damping, LEAST_DAMPING)
 
 
 @inlined
-def _dot(a, b):
+def scalar_product(a, b):
     """The scalar product of two matrices. Shapes (K, n)."""
     total = 0.0
     for k in range(a.shape[0]):

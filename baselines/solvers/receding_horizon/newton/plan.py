@@ -7,10 +7,11 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from baselines.solvers.receding_horizon.newton.cost import true_cost
 from baselines.solvers.receding_horizon.newton.grid import Grid, empty_grid, shift_multipliers, shift_path
 from baselines.solvers.receding_horizon.newton.guess import DAMPING, STREAM, draw, initial_guess, slow_down, uniform
-from baselines.solvers.receding_horizon.newton.minimise import NewtonSettings, minimise
+from baselines.solvers.receding_horizon.newton.interior_point.excess import cost_within
+from baselines.solvers.receding_horizon.newton.interior_point.minimise import minimise_path
+from baselines.solvers.receding_horizon.newton.minimise import NewtonSettings
 from baselines.solvers.receding_horizon.newton.workspace import NewtonWorkspace, newton_workspace
 from ikgym.jit import inlined, kernel, uncounted
 
@@ -22,6 +23,10 @@ STEPS_OF_A_START, TOLERANCE_OF_A_START = 30, 1e-4
 HOPELESS, TRIED = 10.0, 5
 # Likewise after `start_steps` of them, where initial guesses are tried one after the other as candidates.
 UNPROMISING = 2.0
+# μ of a plan under limits of acceleration that has few Newton steps a period, in units of the cost for each knot.
+SMOOTHING = 1e-2
+# By which share such a plan may leave a limit and replace another one.
+LOOSE = 1e-3
 # A restart candidate replaces the plan only for a gain that is worth the jump.
 GAIN = 1e-3
 
@@ -59,10 +64,10 @@ class PlanWorkspace(NamedTuple):
 
 
 @kernel
-def plan_workspace(kind, m, knots, n, width):
-    """The workspace for plans of up to ``knots`` knots, ``n`` joints and ``width`` multipliers a knot."""
+def plan_workspace(kind, m, knots, n, width, limited):
+    """The workspace for plans of ``knots`` knots and ``width`` multipliers a knot; see :func:`newton_workspace`."""
     kept = plan_in(np.empty(knots * (n + width)), knots, n)
-    newton, vectors = newton_workspace(kind, m, knots, n), np.empty((2, n))
+    newton, vectors = newton_workspace(kind, m, knots, n, limited), np.empty((2, n))
     return PlanWorkspace(newton, kept, vectors[0], vectors[1], empty_grid(knots), empty_grid(knots))
 
 
@@ -119,14 +124,14 @@ def initial_plan(problem, settings, plan, workspace):
         workspace.drift[:] = 0.0
         if trial > 0:
             damping = draw(settings.seed, trial, workspace.drift)
-        _guess(problem, settings, 0, damping, plan.path, workspace)
+        _guess(problem, settings, 0, knots, damping, plan.path, workspace)
         plan.multipliers[:] = 0.0
         if trials == 1:
             return 0
         coarse = NewtonSettings(False, STEPS_OF_A_START, TOLERANCE_OF_A_START)
-        minimum = minimise(problem, plan.path, plan.multipliers, coarse, newton)
+        minimum = minimise_path(problem, plan.path, plan.multipliers, coarse, 0.0, newton)
         made += minimum.steps
-        value = max(minimum.cost, true_cost(problem, plan.path, newton))
+        value = max(minimum.cost, cost_within(problem, plan.path, LOOSE, newton))
         if value < best:
             best = value
             _copy(plan, kept)
@@ -136,9 +141,9 @@ def initial_plan(problem, settings, plan, workspace):
 
 
 @inlined
-def _guess(problem, settings, first, damping, path, workspace):
+def _guess(problem, settings, first, until, damping, path, workspace):
     """An initial guess from knot ``first`` on, with the drift in the workspace; slowed down where plans may recover."""
-    initial_guess(problem, first, workspace.drift, damping, path, workspace.newton.knot)
+    initial_guess(problem, first, until, workspace.drift, damping, path, workspace.newton.knot)
     if settings.recovery_steps > 0:
         slow_down(problem, path)
 
@@ -161,11 +166,11 @@ def try_start(problem, settings, steps, plan, cost, number, workspace):
     """
     guess, newton = first_part(workspace.kept, plan.path.shape[0]), workspace.newton
     damping = draw(settings.seed, number, workspace.drift)
-    _guess(problem, settings, 0, damping, guess.path, workspace)
+    _guess(problem, settings, 0, guess.path.shape[0], damping, guess.path, workspace)
     guess.multipliers[:] = 0.0
     few = NewtonSettings(False, steps, TOLERANCE_OF_A_START)
-    minimum = minimise(problem, guess.path, guess.multipliers, few, newton)
-    if max(minimum.cost, true_cost(problem, guess.path, newton)) < (1.0 - GAIN) * cost:
+    minimum = minimise_path(problem, guess.path, guess.multipliers, few, 0.0, newton)
+    if max(minimum.cost, cost_within(problem, guess.path, LOOSE, newton)) < (1.0 - GAIN) * cost:
         _copy(guess, plan)
     return minimum.steps
 
@@ -173,6 +178,9 @@ def try_start(problem, settings, steps, plan, cost, number, workspace):
 @kernel
 def branch_off(problem, settings, plan, anew, number, candidate, workspace):
     """Begins a restart candidate: the plan up to a random knot, and from there on a random guess.
+
+    Where initial guesses have periods of their own, the drift of the guess ends at another random knot: who has gone
+    elsewhere in the null space may stay there.
 
     Args:
         problem: A :class:`workspace.PathProblem` of K knots.
@@ -189,7 +197,9 @@ def branch_off(problem, settings, plan, anew, number, candidate, workspace):
     candidate.multipliers[:branch] = plan.multipliers[:branch]
     candidate.multipliers[branch:] = 0.0
     damping = draw(settings.seed, number, workspace.drift)
-    _guess(problem, settings, branch, damping, candidate.path[:knots], workspace)
+    share = uniform(settings.seed, STREAM * number + STREAM - 1) if settings.start_steps > 0 else 1.0
+    until = branch + 1 + int(share * (knots - branch))
+    _guess(problem, settings, branch, until, damping, candidate.path[:knots], workspace)
 
 
 @kernel
@@ -211,11 +221,11 @@ def improve_candidate(problem, settings, rate, plan, cost, candidate, age, works
     """
     newton, early = workspace.newton, settings.start_steps > 0
     few = NewtonSettings(False, rate, settings.tolerance)
-    minimum = minimise(problem, candidate.path, candidate.multipliers, few, newton)
+    minimum = minimise_path(problem, candidate.path, candidate.multipliers, few, SMOOTHING, newton)
     age[0] += rate
     last, tried = age[0] >= settings.restart_steps, settings.start_steps if early else TRIED
     if (early or last) and minimum.cost < (1.0 - GAIN) * cost:
-        true = true_cost(problem, candidate.path, newton)
+        true = cost_within(problem, candidate.path, LOOSE, newton)
         if true < (1.0 - GAIN) * cost:
             age[0] = 0
             _copy(candidate, plan)

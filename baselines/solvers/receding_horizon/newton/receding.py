@@ -11,8 +11,10 @@ import numpy.typing as npt
 from baselines.policy_kernels import REFUSED, all_finite, answer_parts, as_rows, cut_rows
 from baselines.solvers.arm_task import arm_task_of, joint_limits_of, period_of
 from baselines.solvers.receding_horizon.newton.grid import cut, first_knots
-from baselines.solvers.receding_horizon.newton.minimise import CONVERGED, NewtonSettings, minimise
+from baselines.solvers.receding_horizon.newton.interior_point.minimise import minimise_path
+from baselines.solvers.receding_horizon.newton.minimise import CONVERGED, NewtonSettings
 from baselines.solvers.receding_horizon.newton.plan import (
+    SMOOTHING,
     branch_off,
     first_part,
     improve_candidate,
@@ -121,7 +123,9 @@ def plan_rows(
     cost, settings = settings_of(numbers, integers)
     data = ProblemData(chain, kind, cost, dt, lower, upper, velocity_limit)
     knots = settings.at.shape[0]
-    workspace = plan_workspace(kind, nominal.shape[2], knots, n, plans.shape[2] // knots - n)
+    workspace = plan_workspace(
+        kind, nominal.shape[2], knots, n, plans.shape[2] // knots - n, settings.change_limit.shape[0] > 0
+    )
     memory, answers = HorizonMemory(plans, counts), Answers(qdot, status, iterations)
     plan_batch(data, settings, observations, memory, answers, workspace)
     return cut_rows(qdot, action_scale, action.reshape(qdot.shape), status)
@@ -143,12 +147,16 @@ def plan_batch(data, settings, observations, memory, answers, workspace):
     for row in range(observations.q.shape[0]):
         q, qdot_before, count = observations.q[row], observations.qdot[row], counts[row]
         grid, old_grid = _grids(settings, observations.remaining[row], workspace)
-        problem = PathProblem(data, grid, q, observations.nominal[row], qdot_before, settings.rate_weight)
+        # Where the horizon ends with the episode nothing comes behind it.
+        braking = not settings.stop_at_end or observations.remaining[row] > settings.at[-1]
+        problem = PathProblem(
+            data, grid, q, observations.nominal[row], qdot_before, settings.rate_weight, settings.change_limit, braking
+        )
         for j in range(q.shape[0]):
             workspace.passed[j] = qdot_before[j] * data.dt
         minimum, made = _plan_row(problem, settings, old_grid, plans[row], count, workspace)
         count[PERIODS] += 1
-        kept = _first_velocity(data, q, plans[row, 0], grid.length[0], answers.qdot[row])
+        kept = _first_velocity(problem, plans[row, 0], answers.qdot[row])
         count[FAR] = 0 if kept or settings.recovery_steps == 0 else count[FAR] + 1
         answers.status[row] = (_CONVERGED if minimum.outcome == CONVERGED else _LIMIT) if kept else _SATURATED
         answers.iterations[row] = made
@@ -199,7 +207,9 @@ def _plan_row(problem, settings, old_grid, plans, counts, workspace):
         else:
             shift_plan(old_grid, whole_candidate, problem.grid, workspace)
         candidate = first_part(whole_candidate, knots)
-        rate = settings.start_steps if starting else settings.restart_rate
+        # Newton steps under limits of acceleration take three times as long: no period has time for several of a guess.
+        hasty = starting and problem.change_limit.shape[0] == 0
+        rate = settings.start_steps if hasty else settings.restart_rate
         counts[TRIED] += starting
         made += improve_candidate(problem, settings, rate, plan, minimum.cost, candidate, age, workspace)
     return minimum, made
@@ -231,25 +241,25 @@ def _plan(problem, settings, most, period, old_grid, plan, workspace):
     if exact:
         steps = STEPS_TO_THE_OPTIMUM
     newton = NewtonSettings(exact, steps, settings.tolerance)
-    minimum = minimise(problem, part.path, part.multipliers, newton, workspace.newton)
+    smoothing = 0.0 if exact or period == 0 else SMOOTHING
+    minimum = minimise_path(problem, part.path, part.multipliers, newton, smoothing, workspace.newton)
     return minimum, made + minimum.steps
 
 
 @inlined
-def _first_velocity(data, q, target, length, qdot):
+def _first_velocity(problem, target, qdot):
     """The joint velocities of a plan's first block, within all limits.
 
     Args:
-        data: The :class:`ProblemData`.
-        q: Joint coordinates now, in [rad] or [m]. Shape (n,).
-        target: Joint coordinates at the first knot, in [rad] or [m]. Shape (n,).
-        length: Steps of the block.
+        problem: The :class:`PathProblem`.
+        target: Joint coordinates at the first knot, in [rad] or [m]. Shape (at least n,).
         qdot: Receives the joint velocities, in [rad/s] or [m/s]. Shape (n,).
 
     Returns:
-        Whether the plan keeps the velocity limit.
+        Whether the plan keeps the limits of velocity and acceleration.
     """
-    kept = True
+    data, q, before, changes, kept = problem.data, problem.start, problem.qdot_before, problem.change_limit, True
+    length, limited = problem.grid.length[0], changes.shape[0] > 0
     for j in range(q.shape[0]):
         # A limit that holds the plan is kept to the tolerance only; what is no number stays none.
         here, limit = target[j], data.velocity_limit[j]
@@ -261,5 +271,8 @@ def _first_velocity(data, q, target, length, qdot):
         if abs(velocity) > limit:
             kept = kept and abs(velocity) <= (1.0 + KEPT) * limit
             velocity = math.copysign(limit, velocity)
+        if limited and abs(velocity - before[j]) > changes[j]:
+            kept = kept and abs(velocity - before[j]) <= (1.0 + KEPT) * changes[j]
+            velocity = before[j] + math.copysign(changes[j], velocity - before[j])
         qdot[j] = velocity
     return kept

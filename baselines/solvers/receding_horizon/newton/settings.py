@@ -30,6 +30,7 @@ class PlanSettings(NamedTuple):
         start_steps: Newton steps of an initial guess that has a period of its own; 0 where all share the first.
         recovery_steps: Newton steps behind a period that ended beyond the velocity limits; 0 for as many as in others.
         rate_weight: What changes of velocity cost, see :mod:`rate`.
+        change_limit: Largest changes of velocity in one step, see :class:`workspace.PathProblem`. Shape (n or 0,).
     """
 
     at: Integers
@@ -44,6 +45,12 @@ class PlanSettings(NamedTuple):
     start_steps: int
     recovery_steps: int
     rate_weight: float
+    change_limit: Floats
+
+
+def change_limit(acceleration_limit: Floats, dt: float) -> Floats:
+    """The largest changes of velocity in one step of Δt, in [rad/s] or [m/s]. Shape (n,), or (0,) without a limit."""
+    return dt * acceleration_limit if np.isfinite(acceleration_limit).any() else np.zeros(0)
 
 
 def plain_settings(cost: CostParameters, settings: PlanSettings) -> tuple[Floats, Integers]:
@@ -52,7 +59,7 @@ def plain_settings(cost: CostParameters, settings: PlanSettings) -> tuple[Floats
     A `predict` takes arguments apart at 0.1 µs each, which for all of them one by one is longer than a Newton step.
     """
     s = settings
-    numbers = np.array([*cost, s.terminal_weight, s.tolerance, s.rate_weight])
+    numbers = np.array([*cost, s.terminal_weight, s.tolerance, s.rate_weight, *s.change_limit])
     steps = s.iterations, s.starts, s.restart_steps, s.restart_rate, s.seed, s.start_steps, s.recovery_steps
     integers = np.array([s.stop_at_end, *steps, *s.at], dtype=np.int64)
     for block in (numbers, integers):
@@ -78,4 +85,5 @@ def settings_of(numbers, integers):
         integers[6],
         integers[7],
         rate_weight,
+        numbers[8:],
     )

@@ -14,6 +14,10 @@ from ikgym.jit import kernel
 
 Floats = npt.NDArray[np.float64]
 
+# What is kept of a barrier: λ; and φ', what was taken for φ'', and u at the path before.
+MULTIPLIER, GRADIENT, CURVATURE, BEYOND = range(4)
+BARRIER_SIZE = 4
+
 # Of problems in which changes of velocity cost nothing.
 NO_VELOCITY: Floats = np.zeros(0)
 
@@ -29,6 +33,10 @@ class PathProblem(NamedTuple):
         qdot_before: Joint velocities of the step that has passed, in [rad/s] or [m/s]; read where changes of velocity
             cost something. Shape (n,).
         rate_weight: What changes of velocity cost, see :mod:`rate`, in [cost] / [(rad/s)²] or [cost] / [(m/s)²].
+        change_limit: Largest changes of the joint velocities in one step, in [rad/s] or [m/s]. Shape (n,), or (0,)
+            where accelerations have no limit.
+        braking: Whether the arm has to be able to stop within its joint limits behind the last knot; read where
+            accelerations have a limit.
     """
 
     data: ProblemData
@@ -37,6 +45,8 @@ class PathProblem(NamedTuple):
     nominal: Floats
     qdot_before: Floats = NO_VELOCITY
     rate_weight: float = 0.0
+    change_limit: Floats = NO_VELOCITY
+    braking: bool = False
 
 
 class KnotWorkspace(NamedTuple):
@@ -106,6 +116,10 @@ class NewtonWorkspace(NamedTuple):
         factor: A pivot and its factor. Shape (n, n).
         step: The Newton step. Shape (K, n).
         trial: The path at a trial step length. Shape (K, n).
+        before: Velocities of the block before, in [rad/s] or [m/s]. Shape (n,).
+        barriers: Where accelerations are limited, the barriers (see :mod:`interior_point`) of the knots' errors, then
+            of their velocities, changes of velocity and positions, at the upper and at the lower bound.
+            Shape (K or 0, e + 3 n, 2, 4).
     """
 
     knot: KnotWorkspace
@@ -115,6 +129,8 @@ class NewtonWorkspace(NamedTuple):
     factor: Floats
     step: Floats
     trial: Floats
+    before: Floats
+    barriers: Floats
 
 
 # Arrays of the same shape are parts of one: an allocation takes 40 ns, and all of them once took 0.9 µs of a `predict`.
@@ -142,15 +158,26 @@ def knot_workspace(kind, m, n):
 
 
 @kernel
-def newton_workspace(kind, m, knots, n):
-    """The workspace for paths of up to ``knots`` knots, task coordinates of ``m`` numbers and ``n`` joints."""
+def newton_workspace(kind, m, knots, n, limited=False):
+    """The workspace for paths of up to ``knots`` knots, task coordinates of ``m`` numbers and ``n`` joints.
+
+    Args:
+        kind: The kind of task coordinates.
+        m: Their number.
+        knots: K.
+        n: Joints.
+        limited: Whether accelerations are limited.
+    """
+    e = task_kernels.error_size(kind, m)
     vectors, blocks, squares = np.empty((5, knots, n)), np.empty((4, knots, n, n)), np.empty((2, n, n))
     return NewtonWorkspace(
         knot_workspace(kind, m, n),
-        np.empty((knots, task_kernels.error_size(kind, m))),
+        np.empty((knots, e)),
         QuadraticModel(vectors[0], blocks[0], blocks[1], vectors[1], vectors[2], blocks[2], squares[0]),
         blocks[3],
         squares[1],
         vectors[3],
         vectors[4],
+        np.empty(n),
+        np.zeros((knots if limited else 0, e + 3 * n, 2, BARRIER_SIZE)),
     )

@@ -45,7 +45,7 @@ def random_signs(episodes):
 def test_recovers_from_far_off():
     signs = random_signs(16)[[1, 4]]
     assert recovered(signs, 130).all()
-    assert not recovered(signs, 130, recovery_steps=0).any()  # which is what the parameter is for
+    assert not recovered(signs, 130, recovery_steps=0).all()  # which is what the parameter is for
 
 
 @pytest.mark.slow
@@ -91,6 +91,24 @@ def test_initial_guesses_one_after_the_other_find_another_plan():
     assert any(not np.array_equal(a.q, b.q) for a, b in zip(many, one, strict=True))
 
 
+def long_costs(seeds, **parameters):
+    scenario = ikgym.scenarios.get("varga7-pose-random-long")
+    episodes = rollouts(scenario, baselines.make("rhc_foresight", scenario, **parameters), seeds)
+    return np.array([float((e.tracking_cost + e.velocity_cost).sum()) for e in episodes])
+
+
+def test_1500_steps_of_foresight_are_too_few_in_a_long_episode():
+    """How the arm moves in its null space from the first step on decides what the last 300 of 3,000 steps cost."""
+    assert 2.0 * long_costs([1_000_038]) < long_costs([1_000_038], horizon=1501, move_blocks=57)
+
+
+@pytest.mark.slow
+def test_evenly_growing_blocks_cost_less_than_geometric_ones_in_long_episodes():
+    """64 knots in 3,000 steps, the last two of them 258 steps apart, against 65."""
+    seeds = ikgym.scenarios.seeds("validation", 64)
+    assert np.log(long_costs(seeds) / long_costs(seeds, move_blocks=64)).mean() < -0.005
+
+
 @pytest.mark.parametrize(("seed", "same"), [(0, True), (1, False)])
 def test_the_seed_chooses_the_initial_guesses(seed, same):
     candidates = []
@@ -105,18 +123,23 @@ def test_the_seed_chooses_the_initial_guesses(seed, same):
 
 
 @pytest.mark.parametrize(
-    ("horizon", "blocks"), [(2, 1), (31, 16), (101, 27), (301, 39), (601, 47), (1001, 52), (1501, 57), (3001, 64)]
+    ("horizon", "knots"), [(2, 1), (31, 8), (101, 13), (301, 21), (1001, 38), (1501, 46), (3001, 65)]
 )
-def test_knots_of_each_horizon(horizon, blocks):
-    """As dense near the present, whatever the horizon; or as many as asked for."""
+def test_knots_of_each_horizon(horizon, knots):
+    """The same up to the horizon, whatever it is, and none farther apart than a third of an oscillation of 3 Hz."""
     policy = baselines.make("rhc_foresight", SCENARIO, horizon=horizon)
     full = baselines.make("rhc_foresight", SCENARIO).offsets
-    assert policy.move_blocks == blocks
+    assert len(policy.offsets) == knots
     assert policy.offsets[-1] == horizon - 1
-    near = policy.offsets[: blocks // 2]
-    assert (abs(near - full[: len(near)]) <= 1 + 0.1 * near).all()
-    asked = baselines.make("rhc_foresight", SCENARIO, horizon=horizon, move_blocks=1)
-    assert len(asked.offsets) == 1
+    assert np.array_equal(policy.offsets[:-1], full[: knots - 1])
+    assert np.diff(policy.offsets).max(initial=1) <= 101
+
+
+def test_knots_that_are_asked_for_are_those_of_rhc():
+    asked, rhc = (
+        baselines.make(name, SCENARIO, horizon=1501, move_blocks=57).offsets for name in ("rhc_foresight", "rhc")
+    )
+    assert np.array_equal(asked, rhc)
 
 
 def test_initial_guesses_after_the_first_are_restart_candidates():

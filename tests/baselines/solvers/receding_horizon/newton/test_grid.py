@@ -7,7 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from baselines.solvers.receding_horizon.newton.grid import offsets, shift_multipliers, shift_path
+from baselines.solvers.receding_horizon.newton.grid import (
+    evenly_growing_offsets,
+    offsets,
+    shift_multipliers,
+    shift_path,
+)
 from tests.baselines.solvers.receding_horizon.newton.problems import grid_of
 
 horizons = st.integers(1, 3000).flatmap(lambda steps: st.tuples(st.just(steps), st.integers(1, steps)))
@@ -39,6 +44,25 @@ def test_offsets_grow_geometrically():
     lengths = np.diff(offsets(1500, 48)).astype(float)
     ratio = lengths[21:] / lengths[20:-1]
     assert np.ptp(ratio) < 0.15
+
+
+@given(st.integers(1, 3000), st.floats(0.1, 5.0), st.floats(1.0, 400.0))
+def test_evenly_growing_offsets(steps, growth, longest):
+    at = evenly_growing_offsets(steps, growth, longest)
+    assert at.dtype == np.int64
+    assert at[-1] == steps
+    lengths = np.diff(at, prepend=0)
+    assert lengths[0] == 1
+    assert (lengths >= 1).all()
+    assert lengths.max() <= longest + 1.0  # by rounding
+    growing = np.minimum(1.0 + growth * np.arange(len(at)), longest)
+    assert np.allclose(lengths[1:-1], growing[: len(at) - 2], atol=1.0)
+
+
+def test_evenly_growing_offsets_by_hand():
+    assert evenly_growing_offsets(1, 2.0, 6.0).tolist() == [1]
+    assert evenly_growing_offsets(30, 2.0, 6.0).tolist() == [1, 2, 5, 10, 16, 22, 28, 30]
+    assert evenly_growing_offsets(5, 0.0, 6.0).tolist() == [1, 2, 3, 4, 5]
 
 
 def by_hand(at):

@@ -1,0 +1,1 @@
+"""The page of the problems that others published: policies, and the initial trajectories that were published."""

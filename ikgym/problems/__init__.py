@@ -1,0 +1,128 @@
+"""Path-following problems that others published: waypoints, starts, and initial trajectories for an optimiser.
+
+- ``rlitg-…``: MinsungYoon/RL-ITG (MIT; Yoon, Kang, Park and Yoon, *Learning-based initialization of trajectory
+  optimization for path-following problems of redundant manipulators*, ICRA 2023). Arm ``fetch_arm``.
+- ``cppflow-…``: jstmn/cppflow (MIT; Morgan, Millard and Sukhatme, *CppFlow: generative inverse kinematics for efficient
+  and robust Cartesian path planning*, ICRA 2024). Arms ``fetch_arm``, ``fetch`` and ``panda``.
+
+The licences lie beside this file, and so does the script that wrote the data from the repositories.
+"""
+
+from __future__ import annotations
+
+import functools
+import pathlib
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ikgym.problems import packing
+from ikgym.validation import FloatArray, known_name, read_only
+
+FOLDER = pathlib.Path(__file__).parent
+WAYPOINTS, TRAJECTORIES = FOLDER / "waypoints.npz", FOLDER / "trajectories.npz"
+#: One over the resolution of waypoints and starts in [m], [rad] or 1, and of trajectories in [rad], which are published
+#: with six digits; and the orders of the differences that they are stored in.
+FINE, COARSE = 10**6, 10**5
+WAYPOINTS_ORDER, TRAJECTORIES_ORDER = 3, 2
+#: The paths of RL-ITG that were drawn, how many random ones there are, and those of CppFlow's problems on the Fetch.
+DRAWN, RANDOM, ON_FETCH = ("hello", "rotation", "zig", "kaist", "sgvr"), 100, ("hello", "rot_yz", "rot_yz2")
+NAMES = (
+    *(f"rlitg-{path}" for path in DRAWN),
+    *(f"rlitg-random-{i:03}" for i in range(RANDOM)),
+    *(f"cppflow-{arm}-{path}" for arm in ("fetch_arm", "fetch") for path in ON_FETCH),
+    "cppflow-panda-square",
+)
+#: How initial trajectories were made, and what each is called.
+METHODS = {
+    "greedy": "greedy IK",
+    "cloning": "behaviour cloning",
+    "reinforcement": "reinforcement learning",
+}
+
+
+class Waypoints(NamedTuple):
+    """What a path leads through; all arrays are read-only.
+
+    Attributes:
+        positions: In the base frame of the arm, in [m]. Shape (k, 3).
+        quaternions: w, x, y, z, of length 1. Shape (k, 4).
+        starts: Joint coordinates at the first waypoint, in [rad]; none where none are published. Shape (s, n).
+    """
+
+    positions: FloatArray
+    quaternions: FloatArray
+    starts: FloatArray
+
+
+def names(family: str = "") -> tuple[str, ...]:
+    """The names of all problems, or of those that begin with a text."""
+    return tuple(name for name in NAMES if name.startswith(family))
+
+
+def waypoints(name: str) -> Waypoints:
+    """The waypoints of a problem.
+
+    Raises:
+        UnknownNameError: There is no such problem; the message has the nearest name.
+    """
+    known_name("problem", name, names())
+    return _stored()[name]
+
+
+def published(name: str) -> tuple[str, ...]:
+    """The methods, of :data:`METHODS`, whose initial trajectory for a problem is published here."""
+    return tuple(method for method in METHODS if (name, method) in _trajectories())
+
+
+def trajectory(name: str, method: str) -> FloatArray:
+    """A published initial trajectory, which begins at the first start.
+
+    Args:
+        name: The problem.
+        method: One of :data:`METHODS`.
+
+    Returns:
+        Joint coordinates in [rad], one row a waypoint. Joints without limits are published modulo 2π, and may jump by
+        it. Shape (k, n).
+
+    Raises:
+        UnknownNameError: There is no such problem, or no such trajectory of it; the message has the nearest name.
+    """
+    known_name("problem", name, names())
+    known_name(f"initial trajectory of {name}", method, published(name))
+    return _trajectories()[name, method]
+
+
+@functools.cache
+def _stored() -> dict[str, Waypoints]:
+    stored = _load(WAYPOINTS)
+    poses = packing.restored(stored["poses"], stored["lengths"].tolist(), FINE, WAYPOINTS_ORDER)
+    starts = _parts(stored["starts"] / FINE, stored["start_counts"].tolist())
+    problems = zip(stored["names"].tolist(), poses, starts, strict=True)
+    return {name: Waypoints(*_split(pose), read_only(start)) for name, pose, start in problems}
+
+
+@functools.cache
+def _trajectories() -> dict[tuple[str, str], FloatArray]:
+    stored = _load(TRAJECTORIES)
+    keys = zip(stored["names"].tolist(), stored["methods"].tolist(), strict=True)
+    lengths = [len(_stored()[name].positions) for name in stored["names"].tolist()]
+    paths = packing.restored(stored["joints"], lengths, COARSE, TRAJECTORIES_ORDER)
+    return {key: read_only(path) for key, path in zip(keys, paths, strict=True)}
+
+
+def _load(file: pathlib.Path) -> dict[str, Any]:
+    with np.load(file, allow_pickle=False) as archive:
+        return dict(archive)
+
+
+def _parts(table: FloatArray, counts: Sequence[int]) -> list[FloatArray]:
+    return [part.copy() for part in np.split(table, np.cumsum(counts)[:-1])]
+
+
+def _split(poses: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Positions, and quaternions, whose rounding is taken off their length."""
+    quaternions = poses[:, 3:] / np.linalg.norm(poses[:, 3:], axis=1, keepdims=True)
+    return read_only(poses[:, :3].copy()), read_only(quaternions)

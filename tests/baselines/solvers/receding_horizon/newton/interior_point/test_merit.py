@@ -1,0 +1,129 @@
+"""The barrier function: its derivatives by differences, and the terms that it is made of by plain NumPy."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from baselines.solvers.receding_horizon.newton.cost import true_cost
+from baselines.solvers.receding_horizon.newton.interior_point.merit import ANEW, KEPT, Barrier, linearise, merit
+from baselines.solvers.receding_horizon.newton.workspace import GRADIENT, MULTIPLIER, newton_workspace
+from benchmarks.rivals.numpy_horizon import beyond_limits
+from tests.baselines.solvers.receding_horizon.newton.interior_point.states import (
+    draw,
+    horizon_of,
+    path_problem,
+    problem_of,
+)
+from tests.baselines.solvers.receding_horizon.newton.test_cost import differences
+from tests.baselines.solvers.receding_horizon.newton.test_rate import whole
+
+BARRIER = Barrier(30.0, 200.0)
+
+
+def place(at=(1, 2, 4, 7), task="pose", braking=True, **changes):
+    """A path near a nominal one, half of it beyond its limits; and what the kernels are handed."""
+    rng = np.random.default_rng(len(at))
+    problem = problem_of(task=task)
+    horizon = horizon_of(problem, draw(rng), at=at)
+    here = path_problem(problem, horizon, braking)
+    change = here.change_limit * np.array([1, 1, np.inf, 1, 1, 1, 1])  # a joint without a limit of acceleration
+    here = here._replace(change_limit=change, **changes)
+    path = horizon.q + np.cumsum(rng.normal(size=(len(at), 7)) * 2e-3 * here.grid.length[:, None], axis=0)
+    return here, path, newton_workspace(here.data.kind, here.nominal.shape[1], *path.shape, True)
+
+
+@pytest.mark.parametrize("braking", [False, True])
+@pytest.mark.parametrize("at", [(1,), (1, 2), (3, 5, 6), (1, 2, 4, 7)])
+@pytest.mark.parametrize("task", ["pose", "position"])
+def test_derivatives_against_central_differences(at, task, braking):
+    problem, path, workspace = place(at, task, braking)
+    model = workspace.model
+    value = linearise(problem, path, BARRIER, ANEW, False, workspace)
+    assert value == pytest.approx(merit(problem, path, BARRIER, workspace), rel=1e-12)
+    central = differences(lambda x: merit(problem, x, BARRIER, workspace), path, 1e-8).reshape(path.shape)
+    np.testing.assert_allclose(model.gradient, central, atol=1e-5 * abs(central).max())
+
+    def slope(x):
+        linearise(problem, x, BARRIER, ANEW, True, workspace)
+        return model.gradient.ravel().copy()
+
+    central = differences(slope, path, 1e-7)
+    linearise(problem, path, BARRIER, ANEW, True, workspace)
+    wrong = whole(model) - central
+    if braking:  # left out where it is concave: between the last two knots, joint by joint
+        for rows in (slice(-7, None), slice(-14, -7))[: len(at)]:
+            for columns in (slice(-7, None), slice(-14, -7))[: len(at)]:
+                left_out = np.diagonal(wrong[rows, columns])
+                assert (left_out * (1.0 if rows == columns else -1.0) >= -1e-4 * abs(central).max()).all()
+                wrong[rows, columns] -= np.diag(left_out)
+    # The second derivatives of a pose are those of small rotations.
+    np.testing.assert_allclose(wrong, 0.0, atol=(1e-5 if task == "position" else 1e-2) * abs(central).max())
+
+
+def test_changes_of_velocity_cost_what_they_do_elsewhere():
+    problem, path, workspace = place(rate_weight=0.0)
+    more = problem._replace(rate_weight=3.0)
+    extra = merit(more, path, BARRIER, workspace) - merit(problem, path, BARRIER, workspace)
+    newton = workspace
+    assert extra == pytest.approx(true_cost(more, path, newton) - true_cost(problem, path, newton), rel=1e-9)
+    linearise(problem, path, BARRIER, ANEW, False, workspace)
+    without = workspace.model.gradient.copy()
+    linearise(more, path, BARRIER, ANEW, False, workspace)
+    central = differences(lambda x: merit(more, x, BARRIER, workspace), path, 1e-8).reshape(path.shape)
+    np.testing.assert_allclose(workspace.model.gradient, central, atol=1e-5 * abs(central).max())
+    assert not np.allclose(without, central, rtol=1e-3)
+
+
+@pytest.mark.parametrize("at", [(1, 2, 3), (1, 2, 4, 7)])
+def test_it_tends_to_the_cost_and_the_weighted_excess(at):
+    """With μ to 0 what is left is the cost and w times all that is beyond a limit."""
+    problem, path, workspace = place(at, braking=False)
+    barrier = Barrier(1e-12, 50.0)
+    excess = (merit(problem, path, barrier, workspace) - true_cost(problem, path, workspace)) / 50.0
+    arm, h = problem_of().model, problem.grid.length[:, None] * problem.data.dt
+    qdot = np.diff(np.vstack([problem.start, path]), axis=0) / h
+    spans = np.vstack([[problem.data.dt], 0.5 * (h[:-1] + h[1:])])
+    qddot = np.diff(np.vstack([problem.qdot_before, qdot]), axis=0) / spans
+    limit = arm.acceleration_limit * np.array([1, 1, np.inf, 1, 1, 1, 1])
+    beyond = np.maximum(abs(qdot) / arm.velocity_limit - 1.0, 0.0).sum()
+    beyond += np.maximum(abs(qddot) / limit - 1.0, 0.0).sum()
+    step = problem.data.dt * arm.velocity_limit
+    beyond += (np.maximum(np.maximum(path - arm.upper, arm.lower - path), 0.0) / step).sum()
+    assert excess == pytest.approx(beyond, rel=1e-9)
+    assert beyond > 0.1
+
+
+def test_multipliers_go_on_as_the_primal_dual_equations_say():
+    """After a full Newton step of a quadratic model they are μ / room; after none they stay."""
+    problem, path, workspace = place()
+    linearise(problem, path, BARRIER, ANEW, False, workspace)
+    before = workspace.barriers[..., MULTIPLIER].copy()
+    np.testing.assert_array_equal(before, workspace.barriers[..., GRADIENT])
+    linearise(problem, path, BARRIER._replace(mu=15.0), KEPT, False, workspace)
+    np.testing.assert_allclose(workspace.barriers[..., MULTIPLIER], before)
+    moved = path + 1e-9
+    linearise(problem, path, BARRIER, ANEW, False, workspace)
+    linearise(problem, moved, BARRIER, 1.0, False, workspace)
+    np.testing.assert_allclose(workspace.barriers[..., MULTIPLIER], workspace.barriers[..., GRADIENT], rtol=1e-3)
+
+
+def test_braking_counts_at_the_last_knot():
+    """The way to a stop, v² / (2 q̈_max), is part of the position there, and only with braking."""
+    problem = problem_of()
+    horizon = horizon_of(problem, draw(np.random.default_rng(0)), knots=3)
+    q = np.clip(horizon.q, problem.model.lower + 1.0, problem.model.upper - 1.0)
+    speed = 0.9 * problem.model.velocity_limit
+    path = q + 2e-3 * speed * np.arange(1, 4)[:, None]
+    room = path[-1] + 0.5 * speed**2 / (2.0 * problem.model.acceleration_limit)  # half of what braking takes
+    arm = problem.model.replace(upper=np.minimum(room, problem.model.upper), home=None)
+    from_there = horizon.__class__(q, horizon.nominal, qdot=speed)
+    narrow = problem_of(arm)
+    assert beyond_limits(narrow, from_there, path)["position"] < 0.0
+    assert beyond_limits(narrow, from_there, path, braking=True)["position"] > 0.01
+    values = []
+    for braking in (False, True):
+        here = path_problem(narrow, from_there, braking)
+        workspace = newton_workspace(here.data.kind, here.nominal.shape[1], *path.shape, True)
+        values.append(merit(here, path, Barrier(1e-9, 100.0), workspace))
+    assert values[1] > values[0] + 100.0

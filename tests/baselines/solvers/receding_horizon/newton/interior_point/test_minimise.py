@@ -1,0 +1,173 @@
+"""Minima within limits of acceleration: against those that IPOPT finds, and by hand."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import ikgym
+from baselines.solvers.receding_horizon.newton.minimise import CONVERGED, RAN_OUT, STALLED
+from benchmarks.rivals.numpy_horizon import Horizon, beyond_limits, plan_cost
+from tests.baselines.solvers.receding_horizon.newton.interior_point.states import (
+    State,
+    draw,
+    horizon_of,
+    path_problem,
+    problem_of,
+    solved,
+)
+
+GOLDEN = [
+    (State(*map(np.array, (line["q"], line["qdot"], line["path"]))), line["cost"], line["at_limit"])
+    for line in json.loads((Path(__file__).parent / "golden/horizons.json").read_text())
+]
+
+
+def check(states):
+    """The horizon's optimum is IPOPT's to 1e-6, and keeps all limits, with braking behind its end."""
+    problem = problem_of()
+    for state, cost, _ in states:
+        horizon = horizon_of(problem, state)
+        minimum, path = solved(problem, horizon)
+        assert minimum.outcome == CONVERGED
+        assert minimum.cost == pytest.approx(cost, rel=1e-6)
+        assert minimum.cost == pytest.approx(plan_cost(problem, horizon, path), rel=1e-9)
+        assert max(beyond_limits(problem, horizon, path, braking=True).values()) < 1e-9
+
+
+def test_optimum_is_ipopts():
+    check(GOLDEN[8:13])
+
+
+@pytest.mark.slow
+def test_optimum_is_ipopts_on_50_states():
+    assert len(GOLDEN) == 50
+    check(GOLDEN)
+
+
+def test_golden_states_are_at_all_limits():
+    """A table of plans that no limit touches would show nothing."""
+    held = np.array([at_limit for *_, at_limit in GOLDEN])
+    assert (held[:, 2] >= 40).all()
+    assert (held > 0).sum(axis=0).tolist() >= [10, 2, 50]
+    assert (np.array([at_limit for *_, at_limit in GOLDEN[8:13]]) > 0).any(axis=0).all()
+
+
+@pytest.mark.parametrize("braking", [False, True])
+@pytest.mark.parametrize("at", [(1,), (2, 5), (1, 2, 4, 8, 15, 25)])
+def test_optimum_between_uneven_knots_is_ipopts(at, braking):
+    pytest.importorskip("casadi", reason="pip install ikgym[rivals]")
+    from benchmarks.rivals.casadi_horizon import CasadiHorizon
+
+    problem, rng = problem_of(), np.random.default_rng(len(at))
+    solver = CasadiHorizon(problem, len(at), limited=True, braking=braking)
+    for _ in range(2):
+        horizon = horizon_of(problem, draw(rng), at=at)
+        best = solver.solve(horizon)
+        minimum, path = solved(problem, horizon, braking=braking)
+        assert best.converged
+        assert minimum.outcome == CONVERGED
+        assert minimum.cost == pytest.approx(best.cost, rel=1e-6)
+        assert max(beyond_limits(problem, horizon, path, braking).values()) < 1e-9
+
+
+def test_gauss_newton_finds_the_same_optimum():
+    problem = problem_of()
+    horizon = horizon_of(problem, GOLDEN[3][0])
+    minimum, _ = solved(problem, horizon, exact=False)
+    assert minimum.outcome == CONVERGED
+    assert minimum.cost == pytest.approx(GOLDEN[3][1], rel=1e-6)
+
+
+def test_without_limits_in_reach_it_finds_what_newton_finds():
+    """With limits far away the optimum is that of the augmented Lagrangian."""
+    from baselines.solvers.receding_horizon.newton.minimise import NewtonSettings, minimise
+    from baselines.solvers.receding_horizon.newton.workspace import NO_VELOCITY, newton_workspace
+
+    arm = problem_of().model.replace(acceleration_limit=np.full(7, 1e7), velocity_limit=np.full(7, 1e4))
+    problem = problem_of(arm)
+    state = GOLDEN[0][0]
+    horizon = horizon_of(problem, state)
+    minimum, path = solved(problem, horizon, braking=False)
+    free = path_problem(problem, horizon)._replace(change_limit=NO_VELOCITY)
+    plain, multipliers = np.tile(horizon.q, (horizon.knots, 1)), np.zeros((horizon.knots, 6 + 14))
+    workspace = newton_workspace(problem.task.kind, problem.task.size, *plain.shape)
+    minimise(free, plain, multipliers, NewtonSettings(True, 300, 1e-10), workspace)
+    assert minimum.cost == pytest.approx(plan_cost(problem, horizon, plain), rel=1e-6)
+    np.testing.assert_allclose(path, plain, atol=1e-6)
+
+
+# One joint that slides along x, 10 m/s² at most.
+def slider(**limits):
+    unlimited = {"lower": [-np.inf], "upper": [np.inf], "velocity_limit": [100.0], "acceleration_limit": [10.0]}
+    return ikgym.Arm("slider", np.zeros((1, 3)), [[1.0, 0.0, 0.0]], (True,), **(unlimited | limits))
+
+
+def goals(x, knots):
+    nominal = np.zeros((knots, 3))
+    nominal[:, 0] = x
+    return nominal
+
+
+def test_far_from_its_goal_an_arm_accelerates_as_it_may():
+    problem = problem_of(slider(), "position")
+    horizon = Horizon(np.zeros(1), goals(0.05, 20), qdot=np.zeros(1))
+    minimum, path = solved(problem, horizon, braking=False, tolerance=1e-10)
+    assert minimum.outcome == CONVERGED
+    np.testing.assert_allclose(np.diff(np.append([0.0, 0.0], path[:, 0]), 2), 10.0 * 2e-3**2, rtol=1e-5)
+
+
+def test_it_stops_before_the_end_of_its_joint():
+    """With the goal beyond the limit the arm goes as fast as it can still stop, behind the last knot, too."""
+    problem = problem_of(slider(upper=[0.03]), "position")
+    horizon = Horizon(np.zeros(1), goals(0.05, 30), qdot=np.zeros(1))
+    minimum, path = solved(problem, horizon)
+    assert minimum.outcome == CONVERGED
+    speed = (path[-1, 0] - path[-2, 0]) / 2e-3
+    assert path[-1, 0] + speed**2 / 20.0 <= 0.03
+    longer = Horizon(np.zeros(1), goals(0.05, 80), qdot=np.zeros(1))
+    _, whole = solved(problem, longer)
+    assert whole[-1, 0] == pytest.approx(0.03, abs=1e-6)
+    assert (whole <= 0.03).all()
+    without, blind = solved(problem, horizon, braking=False)
+    assert without.cost < minimum.cost
+    assert blind[-1, 0] + ((blind[-1, 0] - blind[-2, 0]) / 2e-3) ** 2 / 20.0 > 0.03
+
+
+def test_where_limits_cannot_be_kept_it_says_so():
+    """Too fast to stop in time."""
+    problem = problem_of(slider(upper=[0.01]), "position")
+    horizon = Horizon(np.zeros(1), goals(0.0, 10), qdot=np.full(1, 2.0))
+    minimum, path = solved(problem, horizon)
+    assert minimum.outcome == STALLED
+    assert np.isfinite(path).all()
+    assert max(beyond_limits(problem, horizon, path).values()) > 0.0
+
+
+def test_a_stop_in_the_last_moment_is_possible():
+    """Braking all the way is the only path within the limits: nothing lies inside of them."""
+    problem = problem_of(slider(upper=[0.2]), "position")
+    horizon = Horizon(np.zeros(1), goals(0.5, 10), qdot=np.full(1, 2.0))
+    minimum, path = solved(problem, horizon)
+    assert minimum.outcome == CONVERGED
+    np.testing.assert_allclose(np.diff(path[:, 0]) / 2e-3, 2.0 - 0.02 * np.arange(2, 11), atol=1e-3)
+
+
+def test_steps_run_out():
+    problem = problem_of()
+    minimum, path = solved(problem, horizon_of(problem, GOLDEN[0][0]), steps=3)
+    assert minimum.outcome == RAN_OUT
+    assert minimum.steps == 3
+    assert np.isfinite(path).all()
+
+
+def test_a_start_at_the_optimum_stays():
+    problem = problem_of()
+    horizon = horizon_of(problem, GOLDEN[1][0])
+    _, best = solved(problem, horizon)
+    minimum, path = solved(problem, horizon, path=best)
+    assert minimum.outcome == CONVERGED
+    np.testing.assert_allclose(path, best, atol=1e-5)

@@ -1,0 +1,127 @@
+"""Receding horizons under limits of acceleration: their optima are IPOPT's, and the plant holds nothing back."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import baselines
+import ikgym
+from baselines.evaluation.rollout import rollouts
+from baselines.solvers.receding_horizon.newton.settings import change_limit
+from benchmarks.rivals.numpy_horizon import Horizon, beyond_limits, plan_cost
+from tests.baselines.solvers.receding_horizon.newton.interior_point.states import DT, KNOTS, horizon_of, problem_of
+from tests.baselines.solvers.receding_horizon.newton.interior_point.test_minimise import GOLDEN
+from tests.baselines.solvers.receding_horizon.test_rhc import observe
+from tests.limited import limited
+
+SEEDS = ikgym.scenarios.seeds("validation", 2)
+
+
+def panda(steps=60, **changes):
+    """A gentle motion: nominal velocities and accelerations stay below the limits."""
+    return ikgym.scenarios.get("panda-random").replace(steps=steps, **changes)
+
+
+def states(golden):
+    """Observations of golden states, one row each, and their horizons."""
+    problem = problem_of()
+    horizons = [horizon_of(problem, state) for state, *_ in golden]
+    q, qdot, nominal = (np.array([getattr(h, name) for h in horizons]) for name in ("q", "qdot", "nominal"))
+    return problem, horizons, observe(problem, q, nominal, qdot)
+
+
+def check_plans(golden):
+    """To convergence the plan is IPOPT's, and what is applied is its first velocity."""
+    problem, horizons, observation = states(golden)
+    policy = baselines.get("rhc")(problem, horizon=KNOTS + 1, tolerance=1e-8)
+    action, state = policy.predict(observation)
+    assert (state[0] == 0).all()  # CONVERGED
+    for plan, horizon, (_, cost, _), row in zip(policy.plan(state), horizons, golden, action, strict=True):
+        assert plan_cost(problem, horizon, plan) == pytest.approx(cost, rel=1e-6)
+        assert max(beyond_limits(problem, horizon, plan, braking=True).values()) < 1e-9
+        velocity = row * problem.velocity_limit
+        np.testing.assert_allclose(velocity, (plan[0] - horizon.q) / DT, atol=1e-6)
+        assert (abs(velocity - horizon.qdot) <= DT * problem.model.acceleration_limit + 1e-6).all()
+    return policy, observation, action, state
+
+
+def test_plans_are_ipopts_and_a_batch_is_its_rows():
+    policy, observation, action, state = check_plans(GOLDEN[8:13])
+    for row in (0, 3):
+        alone, own = policy.predict({name: array[row] for name, array in observation.items()})
+        np.testing.assert_array_equal(alone, action[row])
+        np.testing.assert_array_equal(policy.plan(own)[0], policy.plan(state)[row])
+
+
+@pytest.mark.slow
+def test_plans_are_ipopts_on_50_states():
+    check_plans(GOLDEN)
+
+
+@pytest.mark.parametrize(
+    ("name", "parameters"),
+    [
+        ("rhc", {"horizon": 10}),
+        ("rhc", {"horizon": 60, "move_blocks": 12, "iterations": 1, "starts": 3, "restart_steps": 5}),
+        ("rhc_foresight", {"horizon": 101}),
+    ],
+)
+def test_on_a_gentle_path_nothing_is_held_back(name, parameters):
+    scenario = panda()
+    policy = baselines.make(name, scenario, **parameters)
+    for episode in rollouts(scenario, policy, SEEDS):
+        assert not episode.at_limit.any()
+        changes = np.diff(episode.qdot, axis=0, prepend=0.0)
+        assert (abs(changes) <= scenario.dt * scenario.arm.acceleration_limit + 1e-6).all()
+        assert episode.position_error.max() < 1e-3
+
+
+def test_a_short_horizon_stops_before_the_end_of_a_joint():
+    """Towards a stop an arm brakes within its acceleration, though that takes longer than the horizon."""
+    scenario = panda(steps=150)
+    arm, path = scenario.arm, scenario.nominal_joint_path(SEEDS[0])
+    j = int(np.argmax(np.abs(path[150] - path[0])))
+    upper, lower = arm.upper.copy(), arm.lower.copy()
+    middle = 0.5 * (path[0, j] + path[150, j])
+    (upper if path[150, j] > path[0, j] else lower)[j] = middle
+    narrow = arm.replace(upper=upper, lower=lower, home=None)
+    motion = scenario.trajectory.sample(np.random.default_rng(SEEDS[0]))
+    stopping = scenario.replace(arm=narrow, trajectory=motion, start=path[0])
+    policy = baselines.make("rhc", stopping, horizon=6)
+    (episode,) = rollouts(stopping, policy, SEEDS[:1])
+    assert not episode.at_limit.any()
+    assert abs(episode.q[:, j] - middle).min() < 1e-2
+
+
+def test_velocities_of_a_plan_that_cannot_keep_them_are_cut():
+    """Faster than can be stopped: the first velocity keeps the acceleration limit all the same, and it is said."""
+    problem, horizons, observation = states(GOLDEN[:1])
+    arm, horizon = problem.model, horizons[0]
+    observation["q"] = np.array([arm.upper - 1e-3])
+    observation["qdot"] = np.array([0.9 * arm.velocity_limit])
+    policy = baselines.get("rhc")(problem, horizon=KNOTS + 1)
+    action, state = policy.predict(observation)
+    change = action[0] * problem.velocity_limit - observation["qdot"][0]
+    assert (abs(change) <= DT * arm.acceleration_limit + 1e-6).all()
+    assert state[0][0] != 0
+    assert isinstance(horizon, Horizon)
+
+
+def test_joints_without_a_limit_are_free():
+    """One joint with a limit of acceleration, the others without: the plant holds none of them back."""
+    scenario = limited()
+    finite = np.isfinite(scenario.arm.acceleration_limit)
+    assert finite.any()
+    assert not finite.all()
+    policy = baselines.make("rhc", scenario, horizon=6)
+    for episode in rollouts(scenario, policy, SEEDS):
+        assert not episode.at_limit.any()
+        assert np.isfinite(episode.qdot).all()
+
+
+def test_without_a_limit_there_are_no_barriers():
+    """Then the kernels take the branch that they always took."""
+    unlimited = ikgym.scenarios.get("varga7-fast").arm.acceleration_limit
+    assert change_limit(unlimited, DT).shape == (0,)
+    np.testing.assert_array_equal(change_limit(np.array([10.0, np.inf]), DT), [10.0 * DT, np.inf])

@@ -1,0 +1,144 @@
+"""The problems of others: complete, as they were published, and in the frames that they are said to be in."""
+
+from __future__ import annotations
+
+import hashlib
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import ikgym
+from ikgym import problems
+from ikgym.exceptions import UnknownNameError
+from ikgym.problems import packing, write
+
+RANDOM = problems.names("rlitg-random-")
+DRAWN = [name for name in problems.NAMES if name not in RANDOM]
+
+
+def test_names():
+    assert len(problems.names()) == len(set(problems.names())) == 112
+    assert len(RANDOM) == 100
+    assert [len(problems.waypoints(name).positions) for name in DRAWN] == [
+        *(553, 209, 227, 478, 587),
+        *(553, 209, 249, 553, 209, 249),
+        320,
+    ]
+    lengths = [len(problems.waypoints(name).positions) for name in RANDOM]
+    assert (min(lengths), max(lengths), sum(lengths)) == (379, 966, 62_610)
+
+
+@pytest.mark.parametrize("name", problems.names())
+def test_shapes_and_units(name):
+    positions, quaternions, starts = problems.waypoints(name)
+    assert positions.shape == (len(positions), 3)
+    assert quaternions.shape == (len(positions), 4)
+    np.testing.assert_allclose(np.linalg.norm(quaternions, axis=1), 1.0, atol=1e-15)
+    expected = 0 if name.startswith("cppflow") else 1 if name in RANDOM else 100
+    assert starts.shape == (expected, 7)
+    assert not any(array.flags.writeable for array in problems.waypoints(name))
+    # Paths do not jump: 48.1 mm and 16.1° at most.
+    assert np.linalg.norm(np.diff(positions, axis=0), axis=1).max() < 0.049
+    turns = Rotation.from_quat(quaternions, scalar_first=True)
+    assert np.degrees((turns[:-1].inv() * turns[1:]).magnitude()).max() < 16.1
+
+
+def test_the_numbers_have_not_changed():
+    digest = hashlib.sha256()
+    for name in problems.names():
+        for array in (*problems.waypoints(name), *(problems.trajectory(name, m) for m in problems.published(name))):
+            digest.update(np.rint(1e6 * array).astype(np.int64).tobytes())
+    assert digest.hexdigest()[:12] == "aa878e2b219e"
+
+
+def test_the_first_waypoints_are_where_the_published_starts_are():
+    """Base, tool, order of the quaternions and rest posture of the torso: all would show here."""
+    arm = ikgym.arms.get("fetch_arm")
+    for name in problems.names("rlitg"):
+        positions, quaternions, starts = problems.waypoints(name)
+        rotations, there = arm.forward(starts)
+        assert np.linalg.norm(there - positions[0], axis=1).max() < 1.5e-5
+        wanted = Rotation.from_quat(quaternions[0], scalar_first=True)
+        assert (Rotation.from_matrix(rotations) * wanted.inv()).magnitude().max() < 1e-3
+
+
+def test_published_trajectories_belong_to_their_paths():
+    assert {name for name in problems.NAMES if problems.published(name)} == {
+        *("rlitg-hello", "rlitg-rotation", "rlitg-zig"),
+        *RANDOM,
+    }
+    for name in ("rlitg-hello", "rlitg-random-042"):
+        positions, _, starts = problems.waypoints(name)
+        assert problems.published(name) == ("greedy", "cloning", "reinforcement")
+        for method in problems.published(name):
+            q = problems.trajectory(name, method)
+            assert q.shape == (len(positions), 7)
+            assert not q.flags.writeable
+            np.testing.assert_allclose(q[0], starts[0], atol=1e-5)
+
+
+@pytest.mark.parametrize(("one", "other"), [("hello", "hello"), ("rotation", "rot_yz")])
+def test_both_sources_have_two_paths_in_common(one, other):
+    first, second = problems.waypoints(f"rlitg-{one}"), problems.waypoints(f"cppflow-fetch_arm-{other}")
+    np.testing.assert_allclose(first.positions, second.positions, atol=1.1e-6)
+    np.testing.assert_allclose(first.quaternions, second.quaternions, atol=1e-12)
+
+
+def test_the_hand_of_the_panda_points_forward():
+    turn = Rotation.from_quat(problems.waypoints("cppflow-panda-square").quaternions[0], scalar_first=True)
+    np.testing.assert_allclose(turn.apply([0.0, 0.0, 1.0]), [1.0, 0.0, 0.0], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: problems.waypoints("rlitg-helo"), "There is no problem 'rlitg-helo'. Did you mean 'rlitg-hello'"),
+        (lambda: problems.trajectory("rlitg-helo", "greedy"), "Did you mean 'rlitg-hello'"),
+        (lambda: problems.trajectory("rlitg-hello", "greed"), "initial trajectory of rlitg-hello 'greed'. Did you"),
+        (lambda: problems.trajectory("rlitg-kaist", "greedy"), "Available: none"),
+    ],
+)
+def test_what_there_is_not(call, message):
+    with pytest.raises(UnknownNameError, match=message):
+        call()
+
+
+def test_what_is_packed_is_restored(tmp_path):
+    rng = np.random.default_rng(0)
+    tables = [np.cumsum(rng.normal(size=(k, 3)), axis=0) for k in (1, 2, 40)]
+    packed = packing.differences(tables, 1000, order=2)
+    packing.save(tmp_path / "x.npz", {"packed": packed})
+    packing.save(tmp_path / "y.npz", {"packed": packed})
+    assert (tmp_path / "x.npz").read_bytes() == (tmp_path / "y.npz").read_bytes()
+    with np.load(tmp_path / "x.npz", allow_pickle=False) as archive:
+        restored = packing.restored(archive["packed"], [1, 2, 40], 1000, order=2)
+    for table, again in zip(tables, restored, strict=True):
+        np.testing.assert_allclose(again, table, atol=0.5e-3 + 1e-12)
+
+
+def clone(folder):
+    """A folder as the repositories have it, with numbers of ours."""
+    config = folder / "rlitg" / write.CONFIG
+    for kind in ("path", "start_conf", "initial_traj"):
+        (config / kind).mkdir(parents=True)
+    (config / "path" / "random_7").write_text("0.1,0.2,0.3;1,0,0,0\n0.1,0.2,0.4;0.8,0.6,0,0\n")
+    (config / "start_conf" / "random_7_config.csv").write_text("1,2,3,4,5,6,7\n2,2,3,4,5,6,7\n")
+    (config / "initial_traj" / "random_7-torm_test-0-0.csv").write_text("1,2,3,4,5,6,7\n1,2,3,4,5,6,7\n")
+    (folder / "cppflow" / "cppflow" / "paths").mkdir(parents=True)
+    text = "time,x,y,z,qw,qx,qy,qz\n0.0,0.1,0.2,0.3,0.8,0.6,0.0,0.0\n"
+    (folder / "cppflow" / "cppflow" / "paths" / "square.csv").write_text(text)
+    return folder / "rlitg", folder / "cppflow"
+
+
+def test_what_the_script_reads(tmp_path):
+    rlitg, cppflow = clone(tmp_path)
+    poses = write.poses_of_rlitg(rlitg, "random_7")
+    np.testing.assert_allclose(poses[1], [0.013125, 0.2, 0.77743, 0.8, 0.6, 0.0, 0.0], atol=1e-15)
+    assert write.starts_of_rlitg(rlitg, "random_7").tolist() == [[1, 2, 3, 4, 5, 6, 7]]
+    ((method, joints),) = write.trajectories(rlitg, "random_7")
+    assert (method, joints.shape) == ("greedy", (2, 7))
+    (pose,) = write.poses_of_cppflow(cppflow, write.CPPFLOW["panda-square"])
+    np.testing.assert_allclose(pose[:3], [0.85, 0.2, 0.8], atol=1e-15)
+    turned = Rotation.from_quat([0.6, 0.0, 0.0, 0.8]) * Rotation.from_euler("y", 90, degrees=True)
+    np.testing.assert_allclose(pose[3:], turned.as_quat(scalar_first=True), atol=1e-15)

@@ -1,0 +1,150 @@
+"""The problems of others as scenarios."""
+
+from __future__ import annotations
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import ikgym
+from ikgym import problems, scenarios
+from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.scenarios import elsewhere
+from ikgym.scenarios.elsewhere import waypoint_steps
+from ikgym.trajectories import PublishedPath, RandomPublishedPath
+from tests.comparison import identical
+
+NAMES = scenarios.problems_from_elsewhere()
+RANDOM = scenarios.get("rlitg-random")
+
+
+def test_names():
+    assert (
+        *("rlitg-hello", "rlitg-rotation", "rlitg-zig", "rlitg-kaist", "rlitg-sgvr"),
+        *(f"cppflow-{arm}-{path}" for arm in ("fetch_arm", "fetch") for path in ("hello", "rot_yz", "rot_yz2")),
+        *("cppflow-panda-square", "rlitg-random"),
+    ) == NAMES
+    assert not set(NAMES) & set(scenarios.names())
+    assert scenarios.find("rlitg-random-007") is scenarios.get("rlitg-random-007")
+    with pytest.raises(UnknownNameError, match="There is no scenario 'rlitg-random-100'"):
+        scenarios.get("rlitg-random-100")
+    with pytest.raises(InvalidInputError, match="'rlitg-hello' is registered already"):
+        scenarios.register("rlitg-hello", lambda: RANDOM)
+
+
+@pytest.mark.parametrize("name", [*NAMES[:-1], "rlitg-random-038"])
+def test_the_waypoints_are_met_at_their_steps_from_the_start_on(name):
+    scenario = scenarios.get(name)
+    positions, quaternions, starts = problems.waypoints(name)
+    steps = waypoint_steps(len(positions))
+    assert steps[-1] == scenario.steps
+    nominal = scenario.nominal()[steps]
+    np.testing.assert_allclose(nominal[:, 9:], positions, atol=1e-14)
+    wanted = Rotation.from_quat(quaternions, scalar_first=True).as_matrix()
+    np.testing.assert_allclose(nominal[:, :9].reshape(-1, 3, 3), wanted, atol=1e-12)
+    first = scenario.first_q(scenario.trajectory)
+    rotation, position = scenario.arm.forward(first)
+    np.testing.assert_allclose(position, positions[0], atol=1.5e-5)
+    np.testing.assert_allclose(rotation, wanted[0], atol=1e-4)
+    assert (scenario.arm.lower <= first).all()
+    assert (first <= scenario.arm.upper).all()
+    if len(starts):
+        assert identical(first, starts[0])
+
+
+def test_limits_are_those_of_the_arms_but_for_accelerations():
+    for name, arm in (
+        ("rlitg-hello", "fetch_arm"),
+        ("cppflow-fetch-hello", "fetch"),
+        ("cppflow-panda-square", "panda"),
+    ):
+        scenario, known = scenarios.get(name), ikgym.arms.get(arm)
+        for limit in ("lower", "upper", "velocity_limit"):
+            assert identical(getattr(scenario.arm, limit), getattr(known, limit))
+        assert np.isinf(scenario.arm.acceleration_limit).all()
+        assert identical(scenario.velocity_limit, known.velocity_limit)
+
+
+def test_the_panda_ends_at_its_hand():
+    """`panda_hand` stands on the flange, turned by -45° about its z axis (franka_description)."""
+    flange, hand = ikgym.arms.get("panda"), scenarios.get("cppflow-panda-square").arm
+    rotation, position = flange.forward(flange.home)
+    turned, there = hand.forward(flange.home)
+    np.testing.assert_allclose(there, position, atol=1e-15)
+    expected = rotation @ Rotation.from_euler("z", -45, degrees=True).as_matrix()
+    np.testing.assert_allclose(turned, expected, atol=1e-15)
+
+
+def test_the_seed_chooses_a_path_and_its_start():
+    drawn = [RANDOM.trajectory.sample(np.random.default_rng(seed)) for seed in range(1200)]
+    assert {one.problem for one in drawn} == set(problems.names("rlitg-random-"))
+    env = gym.make("RedundantIK-v0", scenario="rlitg-random")
+    starts = [env.reset(seed=seed)[0]["q"] for seed in (3, 4, 3)]
+    assert identical(starts[0], starts[2])
+    assert not identical(starts[0], starts[1])
+    published = [problems.waypoints(name).starts[0] for name in problems.names("rlitg-random-")]
+    assert all(any(identical(one, start) for start in published) for one in starts)
+
+
+def test_shorter_random_paths_end_at_rest():
+    (name,) = [n for n in problems.names("rlitg-random-") if len(problems.waypoints(n).positions) == 379]
+    trajectory = PublishedPath(name, elsewhere.PERIOD)
+    frames = trajectory.frames(RANDOM.times(RANDOM.steps + 1), RANDOM.model)
+    assert not np.diff(frames[waypoint_steps(379)[-1] :], axis=0).any()
+    assert np.diff(frames[: waypoint_steps(379)[-1]], axis=0).any(axis=1).all()
+
+
+def test_single_and_vector_environments_agree_on_random_paths():
+    rows, steps = 3, 12
+    short = RANDOM.replace(steps=steps)
+    native = gym.make_vec("RedundantIK-v0", num_envs=rows, scenario=short, preview=2)
+    single = [gym.make("RedundantIK-v0", scenario=short, preview=2) for _ in range(rows)]
+    batch = native.reset(seed=5)[0]
+    alone = [env.reset(seed=5 + i)[0] for i, env in enumerate(single)]
+    rng = np.random.default_rng(0)
+    for _ in range(steps - 1):
+        for i in range(rows):
+            assert all(identical(batch[key][i], alone[i][key]) for key in batch)
+        actions = rng.uniform(-1, 1, (rows, 7)).astype(np.float32)
+        batch = native.step(actions)[0]
+        alone = [env.step(action)[0] for env, action in zip(single, actions, strict=True)]
+
+
+@pytest.mark.parametrize("name", ["rlitg-zig", "cppflow-panda-square", "rlitg-random"])
+def test_they_survive_their_files(name, tmp_path):
+    scenario = scenarios.get(name)
+    scenario.save(tmp_path / "x.toml")
+    assert (tmp_path / "x.toml").stat().st_size < 4000, "the waypoints stand in no file of a scenario"
+    read = scenarios.load(tmp_path / "x.toml").replace(steps=50)
+    assert identical(read.nominal(2), scenario.replace(steps=50).nominal(2))
+
+
+def test_what_is_out_of_reach():
+    assert elsewhere.unreached("cppflow-panda-square").tolist() == list(range(153, 182))
+    assert not len(elsewhere.unreached("cppflow-fetch-rot_yz"))
+
+
+@pytest.mark.parametrize(
+    ("make", "error", "message"),
+    [
+        (lambda: PublishedPath("rlitg-helo", 0.2), UnknownNameError, "no problem 'rlitg-helo'. Did you mean"),
+        (lambda: PublishedPath("rlitg-hello", 0.0), InvalidInputError, "period: expected a finite number"),
+        (lambda: RandomPublishedPath("none", 0.2), InvalidInputError, "family: expected what names of problems"),
+        (lambda: RandomPublishedPath("cppflow", 0.2), InvalidInputError, "with starts begin with, got 'cppflow'"),
+        (lambda: RandomPublishedPath("rlitg", -1), InvalidInputError, "period: expected a finite number"),
+        (lambda: RANDOM.trajectory.frames(np.zeros(1), RANDOM.model), InvalidInputError, "sample one first"),
+        (lambda: RANDOM.replace(arm=ikgym.arms.get("fetch")), InvalidInputError, "expected 8 joints, as arm 'fetch'"),
+    ],
+)
+def test_bad_input(make, error, message):
+    with pytest.raises(error, match=message):
+        make()
+
+
+def test_reach_bounds_all_random_paths():
+    bound = RANDOM.trajectory.reach(np.zeros(1), RANDOM.model)
+    times = np.arange(0.0, 200.0, 0.01)
+    drawn = (PublishedPath(name, elsewhere.PERIOD) for name in problems.names("rlitg-random-")[::9])
+    farthest = max(np.linalg.norm(one.frames(times, RANDOM.model)[:, 9:], axis=1).max() for one in drawn)
+    assert 0.8 * bound < farthest <= bound
