@@ -15,7 +15,8 @@ from matplotlib.figure import Figure
 
 from baselines import command as shared
 from baselines.evaluation.machine import describe
-from baselines.evaluation.pages import choosing, cost_time, families, foresight, leaderboard, rivals, sets, tuning
+from baselines.evaluation.pages import cost_time, families, foresight, leaderboard, rivals, sets, tuning
+from baselines.evaluation.pages.choosing import page as choosing
 from baselines.evaluation.pages.entries import FORESIGHT, HORIZONS, Entry, agents, playing, shipped, solvers
 from baselines.evaluation.pages.markdown import table
 from baselines.evaluation.pages.measure import measure

@@ -7,11 +7,8 @@ import pytest
 
 from baselines import registry
 from baselines.evaluation.pages import sets
-from baselines.evaluation.pages.choosing import OWN, PERIODS, SHARE, entries, page, played, rival
-from baselines.evaluation.pages.entries import solver
-from baselines.evaluation.pages.measure import measure, plan
-from baselines.evaluation.pages.measurement import Measurement
-from baselines.evaluation.pages.situations import (
+from baselines.evaluation.pages.choosing.page import OWN, PERIODS, SHARE, entries, page, played, rival
+from baselines.evaluation.pages.choosing.situations import (
     COST,
     SITUATIONS,
     chosen,
@@ -20,6 +17,9 @@ from baselines.evaluation.pages.situations import (
     relative_cost,
     standings,
 )
+from baselines.evaluation.pages.entries import solver
+from baselines.evaluation.pages.measure import measure, plan
+from baselines.evaluation.pages.measurement import Measurement
 from ikgym import arms
 from tests.baselines.evaluation.pages.builders import DOCS, a_measurement, a_section, point
 

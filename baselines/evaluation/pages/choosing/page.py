@@ -7,10 +7,7 @@ from collections.abc import Iterable, Sequence
 
 from baselines import registry
 from baselines.evaluation.pages import sets
-from baselines.evaluation.pages.entries import FORESIGHT, Entry, solver
-from baselines.evaluation.pages.markdown import conditions, table, time
-from baselines.evaluation.pages.measurement import Measurement, Section
-from baselines.evaluation.pages.situations import (
+from baselines.evaluation.pages.choosing.situations import (
     COST,
     EQUAL,
     ERROR,
@@ -22,6 +19,9 @@ from baselines.evaluation.pages.situations import (
     ranked,
     standings,
 )
+from baselines.evaluation.pages.entries import FORESIGHT, Entry, solver
+from baselines.evaluation.pages.markdown import conditions, table, time
+from baselines.evaluation.pages.measurement import Measurement, Section
 from baselines.evaluation.report import NOTHING, number
 from baselines.spec import parse_policy
 
