@@ -22,6 +22,9 @@ from numba.core.dispatcher import Dispatcher
 
 logger = logging.getLogger("ikgym")
 
+# What reading a file of another version, or a damaged one, raises.
+UNREADABLE = (EOFError, pickle.UnpicklingError, ValueError, TypeError, AttributeError, ImportError)
+
 # Stamps of whole modules, by name.
 _stamps: dict[str, str] = {}
 
@@ -72,21 +75,28 @@ def _cached(function: Any, **options: Any) -> Any:
     # Not public, and absent where compilation is switched off: then numba's own stamp has to do.
     cache = getattr(compiled, "_cache", None)
     if cache is not None:
-        cache.load_overload = _forgiving(cache.load_overload, function)
-        cache.save_overload = _forgiving(cache.save_overload, function)
+        cache.load_overload = _forgiving(cache.load_overload, cache.flush, function)
+        cache.save_overload = _forgiving(cache.save_overload, cache.flush, function)
     file = getattr(cache, "_cache_file", None)
     if hasattr(file, "_source_stamp"):
         file._source_stamp = _stamp(function.__module__)  # type: ignore[union-attr]
     return compiled
 
 
-def _forgiving(call: Callable[..., Any], function: Any) -> Callable[..., Any]:
-    """A call of numba's cache that goes without one where the disk is full or closed, or a file on it is damaged."""
+def _forgiving(call: Callable[..., Any], flush: Callable[[], None], function: Any) -> Callable[..., Any]:
+    """A call of numba's cache that goes without one where the disk is full or closed, and forgets what it cannot read.
+
+    That may be damaged, or of an older version of the package with types that are gone.
+    """
 
     def tried(*arguments: Any) -> Any:
         try:
-            return call(*arguments)
-        except (OSError, EOFError, pickle.UnpicklingError, ValueError, TypeError, AttributeError, ImportError) as e:
+            try:
+                return call(*arguments)
+            except UNREADABLE:
+                flush()
+                return call(*arguments)
+        except (OSError, *UNREADABLE) as e:
             if kept_on_disk():  # said once: what hinders one kernel hinders most
                 logger.warning("Machine code cannot be kept on disk, and is compiled anew in each process: %s", e)
             _not_kept.add(f"{function.__module__}.{function.__qualname__}")

@@ -9,6 +9,8 @@ from ikgym.scenarios import catalogue
 
 #: One of each kind among the scenarios that several arms have: task, trajectory, Δt, prismatic joint, random.
 KINDS = ("panda-circle", "panda-glue", "panda-singular", "tiago-raster", "iiwa14-random")
+#: What solvers are tested on: all scenarios but those that say nothing new of a solver's arithmetic.
+ONE_OF_EACH = (*catalogue.SCENARIOS, *KINDS)
 
 
 def every_scenario(make=lambda name: name):
@@ -17,6 +19,6 @@ def every_scenario(make=lambda name: name):
     Args:
         make: What a name is turned into.
     """
-    fast = {*catalogue.SCENARIOS, *KINDS}
+    fast = {*ONE_OF_EACH}
     names = ikgym.scenarios.names()
     return [pytest.param(make(name), id=name, marks=() if name in fast else pytest.mark.slow) for name in names]

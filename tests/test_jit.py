@@ -5,10 +5,12 @@ from __future__ import annotations
 import logging
 import os
 import pathlib
+import pickle
 import subprocess
 import sys
 import threading
 
+import numba
 import numba.core.dispatcher
 import numpy as np
 import pytest
@@ -147,9 +149,16 @@ def test_damaged_machine_code_is_made_anew(tmp_path, suffix):
     assert with_cache(tmp_path) == ("2.0 True", "")
     for file in tmp_path.glob(f"__pycache__/*.{suffix}"):
         file.write_bytes(file.read_bytes()[:20])
-    out, said = with_cache(tmp_path)
-    assert out == "2.0 False"
-    assert said.startswith("Machine code cannot be kept on disk")
+    assert with_cache(tmp_path) == ("2.0 True", "")
+
+
+def test_machine_code_of_a_version_with_other_types_is_made_anew(tmp_path):
+    assert with_cache(tmp_path) == ("2.0 True", "")
+    (index,) = tmp_path.glob("__pycache__/*.nbi")
+    stamped = index.read_bytes()
+    index.write_bytes(pickle.dumps(numba.__version__) + b"cno_such_module\nTuple\n.")
+    assert with_cache(tmp_path) == ("2.0 True", "")
+    assert index.read_bytes() == stamped
 
 
 @pytest.mark.parametrize("module", ["ikgym", "baselines"])

@@ -37,7 +37,7 @@ class Names:
     """What a list takes."""
 
     names: Annotated[tyro.conf.Positional[tuple[str, ...]], tyro.conf.arg(metavar="NAME …")] = ()
-    """What is to be shown in full. The list if left out."""
+    """What is to be shown in full: names, or files, .urdf of arms and .toml of scenarios. The list if left out."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -28,6 +28,7 @@ class Catalogue:
         head: Of the columns; the last one takes what is left of a line.
         row: The cells behind the name of a member.
         full: All about a member.
+        ending: Of files that are shown in full like members; none if empty.
     """
 
     kind: str
@@ -35,6 +36,11 @@ class Catalogue:
     head: tuple[str, ...]
     row: Callable[[str], tuple[str, ...]]
     full: Callable[[str], str]
+    ending: str = ""
+
+    def knows(self, name: str) -> bool:
+        """Whether there is such a member, or the name is that of a file."""
+        return name in self.names() or bool(self.ending and name.endswith(self.ending))
 
 
 def shown(catalogue: Catalogue, names: Sequence[str], width: int) -> str:
@@ -42,15 +48,17 @@ def shown(catalogue: Catalogue, names: Sequence[str], width: int) -> str:
 
     Args:
         catalogue: What is listed.
-        names: Of those that are shown in full; none for the table.
+        names: Of those that are shown in full, or files; none for the table.
         width: Characters that a line may have.
 
     Raises:
         UnknownNameError: There is no such member; the message has the nearest name.
+        InvalidInputError: A file cannot be read.
+        MissingDependencyError: A URDF file is to be read, and Pinocchio is not installed.
     """
     known = catalogue.names()
     for name in names:
-        if name not in known:
+        if not catalogue.knows(name):
             raise UnknownNameError(catalogue.kind, name, known)
     if names:
         return "\n\n".join(_refilled(catalogue.full(name), width) for name in names)
@@ -87,7 +95,7 @@ def kinds_of_limits(arm: Arm) -> list[str]:
 
 
 def _arm(name: str) -> str:
-    arm = arms.get(name)
+    arm = arms.from_urdf(name) if name.endswith(ARMS.ending) else arms.get(name)
     rows: list[tuple[str, ...]] = [("joint", "kind", "lower", "upper", "velocity limit", "acceleration limit")]
     numbers = zip(arm.prismatic, arm.lower, arm.upper, arm.velocity_limit, arm.acceleration_limit, strict=True)
     for joint, (prismatic, *limits) in enumerate(numbers, 1):
@@ -101,8 +109,8 @@ def _arm(name: str) -> str:
     return f"{title}\n\n{aligned(rows, 80)}"
 
 
-def _numbers(values: FloatArray) -> str:
-    return ", ".join(f"{x:.4g}" for x in np.round(values, 9) + 0.0)
+def _numbers(values: Sequence[float] | FloatArray) -> str:
+    return ", ".join(f"{x:.4g}" for x in np.round(np.array(values), 9) + 0.0)
 
 
 def _scenario_row(name: str) -> tuple[str, ...]:
@@ -111,8 +119,9 @@ def _scenario_row(name: str) -> tuple[str, ...]:
 
 
 def _scenario(name: str) -> str:
-    scenario = scenarios.get(name)
-    lines = [f"{name}: {scenario.steps} steps of {scenario.dt:g} s", "", scenario.source, ""]
+    scenario = scenarios.find(name)
+    lines = [f"{scenario.name}: {scenario.steps} steps of {scenario.dt:g} s", ""]
+    lines += [scenario.source, ""] if scenario.source else []
     return "\n".join([*lines, *(f"  {key:16} {value}" for key, value in _parts(scenario).items())])
 
 
@@ -126,7 +135,28 @@ def _parts(scenario: Scenario) -> dict[str, object]:
         "random": "yes, by the seed" if scenario.random else "no",
         "velocity limit": f"{', '.join(f'{x:g}' for x in limit)} rad/s or m/s",
         "cost": scenario.cost,
-    }
+    } | _path(scenario)
+
+
+def _path(scenario: Scenario) -> dict[str, object]:
+    """How long a path in space takes, and whether the arm can be there."""
+    if scenario.random or scenario.trajectory.joint_path(np.zeros(1)) is not None:
+        return {}
+    out: dict[str, object] = {}
+    if (duration := getattr(scenario.trajectory, "duration", None)) is not None:  # some go on for ever
+        out["path takes"] = f"{duration:.3g} s, the episode {scenario.steps * scenario.dt:.3g} s"
+    return out | {"within reach": _reach(scenario)}
+
+
+def _reach(scenario: Scenario) -> str:
+    """Which poses of a path the arm cannot take."""
+    missed = scenarios.gaps(scenario)
+    if not missed:
+        return "all poses that were looked at"
+    worst = max(missed, key=lambda gap: (gap.distance, gap.angle))
+    first, last = (f"{gap.time:.3g} s" for gap in (missed[0], missed[-1]))
+    far = f"{worst.distance:.3g} m and {worst.angle:.3g} rad"
+    return f"not all poses: missed from {first} to {last}, at ({_numbers(worst.position)}) m by {far}"
 
 
 def _policy_row(name: str) -> tuple[str, ...]:
@@ -174,12 +204,13 @@ def _filled(part: str, width: int) -> str:
     return textwrap.fill(part, width, subsequent_indent=" " * hanging, break_on_hyphens=False)
 
 
-ARMS = Catalogue("arm", arms.names, ("arm", "joints", "prismatic", "limits"), _arm_row, _arm)
+ARMS = Catalogue("arm", arms.names, ("arm", "joints", "prismatic", "limits"), _arm_row, _arm, ".urdf")
 SCENARIOS = Catalogue(
     "scenario",
     lambda: (*scenarios.names(), *scenarios.problems_from_elsewhere()),
     ("scenario", "arm", "task", "steps", "source"),
     _scenario_row,
     _scenario,
+    ".toml",
 )
 POLICIES = Catalogue("policy", registry.names, ("policy", "what it does"), _policy_row, _policy)

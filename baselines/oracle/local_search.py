@@ -63,7 +63,7 @@ def random_paths(problem, seed, paths, first, last):
     for s in range(first, last):
         drift[:] = 0.0
         damping = DAMPING if s == 0 else draw(seed, s, drift)
-        initial_guess(problem, 0, paths.shape[1], drift, damping, paths[s], workspace)
+        initial_guess(problem, 0, drift, damping, paths[s], workspace)
 
 
 @kernel
@@ -158,7 +158,7 @@ def branch_off(problem, draws, path, partners, drift, branch, workspace):
             _blend(other, path, off, width, branch)
     else:
         branch[:off] = path[:off]
-        initial_guess(problem, off, knots, drift, damping, branch, workspace)
+        initial_guess(problem, off, drift, damping, branch, workspace)
         if kind < BLENDED + BACK:
             # as far as it went off, so long it takes to come back
             length = max(uniform(key, own + 3) * (knots - off), 1.0)

@@ -18,6 +18,7 @@ from ikgym.registry import Registry
 from ikgym.scenarios import catalogue, elsewhere, families
 from ikgym.scenarios.disturbance import Disturbance
 from ikgym.scenarios.importing import imported
+from ikgym.scenarios.reachability import Gap, gaps
 from ikgym.scenarios.reading import load
 from ikgym.scenarios.scenario import Scenario
 from ikgym.validation import known_name, shortened, whole_number
@@ -25,9 +26,11 @@ from ikgym.validation import known_name, shortened, whole_number
 __all__ = [
     "SPLITS",
     "Disturbance",
+    "Gap",
     "Preview",
     "Scenario",
     "find",
+    "gaps",
     "get",
     "load",
     "names",

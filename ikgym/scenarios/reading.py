@@ -30,6 +30,8 @@ URDF_TEXTS = {
     "tip": "the name of a link",
 }
 URDF_NUMBERS = ("tool", "tool_rotation")
+#: What a URDF file does not hold and the scenario file may add, by the names that :class:`ikgym.Arm` has for it.
+ADDED_NUMBERS = ("acceleration_limit", "home")
 #: The keys of a trajectory that is read from a CSV file, and what each is; it may have an orientation besides.
 CSV_TEXTS = {"file": "a CSV file, relative to this file", "time_law": "the name of a time law"}
 CSV_NUMBERS = ("speed", "acceleration", "corner_radius")
@@ -101,12 +103,14 @@ def _arm(table: Table, key: str, folder: pathlib.Path) -> Arm:
         # Both are checked by the arm.
         return _made(key, Arm, arm, texts=("name",), truths=("prismatic", "joint_names"))  # type: ignore[no-any-return]
     with _named(f"[{key}] ", f" of [{key}]"):
-        known_names("key", arm, (*URDF_TEXTS, *URDF_NUMBERS))
-        for name in set(arm).intersection(URDF_NUMBERS):
+        known_names("key", arm, (*URDF_TEXTS, *URDF_NUMBERS, *ADDED_NUMBERS))
+        for name in set(arm).intersection(URDF_NUMBERS + ADDED_NUMBERS):
             only_numbers(name, arm[name])
         texts = {name: checked(arm, name, str, meant) for name, meant in URDF_TEXTS.items() if name in arm}
         path = folder / texts.pop("urdf")
-        return arms.from_urdf(path, **texts, **{name: arm[name] for name in URDF_NUMBERS if name in arm})
+        found = arms.from_urdf(path, **texts, **{name: arm[name] for name in URDF_NUMBERS if name in arm})
+        added = {name: arm[name] for name in ADDED_NUMBERS if name in arm}
+        return found.replace(**added) if added else found
 
 
 def _trajectory(table: Table, folder: pathlib.Path) -> Trajectory:

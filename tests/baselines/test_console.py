@@ -15,6 +15,7 @@ import baselines
 import ikgym
 from baselines import console
 from baselines.console import main
+from baselines.solvers.rivals.model_files import urdf
 
 ROOT = Path(__file__).parents[2]
 
@@ -139,7 +140,7 @@ def test_a_policy_is_shown_with_its_parameters(capsys):
     text = capsys.readouterr().out
     assert "Minimises" in text
     assert "    damping: λ, added to J Jᵀ as it is" in text
-    assert text.endswith("Defaults:\n  gain = 1.0\n  damping = 0.001\n")
+    assert text.endswith("Defaults:\n  gain = 1.0\n  saturation = 'clip'\n  damping = 0.001\n")
 
 
 def test_an_arm_and_a_scenario_are_shown(capsys):
@@ -149,6 +150,39 @@ def test_an_arm_and_a_scenario_are_shown(capsys):
     assert re.search(r"^3 +prismatic +-inf m +inf m +inf m/s +inf m/s²$", text, re.MULTILINE)
     assert main(["scenarios", "varga7-fast"]) == 0
     assert "varga7-fast: 3000 steps of 0.001 s" in capsys.readouterr().out
+
+
+def test_files_are_shown_like_members(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path("mine.urdf").write_text(urdf(ikgym.arms.get("tiago")), encoding="utf-8")
+    assert main(["arms", "mine.urdf"]) == 0
+    text = capsys.readouterr().out
+    assert text.startswith("mine.urdf: 8 joints, tool at ")
+    assert re.search(r"^1 +prismatic +0 m +0\.35 m +0\.07 m/s +inf m/s²$", text, re.MULTILINE)
+    ikgym.scenarios.get("panda-edge").replace(name="mine", source="").save("mine.toml")
+    assert main(["scenarios", "mine.toml"]) == 0
+    text = capsys.readouterr().out
+    assert text.startswith("mine: 3600 steps of 0.001 s\n\n  arm  ")
+    assert re.search(r"^  path takes +3\.5\d* s, the episode 3\.6 s$", text, re.MULTILINE)
+    assert re.search(r"^  within reach +not all poses: missed from 1\.\d+ s to 2\.\d+ s, at \(0\.8", text, re.MULTILINE)
+    assert main(["scenarios", "panda-line"]) == 0
+    assert re.search(r"^  within reach +all poses that were looked at$", capsys.readouterr().out, re.MULTILINE)
+    assert main(["scenarios", "panda-random"]) == 0
+    assert "within reach" not in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["arms", "none.urdf"], "none.urdf: expected a URDF file, got none that can be read"),
+        (["scenarios", "none.toml"], "none.toml: expected a TOML file, got none that can be read"),
+        (["arms", "mine.toml"], "There is no arm 'mine.toml'."),
+    ],
+)
+def test_files_that_cannot_be_shown(arguments, message, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(arguments) == 2
+    assert message in capsys.readouterr().err
 
 
 def test_the_table_stands_before_the_plots_and_the_readme_has_the_command(tmp_path, capsys):

@@ -209,6 +209,17 @@ def test_an_arm_from_a_urdf_is_a_reference_to_it(urdf, where, tmp_path, monkeypa
     assert fingerprint(read) == fingerprint(scenario)
 
 
+def test_what_a_urdf_has_not_is_added(urdf, tmp_path):
+    file = tmp_path / "mine.toml"
+    on_urdf(urdf).save(file)
+    file.write_text(file.read_text().replace("[arm]", "[arm]\nhome = [0.1, 0.2]\nacceleration_limit = [5.0, 5.0]"))
+    arm = load(file).arm
+    np.testing.assert_array_equal(arm.home, [0.1, 0.2])
+    np.testing.assert_array_equal(arm.acceleration_limit, [5.0, 5.0])
+    load(file).save(tmp_path / "again.toml")
+    assert identical(fields(load(tmp_path / "again.toml")), fields(load(file)))
+
+
 @pytest.mark.parametrize("change", ["gone", "another", "faulty"])
 def test_an_arm_whose_urdf_has_changed_is_written_in_numbers(urdf, change, tmp_path):
     scenario = on_urdf(urdf)
@@ -439,6 +450,7 @@ BAD = {
     "urdf": ({"arm": "{urdf = 3}"}, r"\[arm\] urdf: expected a URDF file, relative to this file, got 3"),
     "tip": ({"arm": "{urdf = 'a.urdf', tip = 3}"}, r"\[arm\] tip: expected the name of a link, got 3"),
     "tool": ({"arm": "{urdf = 'a.urdf', tool = 'x'}"}, r"\[arm\] tool: expected numbers, got 'x'"),
+    "home": ({"arm": "{urdf = 'a.urdf', home = 'x'}"}, r"\[arm\] home: expected numbers, got 'x'"),
     "no toml": ({"name": "'"}, "expected TOML, got a fault"),
     "deep": ({"dt": "[" * 10**5}, "expected a TOML file, got none that can be read|expected TOML"),
 }

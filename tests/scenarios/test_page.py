@@ -13,7 +13,7 @@ import pytest
 import ikgym
 from baselines.fingerprints import fingerprint
 from ikgym.scenarios import Scenario
-from ikgym.scenarios.reading import CSV_NUMBERS, CSV_TEXTS, URDF_NUMBERS, URDF_TEXTS
+from ikgym.scenarios.reading import ADDED_NUMBERS, CSV_NUMBERS, CSV_TEXTS, URDF_NUMBERS, URDF_TEXTS
 from tests.arms.test_urdf import joint, robot
 
 ROOT = Path(__file__).parents[2]
@@ -56,7 +56,7 @@ def test_the_table_of_keys_is_complete():
 
 def test_the_arm_from_a_urdf_is_read(tmp_path):
     arm = tomllib.loads(ON_URDF)["arm"]
-    assert set(arm) <= {*URDF_TEXTS, *URDF_NUMBERS}
+    assert set(arm) <= {*URDF_TEXTS, *URDF_NUMBERS, *ADDED_NUMBERS}
     (tmp_path / "robots").mkdir()
     xml = robot(joint("j1", "base_link", "b"), joint("j2", "b", "flange"), links=("base_link", "b", "flange"))
     (tmp_path / arm["urdf"]).write_text(xml)
@@ -65,6 +65,8 @@ def test_the_arm_from_a_urdf_is_read(tmp_path):
     scenario = ikgym.scenarios.load(tmp_path / "x.toml")
     assert scenario.arm.joints == 2
     np.testing.assert_allclose(scenario.arm.forward([0, 0])[1], [0, 0, 0.1])
+    assert scenario.arm.acceleration_limit.tolist() == arm["acceleration_limit"]
+    assert scenario.arm.home.tolist() == arm["home"]
 
 
 def test_the_kinds_of_trajectories_are_named():

@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 from baselines import command as shared
 from baselines.evaluation.machine import describe
 from baselines.evaluation.pages import cost_time, families, foresight, leaderboard, rivals, sets, tuning
+from baselines.evaluation.pages.choosing import page as choosing
 from baselines.evaluation.pages.entries import FORESIGHT, HORIZONS, Entry, agents, playing, shipped, solvers
 from baselines.evaluation.pages.markdown import table
 from baselines.evaluation.pages.measure import measure
@@ -30,11 +31,14 @@ from ikgym.exceptions import InvalidInputError
 from ikgym.validation import whole_number
 
 #: The names of the pages on the command line.
-Page = Literal["leaderboard", "cost-time", "foresight", "leaderboard-skew", "rivals"]
+Page = Literal["leaderboard", "cost-time", "foresight", "leaderboard-skew", "rivals", "choosing"]
 LEADERBOARD: Final = "leaderboard"
 COST_TIME: Final = "cost-time"
 FORESIGHT_PAGE: Final = "foresight"
 RIVALS: Final = "rivals"
+CHOOSING: Final = "choosing"
+#: The pages that need the extra `rivals`, and have no plots.
+REAL_ARMS: Final = {RIVALS: rivals.page, CHOOSING: choosing.page}
 #: The leaderboards, and the main test set of each.
 LEADERBOARDS: Final = {LEADERBOARD: sets.MAIN, "leaderboard-skew": sets.SKEW}
 
@@ -44,9 +48,9 @@ class Options:
     """What the command line takes."""
 
     pages: Annotated[tuple[Page, ...], tyro.conf.arg(metavar="PAGE …")] = (LEADERBOARD, COST_TIME, FORESIGHT_PAGE)
-    """The pages: leaderboard, cost-time, foresight, leaderboard-skew, rivals. What several need is played once. If left
-    out the first three: leaderboard-skew stands on the papers' own skew coordinates, rivals needs the extra of that
-    name."""
+    """The pages: leaderboard, cost-time, foresight, leaderboard-skew, rivals, choosing. What several need is played
+    once. If left out the first three: leaderboard-skew stands on the papers' own skew coordinates, the last two need
+    the extra rivals."""
     out: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="DIR")] = None
     """Folder for the results. If left out nothing is played, and --write writes the pages anew from what lies beside
     them."""
@@ -58,7 +62,7 @@ class Options:
     training seeds, with DIR/seed-N/agent.safetensors and DIR/seed-N/run.json."""
     sets: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME …")] = ()
     """Test sets and scenarios of the cost-time page. If left out the test sets of whole poses, and the fixed scenarios
-    but for those that hold their points. Scenarios of the page of rivals, all paths of its arms if left out. With
+    but for those that hold their points. Those of the last two pages likewise, all paths of real arms if left out. With
     --tune the scenario whose validation episodes are played."""
     tune: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None
     """Search the settings of all solvers on validation episodes, and write them here; nothing else is done. The
@@ -89,7 +93,7 @@ Examples:
   {prog} --tune baselines/data/tuned/{sets.MAIN}.json --sets {sets.MAIN}
   {prog} --out results/pages --agents "PPO=results/ppo" --write docs
   {prog} --pages cost-time --out results/quick --quick
-  {prog} --pages rivals --out results/rivals --write docs
+  {prog} --pages rivals choosing --out results/arms --write docs
   {prog} --write docs
 
 Files:
@@ -158,7 +162,7 @@ def pictures(measurement: Measurement, page: str) -> Iterator[tuple[pathlib.Pure
     """The plots of a page, and where they lie, seen from it."""
     if page in LEADERBOARDS:
         return leaderboard.pictures(measurement, page)
-    if page == RIVALS:
+    if page in REAL_ARMS:
         return iter(())
     return foresight.pictures(measurement) if page == FORESIGHT_PAGE else cost_time.pictures(measurement)
 
@@ -172,8 +176,8 @@ def text(measurement: Measurement, page: str) -> str:
     """
     if page in LEADERBOARDS:
         return leaderboard.page(measurement, tuning.of(LEADERBOARDS[page]), page)
-    if page == RIVALS:
-        return rivals.page(measurement)
+    if page in REAL_ARMS:
+        return REAL_ARMS[page](measurement)
     return foresight.page(measurement) if page == FORESIGHT_PAGE else cost_time.page(measurement)
 
 
@@ -220,12 +224,15 @@ def _entered(options: Options) -> dict[str, dict[str, list[Entry]]]:
     if RIVALS in options.pages:
         names = options.sets or (rivals.QUICK_SETS if options.quick else sets.rivals())
         out[RIVALS] = {name: list(rivals.entries()) for name in names}
+    if CHOOSING in options.pages:
+        names = options.sets or (rivals.QUICK_SETS if options.quick else choosing.played())
+        out[CHOOSING] = {name: list(choosing.entries(name)) for name in names}
     return out
 
 
 def _machine(page: str) -> dict[str, object]:
     """What a page was measured on and with."""
-    return describe() | (rivals.versions() if page == RIVALS else {})
+    return describe() | (rivals.versions() if page in REAL_ARMS else {})
 
 
 def _quick(options: Options, everyone: Sequence[Entry]) -> list[Entry]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import importlib.metadata
 from collections.abc import Iterator, Sequence
@@ -55,9 +56,12 @@ def entries() -> tuple[Entry, ...]:
 
 
 def versions() -> dict[str, str]:
-    """The versions of the rivals' packages, and of the solvers of their programs."""
-    packages = [kind.distribution for kind in _rivals().values()]
-    return {name: importlib.metadata.version(name) for name in (*packages, "daqp", "quadprog")}
+    """The versions of the rivals' packages that are installed, and of the solvers of their programs."""
+    found = {}
+    for name in (*(kind.distribution for kind in _rivals().values()), "daqp", "quadprog"):
+        with contextlib.suppress(importlib.metadata.PackageNotFoundError):
+            found[name] = importlib.metadata.version(name)
+    return found
 
 
 def page(measurement: Measurement) -> str:

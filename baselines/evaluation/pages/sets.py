@@ -5,14 +5,16 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Mapping
 
+import numpy as np
+
 from baselines.evaluation import test_sets
-from ikgym import scenarios
+from ikgym import arms, scenarios
 from ikgym.scenarios import Scenario
 from ikgym.trajectories import RandomSinusoid
 
 #: The test set that scores are published on, the long one beside it, and the one in the papers' own skew coordinates.
 MAIN, LONG, SKEW = "varga7-pose-random", "varga7-pose-random-long", "varga7-random"
-#: The arms of the page of rivals.
+#: The arms of the pages of rivals and of choosing.
 RIVAL_ARMS = ("panda", "iiwa14", "tiago")
 #: Episodes of a random scenario that is no test set: the first of the test split.
 EPISODES = 32
@@ -40,6 +42,50 @@ CHANGED: Mapping[str, tuple[Callable[[], Scenario], str]] = {
         ("frequency", faster, "frequencies of 1 to 4 rad/s instead of 1 to 3 rad/s"),
     )
 }
+
+#: The Pandas whose kinematics were measured.
+CALIBRATED = ("panda-2", "panda-3", "panda-4", "panda-6", "panda-7")
+#: A tool that solvers are not told of: so much longer in [m], and turned by so much about the z axis in [rad].
+LONGER, TURNED = 0.2, np.pi / 6.0
+#: The share of the Panda's acceleration limits that a gentle one has, and the paths that it follows: what the paths
+#: demand of it by itself is less.
+GENTLE = 0.5
+GENTLE_PATHS = ("panda-gentle-square", "panda-gentle-raster", "panda-gentle-line")
+
+
+def gentle(name: str) -> Scenario:
+    """A scenario of the Panda with lower acceleration limits."""
+    base = scenarios.get(name.replace("-gentle", ""))
+    limit = GENTLE * base.arm.acceleration_limit
+    return base.replace(name=name, arm=base.arm.replace(name="panda-gentle", acceleration_limit=limit))
+
+
+def calibrated(arm: str) -> Scenario:
+    """The Panda's circle with a Panda whose kinematics were measured; solvers know the nominal ones."""
+    return scenarios.get("panda-circle").replace(name=f"{arm}-circle", arm=arms.get(arm), model=arms.get("panda"))
+
+
+def unknown_tool() -> Scenario:
+    """The Panda's circle with a tool that solvers are not told of."""
+    arm, base = arms.get("panda"), scenarios.get("panda-circle")
+    cos, sin = np.cos(TURNED), np.sin(TURNED)
+    turned = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+    tool = arm.tool + LONGER * arm.tool_rotation[:, 2]
+    longer = arm.replace(name="panda-tool", tool=tool, tool_rotation=arm.tool_rotation @ turned)
+    return base.replace(name="panda-tool-circle", arm=longer, model=arm)
+
+
+#: Scenarios with other limits, or in which solvers know another arm than the one that moves.
+OTHER_ARMS: Mapping[str, Callable[[], Scenario]] = {
+    **{f"{arm}-circle": functools.partial(calibrated, arm) for arm in CALIBRATED},
+    "panda-tool-circle": unknown_tool,
+    **{name: functools.partial(gentle, name) for name in GENTLE_PATHS},
+}
+
+
+def paths(*names: str, of: tuple[str, ...] = RIVAL_ARMS) -> tuple[str, ...]:
+    """The scenarios in which these arms follow these paths."""
+    return tuple(f"{arm}-{name}" for arm in of for name in names)
 
 
 def leaderboard(main: str = MAIN) -> tuple[str, ...]:
@@ -69,7 +115,7 @@ def rivals() -> tuple[str, ...]:
 
 
 def get(name: str) -> Scenario:
-    """The scenario of a test set, a changed scenario, or a registered one.
+    """The scenario of a test set, a changed scenario, one with another arm, or a registered one.
 
     Raises:
         UnknownNameError: There is none of that name.
@@ -77,6 +123,8 @@ def get(name: str) -> Scenario:
     """
     if name in test_sets.names():
         return test_sets.get(name).scenario
+    if name in OTHER_ARMS:
+        return OTHER_ARMS[name]()
     return CHANGED[name][0]() if name in CHANGED else scenarios.get(name)
 
 

@@ -22,13 +22,12 @@ STREAM = 256
 
 
 @kernel
-def initial_guess(problem, first, until, drift, damping, path, workspace):
-    """Goes from knot to knot by damped least squares, drifting in the null space of the task for a while.
+def initial_guess(problem, first, drift, damping, path, workspace):
+    """Goes from knot to knot by damped least squares, drifting in the null space of the task.
 
     Args:
         problem: A :class:`workspace.PathProblem` of K knots.
         first: The first knot to be set; those before stay as they are.
-        until: The first knot on the way to which there is no drift any more.
         drift: Joint velocities of which the part that does not move the task is added, in [rad/s] or [m/s].
             Shape (n,).
         damping: λ of the damped least squares.
@@ -51,7 +50,7 @@ def initial_guess(problem, first, until, drift, damping, path, workspace):
             task_kernels.jacobian(data.kind, rotation, workspace.geometric, jacobian)
             if correction == 0:
                 # What the drift would do to the task is taken out of the error, and so out of the step.
-                span = grid.length[k] * data.dt if k < until else 0.0
+                span = grid.length[k] * data.dt
                 for i in range(e):
                     error[i] -= span * dot(jacobian[i], drift)
             if not damped_step(jacobian, error, damping, workspace.gram, workspace.solution, move):

@@ -124,7 +124,7 @@ def initial_plan(problem, settings, plan, workspace):
         workspace.drift[:] = 0.0
         if trial > 0:
             damping = draw(settings.seed, trial, workspace.drift)
-        _guess(problem, settings, 0, knots, damping, plan.path, workspace)
+        _guess(problem, settings, 0, damping, plan.path, workspace)
         plan.multipliers[:] = 0.0
         if trials == 1:
             return 0
@@ -141,9 +141,9 @@ def initial_plan(problem, settings, plan, workspace):
 
 
 @inlined
-def _guess(problem, settings, first, until, damping, path, workspace):
+def _guess(problem, settings, first, damping, path, workspace):
     """An initial guess from knot ``first`` on, with the drift in the workspace; slowed down where plans may recover."""
-    initial_guess(problem, first, until, workspace.drift, damping, path, workspace.newton.knot)
+    initial_guess(problem, first, workspace.drift, damping, path, workspace.newton.knot)
     if settings.recovery_steps > 0:
         slow_down(problem, path)
 
@@ -166,7 +166,7 @@ def try_start(problem, settings, steps, plan, cost, number, workspace):
     """
     guess, newton = first_part(workspace.kept, plan.path.shape[0]), workspace.newton
     damping = draw(settings.seed, number, workspace.drift)
-    _guess(problem, settings, 0, guess.path.shape[0], damping, guess.path, workspace)
+    _guess(problem, settings, 0, damping, guess.path, workspace)
     guess.multipliers[:] = 0.0
     few = NewtonSettings(False, steps, TOLERANCE_OF_A_START)
     minimum = minimise_path(problem, guess.path, guess.multipliers, few, 0.0, newton)
@@ -178,9 +178,6 @@ def try_start(problem, settings, steps, plan, cost, number, workspace):
 @kernel
 def branch_off(problem, settings, plan, anew, number, candidate, workspace):
     """Begins a restart candidate: the plan up to a random knot, and from there on a random guess.
-
-    Where initial guesses have periods of their own, the drift of the guess ends at another random knot: who has gone
-    elsewhere in the null space may stay there.
 
     Args:
         problem: A :class:`workspace.PathProblem` of K knots.
@@ -197,9 +194,7 @@ def branch_off(problem, settings, plan, anew, number, candidate, workspace):
     candidate.multipliers[:branch] = plan.multipliers[:branch]
     candidate.multipliers[branch:] = 0.0
     damping = draw(settings.seed, number, workspace.drift)
-    share = uniform(settings.seed, STREAM * number + STREAM - 1) if settings.start_steps > 0 else 1.0
-    until = branch + 1 + int(share * (knots - branch))
-    _guess(problem, settings, branch, until, damping, candidate.path[:knots], workspace)
+    _guess(problem, settings, branch, damping, candidate.path[:knots], workspace)
 
 
 @kernel

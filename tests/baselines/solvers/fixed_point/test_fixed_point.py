@@ -15,6 +15,7 @@ from baselines.solvers.fixed_point.contraction import contraction, evaluate
 from baselines.status import Status
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 from tests.comparison import identical
+from tests.every_scenario import ONE_OF_EACH
 
 REGULAR = "faitli3-regular"
 Q = np.array([0.1, 0.4, 1.0])
@@ -217,7 +218,7 @@ def test_needs_a_square_task_without_the_jacobian():
         baselines.make("fixed_point", "zhang6-lspb", transformation=transformation)
 
 
-@pytest.mark.parametrize("name", ikgym.scenarios.names())
+@pytest.mark.parametrize("name", ONE_OF_EACH)
 def test_the_bound_of_the_jacobian_holds_and_a_is_left_to_it(name):
     scenario = ikgym.scenarios.get(name)
     policy = baselines.make("fixed_point", scenario)

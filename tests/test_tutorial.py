@@ -1,0 +1,67 @@
+"""The tutorial: all of it is run, in a folder of its own, and prints what the page says."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+import baselines
+from docs.tutorial import PAGE, played
+
+TEXT = PAGE.read_text(encoding="utf-8")
+REMEDY = "write it anew with: python -m docs.tutorial"
+#: The end of a line of the table of solvers: p50, p99 and misses, which are measured with a clock, and the status.
+CLOCK = re.compile(r"\S+ +\S+ +\d+ +(applied|saturated|converged)$", re.MULTILINE)
+
+
+def tokens(text):
+    """Words and numbers, without what depends on the clock."""
+    return re.sub(r"-{5,}", "-----", CLOCK.sub(r"\1", text)).split()
+
+
+def same(one, other):
+    try:
+        return float(one) == pytest.approx(float(other), rel=1e-2)
+    except ValueError:
+        return one == other
+
+
+def differences(one, other):
+    first, second = tokens(one), tokens(other)
+    found = [(a, b) for a, b in zip(first, second, strict=False) if not same(a, b)]
+    return found or (first[len(second) :] + second[len(first) :])
+
+
+def test_it_runs_and_prints_what_the_page_says(tmp_path):
+    text = played(TEXT, tmp_path)
+    assert not differences(text, TEXT), REMEDY
+    exported = sorted(file.name for file in (tmp_path / "results" / "export" / "weld").iterdir())
+    assert [name.rpartition("-seed-0")[2] for name in exported] == [".csv", ".json"]
+
+
+def test_a_page_that_says_something_else_is_noticed(tmp_path):
+    block = "```python\nprint(x, 20.5, 'words')\n```\n\n```text\n7 20.5 words\n```\n"
+    page = f"```python\nx = 7\n```\n\n{block}"
+    assert not differences(played(page, tmp_path), page)
+    for wrong in ("8 20.5 words", "7 20.9 words", "7 20.5 word", "7 20.5 words too", "7 20.5"):
+        changed = page.replace("7 20.5 words\n", f"{wrong}\n")
+        assert differences(played(changed, tmp_path), changed), wrong
+
+
+def row(policy):
+    """Cells of a solver in the table of the page: its marks, and numbers from the total cost on."""
+    words = re.search(rf"^{policy} .*$", TEXT, re.MULTILINE)[0].replace("†", "").split()
+    keys = ("total", "tracking", "velocity", "ratio", "position", "orientation", "peak", "p50", "p99")
+    return dict(zip(keys, [float(x) if x != "–" else None for x in words[1:10]], strict=True))
+
+
+def test_what_it_says_of_the_table():
+    rows = {name: row(name) for name in ("dls", "qp", "rhc")}
+    assert re.findall(r"^(\w+) †", TEXT, re.MULTILINE) == ["dls"]
+    assert rows["qp"]["position"] > 5.0  # [mm]
+    assert rows["rhc"]["position"] < 0.1  # [mm]
+    assert rows["rhc"]["peak"] < 0.5 * min(rows["dls"]["peak"], rows["qp"]["peak"])
+    assert rows["rhc"]["total"] == min(one["total"] for one in rows.values())
+    assert "`rhc` looks 29 steps ahead" in TEXT
+    assert baselines.make("rhc", "panda-line").preview == 29
