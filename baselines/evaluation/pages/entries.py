@@ -36,13 +36,6 @@ FULL_ORIENTATION = tuple(
     for horizon, blocks in ((100, 23), (400, 30))
 )
 HORIZONS = ("rhc:horizon=3", "rhc:horizon=3,iterations=1", "rhc:horizon=100", *BLOCKED, *FULL_ORIENTATION)
-#: Solvers whose figures on the pages are of what was the default when they were measured; to be emptied when they are
-#: measured again.
-RECORDED = {
-    "jacobian_transpose": "jacobian_transpose:length=1.0",
-    "fixed_point": "fixed_point:length=1.0",
-    "abstract_rotation": "abstract_rotation:lambda_a=0.0005",
-}
 #: The solvers that are also played where no solver was tuned and no agent trained, as they are and tuned.
 GENERAL = (
     *("dls", "full_orientation", "null_space", "mfac", "rhc_gradient"),
@@ -131,7 +124,7 @@ def compared(*besides: type) -> list[str]:
     """Specs of the registered policies that pages compare, but for references, examples, rivals and these classes."""
     classes = {name: registry.get(name) for name in registry.names() if name not in WITHIN_LIMITS}
     special = {name for name, kind in classes.items() if kind.reference or kind.example or kind.rival}
-    return [RECORDED.get(n, n) for n, kind in classes.items() if n not in special and not issubclass(kind, besides)]
+    return [name for name, kind in classes.items() if name not in special and not issubclass(kind, besides)]
 
 
 def solvers(tuned: Mapping[str, Mapping[str, Any]] = MappingProxyType({})) -> tuple[Entry, ...]:
