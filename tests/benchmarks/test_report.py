@@ -86,7 +86,8 @@ def test_quick_report_is_complete(tmp_path, capsys):
         assert table.text() in printed
         assert len(written["rows"]) == len(table.rows) >= 1
         for row in written["rows"]:
-            figures = [row[column["key"]] for column in written["columns"] if isinstance(row[column["key"]], float)]
+            united = [column for column in written["columns"] if column["unit"]]
+            figures = [row[column["key"]] for column in united or written["columns"]]  # ratios alone have no unit
             assert figures
             assert all(math.isfinite(figure) and figure > 0 for figure in figures)
 
