@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 
 import numpy as np
 
@@ -114,9 +115,10 @@ class Optimum(Frozen):
 
         Returns:
             ``starts`` on the coarse grid, and how many of them came ``within_1_percent`` of the best there without
-            local search, their ``median`` and ``worst`` cost; paths ``polished`` at full resolution, and how many of
-            them came ``polished_within_1e-6`` of the best; and the cost ``without_search``, the lowest of those that
-            did not come from a search: of the nominal joint path, the roll-out, receding horizons, given policies.
+            local search, the ``median`` and ``worst`` cost of those that keep the limits; paths ``polished`` at full
+            resolution, and how many of them came ``polished_within_1e-6`` of the best; and the cost ``without_search``,
+            the lowest of those that did not come from a search: of the nominal joint path, the roll-out, receding
+            horizons, given policies.
         """
         coarse = [one.coarse for one in self.starts if one.coarse is not None]
         first = [one.coarse for one in self.starts if one.coarse is not None and one.kind != LOCAL_SEARCH]
@@ -126,12 +128,12 @@ class Optimum(Frozen):
         }
         if known := [one.cost for one in self.starts if one.cost is not None and one.kind not in SEARCHED]:
             out["without_search"] = min(known)
-        if first:
+        if within := [cost for cost in first if math.isfinite(cost)]:
             out |= {
                 "starts": len(first),
                 "within_1_percent": sum(cost <= 1.01 * min(coarse) for cost in first),
-                "median": float(np.median(first)),
-                "worst": max(first),
+                "median": float(np.median(within)),
+                "worst": max(within),
             }
         return out
 

@@ -1,5 +1,6 @@
 import dataclasses
 import json
+import math
 
 import numpy as np
 import pytest
@@ -159,12 +160,13 @@ def test_what_is_said_of_the_starts():
         Start(RANDOM, 1, 10.2, 10.0),
         Start(RANDOM, 2, 10.06, 10.0 * (1.0 + 1e-5)),
         Start(RANDOM, 3, 900.0),
+        Start(RANDOM, 4, math.inf),  # leaves the limits
         Start(LOCAL_SEARCH, None, 10.05, 10.0),
     )
     optimum = solve(short(steps=2), 0, QUICK).replace(cost=10.0, starts=starts)
     assert optimum.found_by == "nominal joint path; random start; local search"
     assert optimum.spread == {
-        "starts": 4,
+        "starts": 5,
         "within_1_percent": 1,
         "median": (100.0 + 10.2) / 2.0,
         "worst": 900.0,
