@@ -83,8 +83,7 @@ def episodes(scenarios: Sequence[str], test_sets: Sequence[str], seeds: Sequence
 
     Args:
         scenarios: Names of scenarios.
-        test_sets: Names of test sets. Where neither these nor scenarios are named, all fixed scenarios and all
-            sets of arms without limits.
+        test_sets: Names of test sets. Where neither these nor scenarios are named, all fixed scenarios and all sets.
         seeds: Reset seeds of the random scenarios.
 
     Raises:
@@ -103,9 +102,8 @@ def episodes(scenarios: Sequence[str], test_sets: Sequence[str], seeds: Sequence
         whole_number("seeds", seed, at_least=0)
     if not (scenarios or test_sets):
         every = map(scenario_registry.get, scenario_registry.names())
-        # The search knows no limits yet: what is cheapest without them is no standard for an arm that has some.
-        named = [scenario for scenario in every if not scenario.random and not scenario.arm.limited]
-        test_sets = [name for name in known_sets.names() if not known_sets.get(name).scenario.arm.limited]
+        named = [scenario for scenario in every if not scenario.random]
+        test_sets = known_sets.names()
     out = [(scenario, seed) for scenario in named for seed in (seeds if scenario.random else (0,))]
     for one in map(known_sets.get, test_sets):
         out += [(one.scenario, seed) for seed in one.seeds]
