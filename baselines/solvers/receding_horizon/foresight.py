@@ -48,6 +48,7 @@ class RecedingHorizonForesight(RecedingHorizon):
     stop_at_end: bool = True
     starts: int | None = None  # type: ignore[assignment]
     restart_steps: int | None = None  # type: ignore[assignment]
+    seed: int = 2
     start_steps: int | None = None  # type: ignore[assignment]
     recovery_steps: int = 4
 
