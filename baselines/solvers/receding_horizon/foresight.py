@@ -48,7 +48,6 @@ class RecedingHorizonForesight(RecedingHorizon):
     stop_at_end: bool = True
     starts: int | None = None  # type: ignore[assignment]
     restart_steps: int | None = None  # type: ignore[assignment]
-    seed: int = 2
     start_steps: int | None = None  # type: ignore[assignment]
     recovery_steps: int = 4
 
@@ -69,5 +68,5 @@ class RecedingHorizonForesight(RecedingHorizon):
     def _knots(self) -> npt.NDArray[np.int64]:
         """Steps from now to the knots. Shape (K,)."""
         if self.move_blocks is None:
-            return evenly_growing_offsets(self.horizon - 1, GROWTH, LONGEST)
+            return evenly_growing_offsets(self.horizon - 1, GROWTH, LONGEST)  # type: ignore[operator]
         return super()._knots()
