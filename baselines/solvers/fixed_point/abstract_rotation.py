@@ -15,7 +15,7 @@ from baselines.policy import Batch, Memory, Problem, Solution, SolverPolicy
 from baselines.solvers.arm_size import jacobian_bound
 from baselines.solvers.arm_task import arm_task_of, plain_arm_task, pose_arrays
 from baselines.solvers.fixed_point.rotations import adaptive_deform, plane, turn
-from baselines.solvers.linear_algebra import dot
+from baselines.solvers.linear_algebra import dot, transposed_product
 from baselines.status import Status
 from ikgym import arms, task_kernels, tasks
 from ikgym.exceptions import InvalidInputError
@@ -241,9 +241,9 @@ def turn_rows(arm_task, rule, observed, memory, goal, status):
         angles[row, 0] = 0.0
         if method.counter_rotation == _TASK:
             angles[row, 0] = _turn_back(missing, direction[row], e_a, e_b, seen, wanted)
-        _transposed(jacobian, missing, h)
-        _transposed(jacobian, seen, actual)
-        _transposed(jacobian, wanted, desired)
+        transposed_product(jacobian, missing, h)
+        transposed_product(jacobian, seen, actual)
+        transposed_product(jacobian, wanted, desired)
         if method.counter_rotation == _JOINTS:
             angles[row, 0] = _turn_back(h, direction[row], e_a, e_b, actual, desired)
         direction[row] = missing if method.counter_rotation == _TASK else h
@@ -282,15 +282,6 @@ def _turn_back(now, last, e_a, e_b, actual, desired):
     turn(e_a, e_b, angle, actual)
     turn(e_a, e_b, angle, desired)
     return angle
-
-
-@kernel
-def _transposed(jacobian, vector, out):
-    """J̃ᵀ times a vector: shapes (m, n), (m,), (n,)."""
-    out[:] = 0.0
-    for i in range(vector.shape[0]):
-        for j in range(out.shape[0]):
-            out[j] += jacobian[i, j] * vector[i]
 
 
 def _share(problem: Problem) -> float:
