@@ -12,7 +12,7 @@ import numpy.typing as npt
 from baselines.policy_kernels import REFUSED, all_finite, cut_rows
 from baselines.solvers.arm_task import period_of
 from baselines.solvers.quadratic_program.box_minimum import box_minimum
-from baselines.solvers.quadratic_program.limits import limit_rows
+from baselines.solvers.quadratic_program.limits import limits_with_braking
 from baselines.solvers.quadratic_program.program import (
     SCALING_WEIGHT,
     curvature,
@@ -127,7 +127,7 @@ class QuadraticProgram(TaskFeedback):
     def numbers(self) -> tuple[Any, ...]:
         """See :meth:`TaskFeedback.numbers`."""
         share = self.braking_share if self._brakes else 0.0
-        return self.damping, self.lm_damping, share, self.task_scaling, self._pull, limit_rows(self.problem)
+        return self.damping, self.lm_damping, share, self.task_scaling, self._pull, limits_with_braking(self.problem)
 
     def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
         """A factorisation for each active set, which are the iterations, and one for the braking, where used."""

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from baselines.policy_kernels import REFUSED, all_finite, cut_rows
 from baselines.solvers.arm_task import period_of
 from baselines.solvers.linear_algebra import inverted, singular_values
-from baselines.solvers.quadratic_program.limits import limit_rows
+from baselines.solvers.quadratic_program.limits import limits_with_braking
 from baselines.solvers.quadratic_program.velocity_box import velocity_box
 from baselines.solvers.resolved_rate.base import APPLIED, TaskFeedback, asked
 from baselines.status import Status
@@ -62,7 +62,7 @@ class SaturationInNullSpace(TaskFeedback):
 
     def numbers(self) -> tuple[Any, ...]:
         """See :meth:`TaskFeedback.numbers`."""
-        return self.damping, limit_rows(self.problem)
+        return self.damping, limits_with_braking(self.problem)
 
     def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
         """A decomposition for each set of saturated joints, which are the iterations."""
