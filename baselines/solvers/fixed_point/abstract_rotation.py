@@ -21,7 +21,7 @@ from ikgym import arms, task_kernels, tasks
 from ikgym.exceptions import InvalidInputError
 from ikgym.jit import kernel
 from ikgym.kinematics import forward_and_jacobian
-from ikgym.validation import FloatArray, known_name, number, per_joint
+from ikgym.validation import FloatArray, as_given, known_name, number, per_joint
 
 #: What 𝒩 turns, with the numbers that the kernel knows.
 COUNTER_ROTATIONS = {"none": 0, "joints": 1, "task": 2}
@@ -162,8 +162,7 @@ class AbstractRotation(SolverPolicy):
         weights = tuple(_checked_weights(name, getattr(self, name), size) for name, size in sizes.items())
         object.__setattr__(self, "_weights", weights)
         for name, array in zip(sizes, weights, strict=True):
-            given = getattr(self, name)
-            object.__setattr__(self, name, float(given) if np.ndim(given) == 0 else tuple(array.tolist()))
+            object.__setattr__(self, name, as_given(getattr(self, name), array))
         known_name("counter_rotation", self.counter_rotation, COUNTER_ROTATIONS)
         known_name("deformation", self.deformation, DEFORMATIONS)
         known_name("jacobian", self.jacobian, JACOBIANS)

@@ -25,10 +25,11 @@ from baselines.solvers.quadratic_program.program import (
 from baselines.solvers.quadratic_program.velocity_box import velocity_box
 from baselines.solvers.resolved_rate.base import APPLIED, TaskFeedback, asked_apart
 from baselines.status import Status
+from ikgym.arms.limits import middle
 from ikgym.exceptions import InvalidInputError
 from ikgym.jit import kernel
 from ikgym.limit_kernels import CHANGE, FASTEST
-from ikgym.validation import FloatArray, number, per_joint, read_only
+from ikgym.validation import FloatArray, as_given, number, per_joint, read_only
 
 LIMIT, SATURATED = int(Status.ITERATION_LIMIT), int(Status.SATURATED)
 
@@ -106,14 +107,12 @@ class QuadraticProgram(TaskFeedback):
         everywhere = np.full(model.joints, self.secondary_gain)
         if self.posture is not None:
             posture = per_joint("posture", self.posture, model.joints)
-            scalar = np.ndim(self.posture) == 0
-            object.__setattr__(self, "posture", float(posture[0]) if scalar else tuple(posture.tolist()))
+            object.__setattr__(self, "posture", as_given(self.posture, posture))
             return posture, everywhere
         if model.home is not None:
             return model.home, everywhere
-        limited = np.isfinite(model.lower) & np.isfinite(model.upper)
-        middle = 0.5 * (np.where(limited, model.lower, 0.0) + np.where(limited, model.upper, 0.0))
-        return middle, np.where(limited, everywhere, 0.0)
+        limited, posture = middle(model)
+        return posture, np.where(limited, everywhere, 0.0)
 
     @property
     def _brakes(self) -> bool:
