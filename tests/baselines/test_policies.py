@@ -64,8 +64,8 @@ def policy_for(name, on):
             assert on != usual(name)
             return None
         # An agent suits the arms of its size, and only skew coordinates have an ambiguity to resolve.
-        folded = name != "full_orientation" or scenario(on).task.name == "skew"
-        if folded and not (issubclass(get(name), ShippedAgent) or (name, on) in UNSUITED):
+        suits = name != "full_orientation" or scenario(on).task.name == "skew"
+        if suits and not (issubclass(get(name), ShippedAgent) or (name, on) in UNSUITED):
             assert name in HANDED_THE_PATH
             assert scenario(on).nominal_joint_path(1) is None
         return None
