@@ -81,7 +81,6 @@ def test_few_periods_are_longer_than_others():
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(reason="0.66 % on 64 validation episodes: few periods are long, which costs guesses", strict=False)
 def test_initial_guesses_one_after_the_other_lose_little():
     """At most 0.5 % in the geometric mean against 64 of them in the first call."""
     scenario, seeds = ikgym.scenarios.get(SCENARIO), ikgym.scenarios.seeds("validation", 64)
