@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import pathlib
 import re
@@ -104,7 +105,10 @@ class TestCommandLine:
         assert "figure-09.png: Iteration count" in err
         assert str(tmp_path / "new") in out
 
-    def test_a_paper_prints_its_findings(self, capsys, tmp_path):
+    def test_a_paper_prints_its_findings(self, capsys, tmp_path, monkeypatch):
+        """All of its figures are drawn above."""
+        zhang = PAPERS["zhang"]
+        monkeypatch.setitem(PAPERS, "zhang", dataclasses.replace(zhang, figures=zhang.figures[:1]))
         code, out, _ = self.run(capsys, "--paper", "zhang", "--steps", STEPS, "--out", tmp_path)
         assert code == 0
         for claim in PAPERS["zhang"].claims:
