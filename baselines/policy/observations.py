@@ -137,7 +137,8 @@ def as_batch(parts: Parts, single: bool) -> Batch:
 
 def taken(parts: Parts, rows: slice | None) -> Batch:
     """Some rows of all arrays; None adds an axis of rows."""
-    return Batch._make(None if part is None else part[rows] for part in parts)
+    some: list[Any] = [None if part is None else part[rows] for part in parts]
+    return Batch(*some)
 
 
 def _floats(observation: Observation) -> Parts:
