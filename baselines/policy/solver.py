@@ -245,9 +245,9 @@ class SolverPolicy(Frozen, abc.ABC):
         return action[0] if single else action, after
 
     def _without_lost(self, memory: Memory, qdot: FloatArray) -> Memory:
-        """A memory, cleared where a joint velocity is no number."""
+        """A memory, cleared where a joint velocity is no number; with what the start of an episode would leave."""
         lost = np.asarray(~np.isfinite(qdot / self.problem.velocity_limit).all(axis=1))
-        return self.restarted(memory, lost)
+        return replace_rows(memory, self.memory(len(lost)), lost) if memory else memory
 
     def _recall(self, state: Memory | None, episode_start: npt.ArrayLike | None, rows: int) -> Memory:
         starting = None if episode_start is None else states.truth_values(episode_start, rows)

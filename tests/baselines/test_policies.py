@@ -202,6 +202,7 @@ TESTED = {
     "rhc_gradient",
     "rhc_lagrange",
     "smoothed",  # around `rhc_gradient`
+    *("offset_free", "kalman_jacobian", "calibrated"),  # around `rhc`
 }
 
 
