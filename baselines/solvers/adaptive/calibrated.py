@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -16,9 +17,16 @@ from baselines.solvers.adaptive.kalman import gain_of
 from baselines.solvers.adaptive.measurements import Measurement
 from ikgym import task_kernels
 from ikgym.exceptions import InvalidInputError
-from ikgym.jit import kernel
+from ikgym.jit import inlined, kernel
 from ikgym.kinematics import forward
 from ikgym.validation import FloatArray, number
+
+#: Second derivatives of a pose by joint zeros and tilts: those of an arm of some 1 m, in [1/m] and [1/rad].
+CURVATURE = 1.0
+#: Standard deviations of a normal number that are exceeded, to one side, once in 10,000 times.
+RARE = 3.719
+#: Measurements after a sudden change before the next one: where all are surprises, the noise is larger than said.
+PAUSE = 20
 
 
 class CalibrationMemory(NamedTuple):
@@ -29,12 +37,14 @@ class CalibrationMemory(NamedTuple):
         age: See :class:`Measurement`. Shape (B, 1).
         parameters: See :mod:`baselines.solvers.adaptive.chain_parameters`. Shape (B, p).
         covariance: Of their errors. Shape (B, p, p).
+        quiet: How many measurements ago joint zeros were last taken to have changed suddenly. Shape (B,).
     """
 
     before: FloatArray
     age: FloatArray
     parameters: FloatArray
     covariance: FloatArray
+    quiet: npt.NDArray[np.int64]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -58,6 +68,8 @@ class Calibrated(Corrected):
         pose_rotation_noise: The same of the orientation, in [rad] (or as a number, for parts of a rotation matrix).
         walk: How fast joint zeros change, as a payload changes them: standard deviation after a second, in [rad/√s] or
             [m/√s].
+        jump: Standard deviation of a sudden change of joint zeros, in [rad] or [m], that is reckoned with where a pose
+            is farther from what was expected than noise brings it once in 10,000 times. 0 for none.
         keep: Whether what is known of the arm survives the start of an episode, and is cleared with the state alone.
 
     Raises:
@@ -71,13 +83,14 @@ class Calibrated(Corrected):
     pose_noise: float = 3e-4
     pose_rotation_noise: float = 3e-4
     walk: float = 0.0
+    jump: float = 1e-3
     keep: bool = False
 
     name: ClassVar[str] = "calibrated"
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for name in ("zero", "link", "axis", "walk"):
+        for name in ("zero", "link", "axis", "walk", "jump"):
             object.__setattr__(self, name, number(name, getattr(self, name), at_least=0.0))
         for name in ("pose_noise", "pose_rotation_noise"):
             object.__setattr__(self, name, number(name, getattr(self, name), above=0.0))
@@ -89,19 +102,23 @@ class Calibrated(Corrected):
         n = self.problem.model.joints
         deviations = np.repeat([self.zero, self.link, self.axis], [n, 3 * n + 3, 2 * n])
         covariance = np.repeat(np.diag(deviations**2)[None], rows, axis=0)
-        return CalibrationMemory(*self.sensors(rows), np.zeros((rows, len(deviations))), covariance)
+        parameters, quiet = np.zeros((rows, len(deviations))), np.full(rows, PAUSE)
+        return CalibrationMemory(*self.sensors(rows), parameters, covariance, quiet)
 
     def own_restarted(self, own: CalibrationMemory, rows: npt.NDArray[np.bool_]) -> CalibrationMemory:
         """See :meth:`Wrapper.own_restarted`; the arm is the same one as before, if it is kept."""
         fresh = CalibrationMemory(*super().own_restarted(own, rows))
-        return fresh._replace(parameters=own.parameters, covariance=own.covariance) if self.keep else fresh
+        kept = own._replace(before=fresh.before, age=fresh.age)
+        return kept if self.keep else fresh
 
     def learn(self, batch: Batch, measured: Measurement, own: CalibrationMemory, out: FloatArray) -> CalibrationMemory:
         """See :meth:`Corrected.learn`."""
-        kept = own._replace(parameters=own.parameters.copy(), covariance=own.covariance.copy())
+        kept = own._replace(**{name: getattr(own, name).copy() for name in own._fields[2:]})
         model, kind, variances = self.problem.model.chain, self.problem.task.kind, self._variances()
         walk = self.walk**2 * self.problem.dt
-        calibrate_rows((model, kind, variances, walk), batch.q, batch.pose, measured.q, measured.new, kept, out)
+        calibrate_rows(
+            (model, kind, variances, walk, self.jump**2), batch.q, batch.pose, measured.q, measured.new, kept, out
+        )
         return kept
 
     def _variances(self) -> FloatArray:
@@ -118,8 +135,8 @@ def calibrate_rows(rule, q, pose, then, new, known, deviation):
     """Takes the measurements in, and tells the deviations, row by row.
 
     Args:
-        rule: The model of the arm, the kind of task coordinates, the variances of the noises, of shape (e,), and that
-            of the joint zeros' change in a step.
+        rule: The model of the arm, the kind of task coordinates, the variances of the noises, of shape (e,), and those
+            of the joint zeros' change in a step and of that at a surprise.
         q: Present joint coordinates in [rad] or [m]. Shape (B, n).
         pose: Measured task coordinates. Shape (B, m).
         then: Joint coordinates where they were measured. Shape (B, n).
@@ -127,7 +144,7 @@ def calibrate_rows(rule, q, pose, then, new, known, deviation):
         known: A :class:`CalibrationMemory`, changed in place.
         deviation: Receives the deviations. Shape (B, 6).
     """
-    chain, kind, variances, walk = rule
+    chain, kind, variances, walk, jump = rule
     n = q.shape[1]
     offsets, axes, tool = np.empty((n, 3)), np.empty((n, 3)), np.empty(3)
     rotation, position, model_rotation, model_position = np.empty((3, 3)), np.empty(3), np.empty((3, 3)), np.empty(3)
@@ -137,7 +154,10 @@ def calibrate_rows(rule, q, pose, then, new, known, deviation):
             covariance[i, i] += walk
         if new[row]:
             arm = changed_chain(chain, parameters, offsets, axes, tool)
-            improve(arm, kind, variances, then[row], pose[row], parameters, covariance)
+            known.quiet[row] += 1
+            allowed = jump if known.quiet[row] > PAUSE else 0.0
+            if improve(arm, kind, variances, allowed, then[row], pose[row], parameters, covariance):
+                known.quiet[row] = 0
         arm = changed_chain(chain, parameters, offsets, axes, tool)
         forward(arm, q[row] + parameters[:n], rotation, position)
         forward(chain, q[row], model_rotation, model_position)
@@ -145,34 +165,72 @@ def calibrate_rows(rule, q, pose, then, new, known, deviation):
 
 
 @kernel
-def improve(arm, kind, variances, q, pose, parameters, covariance):
-    """One step of the extended Kalman filter, component after component.
+def improve(arm, kind, variances, jump, q, pose, parameters, covariance):
+    """One step of the extended Kalman filter.
 
     Args:
         arm: The chain with the parameters.
         kind: Of task coordinates.
         variances: Of the noises. Shape (e,).
+        jump: What is added to the variances of the joint zeros if the pose is a surprise; 0 for nothing.
         q: Joint coordinates in [rad] or [m]. Shape (n,).
         pose: Measured task coordinates. Shape (m,).
         parameters: Changed in place. Shape (p,).
         covariance: Changed in place. Shape (p, p).
+
+    Returns:
+        Whether the pose was a surprise, and the joint zeros are taken to have changed.
     """
     n, e, p = q.shape[0], variances.shape[0], parameters.shape[0]
     rotation, position, predicted = np.empty((3, 3)), np.empty(3), np.empty(pose.shape[0])
     error, twist, sensitivity = np.empty(e), np.zeros((6, p)), np.empty((e, p))
-    shifted = q + parameters[:n]
+    shifted, change, after = q + parameters[:n], np.zeros(p), covariance.copy()
     forward(arm, shifted, rotation, position)
     task_kernels.coordinates(kind, rotation, position, predicted)
     task_kernels.error(kind, pose, predicted, error)
     parameter_twists(arm, shifted, position, twist)
     task_kernels.jacobian(kind, rotation, twist, sensitivity)
-    change, gain = np.zeros(p), np.empty(p)
-    for k in range(e):
-        gain_of(sensitivity[k], variances[k], covariance, gain)
+    surprise = absorb(sensitivity, error, variances, change, after)
+    jumped = jump > 0.0 and surprise > quantile(e)
+    if jumped:
+        after[:], change[:] = covariance, 0.0
+        for i in range(n):
+            after[i, i] += jump
+        absorb(sensitivity, error, variances, change, after)
+    covariance[:] = after
+    for i in range(p):
+        parameters[i] += change[i]
+    return jumped
+
+
+@kernel
+def absorb(sensitivity, error, variances, change, covariance):
+    """The update by all components of an error, one after the other, since their noises are independent.
+
+    Args:
+        sensitivity: Derivatives by the parameters. Shape (e, p).
+        error: What is missing to what was measured. Shape (e,).
+        variances: Of the noises. Shape (e,).
+        change: Of the parameters, from 0. Shape (p,).
+        covariance: Changed in place. Shape (p, p).
+
+    Returns:
+        The sum of squares of what was not expected, in its standard deviations: chi-square with e degrees of freedom.
+    """
+    p, gain, surprise = change.shape[0], np.empty(change.shape[0]), 0.0
+    for k in range(error.shape[0]):
+        variance = gain_of(sensitivity[k], variances[k], CURVATURE, covariance, gain)
         missing = error[k]
         for i in range(p):
             missing -= sensitivity[k, i] * change[i]
         for i in range(p):
             change[i] += gain[i] * missing
-    for i in range(p):
-        parameters[i] += change[i]
+        surprise += missing * missing / variance
+    return surprise
+
+
+@inlined
+def quantile(freedom):
+    """What chi-square exceeds once in 10,000 times (Wilson and Hilferty 1931)."""
+    share = 2.0 / (9.0 * freedom)
+    return freedom * (1.0 - share + RARE * math.sqrt(share)) ** 3

@@ -68,9 +68,9 @@ class KalmanJacobian(Corrected):
     """
 
     offset: float = 1e-3
-    slope: float = 1e-3
+    slope: float = 6e-4
     offset_walk: float = 0.0
-    slope_walk: float = 1e-3
+    slope_walk: float = 3e-4
     pose_noise: float = 3e-4
     pose_rotation_noise: float = 3e-4
 
@@ -136,7 +136,7 @@ def learn_rows(rule, q, pose, then, new, known, deviation):
             task_kernels.coordinates(kind, rotation, position, modelled)
             missing_deviation(kind, pose[row], modelled, deviation[row], missing)
             for part in range(2):
-                gain_of(regressor, variances[part], known.covariance[row, part], gain)
+                gain_of(regressor, variances[part], 0.0, known.covariance[row, part], gain)
                 for i in range(3 * part, 3 * part + 3):
                     for k in range(1 + n):
                         learnt[i, k] += gain[k] * missing[i]

@@ -59,7 +59,7 @@ class OffsetFree(Corrected):
             of its range.
     """
 
-    gain: float = 0.2
+    gain: float = 0.05
 
     name: ClassVar[str] = "offset_free"
 
