@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from baselines.policy import Batch, Memory, Solution, SolverPolicy, statuses
 from baselines.solvers.adaptive.chain_parameters import changed_chain, parameter_twists
+from baselines.solvers.adaptive.deviation import SIZE, add_deviation, missing_deviation
 from baselines.solvers.adaptive.measurements import nothing_measured, recall
 from baselines.solvers.resolved_rate.dls import damped_rows
 from ikgym import task_kernels
@@ -131,8 +132,9 @@ def adapt_rows(rule, postures, poses, parameters, jacobian, shift):
     (chain, kind, gain, rate), (q, last, then), (pose, present, target) = rule, postures, poses
     rows, e, n, p = q.shape[0], jacobian.shape[1], q.shape[1], parameters.shape[1]
     offsets, axes, tool = np.empty((n, 3)), np.empty((n, 3)), np.empty(3)
-    regressor, before, error, moved = np.empty((e, p)), np.empty((e, p)), np.empty(e), np.empty(e)
-    here, there = np.empty(pose.shape[1]), np.empty(pose.shape[1])
+    regressor, before, error, deviation = np.empty((e, p)), np.empty((e, p)), np.empty(e), np.empty(SIZE)
+    here, there, moved = np.empty(pose.shape[1]), np.empty(pose.shape[1]), np.empty((1, pose.shape[1]))
+    none = np.zeros(SIZE)
     unused = np.empty((e, n))
     for row in range(rows):
         zeros = parameters[row, :n]
@@ -140,14 +142,15 @@ def adapt_rows(rule, postures, poses, parameters, jacobian, shift):
         _at(arm, kind, then[row] + zeros, there, unused, before)
         _at(arm, kind, last[row] + zeros, here, unused, before)
         _at(arm, kind, q[row] + zeros, here, jacobian[row], regressor)
-        task_kernels.error(kind, present[row], pose[row], error)
-        task_kernels.error(kind, here, there, moved)
+        # The measured pose, moved along with the approximate model.
+        missing_deviation(kind, pose[row], there, none, deviation)
+        add_deviation(kind, deviation, 1.0, here.reshape(moved.shape), moved)
+        task_kernels.error(kind, present[row], moved[0], error)
         task_kernels.error(kind, target[row], present[row], shift[row])
         for i in range(e):
-            missing = error[i] - moved[i]  # X^N(k) - x, the measured pose moved along
-            shift[row, i] += gain * missing
+            shift[row, i] += gain * error[i]
             for j in range(p):
-                parameters[row, j] -= rate * (regressor[i, j] - before[i, j]) * missing
+                parameters[row, j] -= rate * (regressor[i, j] - before[i, j]) * error[i]
 
 
 @kernel
