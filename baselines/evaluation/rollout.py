@@ -12,11 +12,11 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.episode import play
-from baselines.policy import KEYS, Memory, Operations, Report
+from baselines.policy import Memory, Operations, Report
 from ikgym.exceptions import InvalidInputError
+from ikgym.outcome import Observation, observation
 from ikgym.scenarios import Preview, Scenario
 from ikgym.simulation import Outcome
-from ikgym.simulator import Observation, observation
 from ikgym.validation import FloatArray
 
 # Steps between two words to the progress bar.
@@ -253,4 +253,4 @@ def _play(
 
 def _seen(out: Outcome, alone: bool) -> Observation:
     """What the policy sees: of the only arm, or with an axis of arms."""
-    return observation(out) if alone else {name: getattr(out, name) for name in KEYS}
+    return observation(out, 0 if alone else None)
