@@ -14,9 +14,10 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.policy.observations import Parts, not_finite
-from baselines.policy.problem import KEYS, Batch, Memory, Solution
+from baselines.policy.problem import Batch, Memory, Solution
 from baselines.policy.solver import SolverPolicy
 from baselines.policy_kernels import REFUSED, parts_of
+from ikgym.outcome import OBSERVED
 
 
 class CompiledPolicy(SolverPolicy, abc.ABC):
@@ -92,7 +93,7 @@ def _blank(rows: int, n: int, memory: Memory) -> tuple[Any, Any, Any]:
 
 def _flat(parts: Parts) -> Parts:
     """The arrays of a batch as kernels take them."""
-    q, qdot, pose, nominal, remaining = parts[: len(KEYS)]
+    q, qdot, pose, nominal, remaining = parts[: len(OBSERVED)]
     return (
         q.reshape(-1),
         qdot.reshape(-1),

@@ -9,21 +9,19 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from baselines.policy.problem import KEYS, Batch, Problem
+from baselines.policy.problem import Batch, Problem
 from ikgym.exceptions import InvalidInputError
+from ikgym.outcome import OBSERVED, SOMETIMES
 from ikgym.preview import furthest
 from ikgym.scenarios import Preview
 from ikgym.simulator import Observation
 from ikgym.validation import FloatArray
 
 _FLOAT = np.dtype(np.float64)
-#: The arrays of an observation, in the order of :class:`Batch`: those of :data:`KEYS`, or all, None for what is absent.
+#: The arrays of an observation, in the order of :class:`Batch`: the first five, or all, None for what is absent.
 Parts = Sequence[Any]
 
-#: What some observations have besides.
-EXTRAS = Batch._fields[len(KEYS) :]
-
-_parts = operator.itemgetter(*KEYS)
+_parts = operator.itemgetter(*OBSERVED)
 
 
 class ObservationReader:
@@ -72,7 +70,7 @@ class ObservationReader:
         n, m = self._problem.model.joints, self._problem.task.size
         ahead = nominal[-2] if len(nominal) == len(rows) + 2 else furthest(self._preview)
         expected = (n,), (n,), (m,), (ahead, m), (1,)
-        for key, parts, shape in zip(KEYS, expected, shapes, strict=True):
+        for key, parts, shape in zip(OBSERVED, expected, shapes, strict=True):
             if shape != (*rows, *parts):
                 raise InvalidInputError(f"observation[{key!r}]: expected shape {(*rows, *parts)}, got {shape}.")
         return 1 if single else q[0], single, self._steps(ahead)
@@ -108,7 +106,7 @@ class ObservationReader:
         """
         n, lead = self._problem.model.joints, () if single else (rows,)
         tails: tuple[tuple[int | None, ...], ...] = (1,), (1,), (None, n)
-        return [_extra(observation, key, lead, tail) for key, tail in zip(EXTRAS, tails, strict=True)]
+        return [_extra(observation, key, lead, tail) for key, tail in zip(SOMETIMES, tails, strict=True)]
 
 
 def _extra(observation: Observation, key: str, lead: tuple[int, ...], tail: tuple[int | None, ...]) -> Any:
@@ -152,7 +150,7 @@ def _floats(observation: Observation) -> Parts:
     except (KeyError, IndexError, TypeError, ValueError) as e:
         keys = sorted(observation) if isinstance(observation, Mapping) else type(observation).__name__
         raise InvalidInputError(
-            f"observation: expected a dict of number arrays with the keys {list(KEYS)}, got {keys} ({e})."
+            f"observation: expected a dict of number arrays with the keys {list(OBSERVED)}, got {keys} ({e})."
         ) from None
 
 

@@ -14,9 +14,6 @@ from ikgym.scenarios import Scenario
 from ikgym.tasks import Task
 from ikgym.validation import FloatArray, Frozen, frozen_array
 
-#: What every observation has, in the order of :class:`Batch`.
-KEYS = "q", "qdot", "pose", "nominal", "remaining"
-
 #: Arrays with a leading axis of B: what a policy remembers, or a whole state, see :mod:`baselines.policy.state`.
 Memory = tuple[npt.NDArray[Any], ...]
 

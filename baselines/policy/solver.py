@@ -14,10 +14,11 @@ import numpy.typing as npt
 
 from baselines.policy import state as states
 from baselines.policy.observations import ObservationReader, Parts, as_batch, not_finite, taken
-from baselines.policy.problem import KEYS, Batch, Memory, Operations, Problem, Solution
+from baselines.policy.problem import Batch, Memory, Operations, Problem, Solution
 from baselines.policy.state import REPORTED, Report, joined, pack, remembered, replace_rows
 from baselines.policy_kernels import all_finite, cut_rows
 from ikgym.compilation import announced
+from ikgym.outcome import OBSERVED
 from ikgym.parallel import in_chunks
 from ikgym.scenarios import Preview, Scenario
 from ikgym.simulator import Observation
@@ -244,7 +245,7 @@ class SolverPolicy(Frozen, abc.ABC):
     def _answer(self, parts: Parts, single: bool, memory: Memory) -> tuple[npt.NDArray[np.float32], Memory]:
         """What `predict` returns, for the arrays of an observation and a memory whose shapes are right."""
         batch = as_batch(parts, single)
-        if not all_finite(*batch[: len(KEYS)]):
+        if not all_finite(*batch[: len(OBSERVED)]):
             raise not_finite()
         action, after = self.act(batch, memory)
         return action[0] if single else action, after
