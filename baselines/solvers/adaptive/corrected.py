@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import abc
 import dataclasses
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -42,6 +42,9 @@ class Corrected(NamedWrapper, abc.ABC):
     policy: str = "rhc"
     history: int = 64
 
+    #: Forward kinematics of a step with a new pose: those of the model where it was measured and at present.
+    evaluated: ClassVar[int] = 2
+
     def __post_init__(self) -> None:
         super().__post_init__()
         object.__setattr__(self, "history", whole_number("history", self.history, at_least=1))
@@ -77,10 +80,16 @@ class Corrected(NamedWrapper, abc.ABC):
         step = self.ask(batch._replace(pose=pose, nominal=shifted, pose_age=batch.q_age), inside)
         return self.solution(step.action * self.problem.velocity_limit, own, step)
 
+    @property
+    def stated(self) -> bool:
+        """Operations are those of steps with a new pose."""
+        return True
+
     def counted(self, inside: Operations) -> Operations:
-        """The poses of the model are a forward kinematics more, and the base policy measures none."""
+        """The forward kinematics of the wrapper come on top, and it is the one that measures."""
         return inside._replace(
-            forward_kinematics=inside.forward_kinematics + 1, measurements=np.ones_like(inside.measurements)
+            forward_kinematics=inside.forward_kinematics + self.evaluated,
+            measurements=np.ones_like(inside.measurements),
         )
 
 
