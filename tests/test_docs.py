@@ -260,7 +260,7 @@ def test_evaluation_snippets_run(capsys, tmp_path, monkeypatch):
 def test_policies_snippets_run(monkeypatch):
     monkeypatch.setattr(registry, "_places", dict(registry._places))
     monkeypatch.setattr(registry, "_classes", dict(registry._classes))
-    own, real = snippets_of("policies.md")
+    own, real, adapting = snippets_of("policies.md")
     names = {"__name__": __name__}
     exec(compile(own, "policies.md", "exec", dont_inherit=True), names)
     assert [(row.policy, row.parameters.get("gain")) for row in names["rows"]] == [
@@ -271,6 +271,8 @@ def test_policies_snippets_run(monkeypatch):
     exec(compile(real, "policies.md", "exec", dont_inherit=True), names)
     assert abs(names["arm"].forward(names["measured"])[1] - names["positions"][100]).max() < 5e-2  # of an arm of 5 m
     assert baselines.track("varga7-fast", "rhc_gradient", steps=100).q[-1] == pytest.approx(names["measured"])
+    exec(compile(adapting, "policies.md", "exec", dont_inherit=True), names)
+    assert names["adapted"].total_cost < 0.01 * names["alone"].total_cost
 
 
 def test_changelog_names_every_policy():

@@ -10,11 +10,12 @@ import numpy.typing as npt
 from gymnasium.utils import seeding
 
 from baselines.episode import added_up, play
-from baselines.policy import Batch, Memory, SolverPolicy
+from baselines.policy import Memory, SolverPolicy
 from baselines.solvers.receding_horizon.newton.grid import Grid
 from baselines.solvers.receding_horizon.newton.workspace import PathProblem
 from baselines.solvers.receding_horizon.problem_data import ProblemData
 from ikgym.exceptions import InvalidInputError
+from ikgym.outcome import observation
 from ikgym.scenarios import Scenario
 from ikgym.simulation import Outcome
 from ikgym.validation import FloatArray, whole_number
@@ -176,7 +177,7 @@ def path_of(policy: SolverPolicy, scenario: Scenario, seed: int) -> FloatArray:
 
     def act(out: Outcome) -> npt.NDArray[np.float32]:
         nonlocal state
-        action, state = policy.predict({name: getattr(out, name) for name in Batch._fields}, state)
+        action, state = policy.predict(observation(out), state)
         return action
 
     return np.stack([out.true_q[0] for out in play(scenario, [seed], act, preview=policy.preview)])

@@ -26,6 +26,7 @@ from baselines.status import Status
 from baselines.wrapper import Wrapper
 from ikgym import parallel
 from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.outcome import OBSERVED
 from ikgym.plant import DrawnPlant
 from ikgym.plant.draw import Draws
 from ikgym.plant.rows import PlantRows
@@ -179,7 +180,7 @@ def test_memory_is_a_named_tuple(name, monkeypatch):
         assert type(policy.memory_of(state)) is type(policy.memory(1))
         assert identical(tuple(policy.memory_of(state)), state[2:])
     if isinstance(policy, CompiledPolicy):  # which calls its kernel with the memory's parts instead
-        policy.solve(Batch(*[observation[key] for key in Batch._fields]), policy.memory_of(state))
+        policy.solve(Batch(*[observation[key] for key in OBSERVED]), policy.memory_of(state))
     assert {type(memory) for memory in handed} == {type(policy.memory(1))}
 
 
@@ -222,6 +223,7 @@ TESTED = {
     "rhc_gradient",
     "rhc_lagrange",
     "smoothed",  # around `rhc_gradient`
+    *("offset_free", "kalman_jacobian", "calibrated"),  # around `rhc`
 }
 
 
