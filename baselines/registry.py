@@ -39,6 +39,7 @@ _places: dict[str, str] = {
     "qp": f"{_SOLVERS}.quadratic_program.qp:QuadraticProgram",
     "sns": f"{_SOLVERS}.quadratic_program.sns:SaturationInNullSpace",
     "broyden": f"{_SOLVERS}.adaptive.broyden:Broyden",
+    "predicted": f"{_SOLVERS}.adaptive.predicted:Predicted",
     "rhc_gradient": f"{_SOLVERS}.receding_horizon.gradient:RecedingHorizonGradient",
     "rhc_lagrange": f"{_SOLVERS}.receding_horizon.lagrange:RecedingHorizonLagrange",
     "rhc": f"{_SOLVERS}.receding_horizon.rhc:RecedingHorizon",
