@@ -46,6 +46,7 @@ _places: dict[str, str] = {
     "rhc_foresight": f"{_SOLVERS}.receding_horizon.foresight:RecedingHorizonForesight",
     "smoothed": f"{_SOLVERS}.wrappers.smoothed:Smoothed",
     "full_orientation": f"{_SOLVERS}.wrappers.full_orientation:FullOrientation",
+    "iterative_learning": f"{_SOLVERS}.wrappers.iterative_learning:IterativeLearning",
     "mfac": f"{_SOLVERS}.levenberg_marquardt.mfac:ModelFreeAdaptiveControl",
     "mfapc": f"{_SOLVERS}.levenberg_marquardt.mfapc:ModelFreeAdaptivePredictiveControl",
     "mfac_helix": f"{_SOLVERS}.levenberg_marquardt.presets:HelixAdaptiveControl",
