@@ -87,7 +87,7 @@ def test_unknown_drives_are_identified(ideal):
     costs, _, state = driven(gentle(), policy, [SEED] * 4, delays, bandwidths)
     told = policy.diagnostics(state)
     np.testing.assert_array_equal(told["delay"], delays)
-    np.testing.assert_allclose(told["time_constant"], 1.0 / (2.0 * np.pi * np.array(bandwidths)), rtol=0.03, atol=1e-5)
+    np.testing.assert_allclose(told["time_constant"], 1.0 / (2.0 * np.pi * np.array(bandwidths)), rtol=0.03, atol=1e-4)
     assert (costs < 2.0 * ideal).all()
 
 
