@@ -17,8 +17,10 @@ from stable_baselines3.common.env_checker import check_env as sb3_check_env
 import ikgym
 from ikgym.env import OBSERVED, REPORTED
 from ikgym.exceptions import InvalidInputError, ResetNeededError, UnknownNameError
+from ikgym.outcome import SOMETIMES
 from tests.comparison import identical
 from tests.every_scenario import every_scenario
+from tests.spawning import random_env
 
 
 def make(scenario="varga7-fast", **kwargs):
@@ -27,7 +29,9 @@ def make(scenario="varga7-fast", **kwargs):
 
 @pytest.mark.parametrize("scenario", every_scenario())
 def test_gymnasium_check_env(scenario):
-    check_env(make(scenario).unwrapped)
+    """Pictures, which take most of its time, of one scenario and of the axis; the tests of the rendering draw all."""
+    drawn = scenario is AXIS or scenario == "varga7-fast"
+    check_env(make(scenario).unwrapped, skip_render_check=not drawn)
 
 
 @pytest.mark.parametrize("scenario", every_scenario())
@@ -43,13 +47,16 @@ def test_stable_baselines3_check_env(scenario):
 @pytest.mark.parametrize("scenario", every_scenario())
 def test_docstring_tables_are_the_spaces(scenario):
     env = make(scenario, preview=(1, 4, 9)).unwrapped
+    late = env.scenario.replace(plant=env.scenario.plant.replace(q_delay=1))
+    shown = ikgym.RedundantIKEnv(late, preview=(1, 4, 9), commands=2).observation_space
     rows = dict(re.findall(r"\| `(\w+)` \| \(([^)]*)\) \|", ikgym.RedundantIKEnv.__doc__))
-    sizes = {"n": env.scenario.joints, "m": env.scenario.task.size, "p": 3, "1": 1}
+    sizes = {"n": env.scenario.joints, "m": env.scenario.task.size, "p": 3, "h": 2, "1": 1}
     shapes = {key: tuple(sizes[s.strip()] for s in text.split(",") if s.strip()) for key, text in rows.items()}
-    assert shapes == {key: space.shape for key, space in env.observation_space.spaces.items()}
-    assert tuple(shapes) == OBSERVED
-    assert all(space.dtype == np.float64 for space in env.observation_space.spaces.values())
-    assert all(np.isfinite([space.low, space.high]).all() for space in env.observation_space.values())
+    assert shapes == {key: space.shape for key, space in shown.spaces.items()}
+    assert tuple(shapes) == (*OBSERVED, *SOMETIMES)
+    assert set(env.observation_space) == {*OBSERVED, *(SOMETIMES[:2] if env.scenario.plant.late else ())}
+    assert all(space.dtype == np.float64 for space in shown.values())
+    assert all(np.isfinite([space.low, space.high]).all() for space in shown.values())
     action = re.search(r"`(Box\([^`]*)` \| 1 \|", ikgym.RedundantIKEnv.__doc__)[1]
     assert str(env.action_space) == action.replace("n", str(sizes["n"])).replace(f"i{sizes['n']}", "in")
     env.reset(seed=0)
@@ -258,12 +265,8 @@ def test_importing_changes_no_global_state():
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
-def _spawned_envs():
-    return gym.make("ikgym:RedundantIK-v0", scenario="varga7-random", preview=1)
-
-
 def test_spawned_workers():
-    envs = gym.vector.AsyncVectorEnv([_spawned_envs] * 2, context="spawn")
+    envs = gym.vector.AsyncVectorEnv([random_env] * 2, context="spawn")
     try:
         observation, _ = envs.reset(seed=3)
         here = make("varga7-random", preview=1)

@@ -26,6 +26,9 @@ from baselines.status import Status
 from baselines.wrapper import Wrapper
 from ikgym import parallel
 from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.plant import DrawnPlant
+from ikgym.plant.draw import Draws
+from ikgym.plant.rows import PlantRows
 from ikgym.simulator import Simulator
 from tests.baselines.making import made, usual
 from tests.comparison import identical
@@ -51,8 +54,9 @@ HANDED_THE_PATH = {"follow_nominal", "fixed_point_extended", "oracle"}
 UNSUITED = {("smoothed", "zhang3-helix"), ("fixed_point_extended", "planar2-bent")}
 
 
+@functools.cache
 def policy_for(name, on):
-    """The policy on a shortened scenario, or None where it does not suit."""
+    """The policy on a shortened scenario, or None where it does not suit; one for all tests, as policies are frozen."""
     seed = {"seed": 1} if name in HANDED_THE_PATH and scenario(on).random else {}
     try:
         return made(name, scenario(on), **seed)
@@ -61,8 +65,8 @@ def policy_for(name, on):
             assert on != usual(name)
             return None
         # An agent suits the arms of its size, and only skew coordinates have an ambiguity to resolve.
-        folded = name != "full_orientation" or scenario(on).task.name == "skew"
-        if folded and not (issubclass(get(name), ShippedAgent) or (name, on) in UNSUITED):
+        suits = name != "full_orientation" or scenario(on).task.name == "skew"
+        if suits and not (issubclass(get(name), ShippedAgent) or (name, on) in UNSUITED):
             assert name in HANDED_THE_PATH
             assert scenario(on).nominal_joint_path(1) is None
         return None
@@ -71,22 +75,38 @@ def policy_for(name, on):
 PAIRS = [(name, on) for name in baselines.names() for on in [*ONE_OF_EACH, AXIS.name]]
 contract = pytest.mark.parametrize(("name", "on"), PAIRS)
 
+#: One scenario for each number of joints, task and kind of limits: all that the order in which rows are worked off can
+#: depend on. All others are in the slow run.
+SHAPES = {
+    *("varga7-fast", "planar2-bent", "zhang3-helix", "zhang6-lspb", "khan8-q7q8"),
+    *("panda-circle", "tiago-raster", "iiwa14-random", AXIS.name),
+}
+by_rows = pytest.mark.parametrize(
+    ("name", "on"), [pytest.param(*pair, marks=() if pair[1] in SHAPES else pytest.mark.slow) for pair in PAIRS]
+)
 
-def observations(on, preview, rows, seed=0):
-    """Observations on and off the nominal path."""
+
+def observations(on, preview, rows):
+    """Observations on and off the nominal path, new arrays each time."""
+    for observation in seen(on, preview, rows):
+        yield {key: value.copy() for key, value in observation.items()}
+
+
+@functools.cache
+def seen(on, preview, rows):
+    """What most policies are shown is the same: it is played once."""
     envs = gym.make_vec("RedundantIK-v0", num_envs=rows, scenario=scenario(on), preview=preview)
-    envs.reset(seed=seed)
-    rng = np.random.default_rng(seed)
-    for _ in range(STEPS - 1):
-        actions = rng.uniform(-0.05, 0.05, envs.action_space.shape).astype(np.float32)
-        yield envs.step(actions)[0]
+    envs.reset(seed=0)
+    rng = np.random.default_rng(0)
+    actions = rng.uniform(-0.05, 0.05, (STEPS - 1, *envs.action_space.shape)).astype(np.float32)
+    return [envs.step(action)[0] for action in actions]
 
 
 def row(observation, i):
     return {key: value[i] for key, value in observation.items()}
 
 
-@contract
+@by_rows
 def test_batch_equals_single_calls_and_memory_goes_by_rows(name, on):
     policy = policy_for(name, on)
     if policy is None:
@@ -106,7 +126,7 @@ def test_batch_equals_single_calls_and_memory_goes_by_rows(name, on):
             assert all(identical(a[0], b[i]) for a, b in zip(states[i], batched, strict=True))
 
 
-@contract
+@by_rows
 def test_rows_that_are_shared_out_to_threads_are_the_same(monkeypatch, name, on):
     policy = policy_for(name, on)
     if policy is None:
@@ -244,13 +264,14 @@ def test_actions_are_in_the_box_and_deterministic_changes_nothing(name, on):
 
 @contract
 def test_a_policy_is_told_the_model_and_never_the_arm(name, on):
-    policy = policy_for(name, on)
+    policy = policy_for.__wrapped__(name, on)  # a new one: what it compiles when it is asked is a maze of numba's
     if policy is None or policy.reference:
         return
     assert {f.name for f in dataclasses.fields(Problem)} == {"model", "task", "cost", "dt", "velocity_limit"}
     assert policy.problem.model is scenario(on).model
     for thing in reachable(policy):
         assert not isinstance(thing, (ikgym.Scenario, gym.Env, gym.vector.VectorEnv, Simulator))
+        assert not isinstance(thing, (ikgym.Plant, DrawnPlant, Draws, PlantRows))
         assert not isinstance(thing, ikgym.Arm) or thing is scenario(on).model
 
 
@@ -285,6 +306,41 @@ def test_the_exact_arm_changes_no_answer(name, on):
         answers = [p.predict(observation, state) for p, state in zip(policies, states, strict=True)]
         assert identical(*answers)
         states = [state for _, state in answers]
+
+
+@pytest.mark.parametrize("name", [name for name in baselines.names() if not get(name).reference])
+def test_the_true_plant_changes_no_answer(monkeypatch, name):
+    """Same observations, same model, another plant behind the scenario, which nobody may ask for what it draws."""
+    on = "iiwa14-random" if policy_for(name, "iiwa14-random") else usual(name)
+    ideal = scenario(on)
+    plant = ikgym.Plant(zero=0.1, link=0.1, axis=0.1, payload=0.1, bandwidth=(1, 9), command_delay=3, q_noise=0.1)
+
+    def asked(*_):
+        raise AssertionError(f"{name} asks for the true plant")
+
+    monkeypatch.setattr(ikgym.Scenario, "drawn_plant", asked)
+    monkeypatch.setattr(Draws, "__init__", asked)
+    policies = [baselines.make(name, which) for which in (ideal, ideal.replace(plant=plant))]
+    states = [None, None]
+    for observation in observations(on, policies[0].preview, 2):
+        answers = [p.predict(observation, state) for p, state in zip(policies, states, strict=True)]
+        assert identical(*answers)
+        states = [state for _, state in answers]
+
+
+def test_the_guard_of_the_plant_would_notice():
+    """A policy that keeps what it is told of the true plant is found out."""
+    told = scenario("iiwa14-random").replace(plant=ikgym.Plant(zero=0.1))
+
+    @dataclasses.dataclass(frozen=True, eq=False)
+    class Told(get("dls")):
+        plant: object = dataclasses.field(kw_only=True, default=None)
+
+        @classmethod
+        def for_scenario(cls, scenario, **parameters):
+            return cls(Problem.of(scenario), plant=scenario.drawn_plant(1), **parameters)
+
+    assert any(isinstance(thing, DrawnPlant) for thing in reachable(Told.for_scenario(told)))
 
 
 @pytest.mark.parametrize("name", baselines.names())
@@ -401,12 +457,13 @@ def test_what_exceeds_the_velocity_limit_is_said():
 
 @pytest.mark.parametrize("name", baselines.names())
 def test_arrays_stay_read_only_in_copies(name):
-    for policy in (made(name, usual(name)), copy.deepcopy(made(name, usual(name)))):
+    short = scenario(usual(name))
+    for policy in (made(name, short), copy.deepcopy(made(name, short))):
         arrays = [policy.problem.velocity_limit, policy.problem.model.offsets]
         arrays += [value for value in vars(policy).values() if isinstance(value, np.ndarray)]
         assert not any(array.flags.writeable for array in arrays)
-        seen = gym.make("RedundantIK-v0", scenario=usual(name), preview=policy.preview).reset()[0]
-        assert policy.predict(seen)[0].shape == (policy.problem.model.joints,)
+        (first, *_) = observations(usual(name), policy.preview, 1)
+        assert policy.predict(row(first, 0))[0].shape == (policy.problem.model.joints,)
 
 
 def test_long_compilation_of_a_policy_is_announced(monkeypatch, caplog):
