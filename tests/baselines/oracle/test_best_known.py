@@ -168,7 +168,7 @@ def nobody_beats(scenarios, policies):
 
 
 def test_no_quick_policy_beats_a_record_on_a_short_scenario():
-    nobody_beats([s for s in recorded() if s.name in {"varga7-fast", "zhang6-lspb"}], QUICK)
+    nobody_beats([s for s in recorded() if s.name == "zhang6-lspb"], QUICK)
 
 
 @pytest.mark.slow
