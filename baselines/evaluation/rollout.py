@@ -5,13 +5,13 @@ from __future__ import annotations
 import dataclasses
 import gc
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
-from baselines.episode import play
+from baselines.episode import Draw, play
 from baselines.policy import Batch, Memory, Operations, Report
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Preview, Scenario
@@ -37,7 +37,7 @@ class Player(Protocol):
     def preview(self) -> Preview:
         """Steps ahead that it asks for, or which ones."""
 
-    def predict(self, observation: Any, state: Any = None) -> tuple[npt.NDArray[Any], Any]:
+    def predict(self, observation: Any, state: Any = None, episode_start: Any = None) -> tuple[npt.NDArray[Any], Any]:
         """Actions, and the state for the next call, which is never None."""
 
     def report(self, state: Any) -> Report:
@@ -93,7 +93,7 @@ class Episode:
 def rollout(
     scenario: Scenario,
     policy: Player,
-    seed: int,
+    seed: int | Draw,
     *,
     preview: Preview | None = None,
     timed: bool = True,
@@ -107,7 +107,7 @@ def rollout(
     Args:
         scenario: What is to be tracked.
         policy: Who tracks it.
-        seed: The reset seed.
+        seed: The reset seed, or what is drawn how.
         preview: What the policy is shown; what it asks for if left out.
         timed: Whether the times of the calls are kept.
         tick: See :data:`Tick`.
@@ -118,14 +118,14 @@ def rollout(
     Raises:
         InvalidInputError: The preview is none, or shorter than the policy needs; an action is refused.
     """
-    (episode,) = _play(scenario, policy, [seed], preview, tick, alone=True, timed=timed)
+    (episode,), _ = _play(scenario, policy, [seed], preview, tick, alone=True, timed=timed)
     return episode
 
 
 def rollouts(
     scenario: Scenario,
     policy: Player,
-    seeds: Sequence[int],
+    seeds: Sequence[int | Draw],
     *,
     preview: Preview | None = None,
     tick: Tick | None = None,
@@ -135,7 +135,7 @@ def rollouts(
     Args:
         scenario: What is to be tracked.
         policy: Who tracks it.
-        seeds: The reset seeds.
+        seeds: The reset seeds, or what is drawn how.
         preview: What the policy is shown; what it asks for if left out.
         tick: See :data:`Tick`; the steps of all episodes count.
 
@@ -145,17 +145,55 @@ def rollouts(
     Raises:
         InvalidInputError: The preview is none, or shorter than the policy needs; an action is refused.
     """
-    return _play(scenario, policy, seeds, preview, tick, alone=False, timed=False)
+    return _play(scenario, policy, seeds, preview, tick, alone=False, timed=False)[0]
 
 
-def finite(action: npt.NDArray[Any], policy: Player, scenario: Scenario, seeds: Sequence[int], steps: int) -> None:
+def sequence(
+    scenario: Scenario,
+    policy: Player,
+    episodes: Sequence[Sequence[Draw]],
+    *,
+    preview: Preview | None = None,
+    alone: bool = False,
+    timed: bool = False,
+    tick: Tick | None = None,
+) -> Iterator[list[Episode]]:
+    """Plays episodes one after the other, and hands the policy's state on; it is told where an episode begins.
+
+    What a policy has learned of its arm can so be of use in the next episode; what does not survive `episode_start` is
+    cleared there.
+
+    Args:
+        scenario: What is to be tracked.
+        policy: Who tracks it.
+        episodes: What is drawn how, of arms side by side, in each episode.
+        preview: What the policy is shown; what it asks for if left out.
+        alone: Whether there is one arm, and the policy is called without an axis of arms.
+        timed: Whether the times of the calls are kept.
+        tick: See :data:`Tick`.
+
+    Yields:
+        What :func:`rollouts` gives of each episode.
+
+    Raises:
+        InvalidInputError: As in :func:`rollouts`.
+    """
+    state: Any = None
+    for draws in episodes:
+        played, state = _play(scenario, policy, draws, preview, tick, alone=alone, timed=timed, state=state)
+        yield played
+
+
+def finite(
+    action: npt.NDArray[Any], policy: Player, scenario: Scenario, seeds: Sequence[int | Draw], steps: int
+) -> None:
     """Refuses actions that are not finite, and says whose they are.
 
     Args:
         action: Of shape (n,), or (B, n).
         policy: Who chose them.
         scenario: What is tracked.
-        seeds: The reset seeds of the B arms.
+        seeds: The reset seeds of the B arms, or what is drawn how.
         steps: Steps made before.
 
     Raises:
@@ -166,7 +204,7 @@ def finite(action: npt.NDArray[Any], policy: Player, scenario: Scenario, seeds: 
     rows = action.reshape(len(seeds), -1)
     row = int(np.argmin(np.isfinite(rows).all(axis=1)))
     raise InvalidInputError(
-        f"{policy.name} in {scenario.name}, seed {seeds[row]}, step {steps + 1}: expected finite actions, got "
+        f"{policy.name} in {scenario.name}, seed {Draw.of(seeds[row]).seed}, step {steps + 1}: expected finite actions, got "
         f"{rows[row].tolist()}."
     )
 
@@ -174,13 +212,15 @@ def finite(action: npt.NDArray[Any], policy: Player, scenario: Scenario, seeds: 
 def _play(
     scenario: Scenario,
     policy: Player,
-    seeds: Sequence[int],
+    seeds: Sequence[int | Draw],
     preview: Preview | None,
     tick: Tick | None,
     *,
     alone: bool,
     timed: bool,
-) -> list[Episode]:
+    state: Any = None,
+) -> tuple[list[Episode], Any]:
+    """The episodes, and the state behind them; one that is given is that of the episodes before."""
     rows, steps, n, m = len(seeds), scenario.steps, scenario.joints, scenario.task.size
     shown = policy.preview if preview is None else preview
     q, qdot, pose = np.empty((rows, steps, n)), np.empty((rows, steps, n)), np.empty((rows, steps, m))
@@ -192,7 +232,8 @@ def _play(
     counters: list[Memory] = []
 
     clock = time.perf_counter_ns
-    state: Any = None
+    # A policy without a state knows that an episode begins.
+    begins = None if state is None else np.ones(rows, dtype=np.bool_)
     made = 0
 
     def act(out: Outcome) -> npt.NDArray[Any]:
@@ -202,7 +243,7 @@ def _play(
             # Compilation, caches and first touch of memory belong to no step: one call on a copy, its answer dropped.
             policy.predict({key: value.copy() for key, value in seen.items()})
         begin = clock()
-        action, state = policy.predict(seen, state)
+        action, state = policy.predict(seen, state, begins if made == 0 else None)
         end = clock()
         if timed:
             time_ns[made] = end - begin
@@ -231,7 +272,7 @@ def _play(
     if tick is not None:
         tick(steps % TICK * rows)
     counted = [np.array(steps) for steps in zip(*counters, strict=True)]
-    return [
+    episodes = [
         Episode(
             q[row],
             qdot[row],
@@ -249,6 +290,7 @@ def _play(
         )
         for row in range(rows)
     ]
+    return episodes, state
 
 
 def _seen(out: Outcome, alone: bool) -> Observation:

@@ -23,12 +23,17 @@ class TestSet:
         episodes: How many: the first seeds of the split.
         digest: What :func:`baselines.fingerprints.set_hash` gave when the set was made.
         split: Where the seeds come from, see :data:`ikgym.scenarios.SPLITS`.
+        noise_seeds: How often each episode is played, with other noise in sensors and drives.
+        sequence: Episodes that one arm plays one after the other: those with the seeds s have the arm seed
+            s // sequence, and a policy's state is handed on from one to the next. 1 where every episode has its own arm.
     """
 
     name: str
     episodes: int
     digest: str
     split: str = "test"
+    noise_seeds: int = 1
+    sequence: int = 1
 
     @property
     def scenario(self) -> Scenario:
@@ -54,6 +59,11 @@ SETS = {
         TestSet("iiwa14-random", episodes=128, digest="4b2efa43deaa"),
     )
 }
+
+
+def sequence(name: str) -> int:
+    """Episodes that one arm plays one after the other in a scenario, as its test set says; 1 where there is none."""
+    return SETS[name].sequence if name in SETS else 1
 
 
 def names() -> tuple[str, ...]:

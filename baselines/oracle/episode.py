@@ -120,6 +120,10 @@ class EpisodeProblem:
         q = np.vstack([self.start, path])
         return np.stack([np.interp(fine, knots, column) for column in q.T], axis=1)
 
+    def through(self, q: FloatArray) -> FloatArray:
+        """The knots of a path, from the joint coordinates after each step. Shapes (steps, n) and (K, n)."""
+        return np.ascontiguousarray(q[self.grid.at - 1])
+
     def feasible(self, path: FloatArray) -> FloatArray:
         """A path within the limits of position and velocity: the nearest that the arm gets to each knot from the last.
 
