@@ -45,6 +45,10 @@ class TestSet:
         """The reset seeds."""
         return scenarios.seeds(self.split, self.episodes)
 
+    def arm_seed(self, seed: int) -> int | None:
+        """Which arm moves in the episode of a seed; None where the seed itself says so."""
+        return seed // self.sequence if self.sequence > 1 else None
+
 
 #: All test sets: those that scores are published on, and those in the papers' own skew coordinates.
 SETS = {

@@ -87,7 +87,16 @@ class EpisodeProblem:
     def on(self, grid: Grid) -> PathProblem:
         """The problem on a grid, as the kernels see it."""
         change = self.scenario.dt * self.scenario.arm.acceleration_limit if self._by_interior_point else np.zeros(0)
-        return PathProblem(self.data, grid, self.start, self.nominal, np.zeros_like(self.start), 0.0, change)
+        rest = np.zeros_like(self.start)
+        return PathProblem(self.data, grid, self.start, self.nominal, rest, 0.0, change, False, self._load(grid))
+
+    def _load(self, grid: Grid) -> FloatArray:
+        """What the payload adds to the zeros of the joints at the knots, in [rad] or [m]. Shape (K, n), (0, n) if none.
+        """
+        plant, n = self.scenario.plant, self.scenario.joints
+        if not np.any(plant.payload):
+            return np.zeros((0, n))
+        return np.where(grid.at[:, None] >= plant.payload_step, np.broadcast_to(plant.payload, n), 0.0)
 
     @property
     def _by_interior_point(self) -> bool:
