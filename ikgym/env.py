@@ -48,7 +48,7 @@ class RedundantIKEnv(gym.Env[Any, Any]):
 
     1. The command is cut to the arm's velocity limit.
     2. Its change from the q̇ last applied is cut to the acceleration limit times Δt. An episode begins at rest.
-    3. The scenario's disturbance is added, if it has one; it is not part of q̇.
+    3. Bias and noise of the scenario's plant are added, if it has some; they are not part of q̇.
     4. A joint that would pass a limit of its coordinate stops there, whatever the acceleration limit says. Its q̇ is
        (q(k+1) − q(k)) / Δt then, no faster than the velocity limit: 0 where it stood at the stop already.
 

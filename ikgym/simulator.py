@@ -53,7 +53,7 @@ class Simulator:
     """
 
     def __init__(self, scenario: Scenario, rows: int | None, preview: Preview, memory: int = MEMORY) -> None:
-        joints, size, disturbance = scenario.joints, scenario.task.size, scenario.disturbance
+        joints, size, plant = scenario.joints, scenario.task.size, scenario.plant
         self._action_shape = (joints,) if rows is None else (rows, joints)
         # One arm has no rows that do not step, whose outcome would have to be zero.
         self._new = np.empty if rows is None else np.zeros
@@ -82,7 +82,7 @@ class Simulator:
             point=self._point % known,
             counted=scenario.counted(),
             preview=np.array(self.preview, dtype=np.int64),
-            disturbance=np.array([np.broadcast_to(part, joints) for part in (disturbance.bias, disturbance.noise)]),
+            disturbance=np.array([np.broadcast_to(part, joints) for part in (plant.bias, plant.noise)]),
             limits=limit_rows(scenario.arm, scenario.largest_qdot, scenario.dt),
         )
         self._state = State(
@@ -135,7 +135,7 @@ class Simulator:
                 self._episodes[row] = episode
         if len(rows):
             state.q[rows] = scenario.first_q_of(episodes) if starts is None else starts[rows]
-        if np.any(scenario.disturbance.noise):
+        if np.any(scenario.plant.noise):
             for row in rows.tolist():
                 state.noise_key[row] = generators[row].integers(2**63, dtype=np.uint64)
         self._own_start[active] = starts is None

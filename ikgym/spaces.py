@@ -33,7 +33,7 @@ def observation_space(scenario: Scenario, preview: Preview) -> spaces.Dict:
     """
     ahead = offsets(preview)
     q = SLACK * scenario.joint_bound()
-    pose = _coordinate_bound(scenario, scenario.arm.reach(q))
+    pose = _coordinate_bound(scenario, scenario.plant.reach(scenario.arm, q))
     if scenario.initial_pose is not None:
         pose = np.maximum(pose, np.abs(scenario.initial_pose))
     times = scenario.times(int(scenario.points(preview)[-1]) + 1)

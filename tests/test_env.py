@@ -224,7 +224,7 @@ def test_global_random_state_is_left_alone():
 
 ROLLOUT = """
 import hashlib, gymnasium as gym, numpy as np, ikgym
-scenario = ikgym.scenarios.get("varga7-random").replace(disturbance=ikgym.Disturbance(noise=0.2), steps=50)
+scenario = ikgym.scenarios.get("varga7-random").replace(plant=ikgym.Plant(noise=0.2), steps=50)
 env = gym.make("RedundantIK-v0", scenario=scenario)
 digest = hashlib.sha256()
 observation, _ = env.reset(seed=9)
@@ -297,7 +297,7 @@ def test_nominal_goes_on_past_the_end():
 def test_bounds_are_true_at_the_worst(name):
     """Full speed from the farthest start, for the whole episode."""
     scenario = ikgym.scenarios.get(name)
-    scenario = scenario.replace(steps=min(scenario.steps, 400), disturbance=ikgym.Disturbance(bias=0.5, noise=0.5))
+    scenario = scenario.replace(steps=min(scenario.steps, 400), plant=ikgym.Plant(bias=0.5, noise=0.5))
     env = make(scenario, disable_env_checker=True)
     bound = scenario.start_bound()
     for sign in (-1, 1):

@@ -77,7 +77,7 @@ def played(scenario, commands):
         ),
         # The disturbance comes after velocity and acceleration, before the stop; it is no part of what is observed.
         (
-            one_joint(upper=0.5, disturbance=ikgym.Disturbance(bias=0.5)),
+            one_joint(upper=0.5, plant=ikgym.Plant(bias=0.5)),
             [4.0, 2.0, -0.5, 0.0],
             [(0.25, 2.0, (0, 1, 0)), (0.5, 2.0, (0, 0, 0)), (0.5, -0.5, (0, 0, 0)), (0.5, 0.0, (1, 0, 0))],
         ),
@@ -130,7 +130,7 @@ ACTIONS = hnp.arrays(np.float32, (25, 7), elements=st.floats(-1.5, 1.5, width=32
 @settings(max_examples=40, derandomize=True, deadline=None)
 @given(ACTIONS, st.integers(0, 10_000), st.sampled_from([0.0, 3.0]))
 def test_no_action_leaves_the_limits(actions, seed, noise):
-    scenario = limited(steps=len(actions), disturbance=ikgym.Disturbance(noise=noise))
+    scenario = limited(steps=len(actions), plant=ikgym.Plant(noise=noise))
     env = ikgym.RedundantIKEnv(scenario)
     last, _ = env.reset(seed=seed)
     for action in actions:

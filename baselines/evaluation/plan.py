@@ -7,8 +7,6 @@ import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Literal, Self
 
-import numpy as np
-
 from baselines.episode import Draw
 from baselines.evaluation import metrics
 from baselines.evaluation import test_sets as known_sets

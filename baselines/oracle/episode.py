@@ -15,6 +15,7 @@ from baselines.solvers.receding_horizon.newton.grid import Grid
 from baselines.solvers.receding_horizon.newton.workspace import PathProblem
 from baselines.solvers.receding_horizon.problem_data import ProblemData
 from ikgym.exceptions import InvalidInputError
+from ikgym.plant import Plant
 from ikgym.scenarios import Scenario
 from ikgym.simulation import Outcome
 from ikgym.validation import FloatArray, whole_number
@@ -51,15 +52,15 @@ class EpisodeProblem:
         """The episode that a reset with the seed begins.
 
         Raises:
-            InvalidInputError: The seed is no whole number of at least 0, or the scenario has a disturbance, or both
-                limits of acceleration and points that are held.
+            InvalidInputError: The seed is no whole number of at least 0, or the scenario's plant is not ideal, or it
+                has both limits of acceleration and points that are held.
         """
         whole_number("seed", seed, at_least=0)
-        disturbance = scenario.disturbance
-        if np.any(disturbance.noise) or np.any(disturbance.bias):
+        payload = {name: getattr(scenario.plant, name) for name in ("payload", "payload_step")}
+        if scenario.plant != Plant(**payload):
             raise InvalidInputError(
-                "The best cost of an episode is that of a joint path, which knows of no disturbance; scenario "
-                f"{scenario.name!r}: expected noise=0 and bias=0, got {disturbance}."
+                "The best cost of an episode is that of a joint path of the arm in the data sheet; scenario "
+                f"{scenario.name!r}: expected an ideal plant, but for a payload, got {scenario.plant}."
             )
         limited = bool(np.isfinite(scenario.arm.acceleration_limit).any())
         if limited and not scenario.counted()[1:].all():

@@ -25,12 +25,14 @@ class DifferentiableArm:
         scenario: What is to be tracked; its joint velocities are what is asked for.
 
     Raises:
-        InvalidInputError: The scenario disturbs the joint velocities, or does not show the pose at its start.
+        InvalidInputError: The scenario's plant is not ideal, or it does not show the pose at its start.
     """
 
     def __init__(self, scenario: Scenario) -> None:
-        if np.any(scenario.disturbance.bias) or np.any(scenario.disturbance.noise):
-            raise InvalidInputError(f"Scenario {scenario.name!r}: its disturbance has no gradient that can be known.")
+        if not scenario.plant.ideal:
+            raise InvalidInputError(
+                f"Scenario {scenario.name!r}: expected an ideal plant, whose gradient is known, got {scenario.plant}."
+            )
         if scenario.initial_pose is not None:
             raise InvalidInputError(f"Scenario {scenario.name!r}: its first pose is not that of the arm.")
         self.scenario = scenario

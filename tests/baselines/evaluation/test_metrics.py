@@ -81,7 +81,7 @@ def test_total_cost_is_the_sum_of_the_rewards_of_gymnasium_bit_for_bit(name, ste
 
 
 def test_noise_is_drawn_as_in_the_environment():
-    which = scenario(steps=50, disturbance=ikgym.Disturbance(noise=0.5))
+    which = scenario(steps=50, plant=ikgym.Plant(noise=0.5))
     solver = baselines.make("dls", which)
     env = gym.make("RedundantIK-v0", scenario=which, preview=1)
     observation, _ = env.reset(seed=7)

@@ -13,7 +13,7 @@ from baselines.training.trainers.differentiable_arm import DifferentiableArm
 from baselines.training.trainers.differentiable_policy import DifferentiablePolicy
 from ikgym import scenarios, tasks
 from ikgym.exceptions import InvalidInputError
-from ikgym.scenarios import Disturbance
+from ikgym.plant import Plant
 from ikgym.simulator import Simulator
 
 OFFSETS = (1, 2, 7, 20)
@@ -190,8 +190,8 @@ def test_gradients_of_base_policies(policy):
 
 
 def test_scenarios_that_cannot_be_differentiated_are_refused():
-    with pytest.raises(InvalidInputError, match="disturbance"):
-        DifferentiableArm(scenarios.get("varga7-random").replace(disturbance=Disturbance(noise=0.1)))
+    with pytest.raises(InvalidInputError, match="ideal plant"):
+        DifferentiableArm(scenarios.get("varga7-random").replace(plant=Plant(noise=0.1)))
     with pytest.raises(InvalidInputError, match="first pose"):
         DifferentiableArm(scenarios.get("zhang3-helix"))
 
