@@ -14,6 +14,7 @@ from ikgym.simulation import Outcome
 from ikgym.simulator import Simulator
 from ikgym.validation import FloatArray
 
+
 class Draw(NamedTuple):
     """What of an episode is drawn how.
 
@@ -58,7 +59,7 @@ def play(
     """
     rows = len(seeds)
     simulator = Simulator(scenario, None if single else rows, preview)
-    simulator.reset(np.ones(rows, dtype=np.bool_), [seeding.np_random(seed)[0] for seed in seeds])
+    simulator.reset(np.ones(rows, dtype=np.bool_), [seeding.np_random(Draw.of(seed).seed)[0] for seed in seeds])
     out = simulator.observe()
     for _ in range(scenario.steps):
         out = simulator.step(act(out))

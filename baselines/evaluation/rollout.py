@@ -203,8 +203,9 @@ def finite(
         return
     rows = action.reshape(len(seeds), -1)
     row = int(np.argmin(np.isfinite(rows).all(axis=1)))
+    seed = Draw.of(seeds[row]).seed
     raise InvalidInputError(
-        f"{policy.name} in {scenario.name}, seed {Draw.of(seeds[row]).seed}, step {steps + 1}: expected finite actions, got "
+        f"{policy.name} in {scenario.name}, seed {seed}, step {steps + 1}: expected finite actions, got "
         f"{rows[row].tolist()}."
     )
 
@@ -243,7 +244,8 @@ def _play(
             # Compilation, caches and first touch of memory belong to no step: one call on a copy, its answer dropped.
             policy.predict({key: value.copy() for key, value in seen.items()})
         begin = clock()
-        action, state = policy.predict(seen, state, begins if made == 0 else None)
+        told = {} if begins is None or made else {"episode_start": begins}
+        action, state = policy.predict(seen, state, **told)
         end = clock()
         if timed:
             time_ns[made] = end - begin

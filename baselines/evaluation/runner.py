@@ -28,7 +28,7 @@ from baselines.evaluation.trajectory_log import TrajectoryLog, trajectory_log
 from baselines.lifetime import end_with_parent
 from baselines.oracle import best_known
 from ikgym.compilation import logger
-from ikgym.exceptions import IkgymError
+from ikgym.exceptions import IkgymError, InvalidInputError
 from ikgym.preview import furthest
 from ikgym.scenarios import Preview, Scenario
 
@@ -202,8 +202,10 @@ def _in_sequence(batch: Sequence[Job], policy: Player, tick: Tick | None) -> lis
     out: dict[Draw, Episode] = {}
     for arms in [[one] for one in starts] if alone else [starts]:
         episodes = [[one._replace(seed=one.seed + k) for one in arms] for k in range(length)]
-        kind = {"preview": first.preview, "alone": alone, "timed": first.timed, "tick": tick}
-        for draws, played in zip(episodes, sequence(first.scenario, policy, episodes, **kind), strict=True):
+        all_played = sequence(
+            first.scenario, policy, episodes, preview=first.preview, alone=alone, timed=first.timed, tick=tick
+        )
+        for draws, played in zip(episodes, all_played, strict=True):
             out |= zip(draws, played, strict=True)
     return [out[job.draw] for job in batch]
 
@@ -215,14 +217,20 @@ def _played(job: Job, episode: Episode) -> Played:
 
 
 def play_episodes(
-    scenario: Scenario, policy: Player, draws: Sequence[Draw], preview: Preview, *, timed: bool, tick: Tick | None = None
+    scenario: Scenario,
+    policy: Player,
+    draws: Sequence[int | Draw],
+    preview: Preview,
+    *,
+    timed: bool,
+    tick: Tick | None = None,
 ) -> list[Episode]:
     """Plays episodes of a policy, together where it may be called for many arms.
 
     Args:
         scenario: What is to be tracked.
         policy: Who tracks it.
-        draws: What is drawn how; of what is timed, one.
+        draws: The reset seeds, or what is drawn how; of what is timed, one.
         preview: What the policy is shown.
         timed: Whether to keep the times of single calls.
         tick: See :data:`baselines.evaluation.rollout.Tick`.

@@ -24,8 +24,8 @@ class TestSet:
         digest: What :func:`baselines.fingerprints.set_hash` gave when the set was made.
         split: Where the seeds come from, see :data:`ikgym.scenarios.SPLITS`.
         noise_seeds: How often each episode is played, with other noise in sensors and drives.
-        sequence: Episodes that one arm plays one after the other: those with the seeds s have the arm seed
-            s // sequence, and a policy's state is handed on from one to the next. 1 where every episode has its own arm.
+        sequence: Episodes that one arm plays one after the other: those with the seed s have the arm seed
+            s // sequence, and a policy's state is handed on. 1 where every episode has its own arm.
     """
 
     name: str

@@ -92,8 +92,7 @@ class EpisodeProblem:
         return PathProblem(self.data, grid, self.start, self.nominal, rest, 0.0, change, False, self._load(grid))
 
     def _load(self, grid: Grid) -> FloatArray:
-        """What the payload adds to the zeros of the joints at the knots, in [rad] or [m]. Shape (K, n), (0, n) if none.
-        """
+        """What the payload adds to the zeros of the joints at the knots; (0, n) where there is none. Shape (K, n)."""
         plant, n = self.scenario.plant, self.scenario.joints
         if not np.any(plant.payload):
             return np.zeros((0, n))

@@ -59,9 +59,7 @@ class ForeignPolicy:
     wrap: Wrap | None = None
     parameters: Mapping[str, Any] = dataclasses.field(default_factory=dict)
 
-    def predict(
-        self, observation: Any, state: Any = None, episode_start: Any = None
-    ) -> tuple[npt.NDArray[Any], Any]:
+    def predict(self, observation: Any, state: Any = None, episode_start: Any = None) -> tuple[npt.NDArray[Any], Any]:
         """The action for one arm, and what the next call is to be given; an episode_start says that an episode begins.
 
         Raises:
