@@ -66,7 +66,7 @@ Columns:
   fingerprint                                    digest of the scenario and the version of the cost
   test_set                                       digest of the test set, null where there is none
   arm_seed                                       which arm moved, null where the reset seed said so
-  noise_seed                                     which noise there was in sensors and drives, 0 is that of the reset seed
+  noise_seed                                     which noise there was, 0 is that of the reset seed
   ideal                                          fingerprint of the scenario with an ideal plant
   operations                                     mean kinematics, Jacobians, factorisations, measurements in a step,
                                                  empty where nobody counts

@@ -61,6 +61,17 @@ SETS = {
         # Half of the episodes of the first: each needs a search of its own for its best known cost.
         TestSet("panda-random", episodes=128, digest="f4492864d6be"),
         TestSet("iiwa14-random", episodes=128, digest="4b2efa43deaa"),
+        # Those of imperfect plants. 64 episodes each, of 3,000 steps: with three noise seeds a policy moves for 576,000
+        # steps, and every episode needs a best known cost on an arm of its own.
+        TestSet("panda-ideal", episodes=64, digest="48bde4a871be"),
+        TestSet("panda-measured", episodes=64, digest="c6fd6151ddef"),
+        TestSet("panda-camera", episodes=64, digest="fef44af732ba", noise_seeds=3),
+        TestSet("panda-camera-slow", episodes=64, digest="6d89d0594207", noise_seeds=3),
+        # 13 arms with five episodes each.
+        TestSet("panda-same-arm", episodes=65, digest="bc8dd757d74b", noise_seeds=3, sequence=5),
+        TestSet("panda-payload", episodes=64, digest="1dcbd797b41b"),
+        TestSet("panda-bus", episodes=64, digest="700b8d28bf95"),
+        TestSet("panda-field", episodes=64, digest="3f19a2c4b072", noise_seeds=3),
     )
 }
 

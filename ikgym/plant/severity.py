@@ -18,12 +18,13 @@ def knowledge(values: Mapping[str, Any], severity: float) -> dict[str, Any]:
 
     Args:
         values: The fields of a plant at severity 1.
-        severity: Deviations, noises and the share of lost measurements grow with it in proportion, and, rounded to whole
-            steps, delays and the steps between two measurements, but for the first.
+        severity: Deviations, noises and the share of lost measurements grow with it in proportion; so do, rounded to
+            whole steps, delays, and the steps by which measurements are further apart than one.
     """
     out = {name: scaled(values[name], severity) for name in KNOWLEDGE}
     out |= {name: round(severity * values[name]) for name in ("q_delay", "pose_delay")}
-    return out | {"pose_every": 1 + round(severity * (values["pose_every"] - 1))}
+    payload_step = values["payload_step"] if severity > 0.0 else 0
+    return out | {"pose_every": 1 + round(severity * (values["pose_every"] - 1)), "payload_step": payload_step}
 
 
 def drives(values: Mapping[str, Any], severity: float) -> dict[str, Any]:
@@ -35,12 +36,11 @@ def drives(values: Mapping[str, Any], severity: float) -> dict[str, Any]:
             steps.
     """
     out = {name: scaled(values[name], severity) for name in DRIVES}
-    delay, bandwidth = values["command_delay"], values["bandwidth"]
-    out["command_delay"] = (
-        tuple(round(severity * end) for end in delay) if isinstance(delay, tuple) else round(severity * delay)
-    )
-    out["bandwidth"] = math.inf if severity == 0.0 else scaled(bandwidth, 1.0 / severity)
-    return out
+    if severity == 0.0:
+        return out | {"command_delay": 0, "bandwidth": math.inf}
+    delay = values["command_delay"]
+    late = tuple(round(severity * end) for end in delay) if isinstance(delay, tuple) else round(severity * delay)
+    return out | {"command_delay": late, "bandwidth": scaled(values["bandwidth"], 1.0 / severity)}
 
 
 def scaled(value: Any, factor: float) -> Any:
