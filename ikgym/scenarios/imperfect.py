@@ -26,18 +26,18 @@ STEPS = round(DURATION / DT)
 # So far from home are the paths at most, in [rad]; the fastest and hardest that a joint moves, in [rad/s] and [rad/s²].
 AROUND_HOME, SPEED, ACCELERATION = 1.0, 1.0, 4.0
 #: Calibration that is left over after a careful one: joint zeros and axes in [rad], links in [m].
-CALIBRATION = {"zero": 5e-4, "link": 3e-4, "axis": 5e-4}
+CALIBRATION: dict[str, Any] = {"zero": 5e-4, "link": 3e-4, "axis": 5e-4}
 #: A camera of some 60 Hz, and a slow one of 30 Hz: position in [m], orientation in [rad].
-CAMERA = {"pose_every": 17, "pose_noise": 3e-4, "pose_rotation_noise": 5e-4, "pose_missing": 0.1}
-SLOW_CAMERA = {"pose_every": 33, "pose_noise": 1e-3, "pose_rotation_noise": 1e-3, "pose_missing": 0.2}
+CAMERA: dict[str, Any] = {"pose_every": 17, "pose_noise": 3e-4, "pose_rotation_noise": 5e-4, "pose_missing": 0.1}
+SLOW_CAMERA: dict[str, Any] = {"pose_every": 33, "pose_noise": 1e-3, "pose_rotation_noise": 1e-3, "pose_missing": 0.2}
 #: Velocity loops of 10 to 20 Hz behind a bus, whose delay of 2 to 12 steps nobody states.
-BUS = {"bandwidth": (10.0, 20.0), "command_delay": (2, 12)}
+BUS: dict[str, Any] = {"bandwidth": (10.0, 20.0), "command_delay": (2, 12)}
 #: All of it at severity 1; at 0.5 the calibration is that of the others.
 FIELD = Plant(
     zero=1e-3, link=6e-4, axis=1e-3, payload=1e-3, payload_step=STEPS // 2, **SLOW_CAMERA, **BUS
 )  # fmt: skip
-#: The severity of `panda-field`.
-SEVERITY = 0.5
+#: The scenario with that plant, and its severity.
+FIELD_NAME, SEVERITY = "panda-field", 0.5
 
 
 def field(knowledge: float = SEVERITY, drives: float | None = None) -> Scenario:
@@ -50,7 +50,7 @@ def field(knowledge: float = SEVERITY, drives: float | None = None) -> Scenario:
     Raises:
         InvalidInputError: A severity is below 0.
     """
-    return _imperfect("panda-field", FIELD.scaled(knowledge, drives))
+    return _imperfect(FIELD_NAME, FIELD.scaled(knowledge, drives))
 
 
 def _imperfect(name: str, plant: Plant) -> Scenario:
@@ -91,4 +91,4 @@ _PLANTS: dict[str, dict[str, Any]] = {
 SCENARIOS: dict[str, Callable[[], Scenario]] = {
     name: functools.partial(lambda name, given: _imperfect(name, Plant(**given)), name, given)
     for name, given in _PLANTS.items()
-} | {"panda-measured": _measured, "panda-field": field}
+} | {"panda-measured": _measured, FIELD_NAME: field}
