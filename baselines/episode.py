@@ -59,7 +59,13 @@ def play(
     """
     rows = len(seeds)
     simulator = Simulator(scenario, None if single else rows, preview)
-    simulator.reset(np.ones(rows, dtype=np.bool_), [seeding.np_random(Draw.of(seed).seed)[0] for seed in seeds])
+    draws = [Draw.of(seed) for seed in seeds]
+    simulator.reset(
+        np.ones(rows, dtype=np.bool_),
+        [seeding.np_random(draw.seed)[0] for draw in draws],
+        arm_seeds=simulator.checked_arm_seeds([draw.arm_seed for draw in draws]),
+        noise_seeds=[draw.noise_seed for draw in draws],
+    )
     out = simulator.observe()
     for _ in range(scenario.steps):
         out = simulator.step(act(out))

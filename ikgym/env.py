@@ -13,16 +13,17 @@ from gymnasium.envs.registration import EnvSpec
 
 from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError, ResetNeededError
+from ikgym.outcome import OBSERVED as OBSERVED
+from ikgym.outcome import Observation, observation
 from ikgym.scenarios import Preview, Scenario
-from ikgym.simulator import Observation, Simulator, observation
+from ikgym.simulator import Simulator
 from ikgym.spaces import action_space, observation_space
 from ikgym.validation import FloatArray, known_names, shortened
 
-OBSERVED = ("q", "qdot", "pose", "nominal", "remaining")
 #: The keys of `info` after a step; the orientation error is there where the task has an orientation.
 REPORTED = ("tracking_cost", "velocity_cost", "position_error", "orientation_error", "clipped", "at_limit", "time")
 #: The keys that the options of a reset may have.
-OPTIONS = ("q",)
+OPTIONS = ("q", "arm_seed")
 
 
 class RedundantIKEnv(gym.Env[Any, Any]):
@@ -102,11 +103,12 @@ class RedundantIKEnv(gym.Env[Any, Any]):
             `"package.module:attribute"`; see `ikgym.scenarios.find`.
         preview: How many steps ahead the nominal coordinates are shown, or which ones.
         render_mode: None, `"human"` (a window) or `"rgb_array"`.
+        commands: h, how many of the last commands are shown.
 
     Raises:
         UnknownNameError: There is no such scenario.
-        InvalidInputError: The scenario, the preview or the render mode is not valid, or there is no memory for so
-            many steps.
+        InvalidInputError: The scenario, the preview, the number of commands or the render mode is not valid, or there
+            is no memory for so many steps.
     """
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": ["human", "rgb_array"], "render_fps": 50}  # type: ignore[misc]
@@ -116,6 +118,7 @@ class RedundantIKEnv(gym.Env[Any, Any]):
         scenario: str | Scenario = "varga7-fast",
         preview: Preview = 2,
         render_mode: str | None = None,
+        commands: int = 0,
     ) -> None:
         if render_mode is not None and render_mode not in self.metadata["render_modes"]:
             raise InvalidInputError(
@@ -124,8 +127,9 @@ class RedundantIKEnv(gym.Env[Any, Any]):
         self.scenario = scenarios.find(scenario)
         self._spec: EnvSpec | None = None
         self.render_mode = render_mode
-        self._simulator = Simulator(self.scenario, None, preview)  # first: it says whether there is memory
-        self.observation_space = observation_space(self.scenario, preview)
+        # First: it says whether there is memory.
+        self._simulator = Simulator(self.scenario, None, preview, commands=commands)
+        self.observation_space = observation_space(self.scenario, preview, commands)
         self.action_space = action_space(self.scenario)
         self._step = -1  # no episode yet
         self._steps, self._dt = self.scenario.steps, self.scenario.dt
@@ -147,27 +151,31 @@ class RedundantIKEnv(gym.Env[Any, Any]):
         """Begins an episode.
 
         Args:
-            seed: Chooses the trajectory of a random scenario.
-            options: ``{"q": …}`` starts at other joint coordinates, in [rad] or [m]. Shape (n,).
+            seed: Chooses the trajectory of a random scenario, and whatever its plant draws.
+            options: ``{"q": …}`` starts at other joint coordinates, in [rad] or [m], of shape (n,); ``{"arm_seed": k}``
+                has the arm and the drives that k draws, whatever the seed.
 
         Returns:
             The first observation, and an empty info.
 
         Raises:
             UnknownNameError: There is no such option.
-            InvalidInputError: The options are no dict, or the start has a wrong shape, is not finite, out of range or
-                outside the limits.
+            InvalidInputError: The options are no dict, the start has a wrong shape, is not finite, out of range or
+                outside the limits, or the seed of the arm is none, or there is nothing that it could keep.
         """
         options = checked_options(options, OPTIONS)
         starts = self._simulator.checked_starts(options.get("q"))
+        arm_seeds = self._simulator.checked_arm_seeds(options.get("arm_seed"))
         super().reset(seed=seed)
-        self._simulator.reset(np.ones(1, dtype=np.bool_), [self.np_random], starts)
+        self._simulator.reset(np.ones(1, dtype=np.bool_), [self.np_random], starts, arm_seeds)
         self._step = 0
         out = self._simulator.observe()
         if self._renderer is not None:
             self._renderer.begin(self._simulator.nominal_positions(0), self._steps * self._dt)
-            self._draw_later(out.q[0], float(out.position_error[0]), float(out.orientation_error[0]))
-        return observation(out), {}
+            self._draw_later(
+                self._simulator.true_q[0].copy(), float(out.position_error[0]), float(out.orientation_error[0])
+            )
+        return observation(out, 0), {}
 
     def step(self, action: npt.NDArray[np.float32]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Applies joint velocities for one time step; the class says what comes back.
@@ -196,7 +204,7 @@ class RedundantIKEnv(gym.Env[Any, Any]):
         info["at_limit"] = held
         info["time"] = self._step * self._dt
         if self._renderer is not None:
-            self._draw_later(seen["q"], position, orientation)
+            self._draw_later(self._simulator.true_q[0].copy(), position, orientation)
         return seen, -(tracking + velocity), False, self._step == self._steps, info
 
     def render(self) -> npt.NDArray[np.uint8] | None:

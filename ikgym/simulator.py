@@ -14,16 +14,17 @@ from ikgym.arms.posture import within_limits
 from ikgym.compilation import announced
 from ikgym.exceptions import InvalidInputError
 from ikgym.memory import afford, of_rows
+from ikgym.outcome import Observation as Observation
+from ikgym.outcome import Outcome, more_size, observation, outcome, size
 from ikgym.parallel import in_chunks
+from ikgym.plant import step as plant_step
+from ikgym.plant.rows import PlantRows
 from ikgym.preview import FARTHEST as FARTHEST
 from ikgym.preview import Preview, offsets
 from ikgym.scenarios import Scenario
-from ikgym.simulation import Constants, Outcome, State, outcome
+from ikgym.simulation import Constants, State
 from ikgym.trajectories import Trajectory
-from ikgym.validation import FloatArray, float_array, shortened
-
-#: What a policy sees of an arm, see :func:`observation`.
-Observation = dict[str, FloatArray]
+from ikgym.validation import FloatArray, float_array, shortened, whole_number
 
 # Rows worth a thread of their own: below, handing over costs more than it saves.
 GRAIN_STEP = 256
@@ -47,13 +48,19 @@ class Simulator:
             those.
         memory: What the nominal frames of all rows may take, in bytes. Those of random episodes that would take
             more are computed block by block on the way; a block is never shorter than the preview looks ahead.
+        commands: How many of the last commands are shown.
 
     Raises:
-        InvalidInputError: The preview is not valid, or there is no memory for so many rows or steps.
+        InvalidInputError: The preview or the number of commands is not valid, or there is no memory for so many rows
+            or steps.
     """
 
-    def __init__(self, scenario: Scenario, rows: int | None, preview: Preview, memory: int = MEMORY) -> None:
-        joints, size, plant = scenario.joints, scenario.task.size, scenario.plant
+    def __init__(
+        self, scenario: Scenario, rows: int | None, preview: Preview, memory: int = MEMORY, commands: int = 0
+    ) -> None:
+        joints, coordinates = scenario.joints, scenario.task.size
+        commands = whole_number("commands", commands, at_least=0)
+        ideal = scenario.plant.ideal and not commands
         self._action_shape = (joints,) if rows is None else (rows, joints)
         # One arm has no rows that do not step, whose outcome would have to be zero.
         self._new = np.empty if rows is None else np.zeros
@@ -69,8 +76,11 @@ class Simulator:
         self._block = points if points <= affordable else min(points, max(affordable // 2, self.preview[-1]))
         self._in_blocks = self._block < points
         known = self._block * (2 if self._in_blocks else 1)
-        shown = 2 * joints + size + len(self.preview) * size + 9
-        afford(f"{rows} environments", of_rows(rows, shown, tables * known * width))
+        shown = size(joints, coordinates, len(self.preview))
+        if not ideal:
+            shown += more_size(joints, coordinates, commands)
+        kept = 0 if ideal else PlantRows.size(scenario.plant, joints, coordinates, commands)
+        afford(f"{rows} environments", of_rows(rows, shown, tables * known * width + rows * kept))
         self._last_block = self._point[self.preview[-1] :] // self._block
         self._blocks_known = np.zeros(tables, dtype=np.int64)
         self._episodes: list[Trajectory] = [scenario.trajectory] * tables
@@ -82,7 +92,6 @@ class Simulator:
             point=self._point % known,
             counted=scenario.counted(),
             preview=np.array(self.preview, dtype=np.int64),
-            disturbance=np.array([np.broadcast_to(part, joints) for part in (plant.bias, plant.noise)]),
             limits=limit_rows(scenario.arm, scenario.largest_qdot, scenario.dt),
         )
         self._state = State(
@@ -91,12 +100,15 @@ class Simulator:
             qdot=np.zeros((rows, joints)),
             step=np.zeros(rows, dtype=np.int64),
             frames=np.zeros((tables, known, width)),
-            noise_key=np.zeros(rows, dtype=np.uint64),
-            scratch=np.empty((rows, 12 + size + scenario.task.error_size)),
+            scratch=np.empty((rows, 12 + coordinates + scenario.task.error_size)),
         )
+        self._plant: PlantRows | None = None
+        if not ideal:
+            self._plant = PlantRows(scenario.plant, scenario.arm, scenario.dt, rows, coordinates, commands)
         if not scenario.random:
             self._know(np.zeros(1, dtype=np.int64))
-        self._shape, self._nominal_shape = (rows, joints, size, len(self.preview)), (len(self.preview), size)
+        self._shape = (rows, joints, coordinates, len(self.preview), None if ideal else commands)
+        self._nominal_shape = (len(self.preview), coordinates)
         self._count = rows * shown
         # Where the parts of the only arm are in the block.
         parts = self._outcome(np.arange(self._count, dtype=np.float64))[1:6]
@@ -119,13 +131,17 @@ class Simulator:
         active: npt.NDArray[np.bool_],
         generators: Sequence[np.random.Generator] | Mapping[int, np.random.Generator],
         starts: FloatArray | None = None,
+        arm_seeds: Sequence[int | None] | None = None,
+        noise_seeds: Sequence[int] | None = None,
     ) -> None:
         """Begins new episodes.
 
         Args:
             active: The rows to reset. Shape (N,).
-            generators: One a row; each draws its row's trajectory and disturbance.
+            generators: One a row; each draws its row's trajectory and plant.
             starts: What :meth:`checked_starts` gave; the scenario's own starts if left out. Shape (N, n).
+            arm_seeds: What :meth:`checked_arm_seeds` gave, one a row; arms are drawn with their episodes if left out.
+            noise_seeds: Which noise of drives and sensors, one a row; 0 is that of the generator, as if left out.
         """
         scenario, state = self.scenario, self._state
         rows = np.flatnonzero(active)
@@ -135,9 +151,8 @@ class Simulator:
                 self._episodes[row] = episode
         if len(rows):
             state.q[rows] = scenario.first_q_of(episodes) if starts is None else starts[rows]
-        if np.any(scenario.plant.noise):
-            for row in rows.tolist():
-                state.noise_key[row] = generators[row].integers(2**63, dtype=np.uint64)
+        if self._plant is not None:
+            self._plant.begin(rows, generators, arm_seeds, noise_seeds)
         self._own_start[active] = starts is None
         state.qdot[active] = 0.0
         state.step[active] = 0
@@ -171,6 +186,28 @@ class Simulator:
             )
         return np.broadcast_to(starts, (self.rows, joints))
 
+    def checked_arm_seeds(self, given: Any) -> list[int | None] | None:
+        """Seeds of arms that a user asks for.
+
+        Args:
+            given: A whole number for all rows, or one a row, where None stands for an arm drawn with the episode.
+
+        Returns:
+            One a row, or None where nothing is asked for.
+
+        Raises:
+            InvalidInputError: They are no such numbers, not one a row, or the plant draws no arm that could be kept.
+        """
+        if given is None:
+            return None
+        seeds = list(given) if isinstance(given, (tuple, list, np.ndarray)) else [given] * self.rows
+        if len(seeds) != self.rows:
+            raise InvalidInputError(f"options['arm_seed']: expected {self.rows} seeds, one a row, got {len(seeds)}.")
+        seeds = [None if one is None else whole_number("options['arm_seed']", one, at_least=0) for one in seeds]
+        if any(one is not None for one in seeds):
+            self.scenario.plant.check_draws_arm(self.scenario.name)
+        return seeds
+
     def observe(self, active: npt.NDArray[np.bool_] | None = None, out: Outcome | None = None) -> Outcome:
         """What the arms show before a step.
 
@@ -182,7 +219,10 @@ class Simulator:
         active = self._all if active is None else active
         self._run(active, out.numbers, moving=False)
         if self.scenario.initial_pose is not None:
-            out.pose[active & self._own_start & (self._state.step == 0)] = self.scenario.initial_pose
+            starting = active & self._own_start & (self._state.step == 0)
+            out.pose[starting] = self.scenario.initial_pose
+            if self._plant is not None:
+                self._plant.state.shown[starting] = self.scenario.initial_pose
         return out
 
     def step(self, actions: npt.ArrayLike, active: npt.NDArray[np.bool_] | None = None) -> Outcome:
@@ -212,6 +252,8 @@ class Simulator:
             What a policy sees, without a row axis; costs, errors and whether the action was clipped; joints held back.
         """
         self._accept(action, self._all)
+        if self._plant is not None:
+            return self._step_one_measured()
         numbers = np.empty(self._count)
         simulation.step(*self._constants, numbers, self._all, True, 0, 1)
         q, qdot, pose, nominal, remaining = self._parts
@@ -224,12 +266,23 @@ class Simulator:
         }
         return seen, numbers[-8:-3].tolist(), numbers[-3:].astype(np.int64) if self._limited else NONE_HELD.copy()
 
+    def _step_one_measured(self) -> tuple[Observation, list[float], npt.NDArray[np.int64]]:
+        out = self._outcome(np.empty(self._count))
+        self._run(self._all, out.numbers, moving=True)
+        told = [out.tracking_cost, out.velocity_cost, out.position_error, out.orientation_error, out.clipped]
+        return observation(out, 0), [float(part[0]) for part in told], out.at_limit[0].astype(np.int64)
+
     def nominal_positions(self, row: int) -> FloatArray:
         """The nominal positions of a row's episode in [m], one a step. Shape (steps + 1, 3)."""
         point = self._point[: self.scenario.steps + 1]
         episode = self._episodes[row if self.scenario.random else 0]
         positions: FloatArray = self.scenario.frames(episode, int(point[-1]) + 1)[point, -3:]
         return positions
+
+    @property
+    def true_q(self) -> FloatArray:
+        """Where the arms are, in [rad] or [m], whatever is measured. Shape (N, n)."""
+        return self._state.q
 
     @property
     def steps_made(self) -> npt.NDArray[np.int64]:
@@ -260,18 +313,22 @@ class Simulator:
             self._look_ahead(np.flatnonzero(active), steps=1)
 
     def _run(self, active: npt.NDArray[np.bool_], numbers: FloatArray, *, moving: bool) -> None:
+        step = simulation.step if self._plant is None else plant_step.step
         in_chunks(
-            lambda start, stop: simulation.step(*self._constants, numbers, active, moving, start, stop),
+            lambda start, stop: step(*self._constants, numbers, active, moving, start, stop),
             self.rows,
             GRAIN_STEP,
         )
 
     def _taken_apart(self) -> tuple[Any, ...]:
-        """What never changes, in parts as :func:`simulation.step` takes it."""
+        """What never changes, in parts as :func:`simulation.step` takes it, or in tuples for that of a plant."""
+        plant, cost = self._plant, self.scenario.cost.parameters
+        if plant is not None:
+            return self._shared, cost, plant.drives, plant.sensors, plant.arms, self._state, plant.state
         return *self.scenario.arm.chain, *self._shared, *self.scenario.cost.parameters, *self._state
 
     def _outcome(self, numbers: FloatArray) -> Outcome:
-        return outcome(numbers, *self._shape)
+        return outcome(numbers, *self._shape, late=self.scenario.plant.late)
 
     def _look_ahead(self, rows: npt.NDArray[np.int64], *, steps: int) -> None:
         """Sees to it that the rows know all nominal frames that they need after some steps more."""
@@ -295,8 +352,3 @@ class Simulator:
 
         in_chunks(work, len(rows), GRAIN_RESET)
         self._blocks_known[rows] += 1
-
-
-def observation(out: Outcome) -> Observation:
-    """What a policy sees of the only arm: the observation of the environment, without a row axis."""
-    return {key: getattr(out, key)[0] for key in ("q", "qdot", "pose", "nominal", "remaining")}

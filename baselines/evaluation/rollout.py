@@ -12,11 +12,11 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.episode import Draw, play
-from baselines.policy import Batch, Memory, Operations, Report
+from baselines.policy import Memory, Operations, Report
 from ikgym.exceptions import InvalidInputError
+from ikgym.outcome import Observation, observation
 from ikgym.scenarios import Preview, Scenario
 from ikgym.simulation import Outcome
-from ikgym.simulator import Observation, observation
 from ikgym.validation import FloatArray
 
 # Steps between two words to the progress bar.
@@ -257,7 +257,7 @@ def _play(
     try:
         for k, out in enumerate(play(scenario, seeds, act, preview=shown, single=alone)):
             report = policy.report(state)
-            q[:, k], qdot[:, k], pose[:, k] = out.q, out.qdot, out.pose
+            q[:, k], qdot[:, k], pose[:, k] = out.true_q, out.qdot, out.true_pose
             tracking[:, k], velocity[:, k] = out.tracking_cost, out.velocity_cost
             position[:, k], orientation[:, k] = out.position_error, out.orientation_error
             at_limit[:, k] = out.at_limit
@@ -297,4 +297,4 @@ def _play(
 
 def _seen(out: Outcome, alone: bool) -> Observation:
     """What the policy sees: of the only arm, or with an axis of arms."""
-    return observation(out) if alone else {name: getattr(out, name) for name in Batch._fields}
+    return observation(out, 0 if alone else None)

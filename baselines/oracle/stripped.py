@@ -33,10 +33,9 @@ def stripped(scenario: Scenario, seed: int, arm_seed: int | None = None) -> Scen
     plant = scenario.plant
     if plant.ideal and arm_seed is None:
         return scenario
-    drawn = scenario.drawn_plant(seed, arm_seed).arm
+    drawn = scenario.drawn_plant(seed, arm_seed)
     kept = Plant(payload=plant.payload, payload_step=plant.payload_step) if np.any(plant.payload) else Plant()
-    arm = drawn.replace(name=scenario.arm.name)  # equal arms are the same, whatever they are called
-    return scenario.replace(arm=arm, model=scenario.model, plant=kept)
+    return scenario.replace(arm=drawn.arm, model=scenario.model, plant=kept)
 
 
 def ideal(scenario: Scenario) -> Scenario:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ikgym.plant.draw import DrawnPlant
 from ikgym.plant.plant import Plant
 
-__all__ = ("Plant",)
+__all__ = ("DrawnPlant", "Plant")

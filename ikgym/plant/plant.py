@@ -13,10 +13,9 @@ from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 from ikgym.plant import checks, severity
 from ikgym.plant.checks import Drawn, PerJoint
+from ikgym.random_numbers import CUT
 from ikgym.validation import LARGEST, FloatArray, Frozen, number, per_joint, shortened, whole_number
 
-#: Normal numbers are cut at so many standard deviations, so that all bounds are finite and true.
-CUT = 6.0
 #: What is one number for all joints, or one a joint; and which of them may be negative.
 JOINT_WISE = ("zero", "payload", "backlash", "bias", "noise", "q_noise")
 SIGNED = ("payload", "bias")
@@ -163,6 +162,21 @@ class Plant(Frozen):
                 raise InvalidInputError(
                     f"{name}: expected at most the {steps} steps of the episode, got {getattr(self, name)}."
                 )
+
+    def check_draws_arm(self, name: str) -> None:
+        """Insists that there is something that a seed of the arm could keep.
+
+        Args:
+            name: Of the scenario.
+
+        Raises:
+            InvalidInputError: Neither the arm nor its drives are drawn.
+        """
+        if not self.draws_arm:
+            raise InvalidInputError(
+                f"arm_seed: expected a scenario whose plant draws an arm or its drives, which the seed keeps; that of "
+                f"{name!r} draws none: {self}."
+            )
 
     @property
     def ideal(self) -> bool:

@@ -17,7 +17,8 @@ from ikgym.arms.limits import farthest, velocity_scale
 from ikgym.arms.posture import within_limits
 from ikgym.cost import TrackingCost
 from ikgym.exceptions import InvalidInputError
-from ikgym.plant import Plant
+from ikgym.plant import DrawnPlant, Plant
+from ikgym.plant.draw import Draws, arm_key, episode_key
 from ikgym.preview import Preview, furthest
 from ikgym.scenarios import bounds, parts, starts, writing
 from ikgym.simulation import nominal_rows
@@ -202,6 +203,28 @@ class Scenario(Frozen):
         if self.random and seed is None:
             raise InvalidInputError(f"Scenario {self.name!r} is random: a seed says which episode is meant.")
         return self.trajectory.sample(seeding.np_random(seed)[0]) if self.random else self.trajectory
+
+    def drawn_plant(self, seed: int | None = None, arm_seed: int | None = None) -> DrawnPlant:
+        """The plant of an episode: privileged information, for the simulation and for references alone.
+
+        Args:
+            seed: The reset seed; needed where the plant draws its arm or its drives.
+            arm_seed: The seed of an arm that is kept, as the reset option has it.
+
+        Raises:
+            InvalidInputError: The plant draws something and there is no seed, or nothing that a seed of the arm keeps.
+        """
+        key = 0
+        if arm_seed is not None:
+            self.plant.check_draws_arm(self.name)
+            key = arm_key(arm_seed)
+        elif self.plant.draws_arm:
+            if seed is None:
+                raise InvalidInputError(f"Scenario {self.name!r} draws its plant: a seed says which episode is meant.")
+            generator = seeding.np_random(seed)[0]
+            self.trajectory.samples([generator])  # drawn before it
+            key = episode_key(self.plant, generator)
+        return Draws(self.plant, self.arm).one(key)
 
     def points(self, preview: Preview = 0) -> npt.NDArray[np.int64]:
         """Which nominal point is the target after k steps.

@@ -1,0 +1,114 @@
+"""The plants of N arms that are simulated side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from ikgym.arms import Arm
+from ikgym.plant.arm_kernels import ARM_STREAMS
+from ikgym.plant.checks import PerJoint
+from ikgym.plant.draw import Draws, arm_key, episode_key
+from ikgym.plant.plant import Plant
+from ikgym.plant.sensor_kernels import STREAMS
+from ikgym.plant.step import Drives, PlantState, Sensors
+from ikgym.random_numbers import stream
+from ikgym.validation import FloatArray
+
+# Numbers of the streams that other noises of an episode come from: more than there are effects.
+NOISE_SEEDS = 1000
+
+Generators = Sequence[np.random.Generator] | Mapping[int, np.random.Generator]
+
+
+class PlantRows:
+    """What the plants of N arms are and remember, as kernels take it.
+
+    Args:
+        plant: What their plants are drawn from.
+        arm: The arm of the data sheet.
+        dt: Δt in [s].
+        rows: N.
+        coordinates: m, of the task.
+        commands: h, how many of the last commands are shown.
+    """
+
+    def __init__(self, plant: Plant, arm: Arm, dt: float, rows: int, coordinates: int, commands: int) -> None:
+        self._plant, self._dt, n = plant, dt, arm.joints
+        self._draws = Draws(plant, arm)
+
+        def every_joint(value: PerJoint) -> FloatArray:
+            return np.array(np.broadcast_to(value, n), dtype=np.float64)
+
+        self.drives = Drives(
+            every_joint(plant.bias),
+            every_joint(plant.noise),
+            every_joint(plant.backlash),
+            np.array(arm.chain.prismatic),
+            plant.payload_step,
+        )
+        self.sensors = Sensors(
+            every_joint(plant.q_noise),
+            plant.pose_noise,
+            plant.pose_rotation_noise,
+            plant.q_delay,
+            plant.pose_delay,
+            plant.pose_every,
+            plant.pose_missing,
+        )
+        self.arms = self._draws.blank(rows)
+        self.state = PlantState(
+            keys=np.zeros((rows, STREAMS), dtype=np.uint64),
+            lag=np.ones(rows),
+            delay=np.zeros(rows, dtype=np.int64),
+            drive=np.zeros((rows, n)),
+            play=np.zeros((rows, n)),
+            commands=np.zeros((rows, max(plant.longest_command_delay + 1, commands), n)),
+            q=np.zeros((rows, plant.q_delay + 1, n)),
+            pose=np.zeros((rows, plant.pose_delay // plant.pose_every + 1, coordinates)),
+            shown=np.zeros((rows, coordinates)),
+            shown_step=np.zeros(rows, dtype=np.int64),
+        )
+
+    @staticmethod
+    def size(plant: Plant, joints: int, coordinates: int, commands: int) -> int:
+        """Numbers that a row takes."""
+        kept = joints * (plant.longest_command_delay + 1 + commands + plant.q_delay + 1)
+        return 2 * (6 * joints + 12) + kept + coordinates * (plant.pose_delay // plant.pose_every + 2) + 4 * joints
+
+    def begin(
+        self,
+        rows: npt.NDArray[np.int64],
+        generators: Generators,
+        arm_seeds: Sequence[int | None] | None,
+        noise_seeds: Sequence[int] | None = None,
+    ) -> None:
+        """Draws the plants of new episodes.
+
+        Args:
+            rows: Which rows begin one. Shape (k,).
+            generators: One a row.
+            arm_seeds: One a row: the seed of the arm that it keeps, None for an arm that is drawn with the episode.
+            noise_seeds: One a row: which noise there is, of drives and sensors; 0 is that of the episode.
+        """
+        keys = [episode_key(self._plant, generators[row]) for row in rows.tolist()]
+        given = [None if arm_seeds is None else arm_seeds[row] for row in rows.tolist()]
+        arm_keys = [key if seed is None else arm_key(seed) for key, seed in zip(keys, given, strict=True)]
+        of_arms = np.array(arm_keys, dtype=np.uint64)
+        self._draws.arms(of_arms, rows, self.arms)
+        bandwidths, self.state.delay[rows] = self._draws.loops(of_arms)
+        self.state.lag[rows] = -np.expm1(-2.0 * np.pi * bandwidths * self._dt)
+        if noise_seeds is not None:
+            keys = [noise_key(key, noise_seeds[row]) for key, row in zip(keys, rows.tolist(), strict=True)]
+        self.state.keys[rows, 0] = keys
+        for number in range(1, STREAMS):
+            self.state.keys[rows, number] = [stream(np.uint64(key), ARM_STREAMS + number) for key in keys]
+        for changed in (self.state.drive, self.state.play):
+            changed[rows] = 0.0
+
+
+def noise_key(key: int, noise_seed: int) -> int:
+    """The key of an episode's noises: its own, or that of a stream far from those of its effects."""
+    return key if noise_seed == 0 else int(stream(np.uint64(key), NOISE_SEEDS + noise_seed))
