@@ -34,7 +34,9 @@ def test_knowledge_and_drives_are_apart():
 
 
 def test_single_numbers_and_one_a_joint():
-    plant = Plant(zero=(1e-3, 2e-3), backlash=4e-4, bias=-1e-3, command_delay=4, bandwidth=10.0, q_delay=3, pose_delay=5)
+    plant = Plant(
+        zero=(1e-3, 2e-3), backlash=4e-4, bias=-1e-3, command_delay=4, bandwidth=10.0, q_delay=3, pose_delay=5
+    )
     half = plant.scaled(0.5)
     assert (half.zero, half.backlash, half.bias) == ((5e-4, 1e-3), 2e-4, -5e-4)
     assert (half.command_delay, half.bandwidth, half.q_delay, half.pose_delay) == (2, 20.0, 2, 2)
