@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.agents.feature_kernels import LARGEST, action_rows, feature_rows, project_rows, speed_rows
-from baselines.policy import Batch, Problem
+from baselines.policy import KEYS, Batch, Problem
 from ikgym.exceptions import InvalidInputError
 from ikgym.validation import FloatArray, Frozen, known_names, number, whole_number
 
@@ -112,7 +112,7 @@ class Processing(Frozen):
             problem.cost.delta_x,
             problem.velocity_limit,
             np.array(self.offsets, dtype=np.int64),
-            *batch,
+            *batch[: len(KEYS)],
             np.empty((rows, 0)) if base is None else base,
             np.empty((len(self.offsets), e)),
             out,

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from gymnasium.utils import seeding
 
 from baselines.episode import added_up, play
-from baselines.policy import Batch, Memory, SolverPolicy
+from baselines.policy import KEYS, Memory, SolverPolicy
 from baselines.solvers.receding_horizon.newton.grid import Grid
 from baselines.solvers.receding_horizon.newton.workspace import PathProblem
 from baselines.solvers.receding_horizon.problem_data import ProblemData
@@ -190,7 +190,7 @@ def path_of(policy: SolverPolicy, scenario: Scenario, seed: int) -> FloatArray:
 
     def act(out: Outcome) -> npt.NDArray[np.float32]:
         nonlocal state
-        action, state = policy.predict({name: getattr(out, name) for name in Batch._fields}, state)
+        action, state = policy.predict({name: getattr(out, name) for name in KEYS}, state)
         return action
 
     return np.stack([out.q[0] for out in play(scenario, [seed], act, preview=policy.preview)])

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from baselines.policy.problem import Batch, Memory, Operations, Problem, Solution
+from baselines.policy.problem import KEYS, Batch, Memory, Operations, Problem, Solution
 from baselines.policy.solver import SolverPolicy
 from baselines.policy.state import Report
 from baselines.status import Status, statuses
 from ikgym.simulator import Observation
 
 __all__ = (
+    "KEYS",
     "Batch",
     "Memory",
     "Observation",

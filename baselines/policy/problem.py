@@ -14,6 +14,9 @@ from ikgym.scenarios import Scenario
 from ikgym.tasks import Task
 from ikgym.validation import FloatArray, Frozen, frozen_array
 
+#: What every observation has, in the order of :class:`Batch`.
+KEYS = "q", "qdot", "pose", "nominal", "remaining"
+
 #: Arrays with a leading axis of B: what a policy remembers, or a whole state, see :mod:`baselines.policy.state`.
 Memory = tuple[npt.NDArray[Any], ...]
 
@@ -60,6 +63,10 @@ class Batch(NamedTuple):
         pose: Measured task coordinates. Shape (B, m).
         nominal: Nominal task coordinates ahead, X^N(k+1) first. Shape (B, p, m).
         remaining: Steps left. Shape (B, 1).
+        q_age: How many steps ago q was measured; None where the observation does not say. Shape (B, 1).
+        pose_age: The same of the pose. Shape (B, 1).
+        commands: The last commands as joint velocities, newest first, in [rad/s] or [m/s]; None where they are not
+            observed. Shape (B, h, n).
     """
 
     q: FloatArray
@@ -67,6 +74,9 @@ class Batch(NamedTuple):
     pose: FloatArray
     nominal: FloatArray
     remaining: FloatArray
+    q_age: FloatArray | None = None
+    pose_age: FloatArray | None = None
+    commands: FloatArray | None = None
 
 
 class Solution(NamedTuple):

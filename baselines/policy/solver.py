@@ -13,8 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.policy import state as states
-from baselines.policy.observations import ObservationReader, Parts, as_batch, not_finite
-from baselines.policy.problem import Batch, Memory, Operations, Problem, Solution
+from baselines.policy.observations import ObservationReader, Parts, as_batch, not_finite, taken
+from baselines.policy.problem import KEYS, Batch, Memory, Operations, Problem, Solution
 from baselines.policy.state import REPORTED, Report, joined, pack, remembered, replace_rows
 from baselines.policy_kernels import all_finite, cut_rows
 from ikgym.compilation import announced
@@ -52,6 +52,8 @@ class SolverPolicy(Frozen, abc.ABC):
     example: ClassVar[bool] = False
     #: Whether it is a solver of another project, whose package is installed with the extra `rivals`.
     rival: ClassVar[bool] = False
+    #: Whether it is shown the ages of measurements and past commands, where an observation has them.
+    sees_extras: ClassVar[bool] = True
     #: Rows that are worth a thread of their own: the fewer, the longer a row takes.
     grain: ClassVar[int] = 256
     #: Whether the policy is read from a file, as learned agents are.
@@ -140,6 +142,8 @@ class SolverPolicy(Frozen, abc.ABC):
         """
         del deterministic
         parts, rows, single = self._read(observation)
+        if self.sees_extras:
+            parts = *parts, *self._read.extras(observation, rows, single)
         return self._answer(parts, single, self._recall(state, episode_start, rows))
 
     def act(self, batch: Batch, memory: Memory) -> tuple[npt.NDArray[np.float32], Memory]:
@@ -235,7 +239,7 @@ class SolverPolicy(Frozen, abc.ABC):
     def _answer(self, parts: Parts, single: bool, memory: Memory) -> tuple[npt.NDArray[np.float32], Memory]:
         """What `predict` returns, for the arrays of an observation and a memory whose shapes are right."""
         batch = as_batch(parts, single)
-        if not all_finite(*batch):
+        if not all_finite(*batch[: len(KEYS)]):
             raise not_finite()
         action, after = self.act(batch, memory)
         return action[0] if single else action, after
@@ -287,7 +291,7 @@ class SolverPolicy(Frozen, abc.ABC):
         parts: dict[int, Solution] = {}
 
         def work(start: int, stop: int) -> None:
-            share = Batch(*[array[start:stop] for array in batch])
+            share = taken(batch, slice(start, stop))
             _sharing.now = True
             try:
                 parts[start] = self.solve(share, self._named(tuple(array[start:stop] for array in memory)))

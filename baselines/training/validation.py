@@ -27,7 +27,7 @@ from baselines.evaluation.rollout import rollouts
 from baselines.evaluation.summary import geometric_mean
 from baselines.files import write
 from baselines.fingerprints import fingerprint
-from baselines.policy import Batch, SolverPolicy
+from baselines.policy import KEYS, SolverPolicy
 from baselines.spec import parse_policy
 from baselines.training.environment.view import View
 from baselines.training.score import Score
@@ -101,7 +101,7 @@ def play(
     starting = np.ones(rows, dtype=np.bool_)
 
     def act(out: Outcome) -> npt.NDArray[Any]:
-        features = view.see({name: getattr(out, name) for name in Batch._fields}, starting)
+        features = view.see({name: getattr(out, name) for name in KEYS}, starting)
         starting[:] = False
         return view.act(actor(features))
 

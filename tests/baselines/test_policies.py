@@ -19,7 +19,7 @@ from stable_baselines3.common.vec_env import DummyVecEnv
 import baselines
 import ikgym
 from baselines.agents.shipped import ShippedAgent
-from baselines.policy import Batch, Problem, Solution, SolverPolicy, statuses
+from baselines.policy import KEYS, Batch, Problem, Solution, SolverPolicy, statuses
 from baselines.policy.compiled import CompiledPolicy
 from baselines.registry import get
 from baselines.status import Status
@@ -159,7 +159,7 @@ def test_memory_is_a_named_tuple(name, monkeypatch):
         assert type(policy.memory_of(state)) is type(policy.memory(1))
         assert identical(tuple(policy.memory_of(state)), state[2:])
     if isinstance(policy, CompiledPolicy):  # which calls its kernel with the memory's parts instead
-        policy.solve(Batch(*[observation[key] for key in Batch._fields]), policy.memory_of(state))
+        policy.solve(Batch(*[observation[key] for key in KEYS]), policy.memory_of(state))
     assert {type(memory) for memory in handed} == {type(policy.memory(1))}
 
 

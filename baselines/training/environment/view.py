@@ -10,7 +10,7 @@ import torch
 
 from baselines.agents.features import Features, Processing
 from baselines.agents.view import AgentView, Seen
-from baselines.policy import Batch, Memory, Problem
+from baselines.policy import KEYS, Batch, Memory, Problem
 from ikgym.exceptions import ResetNeededError
 from ikgym.scenarios import Preview, Scenario
 from ikgym.simulator import Observation
@@ -103,7 +103,7 @@ class View:
 
 
 def _batch(observation: Observation) -> Batch:
-    return Batch(*[np.ascontiguousarray(observation[key], dtype=np.float64) for key in Batch._fields])
+    return Batch(*[np.ascontiguousarray(observation[key], dtype=np.float64) for key in KEYS])
 
 
 def _aligned(features: Features) -> Features:

@@ -11,7 +11,7 @@ import baselines
 import ikgym
 from baselines.agents.features import Processing
 from baselines.evaluation.rollout import rollouts
-from baselines.policy import Batch, Problem
+from baselines.policy import KEYS, Batch, Problem
 from baselines.spec import parse_policy
 from baselines.training.environment.vec_env import ProcessedVecEnv
 from baselines.training.environment.view import View
@@ -47,7 +47,7 @@ def test_features_are_those_of_processing(base_policy):
         under = baselines.make(name, scenario(), **parameters)
 
     def expected(observation, state, starting):
-        batch, base = Batch(*[observation[key] for key in Batch._fields]), None
+        batch, base = Batch(*[observation[key] for key in KEYS]), None
         if under is not None:
             shown = {**observation, "nominal": observation["nominal"][:, : under.preview]}
             action, state = under.predict(shown, state, starting)

@@ -8,7 +8,7 @@ import pytest
 
 import baselines
 import ikgym
-from baselines.policy import Batch
+from baselines.policy import KEYS, Batch
 from baselines.solvers.arm_size import error_weights, jacobian_bound
 from baselines.solvers.fixed_point import fixed_point, iteration
 from baselines.solvers.fixed_point.contraction import contraction, evaluate
@@ -130,7 +130,7 @@ def test_the_sigmoid_bounds_a_step():
     """|F| is at most artanh(slope)."""
     policy = baselines.make("fixed_point", REGULAR, family="sigmoid", iterations=1, a=-1e4, d=0.0)
     far = {**observed(REGULAR, Q), "nominal": np.full((1, 3), 1e3)}
-    batch = Batch(*(np.asarray(far[name])[None] for name in Batch._fields))
+    batch = Batch(*(np.asarray(far[name])[None] for name in KEYS))
     solution = policy.solve(batch, policy.memory(1))
     assert np.linalg.norm(solution.qdot) * 1e-3 <= np.arctanh(0.5) + 1e-12
 
