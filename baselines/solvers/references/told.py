@@ -12,7 +12,8 @@ from baselines import registry
 from baselines.policy import Batch, Memory, Problem, Solution
 from baselines.wrapper import NamedWrapper
 from ikgym.exceptions import InvalidInputError
-from ikgym.scenarios import Scenario
+from ikgym.preview import furthest
+from ikgym.scenarios import Preview, Scenario
 from ikgym.validation import FloatArray, whole_number
 
 if TYPE_CHECKING:
@@ -64,7 +65,7 @@ class Told(NamedWrapper):
         super().__post_init__()
         delay, bandwidth = self.drawn.command_delay, self.drawn.bandwidth
         if delay > 0 or bandwidth < math.inf:
-            known = {"delay": delay, "bandwidth": bandwidth, "identify": False}
+            known = {"delay": delay, "bandwidth": bandwidth if bandwidth < math.inf else None, "identify": False}
             kind = registry.get(PREDICTED)
             driven = kind(self.inner_problem(), policy=self.policy, options=self.options, **known)  # type: ignore[call-arg]
             object.__setattr__(self, "inner", driven)
@@ -74,6 +75,13 @@ class Told(NamedWrapper):
         """See :meth:`SolverPolicy.for_scenario`; unlike others this policy is handed the scenario itself."""
         return cls(Problem.of(scenario), scenario=scenario, **parameters)
 
+    @property
+    def preview(self) -> Preview:
+        """That of the policy, and the longest delay of all episodes on top, so that each is shown the same."""
+        longest = self.scenario.plant.longest_command_delay
+        base = registry.get(self.policy)(self.inner_problem(), **self.options).preview
+        return furthest(base) + longest if longest else self.inner.preview
+
     def inner_problem(self) -> Problem:
         """What the scenario tells, with the arm that moves as the model."""
         return self.problem.replace(model=self.drawn.arm)
@@ -82,7 +90,10 @@ class Told(NamedWrapper):
         """See :meth:`SolverPolicy.solve`."""
         own, inside = self.split(memory)
         # A payload is the same as joints that stand elsewhere: the model goes on to be right.
-        step = self.ask(batch._replace(q=batch.q + self._payload(batch)), inside)
+        q, nominal = batch.q + self._payload(batch), batch.nominal
+        if isinstance(self.inner.preview, int):
+            nominal = np.ascontiguousarray(nominal[:, : self.inner.preview])
+        step = self.ask(batch._replace(q=q, nominal=nominal), inside)
         return self.solution(step.action * self.problem.velocity_limit, own, step)
 
     def _payload(self, batch: Batch) -> FloatArray:
