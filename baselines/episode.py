@@ -40,7 +40,13 @@ Act = Callable[[Outcome], npt.NDArray[Any]]
 
 
 def play(
-    scenario: Scenario, seeds: Sequence[int | Draw], act: Act, *, preview: Preview, single: bool = False
+    scenario: Scenario,
+    seeds: Sequence[int | Draw],
+    act: Act,
+    *,
+    preview: Preview,
+    single: bool = False,
+    commands: int = 0,
 ) -> Iterator[Outcome]:
     """Plays episodes in step, from their resets to their ends.
 
@@ -50,16 +56,17 @@ def play(
         act: Called before each step with what all arms show.
         preview: Steps ahead that the nominal coordinates are shown.
         single: Whether there is one arm, whose actions have no row axis.
+        commands: How many of the last commands are shown.
 
     Yields:
         What came of each step, as arrays with an axis of arms; it stays as it is when the next step is made.
 
     Raises:
-        InvalidInputError: The preview is not valid.
+        InvalidInputError: The preview or the number of commands is not valid, or an arm cannot be kept.
     """
     rows = len(seeds)
-    simulator = Simulator(scenario, None if single else rows, preview)
     draws = [Draw.of(seed) for seed in seeds]
+    simulator = Simulator(scenario, None if single else rows, preview, commands=commands)
     simulator.reset(
         np.ones(rows, dtype=np.bool_),
         [seeding.np_random(draw.seed)[0] for draw in draws],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -14,26 +15,20 @@ from ikgym.arms.posture import within_limits
 from ikgym.compilation import announced
 from ikgym.exceptions import InvalidInputError
 from ikgym.memory import afford, of_rows
+from ikgym.nominal_frames import MEMORY, NominalFrames
+from ikgym.outcome import OBSERVED, Outcome, more_size, observation, outcome, size
 from ikgym.outcome import Observation as Observation
-from ikgym.outcome import Outcome, more_size, observation, outcome, size
 from ikgym.parallel import in_chunks
 from ikgym.plant import step as plant_step
-from ikgym.plant.rows import PlantRows
+from ikgym.plant.rows import PlantRows, checked_arm_seeds
 from ikgym.preview import FARTHEST as FARTHEST
 from ikgym.preview import Preview, offsets
 from ikgym.scenarios import Scenario
 from ikgym.simulation import Constants, State
-from ikgym.trajectories import Trajectory
 from ikgym.validation import FloatArray, float_array, shortened, whole_number
 
 # Rows worth a thread of their own: below, handing over costs more than it saves.
 GRAIN_STEP = 256
-GRAIN_RESET = 4
-# Rows whose nominal frames are computed at a time: their intermediate results stay small.
-PIECE = 64
-
-# What the nominal frames of all rows may take, in bytes: of many long episodes only what is near is kept.
-MEMORY = 2**26
 # Joints held back of an arm without limits: a copy takes less time than a fresh array.
 NONE_HELD = np.zeros(3, dtype=np.int64)
 
@@ -67,29 +62,18 @@ class Simulator:
         rows = 1 if rows is None else rows
         self.scenario, self.rows, self._limited = scenario, rows, scenario.arm.limited
         self.preview = offsets(preview)
-        self._point = scenario.points(preview)
-        width = 12 if scenario.task.has_orientation else 3
-        points = int(self._point[-1]) + 1
-        tables = rows if scenario.random else 1
-        affordable = memory // (8 * width * rows) if scenario.random else points
-        # Rows know all of their points, or two blocks of them: the next one takes the place of the one before.
-        self._block = points if points <= affordable else min(points, max(affordable // 2, self.preview[-1]))
-        self._in_blocks = self._block < points
-        known = self._block * (2 if self._in_blocks else 1)
+        self._nominal = NominalFrames(scenario, rows, self.preview, memory)
         shown = size(joints, coordinates, len(self.preview))
         if not ideal:
             shown += more_size(joints, coordinates, commands)
         kept = 0 if ideal else PlantRows.size(scenario.plant, joints, coordinates, commands)
-        afford(f"{rows} environments", of_rows(rows, shown, tables * known * width + rows * kept))
-        self._last_block = self._point[self.preview[-1] :] // self._block
-        self._blocks_known = np.zeros(tables, dtype=np.int64)
-        self._episodes: list[Trajectory] = [scenario.trajectory] * tables
+        afford(f"{rows} environments", of_rows(rows, shown, math.prod(self._nominal.shape) + rows * kept))
         self._shared = Constants(
             kind=scenario.task.kind,
             dt=scenario.dt,
             velocity_limit=scenario.velocity_limit,
             steps=scenario.steps,
-            point=self._point % known,
+            point=self._nominal.slots,
             counted=scenario.counted(),
             preview=np.array(self.preview, dtype=np.int64),
             limits=limit_rows(scenario.arm, scenario.largest_qdot, scenario.dt),
@@ -99,20 +83,20 @@ class Simulator:
             q=np.zeros((rows, joints)),
             qdot=np.zeros((rows, joints)),
             step=np.zeros(rows, dtype=np.int64),
-            frames=np.zeros((tables, known, width)),
+            frames=self._nominal.allocate(),
             scratch=np.empty((rows, 12 + coordinates + scenario.task.error_size)),
         )
         self._plant: PlantRows | None = None
         if not ideal:
             self._plant = PlantRows(scenario.plant, scenario.arm, scenario.dt, rows, coordinates, commands)
-        if not scenario.random:
-            self._know(np.zeros(1, dtype=np.int64))
         self._shape = (rows, joints, coordinates, len(self.preview), None if ideal else commands)
-        self._nominal_shape = (len(self.preview), coordinates)
-        self._count = rows * shown
-        # Where the parts of the only arm are in the block.
-        parts = self._outcome(np.arange(self._count, dtype=np.float64))[1:6]
-        self._parts = [slice(int(part.flat[0]), int(part.flat[-1]) + 1) for part in parts]
+        self._count, usual = rows * shown, rows * size(joints, coordinates, len(self.preview))
+        self._told, self._held = slice(usual - 8, usual - 3), slice(usual - 3, usual)
+        # Where what is seen of the only arm is in the block: what always is, and what sometimes is, with its shape.
+        seen = observation(self._outcome(np.arange(self._count, dtype=np.float64)), 0)
+        places = {key: slice(int(part.flat[0]), int(part.flat[-1]) + 1) for key, part in seen.items()}
+        self._parts, self._nominal_shape = [places[key] for key in OBSERVED], seen["nominal"].shape
+        self._more = [(key, places[key], seen[key].shape) for key in places if key not in OBSERVED]
         self._constants = self._taken_apart()
         self._all = np.ones(rows, dtype=np.bool_)
         self._own_start = np.zeros(rows, dtype=np.bool_)
@@ -146,9 +130,6 @@ class Simulator:
         scenario, state = self.scenario, self._state
         rows = np.flatnonzero(active)
         episodes = scenario.trajectory.samples([generators[row] for row in rows.tolist()])
-        if scenario.random:
-            for row, episode in zip(rows.tolist(), episodes, strict=True):
-                self._episodes[row] = episode
         if len(rows):
             state.q[rows] = scenario.first_q_of(episodes) if starts is None else starts[rows]
         if self._plant is not None:
@@ -157,8 +138,7 @@ class Simulator:
         state.qdot[active] = 0.0
         state.step[active] = 0
         if scenario.random:
-            self._blocks_known[active] = 0
-            self._look_ahead(rows, steps=0)
+            self._nominal.begin(state.frames, rows, episodes)
 
     def checked_starts(self, q: npt.ArrayLike | None) -> FloatArray | None:
         """Starts that a user asks for.
@@ -187,26 +167,8 @@ class Simulator:
         return np.broadcast_to(starts, (self.rows, joints))
 
     def checked_arm_seeds(self, given: Any) -> list[int | None] | None:
-        """Seeds of arms that a user asks for.
-
-        Args:
-            given: A whole number for all rows, or one a row, where None stands for an arm drawn with the episode.
-
-        Returns:
-            One a row, or None where nothing is asked for.
-
-        Raises:
-            InvalidInputError: They are no such numbers, not one a row, or the plant draws no arm that could be kept.
-        """
-        if given is None:
-            return None
-        seeds = list(given) if isinstance(given, (tuple, list, np.ndarray)) else [given] * self.rows
-        if len(seeds) != self.rows:
-            raise InvalidInputError(f"options['arm_seed']: expected {self.rows} seeds, one a row, got {len(seeds)}.")
-        seeds = [None if one is None else whole_number("options['arm_seed']", one, at_least=0) for one in seeds]
-        if any(one is not None for one in seeds):
-            self.scenario.plant.check_draws_arm(self.scenario.name)
-        return seeds
+        """Seeds of arms that a user asks for, see :func:`ikgym.plant.rows.checked_arm_seeds`."""
+        return checked_arm_seeds(given, self.rows, self.scenario.plant, self.scenario.name)
 
     def observe(self, active: npt.NDArray[np.bool_] | None = None, out: Outcome | None = None) -> Outcome:
         """What the arms show before a step.
@@ -252,10 +214,9 @@ class Simulator:
             What a policy sees, without a row axis; costs, errors and whether the action was clipped; joints held back.
         """
         self._accept(action, self._all)
-        if self._plant is not None:
-            return self._step_one_measured()
         numbers = np.empty(self._count)
-        simulation.step(*self._constants, numbers, self._all, True, 0, 1)
+        step = simulation.step if self._plant is None else plant_step.step
+        step(*self._constants, numbers, self._all, True, 0, 1)
         q, qdot, pose, nominal, remaining = self._parts
         seen = {
             "q": numbers[q],
@@ -264,20 +225,14 @@ class Simulator:
             "nominal": numbers[nominal].reshape(self._nominal_shape),
             "remaining": numbers[remaining],
         }
-        return seen, numbers[-8:-3].tolist(), numbers[-3:].astype(np.int64) if self._limited else NONE_HELD.copy()
-
-    def _step_one_measured(self) -> tuple[Observation, list[float], npt.NDArray[np.int64]]:
-        out = self._outcome(np.empty(self._count))
-        self._run(self._all, out.numbers, moving=True)
-        told = [out.tracking_cost, out.velocity_cost, out.position_error, out.orientation_error, out.clipped]
-        return observation(out, 0), [float(part[0]) for part in told], out.at_limit[0].astype(np.int64)
+        for key, where, shape in self._more:
+            seen[key] = numbers[where].reshape(shape)
+        held = numbers[self._held].astype(np.int64) if self._limited else NONE_HELD.copy()
+        return seen, numbers[self._told].tolist(), held
 
     def nominal_positions(self, row: int) -> FloatArray:
         """The nominal positions of a row's episode in [m], one a step. Shape (steps + 1, 3)."""
-        point = self._point[: self.scenario.steps + 1]
-        episode = self._episodes[row if self.scenario.random else 0]
-        positions: FloatArray = self.scenario.frames(episode, int(point[-1]) + 1)[point, -3:]
-        return positions
+        return self._nominal.positions(row)
 
     @property
     def true_q(self) -> FloatArray:
@@ -309,8 +264,9 @@ class Simulator:
             raise InvalidInputError(
                 f"action{where}: expected finite numbers, got {accepted[bad].tolist()}. The state is as it was."
             )
-        if self._in_blocks:
-            self._look_ahead(np.flatnonzero(active), steps=1)
+        if self._nominal.in_blocks:
+            rows = np.flatnonzero(active)
+            self._nominal.look_ahead(self._state.frames, rows, self._state.step[rows] + 1)
 
     def _run(self, active: npt.NDArray[np.bool_], numbers: FloatArray, *, moving: bool) -> None:
         step = simulation.step if self._plant is None else plant_step.step
@@ -329,26 +285,3 @@ class Simulator:
 
     def _outcome(self, numbers: FloatArray) -> Outcome:
         return outcome(numbers, *self._shape, late=self.scenario.plant.late)
-
-    def _look_ahead(self, rows: npt.NDArray[np.int64], *, steps: int) -> None:
-        """Sees to it that the rows know all nominal frames that they need after some steps more."""
-        last = self._last_block[self._state.step[rows] + steps]
-        while len(late := rows[last >= self._blocks_known[rows]]):
-            self._know(late)
-
-    def _know(self, rows: npt.NDArray[np.int64]) -> None:
-        """Computes the next block of nominal frames of some rows."""
-        frames, block = self._state.frames, self._block
-        first = self._blocks_known[rows] * block
-        ahead = np.arange(block)
-
-        def work(start: int, stop: int) -> None:
-            for part in range(start, stop, PIECE):
-                some = slice(part, min(part + PIECE, stop))
-                points = first[some, None] + ahead
-                episodes = [self._episodes[row] for row in rows[some].tolist()]
-                computed = self.scenario.frames_of(episodes, points)
-                frames[rows[some, None], points % frames.shape[1]] = computed
-
-        in_chunks(work, len(rows), GRAIN_RESET)
-        self._blocks_known[rows] += 1

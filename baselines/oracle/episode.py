@@ -180,7 +180,7 @@ class EpisodeProblem:
         played = play(self.scenario, [self.seed], lambda _: next(actions), preview=1, single=True)
         q, costs = np.empty_like(qdot), np.empty(len(qdot))
         for k, out in enumerate(played):
-            q[k], costs[k] = out.q[0], out.tracking_cost[0] + out.velocity_cost[0]
+            q[k], costs[k] = out.true_q[0], out.tracking_cost[0] + out.velocity_cost[0]
         return q, float(added_up(costs))
 
 
@@ -193,4 +193,4 @@ def path_of(policy: SolverPolicy, scenario: Scenario, seed: int) -> FloatArray:
         action, state = policy.predict({name: getattr(out, name) for name in KEYS}, state)
         return action
 
-    return np.stack([out.q[0] for out in play(scenario, [seed], act, preview=policy.preview)])
+    return np.stack([out.true_q[0] for out in play(scenario, [seed], act, preview=policy.preview)])

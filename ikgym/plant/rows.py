@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from ikgym.arms import Arm
+from ikgym.exceptions import InvalidInputError
 from ikgym.plant.arm_kernels import ARM_STREAMS
 from ikgym.plant.checks import PerJoint
 from ikgym.plant.draw import Draws, arm_key, episode_key
@@ -15,12 +17,38 @@ from ikgym.plant.plant import Plant
 from ikgym.plant.sensor_kernels import STREAMS
 from ikgym.plant.step import Drives, PlantState, Sensors
 from ikgym.random_numbers import stream
-from ikgym.validation import FloatArray
+from ikgym.validation import FloatArray, whole_number
 
 # Numbers of the streams that other noises of an episode come from: more than there are effects.
 NOISE_SEEDS = 1000
 
 Generators = Sequence[np.random.Generator] | Mapping[int, np.random.Generator]
+
+
+def checked_arm_seeds(given: Any, rows: int, plant: Plant, name: str) -> list[int | None] | None:
+    """Seeds of arms that a user asks for.
+
+    Args:
+        given: A whole number for all rows, or one a row, where None stands for an arm that is drawn with the episode.
+        rows: N.
+        plant: What arms are drawn from.
+        name: Of the scenario.
+
+    Returns:
+        One a row, or None where nothing is asked for.
+
+    Raises:
+        InvalidInputError: They are no such numbers, not one a row, or the plant draws no arm that could be kept.
+    """
+    if given is None:
+        return None
+    seeds = list(given) if isinstance(given, (tuple, list, np.ndarray)) else [given] * rows
+    if len(seeds) != rows:
+        raise InvalidInputError(f"options['arm_seed']: expected {rows} seeds, one a row, got {len(seeds)}.")
+    checked = [None if one is None else whole_number("options['arm_seed']", one, at_least=0) for one in seeds]
+    if any(one is not None for one in checked):
+        plant.check_draws_arm(name)
+    return checked
 
 
 class PlantRows:

@@ -20,7 +20,15 @@ SHORT = {name: ikgym.scenarios.get(name).replace(steps=16) for name in ("panda-i
 def rows_of(costs, scenario="lab", fingerprint="1", ideal="0", **changes):
     """Rows of one policy, by seed and noise seed."""
     return [
-        row(scenario=scenario, fingerprint=fingerprint, ideal=ideal, seed=seed, noise_seed=noise, total_cost=cost, **changes)
+        row(
+            scenario=scenario,
+            fingerprint=fingerprint,
+            ideal=ideal,
+            seed=seed,
+            noise_seed=noise,
+            total_cost=cost,
+            **changes,
+        )
         for seed, several in enumerate(costs)
         for noise, cost in enumerate(several)
     ]
