@@ -139,12 +139,12 @@ def record(records: Iterable[Record], path: pathlib.Path = DATA) -> list[Record]
 def _better(records: Iterable[Record], known: Mapping[Key, Record]) -> dict[Key, Record]:
     """The best of each episode, where it is better than what is known."""
     kept: dict[Key, Record] = {}
-    keys = {one.hash: key for key, one in known.items()}
+    keys = {(one.hash, one.seed): key for key, one in known.items()}
     for new in records:
         if not (math.isfinite(new.cost) and new.cost >= 0.0):
             raise ResultsError(f"{new.scenario}, seed {new.seed}: expected a cost of at least 0, got {new.cost}.")
         # Where the same arm moves in several scenarios, the record keeps the name of the first.
-        key = keys.setdefault(new.hash, (new.scenario, new.seed))
+        key = keys.setdefault((new.hash, new.seed), (new.scenario, new.seed))
         old = kept.get(key, known.get(key))
         if old is None or old.hash != new.hash or new.cost < old.cost:
             kept[key] = dataclasses.replace(new, scenario=key[0])
