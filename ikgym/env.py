@@ -47,14 +47,17 @@ class RedundantIKEnv(gym.Env[Any, Any]):
     q(k+1) = q(k) + Δt q̇(k) (Varga 2021, eq. 5) with the joint velocities q̇ that the arm makes of the command, joint
     by joint, in this order:
 
-    1. The command is cut to the arm's velocity limit.
-    2. Its change from the q̇ last applied is cut to the acceleration limit times Δt. An episode begins at rest.
-    3. Bias and noise of the scenario's plant are added, if it has some; they are not part of q̇.
-    4. A joint that would pass a limit of its coordinate stops there, whatever the acceleration limit says. Its q̇ is
+    1. The command of an earlier step takes its place, if the scenario's plant has a delay.
+    2. It is cut to the arm's velocity limit.
+    3. Its change from the q̇ last applied is cut to the acceleration limit times Δt. An episode begins at rest. This
+       is q̇, which is observed and charged; what the plant makes of it is not.
+    4. The drive lags behind it, bias and noise are added, and backlash lies between drive and joint, if the plant has
+       some.
+    5. A joint that would pass a limit of its coordinate stops there, whatever the acceleration limit says. Its q̇ is
        (q(k+1) − q(k)) / Δt then, no faster than the velocity limit: 0 where it stood at the stop already.
 
-    An arm without limits does what it is told. `info["at_limit"]` counts the joints that were held back, by more than
-    a millionth of the scenario's `velocity_limit`, which is more than what rounding to float32 does.
+    An ideal plant without limits does what it is told. `info["at_limit"]` counts the joints that were held back, by
+    more than a millionth of the scenario's `velocity_limit`, which is more than what rounding to float32 does.
 
     ## Observation space
     A `Dict` of float64:
@@ -66,13 +69,18 @@ class RedundantIKEnv(gym.Env[Any, Any]):
     | `pose` | (m,) | measured task coordinates | [m], rotation parts 1 |
     | `nominal` | (p, m) | nominal task coordinates ahead | [m], rotation parts 1 |
     | `remaining` | (1,) | steps left in the episode | 1 |
+    | `q_age` | (1,) | steps since `q` was measured; where sensors are slow or late | 1 |
+    | `pose_age` | (1,) | steps since `pose` was measured; where sensors are slow or late | 1 |
+    | `commands` | (h, n) | the last h commands within the velocity limit, newest first; with `commands=h` | as `qdot` |
 
+    `q` and `pose` are what the sensors of the scenario's plant show; those of an ideal plant show what is true.
     `preview` = an int p gives X^N(k+1) … X^N(k+p); a tuple such as (1, 10, 40, 120) gives just those steps ahead.
     The nominal goes on past the end of the episode. All bounds are finite and true: they follow from the start,
     the limits, the number of steps and the arm's reach.
 
     ## Reward
-    −(Φ^X(X^N(k+1) − F(q(k+1))) + Φ^U(q̇(k))), minus the stage cost of the scenario's `TrackingCost`. Where a
+    −(Φ^X(X^N(k+1) − F(q(k+1))) + Φ^U(q̇(k))), minus the stage cost of the scenario's `TrackingCost`, of the true joint
+    coordinates and the kinematics of the arm that moves, whatever is measured; so are the errors in `info`. Where a
     scenario holds its nominal points for several steps, only the last step of each point costs anything.
 
     ## Info
@@ -89,8 +97,10 @@ class RedundantIKEnv(gym.Env[Any, Any]):
     After a reset `info` is empty.
 
     ## Starting state
-    The scenario's start, with no velocity. `reset(seed=…)` chooses the trajectory of a random scenario, see
-    `ikgym.scenarios.SPLITS` for the seeds; `reset(options={"q": …})` starts elsewhere, within the limits of the arm. A
+    The scenario's start, with no velocity. `reset(seed=…)` chooses the trajectory of a random scenario, and whatever
+    its plant draws; see `ikgym.scenarios.SPLITS` for the seeds. `reset(options={"arm_seed": k})` has the arm and the
+    drives that k draws, for this episode, whatever the seed; it is an error where the plant draws neither, as that of
+    an ideal plant. `reset(options={"q": …})` starts elsewhere, within the limits of the arm. A
     joint without limits starts at most 2π [rad] or [m] from home (or as far as the scenario's own start, if that is
     farther).
 

@@ -65,6 +65,7 @@ def test_one_call_of_the_policy_a_step():
 
     class Watched:
         preview = solver.preview
+        commands = 0
         report = staticmethod(solver.report)
         diagnostics = staticmethod(solver.diagnostics)
         counters = staticmethod(solver.counters)
