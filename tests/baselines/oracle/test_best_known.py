@@ -113,7 +113,7 @@ def test_another_arm_has_another_record(file):
     assert best_known.costs(noisy, [0, 1]) == [10.0, None]
     assert lookup(calibrated, 0, arm_seed=3) is None
     assert lookup(short_panda(), 0) is None
-    record([one(stripped(calibrated, 0, 3), 20.0, scenario="another-arm")], file)
+    record([dataclasses.replace(one(stripped(calibrated, 0, 3), 20.0), scenario="another arm")], file)
     assert (cost(noisy, 0, 3), cost(noisy, 0)) == (20.0, 10.0)
 
 
