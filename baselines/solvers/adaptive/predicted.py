@@ -156,7 +156,7 @@ class Predicted(NamedWrapper):
         q_age, pose_age = (_steps(age, len(fresh)) for age in (batch.q_age, batch.pose_age))
         delay = kept.delay.copy()
         identify_rows(batch.q, q_age, tuple(self._hypotheses), tuple(kept))
-        # With another delay the arm that is driven belongs to another time; to jump there would be to jolt the real one.
+        # With another delay the arm that is driven belongs to another time: by how it moves, not with a jump.
         kept.arm_q[:] += self.problem.dt * (kept.delay - delay)[:, None] * kept.arm_qdot
         off: FloatArray = batch.q - self._past(kept.delay + q_age, kept)
         seen = self._past(kept.delay + pose_age, kept) + off

@@ -7,13 +7,12 @@ import math
 
 import numpy as np
 import pytest
-from gymnasium.utils import seeding
 
 import baselines
 import ikgym
+from baselines.evaluation.rollout import rollouts
 from baselines.solvers.adaptive.drives import Hypotheses, identify_rows, start_memory
 from ikgym.exceptions import InvalidInputError
-from ikgym.simulator import Simulator
 
 STEPS, SEED = 400, 1_000_003
 
@@ -25,41 +24,13 @@ def gentle(steps=STEPS):
     return scenario.replace(dt=1e-3, steps=steps, trajectory=trajectory)
 
 
-def driven(scenario, policy, seeds, delays, bandwidths, *, noise=0.0, q_delay=0):
-    """Plays episodes on drives with a delay and a lag: costs and joint paths by step, and the last state.
-
-    The simulator gets the velocities behind the lag, and is told of no acceleration limit.
-    """
-    rows, dt, unit, arm = len(seeds), scenario.dt, scenario.velocity_limit, scenario.arm
-    simulator = Simulator(
-        scenario.replace(arm=arm.replace(acceleration_limit=np.full(7, np.inf))), rows, policy.preview
-    )
-    simulator.reset(np.ones(rows, dtype=bool), [seeding.np_random(seed)[0] for seed in seeds])
-    out, state, rng = simulator.observe(), None, np.random.default_rng(0)
-    delays, share = np.array(delays), 1.0 - np.exp(-2.0 * np.pi * np.array(bandwidths)[:, None] * dt)
-    commands, velocity, setpoint = np.zeros((20, rows, 7)), np.zeros((rows, 7)), np.zeros((rows, 7))
-    costs, paths = np.empty((scenario.steps, rows)), [out.q.copy()]
-    for k in range(scenario.steps):
-        age = min(q_delay, k)
-        observation = {
-            "q": paths[k - age] + noise * rng.standard_normal((rows, 7)),
-            "qdot": setpoint.copy(),
-            "pose": out.pose.copy(),
-            "nominal": out.nominal.copy(),
-            "remaining": out.remaining.copy(),
-        }
-        if q_delay:
-            observation |= {"q_age": np.full((rows, 1), float(age)), "pose_age": np.zeros((rows, 1))}
-        action, state = policy.predict(observation, state)
-        commands = np.roll(commands, 1, axis=0)
-        commands[0] = np.clip(action * unit, -arm.velocity_limit, arm.velocity_limit)
-        most = arm.acceleration_limit * dt
-        setpoint = setpoint + np.clip(commands[delays, np.arange(rows)] - setpoint, -most, most)
-        velocity = velocity + share * (setpoint - velocity)
-        out = simulator.step(velocity / unit)
-        costs[k] = out.tracking_cost + [scenario.cost.velocity(row) for row in setpoint]
-        paths.append(out.q.copy())
-    return costs.sum(axis=0), np.array(paths), state
+def driven(scenario, policy, seeds=(SEED,), **plant):
+    """Plays episodes on a plant: costs, joint paths and what the policy takes for true at the end, by row."""
+    on = scenario.replace(plant=ikgym.Plant(**plant))
+    episodes = rollouts(on, policy, list(seeds))
+    costs = np.array([(episode.tracking_cost + episode.velocity_cost).sum() for episode in episodes])
+    told = {name: np.array([e.diagnostics[name][-1] for e in episodes]) for name in episodes[0].diagnostics}
+    return costs, np.array([episode.q for episode in episodes]), told
 
 
 def made(policy="dls", scenario=None, **parameters):
@@ -69,68 +40,86 @@ def made(policy="dls", scenario=None, **parameters):
 @pytest.fixture(scope="module")
 def ideal():
     """What `dls` costs without delay and lag."""
-    return driven(gentle(), baselines.make("dls", gentle()), [SEED], [0], [math.inf])[0]
+    return driven(gentle(), baselines.make("dls", gentle()))[0]
 
 
 def test_a_policy_of_gain_1_is_lost_by_itself_and_not_with_known_drives(ideal):
-    scenario = gentle()
-    alone, _, _ = driven(scenario, baselines.make("dls", scenario), [SEED], [5], [13.0])
-    known, _, _ = driven(scenario, made(delay=5, bandwidth=13.0, identify=False), [SEED], [5], [13.0])
+    scenario, drives = gentle(), {"command_delay": 5, "bandwidth": 13.0}
+    alone, _, _ = driven(scenario, baselines.make("dls", scenario), **drives)
+    known, _, _ = driven(scenario, made(delay=5, bandwidth=13.0, identify=False), **drives)
     assert alone > 1e4 * ideal
     assert known < 1.3 * ideal
 
 
-def test_unknown_drives_are_identified(ideal):
-    """Row by row, each with drives of its own."""
-    delays, bandwidths = [2, 7, 12, 0], [10.0, 14.0, 20.0, math.inf]
-    policy = made()
-    costs, _, state = driven(gentle(), policy, [SEED] * 4, delays, bandwidths)
-    told = policy.diagnostics(state)
-    np.testing.assert_array_equal(told["delay"], delays)
-    np.testing.assert_allclose(told["time_constant"], 1.0 / (2.0 * np.pi * np.array(bandwidths)), rtol=0.03, atol=1e-5)
+def test_unknown_drives_are_identified():
+    """Row by row, each with drives of its own; within 3 % of the lag, or 0.1 ms."""
+    scenario, seeds = gentle(), range(SEED, SEED + 6)
+    drives = {"command_delay": (0, 12), "bandwidth": (10.0, 20.0)}
+    costs, _, told = driven(scenario, made(), seeds, **drives)
+    drawn = [scenario.replace(plant=ikgym.Plant(**drives)).drawn_plant(seed) for seed in seeds]
+    assert len({one.command_delay for one in drawn}) > 3
+    np.testing.assert_array_equal(told["delay"], [one.command_delay for one in drawn])
+    constants = 1.0 / (2.0 * np.pi * np.array([one.bandwidth for one in drawn]))
+    np.testing.assert_allclose(told["time_constant"], constants, rtol=0.03, atol=1e-4)
+    ideal, _, _ = driven(scenario, baselines.make("dls", scenario), seeds)
     assert (costs < 2.0 * ideal).all()
+
+
+def test_drives_without_delay_and_lag_are_identified(ideal):
+    costs, _, told = driven(gentle(), made())
+    assert told["delay"] == 0
+    assert told["time_constant"] < 1e-4
+    assert costs < 2.0 * ideal
 
 
 def test_rows_of_a_batch_are_single_calls():
     """With other delays in use beside them, other parts of the reference are shown."""
-    delays, bandwidths, scenario = [3, 11], [18.0, 10.0], gentle(60)
-    _, together, _ = driven(scenario, made(scenario=scenario), [SEED, SEED + 1], delays, bandwidths)
+    scenario, drives = gentle(60), {"command_delay": (2, 12), "bandwidth": (10.0, 20.0)}
+    _, together, told = driven(scenario, made(scenario=scenario), (SEED, SEED + 1), **drives)
+    assert told["delay"][0] != told["delay"][1]
     for row in range(2):
-        alone = driven(
-            scenario, made(scenario=scenario), [SEED + row], delays[row : row + 1], bandwidths[row : row + 1]
-        )
-        np.testing.assert_array_equal(together[:, row], alone[1][:, 0])
+        _, alone, _ = driven(scenario, made(scenario=scenario), [SEED + row], **drives)
+        np.testing.assert_array_equal(together[row], alone[0])
 
 
 def test_without_delay_and_lag_it_is_the_base_policy():
     scenario = gentle(200)
     policy = made(scenario=scenario, delay=0, bandwidth=None, identify=False)
-    _, alone, _ = driven(scenario, baselines.make("dls", scenario), [SEED], [0], [math.inf])
-    _, path, _ = driven(scenario, policy, [SEED], [0], [math.inf])
+    _, alone, _ = driven(scenario, baselines.make("dls", scenario))
+    _, path, _ = driven(scenario, policy)
     assert policy.preview == 1
     np.testing.assert_allclose(path, alone, atol=1e-7)
 
 
 @pytest.mark.parametrize(("delay", "bandwidth"), [(5, 20.0), (9, 11.0)])
 def test_a_wrong_guess_is_stable(ideal, delay, bandwidth):
-    costs, path, _ = driven(gentle(), made(delay=delay, bandwidth=bandwidth, identify=False), [SEED], [7], [15.0])
+    policy = made(delay=delay, bandwidth=bandwidth, identify=False)
+    costs, path, _ = driven(gentle(), policy, command_delay=7, bandwidth=15.0)
     assert ideal < costs < 1e4 * ideal
-    assert np.abs(np.diff(path[-20:], axis=0)).max() < 1e-4  # it has come to rest with the reference
+    assert np.abs(np.diff(path[0, -20:], axis=0)).max() < 1e-4  # it has come to rest with the reference
 
 
 def test_noise_costs_little_and_the_delay_is_found(ideal):
-    policy = made()
-    costs, _, state = driven(gentle(), policy, [SEED], [4], [12.0], noise=1e-5)
-    assert policy.diagnostics(state)["delay"] == 4
+    costs, _, told = driven(gentle(), made(), command_delay=4, bandwidth=12.0, q_noise=1e-5)
+    assert told["delay"] == 4
     assert costs < 10.0 * ideal
 
 
-def test_old_measurements_are_taken_for_what_they_are(ideal):
+def test_old_joint_coordinates_are_taken_for_what_they_are(ideal):
     """The delay is that of the commands, not that of the sensor."""
-    policy = made(oldest=5)
-    costs, _, state = driven(gentle(), policy, [SEED], [4], [12.0], q_delay=5)
-    assert policy.diagnostics(state)["delay"] == 4
+    costs, _, told = driven(gentle(), made(oldest=5), command_delay=4, bandwidth=12.0, q_delay=5)
+    assert told["delay"] == 4
     assert costs < 1.5 * ideal
+
+
+def test_old_poses_are_held_against_the_joint_coordinates_of_their_time(ideal):
+    """The model is right, and so there is no offset, however old the pose is."""
+    costs = [
+        driven(gentle(), made(oldest=oldest), command_delay=4, bandwidth=12.0, pose_delay=9, pose_every=8)[0]
+        for oldest in (0, 16)
+    ]
+    assert costs[0] > 10.0 * ideal
+    assert costs[1] < 1.5 * ideal
 
 
 def test_an_arm_at_rest_says_nothing_of_its_drives():

@@ -81,11 +81,16 @@ def test_the_rest_of_a_path_that_is_too_long_is_that_of_the_inner_policy():
     assert found[1] == pytest.approx(found[0], rel=1e-3)
 
 
-def test_learns_what_a_low_gain_makes_late():
-    scenario = wrong_arm()
-    low = {"policy": "dls", "options": {"gain": 0.02}, "keep": True}
-    late, _ = costs(baselines.make("iterative_learning", scenario, **low, rate=1.0), [SEED] * 4)
-    assert late[3] < 0.2 * late[0]
+def test_the_lead_of_a_delay_is_learnt_with():
+    """Commands come 12 steps late, and a low gain is behind: 30 steps ahead learning at the full rate stays stable."""
+    scenario = wrong_arm().replace(plant=ikgym.Plant(command_delay=12, bandwidth=10.0))
+    low = {"policy": "dls", "options": {"gain": 0.02}, "keep": True, "rate": 1.0}
+    found = {
+        lead: costs(baselines.make("iterative_learning", scenario, **low, lead=lead), [SEED] * 5, scenario)[0]
+        for lead in (0, 25)
+    }
+    assert found[25][4] < 0.05 * found[25][0]
+    assert found[25][4] < 0.5 * found[0][4]
 
 
 @pytest.mark.parametrize(
