@@ -73,6 +73,7 @@ _places: dict[str, str] = {
 _incomplete: dict[str, str] = {
     "agent": "baselines.agents.policy:Agent",
     "published": f"{_SOLVERS}.references.published:Published",
+    "told": f"{_SOLVERS}.references.told:Told",
 }
 
 

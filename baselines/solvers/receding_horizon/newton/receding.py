@@ -153,7 +153,15 @@ def plan_batch(data, settings, observations, memory, answers, workspace):
         # Where the horizon ends with the episode nothing comes behind it.
         braking = not settings.stop_at_end or observations.remaining[row] > settings.at[-1]
         problem = PathProblem(
-            data, grid, q, observations.nominal[row], qdot_before, settings.rate_weight, settings.change_limit, braking
+            data,
+            grid,
+            q,
+            observations.nominal[row],
+            qdot_before,
+            settings.rate_weight,
+            settings.change_limit,
+            braking,
+            workspace.newton.errors[:0],  # policies know of no payload
         )
         for j in range(q.shape[0]):
             workspace.passed[j] = qdot_before[j] * data.dt
