@@ -1,0 +1,173 @@
+"""The compiled segment is the environment, and its adjoint the gradient: by central differences in float64."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from baselines.agents.bilinear.kernels import action_rows
+from baselines.agents.bilinear.twists import twist_size
+from baselines.training.gradients.adjoint import Gradient, adjoint
+from baselines.training.gradients.segment import Path, Rows, Task, segment
+from ikgym import TrackingCost, arms, scenarios, tasks
+from ikgym.arms.limits import limit_rows
+from ikgym.simulator import Simulator
+
+ARMS = ["varga7", "planar2", "khan8", "tiago"]  # a prismatic joint, the fewest joints, eight, a prismatic joint 1
+ROWS, STEPS, DT = 4, 5, 0.01
+#: So many steps count as known that weights are constants.
+FOREVER = 1e15
+#: Of G: such that some of the commands exceed the velocity limit of 1.
+GAIN = 0.02
+
+
+@dataclasses.dataclass
+class Case:
+    """Arms near a reference that goes past them, and the gradient of a number by all that a segment begins with."""
+
+    task: Task
+    rows: Rows
+    start: list[np.ndarray]
+    by_end: list[np.ndarray]
+
+    @classmethod
+    def of(cls, arm, kind, limited, cost, seed=0):
+        rng = np.random.default_rng(seed)
+        n, home = arm.joints, rng.uniform(-1.0, 1.0, arm.joints)
+        limits = np.empty((0, n))
+        if limited:
+            ones = np.ones(n)
+            limits = np.array([home - 0.06, home + 0.06, 0.8 * ones, 0.5 * ones])
+        task = Task(arm.chain, kind.kind, kind.error_size, DT, np.ones(n), limits, cost.parameters, np.ones(21, bool))
+        q = home + rng.uniform(-0.05, 0.05, (ROWS, n))
+        way = home + np.cumsum(rng.normal(scale=0.02, size=(ROWS, 21, n)), 1)
+        nominal = kind.coordinates(*arm.forward(way))
+        count = np.array([STEPS, STEPS, STEPS - 2, 0])
+        speed, usual = rng.uniform(0.1, 1.0, ROWS), rng.uniform(0.5, 2.0, ROWS)
+        rows = Rows(nominal, np.array([0, 3, 9, 5]), count, speed, usual, np.zeros(ROWS), np.zeros(ROWS))
+        scale = np.tile([GAIN] * twist_size(kind.kind) + [0.5], n)
+        output = scale * rng.normal(size=(ROWS, len(scale)))
+        by_end = [rng.normal(size=ROWS), rng.normal(size=q.shape), rng.normal(size=q.shape)]
+        return cls(task, rows, [q, rng.uniform(-0.5, 0.5, q.shape), output], by_end)
+
+    def play(self, start):
+        path = Path.empty(ROWS, STEPS, start[0].shape[1])
+        path.q[:, 0], path.qdot[:, 0] = start[:2]
+        loss, distance = np.empty(ROWS), np.empty(ROWS)
+        self.rows.spent[:] = self.rows.played[:] = 0.0
+        segment(self.task, self.rows, FOREVER, start[2], path, loss, distance, 0, ROWS)
+        return path, loss
+
+    def numbers(self, start):
+        """One of each arm."""
+        path, loss = self.play(start)
+        last = np.arange(ROWS), self.rows.count
+        by_loss, by_q, by_qdot = self.by_end
+        return by_loss * loss + (by_q * path.q[last]).sum(1) + (by_qdot * path.qdot[last]).sum(1)
+
+    def gradient(self):
+        path, _ = self.play(self.start)
+        out = Gradient(self.by_end[1].copy(), self.by_end[2].copy(), np.full(self.start[2].shape, np.nan))
+        adjoint(self.task, self.rows, self.start[2], path, self.by_end[0], out, 0, ROWS)
+        return out
+
+    def differences(self, part, step=1e-6):
+        """The gradient of the numbers, each by what its own arm begins with."""
+        out = np.zeros(self.start[part].shape)
+        for column in range(out.shape[1]):
+            for sign in (1.0, -1.0):
+                moved = [array.copy() for array in self.start]
+                moved[part][:, column] += sign * step
+                out[:, column] += sign * self.numbers(moved) / (2.0 * step)
+        return out
+
+    def check(self):
+        for part, given in enumerate(self.gradient()):
+            wanted = self.differences(part)
+            largest = np.abs(wanted).max(1, keepdims=True)
+            assert (np.abs(given - wanted) <= 1e-6 * largest + 1e-9).all(), (part, given, wanted)
+
+
+SMOOTH = TrackingCost(delta_x=0.03, p_x=3, delta_qdot=0.3, p_out=4, p_in=4)
+
+
+@pytest.mark.parametrize("limited", [False, True])
+@pytest.mark.parametrize("kind", tasks.names())
+@pytest.mark.parametrize("name", ARMS)
+def test_gradients_by_all_that_a_segment_begins_with(name, kind, limited):
+    case = Case.of(arms.get(name), tasks.get(kind), limited, SMOOTH)
+    case.check()
+
+
+def test_limits_are_met():
+    """What the gradients above were tested at: stops, limits of velocity and acceleration, and none of them."""
+    case = Case.of(arms.get("varga7"), tasks.get("pose"), True, SMOOTH)
+    path, _ = case.play(case.start)
+    q, qdot = path.q[:2], path.qdot[:2]
+    lower, upper, fastest, change = case.task.limits
+    stands = (q == lower) | (q == upper)
+    moving = ~stands[:, 1:]
+    fast = moving & (np.abs(qdot[:, 1:]) == fastest)
+    jerky = moving & np.isclose(np.abs(np.diff(qdot, axis=1)), change, rtol=1e-12)
+    assert stands.any()
+    assert fast.any()
+    assert jerky.any()
+    assert (moving & ~fast & ~jerky).any()
+
+
+@pytest.mark.parametrize("exponents", [(3.0, 4.0, 4.0), (2.0, 3.0, 1.5), (1.0, 2.0, 1.0)])
+def test_gradients_of_costs_with_other_exponents(exponents):
+    p_x, p_out, p_in = exponents
+    cost = TrackingCost(delta_x=0.03, p_x=p_x, delta_qdot=0.3, p_out=p_out, p_in=p_in)
+    case = Case.of(arms.get("planar2"), tasks.get("position"), False, cost)
+    case.check()
+
+
+def known(name):
+    if name == "zhang6-axis":
+        return scenarios.get("zhang6-lspb").replace(name=name, task=tasks.get("axis"))
+    return scenarios.get(name)
+
+
+@pytest.mark.parametrize("name", ["varga7-random", "faitli3-stretched", "zhang6-axis", "khan8-q7q8", "panda-circle", "tiago-line"])
+def test_a_segment_is_the_environment(name):
+    """The same joint coordinates, velocities and costs, within the same limits."""
+    scenario, steps = known(name).replace(steps=12), 12
+    simulator = Simulator(scenario, 1, 1)
+    simulator.reset(np.ones(1, dtype=bool), [np.random.default_rng(3)])
+    out = simulator.observe()
+    nominal, chain, kind = [np.zeros(out.nominal[:, 0].shape)], scenario.arm.chain, scenario.task.kind
+    limits = limit_rows(scenario.arm, scenario.largest_qdot, scenario.dt)
+    task = Task(
+        chain, kind, scenario.task.error_size, scenario.dt, scenario.velocity_limit.copy(), limits,
+        scenario.cost.parameters, scenario.counted(),
+    )  # fmt: skip
+    rng = np.random.default_rng(1)
+    output = rng.normal(scale=2.0, size=(1, scenario.joints * (twist_size(kind) + 1)))
+    start, costs, speed, qs = out.q.copy(), [], np.array([0.7]), []
+    for _ in range(steps):
+        action = np.empty(out.q.shape)
+        nominal.append(out.nominal[:, 0].copy())
+        action_rows(
+            kind, chain.prismatic, chain.axes[0], scenario.dt, task.velocity_limit,
+            out.q, out.pose, out.nominal, speed, output, action,
+        )  # fmt: skip
+        out = simulator.step(action)
+        costs.append(float(out.tracking_cost[0] + out.velocity_cost[0]))
+        qs.append(np.concatenate([out.q[0], out.qdot[0]]))
+    path = Path.empty(1, steps, scenario.joints)
+    path.q[:, 0], path.qdot[:, 0] = start, 0.0
+    rows = Rows(
+        np.stack(nominal, 1), np.zeros(1, int), np.array([steps]), speed, np.array([2.0]), np.zeros(1), np.zeros(1)
+    )
+    loss, distance = np.empty(1), np.empty(1)
+    segment(task, rows, 10.0, output, path, loss, distance, 0, 1)
+    np.testing.assert_allclose(np.concatenate([path.q[0, 1:], path.qdot[0, 1:]], 1), qs, rtol=1e-11, atol=1e-11)
+    assert rows.spent[0] == pytest.approx(sum(costs), rel=1e-9)
+    assert rows.played[0] == steps
+    assert distance[0] == pytest.approx(out.position_error[0], rel=1e-9)
+    weights = (np.arange(1, steps + 1) + 10.0) / (np.cumsum(costs) + 10.0 * 2.0)
+    np.testing.assert_allclose(path.weight[0], weights * scenario.counted()[1:], rtol=1e-9)
+    assert loss[0] == pytest.approx(float((weights * costs).sum()), rel=1e-9)
