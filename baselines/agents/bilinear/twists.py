@@ -31,11 +31,11 @@ def is_turned(kind, prismatic):
     return kind != task_kernels.SKEW and not prismatic[0]
 
 
-@inlined
-def shown_joints(turned, prismatic):
+@kernel
+def shown_joints(kind, prismatic):
     """Features that joint coordinates take: one of a prismatic joint, two of a revolute one."""
     shown = 0
-    for j in range(1 if turned else 0, prismatic.shape[0]):
+    for j in range(1 if is_turned(kind, prismatic) else 0, prismatic.shape[0]):
         shown += 1 if prismatic[j] else 2
     return shown
 

@@ -59,8 +59,8 @@ def adjoint(task, rows, output, path, by_loss, gradient, start, stop):
         start: The first row that is meant.
         stop: The row after the last.
     """
-    chain, kind, e, dt, velocity_limit, limits, cost, _ = task
-    nominal, made, count, speed = rows[:4]
+    chain, kind, e, dt, velocity_limit, limits, cost = task
+    nominal, _, count, speed = rows[:4]
     q_path, qdot_path, weights = path
     by_q, by_qdot, by_output = gradient
     prismatic, axis, m, n = chain.prismatic, chain.axes[0], nominal.shape[2], q_path.shape[2]
@@ -74,7 +74,7 @@ def adjoint(task, rows, output, path, by_loss, gradient, start, stop):
         into[:] = 0.0
         forward_and_jacobian(chain, q_path[row, count[row]], rotation, position, geometric)
         for t in range(count[row] - 1, -1, -1):
-            target, weight = nominal[row, made[row] + t + 1], weights[row, t] * by_loss[row]
+            target, weight = nominal[row, t], weights[row, t] * by_loss[row]
             q, last, reached, applied = q_path[row, t], qdot_path[row, t], q_path[row, t + 1], qdot_path[row, t + 1]
             # The stage cost.
             if weight != 0.0:
@@ -110,9 +110,7 @@ def adjoint(task, rows, output, path, by_loss, gradient, start, stop):
             error_gradient(kind, target, by_due, by_error[:size])
             task_kernels.error(of_twist, target, pose, error[:size])
             task_kernels.jacobian(of_twist, rotation, geometric, task_jacobian[:size])
-            task_kernels.error_jacobian(
-                of_twist, target, pose, error[:size], task_jacobian[:size], jacobian[:size]
-            )
+            task_kernels.error_jacobian(of_twist, target, pose, error[:size], task_jacobian[:size], jacobian[:size])
             add_product(jacobian[:size], by_error[:size], 1.0, lambda_)
 
 

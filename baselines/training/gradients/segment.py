@@ -10,13 +10,14 @@ import numpy.typing as npt
 
 from baselines.agents.bilinear.twists import is_turned, turn, twist, twist_size
 from ikgym import cost_kernels, task_kernels
+from ikgym.arms.limits import limit_rows
 from ikgym.cost_kernels import CostParameters
 from ikgym.jit import inlined, kernel
 from ikgym.kinematics import Chain, forward
 from ikgym.limit_kernels import LOWER, UPPER, driven, stopped, within
+from ikgym.scenarios import Scenario
 
 Floats = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
 
 
 class Task(NamedTuple):
@@ -30,7 +31,6 @@ class Task(NamedTuple):
         velocity_limit: What an action of 1 means, in [rad/s] or [m/s]. Shape (n,).
         limits: What :func:`ikgym.arms.limits.limit_rows` gives. Shape (4, n), or (0, n) where there are none.
         cost: Of the tracking error and of the joint velocities.
-        counted: Whether costs count after k steps. Shape (steps + 1,).
     """
 
     chain: Chain
@@ -40,16 +40,24 @@ class Task(NamedTuple):
     velocity_limit: Floats
     limits: Floats
     cost: CostParameters
-    counted: npt.NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, scenario: Scenario) -> Task:
+        """That of a scenario."""
+        limits = limit_rows(scenario.arm, scenario.largest_qdot, scenario.dt)
+        velocity_limit, cost = scenario.velocity_limit.copy(), scenario.cost.parameters
+        return cls(
+            scenario.arm.chain, scenario.task.kind, scenario.task.error_size, scenario.dt, velocity_limit, limits, cost
+        )
 
 
 class Rows(NamedTuple):
-    """Where the arms are in their episodes.
+    """What the arms are to do in a segment, and what they have done before.
 
     Attributes:
-        nominal: Reference task coordinates X^N(0), X^N(1), … of each. Shape (N, at least steps + 1, m).
-        made: Steps made. Shape (N,).
-        count: Steps to make; those of a row with fewer end before the others. Shape (N,).
+        nominal: Reference task coordinates after each of the K steps. Shape (N, K, m).
+        counted: Whether the cost of each step counts. Shape (N, K).
+        count: Steps to make, at most K. Shape (N,).
         speed: s, see :mod:`baselines.agents.bilinear`. Shape (N,).
         usual: A stage cost that each episode's costs are compared with until they are known. Shape (N,).
         spent: The cost of the episode so far; written. Shape (N,).
@@ -57,8 +65,8 @@ class Rows(NamedTuple):
     """
 
     nominal: Floats
-    made: Integers
-    count: Integers
+    counted: npt.NDArray[np.bool_]
+    count: npt.NDArray[np.int64]
     speed: Floats
     usual: Floats
     spent: Floats
@@ -99,8 +107,8 @@ def segment(task, rows, prior, output, path, loss, distance, start, stop):
         start: The first row that is meant.
         stop: The row after the last.
     """
-    chain, kind, e, dt, velocity_limit, limits, cost, counted = task
-    nominal, made, count, speed, usual, spent, played = rows
+    chain, kind, e, dt, velocity_limit, limits, cost = task
+    nominal, counted, count, speed, usual, spent, played = rows
     q_path, qdot_path, weights = path
     prismatic, axis, m, n = chain.prismatic, chain.axes[0], nominal.shape[2], q_path.shape[2]
     turned, w, limited = is_turned(kind, prismatic), twist_size(kind), limits.shape[0] > 0
@@ -111,7 +119,7 @@ def segment(task, rows, prior, output, path, loss, distance, start, stop):
         forward(chain, q_path[row, 0], rotation, position)
         task_kernels.coordinates(kind, rotation, position, pose)
         for t in range(count[row]):
-            target = nominal[row, made[row] + t + 1]
+            target = nominal[row, t]
             q, qdot, reached, applied = q_path[row, t], qdot_path[row, t], q_path[row, t + 1], qdot_path[row, t + 1]
             twist(kind, target, pose, error, due)
             if turned:
@@ -129,7 +137,7 @@ def segment(task, rows, prior, output, path, loss, distance, start, stop):
             task_kernels.error(kind, target, pose, error[:e])
             played[row] += 1.0
             weights[row, t] = 0.0
-            if counted[made[row] + t + 1]:
+            if counted[row, t]:
                 stage = cost_kernels.tracking(cost, error[:e]) + cost_kernels.velocity(cost, applied)
                 spent[row] += stage
                 weights[row, t] = (played[row] + prior) / (spent[row] + prior * usual[row])

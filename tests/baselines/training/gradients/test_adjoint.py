@@ -7,12 +7,11 @@ import dataclasses
 import numpy as np
 import pytest
 
-from baselines.agents.bilinear.kernels import action_rows
+from baselines.agents.bilinear.kernels import action_rows, mean_twists
 from baselines.agents.bilinear.twists import twist_size
 from baselines.training.gradients.adjoint import Gradient, adjoint
 from baselines.training.gradients.segment import Path, Rows, Task, segment
 from ikgym import TrackingCost, arms, scenarios, tasks
-from ikgym.arms.limits import limit_rows
 from ikgym.simulator import Simulator
 
 ARMS = ["varga7", "planar2", "khan8", "tiago"]  # a prismatic joint, the fewest joints, eight, a prismatic joint 1
@@ -40,13 +39,13 @@ class Case:
         if limited:
             ones = np.ones(n)
             limits = np.array([home - 0.06, home + 0.06, 0.8 * ones, 0.5 * ones])
-        task = Task(arm.chain, kind.kind, kind.error_size, DT, np.ones(n), limits, cost.parameters, np.ones(21, bool))
+        task = Task(arm.chain, kind.kind, kind.error_size, DT, np.ones(n), limits, cost.parameters)
         q = home + rng.uniform(-0.05, 0.05, (ROWS, n))
-        way = home + np.cumsum(rng.normal(scale=0.02, size=(ROWS, 21, n)), 1)
+        way = home + np.cumsum(rng.normal(scale=0.02, size=(ROWS, STEPS, n)), 1)
         nominal = kind.coordinates(*arm.forward(way))
         count = np.array([STEPS, STEPS, STEPS - 2, 0])
         speed, usual = rng.uniform(0.1, 1.0, ROWS), rng.uniform(0.5, 2.0, ROWS)
-        rows = Rows(nominal, np.array([0, 3, 9, 5]), count, speed, usual, np.zeros(ROWS), np.zeros(ROWS))
+        rows = Rows(nominal, rng.random((ROWS, STEPS)) < 0.7, count, speed, usual, np.zeros(ROWS), np.zeros(ROWS))
         scale = np.tile([GAIN] * twist_size(kind.kind) + [0.5], n)
         output = scale * rng.normal(size=(ROWS, len(scale)))
         by_end = [rng.normal(size=ROWS), rng.normal(size=q.shape), rng.normal(size=q.shape)]
@@ -131,43 +130,38 @@ def known(name):
     return scenarios.get(name)
 
 
-@pytest.mark.parametrize("name", ["varga7-random", "faitli3-stretched", "zhang6-axis", "khan8-q7q8", "panda-circle", "tiago-line"])
+@pytest.mark.parametrize(
+    "name", ["varga7-random", "faitli3-stretched", "zhang6-axis", "khan8-q7q8", "panda-circle", "tiago-line"]
+)
 def test_a_segment_is_the_environment(name):
-    """The same joint coordinates, velocities and costs, within the same limits."""
-    scenario, steps = known(name).replace(steps=12), 12
-    simulator = Simulator(scenario, 1, 1)
+    """Step by step the same joint coordinates, velocities and costs as the agent's actions, within the same limits."""
+    scenario, offsets = known(name).replace(steps=12, iterations_per_point=2), np.array([1, 7])
+    simulator = Simulator(scenario, 1, tuple(offsets.tolist()))
     simulator.reset(np.ones(1, dtype=bool), [np.random.default_rng(3)])
-    out = simulator.observe()
-    nominal, chain, kind = [np.zeros(out.nominal[:, 0].shape)], scenario.arm.chain, scenario.task.kind
-    limits = limit_rows(scenario.arm, scenario.largest_qdot, scenario.dt)
-    task = Task(
-        chain, kind, scenario.task.error_size, scenario.dt, scenario.velocity_limit.copy(), limits,
-        scenario.cost.parameters, scenario.counted(),
-    )  # fmt: skip
-    rng = np.random.default_rng(1)
-    output = rng.normal(scale=2.0, size=(1, scenario.joints * (twist_size(kind) + 1)))
-    start, costs, speed, qs = out.q.copy(), [], np.array([0.7]), []
-    for _ in range(steps):
-        action = np.empty(out.q.shape)
-        nominal.append(out.nominal[:, 0].copy())
+    out, task, n = simulator.observe(), Task.of(scenario), scenario.joints
+    chain, w, counted = task.chain, twist_size(task.kind), scenario.counted()
+    output = np.random.default_rng(1).normal(scale=2.0, size=(1, n * (w + 1)))
+    prior, usual, spent, played = 10.0, np.array([2.0]), np.zeros(1), np.zeros(1)
+    weighed, loss, distance = 0.0, np.empty(1), np.empty(1)
+    for k in range(scenario.steps):
+        action, path, ahead = np.empty((1, n)), Path.empty(1, 1, n), np.empty((1, w))
         action_rows(
-            kind, chain.prismatic, chain.axes[0], scenario.dt, task.velocity_limit,
-            out.q, out.pose, out.nominal, speed, output, action,
+            task.kind, chain.prismatic, chain.axes[0], task.dt, offsets, task.velocity_limit,
+            out.q, out.pose, out.nominal, output, action,
         )  # fmt: skip
+        path.q[:, 0], path.qdot[:, 0] = out.q, out.qdot
+        speed = np.array([mean_twists(task.kind, task.dt, offsets, out.nominal[0], np.empty(6), ahead)])
+        rows = Rows(
+            out.nominal[:, :1].copy(), counted[None, k + 1 : k + 2], np.ones(1, int), speed, usual, spent, played
+        )
+        segment(task, rows, prior, output, path, loss, distance, 0, 1)
         out = simulator.step(action)
-        costs.append(float(out.tracking_cost[0] + out.velocity_cost[0]))
-        qs.append(np.concatenate([out.q[0], out.qdot[0]]))
-    path = Path.empty(1, steps, scenario.joints)
-    path.q[:, 0], path.qdot[:, 0] = start, 0.0
-    rows = Rows(
-        np.stack(nominal, 1), np.zeros(1, int), np.array([steps]), speed, np.array([2.0]), np.zeros(1), np.zeros(1)
-    )
-    loss, distance = np.empty(1), np.empty(1)
-    segment(task, rows, 10.0, output, path, loss, distance, 0, 1)
-    np.testing.assert_allclose(np.concatenate([path.q[0, 1:], path.qdot[0, 1:]], 1), qs, rtol=1e-11, atol=1e-11)
-    assert rows.spent[0] == pytest.approx(sum(costs), rel=1e-9)
-    assert rows.played[0] == steps
-    assert distance[0] == pytest.approx(out.position_error[0], rel=1e-9)
-    weights = (np.arange(1, steps + 1) + 10.0) / (np.cumsum(costs) + 10.0 * 2.0)
-    np.testing.assert_allclose(path.weight[0], weights * scenario.counted()[1:], rtol=1e-9)
-    assert loss[0] == pytest.approx(float((weights * costs).sum()), rel=1e-9)
+        np.testing.assert_allclose(path.q[:, 1], out.q, rtol=0, atol=1e-13)
+        np.testing.assert_allclose(path.qdot[:, 1], out.qdot, rtol=1e-12, atol=1e-10)
+        cost = out.tracking_cost[0] + out.velocity_cost[0]
+        weighed += cost
+        weight = (k + 1 + prior) / (weighed + prior * usual[0])
+        assert path.weight[0, 0] == pytest.approx(weight * counted[k + 1], rel=1e-8)
+        assert loss[0] == pytest.approx(weight * cost, rel=1e-8)
+        assert distance[0] == pytest.approx(out.position_error[0], rel=1e-9)
+    assert (spent[0], played[0]) == (pytest.approx(weighed, rel=1e-8), scenario.steps)
