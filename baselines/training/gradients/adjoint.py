@@ -60,7 +60,7 @@ def adjoint(task, rows, output, path, by_loss, gradient, start, stop):
         stop: The row after the last.
     """
     chain, kind, e, dt, velocity_limit, limits, cost = task
-    nominal, _, count, speed = rows[:4]
+    nominal, _, steps, speed = rows[:4]
     q_path, qdot_path, weights = path
     by_q, by_qdot, by_output = gradient
     prismatic, axis, m, n = chain.prismatic, chain.axes[0], nominal.shape[2], q_path.shape[2]
@@ -72,8 +72,8 @@ def adjoint(task, rows, output, path, by_loss, gradient, start, stop):
     for row in range(start, stop):
         lambda_, mu, into = by_q[row], by_qdot[row], by_output[row]
         into[:] = 0.0
-        forward_and_jacobian(chain, q_path[row, count[row]], rotation, position, geometric)
-        for t in range(count[row] - 1, -1, -1):
+        forward_and_jacobian(chain, q_path[row, steps[row]], rotation, position, geometric)
+        for t in range(steps[row] - 1, -1, -1):
             target, weight = nominal[row, t], weights[row, t] * by_loss[row]
             q, last, reached, applied = q_path[row, t], qdot_path[row, t], q_path[row, t + 1], qdot_path[row, t + 1]
             # The stage cost.

@@ -65,10 +65,8 @@ class Arms:
             speed: s of each arm. Shape (N,).
         """
         at = self.made[:, None] + np.arange(1, steps + 1)
-        count = np.minimum(self._scenario.steps - self.made, steps)
-        return Rows(
-            self._nominal[self._every, at], self._counted[at], count, speed, self.usual, self.spent, self.played
-        )
+        left = np.minimum(self._scenario.steps - self.made, steps)
+        return Rows(self._nominal[self._every, at], self._counted[at], left, speed, self.usual, self.spent, self.played)
 
     def begin(self, rows: Indices, seeds: Indices, at: Indices) -> None:
         """Begins episodes, or enters them after some steps, where their reference joint path is then.
@@ -102,7 +100,8 @@ class Arms:
     @property
     def _follows(self) -> npt.NDArray[np.bool_]:
         """Whether there is a reference joint path. Shape (N,)."""
-        return ~np.isnan(self._path[:, 0, 0])
+        known: npt.NDArray[np.bool_] = ~np.isnan(self._path[:, 0, 0])
+        return known
 
     def _put(self, rows: Indices, at: Indices) -> None:
         """Puts arms where their episodes are after some steps, at the velocity of the reference, at rest at first."""

@@ -75,7 +75,7 @@ class Law:
             Joint coordinates and velocities after it, the weighed costs of shape (N,), and the position errors at its
             end in [m], of shape (N,).
         """
-        distance = np.empty(len(rows.count))
+        distance = np.empty(len(rows.steps))
         ends: Any = _Segment.apply(q, qdot, output, self, rows, prior, distance)  # type: ignore[no-untyped-call]
         return *ends, distance
 
@@ -117,7 +117,7 @@ class _Segment(torch.autograd.Function):
             lambda start, stop: segment(law.task, rows, prior, held, path, loss, distance, start, stop), count, GRAIN
         )
         ctx.law, ctx.rows, ctx.path, ctx.held = law, rows, path, held
-        last = np.arange(count), rows.count
+        last = np.arange(count), rows.steps
         return torch.from_numpy(path.q[last]), torch.from_numpy(path.qdot[last]), torch.from_numpy(loss)
 
     @staticmethod

@@ -57,7 +57,7 @@ class Rows(NamedTuple):
     Attributes:
         nominal: Reference task coordinates after each of the K steps. Shape (N, K, m).
         counted: Whether the cost of each step counts. Shape (N, K).
-        count: Steps to make, at most K. Shape (N,).
+        steps: Steps to make, at most K. Shape (N,).
         speed: s, see :mod:`baselines.agents.bilinear`. Shape (N,).
         usual: A stage cost that each episode's costs are compared with until they are known. Shape (N,).
         spent: The cost of the episode so far; written. Shape (N,).
@@ -66,7 +66,7 @@ class Rows(NamedTuple):
 
     nominal: Floats
     counted: npt.NDArray[np.bool_]
-    count: npt.NDArray[np.int64]
+    steps: npt.NDArray[np.int64]
     speed: Floats
     usual: Floats
     spent: Floats
@@ -108,7 +108,7 @@ def segment(task, rows, prior, output, path, loss, distance, start, stop):
         stop: The row after the last.
     """
     chain, kind, e, dt, velocity_limit, limits, cost = task
-    nominal, counted, count, speed, usual, spent, played = rows
+    nominal, counted, steps, speed, usual, spent, played = rows
     q_path, qdot_path, weights = path
     prismatic, axis, m, n = chain.prismatic, chain.axes[0], nominal.shape[2], q_path.shape[2]
     turned, w, limited = is_turned(kind, prismatic), twist_size(kind), limits.shape[0] > 0
@@ -118,7 +118,7 @@ def segment(task, rows, prior, output, path, loss, distance, start, stop):
         loss[row] = distance[row] = 0.0
         forward(chain, q_path[row, 0], rotation, position)
         task_kernels.coordinates(kind, rotation, position, pose)
-        for t in range(count[row]):
+        for t in range(steps[row]):
             target = nominal[row, t]
             q, qdot, reached, applied = q_path[row, t], qdot_path[row, t], q_path[row, t + 1], qdot_path[row, t + 1]
             twist(kind, target, pose, error, due)
@@ -142,7 +142,7 @@ def segment(task, rows, prior, output, path, loss, distance, start, stop):
                 spent[row] += stage
                 weights[row, t] = (played[row] + prior) / (spent[row] + prior * usual[row])
                 loss[row] += weights[row, t] * stage
-        if count[row] > 0:
+        if steps[row] > 0:
             distance[row] = missing(target, position)
 
 

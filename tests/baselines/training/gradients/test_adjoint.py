@@ -62,7 +62,7 @@ class Case:
     def numbers(self, start):
         """One of each arm."""
         path, loss = self.play(start)
-        last = np.arange(ROWS), self.rows.count
+        last = np.arange(ROWS), self.rows.steps
         by_loss, by_q, by_qdot = self.by_end
         return by_loss * loss + (by_q * path.q[last]).sum(1) + (by_qdot * path.qdot[last]).sum(1)
 
