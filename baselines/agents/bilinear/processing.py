@@ -15,8 +15,7 @@ from baselines.agents.bilinear.twists import shown_joints, twist_size
 from baselines.agents.features import Features
 from baselines.policy import Batch, Problem
 from ikgym.exceptions import InvalidInputError
-from ikgym.preview import offsets as checked_offsets
-from ikgym.validation import FloatArray, Frozen, known_names
+from ikgym.validation import FloatArray, Frozen, known_names, whole_number
 
 
 @dataclasses.dataclass(frozen=True)
@@ -58,7 +57,7 @@ class Bilinear(Frozen):
     kind: ClassVar[str] = "bilinear"
 
     def __post_init__(self) -> None:
-        offsets = checked_offsets(self.offsets)
+        offsets = tuple(whole_number("offsets", o, at_least=1) for o in self.offsets)
         rising = all(a < b for a, b in itertools.pairwise(offsets))
         if len(offsets) < 2 or offsets[0] != 1 or not rising:
             raise InvalidInputError(f"offsets: expected at least two, rising from 1, got {self.offsets}.")

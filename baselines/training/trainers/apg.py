@@ -22,7 +22,7 @@ from ikgym import scenarios
 from ikgym.scenarios import Scenario
 
 #: No gradient by a joint coordinate that still says anything is this long.
-OVERFLOW = 1e9
+OVERFLOW = 1e30
 
 
 class APGTrainer(ActorTrainer):
@@ -85,7 +85,7 @@ class APGTrainer(ActorTrainer):
             given_up += self._renew(generator)
             q, qdot = _limited(arms.q, OVERFLOW), _limited(arms.qdot, OVERFLOW)
             features, speed = self._law.features(q, arms.ahead, arms.remaining)
-            output = _limited(self._actor(features.float()).double(), most)
+            output = _limited(self._actor(features.to(self._actor[0].weight.dtype)).double(), most)
             rows = arms.rows(config.hold, speed)
             arms.q, arms.qdot, loss, self._far = self._law.move(q, qdot, output, rows, config.cost_prior_steps)
             arms.made += rows.steps
