@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Any, Protocol
 from baselines.training.config.base import Stored
 
 if TYPE_CHECKING:  # the command line is read without it
-    from baselines.training.trainers.models import Model
+    from stable_baselines3.common.base_class import BaseAlgorithm
+
+    from baselines.training.networks import ActorModel
 
 #: What a trainer says of a segment, by name.
 SegmentMetrics = dict[str, float]
@@ -29,7 +31,7 @@ class Trainer(Protocol):
         steps: Steps of the environment so far, those of all arms together.
     """
 
-    model: Model
+    model: BaseAlgorithm | ActorModel
     processing: Stored
     segments: int
 

@@ -13,9 +13,9 @@ from torch import Tensor
 from baselines.training.config.actor_only import APG
 from baselines.training.gradients.arms import Arms
 from baselines.training.gradients.law import Law
+from baselines.training.networks import ActorModel
 from baselines.training.randomness import sequence
 from baselines.training.trainer import SegmentMetrics
-from baselines.training.trainers.actor_model import ActorModel
 from baselines.training.trainers.actor_only import ActorTrainer
 from baselines.training.trainers.initial_weights import begin_actor_from
 from ikgym import scenarios
@@ -80,12 +80,12 @@ class APGTrainer(ActorTrainer):
             The loss, and how many arms were given up.
         """
         config, arms, total, given_up = self._config, self._arms, torch.zeros((), dtype=torch.float64), 0
-        most = config.max_gradient_share * config.hold / (config.n_envs * steps)
+        most, precision = config.max_gradient_share * config.hold / (config.n_envs * steps), self._precision
         for _ in range(steps // config.hold):
             given_up += self._renew(generator)
             q, qdot = _limited(arms.q, OVERFLOW), _limited(arms.qdot, OVERFLOW)
             features, speed = self._law.features(q, arms.ahead, arms.remaining)
-            output = _limited(self._actor(features.to(self._actor[0].weight.dtype)).double(), most)
+            output = _limited(self._actor(features.to(precision)).double(), most)
             rows = arms.rows(config.hold, speed)
             arms.q, arms.qdot, loss, self._far = self._law.move(q, qdot, output, rows, config.cost_prior_steps)
             arms.made += rows.steps
@@ -101,6 +101,11 @@ class APGTrainer(ActorTrainer):
         if len(over):
             self._arms.begin(over, self._seeds(generator, len(over)), np.zeros(len(over), dtype=np.int64))
         return int(lost.sum())
+
+    @property
+    def _precision(self) -> torch.dtype:
+        """Of the actor's weights."""
+        return next(self._actor.parameters()).dtype
 
     def _average(self) -> None:
         """Lets the model follow the actor, at first faster."""

@@ -16,8 +16,7 @@ from torch import Tensor, nn
 from baselines.agents.features import Features
 from baselines.training.config.base import Activation, Algorithm
 from baselines.training.environment.vec_env import ProcessedVecEnv
-from baselines.training.trainers.actor_model import ActorModel
-from baselines.training.trainers.layers import ACTIVATIONS, QUIET
+from baselines.training.networks import ACTIVATIONS, QUIET, ActorModel
 
 ALGORITHMS: dict[Algorithm, type[BaseAlgorithm]] = {"ppo": PPO, "sac": SAC, "td3": TD3}
 

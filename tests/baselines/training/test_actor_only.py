@@ -7,10 +7,14 @@ import pytest
 import torch
 
 from baselines.agents.bilinear.processing import Bilinear
+from baselines.agents.files import load_agent
 from baselines.training.config.actor_only import APG, Imitate
+from baselines.training.errors import TrainingError
 from baselines.training.gradients.law import Law
+from baselines.training.networks import ActorModel
 from baselines.training.randomness import deterministic_torch
-from baselines.training.trainers.actor_model import ActorModel
+from baselines.training.run import train
+from baselines.training.trainers.initial_weights import inherit
 from baselines.training.trainers.models import ALGORITHMS, network_outputs, weights_hash
 from baselines.training.validation import play, validation_seeds
 from ikgym import scenarios
@@ -106,6 +110,24 @@ def test_analytic_policy_gradient_learns():
     losses = [metrics["train/loss"] for metrics in play_segments(trainer, range(4))]
     assert cost(trainer, config) < 2e-3 * before
     assert losses[-1] < losses[0]
+
+
+def test_a_run_of_apg_repeats_and_goes_on(tmp_path):
+    """Bit for bit from its configuration; its actor is what another run begins with."""
+    results = [train(BILINEAR, 1, tmp_path / name) for name in ("one", "other")]
+    assert len({result.weights_sha256 for result in results}) == 1
+    files = {file.name for file in (tmp_path / "one").iterdir() if file.is_file()} - {".lock"}
+    assert files == {"run.json", "history.json", "checkpoint.pt", "agent.safetensors"}
+    agent = load_agent(tmp_path / "one" / "agent.safetensors")
+    config = inherit(BILINEAR.replace(init=agent.source, hidden=(3,)), ())
+    assert config.hidden == BILINEAR.hidden
+    begun = made(config, seed=5)
+    for layer, weights in zip(begun.model.policy[::2], agent.network.weights, strict=True):
+        np.testing.assert_array_equal(layer.weight.detach(), weights)
+    with pytest.raises(TrainingError, match="another structure than imitate trains"):
+        inherit(Imitate(**SMALL, init=agent.source), ())
+    with pytest.raises(TrainingError, match=r"offsets: .* has \(1, 2, 10\), got \(1, 5\)"):
+        inherit(BILINEAR.replace(init=agent.source, offsets=(1, 5)), {"offsets"})
 
 
 def test_lost_arms_are_put_back_on_their_path():

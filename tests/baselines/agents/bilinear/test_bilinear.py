@@ -4,12 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from gymnasium.utils import seeding
 
+import baselines
 from baselines.agents.bilinear.kernels import feature_gradient_rows, feature_rows
 from baselines.agents.bilinear.processing import Bilinear
+from baselines.agents.files import load_agent, save_agent
+from baselines.agents.network import Network
+from baselines.evaluation.rollout import rollouts
 from baselines.policy import Batch, Problem
 from ikgym import arms, scenarios, tasks
 from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.simulator import Simulator
 from tests.comparison import identical
 
 OFFSETS = (1, 5, 20)
@@ -151,6 +157,40 @@ def test_a_row_of_a_batch_is_the_single_call():
         alone = Batch(*[array[row : row + 1] for array in batch])
         assert identical(features(problem, alone), features(problem, batch)[row : row + 1])
         assert identical(qdot(problem, alone, output[row : row + 1]), qdot(problem, batch, output)[row : row + 1])
+
+
+@pytest.fixture
+def agent(tmp_path):
+    """The file of an agent for whole poses of `varga7`."""
+    scenario, processing = scenarios.get("varga7-pose-random"), Bilinear(OFFSETS)
+    problem, rng = Problem.of(scenario), np.random.default_rng(5)
+    sizes = processing.size(problem), 16, processing.outputs(problem)
+    weights = tuple(0.1 * rng.normal(size=shape) for shape in ((16, sizes[0]), (sizes[2], 16)))
+    net = Network(weights, (np.zeros(16), np.zeros(sizes[2])), "silu", "linear")
+    save_agent(tmp_path / "a.safetensors", net, processing, scenario)
+    return tmp_path / "a.safetensors"
+
+
+def test_agents_play(agent):
+    """From their file, also where skew coordinates are shown, but no arm with other joints."""
+    read = load_agent(agent)
+    assert read.processing == Bilinear(OFFSETS)
+    scenario = scenarios.get("varga7-pose-random").replace(steps=20)
+    policy = baselines.make("agent", scenario, path=str(agent))
+    assert policy.preview == OFFSETS
+    (episode,) = rollouts(scenario, policy, [3])
+    simulator = Simulator(scenario, 1, OFFSETS)
+    simulator.reset(np.ones(1, dtype=bool), [seeding.np_random(3)[0]])
+    out, problem = simulator.observe(), Problem.of(scenario)
+    batch = Batch(*[getattr(out, name).copy() for name in Batch._fields])
+    output = read.network.forward(Bilinear(OFFSETS).features(problem, batch))
+    first = Bilinear(OFFSETS).action(problem, batch, output).astype(np.float32) * scenario.velocity_limit
+    np.testing.assert_allclose(episode.qdot[0], first[0], rtol=1e-12)
+    skew = scenarios.get("varga7-random").replace(steps=20)
+    (shown,) = rollouts(skew, baselines.make("agent", skew, path=str(agent)), [3])
+    np.testing.assert_allclose(shown.qdot, episode.qdot, rtol=1e-3, atol=1e-5)
+    with pytest.raises(InvalidInputError, match="was trained for 7 joints"):
+        baselines.make("agent", scenarios.get("zhang6-lspb"), path=str(agent))
 
 
 def test_json():

@@ -1,4 +1,4 @@
-"""An actor and nothing else, where a method needs no critic: a network in PyTorch whose outputs are not squashed."""
+"""Networks in PyTorch: what all have in common, and an actor that stands alone."""
 
 from __future__ import annotations
 
@@ -10,12 +10,23 @@ import torch
 from torch import nn
 
 from baselines.training.config.base import Activation
-from baselines.training.trainers.layers import ACTIVATIONS, QUIET
+
+ACTIVATIONS: dict[Activation, type[nn.Module]] = {
+    "silu": nn.SiLU,
+    "relu": nn.ReLU,
+    "tanh": nn.Tanh,
+    "elu": nn.ELU,
+}
+
+#: The last layer's first weights are made this much smaller: an agent begins near its base policy, or near rest.
+QUIET = 0.01
 
 
 @dataclasses.dataclass(eq=False)
 class ActorModel:
-    """What stands where other methods have a model of Stable-Baselines3.
+    """An actor and nothing else, whose outputs are not squashed.
+
+    Where a method needs no critic, it stands where others have a model of Stable-Baselines3.
 
     Args:
         policy: Linear layers with activations in between, the last one without.
