@@ -61,7 +61,7 @@ def adjoint(task, rows, output, path, by_loss, gradient, start, stop):
     """
     chain, kind, e, dt, velocity_limit, limits, cost = task
     nominal, _, steps, speed = rows[:4]
-    q_path, qdot_path, weights = path
+    q_path, qdot_path, weights = path[:3]
     by_q, by_qdot, by_output = gradient
     prismatic, axis, m, n = chain.prismatic, chain.axes[0], nominal.shape[2], q_path.shape[2]
     turned, w, of_twist = is_turned(kind, prismatic), twist_size(kind), error_kind(kind)
@@ -95,9 +95,8 @@ def adjoint(task, rows, output, path, by_loss, gradient, start, stop):
             by_due[:] = 0.0
             for j in range(n):
                 asked = commanded(output[row], j, due, speed[row], dt)
-                by_asked, lambda_[j], mu[j] = unlimited(
-                    limits, velocity_limit, j, asked, last[j], q[j], reached[j], lambda_[j], mu[j], dt
-                )
+                move, by = (last[j], q[j], reached[j]), (lambda_[j], mu[j])
+                by_asked, lambda_[j], mu[j] = unlimited(limits, velocity_limit, j, asked, move, by, dt)
                 own, of_output = j * (w + 1), by_asked / dt
                 for a in range(w):
                     into[own + a] += of_output * due[a]
@@ -115,7 +114,7 @@ def adjoint(task, rows, output, path, by_loss, gradient, start, stop):
 
 
 @inlined
-def unlimited(limits, velocity_limit, j, asked, last, here, reached, lambda_, mu, dt):
+def unlimited(limits, velocity_limit, j, asked, move, by, dt):
     """Leads the gradients of joint ``j`` back through what :func:`ikgym.simulation.step` does to a command.
 
     Args:
@@ -123,16 +122,15 @@ def unlimited(limits, velocity_limit, j, asked, last, here, reached, lambda_, mu
         velocity_limit: Shape (n,).
         j: The joint.
         asked: The command in [rad/s] or [m/s].
-        last: What was applied in the step before.
-        here: Its coordinate before the step in [rad] or [m].
-        reached: After it.
-        lambda_: The gradient by `reached`.
-        mu: The gradient by what was applied.
+        move: The velocity applied in the step before; the coordinate before this step in [rad] or [m], and after it.
+        by: The gradients by the coordinate after the step, and by the velocity applied in it.
         dt: Δt in [s].
 
     Returns:
         The gradients by the command, by the coordinate before, and by the velocity before.
     """
+    last, here, reached = move
+    lambda_, mu = by
     by_last, passes = 0.0, abs(asked) <= velocity_limit[j]
     if limits.shape[0] == 0:
         return (dt * lambda_ + mu if passes else 0.0), lambda_, by_last

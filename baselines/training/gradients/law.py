@@ -75,9 +75,9 @@ class Law:
             Joint coordinates and velocities after it, the weighed costs of shape (N,), and the position errors at its
             end in [m], of shape (N,).
         """
-        distance = np.empty(len(rows.steps))
-        ends: Any = _Segment.apply(q, qdot, output, self, rows, prior, distance)  # type: ignore[no-untyped-call]
-        return *ends, distance
+        path = Path.empty(len(rows.steps), rows.nominal.shape[1], q.shape[1])
+        ends: Any = _Segment.apply(q, qdot, output, self, rows, prior, path)  # type: ignore[no-untyped-call]
+        return *ends, path.distance
 
 
 class _Features(torch.autograd.Function):
@@ -108,17 +108,14 @@ class _Features(torch.autograd.Function):
 class _Segment(torch.autograd.Function):
     @staticmethod
     def forward(
-        ctx: Any, q: Tensor, qdot: Tensor, output: Tensor, law: Law, rows: Rows, prior: float, distance: FloatArray
+        ctx: Any, q: Tensor, qdot: Tensor, output: Tensor, law: Law, rows: Rows, prior: float, path: Path
     ) -> tuple[Tensor, Tensor, Tensor]:
         count, held = len(q), np.ascontiguousarray(output.detach().numpy())
-        path, loss = Path.empty(count, rows.nominal.shape[1], q.shape[1]), np.empty(count)
         path.q[:, 0], path.qdot[:, 0] = q.detach().numpy(), qdot.detach().numpy()
-        in_chunks(
-            lambda start, stop: segment(law.task, rows, prior, held, path, loss, distance, start, stop), count, GRAIN
-        )
+        in_chunks(lambda start, stop: segment(law.task, rows, prior, held, path, start, stop), count, GRAIN)
         ctx.law, ctx.rows, ctx.path, ctx.held = law, rows, path, held
         last = np.arange(count), rows.steps
-        return torch.from_numpy(path.q[last]), torch.from_numpy(path.qdot[last]), torch.from_numpy(loss)
+        return torch.from_numpy(path.q[last]), torch.from_numpy(path.qdot[last]), torch.from_numpy(path.loss)
 
     @staticmethod
     @once_differentiable

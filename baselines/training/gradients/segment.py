@@ -80,20 +80,25 @@ class Path(NamedTuple):
         q: Joint coordinates in [rad] or [m]. Shape (N, K + 1, n).
         qdot: Joint velocities applied before them, in [rad/s] or [m/s]. Shape (N, K + 1, n).
         weight: What each stage cost is multiplied by; 0 where it does not count. Shape (N, K).
+        loss: The weighed costs, added up. Shape (N,).
+        distance: The position error at the end in [m]. Shape (N,).
     """
 
     q: Floats
     qdot: Floats
     weight: Floats
+    loss: Floats
+    distance: Floats
 
     @classmethod
     def empty(cls, rows: int, steps: int, n: int) -> Path:
         """Room for N arms and K steps."""
-        return cls(np.empty((rows, steps + 1, n)), np.empty((rows, steps + 1, n)), np.empty((rows, steps)))
+        q, qdot = np.empty((2, rows, steps + 1, n))
+        return cls(q, qdot, np.empty((rows, steps)), np.empty(rows), np.empty(rows))
 
 
 @kernel
-def segment(task, rows, prior, output, path, loss, distance, start, stop):
+def segment(task, rows, prior, output, path, start, stop):
     """Moves arms.
 
     Args:
@@ -101,15 +106,13 @@ def segment(task, rows, prior, output, path, loss, distance, start, stop):
         rows: A :class:`Rows`; `spent` and `played` go on.
         prior: Steps that `usual` counts as much as.
         output: (G, h) of each arm, see :func:`baselines.agents.bilinear.kernels.action_rows`. Shape (N, n (w + 1)).
-        path: A :class:`Path` with the first `q` and `qdot`; receives the others.
-        loss: Receives the weighed costs, added up. Shape (N,).
-        distance: Receives the position error at the end in [m]. Shape (N,).
+        path: A :class:`Path` with the first `q` and `qdot`; receives all else.
         start: The first row that is meant.
         stop: The row after the last.
     """
     chain, kind, e, dt, velocity_limit, limits, cost = task
     nominal, counted, steps, speed, usual, spent, played = rows
-    q_path, qdot_path, weights = path
+    q_path, qdot_path, weights, loss, distance = path
     prismatic, axis, m, n = chain.prismatic, chain.axes[0], nominal.shape[2], q_path.shape[2]
     turned, w, limited = is_turned(kind, prismatic), twist_size(kind), limits.shape[0] > 0
     rotation, position, pose = np.empty((3, 3)), np.empty(3), np.empty(m)

@@ -54,20 +54,19 @@ class Case:
     def play(self, start):
         path = Path.empty(ROWS, STEPS, start[0].shape[1])
         path.q[:, 0], path.qdot[:, 0] = start[:2]
-        loss, distance = np.empty(ROWS), np.empty(ROWS)
         self.rows.spent[:] = self.rows.played[:] = 0.0
-        segment(self.task, self.rows, FOREVER, start[2], path, loss, distance, 0, ROWS)
-        return path, loss
+        segment(self.task, self.rows, FOREVER, start[2], path, 0, ROWS)
+        return path
 
     def numbers(self, start):
         """One of each arm."""
-        path, loss = self.play(start)
+        path = self.play(start)
         last = np.arange(ROWS), self.rows.steps
         by_loss, by_q, by_qdot = self.by_end
-        return by_loss * loss + (by_q * path.q[last]).sum(1) + (by_qdot * path.qdot[last]).sum(1)
+        return by_loss * path.loss + (by_q * path.q[last]).sum(1) + (by_qdot * path.qdot[last]).sum(1)
 
     def gradient(self):
-        path, _ = self.play(self.start)
+        path = self.play(self.start)
         out = Gradient(self.by_end[1].copy(), self.by_end[2].copy(), np.full(self.start[2].shape, np.nan))
         adjoint(self.task, self.rows, self.start[2], path, self.by_end[0], out, 0, ROWS)
         return out
@@ -103,7 +102,7 @@ def test_gradients_by_all_that_a_segment_begins_with(name, kind, limited):
 def test_limits_are_met():
     """What the gradients above were tested at: stops, limits of velocity and acceleration, and none of them."""
     case = Case.of(arms.get("varga7"), tasks.get("pose"), True, SMOOTH)
-    path, _ = case.play(case.start)
+    path = case.play(case.start)
     q, qdot = path.q[:2], path.qdot[:2]
     lower, upper, fastest, change = case.task.limits
     stands = (q == lower) | (q == upper)
@@ -142,7 +141,7 @@ def test_a_segment_is_the_environment(name):
     chain, w, counted = task.chain, twist_size(task.kind), scenario.counted()
     output = np.random.default_rng(1).normal(scale=2.0, size=(1, n * (w + 1)))
     prior, usual, spent, played = 10.0, np.array([2.0]), np.zeros(1), np.zeros(1)
-    weighed, loss, distance = 0.0, np.empty(1), np.empty(1)
+    weighed = 0.0
     for k in range(scenario.steps):
         action, path, ahead = np.empty((1, n)), Path.empty(1, 1, n), np.empty((1, w))
         action_rows(
@@ -154,7 +153,7 @@ def test_a_segment_is_the_environment(name):
         rows = Rows(
             out.nominal[:, :1].copy(), counted[None, k + 1 : k + 2], np.ones(1, int), speed, usual, spent, played
         )
-        segment(task, rows, prior, output, path, loss, distance, 0, 1)
+        segment(task, rows, prior, output, path, 0, 1)
         out = simulator.step(action)
         np.testing.assert_allclose(path.q[:, 1], out.q, rtol=0, atol=1e-13)
         np.testing.assert_allclose(path.qdot[:, 1], out.qdot, rtol=1e-12, atol=1e-10)
@@ -162,6 +161,6 @@ def test_a_segment_is_the_environment(name):
         weighed += cost
         weight = (k + 1 + prior) / (weighed + prior * usual[0])
         assert path.weight[0, 0] == pytest.approx(weight * counted[k + 1], rel=1e-8)
-        assert loss[0] == pytest.approx(weight * cost, rel=1e-8)
-        assert distance[0] == pytest.approx(out.position_error[0], rel=1e-9)
+        assert path.loss[0] == pytest.approx(weight * cost, rel=1e-8)
+        assert path.distance[0] == pytest.approx(out.position_error[0], rel=1e-9)
     assert (spent[0], played[0]) == (pytest.approx(weighed, rel=1e-8), scenario.steps)
