@@ -13,6 +13,7 @@ from baselines.training.gradients.adjoint import Gradient, adjoint
 from baselines.training.gradients.segment import Path, Rows, Task, segment
 from ikgym import TrackingCost, arms, scenarios, tasks
 from ikgym.simulator import Simulator
+from tests.comparison import identical
 
 ARMS = ["varga7", "planar2", "khan8", "tiago"]  # a prismatic joint, the fewest joints, eight, a prismatic joint 1
 ROWS, STEPS, DT = 4, 5, 0.01
@@ -164,3 +165,20 @@ def test_a_segment_is_the_environment(name):
         assert path.loss[0] == pytest.approx(weight * cost, rel=1e-8)
         assert path.distance[0] == pytest.approx(out.position_error[0], rel=1e-9)
     assert (spent[0], played[0]) == (pytest.approx(weighed, rel=1e-8), scenario.steps)
+
+
+def test_rows_are_independent():
+    """Shared out to threads, they give the same bit for bit."""
+    case = Case.of(arms.get("varga7"), tasks.get("pose"), True, SMOOTH)
+    whole, wanted = case.play(case.start), case.gradient()
+    parts = Path.empty(ROWS, STEPS, 7)
+    parts.q[:, 0], parts.qdot[:, 0] = case.start[:2]
+    gradient = Gradient(case.by_end[1].copy(), case.by_end[2].copy(), np.empty(case.start[2].shape))
+    case.rows.spent[:] = case.rows.played[:] = 0.0
+    for start, stop in ((2, 4), (0, 1), (1, 2)):
+        segment(case.task, case.rows, FOREVER, case.start[2], parts, start, stop)
+        adjoint(case.task, case.rows, case.start[2], parts, case.by_end[0], gradient, start, stop)
+    last = np.arange(ROWS), case.rows.steps
+    assert identical(parts.q[last], whole.q[last])
+    assert identical(parts.loss, whole.loss)
+    assert all(identical(given, right) for given, right in zip(gradient, wanted, strict=True))
