@@ -24,7 +24,8 @@ from baselines.agents.bilinear.twists import (
 )
 from baselines.training.gradients.segment import commanded
 from ikgym import cost_kernels, task_kernels
-from ikgym.jit import inlined, kernel
+from ikgym.cost_kernels import P_X_INSIDE
+from ikgym.jit import inlined, kernel, uncounted
 from ikgym.kinematics import forward_and_jacobian
 from ikgym.limit_kernels import CHANGE, FASTEST, LOWER, UPPER, within
 
@@ -43,6 +44,26 @@ class Gradient(NamedTuple):
     q: Floats
     qdot: Floats
     output: Floats
+
+
+class Place(NamedTuple):
+    """What is known of the arm at one configuration, and room for Jacobians of the error there.
+
+    Attributes:
+        rotation: Of the tool. Shape (3, 3).
+        position: Of the tool point in [m]. Shape (3,).
+        pose: Task coordinates. Shape (m,).
+        geometric: Geometric Jacobian. Shape (6, n).
+        task_jacobian: What :func:`ikgym.task_kernels.jacobian` gives, in its first rows. Shape (at least e, n).
+        jacobian: What :func:`ikgym.task_kernels.error_jacobian` gives. Shape (at least e, n).
+    """
+
+    rotation: Floats
+    position: Floats
+    pose: Floats
+    geometric: Floats
+    task_jacobian: Floats
+    jacobian: Floats
 
 
 @kernel
@@ -66,30 +87,25 @@ def adjoint(task, rows, output, path, by_loss, gradient, start, stop):
     prismatic, axis, m, n = chain.prismatic, chain.axes[0], nominal.shape[2], q_path.shape[2]
     turned, w, of_twist = is_turned(kind, prismatic), twist_size(kind), error_kind(kind)
     size = 5 if kind == task_kernels.AXIS else w
-    rotation, position, pose = np.empty((3, 3)), np.empty(3), np.empty(m)
-    geometric, task_jacobian, jacobian = np.empty((6, n)), np.empty((max(e, 6), n)), np.empty((max(e, 6), n))
+    pose, task_jacobian, jacobian = np.empty(m), np.empty((max(e, 6), n)), np.empty((max(e, 6), n))
+    place = Place(np.empty((3, 3)), np.empty(3), pose, np.empty((6, n)), task_jacobian, jacobian)
     error, by_error, due, by_due = np.empty(max(e, 6)), np.empty(max(e, 6)), np.empty(w), np.empty(w)
     for row in range(start, stop):
         lambda_, mu, into = by_q[row], by_qdot[row], by_output[row]
         into[:] = 0.0
-        forward_and_jacobian(chain, q_path[row, steps[row]], rotation, position, geometric)
+        look(chain, kind, q_path[row, steps[row]], place)
         for t in range(steps[row] - 1, -1, -1):
             target, weight = nominal[row, t], weights[row, t] * by_loss[row]
             q, last, reached, applied = q_path[row, t], qdot_path[row, t], q_path[row, t + 1], qdot_path[row, t + 1]
-            # The stage cost.
             if weight != 0.0:
-                task_kernels.coordinates(kind, rotation, position, pose)
                 task_kernels.error(kind, target, pose, error[:e])
-                cost_kernels.tracking_gradient(cost, error[:e], by_error[:e])
-                task_kernels.jacobian(kind, rotation, geometric, task_jacobian[:e])
-                task_kernels.error_jacobian(kind, target, pose, error[:e], task_jacobian[:e], jacobian[:e])
-                add_product(jacobian[:e], by_error[:e], weight, lambda_)
+                for a in range(e):
+                    by_error[a] = weight * cost_kernels.gradient(error[a], cost.delta_x, P_X_INSIDE, cost.p_x)
                 for j in range(n):
                     mu[j] += weight * cost_kernels.gradient(applied[j], cost.delta_qdot, cost.p_in, cost.p_out)
-            # The law, and what limits make of it.
-            forward_and_jacobian(chain, q, rotation, position, geometric)
-            task_kernels.coordinates(kind, rotation, position, pose)
-            twist(kind, target, pose, error[:6], due)
+                through_error(kind, target, place, error[:e], by_error[:e], lambda_)
+            look(chain, kind, q, place)
+            twist(kind, target, pose, error, due)
             if turned:
                 turn(axis, -q[0], due)
             by_due[:] = 0.0
@@ -97,20 +113,63 @@ def adjoint(task, rows, output, path, by_loss, gradient, start, stop):
                 asked = commanded(output[row], j, due, speed[row], dt)
                 move, by = (last[j], q[j], reached[j]), (lambda_[j], mu[j])
                 by_asked, lambda_[j], mu[j] = unlimited(limits, velocity_limit, j, asked, move, by, dt)
-                own, of_output = j * (w + 1), by_asked / dt
-                for a in range(w):
-                    into[own + a] += of_output * due[a]
-                    by_due[a] += of_output * output[row, own + a]
-                into[own + w] += by_asked * speed[row]
-            # The twist that is due.
+                through_law(output[row], j, by_asked, due, speed[row], dt, into, by_due)
             if turned:
                 lambda_[0] += turn_gradient(axis, due, by_due)
                 turn(axis, q[0], by_due)
             error_gradient(kind, target, by_due, by_error[:size])
             task_kernels.error(of_twist, target, pose, error[:size])
-            task_kernels.jacobian(of_twist, rotation, geometric, task_jacobian[:size])
-            task_kernels.error_jacobian(of_twist, target, pose, error[:size], task_jacobian[:size], jacobian[:size])
-            add_product(jacobian[:size], by_error[:size], 1.0, lambda_)
+            through_error(of_twist, target, place, error[:size], by_error[:size], lambda_)
+
+
+@uncounted
+def look(chain, kind, q, place):
+    """Where the tool is at some joint coordinates of shape (n,), and how it moves: fills a :class:`Place`."""
+    forward_and_jacobian(chain, q, place.rotation, place.position, place.geometric)
+    task_kernels.coordinates(kind, place.rotation, place.position, place.pose)
+
+
+@uncounted
+def through_error(kind, target, place, error, by_error, lambda_):
+    """Adds to the gradient by the joint coordinates what comes of that by the error of the task.
+
+    Args:
+        kind: Of task coordinates.
+        target: Reference task coordinates. Shape (m,).
+        place: A :class:`Place`.
+        error: Of the task. Shape (e,).
+        by_error: The gradient by it. Shape (e,).
+        lambda_: That by the joint coordinates. Shape (n,).
+    """
+    e = error.shape[0]
+    task_jacobian, jacobian = place.task_jacobian[:e], place.jacobian[:e]
+    task_kernels.jacobian(kind, place.rotation, place.geometric, task_jacobian)
+    task_kernels.error_jacobian(kind, target, place.pose, error, task_jacobian, jacobian)
+    for a in range(e):
+        for j in range(lambda_.shape[0]):
+            lambda_[j] += by_error[a] * jacobian[a, j]
+
+
+@inlined
+def through_law(output, j, by_asked, due, speed, dt, into, by_due):
+    """Adds to the gradients by (G, h) and by the twist that is due what comes of that by a joint's command.
+
+    Args:
+        output: (G, h). Shape (n (w + 1),).
+        j: The joint.
+        by_asked: The gradient by its command.
+        due: The twist. Shape (w,).
+        speed: s.
+        dt: Δt in [s].
+        into: The gradient by (G, h). Shape (n (w + 1),).
+        by_due: The gradient by the twist. Shape (w,).
+    """
+    w, scaled = due.shape[0], by_asked / dt
+    own = j * (w + 1)
+    for a in range(w):
+        into[own + a] += scaled * due[a]
+        by_due[a] += scaled * output[own + a]
+    into[own + w] += by_asked * speed
 
 
 @inlined
@@ -146,12 +205,3 @@ def unlimited(limits, velocity_limit, j, asked, move, by, dt):
     if not accelerates:
         return 0.0, lambda_, by_velocity
     return (by_velocity if passes else 0.0), lambda_, by_last
-
-
-@inlined
-def add_product(jacobian, by_error, factor, out):
-    """``out += factor · Jᵀ g``: shapes (e, n), (e,), (n,)."""
-    for a in range(jacobian.shape[0]):
-        value = factor * by_error[a]
-        for j in range(out.shape[0]):
-            out[j] += value * jacobian[a, j]
