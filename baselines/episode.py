@@ -19,7 +19,14 @@ Act = Callable[[Outcome], npt.NDArray[Any]]
 
 
 def play(
-    scenario: Scenario, seeds: Sequence[int], act: Act, *, preview: Preview, single: bool = False
+    scenario: Scenario,
+    seeds: Sequence[int],
+    act: Act,
+    *,
+    preview: Preview,
+    single: bool = False,
+    commands: int = 0,
+    arm_seeds: Sequence[int | None] | None = None,
 ) -> Iterator[Outcome]:
     """Plays episodes in step, from their resets to their ends.
 
@@ -29,16 +36,20 @@ def play(
         act: Called before each step with what all arms show.
         preview: Steps ahead that the nominal coordinates are shown.
         single: Whether there is one arm, whose actions have no row axis.
+        commands: How many of the last commands are shown.
+        arm_seeds: Seeds of the arms that are kept, one an arm, None where it is drawn with the episode.
 
     Yields:
         What came of each step, as arrays with an axis of arms; it stays as it is when the next step is made.
 
     Raises:
-        InvalidInputError: The preview is not valid.
+        InvalidInputError: The preview or the number of commands is not valid, or an arm cannot be kept.
     """
     rows = len(seeds)
-    simulator = Simulator(scenario, None if single else rows, preview)
-    simulator.reset(np.ones(rows, dtype=np.bool_), [seeding.np_random(seed)[0] for seed in seeds])
+    simulator = Simulator(scenario, None if single else rows, preview, commands=commands)
+    generators = [seeding.np_random(seed)[0] for seed in seeds]
+    arms = simulator.checked_arm_seeds(arm_seeds)
+    simulator.reset(np.ones(rows, dtype=np.bool_), generators, arm_seeds=arms)
     out = simulator.observe()
     for _ in range(scenario.steps):
         out = simulator.step(act(out))

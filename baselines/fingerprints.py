@@ -12,6 +12,7 @@ import numpy as np
 from baselines.canonical import canonical, jsonable
 from ikgym import cost_kernels
 from ikgym.arms import Arm
+from ikgym.plant import Plant
 from ikgym.scenarios import Scenario
 
 #: Numbers in arrays, mostly of the order of 1, count up to here.
@@ -27,9 +28,18 @@ def fingerprint(scenario: Scenario) -> str:
     parts = {
         f.name: getattr(scenario, f.name) for f in dataclasses.fields(scenario) if f.name not in {"name", "source"}
     }
+    parts |= _of_plant(parts.pop("plant"))
     if scenario.start is None and not scenario.starts_nominally:
         parts["start"] = ["near home", scenario.arm.home]
     return _digest(cost_kernels.COST_VERSION, _canonical(parts))
+
+
+def _of_plant(plant: Plant) -> dict[str, Any]:
+    """What is switched on, but for bias and noise, whose digest is the one of when there was nothing else."""
+    given = plant.switched_on()
+    disturbance = ["Disturbance", {name: getattr(plant, name) for name in ("bias", "noise")}]
+    others = {name: value for name, value in given.items() if name not in {"bias", "noise"}}
+    return {"disturbance": disturbance, **({"plant": others} if others else {})}
 
 
 def same(one: object, other: object) -> bool:

@@ -185,6 +185,11 @@ class NamedWrapper(Wrapper, abc.ABC):
         """That of the inner policy."""
         return self.inner.preview
 
+    @property
+    def commands(self) -> int:
+        """See :attr:`SolverPolicy.commands`."""
+        return self.inner.commands
+
 
 def policies_in(spec: PolicySpec) -> Iterator[type[SolverPolicy]]:
     """The classes of all policies that a spec names: its own, and those of inner policies.

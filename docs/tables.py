@@ -146,7 +146,16 @@ def statuses() -> list[tuple[str, ...]]:
     return rows
 
 
+def plant() -> list[tuple[str, ...]]:
+    """One line an effect, from the docstring of the class."""
+    text = inspect.getdoc(ikgym.Plant).split("Args:\n")[1].split("\n\nRaises:")[0]
+    meanings = {name: " ".join(said.split()) for name, said in re.findall(r"^    (\w+): (.*(?:\n {8}.*)*)", text, re.M)}
+    defaults = {field.name: field.default for field in dataclasses.fields(ikgym.Plant)}
+    return [("key", "meaning", "off")] + [(f"`{n}`", m, f"`{defaults[n]!r}`") for n, m in meanings.items()]
+
+
 TABLES = {
+    "plant": plant,
     "arms": arms,
     "tasks": tasks,
     "scenarios": scenarios,

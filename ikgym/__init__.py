@@ -7,6 +7,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import gymnasium as gym
 
 from ikgym import arms, exceptions, problems, rotations, scenarios, tasks, trajectories
@@ -14,13 +16,14 @@ from ikgym.arms import Arm
 from ikgym.cost import TrackingCost
 from ikgym.env import RedundantIKEnv
 from ikgym.exceptions import IkgymError
-from ikgym.scenarios import Disturbance, Scenario
+from ikgym.plant import Plant
+from ikgym.scenarios import Scenario
 from ikgym.vector_env import RedundantIKVectorEnv
 
 __all__ = [
     "Arm",
-    "Disturbance",
     "IkgymError",
+    "Plant",
     "RedundantIKEnv",
     "RedundantIKVectorEnv",
     "Scenario",
@@ -33,6 +36,14 @@ __all__ = [
     "tasks",
     "trajectories",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    if name == "Disturbance":
+        raise AttributeError("ikgym.Disturbance is gone: bias and noise belong to ikgym.Plant(bias=…, noise=…).")
+    raise AttributeError(f"module 'ikgym' has no attribute {name!r}")
+
+
 __version__ = "0.2.0"
 
 if "RedundantIK-v0" not in gym.registry:

@@ -13,16 +13,17 @@ from gymnasium.envs.registration import EnvSpec
 
 from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError, ResetNeededError
+from ikgym.outcome import OBSERVED as OBSERVED
+from ikgym.outcome import Observation, observation
 from ikgym.scenarios import Preview, Scenario
-from ikgym.simulator import Observation, Simulator, observation
+from ikgym.simulator import Simulator
 from ikgym.spaces import action_space, observation_space
 from ikgym.validation import FloatArray, known_names, shortened
 
-OBSERVED = ("q", "qdot", "pose", "nominal", "remaining")
 #: The keys of `info` after a step; the orientation error is there where the task has an orientation.
 REPORTED = ("tracking_cost", "velocity_cost", "position_error", "orientation_error", "clipped", "at_limit", "time")
 #: The keys that the options of a reset may have.
-OPTIONS = ("q",)
+OPTIONS = ("q", "arm_seed")
 
 
 class RedundantIKEnv(gym.Env[Any, Any]):
@@ -46,14 +47,17 @@ class RedundantIKEnv(gym.Env[Any, Any]):
     q(k+1) = q(k) + Δt q̇(k) (Varga 2021, eq. 5) with the joint velocities q̇ that the arm makes of the command, joint
     by joint, in this order:
 
-    1. The command is cut to the arm's velocity limit.
-    2. Its change from the q̇ last applied is cut to the acceleration limit times Δt. An episode begins at rest.
-    3. The scenario's disturbance is added, if it has one; it is not part of q̇.
-    4. A joint that would pass a limit of its coordinate stops there, whatever the acceleration limit says. Its q̇ is
+    1. The command of an earlier step takes its place, if the scenario's plant has a delay.
+    2. It is cut to the arm's velocity limit.
+    3. Its change from the q̇ last applied is cut to the acceleration limit times Δt. An episode begins at rest. This
+       is q̇, which is observed and charged; what the plant makes of it is not.
+    4. The drive lags behind it, bias and noise are added, and backlash lies between drive and joint, if the plant has
+       some.
+    5. A joint that would pass a limit of its coordinate stops there, whatever the acceleration limit says. Its q̇ is
        (q(k+1) − q(k)) / Δt then, no faster than the velocity limit: 0 where it stood at the stop already.
 
-    An arm without limits does what it is told. `info["at_limit"]` counts the joints that were held back, by more than
-    a millionth of the scenario's `velocity_limit`, which is more than what rounding to float32 does.
+    An ideal plant without limits does what it is told. `info["at_limit"]` counts the joints that were held back, by
+    more than a millionth of the scenario's `velocity_limit`, which is more than what rounding to float32 does.
 
     ## Observation space
     A `Dict` of float64:
@@ -65,13 +69,18 @@ class RedundantIKEnv(gym.Env[Any, Any]):
     | `pose` | (m,) | measured task coordinates | [m], rotation parts 1 |
     | `nominal` | (p, m) | nominal task coordinates ahead | [m], rotation parts 1 |
     | `remaining` | (1,) | steps left in the episode | 1 |
+    | `q_age` | (1,) | steps since `q` was measured; where sensors are slow or late | 1 |
+    | `pose_age` | (1,) | steps since `pose` was measured; where sensors are slow or late | 1 |
+    | `commands` | (h, n) | the last h commands within the velocity limit, newest first; with `commands=h` | as `qdot` |
 
+    `q` and `pose` are what the sensors of the scenario's plant show; those of an ideal plant show what is true.
     `preview` = an int p gives X^N(k+1) … X^N(k+p); a tuple such as (1, 10, 40, 120) gives just those steps ahead.
     The nominal goes on past the end of the episode. All bounds are finite and true: they follow from the start,
     the limits, the number of steps and the arm's reach.
 
     ## Reward
-    −(Φ^X(X^N(k+1) − F(q(k+1))) + Φ^U(q̇(k))), minus the stage cost of the scenario's `TrackingCost`. Where a
+    −(Φ^X(X^N(k+1) − F(q(k+1))) + Φ^U(q̇(k))), minus the stage cost of the scenario's `TrackingCost`, of the true joint
+    coordinates and the kinematics of the arm that moves, whatever is measured; so are the errors in `info`. Where a
     scenario holds its nominal points for several steps, only the last step of each point costs anything.
 
     ## Info
@@ -88,8 +97,10 @@ class RedundantIKEnv(gym.Env[Any, Any]):
     After a reset `info` is empty.
 
     ## Starting state
-    The scenario's start, with no velocity. `reset(seed=…)` chooses the trajectory of a random scenario, see
-    `ikgym.scenarios.SPLITS` for the seeds; `reset(options={"q": …})` starts elsewhere, within the limits of the arm. A
+    The scenario's start, with no velocity. `reset(seed=…)` chooses the trajectory of a random scenario, and whatever
+    its plant draws; see `ikgym.scenarios.SPLITS` for the seeds. `reset(options={"arm_seed": k})` has the arm and the
+    drives that k draws, for this episode, whatever the seed; it is an error where the plant draws neither, as that of
+    an ideal plant. `reset(options={"q": …})` starts elsewhere, within the limits of the arm. A
     joint without limits starts at most 2π [rad] or [m] from home (or as far as the scenario's own start, if that is
     farther).
 
@@ -102,11 +113,12 @@ class RedundantIKEnv(gym.Env[Any, Any]):
             `"package.module:attribute"`; see `ikgym.scenarios.find`.
         preview: How many steps ahead the nominal coordinates are shown, or which ones.
         render_mode: None, `"human"` (a window) or `"rgb_array"`.
+        commands: h, how many of the last commands are shown.
 
     Raises:
         UnknownNameError: There is no such scenario.
-        InvalidInputError: The scenario, the preview or the render mode is not valid, or there is no memory for so
-            many steps.
+        InvalidInputError: The scenario, the preview, the number of commands or the render mode is not valid, or there
+            is no memory for so many steps.
     """
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": ["human", "rgb_array"], "render_fps": 50}  # type: ignore[misc]
@@ -116,6 +128,7 @@ class RedundantIKEnv(gym.Env[Any, Any]):
         scenario: str | Scenario = "varga7-fast",
         preview: Preview = 2,
         render_mode: str | None = None,
+        commands: int = 0,
     ) -> None:
         if render_mode is not None and render_mode not in self.metadata["render_modes"]:
             raise InvalidInputError(
@@ -124,8 +137,9 @@ class RedundantIKEnv(gym.Env[Any, Any]):
         self.scenario = scenarios.find(scenario)
         self._spec: EnvSpec | None = None
         self.render_mode = render_mode
-        self._simulator = Simulator(self.scenario, None, preview)  # first: it says whether there is memory
-        self.observation_space = observation_space(self.scenario, preview)
+        # First: it says whether there is memory.
+        self._simulator = Simulator(self.scenario, None, preview, commands=commands)
+        self.observation_space = observation_space(self.scenario, preview, commands)
         self.action_space = action_space(self.scenario)
         self._step = -1  # no episode yet
         self._steps, self._dt = self.scenario.steps, self.scenario.dt
@@ -147,27 +161,31 @@ class RedundantIKEnv(gym.Env[Any, Any]):
         """Begins an episode.
 
         Args:
-            seed: Chooses the trajectory of a random scenario.
-            options: ``{"q": …}`` starts at other joint coordinates, in [rad] or [m]. Shape (n,).
+            seed: Chooses the trajectory of a random scenario, and whatever its plant draws.
+            options: ``{"q": …}`` starts at other joint coordinates, in [rad] or [m], of shape (n,); ``{"arm_seed": k}``
+                has the arm and the drives that k draws, whatever the seed.
 
         Returns:
             The first observation, and an empty info.
 
         Raises:
             UnknownNameError: There is no such option.
-            InvalidInputError: The options are no dict, or the start has a wrong shape, is not finite, out of range or
-                outside the limits.
+            InvalidInputError: The options are no dict, the start has a wrong shape, is not finite, out of range or
+                outside the limits, or the seed of the arm is none, or there is nothing that it could keep.
         """
         options = checked_options(options, OPTIONS)
         starts = self._simulator.checked_starts(options.get("q"))
+        arm_seeds = self._simulator.checked_arm_seeds(options.get("arm_seed"))
         super().reset(seed=seed)
-        self._simulator.reset(np.ones(1, dtype=np.bool_), [self.np_random], starts)
+        self._simulator.reset(np.ones(1, dtype=np.bool_), [self.np_random], starts, arm_seeds)
         self._step = 0
         out = self._simulator.observe()
         if self._renderer is not None:
             self._renderer.begin(self._simulator.nominal_positions(0), self._steps * self._dt)
-            self._draw_later(out.q[0], float(out.position_error[0]), float(out.orientation_error[0]))
-        return observation(out), {}
+            self._draw_later(
+                self._simulator.true_q[0].copy(), float(out.position_error[0]), float(out.orientation_error[0])
+            )
+        return observation(out, 0), {}
 
     def step(self, action: npt.NDArray[np.float32]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Applies joint velocities for one time step; the class says what comes back.
@@ -196,7 +214,7 @@ class RedundantIKEnv(gym.Env[Any, Any]):
         info["at_limit"] = held
         info["time"] = self._step * self._dt
         if self._renderer is not None:
-            self._draw_later(seen["q"], position, orientation)
+            self._draw_later(self._simulator.true_q[0].copy(), position, orientation)
         return seen, -(tracking + velocity), False, self._step == self._steps, info
 
     def render(self) -> npt.NDArray[np.uint8] | None:

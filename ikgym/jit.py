@@ -2,7 +2,7 @@
 
 numba looks at the file of a function alone to tell whether what it has on disk is still good. A kernel whose callee in
 another file has changed, or a constant from there, would go on running as it was. Here the stamp of a kernel is made
-of all that it may reach.
+of all that it may reach, and of this file.
 """
 
 from __future__ import annotations
@@ -106,10 +106,10 @@ def _forgiving(call: Callable[..., Any], flush: Callable[[], None], function: An
 
 
 def _stamp(module: str) -> str:
-    """A digest of a module's file, of the constants it has so far, and of the modules that its kernels come from."""
+    """A digest of a module's file and this one, of its constants so far, and of the modules its kernels come from."""
     if module in _stamps:
         return _stamps[module]
-    digest = hashlib.sha256(_source(module))
+    digest = hashlib.sha256(_source(__name__) + _source(module))
     for name, value in sorted(vars(sys.modules[module]).items()):
         if isinstance(value, (bool, int, float, str)) and not name.startswith("__"):
             digest.update(f"{name}={value!r};".encode())

@@ -51,15 +51,18 @@ class RedundantIKVecEnv(VecEnv):
         num_envs: N.
         scenario: A scenario or what names one, see `ikgym.scenarios.find`.
         preview: How many steps ahead the nominal coordinates are shown, or which ones.
+        commands: How many of the last commands are shown.
 
     Raises:
         UnknownNameError: There is no such scenario.
-        InvalidInputError: N, the scenario or the preview is not valid, there is no memory for N arms, or a step may
-            cost more than fits into a float32.
+        InvalidInputError: N, the scenario, the preview or the number of commands is not valid, there is no memory for N
+            arms, or a step may cost more than fits into a float32.
     """
 
-    def __init__(self, num_envs: int = 1, scenario: str | Scenario = "varga7-fast", preview: Preview = 2) -> None:
-        self._envs = RedundantIKVectorEnv(num_envs, scenario, preview, AutoresetMode.SAME_STEP)
+    def __init__(
+        self, num_envs: int = 1, scenario: str | Scenario = "varga7-fast", preview: Preview = 2, commands: int = 0
+    ) -> None:
+        self._envs = RedundantIKVectorEnv(num_envs, scenario, preview, AutoresetMode.SAME_STEP, commands=commands)
         self.scenario = self._envs.scenario
         worst, most = self.scenario.largest_step_cost(), float(np.finfo(np.float32).max)
         if worst > most:
@@ -77,7 +80,7 @@ class RedundantIKVecEnv(VecEnv):
         """Begins episodes in all rows, with what `seed()` and `set_options()` have left for this reset.
 
         Row i is seeded with seed + i; without a seed it goes on with its generator. An option ``{"q": …}`` of shape
-        (n,), in [rad] or [m], starts elsewhere.
+        (n,), in [rad] or [m], starts elsewhere, ``{"arm_seed": k}`` keeps the arm that k draws.
 
         Returns:
             The first observations, each of shape (N, …).
@@ -166,11 +169,17 @@ class RedundantIKVecEnv(VecEnv):
             "t": round(time.perf_counter() - self._made, 6),
         }
 
-    def _checked_options(self) -> dict[str, FloatArray]:
+    def _checked_options(self) -> dict[str, Any]:
         """The options of all rows as one."""
         if len(self._options) != self.num_envs:
             raise InvalidInputError(f"options: expected {self.num_envs}, one a row, got {len(self._options)}.")
-        starts = [checked_options(options, OPTIONS).get("q") for options in self._options]
+        given = [checked_options(options, OPTIONS) for options in self._options]
+        arm_seeds = [options.get("arm_seed") for options in given]
+        kept = {} if all(seed is None for seed in arm_seeds) else {"arm_seed": arm_seeds}
+        return {**kept, **self._checked_starts([options.get("q") for options in given])}
+
+    def _checked_starts(self, starts: list[Any]) -> dict[str, FloatArray]:
+        """The starts of all rows as one option."""
         given = [float_array("options['q']", q, (self.scenario.joints,)) for q in starts if q is not None]
         if not given:
             return {}

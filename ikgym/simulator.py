@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -14,25 +15,20 @@ from ikgym.arms.posture import within_limits
 from ikgym.compilation import announced
 from ikgym.exceptions import InvalidInputError
 from ikgym.memory import afford, of_rows
+from ikgym.nominal_frames import MEMORY, NominalFrames
+from ikgym.outcome import OBSERVED, Outcome, more_size, observation, outcome, size
+from ikgym.outcome import Observation as Observation
 from ikgym.parallel import in_chunks
+from ikgym.plant import step as plant_step
+from ikgym.plant.rows import PlantRows, checked_arm_seeds
 from ikgym.preview import FARTHEST as FARTHEST
 from ikgym.preview import Preview, offsets
 from ikgym.scenarios import Scenario
-from ikgym.simulation import Constants, Outcome, State, outcome
-from ikgym.trajectories import Trajectory
-from ikgym.validation import FloatArray, float_array, shortened
-
-#: What a policy sees of an arm, see :func:`observation`.
-Observation = dict[str, FloatArray]
+from ikgym.simulation import Constants, State
+from ikgym.validation import FloatArray, float_array, shortened, whole_number
 
 # Rows worth a thread of their own: below, handing over costs more than it saves.
 GRAIN_STEP = 256
-GRAIN_RESET = 4
-# Rows whose nominal frames are computed at a time: their intermediate results stay small.
-PIECE = 64
-
-# What the nominal frames of all rows may take, in bytes: of many long episodes only what is near is kept.
-MEMORY = 2**26
 # Joints held back of an arm without limits: a copy takes less time than a fresh array.
 NONE_HELD = np.zeros(3, dtype=np.int64)
 
@@ -47,42 +43,39 @@ class Simulator:
             those.
         memory: What the nominal frames of all rows may take, in bytes. Those of random episodes that would take
             more are computed block by block on the way; a block is never shorter than the preview looks ahead.
+        commands: How many of the last commands are shown.
 
     Raises:
-        InvalidInputError: The preview is not valid, or there is no memory for so many rows or steps.
+        InvalidInputError: The preview or the number of commands is not valid, or there is no memory for so many rows
+            or steps.
     """
 
-    def __init__(self, scenario: Scenario, rows: int | None, preview: Preview, memory: int = MEMORY) -> None:
-        joints, size, disturbance = scenario.joints, scenario.task.size, scenario.disturbance
+    def __init__(
+        self, scenario: Scenario, rows: int | None, preview: Preview, memory: int = MEMORY, commands: int = 0
+    ) -> None:
+        joints, coordinates = scenario.joints, scenario.task.size
+        commands = whole_number("commands", commands, at_least=0)
+        ideal = scenario.plant.ideal and not commands
         self._action_shape = (joints,) if rows is None else (rows, joints)
         # One arm has no rows that do not step, whose outcome would have to be zero.
         self._new = np.empty if rows is None else np.zeros
         rows = 1 if rows is None else rows
         self.scenario, self.rows, self._limited = scenario, rows, scenario.arm.limited
         self.preview = offsets(preview)
-        self._point = scenario.points(preview)
-        width = 12 if scenario.task.has_orientation else 3
-        points = int(self._point[-1]) + 1
-        tables = rows if scenario.random else 1
-        affordable = memory // (8 * width * rows) if scenario.random else points
-        # Rows know all of their points, or two blocks of them: the next one takes the place of the one before.
-        self._block = points if points <= affordable else min(points, max(affordable // 2, self.preview[-1]))
-        self._in_blocks = self._block < points
-        known = self._block * (2 if self._in_blocks else 1)
-        shown = 2 * joints + size + len(self.preview) * size + 9
-        afford(f"{rows} environments", of_rows(rows, shown, tables * known * width))
-        self._last_block = self._point[self.preview[-1] :] // self._block
-        self._blocks_known = np.zeros(tables, dtype=np.int64)
-        self._episodes: list[Trajectory] = [scenario.trajectory] * tables
+        self._nominal = NominalFrames(scenario, rows, self.preview, memory)
+        shown = size(joints, coordinates, len(self.preview))
+        if not ideal:
+            shown += more_size(joints, coordinates, commands)
+        kept = 0 if ideal else PlantRows.size(scenario.plant, joints, coordinates, commands)
+        afford(f"{rows} environments", of_rows(rows, shown, math.prod(self._nominal.shape) + rows * kept))
         self._shared = Constants(
             kind=scenario.task.kind,
             dt=scenario.dt,
             velocity_limit=scenario.velocity_limit,
             steps=scenario.steps,
-            point=self._point % known,
+            point=self._nominal.slots,
             counted=scenario.counted(),
             preview=np.array(self.preview, dtype=np.int64),
-            disturbance=np.array([np.broadcast_to(part, joints) for part in (disturbance.bias, disturbance.noise)]),
             limits=limit_rows(scenario.arm, scenario.largest_qdot, scenario.dt),
         )
         self._state = State(
@@ -90,17 +83,20 @@ class Simulator:
             q=np.zeros((rows, joints)),
             qdot=np.zeros((rows, joints)),
             step=np.zeros(rows, dtype=np.int64),
-            frames=np.zeros((tables, known, width)),
-            noise_key=np.zeros(rows, dtype=np.uint64),
-            scratch=np.empty((rows, 12 + size + scenario.task.error_size)),
+            frames=self._nominal.allocate(),
+            scratch=np.empty((rows, 12 + coordinates + scenario.task.error_size)),
         )
-        if not scenario.random:
-            self._know(np.zeros(1, dtype=np.int64))
-        self._shape, self._nominal_shape = (rows, joints, size, len(self.preview)), (len(self.preview), size)
-        self._count = rows * shown
-        # Where the parts of the only arm are in the block.
-        parts = self._outcome(np.arange(self._count, dtype=np.float64))[1:6]
-        self._parts = [slice(int(part.flat[0]), int(part.flat[-1]) + 1) for part in parts]
+        self._plant: PlantRows | None = None
+        if not ideal:
+            self._plant = PlantRows(scenario.plant, scenario.arm, scenario.dt, rows, coordinates, commands)
+        self._shape = (rows, joints, coordinates, len(self.preview), None if ideal else commands)
+        self._count, usual = rows * shown, rows * size(joints, coordinates, len(self.preview))
+        self._told, self._held = slice(usual - 8, usual - 3), slice(usual - 3, usual)
+        # Where what is seen of the only arm is in the block: what always is, and what sometimes is, with its shape.
+        seen = observation(self._outcome(np.arange(self._count, dtype=np.float64)), 0)
+        places = {key: slice(int(part.flat[0]), int(part.flat[-1]) + 1) for key, part in seen.items()}
+        self._parts, self._nominal_shape = [places[key] for key in OBSERVED], seen["nominal"].shape
+        self._more = [(key, places[key], seen[key].shape) for key in places if key not in OBSERVED]
         self._constants = self._taken_apart()
         self._all = np.ones(rows, dtype=np.bool_)
         self._own_start = np.zeros(rows, dtype=np.bool_)
@@ -119,31 +115,28 @@ class Simulator:
         active: npt.NDArray[np.bool_],
         generators: Sequence[np.random.Generator] | Mapping[int, np.random.Generator],
         starts: FloatArray | None = None,
+        arm_seeds: Sequence[int | None] | None = None,
     ) -> None:
         """Begins new episodes.
 
         Args:
             active: The rows to reset. Shape (N,).
-            generators: One a row; each draws its row's trajectory and disturbance.
+            generators: One a row; each draws its row's trajectory and plant.
             starts: What :meth:`checked_starts` gave; the scenario's own starts if left out. Shape (N, n).
+            arm_seeds: What :meth:`checked_arm_seeds` gave, one a row; arms are drawn with their episodes if left out.
         """
         scenario, state = self.scenario, self._state
         rows = np.flatnonzero(active)
         episodes = scenario.trajectory.samples([generators[row] for row in rows.tolist()])
-        if scenario.random:
-            for row, episode in zip(rows.tolist(), episodes, strict=True):
-                self._episodes[row] = episode
         if len(rows):
             state.q[rows] = scenario.first_q_of(episodes) if starts is None else starts[rows]
-        if np.any(scenario.disturbance.noise):
-            for row in rows.tolist():
-                state.noise_key[row] = generators[row].integers(2**63, dtype=np.uint64)
+        if self._plant is not None:
+            self._plant.begin(rows, generators, arm_seeds)
         self._own_start[active] = starts is None
         state.qdot[active] = 0.0
         state.step[active] = 0
         if scenario.random:
-            self._blocks_known[active] = 0
-            self._look_ahead(rows, steps=0)
+            self._nominal.begin(state.frames, rows, episodes)
 
     def checked_starts(self, q: npt.ArrayLike | None) -> FloatArray | None:
         """Starts that a user asks for.
@@ -171,6 +164,10 @@ class Simulator:
             )
         return np.broadcast_to(starts, (self.rows, joints))
 
+    def checked_arm_seeds(self, given: Any) -> list[int | None] | None:
+        """Seeds of arms that a user asks for, see :func:`ikgym.plant.rows.checked_arm_seeds`."""
+        return checked_arm_seeds(given, self.rows, self.scenario.plant, self.scenario.name)
+
     def observe(self, active: npt.NDArray[np.bool_] | None = None, out: Outcome | None = None) -> Outcome:
         """What the arms show before a step.
 
@@ -182,7 +179,10 @@ class Simulator:
         active = self._all if active is None else active
         self._run(active, out.numbers, moving=False)
         if self.scenario.initial_pose is not None:
-            out.pose[active & self._own_start & (self._state.step == 0)] = self.scenario.initial_pose
+            starting = active & self._own_start & (self._state.step == 0)
+            out.pose[starting] = self.scenario.initial_pose
+            if self._plant is not None:
+                self._plant.state.shown[starting] = self.scenario.initial_pose
         return out
 
     def step(self, actions: npt.ArrayLike, active: npt.NDArray[np.bool_] | None = None) -> Outcome:
@@ -213,7 +213,8 @@ class Simulator:
         """
         self._accept(action, self._all)
         numbers = np.empty(self._count)
-        simulation.step(*self._constants, numbers, self._all, True, 0, 1)
+        step = simulation.step if self._plant is None else plant_step.step
+        step(*self._constants, numbers, self._all, True, 0, 1)
         q, qdot, pose, nominal, remaining = self._parts
         seen = {
             "q": numbers[q],
@@ -222,14 +223,19 @@ class Simulator:
             "nominal": numbers[nominal].reshape(self._nominal_shape),
             "remaining": numbers[remaining],
         }
-        return seen, numbers[-8:-3].tolist(), numbers[-3:].astype(np.int64) if self._limited else NONE_HELD.copy()
+        for key, where, shape in self._more:
+            seen[key] = numbers[where].reshape(shape)
+        held = numbers[self._held].astype(np.int64) if self._limited else NONE_HELD.copy()
+        return seen, numbers[self._told].tolist(), held
 
     def nominal_positions(self, row: int) -> FloatArray:
         """The nominal positions of a row's episode in [m], one a step. Shape (steps + 1, 3)."""
-        point = self._point[: self.scenario.steps + 1]
-        episode = self._episodes[row if self.scenario.random else 0]
-        positions: FloatArray = self.scenario.frames(episode, int(point[-1]) + 1)[point, -3:]
-        return positions
+        return self._nominal.positions(row)
+
+    @property
+    def true_q(self) -> FloatArray:
+        """Where the arms are, in [rad] or [m], whatever is measured. Shape (N, n)."""
+        return self._state.q
 
     @property
     def steps_made(self) -> npt.NDArray[np.int64]:
@@ -256,47 +262,24 @@ class Simulator:
             raise InvalidInputError(
                 f"action{where}: expected finite numbers, got {accepted[bad].tolist()}. The state is as it was."
             )
-        if self._in_blocks:
-            self._look_ahead(np.flatnonzero(active), steps=1)
+        if self._nominal.in_blocks:
+            rows = np.flatnonzero(active)
+            self._nominal.look_ahead(self._state.frames, rows, self._state.step[rows] + 1)
 
     def _run(self, active: npt.NDArray[np.bool_], numbers: FloatArray, *, moving: bool) -> None:
+        step = simulation.step if self._plant is None else plant_step.step
         in_chunks(
-            lambda start, stop: simulation.step(*self._constants, numbers, active, moving, start, stop),
+            lambda start, stop: step(*self._constants, numbers, active, moving, start, stop),
             self.rows,
             GRAIN_STEP,
         )
 
     def _taken_apart(self) -> tuple[Any, ...]:
-        """What never changes, in parts as :func:`simulation.step` takes it."""
+        """What never changes, in parts as :func:`simulation.step` takes it, or in tuples for that of a plant."""
+        plant, cost = self._plant, self.scenario.cost.parameters
+        if plant is not None:
+            return self._shared, cost, plant.drives, plant.sensors, plant.arms, self._state, plant.state
         return *self.scenario.arm.chain, *self._shared, *self.scenario.cost.parameters, *self._state
 
     def _outcome(self, numbers: FloatArray) -> Outcome:
-        return outcome(numbers, *self._shape)
-
-    def _look_ahead(self, rows: npt.NDArray[np.int64], *, steps: int) -> None:
-        """Sees to it that the rows know all nominal frames that they need after some steps more."""
-        last = self._last_block[self._state.step[rows] + steps]
-        while len(late := rows[last >= self._blocks_known[rows]]):
-            self._know(late)
-
-    def _know(self, rows: npt.NDArray[np.int64]) -> None:
-        """Computes the next block of nominal frames of some rows."""
-        frames, block = self._state.frames, self._block
-        first = self._blocks_known[rows] * block
-        ahead = np.arange(block)
-
-        def work(start: int, stop: int) -> None:
-            for part in range(start, stop, PIECE):
-                some = slice(part, min(part + PIECE, stop))
-                points = first[some, None] + ahead
-                episodes = [self._episodes[row] for row in rows[some].tolist()]
-                computed = self.scenario.frames_of(episodes, points)
-                frames[rows[some, None], points % frames.shape[1]] = computed
-
-        in_chunks(work, len(rows), GRAIN_RESET)
-        self._blocks_known[rows] += 1
-
-
-def observation(out: Outcome) -> Observation:
-    """What a policy sees of the only arm: the observation of the environment, without a row axis."""
-    return {key: getattr(out, key)[0] for key in ("q", "qdot", "pose", "nominal", "remaining")}
+        return outcome(numbers, *self._shape, late=self.scenario.plant.late)

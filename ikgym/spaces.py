@@ -6,6 +6,7 @@ import numpy as np
 from gymnasium import spaces
 
 from ikgym.preview import Preview, offsets
+from ikgym.random_numbers import CUT
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray
 
@@ -18,33 +19,45 @@ def action_space(scenario: Scenario) -> spaces.Box:
     return spaces.Box(-1.0, 1.0, (scenario.joints,), np.float32)
 
 
-def observation_space(scenario: Scenario, preview: Preview) -> spaces.Dict:
+def observation_space(scenario: Scenario, preview: Preview, commands: int = 0) -> spaces.Dict:
     """What a policy sees; the bounds follow from start, limits, number of steps and reach.
 
     Args:
         scenario: The tracking problem.
         preview: As in the environment.
+        commands: h, how many of the last commands are shown.
 
     Returns:
-        Boxes of float64: q (n,), qdot (n,), pose (m,), nominal (p, m), remaining (1,).
+        Boxes of float64: q (n,), qdot (n,), pose (m,), nominal (p, m), remaining (1,); where sensors are slow or late
+        q_age (1,) and pose_age (1,); where commands are shown commands (h, n).
 
     Raises:
         InvalidInputError: The preview is not valid.
     """
     ahead = offsets(preview)
     q = SLACK * scenario.joint_bound()
-    pose = _coordinate_bound(scenario, scenario.arm.reach(q))
+    plant, noise = scenario.plant, CUT * np.asarray(scenario.plant.q_noise)
+    pose = _coordinate_bound(scenario, plant.reach(scenario.arm, q) + CUT * plant.pose_noise)
     if scenario.initial_pose is not None:
         pose = np.maximum(pose, np.abs(scenario.initial_pose))
     times = scenario.times(int(scenario.points(preview)[-1]) + 1)
     nominal = _coordinate_bound(scenario, scenario.trajectory.reach(times, scenario.model))
+    lower, upper = np.maximum(-q, scenario.arm.lower) - noise, np.minimum(q, scenario.arm.upper) + noise
+    ages, past = {}, {}
+    if plant.late:
+        ages["q_age"] = spaces.Box(0.0, float(max(plant.q_delay, 1)), (1,), np.float64)
+        ages["pose_age"] = spaces.Box(0.0, float(scenario.steps), (1,), np.float64)
+    if commands:
+        past["commands"] = _box(np.tile(scenario.largest_qdot, (commands, 1)))
     return spaces.Dict(
         {
-            "q": spaces.Box(np.maximum(-q, scenario.arm.lower), np.minimum(q, scenario.arm.upper), dtype=np.float64),
+            "q": spaces.Box(lower, upper, dtype=np.float64),
             "qdot": _box(scenario.largest_qdot),
             "pose": _box(pose),
             "nominal": _box(np.tile(nominal, (len(ahead), 1))),
             "remaining": spaces.Box(0.0, float(scenario.steps), (1,), np.float64),
+            **ages,
+            **past,
         }
     )
 

@@ -80,6 +80,11 @@ def per_joint(name: str, value: npt.ArrayLike, n: int, *, at_most: float = math.
     return frozen_array(name, array, (n,)) if array.ndim else read_only(np.full(n, array))
 
 
+def as_given(given: npt.ArrayLike, array: FloatArray) -> float | tuple[float, ...]:
+    """What :func:`per_joint` has checked, as plain numbers: one where one was given for all, or else all of them."""
+    return float(array[0]) if np.ndim(given) == 0 else tuple(array.tolist())
+
+
 def number(
     name: str,
     value: float,

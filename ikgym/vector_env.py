@@ -17,10 +17,10 @@ from gymnasium.vector.utils import batch_space
 from ikgym import scenarios
 from ikgym.env import OPTIONS, RedundantIKEnv, checked_options, limited
 from ikgym.exceptions import InvalidInputError, ResetNeededError, UnknownNameError
+from ikgym.outcome import Observation, Outcome, observation
 from ikgym.rows import ArmRow
 from ikgym.scenarios import Preview, Scenario
-from ikgym.simulation import Outcome
-from ikgym.simulator import Observation, Simulator
+from ikgym.simulator import Simulator
 from ikgym.spaces import action_space, observation_space
 from ikgym.validation import FloatArray, shortened, whole_number
 
@@ -45,7 +45,8 @@ class RedundantIKVectorEnv(gym.vector.VectorEnv[Observation, npt.NDArray[np.floa
     row can be stepped or drawn alone.
 
     `reset(options={"reset_mask": mask})` resets just the rows where the mask, a Boolean array of shape (N,), is
-    true; `options={"q": …}` starts elsewhere, with shape (n,) for all rows or (N, n).
+    true; `options={"q": …}` starts elsewhere, with shape (n,) for all rows or (N, n); `options={"arm_seed": …}` keeps
+    arms, one number for all rows or one a row.
 
     Args:
         num_envs: N.
@@ -54,11 +55,12 @@ class RedundantIKVectorEnv(gym.vector.VectorEnv[Observation, npt.NDArray[np.floa
         autoreset_mode: A mode of Gymnasium, or its value such as ``"SameStep"``.
         render_mode: None; there is nothing to see of N arms. Make a single environment to render.
         max_episode_steps: None or the scenario's own number of steps, as Gymnasium hands it over from a `spec`.
+        commands: h, how many of the last commands are shown.
 
     Raises:
         UnknownNameError: There is no such scenario or autoreset mode.
-        InvalidInputError: N, the scenario, the preview, the render mode or the number of steps is not valid, or
-            there is no memory for N arms.
+        InvalidInputError: N, the scenario, the preview, the render mode, the number of steps or of commands is not
+            valid, or there is no memory for N arms.
     """
 
     def __init__(
@@ -69,6 +71,7 @@ class RedundantIKVectorEnv(gym.vector.VectorEnv[Observation, npt.NDArray[np.floa
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
         render_mode: str | None = None,
         max_episode_steps: int | None = None,
+        commands: int = 0,
     ) -> None:
         if render_mode is not None:
             raise InvalidInputError(
@@ -83,8 +86,9 @@ class RedundantIKVectorEnv(gym.vector.VectorEnv[Observation, npt.NDArray[np.floa
                 f"max_episode_steps: expected the {self.scenario.steps} of the scenario, got {max_episode_steps!r}."
             )
         self._spec: EnvSpec | None = None
-        self._simulator = Simulator(self.scenario, self.num_envs, preview)  # first: it says whether there is memory
-        self.single_observation_space = observation_space(self.scenario, preview)
+        # First: it says whether there is memory.
+        self._simulator = Simulator(self.scenario, self.num_envs, preview, commands=commands)
+        self.single_observation_space = observation_space(self.scenario, preview, commands)
         self.single_action_space = action_space(self.scenario)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
@@ -122,14 +126,16 @@ class RedundantIKVectorEnv(gym.vector.VectorEnv[Observation, npt.NDArray[np.floa
 
         Args:
             seed: Row i is seeded with seed + i, or with the i-th of a sequence; None goes on with its generator.
-            options: ``{"reset_mask": …}`` of shape (N,), ``{"q": …}`` of shape (n,) or (N, n).
+            options: ``{"reset_mask": …}`` of shape (N,), ``{"q": …}`` of shape (n,) or (N, n), ``{"arm_seed": …}`` one
+                number for all rows, or one a row, None where the arm is drawn with the episode.
 
         Returns:
             The observations of all rows, and empty infos.
 
         Raises:
             UnknownNameError: There is no such option.
-            InvalidInputError: Seeds, mask or starts are of a wrong shape or type. Nothing has changed then.
+            InvalidInputError: Seeds, mask, starts or seeds of arms are of a wrong shape or type. Nothing has changed
+                then.
             ResetNeededError: The mask leaves out a row that has never been reset.
         """
         options = checked_options(options, (*OPTIONS, "reset_mask"))
@@ -138,11 +144,12 @@ class RedundantIKVectorEnv(gym.vector.VectorEnv[Observation, npt.NDArray[np.floa
         if not (self._begun | mask).all():
             raise ResetNeededError("The first reset must begin episodes in all rows: leave out the reset_mask.")
         starts = self._simulator.checked_starts(options.get("q"))
+        arm_seeds = self._simulator.checked_arm_seeds(options.get("arm_seed"))
         for row in np.flatnonzero(mask).tolist():
             if seeds[row] is not None:
                 self._generators[row], self._seeds[row] = seeding.np_random(seeds[row])
-        self._begin(mask, starts)
-        return _observation(self._simulator.observe()), {}
+        self._begin(mask, starts, arm_seeds)
+        return observation(self._simulator.observe()), {}
 
     def step(self, actions: npt.NDArray[np.float32]) -> tuple[Observation, FloatArray, Flags, Flags, Infos]:
         """One step of all arms; the class of the single environment says what comes back.
@@ -167,7 +174,7 @@ class RedundantIKVectorEnv(gym.vector.VectorEnv[Observation, npt.NDArray[np.floa
         same_step = self.autoreset_mode is AutoresetMode.SAME_STEP and bool(ended.any())
         infos: Infos = {}
         if same_step:
-            infos["final_obs"], infos["_final_obs"] = _rows_of(_observation(out), ended), ended.copy()
+            infos["final_obs"], infos["_final_obs"] = _rows_of(observation(out), ended), ended.copy()
             infos["final_info"], infos["_final_info"] = self._infos(out, ended), ended.copy()
         infos.update(self._infos(out, stepping & ~ended if same_step else stepping))
         beginning = ended if same_step else waiting
@@ -175,7 +182,7 @@ class RedundantIKVectorEnv(gym.vector.VectorEnv[Observation, npt.NDArray[np.floa
             self._begin(beginning)
             self._simulator.observe(beginning, out)
         self._ended = np.zeros_like(ended) if same_step else ended
-        return _observation(out), rewards, np.zeros_like(ended), ended.copy(), infos
+        return observation(out), rewards, np.zeros_like(ended), ended.copy(), infos
 
     def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
         """What `get_attr` finds in the rows; what can be called is called, as `SyncVectorEnv` does.
@@ -219,8 +226,11 @@ class RedundantIKVectorEnv(gym.vector.VectorEnv[Observation, npt.NDArray[np.floa
     def _rows(self) -> list[ArmRow]:
         return [ArmRow(self, index) for index in range(self.num_envs)]
 
-    def _begin(self, mask: Flags, starts: FloatArray | None = None) -> None:
-        self._simulator.reset(mask, {row: self.generator(row)[0] for row in np.flatnonzero(mask).tolist()}, starts)
+    def _begin(
+        self, mask: Flags, starts: FloatArray | None = None, arm_seeds: Sequence[int | None] | None = None
+    ) -> None:
+        generators = {row: self.generator(row)[0] for row in np.flatnonzero(mask).tolist()}
+        self._simulator.reset(mask, generators, starts, arm_seeds)
         self._begun |= mask
         self._ended = self._ended & ~mask
 
@@ -279,16 +289,6 @@ def _autoreset_mode(mode: str | AutoresetMode) -> AutoresetMode:
         return AutoresetMode(mode)
     except ValueError:
         raise UnknownNameError("autoreset mode", mode, [m.value for m in AutoresetMode]) from None
-
-
-def _observation(out: Outcome) -> Observation:
-    return {
-        "q": out.q,
-        "qdot": out.qdot,
-        "pose": out.pose,
-        "nominal": out.nominal,
-        "remaining": out.remaining,
-    }
 
 
 def _rows_of(observation: Observation, rows: Flags) -> npt.NDArray[np.object_]:

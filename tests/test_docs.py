@@ -233,6 +233,11 @@ def test_changelog_counts_right():
     assert f"## {ikgym.__version__}" in text or "## Unreleased" in text
 
 
+def test_the_citation_is_of_this_version():
+    said = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert re.search(r"^version: (.*)$", said, re.MULTILINE)[1] == ikgym.__version__
+
+
 def snippets_of(page):
     return re.findall(r"```python\n(.*?)```", (PAGES / page).read_text(encoding="utf-8"), re.DOTALL)
 

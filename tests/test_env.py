@@ -17,6 +17,7 @@ from stable_baselines3.common.env_checker import check_env as sb3_check_env
 import ikgym
 from ikgym.env import OBSERVED, REPORTED
 from ikgym.exceptions import InvalidInputError, ResetNeededError, UnknownNameError
+from ikgym.outcome import SOMETIMES
 from tests.comparison import identical
 from tests.every_scenario import every_scenario
 
@@ -43,13 +44,16 @@ def test_stable_baselines3_check_env(scenario):
 @pytest.mark.parametrize("scenario", every_scenario())
 def test_docstring_tables_are_the_spaces(scenario):
     env = make(scenario, preview=(1, 4, 9)).unwrapped
+    late = env.scenario.replace(plant=env.scenario.plant.replace(q_delay=1))
+    shown = ikgym.RedundantIKEnv(late, preview=(1, 4, 9), commands=2).observation_space
     rows = dict(re.findall(r"\| `(\w+)` \| \(([^)]*)\) \|", ikgym.RedundantIKEnv.__doc__))
-    sizes = {"n": env.scenario.joints, "m": env.scenario.task.size, "p": 3, "1": 1}
+    sizes = {"n": env.scenario.joints, "m": env.scenario.task.size, "p": 3, "h": 2, "1": 1}
     shapes = {key: tuple(sizes[s.strip()] for s in text.split(",") if s.strip()) for key, text in rows.items()}
-    assert shapes == {key: space.shape for key, space in env.observation_space.spaces.items()}
-    assert tuple(shapes) == OBSERVED
-    assert all(space.dtype == np.float64 for space in env.observation_space.spaces.values())
-    assert all(np.isfinite([space.low, space.high]).all() for space in env.observation_space.values())
+    assert shapes == {key: space.shape for key, space in shown.spaces.items()}
+    assert tuple(shapes) == (*OBSERVED, *SOMETIMES)
+    assert set(env.observation_space) == {*OBSERVED, *(SOMETIMES[:2] if env.scenario.plant.late else ())}
+    assert all(space.dtype == np.float64 for space in shown.values())
+    assert all(np.isfinite([space.low, space.high]).all() for space in shown.values())
     action = re.search(r"`(Box\([^`]*)` \| 1 \|", ikgym.RedundantIKEnv.__doc__)[1]
     assert str(env.action_space) == action.replace("n", str(sizes["n"])).replace(f"i{sizes['n']}", "in")
     env.reset(seed=0)
@@ -224,7 +228,7 @@ def test_global_random_state_is_left_alone():
 
 ROLLOUT = """
 import hashlib, gymnasium as gym, numpy as np, ikgym
-scenario = ikgym.scenarios.get("varga7-random").replace(disturbance=ikgym.Disturbance(noise=0.2), steps=50)
+scenario = ikgym.scenarios.get("varga7-random").replace(plant=ikgym.Plant(noise=0.2), steps=50)
 env = gym.make("RedundantIK-v0", scenario=scenario)
 digest = hashlib.sha256()
 observation, _ = env.reset(seed=9)
@@ -297,7 +301,7 @@ def test_nominal_goes_on_past_the_end():
 def test_bounds_are_true_at_the_worst(name):
     """Full speed from the farthest start, for the whole episode."""
     scenario = ikgym.scenarios.get(name)
-    scenario = scenario.replace(steps=min(scenario.steps, 400), disturbance=ikgym.Disturbance(bias=0.5, noise=0.5))
+    scenario = scenario.replace(steps=min(scenario.steps, 400), plant=ikgym.Plant(bias=0.5, noise=0.5))
     env = make(scenario, disable_env_checker=True)
     bound = scenario.start_bound()
     for sign in (-1, 1):

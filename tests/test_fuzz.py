@@ -27,7 +27,7 @@ fuzz = settings(
 )
 
 STEPS = 12
-SCENARIO = ikgym.scenarios.get("varga7-random").replace(steps=STEPS, disturbance=ikgym.Disturbance(noise=0.1))
+SCENARIO = ikgym.scenarios.get("varga7-random").replace(steps=STEPS, plant=ikgym.Plant(noise=0.1))
 GOOD = np.full(7, 0.3, dtype=np.float32)
 
 DTYPES = st.sampled_from(

@@ -56,6 +56,20 @@ def test_a_changed_callee_or_constant_is_noticed(tmp_path):
     assert answer(tmp_path, OURS, scale=3.0, shift=10.0) == 13.0
 
 
+def test_a_change_of_how_kernels_are_compiled_is_noticed(tmp_path, monkeypatch):
+    """Every stamp has the file that compiles them in it."""
+
+    def stamp():
+        monkeypatch.setattr(jit, "_stamps", {})
+        return jit._stamp("ikgym.rotations")
+
+    before, changed = stamp(), tmp_path / "jit.py"
+    assert stamp() == before
+    changed.write_text(pathlib.Path(jit.__file__).read_text() + "# changed\n")
+    monkeypatch.setattr(jit, "__file__", str(changed))
+    assert stamp() != before
+
+
 def test_numba_alone_would_not_notice(tmp_path):
     """If this fails numba has learned it, and the stamp can go."""
     assert answer(tmp_path, NUMBAS, scale=2.0, shift=0.0) == 2.0

@@ -20,6 +20,8 @@ from tests.comparison import identical
 from tests.limited import ACCELERATION, LOWER, UPPER, VELOCITY, limited
 
 DT, SCALE = 0.1, 4.0
+# The bandwidth at which a drive makes up for half of what is missing in a step, in [Hz].
+HALF = math.log(2.0) / (2.0 * math.pi * DT)
 
 
 def one_joint(lower=-1.0, upper=1.0, velocity=2.0, acceleration=np.inf, **changes):
@@ -75,11 +77,30 @@ def played(scenario, commands):
             [1.0, 2.0, 0.0],
             [(0.1, 1.0, (0, 0, 0)), (0.3, 2.0, (0, 0, 0)), (0.3, 0.0, (1, 0, 1))],
         ),
-        # The disturbance comes after velocity and acceleration, before the stop; it is no part of what is observed.
+        # The bias comes after velocity and acceleration, before the stop; it is no part of what is observed.
         (
-            one_joint(upper=0.5, disturbance=ikgym.Disturbance(bias=0.5)),
+            one_joint(upper=0.5, plant=ikgym.Plant(bias=0.5)),
             [4.0, 2.0, -0.5, 0.0],
             [(0.25, 2.0, (0, 1, 0)), (0.5, 2.0, (0, 0, 0)), (0.5, -0.5, (0, 0, 0)), (0.5, 0.0, (1, 0, 0))],
+        ),
+        # All in their order: delay, velocity, acceleration, a lag that makes up for half in a step, bias, stop.
+        (
+            one_joint(upper=0.5, acceleration=10.0, plant=ikgym.Plant(command_delay=1, bandwidth=HALF, bias=0.5)),
+            [4.0, 4.0, 0.0, 0.0, 0.0, 0.0],
+            [
+                (0.05, 0.0, (0, 0, 0)),
+                (0.15, 1.0, (0, 1, 1)),
+                (0.325, 2.0, (0, 1, 0)),
+                (0.4875, 1.0, (0, 0, 1)),
+                (0.5, 0.125, (1, 0, 0)),
+                (0.5, 0.0, (1, 0, 0)),
+            ],
+        ),
+        # Backlash comes after all of them but the stop: half of it is lost at the start, all of it at a turn.
+        (
+            one_joint(plant=ikgym.Plant(backlash=0.1, bias=0.5)),
+            [1.0, 1.0, -1.5, -1.5],
+            [(0.1, 1.0, (0, 0, 0)), (0.25, 1.0, (0, 0, 0)), (0.25, -1.5, (0, 0, 0)), (0.15, -1.5, (0, 0, 0))],
         ),
     ],
 )  # fmt: skip
@@ -130,7 +151,7 @@ ACTIONS = hnp.arrays(np.float32, (25, 7), elements=st.floats(-1.5, 1.5, width=32
 @settings(max_examples=40, derandomize=True, deadline=None)
 @given(ACTIONS, st.integers(0, 10_000), st.sampled_from([0.0, 3.0]))
 def test_no_action_leaves_the_limits(actions, seed, noise):
-    scenario = limited(steps=len(actions), disturbance=ikgym.Disturbance(noise=noise))
+    scenario = limited(steps=len(actions), plant=ikgym.Plant(noise=noise))
     env = ikgym.RedundantIKEnv(scenario)
     last, _ = env.reset(seed=seed)
     for action in actions:

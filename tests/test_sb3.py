@@ -26,7 +26,7 @@ PREVIEW = (1, 3, 8)
 
 
 def noisy(name="varga7-random", steps=7):
-    return ikgym.scenarios.get(name).replace(steps=steps, disturbance=ikgym.Disturbance(bias=0.1, noise=0.3))
+    return ikgym.scenarios.get(name).replace(steps=steps, plant=ikgym.Plant(bias=0.1, noise=0.3))
 
 
 def single(scenario):

@@ -11,8 +11,9 @@ import pytest
 import ikgym
 from ikgym import compilation, parallel, scenarios
 from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.plant import Plant
 from ikgym.random_numbers import uniform as _uniform
-from ikgym.scenarios import Disturbance, Scenario, catalogue
+from ikgym.scenarios import Scenario, catalogue
 from tests.every_scenario import every_scenario
 
 
@@ -138,7 +139,7 @@ def test_seed_ranges_are_disjoint_and_documented():
             {"trajectory": ikgym.trajectories.Helix([0, 0, 0], 1, 1, 1), "start": np.zeros(7)},
             "task 'skew' needs orientations",
         ),
-        ({"disturbance": Disturbance(bias=(1.0, 2.0))}, r"bias: expected shape \(7,\)"),
+        ({"plant": Plant(bias=(1.0, 2.0))}, r"bias: expected shape \(7,\)"),
     ],
 )
 def test_bad_scenarios(change, message):
@@ -147,15 +148,15 @@ def test_bad_scenarios(change, message):
 
 
 def test_a_bias_may_be_negative_but_no_matrix():
-    assert Disturbance(bias=-0.5).bias == -0.5
+    assert Plant(bias=-0.5).bias == -0.5
     with pytest.raises(InvalidInputError, match="bias: expected a number or one a joint"):
-        Disturbance(bias=[[1.0]])
+        Plant(bias=[[1.0]])
 
 
 @pytest.mark.parametrize("noise", [-0.1, np.nan, (0.1, -0.1)])
 def test_bad_disturbances(noise):
     with pytest.raises(InvalidInputError, match="noise: expected"):
-        Disturbance(noise=noise)
+        Plant(noise=noise)
 
 
 def test_register_your_own(monkeypatch):
@@ -172,7 +173,7 @@ def test_register_your_own(monkeypatch):
 
 
 def test_disturbance_moves_the_arm_as_said():
-    scenario = scenarios.get("varga7-fast").replace(steps=400, disturbance=Disturbance(bias=0.5, noise=0.25))
+    scenario = scenarios.get("varga7-fast").replace(steps=400, plant=Plant(bias=0.5, noise=0.25))
     env = ikgym.RedundantIKEnv(scenario)
     before = env.reset(seed=3)[0]["q"]
     drifts = []

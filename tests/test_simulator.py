@@ -52,7 +52,7 @@ def random_scenarios():
         "held": drawn.replace(iterations_per_point=(3, 2)),
         "bent": drawn.replace(trajectory=Bent(drawn.trajectory.amplitude)),
         "wanderer": wanderer,
-        "noisy": drawn.replace(disturbance=ikgym.Disturbance(noise=0.3)),
+        "noisy": drawn.replace(plant=ikgym.Plant(noise=0.3)),
     }
 
 

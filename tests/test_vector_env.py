@@ -15,7 +15,7 @@ from tests.every_scenario import every_scenario
 from tests.limited import limited
 
 N = 3
-NOISE = ikgym.Disturbance(bias=0.1, noise=0.3)
+NOISE = ikgym.Plant(bias=0.1, noise=0.3)
 
 
 def pair(scenario, mode, preview=2, num_envs=N):
@@ -36,7 +36,7 @@ def short(name, steps=7):
 
 
 def noisy(name, steps=7):
-    return short(name, steps).replace(disturbance=NOISE)
+    return short(name, steps).replace(plant=NOISE)
 
 
 @pytest.mark.parametrize("mode", list(AutoresetMode), ids=lambda mode: mode.value)
@@ -44,8 +44,8 @@ def noisy(name, steps=7):
     "scenario",
     every_scenario(short)
     + [
-        pytest.param(one, id=f"{one.name}-{one.steps}-{one.disturbance.noise}")
-        for one in (noisy("varga7-random"), short("khan8-q1", 130), limited(), limited(disturbance=NOISE))
+        pytest.param(one, id=f"{one.name}-{one.steps}-{one.plant.noise}")
+        for one in (noisy("varga7-random"), short("khan8-q1", 130), limited(), limited(plant=NOISE))
     ],
 )
 def test_bit_identical_to_sync_over_whole_episodes(scenario, mode):

@@ -7,8 +7,6 @@ import sys
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, Literal
 
-import numpy as np
-
 from baselines.evaluation import metrics
 from baselines.evaluation import test_sets as known_sets
 from baselines.evaluation.entrants import ALL, AnyPolicy, Entrant, Wrap, entrants
@@ -173,7 +171,7 @@ def _drawn(
     """Scenarios, the seeds that they are played with, and that they belong to no set."""
     for scenario in scenarios:
         # One that is the same at every reset would only be played N times over.
-        yield scenario, drawn if scenario.random or np.any(scenario.disturbance.noise) else (0,), None
+        yield scenario, drawn if scenario.random or scenario.plant.random else (0,), None
 
 
 def _scenarios(given: str | Scenario | Iterable[str | Scenario], steps: int | None) -> list[Scenario]:

@@ -12,11 +12,11 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.episode import play
-from baselines.policy import Batch, Memory, Operations, Report
+from baselines.policy import Memory, Operations, Report
 from ikgym.exceptions import InvalidInputError
+from ikgym.outcome import Observation, observation
 from ikgym.scenarios import Preview, Scenario
 from ikgym.simulation import Outcome
-from ikgym.simulator import Observation, observation
 from ikgym.validation import FloatArray
 
 # Steps between two words to the progress bar.
@@ -36,6 +36,10 @@ class Player(Protocol):
     @property
     def preview(self) -> Preview:
         """Steps ahead that it asks for, or which ones."""
+
+    @property
+    def commands(self) -> int:
+        """How many of the last commands it asks for."""
 
     def predict(self, observation: Any, state: Any = None) -> tuple[npt.NDArray[Any], Any]:
         """Actions, and the state for the next call, which is never None."""
@@ -58,9 +62,9 @@ class Episode:
     """All that happened in an episode; row k is what came of the k-th step, counted from 0.
 
     Args:
-        q: Joint coordinates after the step, in [rad] or [m]. Shape (steps, n).
+        q: Joint coordinates after the step, in [rad] or [m], whatever was measured. Shape (steps, n).
         qdot: Joint velocities applied, in [rad/s] or [m/s]. Shape (steps, n).
-        pose: Task coordinates after the step. Shape (steps, m).
+        pose: Task coordinates after the step, whatever was measured. Shape (steps, m).
         tracking_cost: Φ^X, 0 where the step does not count. Shape (steps,).
         velocity_cost: Φ^U, 0 where the step does not count. Shape (steps,).
         position_error: In [m]. Shape (steps,).
@@ -212,9 +216,9 @@ def _play(
     collecting = gc.isenabled()
     gc.disable()
     try:
-        for k, out in enumerate(play(scenario, seeds, act, preview=shown, single=alone)):
+        for k, out in enumerate(play(scenario, seeds, act, preview=shown, single=alone, commands=policy.commands)):
             report = policy.report(state)
-            q[:, k], qdot[:, k], pose[:, k] = out.q, out.qdot, out.pose
+            q[:, k], qdot[:, k], pose[:, k] = out.true_q, out.qdot, out.true_pose
             tracking[:, k], velocity[:, k] = out.tracking_cost, out.velocity_cost
             position[:, k], orientation[:, k] = out.position_error, out.orientation_error
             at_limit[:, k] = out.at_limit
@@ -253,4 +257,4 @@ def _play(
 
 def _seen(out: Outcome, alone: bool) -> Observation:
     """What the policy sees: of the only arm, or with an axis of arms."""
-    return observation(out) if alone else {name: getattr(out, name) for name in Batch._fields}
+    return observation(out, 0 if alone else None)

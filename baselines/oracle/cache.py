@@ -53,7 +53,7 @@ def solve(
 
     Raises:
         UnknownNameError: There is no such scenario.
-        InvalidInputError: The seed is no whole number of at least 0, or the scenario has a disturbance.
+        InvalidInputError: The seed is no whole number of at least 0, or the scenario's plant is not ideal.
     """
     scenario = scenario if isinstance(scenario, Scenario) else scenarios.get(scenario)
     seed, how = whole_number("seed", seed, at_least=0), how or Search()

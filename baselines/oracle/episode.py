@@ -51,15 +51,14 @@ class EpisodeProblem:
         """The episode that a reset with the seed begins.
 
         Raises:
-            InvalidInputError: The seed is no whole number of at least 0, or the scenario has a disturbance, or both
-                limits of acceleration and points that are held.
+            InvalidInputError: The seed is no whole number of at least 0, or the scenario's plant is not ideal, or it
+                has both limits of acceleration and points that are held.
         """
         whole_number("seed", seed, at_least=0)
-        disturbance = scenario.disturbance
-        if np.any(disturbance.noise) or np.any(disturbance.bias):
+        if not scenario.plant.ideal:
             raise InvalidInputError(
-                "The best cost of an episode is that of a joint path, which knows of no disturbance; scenario "
-                f"{scenario.name!r}: expected noise=0 and bias=0, got {disturbance}."
+                "The best cost of an episode is that of a joint path of the arm in the data sheet; scenario "
+                f"{scenario.name!r}: expected an ideal plant, got {scenario.plant}."
             )
         limited = bool(np.isfinite(scenario.arm.acceleration_limit).any())
         if limited and not scenario.counted()[1:].all():
@@ -167,7 +166,7 @@ class EpisodeProblem:
         played = play(self.scenario, [self.seed], lambda _: next(actions), preview=1, single=True)
         q, costs = np.empty_like(qdot), np.empty(len(qdot))
         for k, out in enumerate(played):
-            q[k], costs[k] = out.q[0], out.tracking_cost[0] + out.velocity_cost[0]
+            q[k], costs[k] = out.true_q[0], out.tracking_cost[0] + out.velocity_cost[0]
         return q, float(added_up(costs))
 
 
@@ -180,4 +179,4 @@ def path_of(policy: SolverPolicy, scenario: Scenario, seed: int) -> FloatArray:
         action, state = policy.predict({name: getattr(out, name) for name in Batch._fields}, state)
         return action
 
-    return np.stack([out.q[0] for out in play(scenario, [seed], act, preview=policy.preview)])
+    return np.stack([out.true_q[0] for out in play(scenario, [seed], act, preview=policy.preview)])

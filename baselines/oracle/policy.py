@@ -34,7 +34,7 @@ class Oracle(PrivilegedPath):
         scenario: What is tracked.
 
     Raises:
-        InvalidInputError: The scenario is random and there is no seed, it has random noise, or a number is out of
+        InvalidInputError: The scenario is random and there is no seed, its plant is random, or a number is out of
             range.
     """
 
@@ -50,9 +50,9 @@ class Oracle(PrivilegedPath):
             object.__setattr__(self, "seed", whole_number("seed", self.seed, at_least=0))
         elif self.scenario.random:
             raise InvalidInputError(f"Scenario {self.scenario.name!r} is random: a seed says which episode is meant.")
-        if np.any(self.scenario.disturbance.noise):
+        if self.scenario.plant.random:
             raise InvalidInputError(
-                f"{self.name} has to know all that happens; scenario {self.scenario.name!r} has a random disturbance."
+                f"{self.name} has to know all that happens; scenario {self.scenario.name!r} has a random plant."
             )
         for name in ("starts", "generations"):
             object.__setattr__(self, name, whole_number(name, getattr(self, name), at_least=0))

@@ -56,7 +56,7 @@ def search(
         paths: Joint coordinates after each step by name, further starts. Shapes (steps, n).
 
     Raises:
-        InvalidInputError: The seed is no whole number of at least 0, or the scenario has a disturbance.
+        InvalidInputError: The seed is no whole number of at least 0, or the scenario's plant is not ideal.
     """
     episode = EpisodeProblem.of(scenario, seed)
     done = tick or (lambda share: None)

@@ -95,6 +95,11 @@ class SolverPolicy(Frozen, abc.ABC):
         """How many steps ahead the policy must be shown, or a tuple of which ones."""
         return 1
 
+    @property
+    def commands(self) -> int:
+        """How many of its last commands the policy must be shown."""
+        return 0
+
     def memory(self, rows: int) -> Memory:
         """The memory at the start of an episode, preferably a NamedTuple: :meth:`solve` is handed one of its type.
 

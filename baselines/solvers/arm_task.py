@@ -103,7 +103,19 @@ def pose_arrays(n, m):
 @kernel
 def task_shift(kind, gain, pose, target, present, error, shift):
     """Δx = (X^N(k+1) - X^N(k)) + gain (X^N(k) - x(k)) of one row; ``error`` (e,) receives the last difference."""
-    task_kernels.error(kind, target, present, shift)
+    motion_and_error(kind, pose, target, present, shift, error)
+    add_feedback(gain, error, shift)
+
+
+@inlined
+def motion_and_error(kind, pose, target, present, motion, error):
+    """The differences X^N(k+1) - X^N(k) and X^N(k) - x(k) of one row, both of shape (e,)."""
+    task_kernels.error(kind, target, present, motion)
     task_kernels.error(kind, present, pose, error)
+
+
+@inlined
+def add_feedback(gain, error, shift):
+    """Adds a share of the error to a task shift of one row, both of shape (e,)."""
     for i in range(error.shape[0]):
         shift[i] += gain * error[i]

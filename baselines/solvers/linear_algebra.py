@@ -108,30 +108,53 @@ def pseudoinverse_rows(jacobian, shift, tolerance, full_rank, out, deficient):
     columns, left = np.empty((n, e)), np.empty((e, e))
     squares = np.empty(e)
     for row in range(jacobian.shape[0]):
-        # Jᵀ = (V Σ) Uᵀ: the columns become V Σ, the rotations U.
         for a in range(e):
             for k in range(n):
                 columns[k, a] = jacobian[row, a, k]
-        orthogonal_columns(columns, left)
-        largest = 0.0
-        for a in range(e):
-            squares[a] = 0.0
-            for k in range(n):
-                squares[a] += columns[k, a] * columns[k, a]
-            largest = max(largest, squares[a])
-        rank = 0
-        out[row] = 0.0
-        for a in range(e):
-            if squares[a] <= tolerance * tolerance * largest or squares[a] == 0.0:
-                continue
-            rank += 1
-            amount = 0.0
-            for b in range(e):
-                amount += left[b, a] * shift[row, b]
-            amount /= squares[a]
-            for k in range(n):
-                out[row, k] += amount * columns[k, a]
+        singular_values(columns, left, squares)
+        smallest = tolerance * tolerance * squares.max()
+        rank = inverted(columns, left, squares, 0.0, smallest, shift[row], out[row])
         deficient[row] = rank < full_rank
+
+
+@kernel
+def singular_values(columns, left, squares):
+    """Jᵀ = (V Σ) Uᵀ: ``columns`` (n, e) becomes V Σ, ``left`` (e, e) receives U and ``squares`` (e,) Σ²."""
+    orthogonal_columns(columns, left)
+    for a in range(squares.shape[0]):
+        squares[a] = 0.0
+        for k in range(columns.shape[0]):
+            squares[a] += columns[k, a] * columns[k, a]
+
+
+@kernel
+def inverted(columns, left, squares, damping, smallest, shift, out):
+    """Δq = V Σ (Σ² + λ)⁻¹ Uᵀ Δx, which is J⁺ Δx without damping, see :func:`singular_values`.
+
+    Args:
+        columns: V Σ. Shape (n, e).
+        left: U. Shape (e, e).
+        squares: Σ². Shape (e,).
+        damping: λ, at least 0.
+        smallest: Σ² up to here are left out; at least 0.
+        shift: Δx. Shape (e,).
+        out: Receives Δq. Shape (n,).
+
+    Returns:
+        How many singular values are left.
+    """
+    out[:], rank = 0.0, 0
+    for a in range(squares.shape[0]):
+        if squares[a] <= smallest:
+            continue
+        rank += 1
+        amount = 0.0
+        for b in range(squares.shape[0]):
+            amount += left[b, a] * shift[b]
+        amount /= squares[a] + damping
+        for k in range(out.shape[0]):
+            out[k] += amount * columns[k, a]
+    return rank
 
 
 @kernel

@@ -57,7 +57,7 @@ def reference_policy(scenario: Scenario) -> SolverPolicy:
 
 def validation_seeds(scenario: Scenario, episodes: int) -> tuple[int, ...]:
     """The first seeds of the validation split; one where the scenario is deterministic."""
-    random = scenario.random or bool(np.any(scenario.disturbance.noise))
+    random = scenario.random or scenario.plant.random
     return scenarios.seeds("validation", episodes if random else 1)
 
 

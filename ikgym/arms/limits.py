@@ -42,6 +42,12 @@ def farthest(arm: Arm) -> FloatArray:
     return np.maximum(np.abs(arm.lower), np.abs(arm.upper))
 
 
+def middle(arm: Arm) -> tuple[npt.NDArray[np.bool_], FloatArray]:
+    """Which joints have limits of both sides, and the middle between those in [rad] or [m], else 0. Shapes (n,)."""
+    both = np.isfinite(arm.lower) & np.isfinite(arm.upper)
+    return both, 0.5 * (np.where(both, arm.lower, 0.0) + np.where(both, arm.upper, 0.0))
+
+
 def limit_rows(arm: Arm, fastest: FloatArray, dt: float) -> FloatArray:
     """The limits of an arm as kernels take them, see :mod:`ikgym.limit_kernels`.
 

@@ -16,7 +16,6 @@ from ikgym.exceptions import InvalidInputError
 from ikgym.preview import Preview
 from ikgym.registry import Registry
 from ikgym.scenarios import catalogue, elsewhere, families
-from ikgym.scenarios.disturbance import Disturbance
 from ikgym.scenarios.importing import imported
 from ikgym.scenarios.reachability import Gap, gaps
 from ikgym.scenarios.reading import load
@@ -25,7 +24,6 @@ from ikgym.validation import known_name, shortened, whole_number
 
 __all__ = [
     "SPLITS",
-    "Disturbance",
     "Gap",
     "Preview",
     "Scenario",

@@ -8,11 +8,11 @@ from typing import Any
 from ikgym.arms import Arm
 from ikgym.cost import TrackingCost
 from ikgym.exceptions import InvalidInputError
-from ikgym.scenarios.disturbance import Disturbance
+from ikgym.plant import Plant
 from ikgym.tasks import Task
 from ikgym.trajectories import Trajectory
 
-KINDS = {"arm": Arm, "task": Task, "trajectory": Trajectory, "cost": TrackingCost, "disturbance": Disturbance}
+KINDS = {"arm": Arm, "task": Task, "trajectory": Trajectory, "cost": TrackingCost, "plant": Plant}
 
 
 def check_kinds(fields: Mapping[str, Any]) -> None:
@@ -29,6 +29,19 @@ def check_kinds(fields: Mapping[str, Any]) -> None:
     for field in ("name", "source"):
         if not isinstance(fields[field], str):
             raise InvalidInputError(f"{field} of a scenario: expected a text, got {fields[field]!r}.")
+
+
+def refuse_disturbance(given: Mapping[str, Any]) -> None:
+    """Says where the drives' bias and noise belong to those who give them by the name that they once had.
+
+    Raises:
+        InvalidInputError: There is a `disturbance`.
+    """
+    if "disturbance" in given:
+        raise InvalidInputError(
+            "disturbance: expected its bias and noise in plant, as in plant=ikgym.Plant(bias=…, noise=…) or a table "
+            f"[plant], got {given['disturbance']!r}."
+        )
 
 
 def check_model(name: str, model: object, joints: int) -> None:

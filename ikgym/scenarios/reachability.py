@@ -7,8 +7,8 @@ import dataclasses
 import numpy as np
 
 from ikgym.exceptions import InvalidInputError
-from ikgym.rotations import geodesic_angle
 from ikgym.scenarios.scenario import Scenario
+from ikgym.scenarios.starts import distances
 from ikgym.validation import whole_number
 
 
@@ -53,13 +53,11 @@ def gaps(scenario: Scenario, poses: int = 200) -> tuple[Gap, ...]:
     frames = scenario.frames_of([scenario.trajectory], scenario.points()[steps][None])[0]
     rotations = frames[:, :9].reshape(-1, 3, 3) if scenario.task.error_size >= 6 else None
     q, converged = scenario.arm.inverse(rotations, frames[:, -3:])
-    there_rotation, there = scenario.arm.forward(q)
     return tuple(
         Gap(
             float(steps[i] * scenario.dt),
             tuple(frames[i, -3:].tolist()),
-            float(np.linalg.norm(there[i] - frames[i, -3:])),
-            float(geodesic_angle(rotations[i], there_rotation[i])) if rotations is not None else 0.0,
+            *distances(scenario.arm, q[i], None if rotations is None else rotations[i], frames[i, -3:]),
         )
         for i in np.flatnonzero(~converged)
     )

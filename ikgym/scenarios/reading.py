@@ -13,7 +13,8 @@ from ikgym import arms, tasks
 from ikgym.arms import Arm
 from ikgym.cost import TrackingCost
 from ikgym.exceptions import InvalidInputError, UnknownNameError
-from ikgym.scenarios.disturbance import Disturbance
+from ikgym.plant import Plant
+from ikgym.scenarios.parts import refuse_disturbance
 from ikgym.scenarios.scenario import Scenario
 from ikgym.scenarios.toml import checked, only_numbers
 from ikgym.trajectories import KINDS, Trajectory, from_csv
@@ -56,6 +57,7 @@ def load(file: str | os.PathLike[str]) -> Scenario:
     """
     with _named(f"{file}: ", f" in {file}"):
         table = _table(file)
+        refuse_disturbance(table)
         known_names("key", table, [f.name for f in dataclasses.fields(Scenario)])
         folder = pathlib.Path(file).parent
         parts: Table = {
@@ -66,9 +68,10 @@ def load(file: str | os.PathLike[str]) -> Scenario:
         }
         if "model" in table:
             parts["model"] = _arm(table, "model", folder)
-        for key, kind in {"cost": TrackingCost, "disturbance": Disturbance}.items():
-            if key in table:
-                parts[key] = _made(key, kind, checked(table, key, dict, "a table"))
+        if "cost" in table:
+            parts["cost"] = _made("cost", TrackingCost, checked(table, "cost", dict, "a table"))
+        if "plant" in table:
+            parts["plant"] = _plant(checked(table, "plant", dict, "a table"), folder)
         if "source" in table:
             parts["source"] = checked(table, "source", str, "a text")
         numbers = {key: value for key, value in table.items() if key not in parts}
@@ -111,6 +114,15 @@ def _arm(table: Table, key: str, folder: pathlib.Path) -> Arm:
         found = arms.from_urdf(path, **texts, **{name: arm[name] for name in URDF_NUMBERS if name in arm})
         added = {name: arm[name] for name in ADDED_NUMBERS if name in arm}
         return found.replace(**added) if added else found
+
+
+def _plant(table: Table, folder: pathlib.Path) -> Plant:
+    if "arms" not in table:
+        return _made("plant", Plant, table)  # type: ignore[no-any-return]
+    with _named("[plant] ", " of [plant]"):
+        given = checked(table, "arms", list, "a list of arms")
+        found = [_arm({"arms": one}, "arms", folder) for one in given]
+    return _made("plant", Plant, {**table, "arms": found}, made=("arms",))  # type: ignore[no-any-return]
 
 
 def _trajectory(table: Table, folder: pathlib.Path) -> Trajectory:

@@ -17,13 +17,14 @@ from ikgym.arms.limits import farthest, velocity_scale
 from ikgym.arms.posture import within_limits
 from ikgym.cost import TrackingCost
 from ikgym.exceptions import InvalidInputError
+from ikgym.plant import DrawnPlant, Plant
+from ikgym.plant.draw import Draws, arm_key, episode_key
 from ikgym.preview import Preview, furthest
 from ikgym.scenarios import bounds, parts, starts, writing
-from ikgym.scenarios.disturbance import Disturbance
 from ikgym.simulation import nominal_rows
 from ikgym.tasks import Task
 from ikgym.trajectories import Trajectory, first_joints_of, frames_of
-from ikgym.validation import LARGEST, SMALLEST, FloatArray, Frozen, frozen_array, number, per_joint
+from ikgym.validation import LARGEST, SMALLEST, FloatArray, Frozen, frozen_array, number
 
 # A start given by `options={"q": …}` may be this far from home in each joint, in [rad] or [m].
 START_RANGE = 2.0 * np.pi
@@ -35,7 +36,7 @@ class Scenario(Frozen):
 
     Args:
         name: What the scenario is called.
-        arm: The arm that moves, within its limits, and is measured.
+        arm: The arm that moves, within its limits, and is measured, as far as the plant does not change it.
         task: The task coordinates.
         trajectory: The nominal trajectory. X^N(k) is where it stands at the time k Δt.
         velocity_limit: The joint velocity that an action of 1 means, in [rad/s] or [m/s]. A number, or one a
@@ -51,7 +52,7 @@ class Scenario(Frozen):
         initial_pose: What is measured at the start, where it is not the arm's pose. Shape (m,).
         iterations_per_point: Steps for which the nominal point 1, 2, … is held; the last number goes on. Errors
             and costs of a point count at its last step.
-        disturbance: What the drives add to the joint velocity.
+        plant: What of the arm that moves, its drives and its sensors differs from the data sheet; nothing by default.
         source: Where the scenario comes from.
 
     Lengths, angles and velocities are at most 1e12; Δt and velocity limits are at least 1e-12, too.
@@ -72,8 +73,13 @@ class Scenario(Frozen):
     start: FloatArray | None = None
     initial_pose: FloatArray | None = None
     iterations_per_point: int | tuple[int, ...] = (1,)
-    disturbance: Disturbance = dataclasses.field(default_factory=Disturbance)
+    plant: Plant = dataclasses.field(default_factory=Plant)
     source: str = ""
+
+    def __new__(cls, *_: Any, **fields: Any) -> Self:
+        """Refuses a field that there once was, before Python does so with less to say."""
+        parts.refuse_disturbance(fields)
+        return super().__new__(cls)
 
     def __post_init__(self) -> None:
         def settle(field: str, value: object) -> None:
@@ -99,8 +105,7 @@ class Scenario(Frozen):
             raise InvalidInputError("iterations_per_point: expected at least one number, got none.")
         held = tuple(bounds.step_count("iterations_per_point", number_of_steps, n) for number_of_steps in held)
         settle("iterations_per_point", held)
-        for name in ("bias", "noise"):
-            per_joint(name, getattr(self.disturbance, name), n)
+        self.plant.check(self.arm, self.steps)
         if not self.starts_nominally or (self.arm.limited and not self.random):
             self.first_q(self.trajectory)  # says whether the arm can be there
         bounds.check_cost(self.name, self.largest_step_cost(), self.steps)
@@ -115,6 +120,7 @@ class Scenario(Frozen):
             UnknownNameError: There is no field of that name.
             InvalidInputError: A new value is refused.
         """
+        parts.refuse_disturbance(changes)
         if "arm" in changes and self.model is self.arm:
             changes.setdefault("model", None)
         arm = changes.get("arm")
@@ -197,6 +203,28 @@ class Scenario(Frozen):
         if self.random and seed is None:
             raise InvalidInputError(f"Scenario {self.name!r} is random: a seed says which episode is meant.")
         return self.trajectory.sample(seeding.np_random(seed)[0]) if self.random else self.trajectory
+
+    def drawn_plant(self, seed: int | None = None, arm_seed: int | None = None) -> DrawnPlant:
+        """The plant of an episode: privileged information, for the simulation and for references alone.
+
+        Args:
+            seed: The reset seed; needed where the plant draws its arm or its drives.
+            arm_seed: The seed of an arm that is kept, as the reset option has it.
+
+        Raises:
+            InvalidInputError: The plant draws something and there is no seed, or nothing that a seed of the arm keeps.
+        """
+        key = 0
+        if arm_seed is not None:
+            self.plant.check_draws_arm(self.name)
+            key = arm_key(arm_seed)
+        elif self.plant.draws_arm:
+            if seed is None:
+                raise InvalidInputError(f"Scenario {self.name!r} draws its plant: a seed says which episode is meant.")
+            generator = seeding.np_random(seed)[0]
+            self.trajectory.samples([generator])  # drawn before it
+            key = episode_key(self.plant, generator)
+        return Draws(self.plant, self.arm).one(key)
 
     def points(self, preview: Preview = 0) -> npt.NDArray[np.int64]:
         """Which nominal point is the target after k steps.
@@ -301,8 +329,8 @@ class Scenario(Frozen):
 
     def joint_bound(self) -> FloatArray:
         """Absolute joint coordinates that no arm exceeds in an episode, in [rad] or [m]. Shape (n,)."""
-        disturbance: FloatArray = np.abs(self.disturbance.bias) + np.abs(self.disturbance.noise)
-        travelled = self.start_bound() + self.steps * self.dt * (self.velocity_limit + disturbance)
+        added: FloatArray = np.abs(self.plant.bias) + np.abs(self.plant.noise)
+        travelled = self.start_bound() + self.steps * self.dt * (self.velocity_limit + added)
         return np.minimum(travelled, farthest(self.arm))
 
     @property
@@ -317,7 +345,7 @@ class Scenario(Frozen):
             nominal = LARGEST  # a distribution that does not say how far its paths go
         else:
             nominal = trajectory.reach(self.times(int(self.points()[-1]) + 1), self.model)
-        distance = self.arm.reach(self.joint_bound()) + nominal
+        distance = self.plant.reach(self.arm, self.joint_bound()) + nominal
         return bounds.largest_step_cost(self.task, self.cost, self.velocity_limit, distance)
 
     def start_bound(self) -> FloatArray:

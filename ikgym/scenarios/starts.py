@@ -28,15 +28,18 @@ def found(name: str, arm: Arm, frame: FloatArray) -> FloatArray:
     rotation, position = (frame[:9].reshape(3, 3) if len(frame) == 12 else None), frame[-3:]
     q, converged = arm.inverse(rotation, position)
     if not converged:
+        distance, angle = distances(arm, q, rotation, position)
+        gap = f"{distance:.3g} m" if rotation is None else f"{distance:.3g} m and {angle:.3g} rad"
         raise InvalidInputError(
             f"Scenario {name!r}: expected a trajectory that begins where arm {arm.name!r} can be, got one that begins "
-            f"{_gap(arm, q, rotation, position)} from the nearest joint coordinates that were found within its limits; "
-            "give a start, or another trajectory."
+            f"{gap} from the nearest joint coordinates that were found within its limits; give a start, or another "
+            "trajectory."
         )
     return read_only(q)
 
 
-def _gap(arm: Arm, q: FloatArray, rotation: FloatArray | None, position: FloatArray) -> str:
-    there = arm.forward(q)
-    distance = f"{np.linalg.norm(there[1] - position):.3g} m"
-    return distance if rotation is None else f"{distance} and {geodesic_angle(rotation, there[0]):.3g} rad"
+def distances(arm: Arm, q: FloatArray, rotation: FloatArray | None, position: FloatArray) -> tuple[float, float]:
+    """How far an arm is from a pose: in [m], and in [rad], which is 0 where no orientation is asked for."""
+    there_rotation, there = arm.forward(q)
+    angle = 0.0 if rotation is None else float(geodesic_angle(rotation, there_rotation))
+    return float(np.linalg.norm(there - position)), angle

@@ -78,6 +78,8 @@ def _text(value: Any) -> str:
         return repr(int(value))
     if isinstance(value, (float, np.floating)):
         return repr(float(value))
+    if isinstance(value, Mapping):  # one of a list of tables
+        return "{ " + ", ".join(f"{key} = {_text(part)}" for key, part in value.items() if part is not None) + " }"
     if isinstance(value, np.ndarray) and value.ndim > 1:
         return "[\n" + "".join(f"  {_text(row)},\n" for row in value) + "]"
     if isinstance(value, Iterable):

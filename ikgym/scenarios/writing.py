@@ -15,7 +15,7 @@ from ikgym.arms import Arm
 from ikgym.arms.arm import numbered_joints
 from ikgym.cost import TrackingCost
 from ikgym.exceptions import IkgymError, InvalidInputError
-from ikgym.scenarios.disturbance import Disturbance
+from ikgym.plant import Plant
 from ikgym.scenarios.toml import document
 from ikgym.tasks import Task
 from ikgym.trajectories import KINDS, Trajectory
@@ -59,7 +59,7 @@ def _values(scenario: Mapping[str, Any], folder: pathlib.Path) -> dict[str, Any]
         "task": _task(scenario["task"]),
         "trajectory": _trajectory(scenario["trajectory"]),
         "cost": _parameters("cost", scenario["cost"], TrackingCost),
-        "disturbance": _parameters("disturbance", scenario["disturbance"], Disturbance),
+        "plant": _plant(scenario["plant"], folder),
     }
 
 
@@ -98,6 +98,15 @@ def _urdf(arm: Arm, folder: pathlib.Path) -> dict[str, Any] | None:
         "tool": tool,
         "tool_rotation": tool_rotation,
     }
+
+
+def _plant(plant: Plant, folder: pathlib.Path) -> dict[str, Any] | None:
+    """What is switched on; None where nothing is."""
+    _parameters("plant", plant, Plant)  # says whether a file can hold it
+    given = plant.switched_on()
+    if plant.arms:
+        given["arms"] = [_arm(one, folder) for one in plant.arms]
+    return given or None
 
 
 def _task(task: Task) -> str:

@@ -26,6 +26,9 @@ from baselines.status import Status
 from baselines.wrapper import Wrapper
 from ikgym import parallel
 from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.plant import DrawnPlant
+from ikgym.plant.draw import Draws
+from ikgym.plant.rows import PlantRows
 from ikgym.simulator import Simulator
 from tests.baselines.making import made, usual
 from tests.comparison import identical
@@ -61,8 +64,8 @@ def policy_for(name, on):
             assert on != usual(name)
             return None
         # An agent suits the arms of its size, and only skew coordinates have an ambiguity to resolve.
-        folded = name != "full_orientation" or scenario(on).task.name == "skew"
-        if folded and not (issubclass(get(name), ShippedAgent) or (name, on) in UNSUITED):
+        suits = name != "full_orientation" or scenario(on).task.name == "skew"
+        if suits and not (issubclass(get(name), ShippedAgent) or (name, on) in UNSUITED):
             assert name in HANDED_THE_PATH
             assert scenario(on).nominal_joint_path(1) is None
         return None
@@ -251,6 +254,7 @@ def test_a_policy_is_told_the_model_and_never_the_arm(name, on):
     assert policy.problem.model is scenario(on).model
     for thing in reachable(policy):
         assert not isinstance(thing, (ikgym.Scenario, gym.Env, gym.vector.VectorEnv, Simulator))
+        assert not isinstance(thing, (ikgym.Plant, DrawnPlant, Draws, PlantRows))
         assert not isinstance(thing, ikgym.Arm) or thing is scenario(on).model
 
 
@@ -285,6 +289,41 @@ def test_the_exact_arm_changes_no_answer(name, on):
         answers = [p.predict(observation, state) for p, state in zip(policies, states, strict=True)]
         assert identical(*answers)
         states = [state for _, state in answers]
+
+
+@pytest.mark.parametrize("name", [name for name in baselines.names() if not get(name).reference])
+def test_the_true_plant_changes_no_answer(monkeypatch, name):
+    """Same observations, same model, another plant behind the scenario, which nobody may ask for what it draws."""
+    on = "iiwa14-random" if policy_for(name, "iiwa14-random") else usual(name)
+    ideal = scenario(on)
+    plant = ikgym.Plant(zero=0.1, link=0.1, axis=0.1, payload=0.1, bandwidth=(1, 9), command_delay=3, q_noise=0.1)
+
+    def asked(*_):
+        raise AssertionError(f"{name} asks for the true plant")
+
+    monkeypatch.setattr(ikgym.Scenario, "drawn_plant", asked)
+    monkeypatch.setattr(Draws, "__init__", asked)
+    policies = [baselines.make(name, which) for which in (ideal, ideal.replace(plant=plant))]
+    states = [None, None]
+    for observation in observations(on, policies[0].preview, 2):
+        answers = [p.predict(observation, state) for p, state in zip(policies, states, strict=True)]
+        assert identical(*answers)
+        states = [state for _, state in answers]
+
+
+def test_the_guard_of_the_plant_would_notice():
+    """A policy that keeps what it is told of the true plant is found out."""
+    told = scenario("iiwa14-random").replace(plant=ikgym.Plant(zero=0.1))
+
+    @dataclasses.dataclass(frozen=True, eq=False)
+    class Told(get("dls")):
+        plant: object = dataclasses.field(kw_only=True, default=None)
+
+        @classmethod
+        def for_scenario(cls, scenario, **parameters):
+            return cls(Problem.of(scenario), plant=scenario.drawn_plant(1), **parameters)
+
+    assert any(isinstance(thing, DrawnPlant) for thing in reachable(Told.for_scenario(told)))
 
 
 @pytest.mark.parametrize("name", baselines.names())

@@ -11,7 +11,7 @@ import pytest
 import ikgym
 from ikgym import memory, scenarios
 from ikgym.exceptions import InvalidInputError
-from ikgym.scenarios import Disturbance
+from ikgym.plant import Plant
 from ikgym.trajectories import Helix, RandomSinusoid, Sinusoid, StraightLine
 from tests.every_scenario import every_scenario
 
@@ -43,7 +43,7 @@ FRAME = [*np.eye(3).ravel(), 1.0, 0.0, 0.0]
         (lambda: Helix([0, 0, 0], 1e308, 1, 1), "radius: expected a finite number above 0 and of at most"),
         (lambda: Helix([0, 0, 0], 1, 1, -1e308), r"climb: expected a finite number from -1e\+12 to 1e\+12"),
         (lambda: StraightLine(FRAME, FRAME, 1.0, 5e-324), "blend: expected a finite number from 1e-12"),
-        (lambda: Disturbance(bias=1e308), "bias: expected absolute values of at most"),
+        (lambda: Plant(bias=1e308), "bias: expected absolute values of at most"),
         (lambda: ikgym.Arm("far", [[0, 0, 1e308]], [[0, 0, 1]]), "offsets of arm 'far': expected absolute values"),
     ],
 )

@@ -19,7 +19,8 @@ from baselines.fingerprints import fingerprint
 from ikgym import scenarios
 from ikgym.arms import Arm, from_urdf
 from ikgym.exceptions import InvalidInputError, UnknownNameError
-from ikgym.scenarios import Disturbance, Scenario, load
+from ikgym.plant import Plant
+from ikgym.scenarios import Scenario, load
 from ikgym.scenarios.toml import document
 from ikgym.trajectories import (
     KINDS,
@@ -69,7 +70,26 @@ WHOLE = Scenario(
     start=np.array([0.1, 0.2, 0.3]),
     initial_pose=np.array([1e12, 5e-324, -0.0]),
     iterations_per_point=(3, 2),
-    disturbance=Disturbance(bias=(0.1, -0.2, 0.3), noise=0.01),
+    plant=Plant(
+        zero=(1e-3, 0.0, 1 / 3),
+        link=1e-4,
+        axis=2e-4,
+        payload=(-1e-3, 0.0, 1e-3),
+        payload_step=9,
+        arms=(OWN, OWN.replace(name="other", offsets=OWN.offsets + 1 / 3)),
+        bandwidth=(10.0, 1e3 / 3),
+        command_delay=(2, 5),
+        backlash=1e-4,
+        bias=(0.1, -0.2, 0.3),
+        noise=0.01,
+        q_noise=1e-5,
+        pose_noise=1e-3,
+        pose_rotation_noise=2e-3,
+        q_delay=1,
+        pose_delay=4,
+        pose_every=3,
+        pose_missing=0.1,
+    ),
     source="a test",
 )
 
@@ -81,6 +101,8 @@ def fields(part):
             type(part).__name__,
             {f.name: fields(getattr(part, f.name)) for f in dataclasses.fields(part) if f.init},
         ]
+    if isinstance(part, tuple) and part and isinstance(part[0], ikgym.Arm):
+        return [fields(one) for one in part]
     return "None" if part is None else part
 
 
@@ -354,7 +376,11 @@ UNKNOWN = {
         r"no key of \[trajectory\] in .*mine\.toml 'frequencies'\. Did you mean 'frequency'\?",
     ),
     "cost": ({"cost": "{delta = 1}"}, r"no key of \[cost\] in .*mine\.toml 'delta'\. Did you mean 'delta_x'"),
-    "disturbance": ({"disturbance": "{nois = 1}"}, r"of \[disturbance\] .*'nois'\. Did you mean 'noise'"),
+    "plant": ({"plant": "{nois = 1}"}, r"of \[plant\] .*'nois'\. Did you mean 'noise'"),
+    "arms of a plant": (
+        {"plant": "{arms = ['panda-22']}"},
+        r"no arm of \[plant\] in .*'panda-22'\. Did you mean 'panda-2'",
+    ),
     "arm's": ({"arm": "{name = 'a', axis = []}"}, r"no key of \[arm\] in .*'axis'\. Did you mean 'axes'"),
     "urdf's": ({"model": "{urdf = 'a.urdf', tipp = 'c'}"}, r"no key of \[model\] in .*'tipp'\. Did you mean 'tip'"),
 }
@@ -436,7 +462,10 @@ BAD = {
         r"\[trajectory\] scale: expected a range \(low, high\), got \(1, 0\)",
     ),
     "delta_x": ({"cost": "{delta_x = 0}"}, r"\[cost\] delta_x: expected a finite number from 1e-12 to 1e\+12, got 0"),
-    "noise": ({"disturbance": "{noise = -1}"}, r"\[disturbance\] noise: expected a number of at least 0"),
+    "noise": ({"plant": "{noise = -1}"}, r"\[plant\] noise: expected a number of at least 0"),
+    "what is now a plant": ({"disturbance": "{noise = 1}"}, r"disturbance: expected its bias and noise in plant"),
+    "one arm of a plant": ({"plant": "{arms = 'panda-2'}"}, r"\[plant\] arms: expected a list of arms, got 'panda-2'"),
+    "offsets of a plant's arm": ({"plant": "{arms = [{name = 'a'}]}"}, r"\[plant\] \[arms\] offsets: expected numbers"),
     "no offsets": ({"arm": "{name = 'varga7'}"}, r"\[arm\] offsets: expected numbers, got no such key"),
     "axes": (
         {"arm": "{name = 'a', offsets = [[0, 0, 1]], axes = [[0, 0, 2]]}"},

@@ -6,7 +6,7 @@ import dataclasses
 import math
 import time
 from collections.abc import Callable, Mapping
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 import gymnasium as gym
 import numpy as np
@@ -55,6 +55,7 @@ class ForeignPolicy:
     name: str
     model: Predictor
     preview: Preview
+    commands: ClassVar[int] = 0
     wrap: Wrap | None = None
     parameters: Mapping[str, Any] = dataclasses.field(default_factory=dict)
 

@@ -159,6 +159,16 @@ def solver(spec: str, settings: Mapping[str, Any] = MappingProxyType({}), *, tim
     return Entry(spec, seeded, SEEDS, dict(settings), timed=timed, share=share)
 
 
+def first_seed(entry: Entry, share: float = 1.0) -> Entry:
+    """The same with one seed alone, on the first part of the episodes.
+
+    Args:
+        entry: Who plays.
+        share: Of the episodes that it plays.
+    """
+    return dataclasses.replace(entry, variants=entry.variants[:1], seeds=(), share=share)
+
+
 def _costly(policy: RecedingHorizon) -> bool:
     """Whether a receding horizon takes so long that it plays fewer episodes."""
     to_the_optimum = policy.iterations is None and policy.horizon > COSTLY_HORIZON

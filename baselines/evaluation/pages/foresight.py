@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import pathlib
 from collections.abc import Iterable, Iterator, Sequence
 
@@ -14,7 +13,7 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 from baselines.evaluation.pages import sets
 from baselines.evaluation.pages.claims import Comparison
 from baselines.evaluation.pages.cost_time import extent
-from baselines.evaluation.pages.entries import FORESIGHT, Entry, solver
+from baselines.evaluation.pages.entries import FORESIGHT, Entry, first_seed, solver
 from baselines.evaluation.pages.markdown import IMAGES, between, conditions, lost, share, table, time
 from baselines.evaluation.pages.measurement import Measurement, Section
 from baselines.evaluation.pages.statistics import geometric_interval
@@ -51,7 +50,7 @@ geometric mean; **95 %** its interval over the episodes, by the bootstrap that t
 def entries(steps: Iterable[int] = STEPS) -> tuple[Entry, ...]:
     """All horizons with and without knowing the end, each with one seed of the policy."""
     entered = (solver(spec(ahead, knows=knows), timed=1) for knows in KNOWING for ahead in steps)
-    return tuple(dataclasses.replace(one, variants=one.variants[:1], seeds=(), share=SHARE) for one in entered)
+    return tuple(first_seed(one, SHARE) for one in entered)
 
 
 def spec(ahead: int, *, knows: bool) -> str:

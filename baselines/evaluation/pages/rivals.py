@@ -8,7 +8,7 @@ import importlib.metadata
 from collections.abc import Iterator, Sequence
 
 from baselines import registry
-from baselines.evaluation.pages.entries import FORESIGHT, Entry, solver
+from baselines.evaluation.pages.entries import FORESIGHT, Entry, first_seed, solver
 from baselines.evaluation.pages.markdown import conditions, table, time
 from baselines.evaluation.pages.measurement import Line, Measurement, Section
 from baselines.evaluation.report import NOTHING, number
@@ -86,8 +86,7 @@ def _installed() -> Iterator[str]:
 
 def _entry(name: str) -> Entry:
     """One seed is enough: paths are the same at every reset."""
-    one = solver(name, timed=1)
-    return dataclasses.replace(one, variants=one.variants[:1], seeds=(), share=1.0)
+    return first_seed(solver(name, timed=1))
 
 
 def _short(measurement: Measurement) -> list[str]:

@@ -15,13 +15,13 @@ from baselines.policy import Batch, Memory, Problem, Solution, SolverPolicy
 from baselines.solvers.arm_size import jacobian_bound
 from baselines.solvers.arm_task import arm_task_of, plain_arm_task, pose_arrays
 from baselines.solvers.fixed_point.rotations import adaptive_deform, plane, turn
-from baselines.solvers.linear_algebra import dot
+from baselines.solvers.linear_algebra import dot, transposed_product
 from baselines.status import Status
 from ikgym import arms, task_kernels, tasks
 from ikgym.exceptions import InvalidInputError
 from ikgym.jit import kernel
 from ikgym.kinematics import forward_and_jacobian
-from ikgym.validation import FloatArray, known_name, number, per_joint
+from ikgym.validation import FloatArray, as_given, known_name, number, per_joint
 
 #: What 𝒩 turns, with the numbers that the kernel knows.
 COUNTER_ROTATIONS = {"none": 0, "joints": 1, "task": 2}
@@ -162,8 +162,7 @@ class AbstractRotation(SolverPolicy):
         weights = tuple(_checked_weights(name, getattr(self, name), size) for name, size in sizes.items())
         object.__setattr__(self, "_weights", weights)
         for name, array in zip(sizes, weights, strict=True):
-            given = getattr(self, name)
-            object.__setattr__(self, name, float(given) if np.ndim(given) == 0 else tuple(array.tolist()))
+            object.__setattr__(self, name, as_given(getattr(self, name), array))
         known_name("counter_rotation", self.counter_rotation, COUNTER_ROTATIONS)
         known_name("deformation", self.deformation, DEFORMATIONS)
         known_name("jacobian", self.jacobian, JACOBIANS)
@@ -241,9 +240,9 @@ def turn_rows(arm_task, rule, observed, memory, goal, status):
         angles[row, 0] = 0.0
         if method.counter_rotation == _TASK:
             angles[row, 0] = _turn_back(missing, direction[row], e_a, e_b, seen, wanted)
-        _transposed(jacobian, missing, h)
-        _transposed(jacobian, seen, actual)
-        _transposed(jacobian, wanted, desired)
+        transposed_product(jacobian, missing, h)
+        transposed_product(jacobian, seen, actual)
+        transposed_product(jacobian, wanted, desired)
         if method.counter_rotation == _JOINTS:
             angles[row, 0] = _turn_back(h, direction[row], e_a, e_b, actual, desired)
         direction[row] = missing if method.counter_rotation == _TASK else h
@@ -282,15 +281,6 @@ def _turn_back(now, last, e_a, e_b, actual, desired):
     turn(e_a, e_b, angle, actual)
     turn(e_a, e_b, angle, desired)
     return angle
-
-
-@kernel
-def _transposed(jacobian, vector, out):
-    """J̃ᵀ times a vector: shapes (m, n), (m,), (n,)."""
-    out[:] = 0.0
-    for i in range(vector.shape[0]):
-        for j in range(out.shape[0]):
-            out[j] += jacobian[i, j] * vector[i]
 
 
 def _share(problem: Problem) -> float:

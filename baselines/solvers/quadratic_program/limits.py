@@ -11,7 +11,7 @@ from ikgym.validation import FloatArray
 ROUNDING = 2.0**-24
 
 
-def limit_rows(problem: Problem) -> FloatArray:
+def limits_with_braking(problem: Problem) -> FloatArray:
     """The limits of a problem as :func:`velocity_box` takes them.
 
     Braking reckons with a little less than the acceleration limit: a joint that brakes as hard as it can cannot make up

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from baselines.solvers.linear_algebra import transposed_product
 from baselines.solvers.quadratic_program.velocity_box import braking_speed
 from ikgym.jit import kernel
 from ikgym.linear_algebra import cholesky, cholesky_solve
@@ -61,12 +62,10 @@ def feedback_share(hessian, jacobian, error, change):
         error: What would be taken back. Shape (e,).
         change: The changes of the velocity in one step to reckon with, in [rad/s] or [m/s]. Shape (n,).
     """
-    e, n = jacobian.shape
+    n = jacobian.shape[1]
     factor, qdot, share = np.empty((n, n)), np.empty(n), 1.0
+    transposed_product(jacobian, error, qdot)
     for i in range(n):
-        qdot[i] = 0.0
-        for a in range(e):
-            qdot[i] += jacobian[a, i] * error[a]
         for j in range(i + 1):
             factor[i, j] = hessian[i, j]
     if not cholesky(factor):

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from baselines.policy_kernels import REFUSED, all_finite, cut_rows
 from baselines.solvers.arm_task import period_of
 from baselines.solvers.quadratic_program.box_minimum import box_minimum
-from baselines.solvers.quadratic_program.limits import limit_rows
+from baselines.solvers.quadratic_program.limits import limits_with_braking
 from baselines.solvers.quadratic_program.program import (
     SCALING_WEIGHT,
     curvature,
@@ -25,10 +25,11 @@ from baselines.solvers.quadratic_program.program import (
 from baselines.solvers.quadratic_program.velocity_box import velocity_box
 from baselines.solvers.resolved_rate.base import APPLIED, TaskFeedback, asked_apart
 from baselines.status import Status
+from ikgym.arms.limits import middle
 from ikgym.exceptions import InvalidInputError
 from ikgym.jit import kernel
 from ikgym.limit_kernels import CHANGE, FASTEST
-from ikgym.validation import FloatArray, number, per_joint, read_only
+from ikgym.validation import FloatArray, as_given, number, per_joint, read_only
 
 LIMIT, SATURATED = int(Status.ITERATION_LIMIT), int(Status.SATURATED)
 
@@ -106,14 +107,12 @@ class QuadraticProgram(TaskFeedback):
         everywhere = np.full(model.joints, self.secondary_gain)
         if self.posture is not None:
             posture = per_joint("posture", self.posture, model.joints)
-            scalar = np.ndim(self.posture) == 0
-            object.__setattr__(self, "posture", float(posture[0]) if scalar else tuple(posture.tolist()))
+            object.__setattr__(self, "posture", as_given(self.posture, posture))
             return posture, everywhere
         if model.home is not None:
             return model.home, everywhere
-        limited = np.isfinite(model.lower) & np.isfinite(model.upper)
-        middle = 0.5 * (np.where(limited, model.lower, 0.0) + np.where(limited, model.upper, 0.0))
-        return middle, np.where(limited, everywhere, 0.0)
+        limited, posture = middle(model)
+        return posture, np.where(limited, everywhere, 0.0)
 
     @property
     def _brakes(self) -> bool:
@@ -127,7 +126,7 @@ class QuadraticProgram(TaskFeedback):
     def numbers(self) -> tuple[Any, ...]:
         """See :meth:`TaskFeedback.numbers`."""
         share = self.braking_share if self._brakes else 0.0
-        return self.damping, self.lm_damping, share, self.task_scaling, self._pull, limit_rows(self.problem)
+        return self.damping, self.lm_damping, share, self.task_scaling, self._pull, limits_with_braking(self.problem)
 
     def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
         """A factorisation for each active set, which are the iterations, and one for the braking, where used."""

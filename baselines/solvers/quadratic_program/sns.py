@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from baselines.policy_kernels import REFUSED, all_finite, cut_rows
 from baselines.solvers.arm_task import period_of
-from baselines.solvers.linear_algebra import orthogonal_columns
-from baselines.solvers.quadratic_program.limits import limit_rows
+from baselines.solvers.linear_algebra import inverted, singular_values
+from baselines.solvers.quadratic_program.limits import limits_with_braking
 from baselines.solvers.quadratic_program.velocity_box import velocity_box
 from baselines.solvers.resolved_rate.base import APPLIED, TaskFeedback, asked
 from baselines.status import Status
@@ -62,7 +62,7 @@ class SaturationInNullSpace(TaskFeedback):
 
     def numbers(self) -> tuple[Any, ...]:
         """See :meth:`TaskFeedback.numbers`."""
-        return self.damping, limit_rows(self.problem)
+        return self.damping, limits_with_braking(self.problem)
 
     def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
         """A decomposition for each set of saturated joints, which are the iterations."""
@@ -133,8 +133,8 @@ def saturate(jacobian, shift, damping, lower, upper, qdot):
             rest[a] = 0.0
             for j in range(n):
                 rest[a] -= jacobian[a, j] * fixed[j]
-        solve(columns, left, squares, (square, smallest), shift, along)
-        solve(columns, left, squares, (square, smallest), rest, base)
+        inverted(columns, left, squares, square, smallest, shift, along)
+        inverted(columns, left, squares, square, smallest, rest, base)
         base += fixed
         scale, critical = scaling(along, base, lower, upper)
         if scale > best:
@@ -164,38 +164,11 @@ def decompose(jacobian, free, square, columns, left, squares):
     for a in range(e):
         for j in range(n):
             columns[j, a] = jacobian[a, j] if free[j] else 0.0
-    orthogonal_columns(columns, left)
+    singular_values(columns, left, squares)
     rank = 0
     for a in range(e):
-        squares[a] = 0.0
-        for j in range(n):
-            squares[a] += columns[j, a] * columns[j, a]
         rank += squares[a] > square
     return rank
-
-
-@kernel
-def solve(columns, left, squares, added, shift, out):
-    """(J W)⁺ Δx from the decomposition, see :func:`decompose`.
-
-    Args:
-        columns: V Σ. Shape (n, e).
-        left: U. Shape (e, e).
-        squares: Σ². Shape (e,).
-        added: What is added to Σ², and up to where it is left out.
-        shift: Δx. Shape (e,).
-        out: Receives the joint velocities. Shape (n,).
-    """
-    (square, smallest), out[:] = added, 0.0
-    for a in range(squares.shape[0]):
-        if squares[a] <= smallest:
-            continue
-        amount = 0.0
-        for b in range(squares.shape[0]):
-            amount += left[b, a] * shift[b]
-        amount /= squares[a] + square
-        for j in range(out.shape[0]):
-            out[j] += amount * columns[j, a]
 
 
 @kernel

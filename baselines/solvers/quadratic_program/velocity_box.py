@@ -7,7 +7,7 @@ import math
 from ikgym.jit import inlined, kernel
 from ikgym.limit_kernels import CHANGE, FASTEST, LOWER, UPPER
 
-# The row behind those of an arm's limits, see :func:`baselines.solvers.quadratic_program.limits.limit_rows`.
+# The row behind those of an arm's limits, see :func:`baselines.solvers.quadratic_program.limits.limits_with_braking`.
 BRAKING = CHANGE + 1
 
 

@@ -12,7 +12,15 @@ import numpy.typing as npt
 from baselines.policy import Memory
 from baselines.policy.compiled import CompiledPolicy
 from baselines.policy_kernels import answer_parts, as_rows, cut_rows, scale_rows
-from baselines.solvers.arm_task import arm_task_of, joint_limits_of, period_of, plain_arm_task, pose_arrays
+from baselines.solvers.arm_task import (
+    add_feedback,
+    arm_task_of,
+    joint_limits_of,
+    motion_and_error,
+    period_of,
+    plain_arm_task,
+    pose_arrays,
+)
 from baselines.status import Status
 from ikgym import task_kernels
 from ikgym.exceptions import InvalidInputError
@@ -156,8 +164,7 @@ def asked(arm_task, gain, q, pose, nominal, before, known, answer):
     """
     q, jacobian, shift, error, parts = asked_apart(arm_task, q, pose, nominal, before, known, answer)
     for row in range(shift.shape[0]):
-        for i in range(shift.shape[1]):
-            shift[row, i] += gain * error[row, i]
+        add_feedback(gain, error[row], shift[row])
     return q, jacobian, shift, parts
 
 
@@ -174,8 +181,7 @@ def asked_apart(arm_task, q, pose, nominal, before, known, answer):
         forward_and_jacobian(chain, q[row], rotation, position, geometric)
         task_kernels.jacobian(kind, rotation, geometric, jacobian[row])
         present = before[row] if known[row] else pose[row]
-        task_kernels.error(kind, nominal[row, 0], present, motion[row])
-        task_kernels.error(kind, present, pose[row], error[row])
+        motion_and_error(kind, pose[row], nominal[row, 0], present, motion[row], error[row])
         before[row] = nominal[row, 0]
         known[row] = True
     return q, jacobian, motion, error, answer_parts(answer, rows, n)

@@ -16,11 +16,12 @@ from baselines.solvers.resolved_rate.base import APPLIED, answered, asked, say_d
 from baselines.solvers.resolved_rate.dls import damped_rows
 from baselines.solvers.resolved_rate.moore_penrose import MoorePenrose
 from ikgym.arms import Arm
+from ikgym.arms.limits import middle
 from ikgym.exceptions import InvalidInputError
 from ikgym.jit import kernel
 from ikgym.kinematics import forward_and_jacobian
 from ikgym.linear_algebra import cholesky, cholesky_solve
-from ikgym.validation import FloatArray, known_name, number, per_joint, read_only
+from ikgym.validation import FloatArray, as_given, known_name, number, per_joint, read_only
 
 OBJECTIVES = ("posture", "joint_centring", "manipulability")
 
@@ -74,7 +75,7 @@ class NullSpace(MoorePenrose):
     def __post_init__(self) -> None:
         super().__post_init__()
         model = self.problem.model
-        default = "joint_centring" if self.posture is None and _limited(model).any() else "posture"
+        default = "joint_centring" if self.posture is None and middle(model)[0].any() else "posture"
         objective = default if self.objective is None else self.objective
         known_name("objective", objective, OBJECTIVES)
         given = 0.0 if self.posture is None else self.posture
@@ -83,7 +84,7 @@ class NullSpace(MoorePenrose):
         for field, value in {
             "objective": objective,
             "secondary_gain": self.checked_secondary_gain(self.secondary_gain),
-            "posture": float(posture[0]) if np.ndim(given) == 0 else tuple(posture.tolist()),
+            "posture": as_given(given, posture),
             "damping": number("damping", self.damping, at_least=0.0),
             "_target": read_only(target),
             "_joint_gain": read_only(gains),
@@ -128,22 +129,15 @@ class NullSpace(MoorePenrose):
         return 0, 1 + manipulability, 1 + manipulability + damped, 1
 
 
-def _limited(model: Arm) -> npt.NDArray[np.bool_]:
-    """Which joints have limits of both sides. Shape (n,)."""
-    return np.isfinite(model.lower) & np.isfinite(model.upper)
-
-
 def _centre(model: Arm) -> tuple[FloatArray, FloatArray]:
     """The middles between the limits and how strongly to go there, 0 for joints without limits; shapes (n,)."""
-    lower, upper, limited = np.asarray(model.lower), np.asarray(model.upper), _limited(model)
+    limited, target = middle(model)
     if not limited.any():
         raise InvalidInputError(
             f"objective 'joint_centring': expected an arm with joint limits, {model.name!r} has none; "
             "objective 'posture' goes to joint coordinates of your choice."
         )
-    target, gains = np.zeros(model.joints), np.zeros(model.joints)
-    span = upper[limited] - lower[limited]
-    target[limited] = 0.5 * (lower[limited] + upper[limited])
+    gains, span = np.zeros(model.joints), (model.upper - model.lower)[limited]
     gains[limited] = (span.min() / span) ** 2
     return target, gains
 

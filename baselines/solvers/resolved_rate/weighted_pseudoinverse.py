@@ -12,7 +12,7 @@ import numpy.typing as npt
 from baselines.policy import Problem
 from baselines.solvers.resolved_rate.moore_penrose import MoorePenrose
 from ikgym.exceptions import InvalidInputError
-from ikgym.validation import FloatArray, per_joint, read_only
+from ikgym.validation import FloatArray, as_given, per_joint, read_only
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -48,8 +48,7 @@ class WeightedPseudoinverse(MoorePenrose):
         weights = per_joint("weights", given, self.problem.model.joints)
         if not (weights > 0.0).all():
             raise InvalidInputError(f"weights: expected numbers above 0, got {weights.tolist()}.")
-        scalar = np.ndim(given) == 0
-        object.__setattr__(self, "weights", float(weights[0]) if scalar else tuple(weights.tolist()))
+        object.__setattr__(self, "weights", as_given(given, weights))
         object.__setattr__(self, "_root", read_only(np.sqrt(weights)))
 
     def numbers(self) -> tuple[Any, ...]:

@@ -172,9 +172,8 @@ class Rival(SolverPolicy, abc.ABC):
         forward, axis = self.problem.model.forward, self.problem.task.name == "axis"
 
         def target(nominal: FloatArray, q: FloatArray) -> Target:
-            rotation, position = nominal[-3:], nominal[-3:]
             rotation = forward(q)[0]
-            return Target(turned(rotation, nominal[:3]) if axis else rotation, position)
+            return Target(turned(rotation, nominal[:3]) if axis else rotation, nominal[-3:])
 
         return target
 

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from ikgym.arms import Arm
+from ikgym.rotations import quaternion
 from ikgym.validation import FloatArray
 
 BASE, TIP = "base", "tool"
@@ -71,25 +72,6 @@ def roll_pitch_yaw(rotation: FloatArray) -> tuple[float, float, float]:
     if math.hypot(rotation[0, 0], rotation[1, 0]) < 1e-9:  # straight up or down: roll and yaw turn about one axis
         return math.copysign(1.0, -rotation[2, 0]) * math.atan2(rotation[0, 1], rotation[1, 1]), pitch, 0.0
     return math.atan2(rotation[2, 1], rotation[2, 2]), pitch, math.atan2(rotation[1, 0], rotation[0, 0])
-
-
-def quaternion(rotation: FloatArray) -> FloatArray:
-    """The unit quaternion (w, x, y, z) of a rotation: the eigenvector of Bar-Itzhack's matrix (2000).
-
-    Args:
-        rotation: A rotation matrix. Shape (3, 3).
-    """
-    r = rotation
-    matrix = np.array(
-        [
-            [r[0, 0] + r[1, 1] + r[2, 2], r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]],
-            [r[2, 1] - r[1, 2], r[0, 0] - r[1, 1] - r[2, 2], r[0, 1] + r[1, 0], r[0, 2] + r[2, 0]],
-            [r[0, 2] - r[2, 0], r[0, 1] + r[1, 0], r[1, 1] - r[0, 0] - r[2, 2], r[1, 2] + r[2, 1]],
-            [r[1, 0] - r[0, 1], r[0, 2] + r[2, 0], r[1, 2] + r[2, 1], r[2, 2] - r[0, 0] - r[1, 1]],
-        ]
-    )
-    found: FloatArray = np.linalg.eigh(matrix)[1][:, -1]
-    return found
 
 
 def _text(numbers: FloatArray | tuple[float, ...]) -> str:

@@ -31,12 +31,14 @@ class Law:
         processing: What the actor sees.
 
     Raises:
-        InvalidInputError: The arm does not do what it is told, or the scenario does not show the pose at its start.
+        InvalidInputError: The scenario's plant is not ideal, or it does not show the pose at its start.
     """
 
     def __init__(self, scenario: Scenario, processing: Bilinear) -> None:
-        if np.any(scenario.disturbance.bias) or np.any(scenario.disturbance.noise):
-            raise InvalidInputError(f"Scenario {scenario.name!r}: its disturbance has no gradient that can be known.")
+        if not scenario.plant.ideal:
+            raise InvalidInputError(
+                f"Scenario {scenario.name!r}: expected an ideal plant, whose gradient is known, got {scenario.plant}."
+            )
         if scenario.initial_pose is not None:
             raise InvalidInputError(f"Scenario {scenario.name!r}: its first pose is not that of the arm.")
         problem = Problem.of(scenario)

@@ -145,7 +145,7 @@ class TestContract:
         assert set(several) == set(alone)
 
     def test_together_as_alone(self, tmp_path):
-        scenario = RANDOM.replace(steps=25, disturbance=ikgym.Disturbance(noise=0.1))
+        scenario = RANDOM.replace(steps=25, plant=ikgym.Plant(noise=0.1))
         policy = agent_for(tmp_path, scenario, "dls")
         seeds = [2_000_000, 7]
         for seed, episode in zip(seeds, rollouts(scenario, policy, seeds), strict=True):
@@ -167,8 +167,8 @@ class TestContract:
 class TestBasePolicy:
     @pytest.mark.parametrize("base_policy", BASES[1:])
     def test_an_output_of_zero_is_the_base_policy(self, tmp_path, base_policy):
-        noisy = ikgym.Disturbance(bias=0.01, noise=0.1)
-        scenario = RANDOM.replace(steps=200, disturbance=noisy)
+        noisy = ikgym.Plant(bias=0.01, noise=0.1)
+        scenario = RANDOM.replace(steps=200, plant=noisy)
         policy = agent_for(tmp_path, scenario, base_policy, zero=True)
         name, parameters = parse_policy(base_policy)
         base = baselines.make(name, scenario, **parameters)

@@ -88,7 +88,7 @@ def test_seeds_come_from_the_split():
 
 def test_a_scenario_that_is_always_the_same_has_one_episode_unless_there_is_noise():
     assert [job.seed for job in make_plan("varga7-fast", "dls", episodes=5).jobs] == [0]
-    noisy = ikgym.scenarios.get("varga7-fast").replace(disturbance=ikgym.Disturbance(noise=0.1))
+    noisy = ikgym.scenarios.get("varga7-fast").replace(plant=ikgym.Plant(noise=0.1))
     plan = make_plan(noisy, "dls", episodes=2)
     assert [job.seed for job in plan.jobs] == [2_000_000, 2_000_001]
     assert [job.first for job in plan.jobs] == [True, False]

@@ -81,7 +81,7 @@ def test_total_cost_is_the_sum_of_the_rewards_of_gymnasium_bit_for_bit(name, ste
 
 
 def test_noise_is_drawn_as_in_the_environment():
-    which = scenario(steps=50, disturbance=ikgym.Disturbance(noise=0.5))
+    which = scenario(steps=50, plant=ikgym.Plant(noise=0.5))
     solver = baselines.make("dls", which)
     env = gym.make("RedundantIK-v0", scenario=which, preview=1)
     observation, _ = env.reset(seed=7)
@@ -97,6 +97,7 @@ class Pushing:
     """A policy that pushes all joints to and fro."""
 
     preview = 1
+    commands = 0
 
     def predict(self, observation, state=None, episode_start=None, deterministic=True):
         return np.full(7, 1.0 if observation["remaining"][0] % 14 < 7 else -0.9, dtype=np.float32), state
@@ -138,6 +139,7 @@ def test_the_warm_up_call_leaves_no_trace_in_the_episode():
 
     class Counting:
         preview = solver.preview
+        commands = 0
         report = staticmethod(solver.report)
         diagnostics = staticmethod(solver.diagnostics)
         counters = staticmethod(solver.counters)
@@ -165,6 +167,7 @@ def test_garbage_collection_is_as_before_even_after_an_error():
 
     class Failing:
         preview = 1
+        commands = 0
         calls = 0
 
         def predict(self, observation, state=None):

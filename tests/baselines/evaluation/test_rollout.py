@@ -32,7 +32,7 @@ def assert_same(together, alone):
 @pytest.mark.parametrize("name", [name for name in baselines.names() if not get(name).reference])
 @pytest.mark.parametrize("on", ["varga7-random", "zhang6-lspb"])
 def test_together_as_alone(name, on):
-    scenario = ikgym.scenarios.get(on).replace(steps=STEPS, disturbance=ikgym.Disturbance(noise=0.1))
+    scenario = ikgym.scenarios.get(on).replace(steps=STEPS, plant=ikgym.Plant(noise=0.1))
     try:
         policy = made(name, scenario)
     except InvalidInputError:
@@ -53,7 +53,7 @@ def test_a_reference_with_one_arm():
 
 
 def test_points_that_are_held_and_a_longer_preview():
-    scenario = ikgym.scenarios.get("khan8-q7q8").replace(steps=70, disturbance=ikgym.Disturbance(noise=0.1))
+    scenario = ikgym.scenarios.get("khan8-q7q8").replace(steps=70, plant=ikgym.Plant(noise=0.1))
     policy = baselines.make("rhc_gradient", scenario)
     for seed, episode in zip(SEEDS, rollouts(scenario, policy, SEEDS, preview=5), strict=True):
         assert_same(episode, rollout(scenario, policy, seed, preview=5))
@@ -65,6 +65,7 @@ def test_one_call_of_the_policy_a_step():
 
     class Watched:
         preview = solver.preview
+        commands = 0
         report = staticmethod(solver.report)
         diagnostics = staticmethod(solver.diagnostics)
         counters = staticmethod(solver.counters)

@@ -22,7 +22,7 @@ from benchmarks.rivals.casadi_horizon import CasadiHorizon
 from benchmarks.rivals.numpy_horizon import Horizon
 from ikgym import parallel
 from ikgym.exceptions import InvalidInputError, UnknownNameError
-from ikgym.scenarios import Disturbance
+from ikgym.plant import Plant
 from ikgym.trajectories import RandomJointSpline
 from tests.comparison import identical
 
@@ -401,8 +401,8 @@ class TestPolicy:
             baselines.make("oracle", "varga7-random", seed="x")
         with pytest.raises(InvalidInputError, match="starts: expected a whole number of at least 0, got -1"):
             baselines.make("oracle", "varga7-fast", starts=-1)
-        with pytest.raises(InvalidInputError, match="has a random disturbance"):
-            baselines.make("oracle", short(disturbance=Disturbance(noise=0.1)))
+        with pytest.raises(InvalidInputError, match="has a random plant"):
+            baselines.make("oracle", short(plant=Plant(noise=0.1)))
 
     def test_to_make_it_takes_no_time(self, monkeypatch):
         monkeypatch.setattr("baselines.oracle.policy.solve", None)
@@ -425,8 +425,8 @@ class TestPolicy:
         (lambda: Search(starts=-1), InvalidInputError, "starts: expected a whole number of at least 0, got -1"),
         (lambda: Search(polished=0), InvalidInputError, "polished: expected a whole number of at least 1"),
         (lambda: Search(knots=2.5), InvalidInputError, "knots: expected a whole number"),
-        (lambda: solve(short(disturbance=Disturbance(noise=0.1))), InvalidInputError, "expected noise=0 and bias=0"),
-        (lambda: solve(short(disturbance=Disturbance(bias=0.2))), InvalidInputError, "expected noise=0 and bias=0"),
+        (lambda: solve(short(plant=Plant(noise=0.1))), InvalidInputError, "expected an ideal plant"),
+        (lambda: solve(short(plant=Plant(bias=0.2))), InvalidInputError, "expected an ideal plant"),
     ],
 )
 def test_bad_input(call, error, match):

@@ -17,9 +17,8 @@ from baselines.training.run import train
 from baselines.training.trainers.initial_weights import inherit
 from baselines.training.trainers.models import ALGORITHMS, network_outputs, weights_hash
 from baselines.training.validation import play, validation_seeds
-from ikgym import scenarios
+from ikgym import Plant, scenarios
 from ikgym.exceptions import InvalidInputError, UnknownNameError
-from ikgym.scenarios import Disturbance
 from tests.baselines.training.segments import made, play_segments
 from tests.baselines.training.small import TINY
 
@@ -178,8 +177,8 @@ def test_other_arms_and_tasks_are_trained(name):
 
 
 def test_scenarios_that_cannot_be_differentiated_are_refused():
-    noisy = scenarios.get("varga7-random").replace(disturbance=Disturbance(noise=0.1))
-    with pytest.raises(InvalidInputError, match="disturbance"):
+    noisy = scenarios.get("varga7-random").replace(plant=Plant(noise=0.1))
+    with pytest.raises(InvalidInputError, match="expected an ideal plant"):
         Law(noisy, Bilinear())
     with pytest.raises(InvalidInputError, match="first pose"):
         Law(scenarios.get("zhang3-helix"), Bilinear())

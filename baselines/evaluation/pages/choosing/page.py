@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Iterable, Sequence
 
 from baselines import registry
@@ -19,7 +18,7 @@ from baselines.evaluation.pages.choosing.situations import (
     ranked,
     standings,
 )
-from baselines.evaluation.pages.entries import FORESIGHT, Entry, solver
+from baselines.evaluation.pages.entries import FORESIGHT, Entry, first_seed, solver
 from baselines.evaluation.pages.markdown import conditions, table, time
 from baselines.evaluation.pages.measurement import Measurement, Section
 from baselines.evaluation.report import NOTHING, number
@@ -69,7 +68,7 @@ def entries(name: str | None = None) -> tuple[Entry, ...]:
     rivals = tuple(name for name in registry.names() if registry.get(name).rival)
     left_out = SLOW if name is not None and name not in sets.rivals() else ()
     entered = (solver(spec, timed=1) for spec in (*OWN, *rivals) if spec not in left_out)
-    return tuple(dataclasses.replace(one, variants=one.variants[:1], seeds=(), share=SHARE) for one in entered)
+    return tuple(first_seed(one, SHARE) for one in entered)
 
 
 def played() -> tuple[str, ...]:

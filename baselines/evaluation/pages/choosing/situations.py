@@ -61,7 +61,8 @@ SITUATIONS = (
     ),
     Situation(
         "a joint limit stands in the way",
-        "The tool turns by more than the last joint has left: no solver can follow, and the error that remains counts.",
+        "The tool turns by more than the last joint has left, and no solver follows: the error that remains counts. "
+        "The best known motion, planned over the whole path, follows on `panda`, but not on `iiwa14` and `tiago`.",
         sets.paths("turn"),
     ),
     Situation(

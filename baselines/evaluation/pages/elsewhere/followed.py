@@ -9,6 +9,7 @@ import numpy as np
 
 from ikgym.arms import Arm
 from ikgym.problems import Waypoints
+from ikgym.rotations import geodesic_angle
 from ikgym.trajectories.orientations import matrices
 from ikgym.validation import FloatArray
 
@@ -54,14 +55,13 @@ def followed(arm: Arm, q: FloatArray, waypoints: Waypoints) -> Followed:
     """
     rotations, positions = arm.forward(q)
     wanted = matrices(waypoints.quaternions).reshape(-1, 3, 3)
-    chords = np.linalg.norm((rotations - wanted).reshape(-1, 9), axis=1) / 8.0**0.5
     prismatic = np.array(arm.prismatic)
     changes = np.diff(q, axis=0)
     turns = np.abs(np.remainder(changes[:, ~prismatic] + np.pi, 2.0 * np.pi) - np.pi)
     slides = np.abs(changes[:, prismatic])
     return Followed(
         position_error=float(np.linalg.norm(positions - waypoints.positions, axis=1).max()),
-        orientation_error=float(2.0 * np.arcsin(np.minimum(chords, 1.0)).max()),
+        orientation_error=max(map(geodesic_angle, rotations, wanted)),
         turn=float(turns.max(initial=0.0)),
         slide=float(slides.max(initial=0.0)),
         beyond=float(np.maximum(np.maximum(arm.lower - q, q - arm.upper), 0.0).max()),

@@ -22,8 +22,8 @@ from ikgym.exceptions import IkgymError
 from ikgym.scenarios.elsewhere import RANDOM, waypoint_steps
 
 #: Who plays, and which of them take so long that they may be given fewer random paths.
-POLICIES = ("dls", "null_space", "rhc", "rhc_foresight")
-COSTLY = ("rhc", "rhc_foresight")
+POLICIES = ("dls", "null_space", "qp", "rhc", "rhc_foresight")
+COSTLY = ("rhc_foresight",)
 
 
 @dataclasses.dataclass(frozen=True)

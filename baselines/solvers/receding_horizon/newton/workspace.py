@@ -33,8 +33,8 @@ class PathProblem(NamedTuple):
         qdot_before: Joint velocities of the step that has passed, in [rad/s] or [m/s]; read where changes of velocity
             cost something. Shape (n,).
         rate_weight: What changes of velocity cost, see :mod:`rate`, in [cost] / [(rad/s)²] or [cost] / [(m/s)²].
-        change_limit: Largest changes of the joint velocities in one step, in [rad/s] or [m/s]. Shape (n,), or (0,)
-            where accelerations have no limit.
+        change_limit: Largest changes of the joint velocities in one step, in [rad/s] or [m/s]; inf where a joint has
+            none. Shape (n,), for the interior point method, or (0,), for multipliers, which cannot limit them.
         braking: Whether the arm has to be able to stop within its joint limits behind the last knot; read where
             accelerations have a limit.
     """

@@ -156,7 +156,7 @@ def test_equal_points_ahead_are_met():
 
 
 def test_with_damping_the_points_ahead_pull_it_past_the_first():
-    """One sliding joint, two points v apart: the rest point of the iteration is λ v / (g + 2λ) past the first."""
+    """One prismatic joint, two points v apart: the rest point of the iteration is λ v / (g + 2λ) past the first."""
     axis = np.array([[1.0, 0.0, 0.0]])
     arm = ikgym.Arm("slide", np.zeros((1, 3)), axis, (True,))
     scenario = ikgym.scenarios.get("zhang3-helix").replace(

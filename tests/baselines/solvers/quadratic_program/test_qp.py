@@ -9,7 +9,7 @@ from scipy.optimize import linprog, lsq_linear
 import baselines
 import ikgym
 from baselines.policy import Batch
-from baselines.solvers.quadratic_program.limits import limit_rows
+from baselines.solvers.quadratic_program.limits import limits_with_braking
 from baselines.solvers.quadratic_program.velocity_box import velocity_box
 from baselines.solvers.resolved_rate.base import NominalMemory
 from baselines.status import Status
@@ -52,7 +52,7 @@ def program(policy, batch, memory, i):
     rho = policy.damping * np.sum(jacobian**2) / model.joints
     rho += policy.lm_damping * (error @ error) / problem.largest_qdot.max() ** 2
     lower, upper = np.empty(model.joints), np.empty(model.joints)
-    velocity_box(limit_rows(problem), problem.dt, batch.q[i], batch.qdot[i], lower, upper)
+    velocity_box(limits_with_braking(problem), problem.dt, batch.q[i], batch.qdot[i], lower, upper)
     posture = np.zeros(model.joints) if policy.posture is None else np.asarray(policy.posture)
     root = np.sqrt(rho) * np.eye(model.joints)
     matrix = np.vstack([jacobian, root])

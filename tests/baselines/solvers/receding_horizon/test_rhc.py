@@ -461,8 +461,8 @@ def test_the_last_steps_of_an_episode(name):
 
 @pytest.mark.parametrize("parameters", [{}, {"iterations": 1}, RESTARTED])
 def test_disturbed_drives_do_no_harm(parameters):
-    disturbance = ikgym.scenarios.scenario.Disturbance(bias=0.5, noise=2.0)
-    scenario = ikgym.scenarios.get("varga7-fast").replace(steps=80, disturbance=disturbance)
+    plant = ikgym.Plant(bias=0.5, noise=2.0)
+    scenario = ikgym.scenarios.get("varga7-fast").replace(steps=80, plant=plant)
     policy = baselines.make("rhc", scenario, **parameters)
     env = gym.make("RedundantIK-v0", scenario=scenario, preview=policy.preview)
     observation, _ = env.reset(seed=0)

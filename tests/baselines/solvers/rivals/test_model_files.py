@@ -8,7 +8,7 @@ import pinocchio as pin
 import pytest
 
 import ikgym
-from baselines.solvers.rivals.model_files import TIP, mjcf, quaternion, roll_pitch_yaw, urdf
+from baselines.solvers.rivals.model_files import TIP, mjcf, roll_pitch_yaw, urdf
 from ikgym.rotations import rodrigues
 from tests.limited import limited
 
@@ -55,15 +55,6 @@ def test_urdf_has_the_kinematics_and_the_limits(arm):
     finite = np.isfinite(arm.velocity_limit)
     np.testing.assert_array_equal(model.velocityLimit[finite], arm.velocity_limit[finite])
     assert (model.velocityLimit[~finite] > 1e20).all()
-
-
-@pytest.mark.parametrize("angle", [0.0, 1e-9, 1.0, 3.0, np.pi])
-def test_quaternion(angle):
-    for axis in np.vstack([np.eye(3), np.random.default_rng(1).normal(size=(5, 3))]):
-        axis = axis / np.linalg.norm(axis)
-        found = quaternion(rodrigues(axis, angle))
-        wanted = np.concatenate([[np.cos(0.5 * angle)], np.sin(0.5 * angle) * axis])
-        assert abs(found @ wanted) == pytest.approx(1.0, abs=1e-15)
 
 
 @pytest.mark.parametrize("pitch", [0.3, -1.2, np.pi / 2, -np.pi / 2])

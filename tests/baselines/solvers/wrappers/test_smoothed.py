@@ -121,7 +121,7 @@ def test_what_the_inner_policy_sees(feedback, monkeypatch):
 
 
 def test_measured_feedback_corrects_what_the_calculated_path_cannot_know():
-    scenario = short("faitli3-regular", 1500, disturbance=ikgym.scenarios.Disturbance(bias=0.3))
+    scenario = short("faitli3-regular", 1500, plant=ikgym.Plant(bias=0.3))
     errors = {}
     for feedback in ("calculated", "measured"):
         policy = smoothed(scenario, policy="dls", options={"gain": 0.1, "damping": 1e-6}, feedback=feedback)
@@ -237,7 +237,7 @@ def test_bad_parameters(change, error, message):
 def test_a_disturbed_arm_is_smoothed_from_where_it_is():
     """The filter starts from the measured q, so that what drives add does not pile up."""
     scenario = short(steps=1000)
-    disturbed = dataclasses.replace(scenario, disturbance=ikgym.scenarios.Disturbance(bias=0.1))
+    disturbed = dataclasses.replace(scenario, plant=ikgym.Plant(bias=0.1))
     episodes = [rollout(s, smoothed(s, policy="dls"), 0) for s in (scenario, disturbed)]
     apart = np.abs(episodes[0].q - episodes[1].q)
     # A constant velocity b from outside leaves 2 b / Λ, and not b t.

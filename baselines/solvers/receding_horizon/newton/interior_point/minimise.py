@@ -104,14 +104,16 @@ def minimise_limited(problem, path, settings, smoothing, workspace):
 
 @uncounted
 def minimise_path(problem, path, multipliers, settings, smoothing, workspace):
-    """The minimum of a joint path by the method that its limits ask for.
+    """The minimum of a joint path: by the interior point method where there are limits of changes, or by multipliers.
+
+    Infinite ones hold nothing back, and choose the interior point method all the same: the oracle's way for all limits.
 
     Args:
         problem: A :class:`newton.workspace.PathProblem` of K knots.
         path: Joint coordinates at the knots in [rad] or [m], changed in place. Shape (K, n).
-        multipliers: As of :func:`newton.minimise.minimise`; of no use where accelerations are limited.
+        multipliers: As of :func:`newton.minimise.minimise`; of no use in the interior point method.
         settings: :class:`newton.minimise.NewtonSettings`.
-        smoothing: As of :func:`minimise_limited`; of no use where accelerations are not limited.
+        smoothing: As of :func:`minimise_limited`; of no use without it.
         workspace: A :class:`newton.workspace.NewtonWorkspace`.
 
     Returns:

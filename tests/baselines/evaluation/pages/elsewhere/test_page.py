@@ -99,7 +99,7 @@ class TestRun:
         assert entered[0] == ("rlitg-hello", "greedy")
         assert entered[-1] == ("rlitg-random-099", played.POLICIES[-1])
         fewer = set(entered) - set(everybody(20))
-        assert fewer == {(f"rlitg-random-{i:03}", who) for i in range(20, 100) for who in ("rhc", "rhc_foresight")}
+        assert fewer == {(f"rlitg-random-{i:03}", who) for i in range(20, 100) for who in played.COSTLY}
 
 
 @pytest.mark.skipif(not (DOCS / "elsewhere.json").exists(), reason="it has not been measured yet")

@@ -1,0 +1,101 @@
+"""The nominal frames of N episodes: whole tables, or blocks of them that are computed on the way."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from ikgym.parallel import in_chunks
+from ikgym.scenarios import Scenario
+from ikgym.trajectories import Trajectory
+from ikgym.validation import FloatArray
+
+Integers = npt.NDArray[np.int64]
+
+# What the nominal frames of all rows may take, in bytes: of many long episodes only what is near is kept.
+MEMORY = 2**26
+# Rows worth a thread of their own: below, handing over costs more than it saves.
+GRAIN = 4
+# Rows whose frames are computed at a time: their intermediate results stay small.
+PIECE = 64
+
+
+class NominalFrames:
+    """The frames that N episodes need soon; where the scenario is fixed they share one table.
+
+    Args:
+        scenario: What is tracked.
+        rows: N.
+        ahead: Steps ahead that are shown, rising.
+        memory: What the frames of all rows may take, in bytes. Those of random episodes that would take more are
+            computed block by block on the way; a block is never shorter than the preview looks ahead.
+    """
+
+    def __init__(self, scenario: Scenario, rows: int, ahead: tuple[int, ...], memory: int) -> None:
+        self._scenario = scenario
+        self._point = scenario.points(ahead)
+        width = 12 if scenario.task.has_orientation else 3
+        points = int(self._point[-1]) + 1
+        tables = rows if scenario.random else 1
+        affordable = memory // (8 * width * rows) if scenario.random else points
+        # Rows know all of their points, or two blocks of them: the next one takes the place of the one before.
+        self._block = points if points <= affordable else min(points, max(affordable // 2, ahead[-1]))
+        self.in_blocks = self._block < points
+        self.shape = (tables, self._block * (2 if self.in_blocks else 1), width)
+        self._last_block = self._point[ahead[-1] :] // self._block
+        self._blocks_known = np.zeros(tables, dtype=np.int64)
+        self._episodes: list[Trajectory] = [scenario.trajectory] * tables
+
+    def allocate(self) -> FloatArray:
+        """The tables, of :attr:`shape`; that of a fixed scenario is filled."""
+        tables = np.zeros(self.shape)
+        if not self._scenario.random:
+            self._know(tables, np.zeros(1, dtype=np.int64))
+        return tables
+
+    @property
+    def slots(self) -> Integers:
+        """Where the target after k steps is in a table. Shape (steps + furthest preview + 1,)."""
+        return self._point % self.shape[1]
+
+    def begin(self, tables: FloatArray, rows: Integers, episodes: Sequence[Trajectory]) -> None:
+        """Begins new episodes of a random scenario.
+
+        Args:
+            tables: What :meth:`allocate` gave.
+            rows: Which rows begin one. Shape (k,).
+            episodes: Their trajectories.
+        """
+        for row, episode in zip(rows.tolist(), episodes, strict=True):
+            self._episodes[row] = episode
+        self._blocks_known[rows] = 0
+        self.look_ahead(tables, rows, np.zeros(len(rows), dtype=np.int64))
+
+    def look_ahead(self, tables: FloatArray, rows: Integers, steps: Integers) -> None:
+        """Sees to it that rows know all frames that they need after so many steps. Shapes (k,)."""
+        last = self._last_block[steps]
+        while len(late := rows[last >= self._blocks_known[rows]]):
+            self._know(tables, late)
+
+    def positions(self, row: int) -> FloatArray:
+        """The nominal positions of a row's episode in [m], one a step. Shape (steps + 1, 3)."""
+        point = self._point[: self._scenario.steps + 1]
+        episode = self._episodes[row if self._scenario.random else 0]
+        positions: FloatArray = self._scenario.frames(episode, int(point[-1]) + 1)[point, -3:]
+        return positions
+
+    def _know(self, tables: FloatArray, rows: Integers) -> None:
+        """Computes the next block of some rows."""
+        first, ahead = self._blocks_known[rows] * self._block, np.arange(self._block)
+
+        def work(start: int, stop: int) -> None:
+            for part in range(start, stop, PIECE):
+                some = slice(part, min(part + PIECE, stop))
+                points = first[some, None] + ahead
+                episodes = [self._episodes[row] for row in rows[some].tolist()]
+                tables[rows[some, None], points % self.shape[1]] = self._scenario.frames_of(episodes, points)
+
+        in_chunks(work, len(rows), GRAIN)
+        self._blocks_known[rows] += 1

@@ -1,0 +1,135 @@
+"""What N arms show after a step, in one block of numbers and as arrays."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+Floats = npt.NDArray[np.float64]
+
+
+class Outcome(NamedTuple):
+    """What the N arms show after a step: the observation, then what the step cost.
+
+    Attributes:
+        numbers: All of it in one block, which the others are views of; see :func:`outcome`.
+        q: Measured joint coordinates in [rad] or [m]. Shape (N, n).
+        qdot: Joint velocities last applied, in [rad/s] or [m/s]. Shape (N, n).
+        pose: Measured task coordinates. Shape (N, m).
+        nominal: Nominal task coordinates ahead. Shape (N, p, m).
+        remaining: Steps left. Shape (N, 1).
+        tracking_cost: Φ^X, 0 where the step does not count. Shape (N,).
+        velocity_cost: Φ^U, 0 where the step does not count. Shape (N,).
+        position_error: In [m]. Shape (N,).
+        orientation_error: Geodesic angle in [rad], NaN where the task has no orientation. Shape (N,).
+        clipped: 1 where the action left its box, 0 elsewhere. Shape (N,).
+        at_limit: Joints held back by a stop, by the velocity and by the acceleration limit. Shape (N, 3).
+        q_age: Steps since the joint coordinates were measured. Shape (N, 1), or (N, 0) where no sensor is late.
+        pose_age: Steps since the pose was measured. Shape (N, 1), or (N, 0) where no sensor is late.
+        commands: The last h commands within the velocity limit, newest first, in [rad/s] or [m/s]. Shape (N, h, n).
+        true_q: Joint coordinates in [rad] or [m]. Shape (N, n).
+        true_pose: Task coordinates. Shape (N, m).
+    """
+
+    numbers: Floats
+    q: Floats
+    qdot: Floats
+    pose: Floats
+    nominal: Floats
+    remaining: Floats
+    tracking_cost: Floats
+    velocity_cost: Floats
+    position_error: Floats
+    orientation_error: Floats
+    clipped: Floats
+    at_limit: Floats
+    q_age: Floats
+    pose_age: Floats
+    commands: Floats
+    true_q: Floats
+    true_pose: Floats
+
+
+#: What a policy sees, see :func:`observation`.
+Observation = dict[str, Floats]
+#: Its keys in all scenarios.
+OBSERVED = ("q", "qdot", "pose", "nominal", "remaining")
+#: Its keys where there is something to show.
+SOMETIMES = ("q_age", "pose_age", "commands")
+
+
+def observation(out: Outcome, row: int | None = None) -> Observation:
+    """What a policy sees of all arms, or of one, without a row axis: the observation of the environment."""
+    keys = (*OBSERVED, *(key for key in SOMETIMES if getattr(out, key).size))
+    return {key: getattr(out, key) if row is None else getattr(out, key)[row] for key in keys}
+
+
+def outcome(numbers: Floats, rows: int, n: int, m: int, p: int, h: int | None = None, *, late: bool = False) -> Outcome:
+    """The parts of an outcome as views of one block of numbers, as each step fills a fresh one.
+
+    One block, since to allocate ten arrays and to hand them to a kernel takes longer than what the kernel does.
+
+    Args:
+        numbers: The block. Shape (N (2 n + m + p m + 9),), or (N (2 n + m + p m + 9 + 2 + h n + n + m),) where the
+            plant is not ideal.
+        rows: N.
+        n: Joints of the arm.
+        m: Task coordinates.
+        p: Steps ahead that are shown.
+        h: Commands that are shown; None where the plant is ideal, and what is measured is what is true.
+        late: Whether what is measured may be of an earlier step, so that its age is shown.
+    """
+    shown = parts(numbers, rows, n, m, p)
+    nothing = numbers[:0].reshape(rows, 0)
+    if h is None:
+        return Outcome._make((numbers, *shown, nothing, nothing, nothing.reshape(rows, 0, n), shown[0], shown[2]))
+    *ages, commands, q, pose = more_parts(numbers[rows * size(n, m, p) :], rows, n, m, h)
+    return Outcome._make((numbers, *shown, *(ages if late else (nothing, nothing)), commands, q, pose))
+
+
+def size(n: int, m: int, p: int) -> int:
+    """Numbers that a row shows where the plant is ideal."""
+    return 2 * n + m + p * m + 9
+
+
+def more_size(n: int, m: int, h: int) -> int:
+    """Numbers that a row shows besides where the plant is not ideal."""
+    return 2 + h * n + n + m
+
+
+def parts(numbers: Floats, rows: int, n: int, m: int, p: int) -> tuple[Floats, ...]:
+    """The parts of an outcome up to the joints that are held back, see :func:`outcome`."""
+    qdot = rows * n
+    pose = qdot + rows * n
+    nominal = pose + rows * m
+    remaining = nominal + rows * p * m
+    reward = remaining + rows
+    return (
+        numbers[:qdot].reshape(rows, n),
+        numbers[qdot:pose].reshape(rows, n),
+        numbers[pose:nominal].reshape(rows, m),
+        numbers[nominal:remaining].reshape(rows, p, m),
+        numbers[remaining:reward].reshape(rows, 1),
+        numbers[reward : reward + rows],
+        numbers[reward + rows : reward + 2 * rows],
+        numbers[reward + 2 * rows : reward + 3 * rows],
+        numbers[reward + 3 * rows : reward + 4 * rows],
+        numbers[reward + 4 * rows : reward + 5 * rows],
+        numbers[reward + 5 * rows : reward + 8 * rows].reshape(rows, 3),
+    )
+
+
+def more_parts(numbers: Floats, rows: int, n: int, m: int, h: int) -> tuple[Floats, ...]:
+    """The parts of an outcome that are there where the plant is not ideal, see :func:`outcome`."""
+    commands = 2 * rows
+    true_q = commands + rows * h * n
+    true_pose = true_q + rows * n
+    return (
+        numbers[:rows].reshape(rows, 1),
+        numbers[rows:commands].reshape(rows, 1),
+        numbers[commands:true_q].reshape(rows, h, n),
+        numbers[true_q:true_pose].reshape(rows, n),
+        numbers[true_pose : true_pose + rows * m].reshape(rows, m),
+    )

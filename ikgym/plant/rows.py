@@ -1,0 +1,127 @@
+"""The plants of N arms that are simulated side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ikgym.arms import Arm
+from ikgym.exceptions import InvalidInputError
+from ikgym.plant.arm_kernels import ARM_STREAMS
+from ikgym.plant.checks import PerJoint
+from ikgym.plant.draw import Draws, arm_key, episode_key
+from ikgym.plant.plant import Plant
+from ikgym.plant.sensor_kernels import STREAMS
+from ikgym.plant.step import Drives, PlantState, Sensors
+from ikgym.random_numbers import stream
+from ikgym.validation import FloatArray, whole_number
+
+Generators = Sequence[np.random.Generator] | Mapping[int, np.random.Generator]
+
+
+def checked_arm_seeds(given: Any, rows: int, plant: Plant, name: str) -> list[int | None] | None:
+    """Seeds of arms that a user asks for.
+
+    Args:
+        given: A whole number for all rows, or one a row, where None stands for an arm that is drawn with the episode.
+        rows: N.
+        plant: What arms are drawn from.
+        name: Of the scenario.
+
+    Returns:
+        One a row, or None where nothing is asked for.
+
+    Raises:
+        InvalidInputError: They are no such numbers, not one a row, or the plant draws no arm that could be kept.
+    """
+    if given is None:
+        return None
+    seeds = list(given) if isinstance(given, (tuple, list, np.ndarray)) else [given] * rows
+    if len(seeds) != rows:
+        raise InvalidInputError(f"options['arm_seed']: expected {rows} seeds, one a row, got {len(seeds)}.")
+    checked = [None if one is None else whole_number("options['arm_seed']", one, at_least=0) for one in seeds]
+    if any(one is not None for one in checked):
+        plant.check_draws_arm(name)
+    return checked
+
+
+class PlantRows:
+    """What the plants of N arms are and remember, as kernels take it.
+
+    Args:
+        plant: What their plants are drawn from.
+        arm: The arm of the data sheet.
+        dt: Δt in [s].
+        rows: N.
+        coordinates: m, of the task.
+        commands: h, how many of the last commands are shown.
+    """
+
+    def __init__(self, plant: Plant, arm: Arm, dt: float, rows: int, coordinates: int, commands: int) -> None:
+        self._plant, self._dt, n = plant, dt, arm.joints
+        self._draws = Draws(plant, arm)
+
+        def every_joint(value: PerJoint) -> FloatArray:
+            return np.array(np.broadcast_to(value, n), dtype=np.float64)
+
+        self.drives = Drives(
+            every_joint(plant.bias),
+            every_joint(plant.noise),
+            every_joint(plant.backlash),
+            np.array(arm.chain.prismatic),
+            plant.payload_step,
+        )
+        self.sensors = Sensors(
+            every_joint(plant.q_noise),
+            plant.pose_noise,
+            plant.pose_rotation_noise,
+            plant.q_delay,
+            plant.pose_delay,
+            plant.pose_every,
+            plant.pose_missing,
+        )
+        self.arms = self._draws.blank(rows)
+        self.state = PlantState(
+            keys=np.zeros((rows, STREAMS), dtype=np.uint64),
+            lag=np.ones(rows),
+            delay=np.zeros(rows, dtype=np.int64),
+            drive=np.zeros((rows, n)),
+            play=np.zeros((rows, n)),
+            commands=np.zeros((rows, max(plant.longest_command_delay + 1, commands), n)),
+            q=np.zeros((rows, plant.q_delay + 1, n)),
+            pose=np.zeros((rows, plant.pose_delay // plant.pose_every + 1, coordinates)),
+            shown=np.zeros((rows, coordinates)),
+            shown_step=np.zeros(rows, dtype=np.int64),
+        )
+
+    @staticmethod
+    def size(plant: Plant, joints: int, coordinates: int, commands: int) -> int:
+        """Numbers that a row takes."""
+        kept = joints * (plant.longest_command_delay + 1 + commands + plant.q_delay + 1)
+        return 2 * (6 * joints + 12) + kept + coordinates * (plant.pose_delay // plant.pose_every + 2) + 4 * joints
+
+    def begin(
+        self, rows: npt.NDArray[np.int64], generators: Generators, arm_seeds: Sequence[int | None] | None
+    ) -> None:
+        """Draws the plants of new episodes.
+
+        Args:
+            rows: Which rows begin one. Shape (k,).
+            generators: One a row.
+            arm_seeds: One a row: the seed of the arm that it keeps, None for an arm that is drawn with the episode.
+        """
+        keys = [episode_key(self._plant, generators[row]) for row in rows.tolist()]
+        given = [None if arm_seeds is None else arm_seeds[row] for row in rows.tolist()]
+        arm_keys = [key if seed is None else arm_key(seed) for key, seed in zip(keys, given, strict=True)]
+        of_arms = np.array(arm_keys, dtype=np.uint64)
+        self._draws.arms(of_arms, rows, self.arms)
+        bandwidths, self.state.delay[rows] = self._draws.loops(of_arms)
+        self.state.lag[rows] = -np.expm1(-2.0 * np.pi * bandwidths * self._dt)
+        self.state.keys[rows, 0] = keys
+        for number in range(1, STREAMS):
+            self.state.keys[rows, number] = [stream(np.uint64(key), ARM_STREAMS + number) for key in keys]
+        for changed in (self.state.drive, self.state.play):
+            changed[rows] = 0.0

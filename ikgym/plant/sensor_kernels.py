@@ -1,0 +1,123 @@
+"""Kernels: what the sensors of a plant show."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ikgym import task_kernels
+from ikgym.jit import inlined, kernel
+from ikgym.random_numbers import normal, share
+
+# The streams of the key of an episode's noises. The first is the key itself.
+NOISE, Q_NOISE, POSITION, ROTATION, MISSING = range(5)
+STREAMS = 5
+
+
+@inlined
+def measure_q(sensors, keys, row, step, q, kept, out):
+    """Measures joint coordinates, and shows those that have arrived.
+
+    Args:
+        sensors: A :class:`ikgym.plant.step.Sensors`.
+        keys: Of the row's streams. Shape (5,).
+        row: The arm.
+        step: Steps made.
+        q: Joint coordinates. Shape (N, n).
+        kept: Measurements that are on their way. Shape (N, delay + 1, n).
+        out: Receives what is shown. Shape (N, n).
+
+    Returns:
+        Steps since it was measured.
+    """
+    n, room = q.shape[1], kept.shape[1]
+    for j in range(n):
+        value = q[row, j]
+        if sensors.q_noise[j] != 0.0:
+            value += sensors.q_noise[j] * normal(keys[Q_NOISE], np.uint64(step * n + j))
+        kept[row, step % room, j] = value
+    late = max(step - sensors.q_delay, 0)
+    for j in range(n):
+        out[row, j] = kept[row, late % room, j]
+    return step - late
+
+
+@inlined
+def missing(sensors, keys, number):
+    """Whether a measurement of the pose is lost; the first never is."""
+    return number > 0 and sensors.pose_missing > 0.0 and share(keys[MISSING], np.uint64(number)) < sensors.pose_missing
+
+
+@inlined
+def measure_pose(sensors, keys, kind, step, rotation, position, kept, shown):
+    """Measures a pose where it is time to, and takes over what has arrived.
+
+    Args:
+        sensors: A :class:`ikgym.plant.step.Sensors`.
+        keys: Of the row's streams. Shape (5,).
+        kind: The kind of task coordinates.
+        step: Steps made.
+        rotation: Orientation, which the noise may turn. Shape (3, 3).
+        position: Position in [m], which the noise may shift. Shape (3,).
+        kept: Measurements that are on their way. Shape (delay // every + 1, m).
+        shown: Receives what has arrived, if anything has. Shape (m,).
+
+    Returns:
+        The step of the measurement that has arrived, -1 where none has.
+    """
+    every, room = sensors.pose_every, kept.shape[0]
+    if step % every == 0 and not missing(sensors, keys, step // every):
+        blur(sensors.pose_noise, sensors.pose_rotation_noise, keys, kind, step, rotation, position)
+        task_kernels.coordinates(kind, rotation, position, kept[step // every % room])
+    late = step - sensors.pose_delay
+    arrived = (late > 0 and late % every == 0 and not missing(sensors, keys, late // every)) or step == 0
+    if not arrived:
+        return -1
+    late = max(late, 0)
+    newest = kept[late // every % room]
+    for i in range(shown.shape[0]):
+        shown[i] = newest[i]
+    return late
+
+
+@kernel
+def blur(distance, angle, keys, kind, step, rotation, position):
+    """Shifts a position by a normal vector, and turns an orientation by another one.
+
+    Args:
+        distance: Standard deviation of each part of the shift, in [m].
+        angle: Standard deviation of each part of the rotation vector, in [rad].
+        keys: Of the row's streams. Shape (5,).
+        kind: The kind of task coordinates.
+        step: Steps made.
+        rotation: Orientation, changed in place. Shape (3, 3).
+        position: Position in [m], changed in place. Shape (3,).
+    """
+    first = 3 * step
+    if distance != 0.0:
+        for c in range(3):
+            position[c] += distance * normal(keys[POSITION], np.uint64(first + c))
+    if angle != 0.0 and kind != task_kernels.POSITION:
+        turn(
+            angle * normal(keys[ROTATION], np.uint64(first)),
+            angle * normal(keys[ROTATION], np.uint64(first + 1)),
+            angle * normal(keys[ROTATION], np.uint64(first + 2)),
+            rotation,
+        )
+
+
+@inlined
+def turn(wx, wy, wz, rotation):
+    """Turns an orientation by a rotation vector in place: Rodrigues' formula, without a division by the angle."""
+    square = wx * wx + wy * wy + wz * wz
+    theta = math.sqrt(square)
+    half = 0.5 * theta
+    s = math.sin(theta) / theta if theta > 0.0 else 1.0
+    v = 2.0 * (math.sin(half) / theta) ** 2 if theta > 0.0 else 0.5
+    for c in range(3):
+        x, y, z = rotation[0, c], rotation[1, c], rotation[2, c]
+        cx, cy, cz = wy * z - wz * y, wz * x - wx * z, wx * y - wy * x
+        rotation[0, c] = x + s * cx + v * (wy * cz - wz * cy)
+        rotation[1, c] = y + s * cy + v * (wz * cx - wx * cz)
+        rotation[2, c] = z + s * cz + v * (wx * cy - wy * cx)

@@ -1,0 +1,196 @@
+"""Kernel: one step of N arms whose plant is not ideal."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from ikgym import cost_kernels, task_kernels
+from ikgym.jit import inlined, kernel, uncounted
+from ikgym.kinematics import Chain, forward
+from ikgym.limit_kernels import FASTEST, LOWER, SLACK, UPPER, driven, stopped, within
+from ikgym.outcome import more_parts, parts, size
+from ikgym.plant.drive_kernels import counter_of, disturbed, engaged, filtered, remembered
+from ikgym.plant.sensor_kernels import NOISE, measure_pose, measure_q
+from ikgym.simulation import commanded, errors, show_nominal, tracking
+
+Floats = npt.NDArray[np.float64]
+Integers = npt.NDArray[np.int64]
+
+_parts, _more_parts, _size = inlined(parts), inlined(more_parts), inlined(size)
+
+
+class Drives(NamedTuple):
+    """What is the same of the drives in all rows.
+
+    Attributes:
+        bias: In [rad/s] or [m/s]. Shape (n,).
+        noise: In [rad/s] or [m/s]. Shape (n,).
+        backlash: In [rad] or [m]. Shape (n,).
+        prismatic: True where a joint is prismatic. Shape (n,).
+        payload_step: Steps made when the payload is taken up.
+    """
+
+    bias: Floats
+    noise: Floats
+    backlash: Floats
+    prismatic: npt.NDArray[np.bool_]
+    payload_step: int
+
+
+class Sensors(NamedTuple):
+    """What is the same of the sensors in all rows, by the names of :class:`ikgym.Plant`. ``q_noise`` has shape (n,)."""
+
+    q_noise: Floats
+    pose_noise: float
+    pose_rotation_noise: float
+    q_delay: int
+    pose_delay: int
+    pose_every: int
+    pose_missing: float
+
+
+class PlantState(NamedTuple):
+    """What the plants of N arms are, and what they remember.
+
+    Attributes:
+        keys: Of the rows' streams of random numbers. Shape (N, 5).
+        lag: The share of what is missing to a velocity that a step makes up for, 1 without lag. Shape (N,).
+        delay: Steps after which a command reaches the drive. Shape (N,).
+        drive: Velocities of the drives in [rad/s] or [m/s]. Shape (N, n).
+        play: How far drives are from the middle of their backlash, in [rad] or [m]. Shape (N, n).
+        commands: The last commands in [rad/s] or [m/s]; that of step k is number k mod D. Shape (N, D, n).
+        q: The last measured joint coordinates; those of step k are number k mod Q. Shape (N, Q, n).
+        pose: The last measured poses; the i-th is number i mod S. Shape (N, S, m).
+        shown: The poses that are shown. Shape (N, m).
+        shown_step: When they were measured, in steps. Shape (N,).
+    """
+
+    keys: npt.NDArray[np.uint64]
+    lag: Floats
+    delay: Integers
+    drive: Floats
+    play: Floats
+    commands: Floats
+    q: Floats
+    pose: Floats
+    shown: Floats
+    shown_step: Integers
+
+
+@kernel
+def step(constants, cost, drives, sensors, arms, state, plant, numbers, active, moving, start, stop):
+    """Moves rows, and observes them, as :func:`ikgym.simulation.step` does.
+
+    Args:
+        constants: A :class:`ikgym.simulation.Constants`.
+        cost: A :class:`ikgym.cost_kernels.CostParameters`.
+        drives: A :class:`Drives`.
+        sensors: A :class:`Sensors`.
+        arms: The rows' own, an :class:`Arms`.
+        state: A :class:`ikgym.simulation.State`, changed in place.
+        plant: A :class:`PlantState`, changed in place.
+        numbers: The block of an outcome, written in place.
+        active: The rows that are meant. Shape (N,).
+        moving: Whether they move, or are observed where they are.
+        start: The first row.
+        stop: The row after the last.
+    """
+    rows, n = state.q.shape
+    p, m = constants.preview.shape[0], plant.shown.shape[1]
+    usual = rows * _size(n, m, p)
+    h = ((numbers.shape[0] - usual) // rows - 2 - n - m) // n
+    shown, more = _parts(numbers, rows, n, m, p), _more_parts(numbers[usual:], rows, n, m, h)
+    _rows(constants, cost, drives, sensors, arms, state, plant, shown, more, active, moving, start, stop)
+
+
+@uncounted
+def _rows(constants, cost, drives, sensors, arms, state, plant, shown, more, active, moving, start, stop):
+    """The rows of :func:`step`, with the parts of the outcome in two tuples."""
+    kind, point, preview = constants.kind, constants.point, constants.preview
+    q, qdot, made, tables = state.q, state.qdot, state.step, state.frames
+    offsets, axes, tool, tool_rotation = arms.offsets, arms.axes, arms.tool, arms.tool_rotation
+    n, m, scratch = q.shape[1], plant.shown.shape[1], state.scratch
+    rotation, position = scratch[start, :9].reshape(3, 3), scratch[start, 9:12]
+    nominal, error = scratch[start, 12 : 12 + m], scratch[start, 12 + m :]
+    for row in range(start, stop):
+        if not active[row]:
+            continue
+        shown[9][row] = 0.0
+        shown[10][row, 0] = shown[10][row, 1] = shown[10][row, 2] = 0.0
+        if moving:
+            _drive(constants, drives, state, plant, row, shown[9], shown[10])
+            made[row] += 1
+        k = made[row]
+        loaded = 1 if k >= drives.payload_step else 0
+        chain = Chain(
+            offsets[row, loaded], axes[row, loaded], drives.prismatic, tool[row, loaded], tool_rotation[row, loaded]
+        )
+        forward(chain, q[row], rotation, position)
+        pose = more[4][row]
+        task_kernels.coordinates(kind, rotation, position, pose)
+        frames = tables[row if tables.shape[0] > 1 else 0]
+        show_nominal(kind, frames, point, k, preview, shown[3][row])
+        shown[4][row, 0] = constants.steps - k
+        frame = frames[point[k]]
+        shown[7][row], shown[8][row] = errors(kind, frame, rotation, position)
+        shown[5][row] = shown[6][row] = 0.0
+        if constants.counted[k]:
+            shown[5][row] = tracking(kind, cost, frame, pose, nominal, error)
+            shown[6][row] = cost_kernels.velocity(cost, qdot[row])
+        for j in range(n):
+            shown[1][row, j] = qdot[row, j]
+            more[3][row, j] = q[row, j]
+        _recall(constants.limits, plant.commands, row, k, more[2])
+        _sense(sensors, plant, kind, row, k, q, rotation, position, shown, more)
+
+
+@inlined
+def _drive(constants, drives, state, plant, row, clipped, at_limit):
+    """Moves the joints of a row: delay, velocity limit, acceleration limit, lag, bias and noise, backlash, stop."""
+    dt, velocity_limit, limits = constants.dt, constants.velocity_limit, constants.limits
+    q, qdot, limited = state.q, state.qdot, constants.limits.shape[0] > 0
+    n, now, lag = q.shape[1], state.step[row], plant.lag[row]
+    for j in range(n):
+        command = commanded(state.actions[row, j], velocity_limit[j], clipped, row)
+        plant.commands[row, now % plant.commands.shape[1], j] = command
+        applied = remembered(plant.commands, row, now - plant.delay[row], j)
+        slack = SLACK * velocity_limit[j]
+        if limited:
+            applied = driven(limits, j, applied, qdot[row, j], slack, at_limit, row)
+        velocity = filtered(plant.drive, row, j, lag, applied) if lag < 1.0 else applied
+        key = plant.keys[row, NOISE]
+        velocity = disturbed(velocity, drives.bias[j], drives.noise[j], key, counter_of(now, n, j))
+        way = dt * velocity
+        if drives.backlash[j] != 0.0:
+            way = engaged(plant.play, row, j, drives.backlash[j], way)
+        reached = q[row, j] + way  # Varga 2021, eq. 5
+        if limited and not limits[LOWER, j] <= reached <= limits[UPPER, j]:
+            reached, applied = stopped(limits, j, q[row, j], reached, dt)
+            at_limit[row, 0] += abs(velocity - applied) > slack
+            plant.drive[row, j] = applied
+        q[row, j], qdot[row, j] = reached, applied
+
+
+@inlined
+def _recall(limits, commands, row, now, out):
+    """Shows the last commands within the velocity limit. ``out`` has shape (N, h, n)."""
+    for i in range(out.shape[1]):
+        for j in range(out.shape[2]):
+            command = remembered(commands, row, now - 1 - i, j)
+            out[row, i, j] = within(command, limits[FASTEST, j]) if limits.shape[0] > 0 else command
+
+
+@inlined
+def _sense(sensors, plant, kind, row, now, q, rotation, position, shown, more):
+    """Shows what the sensors do. The pose in the scratch is blurred for it, after all else is done with it."""
+    keys = plant.keys[row]
+    more[0][row, 0] = measure_q(sensors, keys, row, now, q, plant.q, shown[0])
+    arrived = measure_pose(sensors, keys, kind, now, rotation, position, plant.pose[row], plant.shown[row])
+    if arrived >= 0:
+        plant.shown_step[row] = arrived
+    more[1][row, 0] = now - plant.shown_step[row]
+    for i in range(plant.shown.shape[1]):
+        shown[2][row, i] = plant.shown[row, i]

@@ -1,0 +1,35 @@
+"""Plants with one effect each, and with all of them."""
+
+from __future__ import annotations
+
+import ikgym
+from ikgym import Plant
+
+#: Each effect at a size that shows within some steps.
+EFFECTS = {
+    "zero": {"zero": 5e-3},
+    "link": {"link": 3e-3},
+    "axis": {"axis": 5e-3},
+    "payload": {"payload": 1e-2, "payload_step": 4},
+    "arms": {"arms": (ikgym.arms.get("panda-2"), ikgym.arms.get("panda-3"))},
+    "bandwidth": {"bandwidth": (10.0, 20.0)},
+    "command_delay": {"command_delay": (2, 5)},
+    "backlash": {"backlash": 1e-3},
+    "bias": {"bias": 0.1},
+    "noise": {"noise": 0.1},
+    "q_noise": {"q_noise": 1e-4},
+    "pose_noise": {"pose_noise": 1e-3},
+    "pose_rotation_noise": {"pose_rotation_noise": 1e-3},
+    "q_delay": {"q_delay": 2},
+    "pose_delay": {"pose_delay": 3},
+    "pose_every": {"pose_every": 3},
+    "pose_missing": {"pose_missing": 0.4},
+}
+ALL = Plant(**{name: value for effect in EFFECTS.values() for name, value in effect.items()})
+PLANTS = {**{name: Plant(**effect) for name, effect in EFFECTS.items()}, "all": ALL}
+
+
+def panda(plant=None, steps=12, **changes):
+    """Random motions of a Panda."""
+    scenario = ikgym.scenarios.get("panda-random")
+    return scenario.replace(steps=steps, plant=Plant() if plant is None else plant, **changes)

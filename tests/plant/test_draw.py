@@ -1,0 +1,166 @@
+"""What an episode draws: of the right size, from streams of their own, and the same for all who ask."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import ikgym
+from ikgym import Plant
+from ikgym.exceptions import InvalidInputError
+from ikgym.plant.draw import Draws
+from tests.comparison import identical
+from tests.plant.effects import ALL, panda
+
+PANDA = ikgym.arms.get("panda")
+KEYS = np.random.default_rng(0).integers(2**63, size=2000, dtype=np.uint64)
+ROWS = np.arange(len(KEYS))
+
+
+def arms(plant, arm=PANDA):
+    """The arms that all keys draw, unloaded."""
+    draws = Draws(plant, arm)
+    out = draws.blank(len(KEYS))
+    draws.arms(KEYS, ROWS, out)
+    return type(out)(*[part[:, 0] for part in out])
+
+
+def close(numbers, deviation):
+    """Whether a mean of 0 and a standard deviation are met, as nearly as so many numbers can tell."""
+    return abs(numbers.mean()) < 0.1 * deviation and abs(numbers.std() / deviation - 1.0) < 0.06
+
+
+def test_zeros_shift_joints():
+    hinge = ikgym.Arm("hinge", [[0, 0, 1]], [[0, 0, 1]], (), [1, 0, 0])
+    drawn = arms(Plant(zero=0.01), hinge)
+    assert close(np.arctan2(drawn.tool[:, 1], drawn.tool[:, 0]), 0.01)
+    slide = ikgym.Arm("slide", [[0, 0, 1]], [[1, 0, 0]], (True,))
+    assert close(arms(Plant(zero=0.01), slide).offsets[:, 0, 0], 0.01)
+    single = Draws(Plant(zero=(0.0, *[0.0] * 5, 0.01)), PANDA).one(int(KEYS[0])).arm
+    q = PANDA.home + np.eye(7)[6] * np.arctan2(*_about_z(PANDA, single))
+    np.testing.assert_allclose(single.forward(PANDA.home)[0], PANDA.forward(q)[0], atol=1e-14)
+    assert abs(q - PANDA.home)[6] > 1e-4
+
+
+def _about_z(nominal, turned):
+    """Sine and cosine of the angle between two tools that the last joint alone tells apart."""
+    between = nominal.forward(nominal.home)[0].T @ turned.forward(nominal.home)[0]
+    return between[1, 0], between[0, 0]
+
+
+def test_a_payload_and_a_zero_are_shifts_of_q():
+    """For all joints at once, at any posture."""
+    payload = np.linspace(-0.02, 0.03, 7)
+    drawn = Draws(Plant(payload=payload), PANDA).one(5)
+    q = np.random.default_rng(1).uniform(-2, 2, (20, 7))
+    assert identical(drawn.arm.forward(q), PANDA.forward(q))
+    for got, wanted in zip(drawn.loaded_arm.forward(q), PANDA.forward(q + payload), strict=True):
+        np.testing.assert_allclose(got, wanted, atol=1e-14)
+    both = Draws(Plant(payload=payload, zero=0.01), PANDA).one(5)
+    for got, wanted in zip(both.loaded_arm.forward(q), both.arm.forward(q + payload), strict=True):
+        np.testing.assert_allclose(got, wanted, atol=1e-14)
+
+
+def test_links_and_axes():
+    drawn = arms(Plant(link=0.01))
+    assert close(drawn.offsets - PANDA.offsets, 0.01)
+    assert close(drawn.tool - PANDA.tool, 0.01)
+    assert identical(drawn.axes[0], PANDA.axes)
+    tilted = arms(Plant(axis=0.01)).axes
+    np.testing.assert_allclose(np.linalg.norm(tilted, axis=-1), 1.0, atol=1e-15)
+    for joint, axis in enumerate(PANDA.axes):
+        across = np.linalg.svd(axis[None])[2][1:]
+        assert close(tilted[:, joint] @ across.T, 0.01)
+    assert identical(arms(Plant(axis=0.01)).offsets, np.tile(PANDA.offsets, (len(KEYS), 1, 1)))
+
+
+def test_one_of_some_arms_is_taken():
+    names = ("panda-2", "panda-3", "panda-4")
+    given = [ikgym.arms.get(name) for name in names]
+    drawn = arms(Plant(arms=given))
+    which = [np.flatnonzero([identical(one, arm.offsets) for arm in given]).tolist() for one in drawn.offsets]
+    counts = np.bincount(np.concatenate(which), minlength=3)
+    assert counts.sum() == len(KEYS)
+    assert abs(counts - len(KEYS) / 3).max() < 4 * len(KEYS) ** 0.5
+    weak = [arm.replace(velocity_limit=None) for arm in given]
+    one = Draws(Plant(arms=weak), PANDA).one(3).arm
+    for limit in ("lower", "upper", "velocity_limit", "acceleration_limit"):
+        assert identical(getattr(one, limit), getattr(PANDA, limit))
+
+
+def test_loops_are_drawn_from_their_ranges():
+    bandwidths, delays = Draws(Plant(bandwidth=(10, 20), command_delay=(2, 4)), PANDA).loops(KEYS)
+    assert 10 <= bandwidths.min() < 10.1
+    assert 19.9 < bandwidths.max() <= 20
+    assert abs(bandwidths.mean() - 15) < 0.3
+    assert abs(np.bincount(delays) - [0, 0, *[len(KEYS) / 3] * 3]).max() < 4 * len(KEYS) ** 0.5
+    assert abs(np.corrcoef(bandwidths, delays)[0, 1]) < 0.1
+    bandwidths, delays = Draws(Plant(bandwidth=7.0, command_delay=3), PANDA).loops(KEYS)
+    assert set(bandwidths) == {7.0}
+    assert set(delays) == {3}
+
+
+def test_switching_one_effect_on_shifts_no_other():
+    """Scenarios of equal kinematic severity share their arms, and severities scale one draw."""
+    kinematics = {"zero": 1e-3, "link": 2e-3, "axis": 3e-3}
+    alone = panda(Plant(**kinematics)).drawn_plant(8).arm
+    assert identical(panda(ALL.replace(**kinematics, arms=(), payload=0.0)).drawn_plant(8).arm.chain, alone.chain)
+    link = panda(Plant(link=2e-3)).drawn_plant(8).arm
+    larger = panda(Plant(link=4e-3, pose_every=3)).drawn_plant(8).arm
+    np.testing.assert_allclose(larger.offsets - PANDA.offsets, 2 * (link.offsets - PANDA.offsets), atol=1e-15)
+    assert panda(Plant(command_delay=(0, 9))).drawn_plant(8).command_delay == (
+        panda(ALL.replace(command_delay=(0, 9))).drawn_plant(8).command_delay
+    )
+
+
+@pytest.mark.parametrize("name", ["panda-random", "panda-circle", "varga7-random"])
+def test_the_drawn_plant_is_the_one_that_moves(name):
+    scenario = ikgym.scenarios.get(name).replace(
+        steps=20, plant=ALL.replace(arms=(), payload_step=7), dt=1e-3, iterations_per_point=1
+    )
+    env = ikgym.RedundantIKEnv(scenario)
+    for seed, options in ((5, {}), (6, {}), (6, {"arm_seed": 9})):
+        env.reset(seed=seed, options=options)
+        drawn, rows = scenario.drawn_plant(seed, **options), env._simulator._plant
+        for loaded, arm in enumerate((drawn.arm, drawn.loaded_arm)):
+            for part in ("offsets", "axes", "tool", "tool_rotation"):
+                assert identical(getattr(rows.arms, part)[0, loaded], getattr(arm, part))
+        assert rows.state.delay[0] == drawn.command_delay
+        assert rows.state.lag[0] == 1.0 - np.exp(-2 * np.pi * drawn.bandwidth * 1e-3) or (
+            abs(rows.state.lag[0] / (1.0 - np.exp(-2 * np.pi * drawn.bandwidth * 1e-3)) - 1) < 1e-12
+        )
+        assert drawn.payload_step == 7
+
+
+def test_episodes_draw_other_plants_and_a_reset_without_a_seed_goes_on():
+    env = ikgym.RedundantIKEnv(panda(Plant(zero=1e-2)))
+    q = env.scenario.arm.home
+    seen = [env.reset(seed=seed, options={"q": q})[0]["pose"] for seed in (1, 2, None, None, 1)]
+    assert len({pose.tobytes() for pose in seen[:4]}) == 4
+    assert identical(seen[0], seen[4])
+
+
+def test_the_trajectory_is_that_of_the_ideal_plant():
+    seen = [ikgym.RedundantIKEnv(panda(plant)).reset(seed=4)[0] for plant in (Plant(), ALL)]
+    assert identical(seen[0]["nominal"], seen[1]["nominal"])
+
+
+def test_an_ideal_plant_draws_nothing():
+    generators = [np.random.default_rng(0) for _ in range(2)]
+    scenario = panda()
+    simulator = ikgym.simulator.Simulator(scenario, 1, 1)
+    simulator.reset(np.ones(1, dtype=bool), generators[:1])
+    scenario.trajectory.samples(generators[1:])
+    assert generators[0].random() == generators[1].random()
+
+
+def test_a_plant_that_is_drawn_needs_a_seed():
+    with pytest.raises(InvalidInputError, match="'panda-random' draws its plant: a seed says which episode"):
+        panda(Plant(zero=1e-3)).drawn_plant()
+    still = panda(Plant(bandwidth=12.0, payload=1e-3)).drawn_plant()
+    assert still.bandwidth == 12.0
+    assert still.loaded_arm is not still.arm
+    ideal = panda().drawn_plant()
+    assert ideal.loaded_arm is ideal.arm
+    assert identical(ideal.arm.chain, PANDA.chain)
+    assert ideal.bandwidth == np.inf
