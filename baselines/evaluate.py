@@ -53,6 +53,8 @@ def evaluate(
     overwrite: bool = False,
     plots: bool = True,
     export: str | Iterable[str] = (),
+    noise_seeds: int = 1,
+    pairs: bool = False,
     progress: bool = False,
 ) -> Rows:
     """Plays all policies on all scenarios, and measures them.
@@ -91,6 +93,10 @@ def evaluate(
         plots: Whether to draw plots; needs `out`.
         export: What the joint motion of each episode is written as: ``"csv"``, ``"joint-trajectory"`` or both, see
             :mod:`baselines.evaluation.export`; needs `out`.
+        noise_seeds: How often each episode is played, with other noise in sensors and drives, the same for all
+            policies; once where there is none. Costs of an episode are put together by their geometric mean.
+        pairs: Whether each scenario whose plant is not ideal is played with an ideal one, too, on the same seeds, so
+            that the table can say what the plant costs each policy.
         progress: Whether to show a bar on stderr.
 
     Returns:
@@ -119,6 +125,8 @@ def evaluate(
         timed=timed,
         trust=trust,
         exported=bool(written),
+        noise_seeds=noise_seeds,
+        pairs=pairs,
     )
     folder = None if out is None else pathlib.Path(out)
     return _carry_out(
@@ -230,6 +238,10 @@ class Options:
     export: Annotated[tuple[str, ...], tyro.conf.arg(metavar="FORMAT …")] = ()
     """Write the joint motion of each episode into the folder: csv for times, joint coordinates and velocities as a
     table, joint-trajectory for a message of ROS 2 as JSON, or both."""
+    noise_seeds: Annotated[int, tyro.conf.arg(metavar="N")] = 1
+    """Play each episode so often, with other noise in sensors and drives. Episodes without noise are played once."""
+    pairs: bool = False
+    """Play each scenario whose plant is not ideal with an ideal one, too, and say what the plant costs each policy."""
     operations: bool = False
     """Print what a step costs in evaluations of the kinematics, factorisations and measured poses, too."""
 
@@ -264,6 +276,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             timed=options.timed,
             trust=options.trust,
             exported=bool(written),
+            noise_seeds=options.noise_seeds,
+            pairs=options.pairs,
         )
         _carry_out(
             plan,

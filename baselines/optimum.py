@@ -13,20 +13,22 @@ import tyro
 from tqdm import tqdm
 
 from baselines import command, registry
+from baselines.episode import Draw
 from baselines.evaluation import test_sets as known_sets
 from baselines.oracle import best_known
 from baselines.oracle.best_known import MARGIN, MEANINGLESS
 from baselines.oracle.cache import VARIABLE, solve
 from baselines.oracle.episode import EpisodeProblem, path_of
 from baselines.oracle.optimum import Optimum, Search
+from baselines.oracle.stripped import NOTE, stripped, strips
 from baselines.spec import parse_policy
 from ikgym import scenarios as scenario_registry
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray, whole_number
 
-#: A scenario and the seed of one of its episodes.
-SeededScenario = tuple[Scenario, int]
+#: A scenario, and which of its episodes is meant.
+SeededScenario = tuple[Scenario, Draw]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -74,6 +76,9 @@ Of each episode is printed: its cost; how many paths at full resolution came wit
 starts came within 1 % of the best before the local search, their median and their worst cost; the norm of the gradient
 in [s/rad] or [s/m]; the CPU time of one path at full resolution; and what led there.
 
+Where the plant is not ideal, drives and sensors are left out: the best known cost is that of the arm that moves, driven
+and measured ideally. The search is that of an ideal plant, and its path is polished on that arm.
+
 Optima are kept in the user's folder for such files, or where the environment variable {VARIABLE} says. What was
 found before Ctrl-C is kept."""
 
@@ -91,7 +96,7 @@ def episodes(scenarios: Sequence[str], test_sets: Sequence[str], seeds: Sequence
         InvalidInputError: Seeds are missing, or there is nothing that they belong to; a test set has drifted.
     """
     named = [scenario_registry.get(name) for name in scenarios]
-    drawn = any(scenario.random for scenario in named)
+    drawn = any(map(_drawn, named))
     if bool(seeds) != drawn:
         raise InvalidInputError(
             "seeds: expected some for the random scenarios, got none."
@@ -102,17 +107,22 @@ def episodes(scenarios: Sequence[str], test_sets: Sequence[str], seeds: Sequence
         whole_number("seeds", seed, at_least=0)
     if not (scenarios or test_sets):
         every = map(scenario_registry.get, scenario_registry.names())
-        named = [scenario for scenario in every if not scenario.random]
+        named = [scenario for scenario in every if not _drawn(scenario)]
         test_sets = known_sets.names()
-    out = [(scenario, seed) for scenario in named for seed in (seeds if scenario.random else (0,))]
+    out = [(scenario, Draw(seed)) for scenario in named for seed in (seeds if _drawn(scenario) else (0,))]
     for one in map(known_sets.get, test_sets):
-        out += [(one.scenario, seed) for seed in one.seeds]
+        out += [(one.scenario, Draw(seed, one.arm_seed(seed))) for seed in one.seeds]
     return out
+
+
+def _drawn(scenario: Scenario) -> bool:
+    """Whether episodes differ in what a best known cost is of: in their trajectories or their arms."""
+    return scenario.random or scenario.plant.draws_arm
 
 
 def optima(
     todo: Sequence[SeededScenario], how: Search, policies: Sequence[str] = (), *, cache: bool
-) -> Iterator[tuple[Scenario, Optimum]]:
+) -> Iterator[tuple[Scenario, Draw, Optimum]]:
     """Solves episodes one after the other, with a bar on stderr.
 
     Args:
@@ -129,13 +139,15 @@ def optima(
         bar_format="{desc}{percentage:3.0f}% |{bar}| {elapsed}<{remaining}",
         mininterval=0.1 if sys.stderr.isatty() else 10.0,
     ) as bar:
-        for number, (scenario, seed) in enumerate(todo, start=1):
-            bar.set_description(f"{scenario.name}, seed {seed} ({number}/{len(todo)})")
-            paths = {spec: path(scenario, seed, spec) for spec in policies}
-            optimum = solve(scenario, seed, how, cached=cache, tick=bar.update, paths=paths)
+        for number, (scenario, draw) in enumerate(todo, start=1):
+            bar.set_description(f"{scenario.name}, seed {draw.seed} ({number}/{len(todo)})")
+            true = stripped(scenario, draw.seed, draw.arm_seed)
+            given = {"how": how, "arm_seed": draw.arm_seed, "cached": cache, "tick": bar.update}
+            paths = {spec: path(true, draw.seed, spec) for spec in policies}
+            optimum = solve(scenario, draw.seed, **given, paths=paths)
             bar.update(number - bar.n)
             bar.clear()
-            yield scenario, optimum
+            yield scenario, draw, optimum
 
 
 def path(scenario: Scenario, seed: int, spec: str) -> FloatArray:
@@ -149,11 +161,11 @@ def path(scenario: Scenario, seed: int, spec: str) -> FloatArray:
     return path_of(registry.make(name, scenario, **parameters), scenario, seed)
 
 
-def line(optimum: Optimum) -> str:
-    """What is printed of an episode."""
+def line(optimum: Optimum, note: str = "") -> str:
+    """What is printed of an episode; a note stands behind its cost."""
     spread = optimum.spread
     parts = [
-        f"{optimum.scenario}, seed {optimum.seed}: {optimum.cost:.10g} by {optimum.found_by}",
+        f"{optimum.scenario}, seed {optimum.seed}: {optimum.cost:.10g}{note and f' {note}'} by {optimum.found_by}",
         f"gradient {optimum.gradient_norm:.1e}",
         f"{spread['polished_within_1e-6']:.0f} of {spread['polished']:.0f} paths within 1e-6",
     ]
@@ -165,12 +177,12 @@ def line(optimum: Optimum) -> str:
     return "; ".join([*parts, f"{optimum.seconds:.2f} s a path"])
 
 
-def verdict(scenario: Scenario, optimum: Optimum) -> str | None:
+def verdict(scenario: Scenario, optimum: Optimum, arm_seed: int | None = None) -> str | None:
     """What is wrong with the record of an episode, by the cost of an optimum played anew; None where nothing is."""
-    known = best_known.lookup(scenario, optimum.seed)
+    known = best_known.lookup(scenario, optimum.seed, arm_seed)
     if known is None:
         return "no record of this content"
-    _, cost = EpisodeProblem.of(scenario, optimum.seed).play(optimum.qdot)
+    _, cost = EpisodeProblem.of(stripped(scenario, optimum.seed, arm_seed), optimum.seed).play(optimum.qdot)
     if max(known.cost, cost) <= MEANINGLESS:
         return None
     ratio = np.inf if known.cost == 0.0 else cost / known.cost
@@ -200,9 +212,9 @@ def _carry_out(arguments: Sequence[str]) -> int:
     options = command.parse(Options, arguments, prog=_program(), description=manual())
     kept, wrong = 0, 0
     todo = episodes(options.scenarios, options.test_sets, options.seeds)
-    for scenario, optimum in optima(todo, options.search, options.policies, cache=options.cache):
-        print(line(optimum), flush=True)
-        if options.check and (reason := verdict(scenario, optimum)):
+    for scenario, draw, optimum in optima(todo, options.search, options.policies, cache=options.cache):
+        print(line(optimum, NOTE if strips(scenario) else ""), flush=True)
+        if options.check and (reason := verdict(scenario, optimum, draw.arm_seed)):
             print(f"  {reason}", flush=True)
             wrong += 1
         if options.update:

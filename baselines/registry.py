@@ -39,12 +39,18 @@ _places: dict[str, str] = {
     "qp": f"{_SOLVERS}.quadratic_program.qp:QuadraticProgram",
     "sns": f"{_SOLVERS}.quadratic_program.sns:SaturationInNullSpace",
     "broyden": f"{_SOLVERS}.adaptive.broyden:Broyden",
+    "adaptive_jacobian": f"{_SOLVERS}.adaptive.adaptive_jacobian:AdaptiveJacobian",
+    "offset_free": f"{_SOLVERS}.adaptive.offset_free:OffsetFree",
+    "kalman_jacobian": f"{_SOLVERS}.adaptive.kalman_jacobian:KalmanJacobian",
+    "calibrated": f"{_SOLVERS}.adaptive.calibrated:Calibrated",
+    "predicted": f"{_SOLVERS}.adaptive.predicted:Predicted",
     "rhc_gradient": f"{_SOLVERS}.receding_horizon.gradient:RecedingHorizonGradient",
     "rhc_lagrange": f"{_SOLVERS}.receding_horizon.lagrange:RecedingHorizonLagrange",
     "rhc": f"{_SOLVERS}.receding_horizon.rhc:RecedingHorizon",
     "rhc_foresight": f"{_SOLVERS}.receding_horizon.foresight:RecedingHorizonForesight",
     "smoothed": f"{_SOLVERS}.wrappers.smoothed:Smoothed",
     "full_orientation": f"{_SOLVERS}.wrappers.full_orientation:FullOrientation",
+    "iterative_learning": f"{_SOLVERS}.wrappers.iterative_learning:IterativeLearning",
     "mfac": f"{_SOLVERS}.levenberg_marquardt.mfac:ModelFreeAdaptiveControl",
     "mfapc": f"{_SOLVERS}.levenberg_marquardt.mfapc:ModelFreeAdaptivePredictiveControl",
     "mfac_helix": f"{_SOLVERS}.levenberg_marquardt.presets:HelixAdaptiveControl",
@@ -67,6 +73,7 @@ _places: dict[str, str] = {
 _incomplete: dict[str, str] = {
     "agent": "baselines.agents.policy:Agent",
     "published": f"{_SOLVERS}.references.published:Published",
+    "told": f"{_SOLVERS}.references.told:Told",
 }
 
 

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from baselines import registry
 from baselines.policy import Batch, Memory, Operations, Problem, Solution, SolverPolicy
-from baselines.policy.state import pack, remembered
+from baselines.policy.state import pack, remembered, replace_rows
 from baselines.spec import PolicySpec, parse_policy
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Preview
@@ -78,6 +78,16 @@ class Wrapper(SolverPolicy, abc.ABC):
     def memory(self, rows: int) -> Memory:
         """The wrapper's own memory, then that of the inner policy."""
         return *self.own_memory(rows), *(() if self.inner is None else self.inner.memory(rows))
+
+    def restarted(self, memory: Memory, rows: npt.NDArray[np.bool_]) -> Memory:
+        """See :meth:`SolverPolicy.restarted`; what the inner policy keeps is kept."""
+        own, inside = self.split(memory)
+        fresh = () if self.inner is None else self.inner.restarted(inside, rows)
+        return *self.own_restarted(own, rows), *fresh
+
+    def own_restarted(self, own: Any, rows: npt.NDArray[np.bool_]) -> Memory:
+        """The wrapper's own memory, cleared where an episode begins."""
+        return replace_rows(own, self.own_memory(len(rows)), rows)
 
     def split(self, memory: Memory) -> tuple[Any, Memory]:
         """The wrapper's own part of its memory, of the type of :meth:`own_memory`, and that of the inner policy."""

@@ -95,19 +95,20 @@ def policies() -> list[tuple[str, ...]]:
 
 def test_sets() -> list[tuple[str, ...]]:
     """One line a test set."""
-    rows: list[tuple[str, ...]] = [("set", "episodes", "steps", "task coordinates")]
+    rows: list[tuple[str, ...]] = [("set", "episodes", "noise seeds", "steps", "task coordinates")]
     for one in map(sets.get, sets.names()):
         scenario = one.scenario
         which = f"the first {one.episodes} of the {one.split} split"
-        rows.append((f"`{one.name}`", which, f"{scenario.steps:,}", f"`{scenario.task.name}`"))
+        which += f", {one.sequence} in a row by one arm" if one.sequence > 1 else ""
+        rows.append((f"`{one.name}`", which, str(one.noise_seeds), f"{scenario.steps:,}", f"`{scenario.task.name}`"))
     return rows
 
 
 def records() -> list[tuple[str, ...]]:
-    """One line a test set: how its best known costs were found."""
+    """One line a test set whose best known costs were searched: how they were found."""
     several, alone = "two or more kinds of starts came to it", "random starts or local search alone did"
     head = ("set", "starts: least, median, most", several, alone, "which gained", "largest gradient [s/rad]")
-    known = {one.scenario for one in best_known.read()}
+    known = {one.scenario for one in best_known.read() if "starts" in one.spread}
     return [head, *(_records(name) for name in sets.names() if name in known)]
 
 

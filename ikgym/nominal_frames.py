@@ -45,12 +45,12 @@ class NominalFrames:
         self.in_blocks = self._block < points
         self.shape = (tables, self._block * (2 if self.in_blocks else 1), width)
         self._last_block = self._point[ahead[-1] :] // self._block
-        self._blocks_known = np.zeros(tables, dtype=np.int64)
-        self._episodes: list[Trajectory] = [scenario.trajectory] * tables
 
     def allocate(self) -> FloatArray:
-        """The tables, of :attr:`shape`; that of a fixed scenario is filled."""
+        """The tables, of :attr:`shape`, when there is memory for them; that of a fixed scenario is filled."""
         tables = np.zeros(self.shape)
+        self._blocks_known = np.zeros(len(tables), dtype=np.int64)
+        self._episodes: list[Trajectory] = [self._scenario.trajectory] * len(tables)
         if not self._scenario.random:
             self._know(tables, np.zeros(1, dtype=np.int64))
         return tables

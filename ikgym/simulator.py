@@ -116,6 +116,7 @@ class Simulator:
         generators: Sequence[np.random.Generator] | Mapping[int, np.random.Generator],
         starts: FloatArray | None = None,
         arm_seeds: Sequence[int | None] | None = None,
+        noise_seeds: Sequence[int] | None = None,
     ) -> None:
         """Begins new episodes.
 
@@ -124,6 +125,7 @@ class Simulator:
             generators: One a row; each draws its row's trajectory and plant.
             starts: What :meth:`checked_starts` gave; the scenario's own starts if left out. Shape (N, n).
             arm_seeds: What :meth:`checked_arm_seeds` gave, one a row; arms are drawn with their episodes if left out.
+            noise_seeds: Which noise of drives and sensors, one a row; 0 is that of the generator, as if left out.
         """
         scenario, state = self.scenario, self._state
         rows = np.flatnonzero(active)
@@ -131,7 +133,7 @@ class Simulator:
         if len(rows):
             state.q[rows] = scenario.first_q_of(episodes) if starts is None else starts[rows]
         if self._plant is not None:
-            self._plant.begin(rows, generators, arm_seeds)
+            self._plant.begin(rows, generators, arm_seeds, noise_seeds)
         self._own_start[active] = starts is None
         state.qdot[active] = 0.0
         state.step[active] = 0

@@ -17,6 +17,8 @@ import ikgym
 from baselines import console, registry
 from baselines.console import main
 from baselines.evaluate import evaluate
+from baselines.oracle import best_known
+from baselines.oracle.best_known import beaten
 from docs.tables import PAGES, filled
 
 ROOT = Path(__file__).parents[1]
@@ -152,6 +154,7 @@ def test_readme_table_is_what_the_demo_prints():
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
     rows = evaluate("varga7-fast", re.search(r"^DEMO := (.*)$", makefile, re.MULTILINE)[1].split())
     assert list(shown) == [row.policy for row in rows]
+    assert not any(map(beaten, rows)), f"write them down with: {best_known.UPDATE}"
     for row in rows:
         # Where the path was lost, or nothing but rounding is left, another processor may print other digits.
         lost = row.position_error_max > 1.0
@@ -257,7 +260,7 @@ def test_evaluation_snippets_run(capsys, tmp_path, monkeypatch):
 def test_policies_snippets_run(monkeypatch):
     monkeypatch.setattr(registry, "_places", dict(registry._places))
     monkeypatch.setattr(registry, "_classes", dict(registry._classes))
-    own, real = snippets_of("policies.md")
+    own, real, adapting = snippets_of("policies.md")
     names = {"__name__": __name__}
     exec(compile(own, "policies.md", "exec", dont_inherit=True), names)
     assert [(row.policy, row.parameters.get("gain")) for row in names["rows"]] == [
@@ -268,6 +271,8 @@ def test_policies_snippets_run(monkeypatch):
     exec(compile(real, "policies.md", "exec", dont_inherit=True), names)
     assert abs(names["arm"].forward(names["measured"])[1] - names["positions"][100]).max() < 5e-2  # of an arm of 5 m
     assert baselines.track("varga7-fast", "rhc_gradient", steps=100).q[-1] == pytest.approx(names["measured"])
+    exec(compile(adapting, "policies.md", "exec", dont_inherit=True), names)
+    assert names["adapted"].total_cost < 0.01 * names["alone"].total_cost
 
 
 def test_changelog_names_every_policy():

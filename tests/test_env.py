@@ -20,6 +20,7 @@ from ikgym.exceptions import InvalidInputError, ResetNeededError, UnknownNameErr
 from ikgym.outcome import SOMETIMES
 from tests.comparison import identical
 from tests.every_scenario import every_scenario
+from tests.spawning import random_env
 
 
 def make(scenario="varga7-fast", **kwargs):
@@ -28,7 +29,9 @@ def make(scenario="varga7-fast", **kwargs):
 
 @pytest.mark.parametrize("scenario", every_scenario())
 def test_gymnasium_check_env(scenario):
-    check_env(make(scenario).unwrapped)
+    """Pictures, which take most of its time, of one scenario and of the axis; the tests of the rendering draw all."""
+    drawn = scenario is AXIS or scenario == "varga7-fast"
+    check_env(make(scenario).unwrapped, skip_render_check=not drawn)
 
 
 @pytest.mark.parametrize("scenario", every_scenario())
@@ -262,12 +265,8 @@ def test_importing_changes_no_global_state():
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
-def _spawned_envs():
-    return gym.make("ikgym:RedundantIK-v0", scenario="varga7-random", preview=1)
-
-
 def test_spawned_workers():
-    envs = gym.vector.AsyncVectorEnv([_spawned_envs] * 2, context="spawn")
+    envs = gym.vector.AsyncVectorEnv([random_env] * 2, context="spawn")
     try:
         observation, _ = envs.reset(seed=3)
         here = make("varga7-random", preview=1)

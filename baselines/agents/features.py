@@ -13,6 +13,7 @@ import numpy.typing as npt
 from baselines.agents.feature_kernels import LARGEST, action_rows, feature_rows, project_rows, speed_rows
 from baselines.policy import Batch, Problem
 from ikgym.exceptions import InvalidInputError
+from ikgym.outcome import OBSERVED
 from ikgym.validation import FloatArray, Frozen, known_names, number, whole_number
 
 __all__ = ("LARGEST", "Features", "Processing", "project_rows", "speed_rows")
@@ -116,7 +117,7 @@ class Processing(Frozen):
             problem.cost.delta_x,
             problem.velocity_limit,
             np.array(self.offsets, dtype=np.int64),
-            *batch,
+            *batch[: len(OBSERVED)],
             np.empty((rows, 0)) if base is None else base,
             np.empty((len(self.offsets), e)),
             out,

@@ -21,6 +21,7 @@ COMMANDS = {
     "train": ("train an agent", "baselines.training.command"),
     "reproduce": ("draw the figures of the papers again, and test their claims", "baselines.reproduce"),
     "leaderboard": ("compare agents and solvers on the test sets", "baselines.leaderboard"),
+    "robustness": ("map what imperfect plants cost policies", "baselines.robustness"),
     "oracle": ("search the best known costs", "baselines.optimum"),
 }
 

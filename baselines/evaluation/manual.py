@@ -29,6 +29,7 @@ Examples:
   {prog} --scenarios varga7-random --episodes 20 --workers 4 --out results/random
   {prog} --scenarios varga7-random --episodes 50 --out results/random --resume
   {prog} --test-sets varga7-pose-random --policies rhc_gradient --out results/test
+  {prog} --test-sets panda-camera --pairs --policies dls rhc told --out results/camera
   {prog} --scenarios varga7-random --policies agent:runs/mine.safetensors dls
   {prog} --scenarios lab.toml --policies dls --out results/lab --export csv joint-trajectory
   {prog} --scenarios lab.toml my_module:scenario --policies my_module:MyPolicy dls
@@ -64,6 +65,9 @@ Columns:
   preview                                        steps ahead that were shown, the furthest of some
   fingerprint                                    digest of the scenario and the version of the cost
   test_set                                       digest of the test set, null where there is none
+  arm_seed                                       which arm moved, null where the reset seed said so
+  noise_seed                                     which noise there was, 0 is that of the reset seed
+  ideal                                          fingerprint of the scenario with an ideal plant
   operations                                     mean kinematics, Jacobians, factorisations, measurements in a step,
                                                  empty where nobody counts
 

@@ -11,7 +11,7 @@ from typing import Any, Self
 import numpy as np
 
 from baselines.canonical import canonical
-from baselines.episode import added_up
+from baselines.episode import Draw, added_up
 from baselines.evaluation.rollout import Episode
 from baselines.files.json_files import JsonError, made, shown
 from baselines.status import Status
@@ -20,6 +20,8 @@ from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray
 
+#: What says which episode of an evaluation is meant: scenario, policy, its parameters, what is drawn how, steps.
+Key = tuple[str, str, str, Draw, int]
 #: The columns that are measured with a clock, and so differ from run to run.
 TIME_COLUMNS = ("time_first_us", "time_p50_us", "time_p99_us", "deadline_misses")
 #: An arm that was at some time farther from its nominal position than this, in [m], has lost track; and so has one that
@@ -72,6 +74,9 @@ class Row:
             are not known.
         time_first_us: Wall time of the first call of the policy, in [µs].
         test_set: The digest of the test set that the episode belongs to, see :mod:`baselines.evaluation.test_sets`.
+        arm_seed: Which arm moved; None where the reset seed said so.
+        noise_seed: Which noise there was in sensors and drives; 0 is that of the reset seed.
+        ideal: The fingerprint of the scenario with an ideal plant; its own where the plant is ideal.
     """
 
     scenario: str
@@ -107,6 +112,9 @@ class Row:
     operations: dict[str, float]
     time_first_us: float | None
     test_set: str | None
+    arm_seed: int | None = None
+    noise_seed: int = 0
+    ideal: str | None = None
 
     @property
     def lost(self) -> bool:
@@ -114,9 +122,10 @@ class Row:
         return lost(self.position_error_max, self.orientation_error_max)
 
     @property
-    def key(self) -> tuple[str, str, str, int, int]:
+    def key(self) -> Key:
         """What says which episode of an evaluation this is."""
-        return key(self.scenario, self.policy, self.parameters, self.seed, self.steps)
+        draw = Draw(self.seed, self.arm_seed, self.noise_seed)
+        return key(self.scenario, self.policy, self.parameters, draw, self.steps)
 
     def to_json(self) -> dict[str, Any]:
         """The row as JSON has it: numbers that are not finite are null."""
@@ -155,18 +164,16 @@ def lost(position_error: float, orientation_error: float | None) -> bool:
     return turned or not position_error <= LOST_POSITION
 
 
-def key(
-    scenario: str, policy: str, parameters: Mapping[str, Any], seed: int, steps: int
-) -> tuple[str, str, str, int, int]:
+def key(scenario: str, policy: str, parameters: Mapping[str, Any], draw: Draw, steps: int) -> Key:
     """What says which episode of an evaluation is meant; two are the same where their keys are."""
-    return scenario, policy, canonical(parameters), seed, steps
+    return scenario, policy, canonical(parameters), draw, steps
 
 
 def measure(
     scenario: Scenario,
     policy: str,
     parameters: Mapping[str, Any],
-    seed: int,
+    seed: int | Draw,
     episode: Episode,
     *,
     machine: Mapping[str, Any],
@@ -174,8 +181,10 @@ def measure(
     fingerprint: str,
     test_set: str | None = None,
     best_known: float | None = None,
+    ideal: str | None = None,
 ) -> Row:
     """The row of a recorded episode; see :class:`Row`; the cost ratio is stated against `best_known`."""
+    draw = Draw.of(seed)
     total = float(added_up(episode.tracking_cost + episode.velocity_cost))
     timed, later = len(episode.time_ns) > 0, episode.time_ns[1:] if len(episode.time_ns) > 1 else episode.time_ns
     counted = scenario.counted()[1:]
@@ -187,7 +196,7 @@ def measure(
         scenario=scenario.name,
         policy=policy,
         parameters=dict(parameters),
-        seed=seed,
+        seed=draw.seed,
         steps=scenario.steps,
         total_cost=total,
         tracking_cost=float(added_up(episode.tracking_cost)),
@@ -217,6 +226,9 @@ def measure(
         operations={name: float(count.mean()) for name, count in operations.items() if len(count)},
         time_first_us=float(episode.time_ns[0]) / 1e3 if timed else None,
         test_set=test_set,
+        arm_seed=draw.arm_seed,
+        noise_seed=draw.noise_seed,
+        ideal=ideal,
     )
 
 

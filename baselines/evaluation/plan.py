@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import dataclasses
 import sys
-from collections.abc import Iterable, Iterator, Mapping
-from typing import Any, Literal
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any, Literal, Self
 
+from baselines.episode import Draw
 from baselines.evaluation import metrics
 from baselines.evaluation import test_sets as known_sets
 from baselines.evaluation.entrants import ALL, AnyPolicy, Entrant, Wrap, entrants
 from baselines.evaluation.rollout import Player
 from baselines.files import ResultsError
 from baselines.fingerprints import fingerprint
+from baselines.oracle.stripped import ideal
 from ikgym import scenarios as scenario_registry
 from ikgym.exceptions import InvalidInputError
 from ikgym.preview import offsets
@@ -37,6 +39,10 @@ class Job:
         fingerprint: Of the scenario.
         test_set: The digest of the test set that it belongs to, None where to none.
         exported: Whether its joint motion is kept.
+        arm_seed: Which arm moves; the seed's own if it is None.
+        noise_seed: Which noise there is in sensors and drives, see :class:`baselines.episode.Draw`.
+        before: Reset seeds of the episodes that the arm plays before, and whose last state the policy is handed.
+        ideal: The fingerprint of the scenario with an ideal plant.
     """
 
     scenario: Scenario
@@ -51,11 +57,20 @@ class Job:
     fingerprint: str
     test_set: str | None
     exported: bool = False
+    arm_seed: int | None = None
+    noise_seed: int = 0
+    before: tuple[int, ...] = ()
+    ideal: str | None = None
 
     @property
-    def key(self) -> tuple[str, str, str, int, int]:
+    def draw(self) -> Draw:
+        """What is drawn how."""
+        return Draw(self.seed, self.arm_seed, self.noise_seed)
+
+    @property
+    def key(self) -> metrics.Key:
         """The key of the row to come."""
-        return metrics.key(self.scenario.name, self.policy, self.parameters, self.seed, self.scenario.steps)
+        return metrics.key(self.scenario.name, self.policy, self.parameters, self.draw, self.scenario.steps)
 
     def make(self) -> Player:
         """The policy.
@@ -100,6 +115,8 @@ def make_plan(
     timed: int | Literal["all"] = 1,
     trust: bool = False,
     exported: bool = False,
+    noise_seeds: int = 1,
+    pairs: bool = False,
 ) -> EvaluationPlan:
     """All episodes of an evaluation, policy by policy within each scenario.
 
@@ -115,6 +132,9 @@ def make_plan(
         timed: Episodes of each policy in each scenario that are timed, ``"all"`` for all of them.
         trust: Whether the files of all agents given are trusted, see :class:`baselines.agents.policy.Agent`.
         exported: Whether the joint motions of all episodes are kept.
+        noise_seeds: How often each episode is played, with other noise in sensors and drives; once where there is none.
+            Test sets say so themselves.
+        pairs: Whether each scenario whose plant is not ideal is played with an ideal one, too, on the same seeds.
 
     Raises:
         UnknownNameError: There is no such scenario, policy, parameter, split or test set.
@@ -123,30 +143,38 @@ def make_plan(
         ResultsError: The file of an agent cannot be used.
     """
     listed, sets = _scenarios(scenarios, steps), (test_sets,) if isinstance(test_sets, str) else tuple(test_sets)
-    if sets and (listed or (episodes, split, steps) != (1, "test", None)):
+    if sets and (listed or (episodes, split, steps, noise_seeds) != (1, "test", None, 1)):
         raise InvalidInputError(
             f"A test set says itself what is played: with {', '.join(map(repr, sets))}, expected no scenarios, "
-            "episodes, split or steps."
+            "episodes, split, steps or noise_seeds."
         )
+    whole_number("noise_seeds", noise_seeds, at_least=1)
     drawn = scenario_registry.seeds(split, episodes)
     if preview is not None:
         offsets(preview)
     clocked = sys.maxsize if timed == ALL else whole_number("timed", timed, at_least=1)
     everyone = entrants(policies, trust=trust, wrap=wrap)
-    jobs: dict[tuple[str, str, str, int, int], Job] = {}
+    jobs: dict[metrics.Key, Job] = {}
     skipped: list[Skipped] = []
-    for scenario, seeds, label in [*_fixed(sets), *_drawn(listed, drawn)]:
-        digest = fingerprint(scenario)
+    played = [*_fixed(sets), *_drawn(listed, drawn, noise_seeds)]
+    for some in _paired(played) if pairs else played:
+        scenario, draws = some.scenario, some.draws
+        digest, of_ideal = fingerprint(scenario), fingerprint(ideal(scenario))
         for one in everyone:
-            if reason := one.unsuited(scenario, seeds[0], preview):
+            if reason := one.unsuited(scenario, draws[0], preview):
                 skipped.append(Skipped(scenario.name, one.name, reason))
                 continue
-            policy = one.make(scenario, one.for_episode(scenario, seeds[0]), preview)
+            policy = one.make(scenario, one.for_episode(scenario, draws[0]), preview)
             own, shown = one.parameters(scenario, policy), one.shown(policy, preview)
-            for number, seed in enumerate(seeds):
-                given = one.for_episode(scenario, seed)
+            for number, draw in enumerate(draws):
+                given = one.for_episode(scenario, draw)
                 first, alone = number == 0, number < clocked
-                job = Job(scenario, one.name, one, given, own, seed, first, alone, shown, digest, label, exported)
+                # A reference is made for one episode, and has nothing to learn from those before.
+                before = () if one.made_for_episodes(scenario) else some.before(draw)
+                job = Job(
+                    *(scenario, one.name, one, given, own, draw.seed, first, alone, shown, digest, some.test_set),
+                    *(exported, draw.arm_seed, draw.noise_seed, before, of_ideal),
+                )
                 jobs.setdefault(job.key, job)
     if not jobs:
         raise InvalidInputError(
@@ -159,19 +187,62 @@ def make_plan(
     return EvaluationPlan(tuple(jobs.values()), tuple(skipped))
 
 
-def _fixed(names: Iterable[str]) -> Iterator[tuple[Scenario, tuple[int, ...], str | None]]:
-    """The scenarios of test sets, their seeds and their digests."""
+@dataclasses.dataclass(frozen=True)
+class _Episodes:
+    """Episodes of a scenario that are to be played.
+
+    Args:
+        scenario: What is to be tracked.
+        draws: What is drawn how.
+        test_set: The digest of the test set that they belong to, None where to none.
+        sequence: Episodes that one arm plays one after the other.
+    """
+
+    scenario: Scenario
+    draws: tuple[Draw, ...]
+    test_set: str | None = None
+    sequence: int = 1
+
+    @classmethod
+    def of(
+        cls, scenario: Scenario, seeds: Iterable[int], noise_seeds: int, test_set: str | None = None, sequence: int = 1
+    ) -> Self:
+        """The episodes with these seeds; each of them once where there is no noise."""
+        times = noise_seeds if scenario.plant.noisy else 1
+        arm_seeds = {seed: seed // sequence if sequence > 1 else None for seed in seeds}
+        draws = tuple(Draw(seed, arm, noise) for seed, arm in arm_seeds.items() for noise in range(times))
+        return cls(scenario, draws, test_set, sequence)
+
+    def before(self, draw: Draw) -> tuple[int, ...]:
+        """The seeds of the episodes that the same arm plays before."""
+        return () if draw.arm_seed is None else tuple(range(draw.arm_seed * self.sequence, draw.seed))
+
+
+def _fixed(names: Iterable[str]) -> Iterator[_Episodes]:
+    """The episodes of test sets."""
     for one in map(known_sets.get, names):
-        yield one.scenario, one.seeds, one.digest
+        yield _Episodes.of(one.scenario, one.seeds, one.noise_seeds, one.digest, one.sequence)
 
 
-def _drawn(
-    scenarios: Iterable[Scenario], drawn: tuple[int, ...]
-) -> Iterator[tuple[Scenario, tuple[int, ...], str | None]]:
-    """Scenarios, the seeds that they are played with, and that they belong to no set."""
+def _drawn(scenarios: Iterable[Scenario], drawn: tuple[int, ...], noise_seeds: int) -> Iterator[_Episodes]:
+    """Episodes of scenarios that belong to no set; arms play as many in a row as in the set of the same name."""
     for scenario in scenarios:
         # One that is the same at every reset would only be played N times over.
-        yield scenario, drawn if scenario.random or scenario.plant.random else (0,), None
+        seeds = drawn if scenario.random or scenario.plant.random else (0,)
+        yield _Episodes.of(scenario, seeds, noise_seeds, sequence=known_sets.sequence(scenario.name))
+
+
+def _paired(played: Sequence[_Episodes]) -> Iterator[_Episodes]:
+    """The episodes, and those with an ideal plant on the same seeds, unless that scenario is played anyway."""
+    yield from played
+    there = {fingerprint(one.scenario) for one in played}
+    names: dict[str, str] = {}
+    for one in played:
+        plain = ideal(one.scenario)
+        if (content := fingerprint(plain)) not in there:
+            name = names.setdefault(content, f"{one.scenario.name}, ideal plant")
+            seeds = dict.fromkeys(draw.seed for draw in one.draws)
+            yield _Episodes.of(plain.replace(name=name), seeds, noise_seeds=1)
 
 
 def _scenarios(given: str | Scenario | Iterable[str | Scenario], steps: int | None) -> list[Scenario]:

@@ -15,7 +15,7 @@ from urllib.parse import quote
 from baselines import registry
 from baselines.evaluation.metrics import LOST_ORIENTATION, LOST_POSITION, Row
 from baselines.evaluation.plan import Skipped
-from baselines.evaluation.summary import Spread, Summary, summarise
+from baselines.evaluation.summary import Paired, Spread, Summary, summarise
 from baselines.evaluation.text_table import Column, fitting, plain
 from baselines.oracle import best_known
 from ikgym.exceptions import IkgymError
@@ -215,6 +215,20 @@ def _spread(names: Mapping[int, str], summaries: Sequence[Summary]) -> list[Colu
         column("worst", lambda spread: number(spread.worst)),
         column("worst seed", lambda spread: str(spread.worst_seed)),
         Column("lost", "", lambda s: str(s.lost)),
+        *(_beside_ideal() if any(summary.paired for summary in summaries) else ()),
+    ]
+
+
+def _beside_ideal() -> list[Column]:
+    """The columns of matched pairs: the same policy on an ideal plant, and what it costs more than there."""
+
+    def column(title: str, unit: str, cell: Callable[[Paired], str]) -> Column:
+        return Column(title, unit, lambda s: cell(s.paired) if s.paired else NOTHING)
+
+    return [
+        column("ideal", "ratio", lambda pair: number(pair.cost_ratio)),
+        column("× ideal", "cost", lambda pair: number(pair.mean)),
+        column("95 %", "", lambda pair: f"{number(pair.low)} … {number(pair.high)}"),
     ]
 
 
@@ -261,6 +275,13 @@ def _notes(rows: Sequence[Row]) -> list[str]:
             "several episodes: costs and cost ratio are geometric means, errors, q̇ peak, p99 and status the worst, p50 "
             "the median, misses the sum; times are those of episodes that were played alone; lost: episodes with more "
             f"than {1e3 * LOST_POSITION:g} mm or {LOST_ORIENTATION:g} rad of error at some time"
+        )
+    if any(row.noise_seed for row in rows):
+        notes.append("costs of an episode are geometric means over its noise seeds; lost counts each of them")
+    if any(summary.paired for summaries in by_scenario(rows).values() for summary in summaries):
+        notes.append(
+            "ideal: cost ratio of the same policy with an ideal plant; × ideal: its cost divided by that on the ideal "
+            "plant with the same seed, geometric mean, and the interval of that over the seeds"
         )
     return notes + _beaten(rows)
 

@@ -163,7 +163,8 @@ class Results:
 
     def export_file(self, of: Job | Row, kind: Format) -> pathlib.Path:
         """Where the joint motion of an episode is written."""
-        return self._file_of(of, "export", f"-seed-{of.seed}{kind.suffix}")
+        noise = f"-noise-{of.noise_seed}" if of.noise_seed else ""
+        return self._file_of(of, "export", f"-seed-{of.seed}{noise}{kind.suffix}")
 
     def _file_of(self, of: Job | Row, folder: str, ending: str) -> pathlib.Path:
         scenario = of.scenario if isinstance(of, Row) else of.scenario.name

@@ -5,13 +5,13 @@ from __future__ import annotations
 import dataclasses
 import gc
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
-from baselines.episode import play
+from baselines.episode import Draw, play
 from baselines.policy import Memory, Operations, Report
 from ikgym.exceptions import InvalidInputError
 from ikgym.outcome import Observation, observation
@@ -41,7 +41,7 @@ class Player(Protocol):
     def commands(self) -> int:
         """How many of the last commands it asks for."""
 
-    def predict(self, observation: Any, state: Any = None) -> tuple[npt.NDArray[Any], Any]:
+    def predict(self, observation: Any, state: Any = None, episode_start: Any = None) -> tuple[npt.NDArray[Any], Any]:
         """Actions, and the state for the next call, which is never None."""
 
     def report(self, state: Any) -> Report:
@@ -97,7 +97,7 @@ class Episode:
 def rollout(
     scenario: Scenario,
     policy: Player,
-    seed: int,
+    seed: int | Draw,
     *,
     preview: Preview | None = None,
     timed: bool = True,
@@ -111,7 +111,7 @@ def rollout(
     Args:
         scenario: What is to be tracked.
         policy: Who tracks it.
-        seed: The reset seed.
+        seed: The reset seed, or what is drawn how.
         preview: What the policy is shown; what it asks for if left out.
         timed: Whether the times of the calls are kept.
         tick: See :data:`Tick`.
@@ -122,14 +122,14 @@ def rollout(
     Raises:
         InvalidInputError: The preview is none, or shorter than the policy needs; an action is refused.
     """
-    (episode,) = _play(scenario, policy, [seed], preview, tick, alone=True, timed=timed)
+    (episode,), _ = _play(scenario, policy, [seed], preview, tick, alone=True, timed=timed)
     return episode
 
 
 def rollouts(
     scenario: Scenario,
     policy: Player,
-    seeds: Sequence[int],
+    seeds: Sequence[int | Draw],
     *,
     preview: Preview | None = None,
     tick: Tick | None = None,
@@ -139,7 +139,7 @@ def rollouts(
     Args:
         scenario: What is to be tracked.
         policy: Who tracks it.
-        seeds: The reset seeds.
+        seeds: The reset seeds, or what is drawn how.
         preview: What the policy is shown; what it asks for if left out.
         tick: See :data:`Tick`; the steps of all episodes count.
 
@@ -149,17 +149,55 @@ def rollouts(
     Raises:
         InvalidInputError: The preview is none, or shorter than the policy needs; an action is refused.
     """
-    return _play(scenario, policy, seeds, preview, tick, alone=False, timed=False)
+    return _play(scenario, policy, seeds, preview, tick, alone=False, timed=False)[0]
 
 
-def finite(action: npt.NDArray[Any], policy: Player, scenario: Scenario, seeds: Sequence[int], steps: int) -> None:
+def sequence(
+    scenario: Scenario,
+    policy: Player,
+    episodes: Sequence[Sequence[Draw]],
+    *,
+    preview: Preview | None = None,
+    alone: bool = False,
+    timed: bool = False,
+    tick: Tick | None = None,
+) -> Iterator[list[Episode]]:
+    """Plays episodes one after the other, and hands the policy's state on; it is told where an episode begins.
+
+    What a policy has learned of its arm can so be of use in the next episode; what does not survive `episode_start` is
+    cleared there.
+
+    Args:
+        scenario: What is to be tracked.
+        policy: Who tracks it.
+        episodes: What is drawn how, of arms side by side, in each episode.
+        preview: What the policy is shown; what it asks for if left out.
+        alone: Whether there is one arm, and the policy is called without an axis of arms.
+        timed: Whether the times of the calls are kept.
+        tick: See :data:`Tick`.
+
+    Yields:
+        What :func:`rollouts` gives of each episode.
+
+    Raises:
+        InvalidInputError: As in :func:`rollouts`.
+    """
+    state: Any = None
+    for draws in episodes:
+        played, state = _play(scenario, policy, draws, preview, tick, alone=alone, timed=timed, state=state)
+        yield played
+
+
+def finite(
+    action: npt.NDArray[Any], policy: Player, scenario: Scenario, seeds: Sequence[int | Draw], steps: int
+) -> None:
     """Refuses actions that are not finite, and says whose they are.
 
     Args:
         action: Of shape (n,), or (B, n).
         policy: Who chose them.
         scenario: What is tracked.
-        seeds: The reset seeds of the B arms.
+        seeds: The reset seeds of the B arms, or what is drawn how.
         steps: Steps made before.
 
     Raises:
@@ -169,8 +207,9 @@ def finite(action: npt.NDArray[Any], policy: Player, scenario: Scenario, seeds: 
         return
     rows = action.reshape(len(seeds), -1)
     row = int(np.argmin(np.isfinite(rows).all(axis=1)))
+    seed = Draw.of(seeds[row]).seed
     raise InvalidInputError(
-        f"{policy.name} in {scenario.name}, seed {seeds[row]}, step {steps + 1}: expected finite actions, got "
+        f"{policy.name} in {scenario.name}, seed {seed}, step {steps + 1}: expected finite actions, got "
         f"{rows[row].tolist()}."
     )
 
@@ -178,13 +217,15 @@ def finite(action: npt.NDArray[Any], policy: Player, scenario: Scenario, seeds: 
 def _play(
     scenario: Scenario,
     policy: Player,
-    seeds: Sequence[int],
+    seeds: Sequence[int | Draw],
     preview: Preview | None,
     tick: Tick | None,
     *,
     alone: bool,
     timed: bool,
-) -> list[Episode]:
+    state: Any = None,
+) -> tuple[list[Episode], Any]:
+    """The episodes, and the state behind them; one that is given is that of the episodes before."""
     rows, steps, n, m = len(seeds), scenario.steps, scenario.joints, scenario.task.size
     shown = policy.preview if preview is None else preview
     q, qdot, pose = np.empty((rows, steps, n)), np.empty((rows, steps, n)), np.empty((rows, steps, m))
@@ -196,7 +237,8 @@ def _play(
     counters: list[Memory] = []
 
     clock = time.perf_counter_ns
-    state: Any = None
+    # A policy without a state knows that an episode begins.
+    begins = None if state is None else np.ones(rows, dtype=np.bool_)
     made = 0
 
     def act(out: Outcome) -> npt.NDArray[Any]:
@@ -206,7 +248,8 @@ def _play(
             # Compilation, caches and first touch of memory belong to no step: one call on a copy, its answer dropped.
             policy.predict({key: value.copy() for key, value in seen.items()})
         begin = clock()
-        action, state = policy.predict(seen, state)
+        told = {} if begins is None or made else {"episode_start": begins}
+        action, state = policy.predict(seen, state, **told)
         end = clock()
         if timed:
             time_ns[made] = end - begin
@@ -235,7 +278,7 @@ def _play(
     if tick is not None:
         tick(steps % TICK * rows)
     counted = [np.array(steps) for steps in zip(*counters, strict=True)]
-    return [
+    episodes = [
         Episode(
             q[row],
             qdot[row],
@@ -253,6 +296,7 @@ def _play(
         )
         for row in range(rows)
     ]
+    return episodes, state
 
 
 def _seen(out: Outcome, alone: bool) -> Observation:

@@ -17,17 +17,18 @@ from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
 from baselines.canonical import canonical, jsonable
+from baselines.episode import Draw
 from baselines.evaluation.entrants import ForeignPolicy, check_sendable, play_wrapped
 from baselines.evaluation.export import Motion
 from baselines.evaluation.machine import describe
 from baselines.evaluation.metrics import Row, measure
 from baselines.evaluation.plan import Job
-from baselines.evaluation.rollout import Episode, Player, Tick, rollout, rollouts
+from baselines.evaluation.rollout import Episode, Player, Tick, rollout, rollouts, sequence
 from baselines.evaluation.trajectory_log import TrajectoryLog, trajectory_log
 from baselines.lifetime import end_with_parent
 from baselines.oracle import best_known
 from ikgym.compilation import logger
-from ikgym.exceptions import IkgymError
+from ikgym.exceptions import IkgymError, InvalidInputError
 from ikgym.preview import furthest
 from ikgym.scenarios import Preview, Scenario
 
@@ -175,13 +176,38 @@ def play(batch: Sequence[Job], tick: Tick | None = None) -> list[Played]:
         batch: The jobs.
         tick: See :data:`baselines.evaluation.rollout.Tick`.
     """
-    first = batch[0]
-    seeds = [job.seed for job in batch]
+    first, draws = batch[0], [job.draw for job in batch]
     # The matrices of one arm are too small to share out, and threads would blur the times. Environment variables
     # would be heeded only by libraries that are not loaded yet, and NumPy is.
     with threadpool_limits(limits=1):
-        episodes = play_episodes(first.scenario, first.make(), seeds, first.preview, timed=first.timed, tick=tick)
+        if any(job.before for job in batch):
+            episodes = _in_sequence(batch, first.make(), tick)
+        else:
+            episodes = play_episodes(first.scenario, first.make(), draws, first.preview, timed=first.timed, tick=tick)
     return [_played(job, one) for job, one in zip(batch, episodes, strict=True)]
+
+
+def _in_sequence(batch: Sequence[Job], policy: Player, tick: Tick | None) -> list[Episode]:
+    """Episodes of arms that play several in a row: those before are played, too, since the policy learns from them.
+
+    Raises:
+        InvalidInputError: The policy plays a wrapped environment, whose states are its own.
+    """
+    first = batch[0]
+    alone = first.timed or isinstance(policy, ForeignPolicy)
+    if isinstance(policy, ForeignPolicy) and policy.wrap is not None:
+        raise InvalidInputError(f"wrap: {first.scenario.name} is played in sequences of episodes, without wrappers.")
+    length = max(len(job.before) for job in batch) + 1
+    starts = list(dict.fromkeys(job.draw._replace(seed=job.seed - len(job.before)) for job in batch))
+    out: dict[Draw, Episode] = {}
+    for arms in [[one] for one in starts] if alone else [starts]:
+        episodes = [[one._replace(seed=one.seed + k) for one in arms] for k in range(length)]
+        all_played = sequence(
+            first.scenario, policy, episodes, preview=first.preview, alone=alone, timed=first.timed, tick=tick
+        )
+        for draws, played in zip(episodes, all_played, strict=True):
+            out |= zip(draws, played, strict=True)
+    return [out[job.draw] for job in batch]
 
 
 def _played(job: Job, episode: Episode) -> Played:
@@ -191,14 +217,20 @@ def _played(job: Job, episode: Episode) -> Played:
 
 
 def play_episodes(
-    scenario: Scenario, policy: Player, seeds: Sequence[int], preview: Preview, *, timed: bool, tick: Tick | None = None
+    scenario: Scenario,
+    policy: Player,
+    draws: Sequence[int | Draw],
+    preview: Preview,
+    *,
+    timed: bool,
+    tick: Tick | None = None,
 ) -> list[Episode]:
     """Plays episodes of a policy, together where it may be called for many arms.
 
     Args:
         scenario: What is to be tracked.
         policy: Who tracks it.
-        seeds: The reset seeds; of what is timed, one.
+        draws: The reset seeds, or what is drawn how; of what is timed, one.
         preview: What the policy is shown.
         timed: Whether to keep the times of single calls.
         tick: See :data:`baselines.evaluation.rollout.Tick`.
@@ -208,12 +240,12 @@ def play_episodes(
     """
     if isinstance(policy, ForeignPolicy):
         if policy.wrap is not None:
-            return [play_wrapped(scenario, policy, seed, timed=timed, tick=tick) for seed in seeds]
-        return [rollout(scenario, policy, seed, preview=preview, timed=timed, tick=tick) for seed in seeds]
+            return [play_wrapped(scenario, policy, draw, timed=timed, tick=tick) for draw in draws]
+        return [rollout(scenario, policy, draw, preview=preview, timed=timed, tick=tick) for draw in draws]
     if timed:
-        (seed,) = seeds
-        return [rollout(scenario, policy, seed, preview=preview, tick=tick)]
-    return rollouts(scenario, policy, seeds, preview=preview, tick=tick)
+        (draw,) = draws
+        return [rollout(scenario, policy, draw, preview=preview, tick=tick)]
+    return rollouts(scenario, policy, draws, preview=preview, tick=tick)
 
 
 def _row(job: Job, episode: Episode) -> Row:
@@ -221,13 +253,14 @@ def _row(job: Job, episode: Episode) -> Row:
         job.scenario,
         job.policy,
         job.parameters,
-        job.seed,
+        job.draw,
         episode,
         machine=describe(),
         preview=furthest(job.preview),
         fingerprint=job.fingerprint,
         test_set=job.test_set,
-        best_known=best_known.cost(job.scenario, job.seed),
+        best_known=best_known.cost(job.scenario, job.seed, job.arm_seed),
+        ideal=job.ideal,
     )
 
 

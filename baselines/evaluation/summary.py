@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import statistics
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -15,6 +15,9 @@ from baselines.evaluation.metrics import Row
 from baselines.status import Status
 from ikgym.exceptions import InvalidInputError
 from ikgym.validation import FloatArray
+
+#: How many times is resampled for an interval.
+RESAMPLES = 9999
 
 
 @dataclasses.dataclass(frozen=True)
@@ -48,6 +51,26 @@ class Spread:
         return cls.of(dict(enumerate(np.ravel(values).tolist())))
 
 
+class Paired(NamedTuple):
+    """A policy beside itself on an ideal plant, on the same reset seeds.
+
+    Attributes:
+        ideal: Geometric mean of the total cost on the ideal plant.
+        cost_ratio: Geometric mean of the cost ratio there; None where it is not known.
+        mean: Geometric mean of the cost divided by that of the same seed on the ideal plant.
+        low: Lower end of its interval of 95 %, over the seeds.
+        high: Upper end.
+        episodes: Seeds that both have played.
+    """
+
+    ideal: float
+    cost_ratio: float | None
+    mean: float
+    low: float
+    high: float
+    episodes: int
+
+
 @dataclasses.dataclass(frozen=True)
 class Summary:
     """The episodes of one policy in one scenario, put together.
@@ -57,7 +80,7 @@ class Summary:
         policy: Its name.
         parameters: The policy's parameters.
         steps: Steps of an episode.
-        episodes: How many there are.
+        episodes: How many there are; those that differ in their noise alone are one.
         total_cost: Over the episodes.
         tracking_cost: Geometric mean.
         velocity_cost: Geometric mean.
@@ -72,7 +95,8 @@ class Summary:
         status: The worst.
         operations: Means over the episodes; empty where they are not known.
         time_first_us: The largest, in [µs].
-        lost: In how many the arm lost track, see :func:`baselines.evaluation.metrics.lost`.
+        lost: In how many the arm lost track, see :func:`baselines.evaluation.metrics.lost`; each noise seed counts.
+        paired: The policy beside itself on an ideal plant; None where the plant is ideal, or it has not played there.
     """
 
     scenario: str
@@ -95,6 +119,7 @@ class Summary:
     operations: dict[str, float]
     time_first_us: float | None
     lost: int
+    paired: Paired | None = None
 
 
 class Times(NamedTuple):
@@ -142,7 +167,49 @@ def summarise(rows: Iterable[Row]) -> list[Summary]:
                 f"{contents[row.scenario]} and {content}."
             )
         groups.setdefault((row.scenario, row.policy, canonical(row.parameters), row.steps), []).append(row)
-    return [_summary(group) for group in groups.values()]
+    on_ideal = {
+        (group[0].fingerprint, *key[1:]): group
+        for key, group in groups.items()
+        if group[0].fingerprint == group[0].ideal
+    }
+    return [_summary(group, on_ideal.get((str(group[0].ideal), *key[1:]))) for key, group in groups.items()]
+
+
+def by_seed(rows: Iterable[Row], value: Callable[[Row], float]) -> dict[int, float]:
+    """A number of each episode: the geometric mean over its noise seeds, by its reset seed."""
+    found: dict[int, list[float]] = {}
+    for row in rows:
+        found.setdefault(row.seed, []).append(value(row))
+    return {seed: geometric_mean(values) for seed, values in found.items()}
+
+
+def paired(rows: Sequence[Row], ideal: Sequence[Row]) -> Paired | None:
+    """A policy beside itself on an ideal plant; None where they have no seed in common, or a cost is 0."""
+    costs, plain = by_seed(rows, _total), by_seed(ideal, _total)
+    common = [seed for seed in costs if seed in plain]
+    if not common or min(plain[seed] for seed in common) <= 0.0 or min(costs[seed] for seed in common) <= 0.0:
+        return None
+    ratios = [costs[seed] / plain[seed] for seed in common]
+    known = [row.cost_ratio for row in ideal if row.seed in costs and row.cost_ratio is not None]
+    return Paired(
+        geometric_mean([plain[seed] for seed in common]),
+        geometric_mean(known) if len(known) == len(common) else None,
+        geometric_mean(ratios),
+        *geometric_interval(ratios),
+        len(common),
+    )
+
+
+def geometric_interval(values: Sequence[float]) -> tuple[float, float]:
+    """The interval of 95 % of a geometric mean: the percentile bootstrap over its values, always the same draws."""
+    logs = np.log(values)
+    drawn = np.random.default_rng(0).integers(len(logs), size=(RESAMPLES, len(logs)))
+    low, high = np.exp(np.percentile(logs[drawn].mean(axis=1), (2.5, 97.5)))
+    return float(low), float(high)
+
+
+def _total(row: Row) -> float:
+    return row.total_cost
 
 
 def geometric_mean(values: Sequence[float]) -> float:
@@ -152,9 +219,10 @@ def geometric_mean(values: Sequence[float]) -> float:
     return values[0] if len(values) == 1 else math.exp(math.fsum(map(math.log, values)) / len(values))
 
 
-def _summary(rows: Sequence[Row]) -> Summary:
+def _summary(rows: Sequence[Row], ideal: Sequence[Row] | None) -> Summary:
     first = rows[0]
-    cost_ratios = {row.seed: row.cost_ratio for row in rows if row.cost_ratio is not None}
+    costs = by_seed(rows, _total)
+    known = all(row.cost_ratio is not None for row in rows)
     angles = [row.orientation_error_max for row in rows if row.orientation_error_max is not None]
     clocked = times(rows)
     misses = [row.deadline_misses for row in rows if row.deadline_misses is not None]
@@ -163,11 +231,11 @@ def _summary(rows: Sequence[Row]) -> Summary:
         policy=first.policy,
         parameters=first.parameters,
         steps=first.steps,
-        episodes=len(rows),
-        total_cost=Spread.of({row.seed: row.total_cost for row in rows}),
+        episodes=len(costs),
+        total_cost=Spread.of(costs),
         tracking_cost=geometric_mean([row.tracking_cost for row in rows]),
         velocity_cost=geometric_mean([row.velocity_cost for row in rows]),
-        cost_ratio=Spread.of(cost_ratios) if len(cost_ratios) == len(rows) else None,
+        cost_ratio=Spread.of(by_seed(rows, lambda row: row.cost_ratio or 0.0)) if known else None,
         position_error_max=max(row.position_error_max for row in rows),
         orientation_error_max=max(angles) if angles else None,
         qdot_peak=max(row.qdot_peak for row in rows),
@@ -179,4 +247,5 @@ def _summary(rows: Sequence[Row]) -> Summary:
         operations={name: statistics.fmean(row.operations[name] for row in rows) for name in first.operations},
         time_first_us=clocked.first_us,
         lost=sum(row.lost for row in rows),
+        paired=None if ideal is None or first.fingerprint == first.ideal else paired(rows, ideal),
     )

@@ -23,12 +23,17 @@ class TestSet:
         episodes: How many: the first seeds of the split.
         digest: What :func:`baselines.fingerprints.set_hash` gave when the set was made.
         split: Where the seeds come from, see :data:`ikgym.scenarios.SPLITS`.
+        noise_seeds: How often each episode is played, with other noise in sensors and drives.
+        sequence: Episodes that one arm plays one after the other: those with the seed s have the arm seed
+            s // sequence, and a policy's state is handed on. 1 where every episode has its own arm.
     """
 
     name: str
     episodes: int
     digest: str
     split: str = "test"
+    noise_seeds: int = 1
+    sequence: int = 1
 
     @property
     def scenario(self) -> Scenario:
@@ -39,6 +44,10 @@ class TestSet:
     def seeds(self) -> tuple[int, ...]:
         """The reset seeds."""
         return scenarios.seeds(self.split, self.episodes)
+
+    def arm_seed(self, seed: int) -> int | None:
+        """Which arm moves in the episode of a seed; None where the seed itself says so."""
+        return seed // self.sequence if self.sequence > 1 else None
 
 
 #: All test sets: those that scores are published on, and those in the papers' own skew coordinates.
@@ -52,8 +61,24 @@ SETS = {
         # Half of the episodes of the first: each needs a search of its own for its best known cost.
         TestSet("panda-random", episodes=128, digest="f4492864d6be"),
         TestSet("iiwa14-random", episodes=128, digest="4b2efa43deaa"),
+        # Those of imperfect plants. 64 episodes each, of 3,000 steps: with three noise seeds a policy moves for 576,000
+        # steps, and every episode needs a best known cost on an arm of its own.
+        TestSet("panda-ideal", episodes=64, digest="48bde4a871be"),
+        TestSet("panda-measured", episodes=64, digest="c6fd6151ddef"),
+        TestSet("panda-camera", episodes=64, digest="fef44af732ba", noise_seeds=3),
+        TestSet("panda-camera-slow", episodes=64, digest="6d89d0594207", noise_seeds=3),
+        # 13 arms with five episodes each.
+        TestSet("panda-same-arm", episodes=65, digest="bc8dd757d74b", noise_seeds=3, sequence=5),
+        TestSet("panda-payload", episodes=64, digest="1dcbd797b41b"),
+        TestSet("panda-bus", episodes=64, digest="700b8d28bf95"),
+        TestSet("panda-field", episodes=64, digest="3f19a2c4b072", noise_seeds=3),
     )
 }
+
+
+def sequence(name: str) -> int:
+    """Episodes that one arm plays one after the other in a scenario, as its test set says; 1 where there is none."""
+    return SETS[name].sequence if name in SETS else 1
 
 
 def names() -> tuple[str, ...]:

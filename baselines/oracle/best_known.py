@@ -1,7 +1,8 @@
 """The best known costs of single episodes, and what they are for: cost ratio = cost / best known cost.
 
 They lie in `baselines/data/best_known.json`, one record a line. A record belongs to the content of its episode, see
-:func:`baselines.fingerprints.episode_hash`: where scenario, steps or cost have changed since it is none.
+:func:`baselines.fingerprints.episode_hash`: where scenario, steps or cost have changed since it is none. The episode is
+that of :func:`baselines.oracle.stripped.stripped`, so that scenarios in which the same arm moves share their records.
 """
 
 from __future__ import annotations
@@ -12,11 +13,12 @@ import json
 import math
 import pathlib
 from collections.abc import Iterable, Mapping
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from baselines.files import ResultsError, json_files, write
 from baselines.files.locks import locked
 from baselines.fingerprints import episode_hash, fingerprint
+from baselines.oracle.stripped import stripped
 from ikgym.scenarios import Scenario
 
 #: Scenario and reset seed.
@@ -57,6 +59,13 @@ class Record:
     hash: str
 
 
+class _Records(NamedTuple):
+    """The records of a file, by scenario and seed, and by the content of their episodes."""
+
+    by_key: Mapping[Key, Record]
+    by_hash: Mapping[str, Record]
+
+
 class Scored(Protocol):
     """What says which episode was played, and what it cost: a :class:`baselines.evaluation.metrics.Row`."""
 
@@ -70,26 +79,33 @@ class Scored(Protocol):
     def total_cost(self) -> float: ...  # noqa: D102
 
 
-def lookup(scenario: Scenario, seed: int) -> Record | None:
-    """The record of an episode; None where there is none, or it is of another content than the episode now has."""
-    return _lookup(scenario.name, seed, scenario)
+def lookup(scenario: Scenario, seed: int, arm_seed: int | None = None) -> Record | None:
+    """The record of an episode; None where there is none, or it is of another content than the episode now has.
+
+    Args:
+        scenario: What is tracked.
+        seed: The reset seed.
+        arm_seed: Which arm moves; the seed's own if left out.
+    """
+    return _lookup(stripped(scenario, seed, arm_seed), seed)
 
 
-def cost(scenario: Scenario, seed: int) -> float | None:
+def cost(scenario: Scenario, seed: int, arm_seed: int | None = None) -> float | None:
     """The best known cost that a cost ratio is stated against; None where there is none, or none above 1e-9."""
-    return costs(scenario, (seed,))[0]
+    return _stated(lookup(scenario, seed, arm_seed))
 
 
 def costs(scenario: Scenario, seeds: Iterable[int]) -> list[float | None]:
     """What :func:`cost` says of several episodes, in one go."""
+    if not scenario.plant.ideal:
+        return [cost(scenario, seed) for seed in seeds]
     content = fingerprint(scenario)
-    found = (_lookup(scenario.name, seed, content) for seed in seeds)
-    return [None if one is None or one.cost <= MEANINGLESS else one.cost for one in found]
+    return [_stated(_lookup(content, seed)) for seed in seeds]
 
 
 def beaten(row: Scored) -> Record | None:
     """The record that a row's cost lies below, by more than rounding; None where it does not."""
-    known = _lookup(row.scenario, row.seed, row.fingerprint)
+    known = _lookup(row.fingerprint, row.seed)
     if known is None or known.cost <= MEANINGLESS or not row.total_cost < known.cost * (1.0 - MARGIN):
         return None
     return known
@@ -111,7 +127,7 @@ def record(records: Iterable[Record], path: pathlib.Path = DATA) -> list[Record]
     """
     with locked(path.parent, PATIENCE):  # read and written by one process at a time, or the slower one's would be all
         _read.cache_clear()
-        known, kept = dict(_read(path)), _better(records, _read(path))
+        known, kept = dict(_read(path).by_key), _better(records, _read(path).by_key)
         if kept:
             known |= kept
             lines = [json.dumps(_plain(known[key]), ensure_ascii=False, allow_nan=False) for key in sorted(known)]
@@ -123,13 +139,15 @@ def record(records: Iterable[Record], path: pathlib.Path = DATA) -> list[Record]
 def _better(records: Iterable[Record], known: Mapping[Key, Record]) -> dict[Key, Record]:
     """The best of each episode, where it is better than what is known."""
     kept: dict[Key, Record] = {}
+    keys = {(one.hash, one.seed): key for key, one in known.items()}
     for new in records:
         if not (math.isfinite(new.cost) and new.cost >= 0.0):
             raise ResultsError(f"{new.scenario}, seed {new.seed}: expected a cost of at least 0, got {new.cost}.")
-        key = new.scenario, new.seed
+        # Where the same arm moves in several scenarios, the record keeps the name of the first.
+        key = keys.setdefault((new.hash, new.seed), (new.scenario, new.seed))
         old = kept.get(key, known.get(key))
         if old is None or old.hash != new.hash or new.cost < old.cost:
-            kept[key] = new
+            kept[key] = dataclasses.replace(new, scenario=key[0])
     return kept
 
 
@@ -139,26 +157,29 @@ def read(path: pathlib.Path = DATA) -> list[Record]:
     Raises:
         ResultsError: It is damaged.
     """
-    return list(_read(path).values())
+    return list(_read(path).by_key.values())
 
 
-def _lookup(name: str, seed: int, content: Scenario | str) -> Record | None:
-    known = _read(DATA).get((name, seed))
-    return known if known is not None and known.hash == episode_hash(content, seed) else None
+def _lookup(content: Scenario | str, seed: int) -> Record | None:
+    return _read(DATA).by_hash.get(episode_hash(content, seed))
+
+
+def _stated(known: Record | None) -> float | None:
+    return None if known is None or known.cost <= MEANINGLESS else known.cost
 
 
 @functools.cache
-def _read(path: pathlib.Path) -> dict[Key, Record]:
+def _read(path: pathlib.Path) -> _Records:
     try:
         content = json_files.read(path)
         if not isinstance(content, list):
             raise ValueError(f"expected a list of records, got {json_files.shown(content)}")
         records = [json_files.made(Record, values) for values in content]
     except FileNotFoundError:
-        return {}
+        return _Records({}, {})
     except (OSError, ValueError) as e:
         raise ResultsError(f"{path} is damaged: {e}. Mend it, or find the costs anew with: {UPDATE}") from None
-    return {(one.scenario, one.seed): one for one in records}
+    return _Records({(one.scenario, one.seed): one for one in records}, {one.hash: one for one in records})
 
 
 def _plain(one: Record) -> dict[str, Any]:

@@ -15,15 +15,19 @@ import numpy as np
 
 from baselines.canonical import canonical
 from baselines.files import ResultsError, archives, json_files, read_bytes, write
-from baselines.fingerprints import episode_hash
+from baselines.fingerprints import episode_hash, fingerprint
 from baselines.oracle.optimum import Optimum, Search
+from baselines.oracle.polishing import polish
 from baselines.oracle.search import VERSION, search
+from baselines.oracle.stripped import ideal, stripped
 from ikgym import scenarios
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray, whole_number
 
 logger = logging.getLogger("ikgym")
 
+#: What paths are called that the search has found for the episode with an ideal plant.
+IDEAL = "optimum with an ideal plant"
 #: The environment variable that says where optima are kept.
 VARIABLE = "IKGYM_CACHE"
 
@@ -33,16 +37,21 @@ def solve(
     seed: int = 0,
     how: Search | None = None,
     *,
+    arm_seed: int | None = None,
     cached: bool = True,
     tick: Callable[[float], object] | None = None,
     paths: Mapping[str, FloatArray] | None = None,
 ) -> Optimum:
     """The cheapest joint path of an episode that a search finds: the best known one, certified by nobody.
 
+    Drives and sensors of the plant are left out, see :mod:`baselines.oracle.stripped`. Where the arm is not that of the
+    data sheet, the search is that of the episode with an ideal plant, and its path is polished on the arm that moves.
+
     Args:
         scenario: What is tracked, or its name.
         seed: The reset seed.
         how: How thoroughly is searched.
+        arm_seed: Which arm moves; the seed's own if left out.
         cached: Whether to look on disk first, and to keep there what was found.
         tick: Called now and then with the share of the work done since the last call.
         paths: Joint coordinates after each step by name, further starts, with which the disk is left alone.
@@ -57,14 +66,20 @@ def solve(
     """
     scenario = scenario if isinstance(scenario, Scenario) else scenarios.get(scenario)
     seed, how = whole_number("seed", seed, at_least=0), how or Search()
-    file = file_of(scenario, seed, how)
-    cached = cached and not paths
-    known = _read(file) if cached else None
+    true, plain = stripped(scenario, seed, arm_seed), ideal(scenario)
+    searched = fingerprint(true) == fingerprint(plain)
+    file = file_of(true, seed, how, polished=not searched)
+    kept = cached and not paths
+    known = _read(file) if kept else None
     if known is not None:
         # The name is not part of the content.
         return known.replace(scenario=scenario.name)
-    optimum = search(scenario, seed, how, tick, paths)
-    if cached:
+    if searched:
+        optimum = search(true, seed, how, tick, paths)
+    else:
+        start = solve(plain, seed, how, cached=cached, tick=tick).q
+        optimum = polish(true, seed, {IDEAL: start, **(paths or {})})
+    if kept:
         try:
             write(file, _packed(optimum))
         except ResultsError as e:
@@ -86,9 +101,16 @@ def folder() -> pathlib.Path:
     return base / "ikgym"
 
 
-def file_of(scenario: Scenario, seed: int, how: Search) -> pathlib.Path:
-    """The file of an optimum: named by the content of the episode, the search, and the version of its code."""
-    what = canonical([episode_hash(scenario, seed), dataclasses.asdict(how), VERSION])
+def file_of(scenario: Scenario, seed: int, how: Search, *, polished: bool = False) -> pathlib.Path:
+    """The file of an optimum: named by the content of the episode, the search, and the version of its code.
+
+    Args:
+        scenario: What is tracked.
+        seed: The reset seed.
+        how: The search.
+        polished: Whether it was that of the episode with an ideal plant, whose path was polished.
+    """
+    what = canonical([episode_hash(scenario, seed), dataclasses.asdict(how), VERSION, *["polished"] * polished])
     return folder() / "oracle" / f"{hashlib.sha256(what.encode()).hexdigest()[:24]}.npz"
 
 

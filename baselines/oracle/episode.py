@@ -10,11 +10,13 @@ import numpy.typing as npt
 from gymnasium.utils import seeding
 
 from baselines.episode import added_up, play
-from baselines.policy import Batch, Memory, SolverPolicy
+from baselines.policy import Memory, SolverPolicy
 from baselines.solvers.receding_horizon.newton.grid import Grid
 from baselines.solvers.receding_horizon.newton.workspace import PathProblem
 from baselines.solvers.receding_horizon.problem_data import ProblemData
 from ikgym.exceptions import InvalidInputError
+from ikgym.outcome import observation
+from ikgym.plant import Plant
 from ikgym.scenarios import Scenario
 from ikgym.simulation import Outcome
 from ikgym.validation import FloatArray, whole_number
@@ -55,10 +57,11 @@ class EpisodeProblem:
                 has both limits of acceleration and points that are held.
         """
         whole_number("seed", seed, at_least=0)
-        if not scenario.plant.ideal:
+        payload = {name: getattr(scenario.plant, name) for name in ("payload", "payload_step")}
+        if scenario.plant != Plant(**payload):
             raise InvalidInputError(
                 "The best cost of an episode is that of a joint path of the arm in the data sheet; scenario "
-                f"{scenario.name!r}: expected an ideal plant, got {scenario.plant}."
+                f"{scenario.name!r}: expected an ideal plant, but for a payload, got {scenario.plant}."
             )
         limited = bool(np.isfinite(scenario.arm.acceleration_limit).any())
         if limited and not scenario.counted()[1:].all():
@@ -86,7 +89,15 @@ class EpisodeProblem:
     def on(self, grid: Grid) -> PathProblem:
         """The problem on a grid, as the kernels see it."""
         change = self.scenario.dt * self.scenario.arm.acceleration_limit if self._by_interior_point else np.zeros(0)
-        return PathProblem(self.data, grid, self.start, self.nominal, np.zeros_like(self.start), 0.0, change)
+        rest = np.zeros_like(self.start)
+        return PathProblem(self.data, grid, self.start, self.nominal, rest, 0.0, change, False, self._load(grid))
+
+    def _load(self, grid: Grid) -> FloatArray:
+        """What the payload adds to the zeros of the joints at the knots; (0, n) where there is none. Shape (K, n)."""
+        plant, n = self.scenario.plant, self.scenario.joints
+        if not np.any(plant.payload):
+            return np.zeros((0, n))
+        return np.where(grid.at[:, None] >= plant.payload_step, np.broadcast_to(plant.payload, n), 0.0)
 
     @property
     def _by_interior_point(self) -> bool:
@@ -118,6 +129,10 @@ class EpisodeProblem:
         fine, knots = np.cumsum(self.grid.length), np.append(0.0, np.cumsum(grid.length))
         q = np.vstack([self.start, path])
         return np.stack([np.interp(fine, knots, column) for column in q.T], axis=1)
+
+    def through(self, q: FloatArray) -> FloatArray:
+        """The knots of a path, from the joint coordinates after each step. Shapes (steps, n) and (K, n)."""
+        return np.ascontiguousarray(q[self.grid.at - 1])
 
     def feasible(self, path: FloatArray) -> FloatArray:
         """A path within the limits of position and velocity: the nearest that the arm gets to each knot from the last.
@@ -176,7 +191,7 @@ def path_of(policy: SolverPolicy, scenario: Scenario, seed: int) -> FloatArray:
 
     def act(out: Outcome) -> npt.NDArray[np.float32]:
         nonlocal state
-        action, state = policy.predict({name: getattr(out, name) for name in Batch._fields}, state)
+        action, state = policy.predict(observation(out), state)
         return action
 
     return np.stack([out.true_q[0] for out in play(scenario, [seed], act, preview=policy.preview)])

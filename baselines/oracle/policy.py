@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from baselines.oracle.cache import solve
 from baselines.oracle.optimum import Search
+from baselines.oracle.stripped import NOTE, strips
 from baselines.policy import Batch, Memory, Problem, Solution, statuses
 from baselines.solvers.references.privileged_path import PrivilegedPath
 from ikgym.exceptions import InvalidInputError
@@ -34,8 +35,8 @@ class Oracle(PrivilegedPath):
         scenario: What is tracked.
 
     Raises:
-        InvalidInputError: The scenario is random and there is no seed, its plant is random, or a number is out of
-            range.
+        InvalidInputError: The scenario is random and there is no seed, its drives or sensors are not ideal, or a
+            number is out of range.
     """
 
     seed: int | None = None
@@ -48,11 +49,12 @@ class Oracle(PrivilegedPath):
     def __post_init__(self) -> None:
         if self.seed is not None:
             object.__setattr__(self, "seed", whole_number("seed", self.seed, at_least=0))
-        elif self.scenario.random:
+        elif self.scenario.random or self.scenario.plant.draws_arm:
             raise InvalidInputError(f"Scenario {self.scenario.name!r} is random: a seed says which episode is meant.")
-        if self.scenario.plant.random:
+        if strips(self.scenario):
             raise InvalidInputError(
-                f"{self.name} has to know all that happens; scenario {self.scenario.name!r} has a random plant."
+                f"{self.name} plays a joint path that was found {NOTE}; scenario {self.scenario.name!r}: expected "
+                f"ideal ones, got {self.scenario.plant}. The reference there is told."
             )
         for name in ("starts", "generations"):
             object.__setattr__(self, name, whole_number(name, getattr(self, name), at_least=0))

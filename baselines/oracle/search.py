@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import dataclasses
-import time
 from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 
-from baselines.fingerprints import episode_hash
 from baselines.oracle import local_search
 from baselines.oracle.episode import EpisodeProblem, path_of
 from baselines.oracle.optimum import LOCAL_SEARCH, RANDOM, Optimum, Search, Start
-from baselines.solvers.receding_horizon.newton.grid import Grid
+from baselines.oracle.polishing import finished, improved
 from baselines.solvers.receding_horizon.newton.minimise import NewtonSettings
 from baselines.solvers.receding_horizon.rhc import RecedingHorizon
 from ikgym.parallel import in_chunks
@@ -27,8 +24,6 @@ HORIZONS: tuple[Mapping[str, Any], ...] = (
     {"horizon": 1001, "move_blocks": 48, "iterations": 1, "starts": 64, "restart_steps": 10, "stop_at_end": True},
     {"horizon": 101, "move_blocks": 24, "iterations": 1, "starts": 64, "restart_steps": 10, "stop_at_end": True},
 )
-# Newton steps of a path at full resolution, and the relative precision that ends them before.
-MOST_STEPS, TOLERANCE = 300, 1e-12
 # Costs closer than this share belong to the same path.
 APART = 1e-3
 # Random starts worth a thread.
@@ -61,7 +56,7 @@ def search(
     episode = EpisodeProblem.of(scenario, seed)
     done = tick or (lambda share: None)
     known = _known_paths(episode)
-    known |= {name: np.ascontiguousarray(q[episode.grid.at - 1]) for name, q in (paths or {}).items()}
+    known |= {name: episode.through(q) for name, q in (paths or {}).items()}
     # Newton's method keeps the cheaper of a path and what it makes of it: no path may be cheap by passing a limit.
     known = {name: episode.feasible(path) for name, path in known.items()}
     starts, fine = [Start(kind) for kind in known], dict(enumerate(known.values()))
@@ -70,37 +65,7 @@ def search(
     if episode.grid.velocity.any():
         starts, found = _coarse_search(episode, how, known, done)
         fine |= found
-    polished = np.stack(list(fine.values()))
-    improved, spent = _improve(episode, episode.grid, polished, NewtonSettings(True, MOST_STEPS, TOLERANCE))
-    played = [_played(episode, path) for path in polished]
-    gradients = improved.gradients * scenario.dt
-    for number, (_, _, cost), gradient, steps in zip(fine, played, gradients, improved.steps, strict=True):
-        starts[number] = dataclasses.replace(
-            starts[number], cost=cost, gradient_norm=float(gradient), newton_steps=int(steps)
-        )
-    best = int(np.argmin([cost for _, _, cost in played]))
-    q, qdot, cost = played[best]
-    done(0.1)
-    return Optimum(
-        scenario=scenario.name,
-        seed=seed,
-        q=q,
-        qdot=qdot,
-        cost=cost,
-        gradient_norm=float(gradients[best]),
-        starts=tuple(starts),
-        seconds=spent / len(fine),
-        hash=episode_hash(scenario, seed),
-    )
-
-
-def _played(episode: EpisodeProblem, path: FloatArray) -> tuple[FloatArray, FloatArray, float]:
-    """Joint coordinates and joint velocities of each step, and their cost in the environment."""
-    limit = episode.scenario.largest_qdot
-    # Multipliers keep limits to rounding; what is left over would add up from step to step.
-    qdot = np.clip(episode.commands(episode.feasible(path)), -limit, limit)
-    q, cost = episode.play(qdot)
-    return q, qdot, cost
+    return finished(episode, starts, fine, done)
 
 
 def _known_paths(episode: EpisodeProblem) -> dict[str, FloatArray]:
@@ -141,7 +106,7 @@ def _coarse_search(
     in_chunks(
         lambda first, last: local_search.random_paths(problem, how.seed, drawn, first + 1, last + 1), how.starts, GRAIN
     )
-    (costs, _, _), _ = _improve(episode, grid, paths, NewtonSettings(False, local_search.STEPS, local_search.PRECISION))
+    (costs, _, _), _ = improved(episode, grid, paths, NewtonSettings(False, local_search.STEPS, local_search.PRECISION))
     done(0.3)
 
     chosen = _distinct(costs, PARTNERS)
@@ -165,22 +130,6 @@ def _coarse_search(
     ]
     best = [number for number in _distinct(costs, how.polished) if number >= len(known)]
     return starts, {number: episode.refined(grid, paths[number]) for number in best}
-
-
-def _improve(
-    episode: EpisodeProblem, grid: Grid, paths: FloatArray, settings: NewtonSettings
-) -> tuple[local_search.Improved, float]:
-    """Improves paths in place, in several threads; gives what became of them, and the CPU time in [s]."""
-    improved, problem = local_search.Improved(*np.empty((3, len(paths)))), episode.on(grid)
-    spent: list[float] = []
-
-    def work(first: int, last: int) -> None:
-        begin = time.thread_time()
-        local_search.improve(problem, settings, paths, improved, first, last)
-        spent.append(time.thread_time() - begin)
-
-    in_chunks(work, len(paths), 1)
-    return improved, sum(spent)
 
 
 def _distinct(costs: FloatArray, most: int) -> list[int]:

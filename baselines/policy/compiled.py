@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import abc
 import functools
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +17,7 @@ from baselines.policy.observations import Parts, not_finite
 from baselines.policy.problem import Batch, Memory, Solution
 from baselines.policy.solver import SolverPolicy
 from baselines.policy_kernels import REFUSED, parts_of
+from ikgym.outcome import OBSERVED
 
 
 class CompiledPolicy(SolverPolicy, abc.ABC):
@@ -29,6 +30,8 @@ class CompiledPolicy(SolverPolicy, abc.ABC):
     begins with ``if checking and not all_finite(…): return REFUSED``, turns the memory into the next one in place, and
     ends with ``return cut_rows(…)``. It does not change the observations.
     """
+
+    sees_extras: ClassVar[bool] = False
 
     @abc.abstractmethod
     def kernel(self) -> Any:
@@ -90,7 +93,7 @@ def _blank(rows: int, n: int, memory: Memory) -> tuple[Any, Any, Any]:
 
 def _flat(parts: Parts) -> Parts:
     """The arrays of a batch as kernels take them."""
-    q, qdot, pose, nominal, remaining = parts
+    q, qdot, pose, nominal, remaining = parts[: len(OBSERVED)]
     return (
         q.reshape(-1),
         qdot.reshape(-1),

@@ -11,16 +11,17 @@ import numpy.typing as npt
 
 from baselines.policy.problem import Batch, Problem
 from ikgym.exceptions import InvalidInputError
+from ikgym.outcome import OBSERVED, SOMETIMES
 from ikgym.preview import furthest
 from ikgym.scenarios import Preview
 from ikgym.simulator import Observation
 from ikgym.validation import FloatArray
 
 _FLOAT = np.dtype(np.float64)
-#: The arrays of an observation, in the order of :class:`Batch`.
-Parts = Sequence[FloatArray]
+#: The arrays of an observation, in the order of :class:`Batch`: the first five, or all, None for what is absent.
+Parts = Sequence[Any]
 
-_parts = operator.itemgetter(*Batch._fields)
+_parts = operator.itemgetter(*OBSERVED)
 
 
 class ObservationReader:
@@ -69,7 +70,7 @@ class ObservationReader:
         n, m = self._problem.model.joints, self._problem.task.size
         ahead = nominal[-2] if len(nominal) == len(rows) + 2 else furthest(self._preview)
         expected = (n,), (n,), (m,), (ahead, m), (1,)
-        for key, parts, shape in zip(Batch._fields, expected, shapes, strict=True):
+        for key, parts, shape in zip(OBSERVED, expected, shapes, strict=True):
             if shape != (*rows, *parts):
                 raise InvalidInputError(f"observation[{key!r}]: expected shape {(*rows, *parts)}, got {shape}.")
         return 1 if single else q[0], single, self._steps(ahead)
@@ -92,10 +93,50 @@ class ObservationReader:
             f"preview={preview}."
         )
 
+    def extras(self, observation: Observation, rows: int, single: bool) -> Parts:
+        """Ages of measurements and past commands, None where the observation has none.
+
+        Args:
+            observation: As the environment gives it.
+            rows: B, as the call told.
+            single: Whether it has no row axis.
+
+        Raises:
+            InvalidInputError: One of them has a wrong shape, is not finite, or an age is below 0.
+        """
+        n, lead = self._problem.model.joints, () if single else (rows,)
+        tails: tuple[tuple[int | None, ...], ...] = (1,), (1,), (None, n)
+        return [_extra(observation, key, lead, tail) for key, tail in zip(SOMETIMES, tails, strict=True)]
+
+
+def _extra(observation: Observation, key: str, lead: tuple[int, ...], tail: tuple[int | None, ...]) -> Any:
+    """One array that an observation may have, checked; None where it has not."""
+    if key not in observation:
+        return None
+    try:
+        array = _as_floats(observation[key])
+    except (TypeError, ValueError) as e:
+        raise InvalidInputError(f"observation[{key!r}]: expected an array of numbers ({e}).") from None
+    expected = (*lead, *tail)
+    if array.ndim != len(expected) or any(e not in {None, s} for e, s in zip(expected, array.shape, strict=True)):
+        shape = str(expected).replace("None", "h")
+        raise InvalidInputError(f"observation[{key!r}]: expected shape {shape}, got {array.shape}.")
+    if not np.isfinite(array).all():
+        raise not_finite()
+    if key.endswith("age") and array.min(initial=0.0) < 0.0:
+        raise InvalidInputError(f"observation[{key!r}]: expected ages of at least 0 steps, got {array.min():g}.")
+    return array
+
 
 def as_batch(parts: Parts, single: bool) -> Batch:
     """A batch from the arrays of an observation."""
-    return Batch(*[part[None] for part in parts]) if single else Batch(*parts)
+    return taken(parts, None) if single else Batch(*parts)
+
+
+def taken(parts: Parts, rows: slice | None) -> Batch:
+    """Some rows of all arrays; None adds an axis of rows."""
+    some: list[Any] = [None if part is None else part[rows] for part in parts]
+    return Batch(*some)
 
 
 def _floats(observation: Observation) -> Parts:
@@ -109,7 +150,7 @@ def _floats(observation: Observation) -> Parts:
     except (KeyError, IndexError, TypeError, ValueError) as e:
         keys = sorted(observation) if isinstance(observation, Mapping) else type(observation).__name__
         raise InvalidInputError(
-            f"observation: expected a dict of number arrays with the keys {list(Batch._fields)}, got {keys} ({e})."
+            f"observation: expected a dict of number arrays with the keys {list(OBSERVED)}, got {keys} ({e})."
         ) from None
 
 

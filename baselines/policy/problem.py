@@ -60,6 +60,10 @@ class Batch(NamedTuple):
         pose: Measured task coordinates. Shape (B, m).
         nominal: Nominal task coordinates ahead, X^N(k+1) first. Shape (B, p, m).
         remaining: Steps left. Shape (B, 1).
+        q_age: How many steps ago q was measured; None where the observation does not say. Shape (B, 1).
+        pose_age: The same of the pose. Shape (B, 1).
+        commands: The last commands as joint velocities, newest first, in [rad/s] or [m/s]; None where they are not
+            observed. Shape (B, h, n).
     """
 
     q: FloatArray
@@ -67,6 +71,9 @@ class Batch(NamedTuple):
     pose: FloatArray
     nominal: FloatArray
     remaining: FloatArray
+    q_age: FloatArray | None = None
+    pose_age: FloatArray | None = None
+    commands: FloatArray | None = None
 
 
 class Solution(NamedTuple):

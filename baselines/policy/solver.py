@@ -13,11 +13,12 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.policy import state as states
-from baselines.policy.observations import ObservationReader, Parts, as_batch, not_finite
+from baselines.policy.observations import ObservationReader, Parts, as_batch, not_finite, taken
 from baselines.policy.problem import Batch, Memory, Operations, Problem, Solution
 from baselines.policy.state import REPORTED, Report, joined, pack, remembered, replace_rows
 from baselines.policy_kernels import all_finite, cut_rows
 from ikgym.compilation import announced
+from ikgym.outcome import OBSERVED
 from ikgym.parallel import in_chunks
 from ikgym.scenarios import Preview, Scenario
 from ikgym.simulator import Observation
@@ -52,6 +53,8 @@ class SolverPolicy(Frozen, abc.ABC):
     example: ClassVar[bool] = False
     #: Whether it is a solver of another project, whose package is installed with the extra `rivals`.
     rival: ClassVar[bool] = False
+    #: Whether it is shown the ages of measurements and past commands, where an observation has them.
+    sees_extras: ClassVar[bool] = True
     #: Rows that are worth a thread of their own: the fewer, the longer a row takes.
     grain: ClassVar[int] = 256
     #: Whether the policy is read from a file, as learned agents are.
@@ -145,6 +148,8 @@ class SolverPolicy(Frozen, abc.ABC):
         """
         del deterministic
         parts, rows, single = self._read(observation)
+        if self.sees_extras:
+            parts = *parts, *self._read.extras(observation, rows, single)
         return self._answer(parts, single, self._recall(state, episode_start, rows))
 
     def act(self, batch: Batch, memory: Memory) -> tuple[npt.NDArray[np.float32], Memory]:
@@ -240,15 +245,15 @@ class SolverPolicy(Frozen, abc.ABC):
     def _answer(self, parts: Parts, single: bool, memory: Memory) -> tuple[npt.NDArray[np.float32], Memory]:
         """What `predict` returns, for the arrays of an observation and a memory whose shapes are right."""
         batch = as_batch(parts, single)
-        if not all_finite(*batch):
+        if not all_finite(*batch[: len(OBSERVED)]):
             raise not_finite()
         action, after = self.act(batch, memory)
         return action[0] if single else action, after
 
     def _without_lost(self, memory: Memory, qdot: FloatArray) -> Memory:
-        """A memory, cleared where a joint velocity is no number."""
+        """A memory, cleared where a joint velocity is no number; with what the start of an episode would leave."""
         lost = np.asarray(~np.isfinite(qdot / self.problem.velocity_limit).all(axis=1))
-        return self.restarted(memory, lost)
+        return replace_rows(memory, self.memory(len(lost)), lost) if memory else memory
 
     def _recall(self, state: Memory | None, episode_start: npt.ArrayLike | None, rows: int) -> Memory:
         starting = None if episode_start is None else states.truth_values(episode_start, rows)
@@ -292,7 +297,7 @@ class SolverPolicy(Frozen, abc.ABC):
         parts: dict[int, Solution] = {}
 
         def work(start: int, stop: int) -> None:
-            share = Batch(*[array[start:stop] for array in batch])
+            share = taken(batch, slice(start, stop))
             _sharing.now = True
             try:
                 parts[start] = self.solve(share, self._named(tuple(array[start:stop] for array in memory)))

@@ -28,11 +28,12 @@ from baselines.evaluation.rollout import rollouts
 from baselines.evaluation.summary import geometric_mean
 from baselines.files import write
 from baselines.fingerprints import fingerprint
-from baselines.policy import Batch, SolverPolicy
+from baselines.policy import SolverPolicy
 from baselines.spec import parse_policy
 from baselines.training.environment.view import View
 from baselines.training.score import Score
 from ikgym import scenarios, tasks
+from ikgym.outcome import observation
 from ikgym.scenarios import Scenario
 from ikgym.simulation import Outcome
 from ikgym.validation import FloatArray
@@ -102,7 +103,7 @@ def play(
     starting = np.ones(rows, dtype=np.bool_)
 
     def act(out: Outcome) -> npt.NDArray[Any]:
-        features = view.see({name: getattr(out, name) for name in Batch._fields}, starting)
+        features = view.see(observation(out), starting)
         starting[:] = False
         return view.act(actor(features))
 

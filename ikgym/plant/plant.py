@@ -5,13 +5,13 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
-from ikgym.plant import checks
+from ikgym.plant import checks, severity
 from ikgym.plant.checks import Drawn, PerJoint
 from ikgym.random_numbers import CUT
 from ikgym.validation import LARGEST, FloatArray, Frozen, number, per_joint, shortened, whole_number
@@ -119,6 +119,26 @@ class Plant(Frozen):
         values = {field.name: (getattr(self, field.name), field.default) for field in dataclasses.fields(self)}
         return {name: value for name, (value, default) in values.items() if value != default}
 
+    def scaled(self, knowledge: float, drives: float | None = None) -> Self:
+        """The plant at other severities: 0 is ideal, 1 the plant itself.
+
+        Args:
+            knowledge: Of calibration, payload and sensors: deviations, noises and the share of lost measurements are
+                so many times as large, and delays and the steps from one measurement to the next so many times as long,
+                rounded to whole steps.
+            drives: Of the drives: time constants, delays, backlash, bias and noise; as the knowledge if left out.
+
+        Raises:
+            InvalidInputError: A severity is below 0 or too large, or the plant has arms of its own, which are no matter
+                of degree.
+        """
+        if self.arms:
+            raise InvalidInputError(f"scaled: expected a plant without arms of its own, got {self}.")
+        known = number("knowledge", knowledge, at_least=0.0, at_most=LARGEST)
+        driven = known if drives is None else number("drives", drives, at_least=0.0, at_most=LARGEST)
+        values = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        return self.replace(**severity.knowledge(values, known), **severity.drives(values, driven))
+
     def check(self, arm: Arm, steps: int) -> None:
         """Insists that the plant suits an arm and an episode.
 
@@ -187,8 +207,12 @@ class Plant(Frozen):
     @property
     def random(self) -> bool:
         """Whether anything is drawn, of an episode or of a step."""
-        noises = ("noise", "q_noise", "pose_noise", "pose_rotation_noise", "pose_missing")
-        return self.draws_arm or self._on(*noises)
+        return self.draws_arm or self.noisy
+
+    @property
+    def noisy(self) -> bool:
+        """Whether anything is drawn anew at each step."""
+        return self._on("noise", "q_noise", "pose_noise", "pose_rotation_noise", "pose_missing")
 
     @property
     def longest_command_delay(self) -> int:

@@ -19,6 +19,9 @@ from ikgym.plant.step import Drives, PlantState, Sensors
 from ikgym.random_numbers import stream
 from ikgym.validation import FloatArray, whole_number
 
+# Numbers of the streams that other noises of an episode come from: more than there are effects.
+NOISE_SEEDS = 1000
+
 Generators = Sequence[np.random.Generator] | Mapping[int, np.random.Generator]
 
 
@@ -104,7 +107,11 @@ class PlantRows:
         return 2 * (6 * joints + 12) + kept + coordinates * (plant.pose_delay // plant.pose_every + 2) + 4 * joints
 
     def begin(
-        self, rows: npt.NDArray[np.int64], generators: Generators, arm_seeds: Sequence[int | None] | None
+        self,
+        rows: npt.NDArray[np.int64],
+        generators: Generators,
+        arm_seeds: Sequence[int | None] | None,
+        noise_seeds: Sequence[int] | None = None,
     ) -> None:
         """Draws the plants of new episodes.
 
@@ -112,6 +119,7 @@ class PlantRows:
             rows: Which rows begin one. Shape (k,).
             generators: One a row.
             arm_seeds: One a row: the seed of the arm that it keeps, None for an arm that is drawn with the episode.
+            noise_seeds: One a row: which noise there is, of drives and sensors; 0 is that of the episode.
         """
         keys = [episode_key(self._plant, generators[row]) for row in rows.tolist()]
         given = [None if arm_seeds is None else arm_seeds[row] for row in rows.tolist()]
@@ -120,8 +128,15 @@ class PlantRows:
         self._draws.arms(of_arms, rows, self.arms)
         bandwidths, self.state.delay[rows] = self._draws.loops(of_arms)
         self.state.lag[rows] = -np.expm1(-2.0 * np.pi * bandwidths * self._dt)
+        if noise_seeds is not None:
+            keys = [noise_key(key, noise_seeds[row]) for key, row in zip(keys, rows.tolist(), strict=True)]
         self.state.keys[rows, 0] = keys
         for number in range(1, STREAMS):
             self.state.keys[rows, number] = [stream(np.uint64(key), ARM_STREAMS + number) for key in keys]
         for changed in (self.state.drive, self.state.play):
             changed[rows] = 0.0
+
+
+def noise_key(key: int, noise_seed: int) -> int:
+    """The key of an episode's noises: its own, or that of a stream far from those of its effects."""
+    return key if noise_seed == 0 else int(stream(np.uint64(key), NOISE_SEEDS + noise_seed))

@@ -15,7 +15,7 @@ from collections.abc import Callable
 from ikgym.exceptions import InvalidInputError
 from ikgym.preview import Preview
 from ikgym.registry import Registry
-from ikgym.scenarios import catalogue, elsewhere, families
+from ikgym.scenarios import catalogue, elsewhere, families, imperfect
 from ikgym.scenarios.importing import imported
 from ikgym.scenarios.reachability import Gap, gaps
 from ikgym.scenarios.reading import load
@@ -46,7 +46,7 @@ SPLITS = {
 }
 
 _registry: Registry[Scenario] = Registry("scenario", Scenario)
-for _scenarios in (catalogue.SCENARIOS, families.SCENARIOS):
+for _scenarios in (catalogue.SCENARIOS, families.SCENARIOS, imperfect.SCENARIOS):
     for _name, _make in _scenarios.items():
         _registry.register(_name, _make)
 for _name, _make in elsewhere.SCENARIOS.items():

@@ -18,7 +18,7 @@ from tests.arms.test_urdf import joint, robot
 
 ROOT = Path(__file__).parents[2]
 TEXT = (ROOT / "docs" / "scenarios.md").read_text(encoding="utf-8").split("## A scenario of your own")[1]
-WHOLE, ON_URDF, FROM_CSV = re.findall(r"```toml\n(.*?)```", TEXT, re.DOTALL)
+WHOLE, ON_URDF, PLANT, FROM_CSV = re.findall(r"```toml\n(.*?)```", TEXT, re.DOTALL)
 PATH, SNIPPET = re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL)
 
 
@@ -30,6 +30,11 @@ def registry(monkeypatch):
 
 def test_the_example_is_the_file_of_the_examples():
     assert tomllib.loads(WHOLE) == tomllib.loads((ROOT / "examples" / "planar4.toml").read_text(encoding="utf-8"))
+
+
+def test_the_plant_of_the_page_is_one(tmp_path):
+    (tmp_path / "x.toml").write_text(WHOLE + PLANT, encoding="utf-8")
+    assert not ikgym.scenarios.load(tmp_path / "x.toml").plant.ideal
 
 
 def test_the_file_and_the_lines_of_python_give_the_same(tmp_path, monkeypatch, registry):
@@ -44,7 +49,7 @@ def test_the_file_and_the_lines_of_python_give_the_same(tmp_path, monkeypatch, r
 
 
 def test_the_table_of_keys_is_complete():
-    keys = re.findall(r"^\| `(\w+)` \|.*\| (.*) \|$", TEXT, re.MULTILINE)
+    keys = re.findall(r"^\| `(\w+)` \|.*\| (.*) \|$", TEXT.split("### The plant")[0], re.MULTILINE)
     fields = {f.name: f for f in dataclasses.fields(Scenario)}
     assert sorted(key for key, _ in keys) == sorted(fields)
     for key, default in keys:

@@ -7,6 +7,7 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Any
 
+from baselines.episode import Draw
 from baselines.evaluation.rollout import Player
 from ikgym.exceptions import InvalidInputError
 from ikgym.preview import offsets
@@ -26,10 +27,14 @@ class Entrant(abc.ABC):
     #: Whether rows tell it from another one of its name, so that results of both cannot be taken for each other.
     told_apart = True
 
-    def for_episode(self, scenario: Scenario, seed: int) -> dict[str, Any]:
+    def for_episode(self, scenario: Scenario, draw: Draw) -> dict[str, Any]:
         """The parameters that it is made with for one episode."""
-        del scenario, seed
+        del scenario, draw
         return {}
+
+    def made_for_episodes(self, scenario: Scenario) -> bool:
+        """Whether it is made anew for each episode, as references are that know which one they play."""
+        return self.for_episode(scenario, Draw(0)) != self.for_episode(scenario, Draw(1))
 
     @abc.abstractmethod
     def make(self, scenario: Scenario, given: Mapping[str, Any], preview: Preview | None) -> Player:
@@ -44,7 +49,7 @@ class Entrant(abc.ABC):
         """The parameters that rows have."""
 
     @abc.abstractmethod
-    def unsuited(self, scenario: Scenario, seed: int, preview: Preview | None) -> str | None:
+    def unsuited(self, scenario: Scenario, draw: Draw, preview: Preview | None) -> str | None:
         """Why it does not suit a scenario; None where it does."""
 
     @abc.abstractmethod

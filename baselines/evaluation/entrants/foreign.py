@@ -12,6 +12,7 @@ import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
 
+from baselines.episode import Draw
 from baselines.evaluation.rollout import Episode, Tick, finite
 from baselines.policy import Memory, Operations, Report
 from baselines.status import Status
@@ -59,13 +60,13 @@ class ForeignPolicy:
     wrap: Wrap | None = None
     parameters: Mapping[str, Any] = dataclasses.field(default_factory=dict)
 
-    def predict(self, observation: Any, state: Any = None) -> tuple[npt.NDArray[Any], Any]:
-        """The action for one arm, and what the next call is to be given.
+    def predict(self, observation: Any, state: Any = None, episode_start: Any = None) -> tuple[npt.NDArray[Any], Any]:
+        """The action for one arm, and what the next call is to be given; an episode_start says that an episode begins.
 
         Raises:
             InvalidInputError: The model raises an error, or answers with something else than numbers and a state.
         """
-        memory, start = (None, True) if state is None else (state[0], False)
+        memory, start = (None, True) if state is None else (state[0], episode_start is not None)
         try:
             answer = self.model.predict(observation, state=memory, episode_start=np.array([start]), deterministic=True)
         except Exception as e:  # whatever the code of somebody else raises
@@ -201,29 +202,32 @@ class Recorder(gym.Wrapper[Any, Any, Any, Any]):
 
 
 def play_wrapped(
-    scenario: Scenario, policy: ForeignPolicy, seed: int, *, timed: bool = True, tick: Tick | None = None
+    scenario: Scenario, policy: ForeignPolicy, seed: int | Draw, *, timed: bool = True, tick: Tick | None = None
 ) -> Episode:
     """Plays one episode in the wrapped environment; costs and errors are those below the wrappers, in float64.
 
     Args:
         scenario: What is to be tracked.
         policy: Who tracks it, with a `wrap`.
-        seed: The reset seed.
+        seed: The reset seed, or what is drawn how, as far as a reset without options can say it.
         timed: Whether to keep the times of the calls.
         tick: See :data:`baselines.evaluation.rollout.Tick`.
 
     Raises:
         InvalidInputError: The environment cannot be wrapped, the episode ends early, or an action is refused.
     """
+    draw = Draw.of(seed)
+    if draw != Draw(draw.seed):
+        raise InvalidInputError(f"wrap: expected an episode that its reset seed says all of, got {draw}.")
     env, recorder = policy.environment(scenario)
-    seen, _ = env.reset(seed=seed)
-    recorder.check(seed)
+    seen, _ = env.reset(seed=draw.seed)
+    recorder.check(draw.seed)
     state, times, over = None, [], False
     while not (recorder.ended or over):
         begin = time.perf_counter_ns()
         action, state = policy.predict(seen, state)
         times.append(time.perf_counter_ns() - begin)
-        finite(action, policy, scenario, [seed], len(recorder.rows))
+        finite(action, policy, scenario, [draw], len(recorder.rows))
         seen, _, terminated, truncated, _ = env.step(action)
         over = terminated or truncated
     if not recorder.ended:

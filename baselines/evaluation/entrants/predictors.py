@@ -9,6 +9,7 @@ from typing import Any, cast
 
 from baselines import registry
 from baselines.canonical import jsonable
+from baselines.episode import Draw
 from baselines.evaluation.entrants.base import Entrant, covering
 from baselines.evaluation.entrants.foreign import ForeignPolicy, Predictor, Wrap
 from baselines.evaluation.entrants.solvers import InstanceEntrant
@@ -54,7 +55,7 @@ class ForeignEntrant(Entrant):
         if isinstance(model, type) or not callable(getattr(model, "predict", None)):
             model = self._called(model, scenario)
         if isinstance(model, SolverPolicy):
-            if reason := InstanceEntrant(self.name, model).unsuited(scenario, 0, preview):
+            if reason := InstanceEntrant(self.name, model).unsuited(scenario, Draw(0), preview):
                 raise _RefusedError(reason)
             return model
         if not callable(getattr(model, "predict", None)):
@@ -68,9 +69,9 @@ class ForeignEntrant(Entrant):
         del scenario
         return dict(jsonable(getattr(player, "parameters")))  # noqa: B009
 
-    def unsuited(self, scenario: Scenario, seed: int, preview: Preview | None) -> str | None:
+    def unsuited(self, scenario: Scenario, draw: Draw, preview: Preview | None) -> str | None:
         """See :meth:`Entrant.unsuited`."""
-        del seed
+        del draw
         try:
             player = self.make(scenario, {}, preview)
         except _RefusedError as e:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from baselines.canonical import jsonable
+from baselines.episode import Draw
 from baselines.evaluation.entrants.base import Entrant, covering
 from baselines.evaluation.rollout import Player
 from baselines.fingerprints import same
@@ -28,9 +29,9 @@ class SolverEntrant(Entrant):
     kind: type[SolverPolicy]
     given: Mapping[str, Any]
 
-    def for_episode(self, scenario: Scenario, seed: int) -> dict[str, Any]:
-        """The parameters, with the episode's seed for a reference that has to know which one it plays."""
-        return {**self._seeded(scenario, seed), **self.given}
+    def for_episode(self, scenario: Scenario, draw: Draw) -> dict[str, Any]:
+        """The parameters, with the episode's seeds for a reference that has to know which one it plays."""
+        return {**self._seeded(scenario, draw), **self.given}
 
     def make(self, scenario: Scenario, given: Mapping[str, Any], preview: Preview | None) -> SolverPolicy:
         """See :meth:`Entrant.make`."""
@@ -40,17 +41,17 @@ class SolverEntrant(Entrant):
     def parameters(self, scenario: Scenario, player: Player) -> dict[str, Any]:
         """All parameters, but for the seed that a reference was given for its episode."""
         assert isinstance(player, SolverPolicy)
-        hidden = self._seeded(scenario, 0).keys() - self.given.keys()
+        hidden = self._seeded(scenario, Draw(0)).keys() - self.given.keys()
         return {name: jsonable(value) for name, value in player.parameters.items() if name not in hidden}
 
-    def unsuited(self, scenario: Scenario, seed: int, preview: Preview | None) -> str | None:
+    def unsuited(self, scenario: Scenario, draw: Draw, preview: Preview | None) -> str | None:
         """See :meth:`Entrant.unsuited`; a policy that is refused with other parameters only is not unsuited.
 
         One whose package is not installed suits no scenario here.
         """
         decisive = {key: self.given[key] for key in self.kind.decisive if key in self.given}
         try:
-            self.make(scenario, {**self._seeded(scenario, seed), **decisive}, preview)
+            self.make(scenario, {**self._seeded(scenario, draw), **decisive}, preview)
         except (InvalidInputError, MissingDependencyError) as e:
             return str(e)
         return None
@@ -59,9 +60,11 @@ class SolverEntrant(Entrant):
         """See :meth:`Entrant.shown`."""
         return covering(player, preview)
 
-    def _seeded(self, scenario: Scenario, seed: int) -> dict[str, Any]:
-        asks = scenario.random and self.kind.reference and "seed" in self.kind.parameter_names()
-        return {"seed": seed} if asks else {}
+    def _seeded(self, scenario: Scenario, draw: Draw) -> dict[str, Any]:
+        """What a reference asks for among the seeds of an episode."""
+        asked = self.kind.parameter_names() if self.kind.reference else ()
+        drawn = {"seed": scenario.random or scenario.plant.random, "arm_seed": draw.arm_seed is not None}
+        return {name: getattr(draw, name) for name, given in drawn.items() if given and name in asked}
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -85,9 +88,9 @@ class InstanceEntrant(Entrant):
         del scenario, player
         return {name: jsonable(value) for name, value in self.policy.parameters.items()}
 
-    def unsuited(self, scenario: Scenario, seed: int, preview: Preview | None) -> str | None:
+    def unsuited(self, scenario: Scenario, draw: Draw, preview: Preview | None) -> str | None:
         """See :meth:`Entrant.unsuited`."""
-        del seed, preview
+        del draw, preview
         if self.policy.reference and scenario.random:
             return f"{self.name} has privileged information on one episode: give its name, not an instance of it."
         mine, there = self.policy.problem, Problem.of(scenario)
@@ -120,7 +123,7 @@ class BrokenEntrant(Entrant):
         """None."""
         raise InvalidInputError(self.reason)
 
-    def unsuited(self, scenario: Scenario, seed: int, preview: Preview | None) -> str:
+    def unsuited(self, scenario: Scenario, draw: Draw, preview: Preview | None) -> str:
         """See :meth:`Entrant.unsuited`."""
         return self.reason
 

@@ -7,6 +7,7 @@ from baselines.papers.khan import (
     conclusion_claims,
     general_path_claims,
     level_path_claims,
+    plant_claims,
     sign_claims,
     variant_claims,
 )
@@ -22,6 +23,7 @@ PAPER = Paper(
         *general_path_claims.CLAIMS,
         *variant_claims.CLAIMS,
         *conclusion_claims.CLAIMS,
+        *plant_claims.CLAIMS,
         *background_claims.CLAIMS,
         *sign_claims.CLAIMS,
     ),

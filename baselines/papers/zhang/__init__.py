@@ -8,6 +8,7 @@ from baselines.papers.zhang import (
     damping_claims,
     example_claims,
     iteration_claims,
+    plant_claims,
     predictive_claims,
     robustness_claims,
     smoothness_claims,
@@ -22,6 +23,7 @@ PAPER = Paper(
     (
         *adaptive_claims.CLAIMS,
         *robustness_claims.CLAIMS,
+        *plant_claims.CLAIMS,
         *iteration_claims.CLAIMS,
         *damping_claims.CLAIMS,
         *predictive_claims.CLAIMS,

@@ -12,53 +12,61 @@ from baselines.solvers.receding_horizon.newton.grid import evenly_growing_offset
 from baselines.solvers.receding_horizon.rhc import RecedingHorizon
 
 # Each block of the plan is so many steps longer than the one before, up to a length.
-GROWTH, LONGEST = 1.5, 100.0
-# What the preset has under limits of acceleration.
-LIMITED = {"iterations": 3, "starts": 1, "restart_steps": 0, "start_steps": 0}
+GROWTH, LONGEST = 2.0, 100.0
+# What parameters are that are None: of arms without limits, and of those with.
+FREE = {"horizon": 3001, "iterations": 1, "starts": 20, "restart_steps": 20, "start_steps": 10}
+LIMITED = {"horizon": 1501, "iterations": 3, "starts": 1, "restart_steps": 0, "start_steps": 0}
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class RecedingHorizonForesight(RecedingHorizon):
     """A preset of :class:`rhc.RecedingHorizon` for control periods of 1 ms, chosen on validation episodes.
 
-    One Newton step a period for the plan, and one for a restart candidate, which finds the way out of local minima that
-    a single plan would keep. The first 28 periods, less than a hundredth of 3,000, try an initial guess each with ten
-    Newton steps; a period behind one that ended beyond the velocity limits has four.
+    **Arms without limits.** One Newton step a period for the plan, and one for a restart candidate, which finds the way
+    out of local minima that a single plan would keep. The plan looks 3,000 steps ahead: what a redundant arm does with
+    its null space now decides what motions seconds later cost. Its 56 blocks grow evenly, and reach that far without
+    skipping an oscillation. Blocks that grow geometrically do skip some: of 57 knots in 1,500 steps, half lie in the
+    first tenth, and the last block has 127 steps. The first plan takes two periods of five Newton steps. Each of the 19
+    after them tries another guess with ten, which is longer than a control period of 1 ms; of 3,000 periods these are
+    0.7 %. A period behind one that ended beyond the velocity limits has four.
 
-    3,000 steps ahead in 65 knots: what a redundant arm does with its null space now decides what motions seconds later
-    cost, and with 1,500 steps a few in a hundred long episodes cost up to three times as much. Blocks that grow evenly
-    reach that far without skipping an oscillation. Those that grow geometrically do: of 57 knots in 1,500 steps, half
-    lie in the first tenth, and the last block has 127 steps.
-
-    Under limits of acceleration, where control periods are 2 ms and more, three Newton steps for the plan alone are
-    worth more than candidates: with one the plan is lost on 2 of 12 validation episodes of `panda-random`, with three
-    the cost ratio is 1.019 in the geometric mean and 1.07 at most. So ``iterations``, ``starts``, ``restart_steps`` and
-    ``start_steps``, where all four are the preset's own, become 3, 1, 0 and 0 there.
+    **Arms with limits** of position, velocity or acceleration. Plans are made by the interior point method, whose
+    Newton steps take longer and go further: three for the plan alone are worth more than candidates. Limits turn up
+    in the far end of a plan that so few steps cannot settle, so that it looks 1,500 steps ahead.
 
     Args:
-        move_blocks: As in ``rhc``, but None for blocks that are each 1.5 steps longer than the one before, up to 100.
+        horizon: As in ``rhc``. None for 3,001, and 1,501 for arms with limits.
+        iterations: As in ``rhc``, where None is the optimum. Here it is 1, and 3 for arms with limits.
+        move_blocks: As in ``rhc``, but None for blocks that are each 2 steps longer than the one before, up to 100.
+        starts: As in ``rhc``. None for 20, and 1 for arms with limits.
+        restart_steps: As in ``rhc``. None for 20, and 0 for arms with limits.
+        start_steps: As in ``rhc``. None for 10, and 0 for arms with limits.
     """
 
-    horizon: int = 3001
-    iterations: int | None = 1
+    horizon: int | None = None  # type: ignore[assignment]
+    iterations: int | None = None
     stop_at_end: bool = True
-    starts: int = 28
-    restart_steps: int = 20
-    start_steps: int = 10
+    starts: int | None = None  # type: ignore[assignment]
+    restart_steps: int | None = None  # type: ignore[assignment]
+    start_steps: int | None = None  # type: ignore[assignment]
     recovery_steps: int = 4
 
     name: ClassVar[str] = "rhc_foresight"
 
     def __post_init__(self) -> None:
-        """Takes other settings where accelerations are limited."""
-        limited = np.isfinite(self.problem.model.acceleration_limit).any()
-        if limited and all(getattr(self, name) == getattr(type(self), name) for name in LIMITED):
-            for name, value in LIMITED.items():
+        """Settles what depends on the arm."""
+        for name, value in (LIMITED if self.interior_point else FREE).items():
+            if getattr(self, name) is None:
                 object.__setattr__(self, name, value)
         super().__post_init__()
+
+    @property
+    def interior_point(self) -> bool:
+        """Whether plans are made by the interior point method: for arms with limits of any kind."""
+        return self.problem.model.limited
 
     def _knots(self) -> npt.NDArray[np.int64]:
         """Steps from now to the knots. Shape (K,)."""
         if self.move_blocks is None:
-            return evenly_growing_offsets(self.horizon - 1, GROWTH, LONGEST)
+            return evenly_growing_offsets(self.horizon - 1, GROWTH, LONGEST)  # type: ignore[operator]
         return super()._knots()

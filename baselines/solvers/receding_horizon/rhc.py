@@ -13,7 +13,7 @@ from baselines.policy.compiled import CompiledPolicy
 from baselines.solvers.arm_task import plain_arm_task
 from baselines.solvers.receding_horizon.newton.grid import offsets
 from baselines.solvers.receding_horizon.newton.receding import HorizonMemory, plan_rows
-from baselines.solvers.receding_horizon.newton.settings import PlanSettings, change_limit, plain_settings
+from baselines.solvers.receding_horizon.newton.settings import PlanSettings, plain_settings
 from ikgym.exceptions import InvalidInputError
 from ikgym.preview import FARTHEST
 from ikgym.validation import FloatArray, number, whole_number
@@ -62,10 +62,11 @@ class RecedingHorizon(CompiledPolicy):
             random guess, and replaces the plan when it is cheaper after its last step. 0 for none.
         restart_rate: Newton steps of the restart candidate in one control period.
         seed: Of the random guesses, which are the same in all episodes.
-        start_steps: Newton steps of an initial guess in a period, where they are spread over the first ``starts``
-            periods: the first plan comes from the first guess, and a period after it goes on with another one, as with
-            a restart candidate, until it is cheaper than the plan or unpromising. 0 to try all of them in the first
-            period, which takes that much longer.
+        start_steps: Newton steps of an initial guess in a period, where they are spread over the first periods: the
+            first plan comes from the first guess, with half of its steps in each of the first two periods, and each of
+            ``starts`` - 1 periods after them goes on with another guess, as with a restart candidate, until it is
+            cheaper than the plan or unpromising. A later candidate begins in a period without a Newton step of it, so
+            that no period has both. 0 to try all guesses in the first period, which takes that much longer.
         recovery_steps: Newton steps in a period instead of ``iterations``, where the one before ended with joint
             velocities beyond their limits; there is no restart candidate then. 0 for no more than
             ``iterations``.
@@ -135,10 +136,15 @@ class RecedingHorizon(CompiledPolicy):
             self.start_steps,
             self.recovery_steps,
             rate_weight,
-            change_limit(model.acceleration_limit, problem.dt),
+            problem.dt * model.acceleration_limit if self.interior_point else np.zeros(0),
         )
         blocks = plain_arm_task(problem), model.chain.prismatic, *plain_settings(problem.cost.parameters, settings)
         object.__setattr__(self, "_constants", blocks)
+
+    @property
+    def interior_point(self) -> bool:
+        """Whether plans are made by the interior point method: where accelerations are limited."""
+        return bool(np.isfinite(self.problem.model.acceleration_limit).any())
 
     @property
     def preview(self) -> int:

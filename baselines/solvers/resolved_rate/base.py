@@ -55,7 +55,8 @@ class TaskFeedback(CompiledPolicy, abc.ABC):
     Args:
         problem: What the policy is told of the scenario.
         gain: Share of the present error that is taken back in one step, K Δt with the feedback gain K in [1/s].
-            Above 0; 1 is deadbeat control, 2 the limit of stability.
+            Above 0; 1 is deadbeat control, 2 the limit of stability. Where commands take effect d steps late, the
+            limit is 2 sin(π / (2 (2 d + 1))): 0.62 at 2 steps, 0.13 at 12.
 
     Raises:
         InvalidInputError: The gain is not between 0 and 2.

@@ -13,6 +13,7 @@ from baselines.agents.protocols import Transform
 from baselines.agents.view import AgentView, Seen
 from baselines.policy import Batch, Memory, Problem
 from ikgym.exceptions import ResetNeededError
+from ikgym.outcome import OBSERVED
 from ikgym.scenarios import Preview, Scenario
 from ikgym.simulator import Observation
 from ikgym.validation import FloatArray
@@ -104,7 +105,7 @@ class View:
 
 
 def _batch(observation: Observation) -> Batch:
-    return Batch(*[np.ascontiguousarray(observation[key], dtype=np.float64) for key in Batch._fields])
+    return Batch(*[np.ascontiguousarray(observation[key], dtype=np.float64) for key in OBSERVED])
 
 
 def _aligned(features: Features) -> Features:

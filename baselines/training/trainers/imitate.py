@@ -14,7 +14,7 @@ from baselines import registry
 from baselines.agents.features import project_rows, speed_rows
 from baselines.episode import added_up
 from baselines.episode import play as play_episodes
-from baselines.policy import Batch, Memory, Problem
+from baselines.policy import Memory, Problem
 from baselines.spec import parse_policy
 from baselines.training.config.actor_only import Imitate
 from baselines.training.environment.vec_env import ProcessedVecEnv
@@ -24,6 +24,7 @@ from baselines.training.trainer import SegmentMetrics
 from baselines.training.trainers.actor_only import ActorTrainer
 from baselines.training.trainers.initial_weights import begin_from
 from baselines.training.trainers.models import mean_network, network_outputs, new_model, squash_of
+from ikgym.outcome import observation
 from ikgym.preview import furthest, offsets
 from ikgym.scenarios import Scenario
 from ikgym.simulation import Outcome
@@ -153,7 +154,7 @@ class _Mixture:
     def act(self, out: Outcome) -> npt.NDArray[Any]:
         """The actions of a step. Shape (N, n)."""
         config = self._config
-        seen = {name: getattr(out, name) for name in Batch._fields}
+        seen = observation(out)
         nominal = np.ascontiguousarray(out.nominal[:, np.array(config.offsets) - 1])
         features = self._view.see(seen, np.full(len(out.q), self._step == 0))
         right, self._memory = self._expert.predict(seen | {"nominal": self._shown(out.nominal)}, self._memory)

@@ -26,6 +26,10 @@ FEW = {
 KNOWN_BEFORE = {"oracle", *(name for name in baselines.names() if get(name).rival)}
 
 
+#: They measure at most in each step.
+CORRECTED = ("offset_free", "kalman_jacobian", "calibrated")
+
+
 def stated(name):
     return baselines.make(name, "varga7-fast").stated
 
@@ -48,11 +52,17 @@ def test_those_that_estimate_say_so():
         "rhc",
         "rhc_foresight",
         "agent_residual",  # around `rhc`
+        *CORRECTED,
     }
     (audited,) = audit("varga7-fast", [("rhc", {"horizon": 3, "iterations": 1})], steps=3)
     assert audited.counted[1:] == audited.stated[1:]  # steps that are neither damped nor shortened
     assert audited.counted[0] != audited.stated[0]  # the initial guess
     assert not audited.agrees
+
+
+def test_corrected_models_are_right_about_steps_that_measure():
+    for audited in audit("varga7-fast", [(name, {"policy": "dls"}) for name in CORRECTED], steps=2):
+        assert audited.agrees
 
 
 class Misstated(DampedLeastSquares):

@@ -285,21 +285,26 @@ def course(steps=60, coordinates=6, joints=7, **changes):
     return {**series, **changes}
 
 
+def assert_every_axis_has_a_label_and_a_unit(figure):
+    figure.draw_without_rendering()
+    labels = [axes.get_ylabel() for axes in figure.axes]
+    assert all(re.search(r"\[.+\]$", label) for label in labels), labels
+    assert any(axes.get_xlabel() == "time [s]" for axes in figure.axes)
+
+
 @pytest.mark.parametrize("coordinates", [3, 6, 12, 5])
-def test_every_axis_has_a_label_and_a_unit(coordinates):
+def test_axes_of_the_tracking_have_labels_and_units(coordinates):
     one = course(coordinates=coordinates)
-    figures = [
-        tracking.draw("t", [("a", one), ("b *", one)]),
-        joints.draw_velocities("v", one),
-        joints.draw_paths("p", one),
-        joints.draw_accelerations("a", {**one, "qddot": one["qdot"], "acceleration_limit": np.full(7, 9.0)}),
-    ]
-    for figure in figures:
-        figure.draw_without_rendering()
-        labels = [axes.get_ylabel() for axes in figure.axes]
-        assert all(re.search(r"\[.+\]$", label) for label in labels), labels
-        assert any(axes.get_xlabel() == "time [s]" for axes in figure.axes)
-    assert len(figures[0].axes) == coordinates + 2
+    figure = tracking.draw("t", [("a", one), ("b *", one)])
+    assert_every_axis_has_a_label_and_a_unit(figure)
+    assert len(figure.axes) == coordinates + 2
+
+
+@pytest.mark.parametrize("draw", [joints.draw_velocities, joints.draw_paths, joints.draw_accelerations])
+def test_axes_of_the_joints_have_labels_and_units(draw):
+    one = course()
+    accelerations = {"qddot": one["qdot"], "acceleration_limit": np.full(7, 9.0)}
+    assert_every_axis_has_a_label_and_a_unit(draw("j", {**one, **accelerations}))
 
 
 def bands_of(axes):

@@ -7,6 +7,7 @@ from baselines.evaluation.plan import make_plan
 from baselines.fingerprints import set_hash
 from ikgym import cost_kernels, scenarios
 from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.scenarios import imperfect
 
 
 @pytest.mark.parametrize("name", test_sets.names())
@@ -24,6 +25,7 @@ def test_the_sets_are_the_published_ones():
         "varga7-random-long": (16, "test", 3000),
         "panda-random": (128, "test", 1000),
         "iiwa14-random": (128, "test", 1000),
+        **{name: (65 if name == "panda-same-arm" else 64, "test", 3000) for name in imperfect.SCENARIOS},
     }
 
 
@@ -38,6 +40,7 @@ def test_the_sets_are_the_published_ones():
         ("varga7-random-long", 2_000_015, (-0.320635318762, 0.603603897137, 0.978702510455, -0.630827291228)),
         ("panda-random", 2_000_000, (-0.229776896407, -1.194726659585, 0.121878139386, -2.554467587124)),
         ("panda-random", 2_000_127, (0.782552705425, -1.422801591503, 0.798453720653, -2.931062047715)),
+        ("panda-ideal", 2_000_000, (-0.246768624713, -1.347738067527, 0.170552587934, -2.369878789443)),
         ("iiwa14-random", 2_000_000, (-0.313736681668, 0.09933127704, 0.079239047267, -1.455366509301)),
         ("iiwa14-random", 2_000_127, (0.782552705425, -0.132054177127, 0.798453720653, -1.969408227173)),
     ],
@@ -67,7 +70,7 @@ def test_a_frozen_set_is_played_as_it_is():
         ("varga7-random", 1000, test_sets.SETS["varga7-random"].digest)
     }
     both = make_plan((), ["dls", "follow_nominal"], test_sets=test_sets.names()).jobs
-    assert len(both) == 2 * (256 + 32 + 64 + 16 + 2 * 128)
+    assert len(both) == 2 * (256 + 32 + 64 + 16 + 2 * 128 + 4 * 64 + 3 * (3 * 64 + 65))
     assert all(job.test_set is None for job in make_plan("varga7-random", "dls").jobs)
 
 

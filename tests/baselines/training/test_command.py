@@ -20,6 +20,7 @@ from baselines.training.errors import TrainingError
 from baselines.training.folder import FORMAT
 from baselines.training.seeds import SeedRuns
 from tests.baselines.training.small import about, timeless
+from tests.spawning import dies_with_seed_7
 
 ROOT = pathlib.Path(__file__).parents[3]
 TINY = [
@@ -30,9 +31,9 @@ TINY = [
 
 @pytest.fixture(scope="module")
 def several(tmp_path_factory):
-    """Three seeds in two processes."""
+    """Two seeds in two processes; that seeds wait their turn is seen where one dies."""
     folder = tmp_path_factory.mktemp("several")
-    code = main(["ppo", *TINY, "--seeds", "0", "1", "5", "--workers", "2", "--out", str(folder)])
+    code = main(["ppo", *TINY, "--seeds", "1", "5", "--workers", "2", "--out", str(folder)])
     return folder, code
 
 
@@ -40,8 +41,8 @@ def test_several_seeds(several, tmp_path, capsys):
     """Each in its folder, and the same as if it were alone."""
     folder, code = several
     assert code == 0
-    assert sorted(path.name for path in folder.iterdir()) == ["seed-0", "seed-1", "seed-5"]
-    assert len({about(folder / f"seed-{seed}")["weights_sha256"] for seed in (0, 1, 5)}) == 3
+    assert sorted(path.name for path in folder.iterdir()) == ["seed-1", "seed-5"]
+    assert len({about(folder / f"seed-{seed}")["weights_sha256"] for seed in (1, 5)}) == 2
     assert main(["ppo", *TINY, "--seeds", "5", "--out", str(tmp_path)]) == 0
     assert about(tmp_path / "seed-5")["weights_sha256"] == about(folder / "seed-5")["weights_sha256"]
     assert timeless(tmp_path / "seed-5") == timeless(folder / "seed-5")
@@ -50,11 +51,22 @@ def test_several_seeds(several, tmp_path, capsys):
     assert printed[1].split()[:2] == ["5", "–"]
 
 
+def test_a_seed_that_dies_takes_no_other_with_it(several, tmp_path, monkeypatch, capfd):
+    """Nor do those that wait for its process to end."""
+    monkeypatch.setattr(seeds, "_child", dies_with_seed_7)
+    assert main(["ppo", *TINY, "--seeds", "7", "1", "--workers", "1", "--out", str(tmp_path)]) == 2
+    assert about(tmp_path / "seed-1")["weights_sha256"] == about(several[0] / "seed-1")["weights_sha256"]
+    printed = capfd.readouterr()
+    assert "   7  failed" in printed.out
+    assert "error: seed 7: its process has died (signal SIGKILL); go on with --resume" in printed.err
+
+
+@pytest.mark.slow
 def test_a_seed_that_fails_or_dies_takes_no_other_with_it(several, tmp_path, monkeypatch, capfd):
     for seed in (0, 1):
         (tmp_path / f"seed-{seed}").mkdir()
     (tmp_path / "seed-0" / "run.json").write_text("{")
-    monkeypatch.setattr(seeds, "_child", _dies_with_seed_7)
+    monkeypatch.setattr(seeds, "_child", dies_with_seed_7)
     code = main(["ppo", *TINY, "--seeds", "7", "0", "1", "--workers", "2", "--resume", "--out", str(tmp_path)])
     assert code == 2
     assert about(tmp_path / "seed-1")["weights_sha256"] == about(several[0] / "seed-1")["weights_sha256"]
@@ -243,24 +255,26 @@ def test_ctrl_c(tmp_path, capsys, monkeypatch):
     assert f"is in {tmp_path}; go on with --resume" in capsys.readouterr().err
 
 
-def _dies_with_seed_7(job, seed, connection, child=seeds._child):
-    import os
-    import signal
+class Pipe:
+    """Keeps what a child tells."""
 
-    if seed == 7:
-        os.kill(os.getpid(), signal.SIGKILL)
-    child(job, seed, connection)
+    sent = None
+
+    def send(self, message):
+        self.sent = message
+
+
+def test_expected_errors_of_a_child_are_told(tmp_path):
+    (tmp_path / "seed-0").mkdir()
+    (tmp_path / "seed-0" / "run.json").write_text("{")
+    pipe = Pipe()
+    seeds._child(SeedRuns(PPO(), tmp_path, resume=True), 0, pipe)
+    assert pipe.sent.seed == 0
+    assert "run.json is damaged" in pipe.sent.error
 
 
 def test_unexpected_errors_of_a_child_are_told(tmp_path, monkeypatch, capfd):
     monkeypatch.setattr(seeds, "_train", lambda *_: 1 / 0)
-
-    class Pipe:
-        sent = None
-
-        def send(self, message):
-            self.sent = message
-
     pipe = Pipe()
     seeds._child(SeedRuns(PPO(), tmp_path), 3, pipe)
     assert pipe.sent.error == "ZeroDivisionError: division by zero"

@@ -16,6 +16,7 @@ from baselines.spec import parse_policy
 from baselines.training.environment.vec_env import ProcessedVecEnv
 from baselines.training.environment.view import View
 from ikgym.exceptions import InvalidInputError, ResetNeededError, UnknownNameError
+from ikgym.outcome import OBSERVED
 from ikgym.sb3 import RedundantIKVecEnv
 
 N, STEPS = 3, 12
@@ -47,7 +48,7 @@ def test_features_are_those_of_processing(base_policy):
         under = baselines.make(name, scenario(), **parameters)
 
     def expected(observation, state, starting):
-        batch, base = Batch(*[observation[key] for key in Batch._fields]), None
+        batch, base = Batch(*[observation[key] for key in OBSERVED]), None
         if under is not None:
             shown = {**observation, "nominal": observation["nominal"][:, : under.preview]}
             action, state = under.predict(shown, state, starting)

@@ -18,6 +18,7 @@ from baselines.solvers.receding_horizon.newton.terms import (
     velocity_derivatives,
     velocity_limit_term,
 )
+from baselines.solvers.receding_horizon.newton.workspace import joints_at
 from ikgym import cost_kernels, task_kernels
 from ikgym.cost_kernels import P_X_INSIDE
 from ikgym.jit import inlined, uncounted
@@ -60,7 +61,7 @@ def tracking_errors(problem, path, workspace):
     errors = workspace.errors
     for k in range(path.shape[0]):
         if tracking[k] != 0.0:
-            forward(chain, path[k], rotation, position)
+            forward(chain, joints_at(problem, path, k, workspace.knot), rotation, position)
             task_kernels.coordinates(kind, rotation, position, pose)
             task_kernels.error(kind, nominal[at[k] - 1], pose, errors[k])
     return errors
@@ -162,7 +163,7 @@ def linearise(problem, path, multipliers, advance, exact, workspace):
                 diagonal[k, a, b] = 0.0
         weight = tracking[k]
         if weight != 0.0:
-            forward_and_jacobian(chain, path[k], rotation, position, geometric)
+            forward_and_jacobian(chain, joints_at(problem, path, k, knot), rotation, position, geometric)
             task_kernels.coordinates(kind, rotation, position, pose)
             task_kernels.error(kind, nominal[at[k] - 1], pose, error)
             task_kernels.jacobian(kind, rotation, geometric, jacobian)

@@ -37,6 +37,8 @@ _CONVERGED, _LIMIT, _SATURATED = int(Status.CONVERGED), int(Status.ITERATION_LIM
 KEPT = 1e-5
 # Newton steps of the initial plan at least, and of a plan that is to be brought to its optimum.
 STEPS_OF_THE_FIRST, STEPS_TO_THE_OPTIMUM = 30, 300
+# Periods that share the Newton steps of the initial plan, where guesses are spread over periods.
+PERIODS_OF_THE_FIRST = 2
 # Behind so many periods beyond the velocity limits another plan is begun beside it.
 RETRY = 4
 
@@ -47,8 +49,9 @@ class HorizonMemory(NamedTuple):
     Attributes:
         plans: The plan and, where there is one, the restart candidate, see :func:`plan.plan_in`: joint coordinates at
             the K knots in [rad] or [m], then e + 2 n multipliers a knot. Shape (B, 1 or 2, K (e + 3 n)).
-        counts: PERIODS planned so far, CANDIDATE_STEPS that the candidate has had, initial guesses TRIED so far, and
-            how many periods in a row have ended FAR beyond the velocity limits. Shape (B, 4).
+        counts: PERIODS planned so far, CANDIDATE_STEPS that the candidate has had (a guess that has a period of its own
+            counts as one), initial guesses TRIED so far, and how many periods in a row have ended FAR beyond the
+            velocity limits. Shape (B, 4).
     """
 
     plans: npt.NDArray[np.float64]
@@ -150,7 +153,15 @@ def plan_batch(data, settings, observations, memory, answers, workspace):
         # Where the horizon ends with the episode nothing comes behind it.
         braking = not settings.stop_at_end or observations.remaining[row] > settings.at[-1]
         problem = PathProblem(
-            data, grid, q, observations.nominal[row], qdot_before, settings.rate_weight, settings.change_limit, braking
+            data,
+            grid,
+            q,
+            observations.nominal[row],
+            qdot_before,
+            settings.rate_weight,
+            settings.change_limit,
+            braking,
+            workspace.newton.errors[:0],  # policies know of no payload
         )
         for j in range(q.shape[0]):
             workspace.passed[j] = qdot_before[j] * data.dt
@@ -188,31 +199,78 @@ def _plan_row(problem, settings, old_grid, plans, counts, workspace):
         The :class:`minimise.Minimum` of the plan, and Newton steps made.
     """
     all_knots, knots, n = settings.at.shape[0], problem.grid.at.shape[0], problem.start.shape[0]
-    period, far, age = counts[PERIODS], counts[FAR], counts[CANDIDATE_STEPS : CANDIDATE_STEPS + 1]
-    starting = settings.start_steps > 0 and period > 0 and counts[TRIED] + 1 < settings.starts
+    period, far, spread = counts[PERIODS], counts[FAR], settings.start_steps > 0
+    first = period < (PERIODS_OF_THE_FIRST if spread else 1)
+    starting = spread and not first and counts[TRIED] + 1 < settings.starts
     retried = far > 0 and far % RETRY == 0
-    hurried = far > 0 and not (starting or retried or settings.iterations < 0)
-    steps = max(settings.recovery_steps, settings.iterations) if hurried else settings.iterations
+    steps = _newton_steps(settings, first, far > 0 and not (starting or retried))
     whole = plan_in(plans[0], all_knots, n)
     minimum, made = _plan(problem, settings, steps, period, old_grid, whole, workspace)
-    plan, number = first_part(whole, knots), settings.starts + period
     if far > 0 and not starting:
-        age[0] = 0  # no time for the candidate, which is left behind
+        counts[CANDIDATE_STEPS] = 0  # no time for the candidate, which is left behind
         if retried:
+            plan, number = first_part(whole, knots), settings.starts + period
             made += try_start(problem, settings, settings.recovery_steps, plan, minimum.cost, number, workspace)
-    elif settings.restart_steps > 0 and period > 0:
-        whole_candidate = plan_in(plans[1], all_knots, n)
-        if age[0] == 0:
-            branch_off(problem, settings, plan, starting, number, whole_candidate, workspace)
-        else:
-            shift_plan(old_grid, whole_candidate, problem.grid, workspace)
-        candidate = first_part(whole_candidate, knots)
-        # Newton steps under limits of acceleration take three times as long: no period has time for several of a guess.
-        hasty = starting and problem.change_limit.shape[0] == 0
-        rate = settings.start_steps if hasty else settings.restart_rate
-        counts[TRIED] += starting
-        made += improve_candidate(problem, settings, rate, plan, minimum.cost, candidate, age, workspace)
+    elif settings.restart_steps > 0 and not first:
+        made += _restart(problem, settings, old_grid, plans, counts, minimum.cost, starting, workspace)
     return minimum, made
+
+
+@inlined
+def _newton_steps(settings, first, hurried):
+    """Newton steps of the plan in one period; -1 to the optimum.
+
+    Args:
+        settings: :class:`settings.PlanSettings`.
+        first: Whether the first plan is made.
+        hurried: Whether the period before ended beyond the velocity limits, and there is time to make up for it.
+    """
+    if settings.iterations < 0:
+        return -1
+    if not first:
+        least = settings.recovery_steps if hurried else 0
+    elif settings.start_steps > 0:
+        least = (settings.start_steps + PERIODS_OF_THE_FIRST - 1) // PERIODS_OF_THE_FIRST
+    else:
+        least = STEPS_OF_THE_FIRST
+    return max(least, settings.iterations)
+
+
+@inlined
+def _restart(problem, settings, old_grid, plans, counts, cost, starting, workspace):
+    """Begins a restart candidate, or goes on with the one there is.
+
+    Args:
+        problem: A :class:`PathProblem`.
+        settings: :class:`settings.PlanSettings`.
+        old_grid: The grid of the candidate, that of the period before.
+        plans: Of :class:`HorizonMemory`, changed in place. Shape (2, K (e + 3 n)).
+        counts: Likewise. Shape (4,).
+        cost: What the plan costs.
+        starting: Whether initial guesses are still to be tried.
+        workspace: A :class:`plan.PlanWorkspace`.
+
+    Returns:
+        Newton steps made.
+    """
+    all_knots, knots, n = settings.at.shape[0], problem.grid.at.shape[0], problem.start.shape[0]
+    plan, whole = first_part(plan_in(plans[0], all_knots, n), knots), plan_in(plans[1], all_knots, n)
+    age, number = counts[CANDIDATE_STEPS : CANDIDATE_STEPS + 1], settings.starts + counts[PERIODS]
+    begun = age[0] == 0
+    if begun:
+        branch_off(problem, settings, plan, starting, number, whole, workspace)
+    else:
+        shift_plan(old_grid, whole, problem.grid, workspace)
+    # Newton steps of the interior point method take three times as long: no period has time for several of a guess.
+    hasty = starting and problem.change_limit.shape[0] == 0
+    rate, made = settings.start_steps if hasty else settings.restart_rate, 0
+    counts[TRIED] += starting
+    if begun and settings.start_steps > 0 and not starting:
+        age[0] = 1  # a guess takes as long as a Newton step, and counts as one: no period has time for both
+    else:
+        candidate = first_part(whole, knots)
+        made = improve_candidate(problem, settings, rate, plan, cost, candidate, age, workspace)
+    return made
 
 
 @inlined
@@ -222,7 +280,7 @@ def _plan(problem, settings, most, period, old_grid, plan, workspace):
     Args:
         problem: A :class:`PathProblem`.
         settings: :class:`settings.PlanSettings`.
-        most: Newton steps in this period; -1 to the optimum.
+        most: Newton steps in this period behind initial guesses; -1 to the optimum.
         period: Periods planned before.
         old_grid: The grid of the plan before.
         plan: The :class:`Plan`, changed in place.
@@ -235,7 +293,6 @@ def _plan(problem, settings, most, period, old_grid, plan, workspace):
     made, exact, steps = 0, most < 0, most
     if period == 0:
         made = initial_plan(problem, settings, part, workspace)
-        steps = max(settings.start_steps if settings.start_steps > 0 else STEPS_OF_THE_FIRST, steps)
     else:
         shift_plan(old_grid, plan, problem.grid, workspace)
     if exact:

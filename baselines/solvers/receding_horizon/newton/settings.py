@@ -27,7 +27,8 @@ class PlanSettings(NamedTuple):
         restart_steps: Newton steps of a restart candidate, 0 for none.
         restart_rate: Of them in one period.
         seed: Of the random guesses.
-        start_steps: Newton steps of an initial guess that has a period of its own; 0 where all share the first.
+        start_steps: Newton steps of an initial guess that has a period of its own; 0 where all share the first. The
+            first plan's are shared by two periods.
         recovery_steps: Newton steps behind a period that ended beyond the velocity limits; 0 for as many as in others.
         rate_weight: What changes of velocity cost, see :mod:`rate`.
         change_limit: Largest changes of velocity in one step, see :class:`workspace.PathProblem`. Shape (n or 0,).
@@ -46,11 +47,6 @@ class PlanSettings(NamedTuple):
     recovery_steps: int
     rate_weight: float
     change_limit: Floats
-
-
-def change_limit(acceleration_limit: Floats, dt: float) -> Floats:
-    """The largest changes of velocity in one step of Δt, in [rad/s] or [m/s]. Shape (n,), or (0,) without a limit."""
-    return dt * acceleration_limit if np.isfinite(acceleration_limit).any() else np.zeros(0)
 
 
 def plain_settings(cost: CostParameters, settings: PlanSettings) -> tuple[Floats, Integers]:

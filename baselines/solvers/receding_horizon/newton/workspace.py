@@ -10,7 +10,7 @@ import numpy.typing as npt
 from baselines.solvers.receding_horizon.newton.grid import Grid
 from baselines.solvers.receding_horizon.problem_data import ProblemData
 from ikgym import task_kernels
-from ikgym.jit import kernel
+from ikgym.jit import inlined, kernel
 
 Floats = npt.NDArray[np.float64]
 
@@ -20,6 +20,8 @@ BARRIER_SIZE = 4
 
 # Of problems in which changes of velocity cost nothing.
 NO_VELOCITY: Floats = np.zeros(0)
+# Of problems without a payload.
+NO_LOAD: Floats = np.zeros((0, 0))
 
 
 class PathProblem(NamedTuple):
@@ -37,6 +39,8 @@ class PathProblem(NamedTuple):
             none. Shape (n,), for the interior point method, or (0,), for multipliers, which cannot limit them.
         braking: Whether the arm has to be able to stop within its joint limits behind the last knot; read where
             accelerations have a limit.
+        load: What a payload adds to the zeros of the joints at each knot, in [rad] or [m]. Shape (K, n), or (0, n)
+            where there is none.
     """
 
     data: ProblemData
@@ -47,6 +51,7 @@ class PathProblem(NamedTuple):
     rate_weight: float = 0.0
     change_limit: Floats = NO_VELOCITY
     braking: bool = False
+    load: Floats = NO_LOAD
 
 
 class KnotWorkspace(NamedTuple):
@@ -65,6 +70,7 @@ class KnotWorkspace(NamedTuple):
         penalty_factor: Factor of the penalties of the limits. Shape (1,).
         gram: Of damped least squares. Shape (e, e).
         solution: Of damped least squares. Shape (e,).
+        loaded: Joint coordinates with a payload. Shape (n,).
     """
 
     rotation: Floats
@@ -79,6 +85,7 @@ class KnotWorkspace(NamedTuple):
     penalty_factor: Floats
     gram: Floats
     solution: Floats
+    loaded: Floats
 
 
 class QuadraticModel(NamedTuple):
@@ -133,6 +140,24 @@ class NewtonWorkspace(NamedTuple):
     barriers: Floats
 
 
+@inlined
+def joints_at(problem, path, k, knot):
+    """The joint coordinates that the kinematics see at a knot: those of the path, with the payload where there is one.
+
+    Args:
+        problem: A :class:`PathProblem` of K knots.
+        path: Joint coordinates at the knots in [rad] or [m]. Shape (K, n).
+        k: The knot.
+        knot: A :class:`KnotWorkspace`.
+    """
+    q = path[k]
+    if problem.load.shape[0] > 0:
+        for j in range(q.shape[0]):
+            knot.loaded[j] = q[j] + problem.load[k, j]
+        q = knot.loaded
+    return q
+
+
 # Arrays of the same shape are parts of one: an allocation takes 40 ns, and all of them once took 0.9 µs of a `predict`.
 
 
@@ -154,6 +179,7 @@ def knot_workspace(kind, m, n):
         np.ones(1),
         np.empty((e, e)),
         vectors[2],
+        np.empty(n),
     )
 
 

@@ -14,6 +14,7 @@ from baselines.solvers.fixed_point import fixed_point, iteration
 from baselines.solvers.fixed_point.contraction import contraction, evaluate
 from baselines.status import Status
 from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.outcome import OBSERVED
 from tests.comparison import identical
 from tests.every_scenario import ONE_OF_EACH
 
@@ -130,7 +131,7 @@ def test_the_sigmoid_bounds_a_step():
     """|F| is at most artanh(slope)."""
     policy = baselines.make("fixed_point", REGULAR, family="sigmoid", iterations=1, a=-1e4, d=0.0)
     far = {**observed(REGULAR, Q), "nominal": np.full((1, 3), 1e3)}
-    batch = Batch(*(np.asarray(far[name])[None] for name in Batch._fields))
+    batch = Batch(*(np.asarray(far[name])[None] for name in OBSERVED))
     solution = policy.solve(batch, policy.memory(1))
     assert np.linalg.norm(solution.qdot) * 1e-3 <= np.arctanh(0.5) + 1e-12
 

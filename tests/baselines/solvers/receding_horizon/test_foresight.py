@@ -62,12 +62,22 @@ def iterations(steps, **parameters):
     return episode.iterations
 
 
-def test_the_first_call_takes_no_more_than_five_ordinary_ones():
-    """In Newton steps; the next ones make one step more, that of the plan itself."""
+def test_the_first_call_takes_less_than_three_ordinary_ones():
+    """In Newton steps: half of those of the first plan; a guess for it takes about as long as two more."""
     made = iterations(120)
-    assert made[0] <= 5 * np.median(made[-20:])
-    assert made[1:].max() <= 6 * np.median(made[-20:])
-    assert iterations(60, start_steps=0)[0] > 50 * np.median(made[-20:])
+    usual = np.median(made[-20:])
+    assert 2 < made[0] < 3 * usual
+    assert made[1] <= 3 * usual
+    assert made[2:].max() <= 6 * usual
+    assert iterations(60, start_steps=0)[0] > 50 * usual
+
+
+def test_few_periods_are_longer_than_others():
+    """Less than 1 % of 3,000. Behind the first guesses there are two Newton steps, or one where a guess is made."""
+    made = iterations(120)
+    assert (made > 2).sum() <= 25
+    assert (made[40:] <= 2).all()
+    assert (made[40:] == 1).any()
 
 
 @pytest.mark.slow
@@ -116,14 +126,15 @@ def test_the_seed_chooses_the_initial_guesses(seed, same):
         policy = baselines.make("rhc_foresight", SCENARIO, seed=number)
         env = gym.make("RedundantIK-v0", scenario=SCENARIO, preview=policy.preview)
         observation, _ = env.reset(seed=1_000_000)
-        _, state = policy.predict(observation)
-        _, state = policy.predict(observation, state)
+        state = None
+        for _ in range(3):  # the first plan takes two periods
+            _, state = policy.predict(observation, state)
         candidates.append(policy.memory_of(state).plans[:, 1])
     assert np.array_equal(*candidates) == same
 
 
 @pytest.mark.parametrize(
-    ("horizon", "knots"), [(2, 1), (31, 8), (101, 13), (301, 21), (1001, 38), (1501, 46), (3001, 65)]
+    ("horizon", "knots"), [(2, 1), (31, 7), (101, 11), (301, 19), (1001, 33), (1501, 40), (3001, 56)]
 )
 def test_knots_of_each_horizon(horizon, knots):
     """The same up to the horizon, whatever it is, and none farther apart than a third of an oscillation of 3 Hz."""

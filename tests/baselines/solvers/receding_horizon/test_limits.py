@@ -8,7 +8,6 @@ import pytest
 import baselines
 import ikgym
 from baselines.evaluation.rollout import rollouts
-from baselines.solvers.receding_horizon.newton.settings import change_limit
 from benchmarks.rivals.numpy_horizon import Horizon, beyond_limits, plan_cost
 from tests.baselines.solvers.receding_horizon.newton.interior_point.states import DT, KNOTS, horizon_of, problem_of
 from tests.baselines.solvers.receding_horizon.newton.interior_point.test_minimise import GOLDEN
@@ -120,19 +119,34 @@ def test_joints_without_a_limit_are_free():
         assert np.isfinite(episode.qdot).all()
 
 
-def test_without_a_limit_there_are_no_barriers():
-    """Then the kernels take the branch that they always took."""
-    unlimited = ikgym.scenarios.get("varga7-fast").arm.acceleration_limit
-    assert change_limit(unlimited, DT).shape == (0,)
-    np.testing.assert_array_equal(change_limit(np.array([10.0, np.inf]), DT), [10.0 * DT, np.inf])
+def test_who_plans_by_the_interior_point_method():
+    """`rhc` under limits of acceleration; the preset for real time under limits of any kind."""
+    expected = {"varga7-fast": (False, False), "tiago-turn": (False, True), "panda-turn": (True, True)}
+    for scenario, interior_point in expected.items():
+        made = tuple(baselines.make(name, scenario).interior_point for name in ("rhc", "rhc_foresight"))
+        assert made == interior_point
 
 
-def test_foresight_has_no_candidates_under_limits_of_acceleration():
-    alone = baselines.make("rhc_foresight", panda())
-    assert (alone.iterations, alone.starts, alone.restart_steps, alone.start_steps) == (3, 1, 0, 0)
-    asked = baselines.make("rhc_foresight", panda(), restart_steps=10)
-    assert (asked.iterations, asked.starts, asked.restart_steps, asked.start_steps) == (1, 28, 10, 10)
-    assert baselines.make("rhc_foresight", ikgym.scenarios.get("varga7-fast")).restart_steps == 20
+PRESET = {"varga7-fast": (1, 20, 20, 10), "tiago-turn": (3, 1, 0, 0), "panda-turn": (3, 1, 0, 0)}
+
+
+@pytest.mark.parametrize("scenario", PRESET)
+def test_what_the_preset_is_depends_on_the_arm_parameter_by_parameter(scenario):
+    iterations, starts, restart_steps, start_steps = PRESET[scenario]
+    for given in ({}, {"starts": 3}, {"iterations": 2, "restart_steps": 30}):
+        policy = baselines.make("rhc_foresight", scenario, **given)
+        assert policy.iterations == given.get("iterations", iterations)
+        assert policy.starts == given.get("starts", starts)
+        assert policy.restart_steps == given.get("restart_steps", restart_steps)
+        assert policy.start_steps == start_steps
+
+
+def test_foresight_stays_within_limits_of_position_and_velocity():
+    """TIAGo's torso moves by 0.07 m/s; multipliers err by 43 µm here with one Newton step a period."""
+    scenario = ikgym.scenarios.get("tiago-raster").replace(steps=400)
+    (episode,) = rollouts(scenario, baselines.make("rhc_foresight", scenario), (0,))
+    assert not episode.at_limit.any()
+    assert episode.position_error.max() < 1e-5
 
 
 @pytest.mark.slow

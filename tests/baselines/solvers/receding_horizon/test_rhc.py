@@ -202,8 +202,15 @@ def descended(name, horizon, count):
     return [plan_cost(descent.problem, Horizon(a, b), p) for a, b, p in zip(q, nominal, plans, strict=True)]
 
 
-@pytest.mark.parametrize("horizon", [3, 6])
-@pytest.mark.parametrize("name", VARGA)
+#: Each scenario and each horizon; those that descend the longest are in the slow run.
+DESCENTS = [
+    pytest.param(name, horizon, marks=pytest.mark.slow if (horizon == 6) == name.endswith("slow") else ())
+    for name in VARGA
+    for horizon in (3, 6)
+]
+
+
+@pytest.mark.parametrize(("name", "horizon"), DESCENTS)
 def test_never_above_gradient_descent(name, horizon):
     scenario = ikgym.scenarios.get(name)
     q, nominal = states_near(scenario, horizon - 1, 20, 1e-2, seed=5)

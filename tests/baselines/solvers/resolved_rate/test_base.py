@@ -8,6 +8,7 @@ import pytest
 
 import baselines
 import ikgym
+from baselines.evaluation.rollout import rollout
 from baselines.status import Status
 from ikgym.exceptions import InvalidInputError
 from tests.every_scenario import ONE_OF_EACH
@@ -113,3 +114,18 @@ def test_tracks_a_regular_trajectory(name):
 def test_bad_parameters(name, change, message):
     with pytest.raises(InvalidInputError, match=message):
         baselines.make(name, "varga7-fast", **change)
+
+
+@pytest.mark.parametrize(("delay", "limit"), [(2, 0.62), (12, 0.13)])
+def test_a_delay_lowers_the_largest_stable_gain(delay, limit):
+    """As the docstring says: errors die out a tenth below the limit, and grow a tenth above."""
+    scenario = ikgym.scenarios.get("panda-circle").replace(steps=1200, plant=ikgym.Plant(command_delay=delay))
+    assert 2.0 * np.sin(np.pi / (2 * (2 * delay + 1))) == pytest.approx(limit, rel=0.04)
+    late = [
+        rollout(scenario, baselines.make("dls", scenario, gain=share * limit), 0, timed=False)
+        .position_error[-100:]
+        .max()
+        for share in (0.9, 1.1)
+    ]
+    assert late[0] < 0.02
+    assert late[1] > 10.0 * late[0]

@@ -97,7 +97,7 @@ def test_what_the_inner_policy_sees(feedback, monkeypatch):
 
     def listening(self, batch, memory):
         if self is policy.inner:
-            seen.append({key: value.copy() for key, value in batch._asdict().items()})
+            seen.append({key: value.copy() for key, value in batch._asdict().items() if value is not None})
         return act(self, batch, memory)
 
     monkeypatch.setattr(type(policy.inner), "act", listening)

@@ -14,7 +14,7 @@ from baselines.solvers.receding_horizon.newton.interior_point.barrier import pri
 from baselines.solvers.receding_horizon.newton.rate import add_rate_cost, rate_cost
 from baselines.solvers.receding_horizon.newton.second_order import second_order
 from baselines.solvers.receding_horizon.newton.terms import velocity_cost, velocity_derivatives
-from baselines.solvers.receding_horizon.newton.workspace import BEYOND, CURVATURE, GRADIENT, MULTIPLIER
+from baselines.solvers.receding_horizon.newton.workspace import BEYOND, CURVATURE, GRADIENT, MULTIPLIER, joints_at
 from ikgym import cost_kernels, task_kernels
 from ikgym.cost_kernels import P_X_INSIDE
 from ikgym.jit import inlined, uncounted
@@ -132,7 +132,7 @@ def _add_tracking(problem, path, barrier, advance, exact, workspace):
         if weight == 0.0:
             second[k] = 0.0
             continue
-        forward_and_jacobian(chain, path[k], rotation, position, geometric)
+        forward_and_jacobian(chain, joints_at(problem, path, k, knot), rotation, position, geometric)
         task_kernels.coordinates(kind, rotation, position, pose)
         task_kernels.error(kind, nominal[at[k] - 1], pose, error)
         task_kernels.jacobian(kind, rotation, geometric, jacobian)

@@ -106,7 +106,7 @@ def minimise_limited(problem, path, settings, smoothing, workspace):
 def minimise_path(problem, path, multipliers, settings, smoothing, workspace):
     """The minimum of a joint path: by the interior point method where there are limits of changes, or by multipliers.
 
-    Infinite ones hold nothing back, and choose the interior point method all the same: the oracle's way for all limits.
+    Infinite ones hold nothing back, and choose the interior point method all the same: the way of oracle and preset.
 
     Args:
         problem: A :class:`newton.workspace.PathProblem` of K knots.

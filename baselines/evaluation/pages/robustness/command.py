@@ -1,0 +1,134 @@
+"""The command line: ``python -m baselines.robustness``."""
+
+from __future__ import annotations
+
+import dataclasses
+import datetime
+import pathlib
+import shlex
+import sys
+from collections.abc import Sequence
+from typing import Annotated, Any
+
+import tyro
+
+from baselines import command as shared
+from baselines.evaluation.machine import describe
+from baselines.evaluation.pages.robustness import measure
+from baselines.evaluation.pages.robustness.measured import Measured
+from baselines.evaluation.pages.robustness.page import drawn, page
+from baselines.evaluation.plots.style import small_png
+from baselines.evaluation.report import is_reference
+from baselines.files import write
+from baselines.files.locks import locked
+from baselines.spec import parse_policy
+from ikgym.exceptions import InvalidInputError
+from ikgym.scenarios import imperfect
+from ikgym.validation import number, whole_number
+
+#: What the command is called where Python has run its module.
+PROGRAM = "python -m baselines.robustness"
+#: What is compared if nothing else is said.
+POLICIES = ("dls", "rhc", "rhc_foresight", "told")
+
+
+@dataclasses.dataclass(frozen=True)
+class Options:
+    """What the command line takes."""
+
+    out: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="DIR")] = None
+    """Folder for the results. If left out nothing is played, and --write writes the page anew from what lies beside
+    it."""
+    write: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="DIR")] = None
+    """Folder for the page, such as docs; what was measured goes beside it as .json, pictures into images/. That of the
+    results if left out."""
+    policies: Annotated[tuple[str, ...], tyro.conf.arg(metavar="POLICY …")] = POLICIES
+    """Policies as NAME or NAME:PARAMETER=VALUE,…."""
+    scenario: Annotated[str, tyro.conf.arg(metavar="NAME|FILE.toml")] = imperfect.FIELD_NAME
+    """Scenario of the map, whose plant stands for severity 1; of panda-field that is the worst one."""
+    severities: Annotated[tuple[float, ...], tyro.conf.arg(metavar="S …")] = measure.SEVERITIES
+    """Severities of knowledge and of drives, from 0. None for no map."""
+    episodes: Annotated[int, tyro.conf.arg(metavar="N")] = 4
+    """Test episodes of each policy in each cell of the map."""
+    sets: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME …")] = ()
+    """Test sets that are played to their ends, with an ideal plant beside each: panda-ideal panda-measured … for the
+    tables. None if left out."""
+    resume: bool = False
+    """Continue with the results in the folder: what is done already is not done again."""
+    overwrite: bool = False
+    """Delete the results in the folder."""
+    workers: Annotated[int, tyro.conf.arg(metavar="N")] = 1
+    """Processes that play."""
+
+
+def manual(prog: str) -> str:
+    """The text of ``--help`` above the options."""
+    return f"""\
+Plays policies on imperfect plants: over two severities, what nobody knows of the arm (calibration, payload, camera) and
+what its drives do (lag, delay), as a map; and on test sets, as tables.
+
+Examples:
+  {prog} --policies dls rhc told --out results/map
+  {prog} --policies dls rhc told --out results/map --resume --write docs
+  {prog} --severities --sets {" ".join(imperfect.SCENARIOS)} --out results/sets
+  {prog} --scenario lab.toml --severities 0 0.5 1 2 --episodes 8 --out results/lab
+  {prog} --write docs
+
+Files:
+  DIR/SCENARIO/results.json, DIR/sets/results.json   rows as those of evaluate
+  robustness.md, robustness.json, images/*.png       the page, what it is made from, and its pictures"""
+
+
+def measured(options: Options, command: str) -> Measured:
+    """What the page is made from: played, or read from the file beside it.
+
+    Raises:
+        IkgymError: Something expected went wrong, see :func:`baselines.evaluation.pages.measure.play`.
+    """
+    if options.out is None:
+        if options.write is None:
+            raise InvalidInputError("Expected --out, where the results go, or --write, the folder of the page.")
+        return Measured.load(options.write / "robustness.json")
+    severities = sorted({number("severities", one, at_least=0.0) for one in options.severities})
+    if not (severities or options.sets):
+        raise InvalidInputError("severities, sets: expected some severities, some test sets, or both; got neither.")
+    how: dict[str, Any] = {name: getattr(options, name) for name in ("workers", "resume", "overwrite")} | {
+        "progress": True
+    }
+    entries = measure.entries(options.sets, options.policies, options.out, **how) if options.sets else ()
+    place = options.scenario, options.policies, options.out
+    cells = measure.cells(*place, severities=severities, episodes=options.episodes, **how) if severities else ()
+    today = datetime.datetime.now(datetime.UTC).date().isoformat()
+    references = tuple(policy for policy in options.policies if is_reference(parse_policy(policy)[0]))
+    return Measured(command, today, describe(), options.scenario, options.episodes, references, entries, cells)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """The command line.
+
+    Args:
+        arguments: What stands behind the command; taken from the process if left out.
+
+    Returns:
+        The exit code: 0, 2 where something expected went wrong, 130 after Ctrl-C.
+    """
+    arguments = sys.argv[1:] if arguments is None else list(arguments)
+    prog, out = shared.program("robustness", PROGRAM), "the folder of --out"
+
+    def work() -> int:
+        nonlocal out
+        options = shared.parse(Options, arguments, prog=prog, description=manual(prog))
+        out = str(options.out)
+        whole_number("workers", options.workers, at_least=1)
+        whole_number("episodes", options.episodes, at_least=1)
+        found = measured(options, shlex.join([*prog.split(), *arguments]))
+        folder = options.write or options.out or pathlib.Path()
+        with locked(folder):
+            found.save(folder / "robustness.json")
+            for where, figure in drawn(found):
+                write(folder / where, small_png(figure))
+            write(folder / "robustness.md", page(found).encode())
+        print(f"written to {folder / 'robustness.md'}")
+        return 0
+
+    return shared.run(work, lambda: f"Stopped. What was finished is in {out}; continue with --resume.")

@@ -1,0 +1,131 @@
+"""Plays policies on test sets of imperfect plants, and over two severities of one of them."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import pathlib
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any
+
+from tqdm import tqdm
+
+from baselines.evaluation.metrics import Row
+from baselines.evaluation.pages import measure
+from baselines.evaluation.pages.robustness.measured import Cell, Entry
+from baselines.evaluation.plan import Job, make_plan
+from baselines.evaluation.report import is_reference
+from baselines.evaluation.results import slug
+from baselines.evaluation.summary import summarise
+from baselines.oracle import Search, best_known, solve
+from baselines.spec import parse_policy
+from ikgym import scenarios
+from ikgym.exceptions import InvalidInputError
+from ikgym.scenarios import Scenario, imperfect
+
+#: Severities of the map, from ideal to the worst.
+SEVERITIES = (0.0, 0.25, 0.5, 0.75, 1.0)
+#: How thoroughly best known costs are searched where none is recorded: on these paths many starts find the same.
+HOW = Search(starts=20, generations=0)
+
+
+def places(severities: Iterable[float]) -> list[tuple[float, float]]:
+    """Severities of knowledge and of drives, in the order of the map."""
+    severities = tuple(severities)
+    return list(itertools.product(severities, severities))
+
+
+def at(name: str, place: tuple[float, float]) -> Scenario:
+    """A scenario at a place of the map; 1 is the plant that it has, and the worst of `panda-field`.
+
+    Args:
+        name: Of the scenario, or of its file.
+        place: Severities of knowledge and of drives.
+
+    Raises:
+        UnknownNameError: There is no such scenario.
+        InvalidInputError: Its plant is ideal, or has arms of its own; a severity is below 0.
+    """
+    base = scenarios.find(name)
+    if base.plant.ideal:
+        raise InvalidInputError(f"Scenario {base.name!r}: expected a plant that is not ideal.")
+    here = imperfect.field(*place) if name == imperfect.FIELD_NAME else base.replace(plant=base.plant.scaled(*place))
+    return here.replace(name=f"{base.name} {place[0]:g} {place[1]:g}")
+
+
+def cells(
+    name: str,
+    policies: Sequence[str],
+    folder: pathlib.Path,
+    *,
+    severities: Sequence[float],
+    episodes: int,
+    **options: Any,
+) -> tuple[Cell, ...]:
+    """The map.
+
+    Args:
+        name: Of the scenario.
+        policies: Names, with parameters or without.
+        folder: For the results.
+        severities: Of knowledge, and of drives.
+        episodes: Of each policy in each cell.
+        options: Of :func:`baselines.evaluation.pages.measure.play`.
+
+    Raises:
+        IkgymError: As in :func:`baselines.evaluation.pages.measure.play`.
+    """
+    everywhere = {place: at(name, place) for place in places(severities)}
+    plans = {
+        (policy, place): _untimed(make_plan(scenario, policy, episodes=episodes).jobs)
+        for policy in policies
+        for place, scenario in everywhere.items()
+    }
+    rows = measure.play(plans, folder / slug(name), **options)
+    bounds = _bounds(everywhere, scenarios.seeds("test", episodes), progress=bool(options.get("progress")))
+    return tuple(Cell.of(policy, place, found, bounds[place]) for (policy, place), found in rows.items())
+
+
+def entries(sets: Sequence[str], policies: Sequence[str], folder: pathlib.Path, **options: Any) -> tuple[Entry, ...]:
+    """Policies on test sets, each beside itself on an ideal plant.
+
+    Args:
+        sets: Names of test sets.
+        policies: Names, with parameters or without.
+        folder: For the results.
+        options: Of :func:`baselines.evaluation.pages.measure.play`.
+
+    Raises:
+        IkgymError: As in :func:`baselines.evaluation.pages.measure.play`.
+    """
+    plans = {policy: _untimed(make_plan((), policy, test_sets=sets, pairs=True).jobs) for policy in policies}
+    played = measure.play(plans, folder / "sets", **options)
+    return tuple(one for policy, rows in played.items() for one in _of_policy(policy, sets, rows))
+
+
+def _of_policy(policy: str, sets: Sequence[str], rows: Sequence[Row]) -> Iterator[Entry]:
+    reference = is_reference(parse_policy(policy)[0])
+    for summary in summarise(rows):
+        if summary.scenario in sets:
+            own = [row for row in rows if row.scenario == summary.scenario]
+            yield Entry.of(policy, summary, own, reference=reference)
+
+
+def _bounds(
+    everywhere: Mapping[tuple[float, float], Scenario], seeds: Sequence[int], *, progress: bool
+) -> dict[tuple[float, float], dict[int, float]]:
+    """The best known cost of each episode; what is not recorded is searched, and kept on disk."""
+    out: dict[tuple[float, float], dict[int, float]] = {}
+    with tqdm(total=len(everywhere) * len(seeds), disable=not progress, unit="best known cost") as bar:
+        for place, scenario in everywhere.items():
+            for seed in seeds:
+                known = best_known.cost(scenario, seed)
+                cost = solve(scenario, seed, HOW).cost if known is None else known
+                out.setdefault(place, {})[seed] = cost
+                bar.update()
+    return out
+
+
+def _untimed(jobs: Iterable[Job]) -> list[Job]:
+    """Jobs without a clock, and without a trajectory log, which nobody draws."""
+    return [dataclasses.replace(job, first=False, timed=False) for job in jobs]

@@ -1,0 +1,111 @@
+"""What policies share that correct the model of another one: it is shown its model's poses and a shifted reference."""
+
+from __future__ import annotations
+
+import abc
+import dataclasses
+from typing import Any, ClassVar
+
+import numpy as np
+
+from baselines.policy import Batch, Memory, Operations, Solution
+from baselines.solvers.adaptive.deviation import SIZE, add_deviation
+from baselines.solvers.adaptive.measurements import Measurement, nothing_measured, recall
+from baselines.wrapper import NamedWrapper
+from ikgym.jit import kernel
+from ikgym.preview import furthest
+from ikgym.task_kernels import pose_rows
+from ikgym.validation import FloatArray, whole_number
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Corrected(NamedWrapper, abc.ABC):
+    """Base of wrappers that estimate how far the arm's pose is from that of the model, and take it from the reference.
+
+    With R = exp(δ) R̂(q) and p = p̂(q) + d, the arm reaches the reference (R*, p*) where the model reaches
+    (exp(-δ) R*, p* - d). The base policy is shown that reference, ahead as far as it looks, and as `pose` that of its
+    own model at q: what it sees is as consistent as on an ideal plant, neither noisy nor late, whatever the sensors.
+    Subclasses estimate the deviation from measured poses and the joint coordinates where they were measured.
+
+    Args:
+        problem: What the policy is told of the scenario.
+        policy: The name of the base policy.
+        options: Its parameters; those left out have its defaults.
+        history: How many steps ago a pose may have been measured to be of use, counted from the newest joint
+            coordinates.
+
+    Raises:
+        UnknownNameError: There is no such policy, or parameter of it.
+        InvalidInputError: The base policy is a reference, or it refuses its parameters; the history is below 1.
+    """
+
+    policy: str = "rhc"
+    history: int = 64
+
+    #: Forward kinematics of a step with a new pose: those of the model where it was measured and at present.
+    evaluated: ClassVar[int] = 2
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "history", whole_number("history", self.history, at_least=1))
+
+    @abc.abstractmethod
+    def learn(self, batch: Batch, measured: Measurement, own: Any, out: FloatArray) -> Any:
+        """Takes a measurement in.
+
+        Args:
+            batch: Observations.
+            measured: Which rows have a new pose, and the joint coordinates where it was measured.
+            own: The wrapper's own memory, a NamedTuple whose fields `before` and `age` are left to the base; must not
+                be changed in place.
+            out: Receives the deviations at the present joint coordinates. Shape (B, 6).
+
+        Returns:
+            What is to be remembered.
+        """
+
+    def sensors(self, rows: int) -> tuple[FloatArray, FloatArray]:
+        """The fields `before` and `age` of the memory at the start, see :func:`nothing_measured`."""
+        return nothing_measured(rows, self.history, self.problem.model.joints)
+
+    def solve(self, batch: Batch, memory: Memory) -> Solution:
+        """See :meth:`SolverPolicy.solve`."""
+        own, inside = self.split(memory)
+        rows, task, deviation = len(batch.q), self.problem.task, np.empty((len(batch.q), SIZE))
+        measured = recall(batch, self.problem.dt, own.before, own.age)
+        own = self.learn(batch, measured, own._replace(before=measured.before, age=measured.age), deviation)
+        nominal = np.ascontiguousarray(batch.nominal[:, : furthest(self.inner.preview)])
+        pose, shifted = np.empty((rows, task.size)), np.empty(nominal.shape)
+        show_rows(self.problem.model.chain, task.kind, batch.q, deviation, nominal, pose, shifted)
+        step = self.ask(batch._replace(pose=pose, nominal=shifted, pose_age=batch.q_age), inside)
+        return self.solution(step.action * self.problem.velocity_limit, own, step)
+
+    @property
+    def stated(self) -> bool:
+        """Operations are those of steps with a new pose."""
+        return True
+
+    def counted(self, inside: Operations) -> Operations:
+        """The forward kinematics of the wrapper come on top, and it is the one that measures."""
+        return inside._replace(
+            forward_kinematics=inside.forward_kinematics + self.evaluated,
+            measurements=np.ones_like(inside.measurements),
+        )
+
+
+@kernel
+def show_rows(chain, kind, q, deviation, nominal, pose, shifted):
+    """What the base policy is shown, row by row.
+
+    Args:
+        chain: The model of the arm.
+        kind: Of task coordinates.
+        q: Joint coordinates in [rad] or [m]. Shape (B, n).
+        deviation: From the model's pose to the arm's. Shape (B, 6).
+        nominal: Nominal task coordinates ahead. Shape (B, p, m).
+        pose: Receives those of the model. Shape (B, m).
+        shifted: Receives the nominal coordinates without the deviation. Shape (B, p, m).
+    """
+    pose_rows(chain, kind, q, pose)
+    for row in range(q.shape[0]):
+        add_deviation(kind, deviation[row], -1.0, nominal[row], shifted[row])

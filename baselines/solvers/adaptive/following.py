@@ -1,0 +1,94 @@
+"""Kernels: commands by which joints follow an arm without delay and lag, and how that arm moves."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from baselines.solvers.adaptive.drives import mixture
+from ikgym.jit import kernel
+from ikgym.limit_kernels import applied
+from ikgym.validation import FloatArray
+
+#: What share of the largest acceleration is spent to take back an error.
+SHARE = 0.2
+
+
+class Servo(NamedTuple):
+    """How errors are taken back, and within which limits.
+
+    Attributes:
+        gain: Share of the present error that is taken back in a step.
+        dt: Δt in [s].
+        unit: What an action of 1 means, in [rad/s] or [m/s]. Shape (n,).
+        largest: The largest velocities in [rad/s] or [m/s]. Shape (n,).
+        change: How much they change at most in a step; inf where there is no limit. Shape (n,).
+    """
+
+    gain: float
+    dt: float
+    unit: FloatArray
+    largest: FloatArray
+    change: FloatArray
+
+
+@kernel
+def move_rows(limits, dt, wanted, q, qdot):
+    """Moves arms that have limits, but no delay and no lag.
+
+    Args:
+        limits: See :func:`ikgym.limit_kernels.applied`; shape (0, n) where there are none.
+        dt: Δt in [s].
+        wanted: Joint velocities in [rad/s] or [m/s]. Shape (B, n).
+        q: Joint coordinates in [rad] or [m], changed in place. Shape (B, n).
+        qdot: The velocities applied last, in [rad/s] or [m/s], changed in place. Shape (B, n).
+    """
+    out = np.empty(q.shape[1])
+    for row in range(q.shape[0]):
+        out[:] = wanted[row]
+        if limits.shape[0] > 0:
+            applied(limits, q[row], wanted[row], qdot[row], dt, out)
+        for j in range(q.shape[1]):
+            q[row, j] += dt * out[j]
+            qdot[row, j] = out[j]
+
+
+@kernel
+def follow_rows(error, wanted, lags, servo, memory, qdot):
+    """Commands by which the joints move as wanted, and what the simulated drives make of them.
+
+    A command is the velocity wanted and a share of the error, through the inverse of the lag. Where accelerations are
+    limited, large errors are taken back no faster than the arm can stop: a share of them would overshoot ever more.
+
+    Args:
+        error: How far the arm will be behind when the command takes effect, in [rad] or [m]. Shape (B, n).
+        wanted: Joint velocities in [rad/s] or [m/s]. Shape (B, n).
+        lags: T of the simulated drives. Shape (L,).
+        servo: A plain :class:`Servo`.
+        memory: A plain :class:`PredictedMemory`, changed in place.
+        qdot: Receives the commands in [rad/s] or [m/s]. Shape (B, n).
+    """
+    gain, dt, unit, largest, change = servo
+    velocity, path, lag, sent = memory[2], memory[3], memory[8], memory[9]
+    for row in range(qdot.shape[0]):
+        low, high, share = mixture(lag[row], lags)
+        a, b = (1.0 - share) / lags[low], share / lags[high]
+        for j in range(qdot.shape[1]):
+            back, stoppable = gain * error[row, j] / dt, SHARE * change[j] / dt * abs(error[row, j])
+            if back * back > stoppable:
+                back = math.copysign(math.sqrt(stoppable), back)
+            target = wanted[row, j] + back
+            free = (1.0 - share - a) * velocity[row, low, j] + (share - b) * velocity[row, high, j]
+            command, last = (target - free) / (a + b), sent[row, j]
+            command = min(max(command, last - change[j]), last + change[j])
+            qdot[row, j] = min(max(command, -largest[j]), largest[j])
+            # What is sent is a float32 share of the unit.
+            sent[row, j] = np.float32(qdot[row, j] / unit[j]) * unit[j]
+        for f in range(lags.shape[0]):
+            for i in range(path.shape[2] - 1, 0, -1):
+                path[row, f, i] = path[row, f, i - 1]
+            for j in range(qdot.shape[1]):
+                velocity[row, f, j] += (sent[row, j] - velocity[row, f, j]) / lags[f]
+                path[row, f, 0, j] += dt * velocity[row, f, j]

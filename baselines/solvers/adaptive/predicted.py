@@ -1,0 +1,191 @@
+"""Any policy on drives with a delay and a lag: it moves an arm that has neither, and the real one follows."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+from typing import ClassVar
+
+import numpy as np
+import numpy.typing as npt
+
+from baselines.policy import Batch, Memory, Operations, Solution
+from baselines.solvers.adaptive.drives import Hypotheses, PredictedMemory, identify_rows, past_rows, start_memory
+from baselines.solvers.adaptive.following import Servo, follow_rows, move_rows
+from baselines.wrapper import NamedWrapper
+from ikgym.arms.limits import limit_rows
+from ikgym.exceptions import InvalidInputError
+from ikgym.preview import furthest, offsets
+from ikgym.task_kernels import pose_rows
+from ikgym.validation import FloatArray, number, whole_number
+
+#: By how much neighbouring lags differ.
+RATIO = 1.23
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Predicted(NamedWrapper):
+    """Lets a policy drive an arm without delay and lag, d steps ahead of the real one, which is made to follow it.
+
+    A command takes effect ``delay`` steps late, and the velocity follows it through a lag of first order. The base
+    policy therefore is shown the arm as it will be when its command takes effect: joint coordinates and velocities of
+    an arm of the model that does what it is told at once, within the limits, and the reference that belongs to that
+    time, for which more of it has to be shown, see :attr:`preview`. So no delay is in its loop, whatever its gain
+    (Smith 1957, with the delay-free part of the loop driven by the model). The pose that it sees is that of the model
+    plus what the measured pose differed by, filtered.
+
+    The command is the velocity of that arm through the inverse of the lag, within the limits of velocity and
+    acceleration, and a small share of the error that is predicted for the time when it takes effect: where the
+    simulated drive will be then, corrected by how far the measured arm is from where the simulated one should be now.
+    With a wrong delay that feedback alone has the delay in its loop, and its gain is low for that.
+
+    Unknown drives are identified from measured joint coordinates and the policy's own commands, see
+    :mod:`baselines.solvers.adaptive.drives`; ``delay`` and ``bandwidth`` are the guess that holds until there is
+    evidence for others. The memory begins anew with each episode.
+
+    Args:
+        problem: What the policy is told of the scenario.
+        policy: The name of the base policy.
+        options: Its parameters; those left out have its defaults.
+        delay: Delay of commands in steps.
+        bandwidth: f of the lag in [Hz]; None where there is none.
+        identify: Whether delay and bandwidth are a guess that is to be improved.
+        longest_delay: The longest delay that can be identified, in steps.
+        lowest_bandwidth: The lowest bandwidth that can be identified, in [Hz].
+        gain: Share of the predicted error that is taken back in a step. Stable below 2 sin(π / (2 (2 d + 1))) where d
+            steps are not compensated for: at 0.06 up to 25.
+        oldest: The oldest measurements that there may be, in steps, see ``q_age`` and ``pose_age`` of observations;
+            older ones are taken to be of that age.
+
+    Raises:
+        UnknownNameError: There is no such policy, or parameter of it.
+        InvalidInputError: A number is out of its range, or the policy is a reference.
+    """
+
+    delay: int = 7
+    bandwidth: float | None = 14.0
+    identify: bool = True
+    longest_delay: int = 12
+    lowest_bandwidth: float = 8.0
+    gain: float = 0.06
+    oldest: int = 0
+
+    name: ClassVar[str] = "predicted"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not isinstance(self.identify, (bool, np.bool_)):
+            raise InvalidInputError(f"identify: expected True or False, got {self.identify!r}.")
+        for name in ("delay", "longest_delay", "oldest"):
+            whole_number(name, getattr(self, name), at_least=0)
+        lowest = number("lowest_bandwidth", self.lowest_bandwidth, above=0.0)
+        if self.identify and self.delay > self.longest_delay:
+            raise InvalidInputError(
+                f"delay: expected a guess of at most longest_delay = {self.longest_delay} steps, got {self.delay}."
+            )
+        if self.bandwidth is not None:
+            guess = number("bandwidth", self.bandwidth, above=0.0)
+            if self.identify and guess < lowest:
+                raise InvalidInputError(
+                    f"bandwidth: expected a guess of at least lowest_bandwidth = {lowest:g} Hz, got {guess:g}."
+                )
+        if number("gain", self.gain, above=0.0) > 1.0:
+            raise InvalidInputError(f"gain: expected a number above 0 and of at most 1, got {self.gain:g}.")
+
+    @property
+    def preview(self) -> int:
+        """That of the base policy, and the longest delay on top."""
+        return furthest(self.inner.preview) + int(self._hypotheses.delays[-1])
+
+    def own_memory(self, rows: int) -> PredictedMemory:
+        """See :func:`start_memory`."""
+        history = int(self._hypotheses.delays[-1]) + self.oldest + 2
+        return start_memory(rows, (self.problem.model.joints, self.problem.task.size), self._hypotheses, history)
+
+    def solve(self, batch: Batch, memory: Memory) -> Solution:
+        """See :meth:`SolverPolicy.solve`."""
+        own, inside = self.split(memory)
+        kept = PredictedMemory(*map(np.copy, own))
+        off = self._observe(batch, kept)
+        step = self.ask(self._shown(batch, kept), inside)
+        behind = kept.arm_q - self._past(np.zeros_like(kept.delay), kept) - off
+        qdot = np.empty_like(batch.q)
+        limits, servo = self._limits
+        move_rows(limits, self.problem.dt, step.action * self.problem.velocity_limit, kept.arm_q, kept.arm_qdot)
+        follow_rows(behind, kept.arm_qdot, self._hypotheses.lags, servo, tuple(kept), qdot)
+        return self.solution(qdot, kept, step)
+
+    def diagnostics(self, state: Memory) -> dict[str, FloatArray]:
+        """Those of the base policy; ``delay`` in steps and ``time_constant`` of the lag in [s], as assumed."""
+        own, _ = self.split(self.memory_of(state))
+        with np.errstate(divide="ignore"):  # no lag at T = 1
+            constants = -self.problem.dt / np.log1p(-1.0 / own.lag)
+        return {**super().diagnostics(state), "delay": own.delay.astype(np.float64), "time_constant": constants}
+
+    def counted(self, inside: Operations) -> Operations:
+        """Two forward kinematics, for the offset of the pose and for the arm that is shown, and a measurement."""
+        kinematics = inside.forward_kinematics + 2
+        return inside._replace(forward_kinematics=kinematics, measurements=np.maximum(inside.measurements, 1))
+
+    @functools.cached_property
+    def _hypotheses(self) -> Hypotheses:
+        guess = self._lag(self.bandwidth)
+        if not self.identify:
+            return Hypotheses(np.array([self.delay]), np.array([guess]), self.delay, guess)
+        longest = self._lag(self.lowest_bandwidth)
+        lags = np.geomspace(1.0, longest, 1 + math.ceil(math.log(longest) / math.log(RATIO)))
+        return Hypotheses(np.arange(self.longest_delay + 1), lags, self.delay, guess)
+
+    def _lag(self, bandwidth: float | None) -> float:
+        """T of a bandwidth, in steps."""
+        return 1.0 if bandwidth is None else -1.0 / math.expm1(-2.0 * math.pi * bandwidth * self.problem.dt)
+
+    @functools.cached_property
+    def _limits(self) -> tuple[FloatArray, tuple[object, ...]]:
+        """The limits of the arm, see :func:`limit_rows`, and a plain :class:`Servo`."""
+        problem, model = self.problem, self.problem.model
+        change = np.array(model.acceleration_limit * problem.dt)
+        servo = Servo(self.gain, problem.dt, np.array(problem.velocity_limit), np.array(problem.largest_qdot), change)
+        return limit_rows(model, problem.largest_qdot, problem.dt), tuple(servo)
+
+    def _observe(self, batch: Batch, kept: PredictedMemory) -> FloatArray:
+        """Takes in what is measured, and tells how far the arm is from where the drives should have brought it."""
+        fresh = ~kept.begun
+        kept.arm_q[fresh], kept.arm_qdot[fresh] = batch.q[fresh], batch.qdot[fresh]
+        q_age, pose_age = (_steps(age, len(fresh)) for age in (batch.q_age, batch.pose_age))
+        delay = kept.delay.copy()
+        identify_rows(batch.q, q_age, tuple(self._hypotheses), tuple(kept))
+        # With another delay the arm that is driven belongs to another time: by how it moves, not with a jump.
+        kept.arm_q[:] += self.problem.dt * (kept.delay - delay)[:, None] * kept.arm_qdot
+        off: FloatArray = batch.q - self._past(kept.delay + q_age, kept)
+        seen = self._past(kept.delay + pose_age, kept) + off
+        share = np.where(fresh, 1.0, self.gain)[:, None]
+        kept.offset[:] += share * (batch.pose - self._pose(seen) - kept.offset)
+        return off
+
+    def _shown(self, batch: Batch, kept: PredictedMemory) -> Batch:
+        """What the base policy sees: the arm that it moves, as late as its command will be."""
+        preview, rows, delay = self.inner.preview, len(batch.q), kept.delay
+        if rows == 1 and isinstance(preview, int):
+            nominal = batch.nominal[:, delay[0] : delay[0] + preview]
+        else:
+            nominal = batch.nominal[np.arange(rows)[:, None], delay[:, None] + np.array(offsets(preview)) - 1]
+        remaining = np.maximum(batch.remaining - delay[:, None], 1.0)
+        return Batch(kept.arm_q.copy(), kept.arm_qdot.copy(), self._pose(kept.arm_q) + kept.offset, nominal, remaining)
+
+    def _past(self, steps: npt.NDArray[np.int64], kept: PredictedMemory) -> FloatArray:
+        """Where the drives should have brought the arms, see :func:`past_rows`."""
+        out = np.empty_like(kept.sent)
+        past_rows(steps, self._hypotheses.lags, tuple(kept), out)
+        return out
+
+    def _pose(self, q: FloatArray) -> FloatArray:
+        out = np.empty((len(q), self.problem.task.size))
+        pose_rows(self.problem.model.chain, self.problem.task.kind, q, out)
+        return out
+
+
+def _steps(age: FloatArray | None, rows: int) -> npt.NDArray[np.int64]:
+    """How old measurements are, in steps. Shape (B,)."""
+    return np.zeros(rows, dtype=np.int64) if age is None else age[:, 0].astype(np.int64)

@@ -1,0 +1,106 @@
+"""Policies beside themselves on an ideal plant."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import ikgym
+from baselines.evaluate import evaluate
+from baselines.evaluation import report
+from baselines.evaluation.plan import make_plan
+from baselines.evaluation.summary import by_seed, geometric_interval, paired, summarise
+from tests.baselines.evaluation.test_report import row
+
+SHORT = {name: ikgym.scenarios.get(name).replace(steps=16) for name in ("panda-ideal", "panda-camera", "panda-bus")}
+
+
+def rows_of(costs, scenario="lab", fingerprint="1", ideal="0", **changes):
+    """Rows of one policy, by seed and noise seed."""
+    return [
+        row(
+            scenario=scenario,
+            fingerprint=fingerprint,
+            ideal=ideal,
+            seed=seed,
+            noise_seed=noise,
+            total_cost=cost,
+            **changes,
+        )
+        for seed, several in enumerate(costs)
+        for noise, cost in enumerate(several)
+    ]
+
+
+PLAIN = rows_of([[1.0], [2.0], [4.0]], "plain", "0")
+
+
+def test_noise_seeds_count_as_one_episode():
+    (summary,) = summarise(rows_of([[1.0, 4.0], [8.0, 32.0]]))
+    assert summary.episodes == 2
+    assert summary.total_cost.mean == pytest.approx(np.sqrt(2.0 * 16.0))
+    assert (summary.total_cost.worst, summary.total_cost.worst_seed) == (pytest.approx(16.0), 1)
+    assert by_seed(rows_of([[2.0, 8.0]]), lambda one: one.total_cost) == {0: pytest.approx(4.0)}
+
+
+def test_the_ratio_of_each_seed():
+    plain, perturbed = summarise([*PLAIN, *rows_of([[3.0, 3.0], [2.0, 8.0], [12.0, 12.0]])])
+    assert plain.paired is None
+    assert perturbed.paired.mean == pytest.approx((3.0 * 2.0 * 3.0) ** (1 / 3))
+    assert perturbed.paired.low <= perturbed.paired.mean <= perturbed.paired.high
+    assert perturbed.paired.low == pytest.approx(2.0)
+    assert perturbed.paired.high == pytest.approx(3.0)
+    assert perturbed.paired.ideal == pytest.approx(2.0)
+    assert perturbed.paired.episodes == 3
+
+
+def test_only_seeds_of_both_count():
+    pair = paired(rows_of([[3.0], [6.0], [12.0], [1e9]]), PLAIN)
+    assert (pair.mean, pair.low, pair.high, pair.episodes) == (pytest.approx(3.0),) * 3 + (3,)
+    assert paired(rows_of([[1.0]]), rows_of([[1.0]])[:0]) is None
+
+
+def test_others_are_no_pairs():
+    other_policy = [dataclasses.replace(one, policy="rhc") for one in PLAIN]
+    other_settings = [dataclasses.replace(one, parameters={}) for one in PLAIN]
+    perturbed = rows_of([[3.0]] * 3)
+    for plain in (other_policy, other_settings, rows_of([[1.0]] * 3, "plain", "2", "2")):
+        assert summarise([*plain, *perturbed])[1].paired is None
+
+
+def test_the_interval_is_of_the_mean_of_the_logarithms():
+    values = np.exp(np.random.default_rng(3).normal(0.5, 0.3, 400))
+    low, high = geometric_interval(values.tolist())
+    spread = 1.96 * np.log(values).std() / 20.0
+    assert np.log(low) == pytest.approx(np.log(values).mean() - spread, abs=0.1 * spread)
+    assert np.log(high) == pytest.approx(np.log(values).mean() + spread, abs=0.1 * spread)
+    assert geometric_interval([3.0]) == (pytest.approx(3.0), pytest.approx(3.0))
+
+
+def test_the_plan_adds_the_ideal_plants_once():
+    jobs = make_plan([SHORT["panda-camera"], SHORT["panda-bus"]], "dls", episodes=2, pairs=True, noise_seeds=2).jobs
+    names = [job.scenario.name for job in jobs]
+    assert names == ["panda-camera"] * 4 + ["panda-bus"] * 2 + ["panda-camera, ideal plant"] * 2
+    assert jobs[-1].scenario.plant.ideal
+    assert [job.seed for job in jobs[-2:]] == [2_000_000, 2_000_001]
+
+
+def test_an_ideal_plant_that_is_played_anyway_is_not_added():
+    given = [SHORT["panda-camera"], SHORT["panda-ideal"]]
+    jobs = make_plan(given, "dls", pairs=True).jobs
+    assert [job.scenario.name for job in jobs] == ["panda-camera", "panda-ideal"]
+    assert [job.scenario.name for job in make_plan(given[:1], "dls").jobs] == ["panda-camera"]
+
+
+def test_tables_show_the_pairs():
+    rows = evaluate(SHORT["panda-bus"], "dls", episodes=3, pairs=True)
+    text = report.table(rows)
+    bus, plain = ([one.total_cost for one in rows if ("ideal" in one.scenario) == ideal] for ideal in (False, True))
+    ratio = np.exp(np.mean(np.log(np.array(bus) / plain)))
+    line = next(line for line in text.split("over the episodes")[1].splitlines() if line.startswith("dls"))
+    assert report.number(float(ratio)) in line.split()
+    assert "…" in line
+    assert "× ideal: its cost divided by that on the ideal plant" in " ".join(text.split())
+    assert "× ideal" not in report.table([one for one in rows if "ideal" not in one.scenario])

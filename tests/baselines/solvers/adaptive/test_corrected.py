@@ -1,0 +1,147 @@
+"""What the wrappers that correct a model show to the base policy, and what becomes of its tracking."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import baselines
+import ikgym
+from baselines.registry import get
+from ikgym.exceptions import InvalidInputError
+from tests.baselines.solvers.adaptive.arms import PANDA, noisy, observed, path, perturbed, scenario
+from tests.comparison import identical
+
+NAMES = ["offset_free", "kalman_jacobian", "calibrated"]
+EXACT = {"pose_noise": 1e-6, "pose_rotation_noise": 1e-6}
+SETTLED = {"offset_free": {"gain": 1.0}, "kalman_jacobian": EXACT, "calibrated": EXACT}
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("task", ikgym.tasks.names())
+def test_on_an_exact_model_the_base_policy_acts_as_if_it_were_alone(name, task):
+    on, zeros = scenario(task), np.zeros(7)
+    alone, policy = baselines.make("dls", on), baselines.make(name, on, policy="dls")
+    states = [None, None]
+    for q, target in zip(path(0, 5), path(0, 6)[1:], strict=True):
+        seen = observed(on, PANDA, zeros, q, on.task.coordinates(*PANDA.forward(target)))
+        (one, states[0]), (other, states[1]) = (
+            p.predict(seen, s) for p, s in zip((alone, policy), states, strict=True)
+        )
+        np.testing.assert_allclose(one, other, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("task", ["pose", "position", "axis", "matrix", "skew"])
+def test_the_base_policy_leads_another_arm_to_the_reference(name, task):
+    """The first step of a base policy of gain 1 ends where the arm, not the model, is at the reference."""
+    (arm, zeros), on = perturbed(1), scenario(task)
+    policy = baselines.make(name, on, policy="dls", options={"damping": 1e-9}, **SETTLED[name])
+    q = PANDA.home + 0.1
+    reference = on.task.coordinates(*arm.forward(q + zeros + 1e-3))
+    action, _ = policy.predict(observed(on, arm, zeros, q, reference))
+    after = on.task.coordinates(*arm.forward(q + zeros + on.dt * action * on.velocity_limit))
+    alone, _ = baselines.make("dls", on, damping=1e-9).predict(
+        observed(on, PANDA, np.zeros(7), q, reference)  # the pose of the model, as policies that only read q see it
+    )
+    unaware = on.task.coordinates(*arm.forward(q + zeros + on.dt * alone * on.velocity_limit))
+    ours, theirs = (np.abs(on.task.error(reference, end)).max() for end in (after, unaware))
+    assert ours < 1e-5
+    assert theirs > 3e-4
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_late_and_missing_poses_are_held_against_the_posture_where_they_were_measured(name):
+    """Poses are exact, but 3 steps old, and every other one is lost: nothing of the deviation is lost by that."""
+    (arm, zeros), on = perturbed(2), scenario()
+    policy = baselines.make(name, on, policy="dls", **SETTLED[name])
+    shown, state, q = None, None, path(3, 60)
+    for k in range(60):
+        if k >= 3 and k % 2 == 1:
+            shown = observed(on, arm, zeros, q[k - 3])["pose"], 3.0
+        elif shown is None:
+            shown = observed(on, arm, zeros, q[0])["pose"], 0.0
+        else:
+            shown = shown[0], shown[1] + 1.0
+        seen = observed(on, arm, zeros, q[k]) | {"pose": shown[0], "pose_age": np.array([shown[1]])}
+        _, state = policy.predict(seen, state)
+    deviation = deviation_of(policy, state, q[-1])
+    assert np.abs(deviation - true_deviation(arm, zeros, q[-1])).max() < 2e-4
+    late = PANDA.forward(q[-1])[1] - PANDA.forward(q[-5])[1]
+    assert np.abs(late).max() > 2e-2
+
+
+def deviation_of(policy, state, q):
+    """What a policy takes the deviation to be at a posture."""
+    own, _ = policy.split(policy.memory_of(state))
+    if hasattr(own, "deviation"):
+        return own.deviation[0]
+    if hasattr(own, "learnt"):
+        return own.learnt[0] @ np.concatenate([[1.0], q - own.first[0]])
+    out, batch = np.empty((1, 6)), type("Shown", (), {"q": q[None], "pose": np.zeros((1, 12))})
+    measured = type("Measured", (), {"new": np.zeros(1, np.bool_), "q": q[None]})
+    policy.learn(batch, measured, own, out)
+    return out[0]
+
+
+def true_deviation(arm, zeros, q):
+    (rotation, position), (modelled, there) = arm.forward(q + zeros), PANDA.forward(q)
+    task = ikgym.tasks.get("pose")
+    return task.error(task.coordinates(rotation, position), task.coordinates(modelled, there))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_noise_is_averaged(name):
+    """After 100 poses with a noise of 1 mm the deviation is known much better than from one."""
+    (arm, zeros), on, rng = perturbed(4), scenario(), np.random.default_rng(5)
+    noise = {} if name == "offset_free" else {"pose_noise": 1e-3, "pose_rotation_noise": 1e-3}
+    policy = baselines.make(name, on, policy="dls", **noise)
+    q, state, errors = path(6, 100), None, []
+    for k in range(100):
+        _, state = policy.predict(noisy(on, observed(on, arm, zeros, q[k]), rng, 1e-3), state)
+        if k in {0, *range(90, 100)}:
+            errors.append(np.linalg.norm(deviation_of(policy, state, q[k]) - true_deviation(arm, zeros, q[k])))
+    assert max(errors[1:]) < 1.2e-3
+    # The deviation itself is of some 3e-3, and one measurement is off by 2.4e-3.
+    assert np.linalg.norm(true_deviation(arm, zeros, q[-1])) > 1.5e-3
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("parameter", ["history"])
+def test_bad_histories(name, parameter):
+    with pytest.raises(InvalidInputError, match="history: expected a whole number of at least 1, got 0"):
+        baselines.make(name, scenario(), **{parameter: 0})
+
+
+@pytest.mark.parametrize(
+    ("name", "parameter", "value", "message"),
+    [
+        ("offset_free", "gain", 0.0, "gain: expected a finite number above 0"),
+        ("offset_free", "gain", 1.5, "gain: expected a finite number"),
+        ("kalman_jacobian", "slope", -1.0, "slope: expected a finite number of at least 0"),
+        ("kalman_jacobian", "pose_noise", 0.0, "pose_noise: expected a finite number above 0"),
+        ("calibrated", "zero", -1e-3, "zero: expected a finite number of at least 0"),
+        ("calibrated", "pose_rotation_noise", 0.0, "pose_rotation_noise: expected a finite number above 0"),
+        ("calibrated", "keep", 1, "keep: expected True or False, got 1"),
+        ("adaptive_jacobian", "gain", 2.0, "gain: expected a number above 0 and below 2, got 2"),
+        ("adaptive_jacobian", "adaptation", -1.0, "adaptation: expected a finite number of at least 0"),
+        (
+            "calibrated",
+            "policy",
+            "oracle",
+            "policy: expected one that acts on what it sees, got the reference 'oracle'",
+        ),
+    ],
+)
+def test_bad_parameters(name, parameter, value, message):
+    assert parameter in get(name).parameter_names()
+    with pytest.raises(InvalidInputError, match=message):
+        baselines.make(name, scenario(), **{parameter: value})
+
+
+def test_the_memory_of_the_base_policy_is_its_own():
+    on = scenario()
+    policy = baselines.make("offset_free", on, policy="calibrated", options={"policy": "dls"})
+    own, inside = policy.split(policy.memory(2))
+    assert own._fields == ("before", "age", "deviation", "measured")
+    assert identical(tuple(inside), tuple(policy.inner.memory(2)))

@@ -1,0 +1,160 @@
+"""Drives with a delay and a lag: known, guessed and identified, and what is refused."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+import baselines
+import ikgym
+from baselines.evaluation.rollout import rollouts
+from baselines.solvers.adaptive.drives import Hypotheses, identify_rows, start_memory
+from ikgym.exceptions import InvalidInputError
+
+STEPS, SEED = 400, 1_000_003
+
+
+def gentle(steps=STEPS):
+    """A smooth motion of the Panda from rest to rest, at 1 kHz."""
+    scenario = ikgym.scenarios.get("panda-random")
+    trajectory = dataclasses.replace(scenario.trajectory, duration=steps * 1e-3, scale=(0.1, 0.4))
+    return scenario.replace(dt=1e-3, steps=steps, trajectory=trajectory)
+
+
+def driven(scenario, policy, seeds=(SEED,), **plant):
+    """Plays episodes on a plant: costs, joint paths and what the policy takes for true at the end, by row."""
+    on = scenario.replace(plant=ikgym.Plant(**plant))
+    episodes = rollouts(on, policy, list(seeds))
+    costs = np.array([(episode.tracking_cost + episode.velocity_cost).sum() for episode in episodes])
+    told = {name: np.array([e.diagnostics[name][-1] for e in episodes]) for name in episodes[0].diagnostics}
+    return costs, np.array([episode.q for episode in episodes]), told
+
+
+def made(policy="dls", scenario=None, **parameters):
+    return baselines.make("predicted", scenario or gentle(), policy=policy, **parameters)
+
+
+@pytest.fixture(scope="module")
+def ideal():
+    """What `dls` costs without delay and lag."""
+    return driven(gentle(), baselines.make("dls", gentle()))[0]
+
+
+def test_a_policy_of_gain_1_is_lost_by_itself_and_not_with_known_drives(ideal):
+    scenario, drives = gentle(), {"command_delay": 5, "bandwidth": 13.0}
+    alone, _, _ = driven(scenario, baselines.make("dls", scenario), **drives)
+    known, _, _ = driven(scenario, made(delay=5, bandwidth=13.0, identify=False), **drives)
+    assert alone > 1e4 * ideal
+    assert known < 1.3 * ideal
+
+
+def test_unknown_drives_are_identified():
+    """Row by row, each with drives of its own; within 3 % of the lag, or 0.1 ms."""
+    scenario, seeds = gentle(), range(SEED, SEED + 6)
+    drives = {"command_delay": (0, 12), "bandwidth": (10.0, 20.0)}
+    costs, _, told = driven(scenario, made(), seeds, **drives)
+    drawn = [scenario.replace(plant=ikgym.Plant(**drives)).drawn_plant(seed) for seed in seeds]
+    assert len({one.command_delay for one in drawn}) > 3
+    np.testing.assert_array_equal(told["delay"], [one.command_delay for one in drawn])
+    constants = 1.0 / (2.0 * np.pi * np.array([one.bandwidth for one in drawn]))
+    np.testing.assert_allclose(told["time_constant"], constants, rtol=0.03, atol=1e-4)
+    ideal, _, _ = driven(scenario, baselines.make("dls", scenario), seeds)
+    assert (costs < 2.0 * ideal).all()
+
+
+def test_drives_without_delay_and_lag_are_identified(ideal):
+    costs, _, told = driven(gentle(), made())
+    assert told["delay"] == 0
+    assert told["time_constant"] < 1e-4
+    assert costs < 2.0 * ideal
+
+
+def test_rows_of_a_batch_are_single_calls():
+    """With other delays in use beside them, other parts of the reference are shown."""
+    scenario, drives = gentle(60), {"command_delay": (2, 12), "bandwidth": (10.0, 20.0)}
+    _, together, told = driven(scenario, made(scenario=scenario), (SEED, SEED + 1), **drives)
+    assert told["delay"][0] != told["delay"][1]
+    for row in range(2):
+        _, alone, _ = driven(scenario, made(scenario=scenario), [SEED + row], **drives)
+        np.testing.assert_array_equal(together[row], alone[0])
+
+
+def test_without_delay_and_lag_it_is_the_base_policy():
+    scenario = gentle(200)
+    policy = made(scenario=scenario, delay=0, bandwidth=None, identify=False)
+    _, alone, _ = driven(scenario, baselines.make("dls", scenario))
+    _, path, _ = driven(scenario, policy)
+    assert policy.preview == 1
+    np.testing.assert_allclose(path, alone, atol=1e-7)
+
+
+@pytest.mark.parametrize(("delay", "bandwidth"), [(5, 20.0), (9, 11.0)])
+def test_a_wrong_guess_is_stable(ideal, delay, bandwidth):
+    policy = made(delay=delay, bandwidth=bandwidth, identify=False)
+    costs, path, _ = driven(gentle(), policy, command_delay=7, bandwidth=15.0)
+    assert ideal < costs < 1e4 * ideal
+    assert np.abs(np.diff(path[0, -20:], axis=0)).max() < 1e-4  # it has come to rest with the reference
+
+
+def test_noise_costs_little_and_the_delay_is_found(ideal):
+    costs, _, told = driven(gentle(), made(), command_delay=4, bandwidth=12.0, q_noise=1e-5)
+    assert told["delay"] == 4
+    assert costs < 10.0 * ideal
+
+
+def test_old_joint_coordinates_are_taken_for_what_they_are(ideal):
+    """The delay is that of the commands, not that of the sensor."""
+    costs, _, told = driven(gentle(), made(oldest=5), command_delay=4, bandwidth=12.0, q_delay=5)
+    assert told["delay"] == 4
+    assert costs < 1.5 * ideal
+
+
+def test_old_poses_are_held_against_the_joint_coordinates_of_their_time(ideal):
+    """The model is right, and so there is no offset, however old the pose is."""
+    costs = [
+        driven(gentle(), made(oldest=oldest), command_delay=4, bandwidth=12.0, pose_delay=9, pose_every=8)[0]
+        for oldest in (0, 16)
+    ]
+    assert costs[0] > 10.0 * ideal
+    assert costs[1] < 1.5 * ideal
+
+
+def test_an_arm_at_rest_says_nothing_of_its_drives():
+    guess = Hypotheses(np.arange(8), np.array([1.0, 4.0, 8.0]), 5, 6.0)
+    memory, rng = start_memory(1, (2, 3), guess, 10), np.random.default_rng(0)
+    for _ in range(500):
+        identify_rows(1e-3 * rng.standard_normal((1, 2)), np.zeros(1, dtype=np.int64), tuple(guess), tuple(memory))
+    assert memory.delay[0] == 5
+    assert memory.lag[0] == pytest.approx(6.0)
+
+
+def test_preview_is_that_of_the_base_policy_and_the_longest_delay():
+    assert made().preview == 1 + 12
+    assert made(longest_delay=20).preview == 1 + 20
+    assert made("rhc", options={"horizon": 5}, delay=3, identify=False).preview == 4 + 3
+
+
+@pytest.mark.parametrize(
+    "parameters",
+    [
+        {"delay": -1},
+        {"delay": 13},
+        {"delay": 1.5},
+        {"bandwidth": 0.0},
+        {"bandwidth": 5.0},
+        {"bandwidth": math.nan},
+        {"longest_delay": -1},
+        {"lowest_bandwidth": 0.0},
+        {"gain": 0.0},
+        {"gain": 1.5},
+        {"oldest": -1},
+        {"identify": "yes"},
+        {"policy": "follow_nominal"},
+    ],
+)
+def test_bad_parameters_are_refused(parameters):
+    with pytest.raises(InvalidInputError, match=next(iter(parameters))):
+        made(**{"policy": "dls", **parameters})

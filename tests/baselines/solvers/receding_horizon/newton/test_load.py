@@ -1,0 +1,53 @@
+"""A payload at some knots: it is what the kinematics see, and nothing else."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from baselines.solvers.receding_horizon.newton.cost import linearise, merit, true_cost
+from baselines.solvers.receding_horizon.newton.interior_point import merit as limited
+from tests.baselines.solvers.receding_horizon.newton.interior_point.test_merit import BARRIER
+from tests.baselines.solvers.receding_horizon.newton.interior_point.test_merit import place as limited_place
+from tests.baselines.solvers.receding_horizon.newton.problems import place
+from tests.baselines.solvers.receding_horizon.newton.test_cost import differences
+
+PAYLOAD = np.linspace(1e-3, 2e-3, 7)
+
+
+def from_knot(first, knots=4):
+    return np.where(np.arange(knots)[:, None] >= first, PAYLOAD, 0.0)
+
+
+def test_a_payload_from_the_start_is_an_arm_that_stands_elsewhere():
+    at = place("panda", "pose", limits=False)
+    elsewhere = at.problem._replace(start=at.start + PAYLOAD)
+    loaded = true_cost(at.problem._replace(load=from_knot(0)), at.path, at.workspace)
+    assert loaded == pytest.approx(true_cost(elsewhere, at.path + PAYLOAD, at.workspace), rel=1e-9)
+    assert loaded != pytest.approx(true_cost(at.problem, at.path, at.workspace), rel=1e-3)
+
+
+def test_it_counts_from_its_knot_on():
+    at = place("panda", "pose", limits=False)
+    half, whole = (true_cost(at.problem._replace(load=from_knot(k)), at.path, at.workspace) for k in (2, 0))
+    none = true_cost(at.problem._replace(load=from_knot(4)), at.path, at.workspace)
+    assert none == true_cost(at.problem, at.path, at.workspace)
+    assert len({half, whole, none}) == 3
+
+
+def test_the_gradient_with_a_payload_on_the_way():
+    at = place("panda", "pose", delta_x=1e-4)
+    problem, workspace = at.problem._replace(load=from_knot(2)), at.workspace
+    linearise(problem, at.path, at.multipliers, False, True, workspace)
+    central = differences(lambda x: merit(problem, x, at.multipliers, workspace).merit, at.path, 1e-8)
+    got = workspace.model.gradient.ravel()
+    np.testing.assert_allclose(got, central, atol=1e-4 * abs(central).max())
+
+
+def test_the_gradient_within_limits_of_acceleration():
+    problem, path, workspace = limited_place()
+    problem = problem._replace(load=from_knot(2))
+    limited.linearise(problem, path, BARRIER, limited.ANEW, False, workspace)
+    central = differences(lambda x: limited.merit(problem, x, BARRIER, workspace), path, 1e-8)
+    got = workspace.model.gradient.ravel()
+    np.testing.assert_allclose(got, central, atol=1e-5 * abs(central).max())

@@ -1,0 +1,94 @@
+"""`told` knows the arm that moves and its drives, and is a reference."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import baselines
+import ikgym
+from baselines.episode import Draw
+from baselines.evaluation.report import is_reference
+from baselines.evaluation.rollout import rollout
+from ikgym import Plant
+from ikgym.exceptions import InvalidInputError
+
+SEED = 1_000_000
+PLAIN = ikgym.scenarios.get("panda-ideal").replace(steps=120)
+RHC = {"horizon": 10}
+CALIBRATION = Plant(zero=5e-4, link=3e-4, axis=5e-4)
+
+
+def cost(plant, name, draw=None, **parameters):
+    scenario = PLAIN.replace(plant=plant)
+    policy = baselines.make(name, scenario, **parameters)
+    episode = rollout(scenario, policy, draw or SEED, timed=False)
+    return float((episode.tracking_cost + episode.velocity_cost).sum()), episode
+
+
+def told(plant, draw=None, **parameters):
+    return cost(plant, "told", draw, policy="rhc", **{"options": RHC, "seed": SEED, **parameters})
+
+
+def test_it_tracks_the_arm_that_moves():
+    (known, episode), (unknown, other) = told(CALIBRATION), cost(CALIBRATION, "rhc", **RHC)
+    assert episode.position_error[-1] < 1e-5
+    assert other.position_error[-1] > 2e-4
+    assert known < unknown
+
+
+def test_another_arm_seed_is_another_arm():
+    _, right = told(CALIBRATION, Draw(SEED, arm_seed=3), arm_seed=3)
+    _, wrong = told(CALIBRATION, Draw(SEED, arm_seed=3), arm_seed=4)
+    assert right.position_error[-1] < 1e-5
+    assert wrong.position_error[-1] > 1e-4
+
+
+def test_a_payload_is_known_once_it_is_there():
+    _, episode = told(Plant(payload=1e-3, payload_step=60))
+    assert episode.position_error[58] < 1e-5
+    assert episode.position_error[59:62].max() > 1e-4
+    assert episode.position_error[-1] < 1e-5
+
+
+def test_delay_and_lag_are_known():
+    late = Plant(bandwidth=(10.0, 20.0), command_delay=(2, 12))
+    _, known = told(late)
+    _, unknown = cost(late, "rhc", **RHC)
+    assert known.position_error.max() < 1e-3
+    assert unknown.position_error.max() > 2.0 * known.position_error.max()
+
+
+def test_episodes_of_other_delays_are_shown_the_same():
+    scenario = PLAIN.replace(plant=Plant(command_delay=(2, 12)))
+    shown = {baselines.make("told", scenario, policy="rhc", options=RHC, seed=SEED + k).preview for k in range(4)}
+    drawn = {scenario.drawn_plant(SEED + k).command_delay for k in range(4)}
+    assert shown == {9 + 12}
+    assert len(drawn) > 1
+
+
+def test_it_is_a_reference_and_none_of_all():
+    assert is_reference("told")
+    assert "told" not in baselines.names()
+    with pytest.raises(InvalidInputError, match="got the reference 'told'"):
+        baselines.make("smoothed", PLAIN, policy="told")
+
+
+@pytest.mark.parametrize(
+    ("parameters", "words"),
+    [
+        ({}, "a seed says which episode"),
+        ({"seed": -1}, "seed: expected a whole number of at least 0"),
+        ({"seed": SEED, "policy": "oracle"}, "got the reference 'oracle'"),
+        ({"seed": SEED, "arm_seed": 1}, "arm_seed"),
+    ],
+)
+def test_bad_input(parameters, words):
+    with pytest.raises(InvalidInputError, match=words):
+        baselines.make("told", PLAIN, **parameters)
+
+
+def test_on_an_ideal_plant_it_is_the_policy_itself():
+    (alone, one), (itself, other) = told(Plant()), cost(Plant(), "rhc", **RHC)
+    assert alone == itself
+    assert np.array_equal(one.q, other.q)

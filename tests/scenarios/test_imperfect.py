@@ -1,0 +1,51 @@
+"""Scenarios of imperfect plants: the same gentle paths, and plants as they are said to be."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import ikgym
+from baselines.fingerprints import fingerprint
+from baselines.oracle.stripped import ideal
+from ikgym.scenarios import imperfect
+
+NAMES = tuple(imperfect.SCENARIOS)
+PLAIN = ikgym.scenarios.get("panda-ideal")
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_without_their_plants_they_are_the_same(name):
+    assert fingerprint(ideal(ikgym.scenarios.get(name))) == fingerprint(PLAIN)
+
+
+def test_one_of_them_is_ideal():
+    assert [name for name in NAMES if ikgym.scenarios.get(name).plant.ideal] == ["panda-ideal"]
+
+
+def test_paths_are_smooth_and_gentle_and_go_from_rest_to_rest():
+    for seed in ikgym.scenarios.seeds("validation", 20):
+        q = PLAIN.nominal_joint_path(seed)
+        qdot = np.diff(q, axis=0) / PLAIN.dt
+        qddot = np.diff(qdot, axis=0) / PLAIN.dt
+        assert abs(qdot).max() < imperfect.SPEED
+        assert abs(qddot).max() < imperfect.ACCELERATION
+        assert abs(qdot[[0, -1]]).max() < 1e-3
+        assert np.ptp(q, axis=0).max() > 0.1
+
+
+def test_the_field_at_severities():
+    assert imperfect.field().plant == ikgym.scenarios.get("panda-field").plant == imperfect.FIELD.scaled(0.5)
+    assert imperfect.field(0.0, 1.0).plant == ikgym.scenarios.get("panda-bus").plant
+    assert imperfect.field(0.0).plant.ideal
+    assert imperfect.field(0.5, 0.0).plant.zero == ikgym.scenarios.get("panda-camera").plant.zero
+
+
+def test_equal_kinematics():
+    """What scenarios share their arms and best known costs by."""
+    kinematics = ("zero", "link", "axis", "payload", "arms")
+    camera, slow, same = (
+        ikgym.scenarios.get(f"panda-{name}").plant for name in ("camera", "camera-slow", "same-arm")
+    )  # fmt: skip
+    for name in kinematics:
+        assert getattr(camera, name) == getattr(slow, name) == getattr(same, name)

@@ -1,0 +1,22 @@
+"""What spawned processes import: a module of tests would bring PyTorch along, which takes them seconds."""
+
+from __future__ import annotations
+
+import os
+import signal
+
+import gymnasium as gym
+
+from baselines.training import seeds
+
+
+def random_env():
+    """An environment with random episodes."""
+    return gym.make("ikgym:RedundantIK-v0", scenario="varga7-random", preview=1)
+
+
+def dies_with_seed_7(job, seed, connection, child=seeds._child):
+    """The life of a process that trains a seed, and is killed where the seed is 7."""
+    if seed == 7:
+        os.kill(os.getpid(), signal.SIGKILL)
+    child(job, seed, connection)
