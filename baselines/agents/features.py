@@ -93,6 +93,10 @@ class Processing(Frozen):
         n, e = problem.model.joints, problem.task.error_size
         return (4 if self.base_policy else 3) * n + (1 + len(self.offsets)) * e + 2
 
+    def outputs(self, problem: Problem) -> int:
+        """The number of network outputs: one a joint."""
+        return problem.model.joints
+
     def features(self, problem: Problem, batch: Batch, base: FloatArray | None = None) -> Features:
         """The features of a batch.
 

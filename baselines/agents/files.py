@@ -15,9 +15,10 @@ from safetensors.numpy import load, save
 
 import ikgym
 from baselines.agents.base_policy import check_base_policy
+from baselines.agents.bilinear.processing import Bilinear
 from baselines.agents.features import Processing
 from baselines.agents.network import Network, Singles
-from baselines.agents.protocols import AgentFile
+from baselines.agents.protocols import AgentFile, StoredTransform
 from baselines.agents.untrusted import parse_json, read, refuse
 from baselines.canonical import canonical
 from baselines.files import write
@@ -42,7 +43,7 @@ _UNREADABLE = (InvalidInputError, UnknownNameError, KeyError, TypeError, ValueEr
 def save_agent(
     file: pathlib.Path,
     network: Network,
-    processing: Processing,
+    processing: StoredTransform,
     scenario: Scenario,
     training: Mapping[str, Any] | None = None,
 ) -> str:
@@ -73,7 +74,7 @@ def save_agent(
     return found
 
 
-def description(processing: Processing, scenario: Scenario, training: Mapping[str, Any] | None) -> dict[str, Any]:
+def description(processing: StoredTransform, scenario: Scenario, training: Mapping[str, Any] | None) -> dict[str, Any]:
     """What files say of an agent besides its network, as JSON has it.
 
     Raises:
@@ -157,14 +158,16 @@ def parse_header(source: str, content: bytes) -> dict[str, Any]:
     return about
 
 
-def check_described(source: str, about: Mapping[str, Any]) -> Processing:
+def check_described(source: str, about: Mapping[str, Any]) -> Processing | Bilinear:
     """The processing in what :func:`description` wrote, all of it being of the right type.
 
     Raises:
         ResultsError: Something is missing, of another type, or the base policy is one that a file must not name.
     """
     try:
-        processing = Processing.from_json(dict(about["processing"]))
+        values = dict(about["processing"])
+        kind = Bilinear if values.get("kind") == Bilinear.kind else Processing
+        processing = kind.from_json(values)
         _check_types(about, processing)
     except _UNREADABLE as e:
         refuse(source, f"is no agent that this version can read: {_said(e)}")
@@ -211,7 +214,7 @@ def _network(about: Mapping[str, Any], tensors: Mapping[str, Any]) -> Network:
     )
 
 
-def _check_types(about: Mapping[str, Any], processing: Processing) -> None:
+def _check_types(about: Mapping[str, Any], processing: StoredTransform) -> None:
     """Insists on the types of what others rely on."""
     texts = about["scenario"]["name"], about["scenario"]["fingerprint"], about["task"]["name"], about["ikgym"]
     numbers = about["joints"], about["task"]["size"], about["task"]["error_size"], about["cost_version"]

@@ -17,20 +17,21 @@ Singles = npt.NDArray[np.float32]
 
 #: What may stand between the layers, by the number that the kernel knows it by.
 ACTIVATIONS = ("linear", "relu", "tanh", "silu", "elu")
-#: What brings the last layer into [-1, 1]: PPO and A2C cut it off, SAC, TD3 and DDPG put tanh behind it.
-SQUASHES = ("clip", "tanh")
+#: What brings the last layer into [-1, 1]: PPO and A2C cut it off, SAC, TD3 and DDPG put tanh behind it. Linear outputs
+#: stay as they are.
+SQUASHES = ("clip", "tanh", "linear")
 
 # Inputs that are added up in one sweep over the outputs: each sweep reads and writes all outputs.
 SWEEP = 8
 
 _RELU, _TANH, _SILU, _ELU = (ACTIVATIONS.index(name) for name in ("relu", "tanh", "silu", "elu"))
-_SQUASH_TANH = SQUASHES.index("tanh")
+_SQUASH_CLIP, _SQUASH_TANH, _ = range(len(SQUASHES))
 _ONE = np.float32(1.0)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Network(Frozen):
-    """y ← activation(W y + b), layer by layer; the last layer has no activation and is squashed into [-1, 1].
+    """y ← activation(W y + b), layer by layer; the last layer has no activation, but a squash.
 
     Args:
         weights: W of each layer. Shapes (outputs, inputs), those of a layer the outputs of the one before.
@@ -80,7 +81,7 @@ class Network(Frozen):
 
     @property
     def outputs(self) -> int:
-        """The number of joints that are moved."""
+        """The number of outputs."""
         return self.sizes[-1]
 
     def forward(self, features: Singles) -> Singles:
@@ -90,7 +91,7 @@ class Network(Frozen):
             features: Shape (B, inputs).
 
         Returns:
-            Numbers in [-1, 1]; NaN where the sums overflow. Shape (B, outputs).
+            Numbers, in [-1, 1] unless `squash` is linear; NaN where the sums overflow. Shape (B, outputs).
 
         Raises:
             InvalidInputError: The features have another shape or are not in float32.
@@ -149,10 +150,8 @@ def forward_rows(weights, biases, sizes, activation, squash, features, out):
             value = x[j]
             if squash == _SQUASH_TANH:
                 value = np.float32(math.tanh(value))
-            elif value > _ONE:
-                value = _ONE
-            elif value < -_ONE:
-                value = -_ONE
+            elif squash == _SQUASH_CLIP and abs(value) > _ONE:  # NaN stays
+                value = math.copysign(_ONE, value)
             out[row, j] = value
 
 

@@ -194,9 +194,12 @@ def _check_size(file: AgentFile, problem: Problem) -> None:
         raise InvalidInputError(
             f"Agent {file.source} was trained for {words.format(*sizes)}; here there are {words.format(*here)}."
         )
-    shape, needed = (file.network.inputs, file.network.outputs), (file.processing.size(problem), n)
+    shape, needed = (
+        (file.network.inputs, file.network.outputs),
+        (file.processing.size(problem), file.processing.outputs(problem)),
+    )
     if shape != needed:
         raise InvalidInputError(
-            f"Agent {file.source}: expected a network from {needed[0]} features to {needed[1]} joints, got "
+            f"Agent {file.source}: expected a network from {needed[0]} features to {needed[1]} outputs, got "
             f"{shape[0]} and {shape[1]}."
         )

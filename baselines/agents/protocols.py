@@ -17,7 +17,8 @@ from ikgym.validation import FloatArray
 class Transform(Protocol):
     """From observations to features, and from network outputs to actions.
 
-    :class:`baselines.agents.features.Processing` is one, :class:`baselines.agents.raw.RawObservation` another.
+    :class:`baselines.agents.features.Processing` is one, :class:`baselines.agents.raw.RawObservation` and
+    :class:`baselines.agents.bilinear.processing.Bilinear` are others.
     """
 
     @property
@@ -35,6 +36,9 @@ class Transform(Protocol):
     def size(self, problem: Problem) -> int:
         """The number of features."""
 
+    def outputs(self, problem: Problem) -> int:
+        """The number of network outputs."""
+
     def features(self, problem: Problem, batch: Batch, base: FloatArray | None = None) -> Features:
         """The features of a batch. Shape (B, f)."""
 
@@ -42,6 +46,13 @@ class Transform(Protocol):
         self, problem: Problem, batch: Batch, output: npt.NDArray[Any], base: FloatArray | None = None
     ) -> FloatArray:
         """What network outputs mean, as fractions of the velocity limit. Shape (B, n)."""
+
+
+class StoredTransform(Transform, Protocol):
+    """A transform that files can describe."""
+
+    def to_json(self) -> dict[str, Any]:
+        """The fields, as JSON has them."""
 
 
 class Actor(Protocol):
@@ -53,10 +64,10 @@ class Actor(Protocol):
 
     @property
     def outputs(self) -> int:
-        """The number of joints that are moved."""
+        """The number of network outputs."""
 
     def forward(self, features: Features) -> npt.NDArray[np.float32]:
-        """Numbers in [-1, 1], row by row. Shape (B, n)."""
+        """What the network says, row by row. Shape (B, outputs)."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -74,6 +74,10 @@ class RawObservation(Frozen):
         m = problem.task.size
         return 2 * problem.model.joints + m + 1 + len(self.offsets) * m
 
+    def outputs(self, problem: Problem) -> int:
+        """The number of network outputs: one a joint."""
+        return problem.model.joints
+
     def features(self, problem: Problem, batch: Batch, base: FloatArray | None = None) -> Features:
         """The features of a batch; see :meth:`baselines.agents.features.Processing.features`."""
         del problem, base

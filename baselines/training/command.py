@@ -99,7 +99,8 @@ Examples:
   {prog} ppo --preset smoke --out runs/smoke
   {prog} ppo --base-policy dls:damping=1e-2 --action-scale 0.5 --seeds 0 1 2 3 4 --workers 2 --out runs/residual-dls
   {prog} imitate --preset residual --seeds 0 1 2 3 4 --workers 2 --out runs/residual
-  {prog} ppo --preset finetune --init runs/apg/seed-0/model.safetensors --out runs/finer
+  {prog} apg --preset quick --out runs/apg
+  {prog} ppo --preset finetune --init runs/imitate/seed-0/model.safetensors --out runs/finer
   {prog} ppo --preset smoke --out runs/smoke --resume
   {prog} repeat runs/smoke/seed-0/run.json --out runs/again
 
@@ -108,8 +109,8 @@ Files in the folder of a run, each replaced in one go, so that it may be stopped
   history.json       a row a segment
   tensorboard/       the same, for: tensorboard --logdir DIR
   checkpoint.pt      where it stands, for --resume
-  model.safetensors  at the end, the kept model with its critics, for --init
-  model.zip          at the end, the same model, for Stable-Baselines3
+  model.safetensors  at the end, the kept model with its critics, for --init; not of apg
+  model.zip          at the end, the same model, for Stable-Baselines3; not of apg
   agent.safetensors  at the end, its actor, for --init and for: {evaluate} --policies agent:FILE
 
 Agents are trained on the seeds of the split "train" and validated on those of "validation"; those of "test" are not

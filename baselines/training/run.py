@@ -6,8 +6,8 @@
 | `history.json` | a row a segment: its metrics, and the score where there was an evaluation |
 | `checkpoint.pt` | where the run stands, to go on from |
 | `tensorboard/` | the history, for TensorBoard |
-| `model.zip` | at the end: the kept model, for Stable-Baselines3 |
-| `model.safetensors` | at the end: all its weights, for ``--init``; cannot run code |
+| `model.zip` | at the end: the kept model, for Stable-Baselines3; not of ``apg``, which has no critic |
+| `model.safetensors` | likewise: all its weights, for ``--init``; cannot run code |
 | `agent.safetensors` | at the end: the same agent, for :mod:`baselines` |
 """
 
@@ -28,7 +28,6 @@ import numba
 import numpy as np
 import stable_baselines3
 import torch
-from stable_baselines3.common.base_class import BaseAlgorithm
 from torch.utils.tensorboard import SummaryWriter
 
 import ikgym
@@ -44,7 +43,7 @@ from baselines.training.randomness import deterministic_torch, reseed
 from baselines.training.score import Score
 from baselines.training.trainer import SegmentMetrics, Trainer
 from baselines.training.trainers.export import export
-from baselines.training.trainers.models import network_outputs, weights_hash
+from baselines.training.trainers.models import Model, network_outputs, weights_hash
 from baselines.training.validation import validate
 from ikgym.scenarios import Scenario
 
@@ -291,6 +290,6 @@ def versions() -> dict[str, str]:
     }
 
 
-def _finite(model: BaseAlgorithm) -> bool:
+def _finite(model: Model) -> bool:
     """Whether all weights are numbers that can still be added up."""
     return all(bool((parameter.detach().abs() < LARGEST).all()) for parameter in model.policy.parameters())

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Protocol
 
-from baselines.agents.features import Processing
+from baselines.training.config.base import Stored
 
 if TYPE_CHECKING:  # the command line is read without it
     from stable_baselines3.common.base_class import BaseAlgorithm
+
+    from baselines.training.networks import ActorModel
 
 #: What a trainer says of a segment, by name.
 SegmentMetrics = dict[str, float]
@@ -22,14 +24,15 @@ class Trainer(Protocol):
     earlier state, ends with the very weights of one that was not.
 
     Attributes:
-        model: An ordinary model of Stable-Baselines3; its observations are the features of `processing`.
+        model: An ordinary model of Stable-Baselines3, or an actor alone, whose observations are the features of
+            `processing`.
         processing: What the agent sees, and what the outputs of its network mean.
         segments: The number of segments.
         steps: Steps of the environment so far, those of all arms together.
     """
 
-    model: BaseAlgorithm
-    processing: Processing
+    model: BaseAlgorithm | ActorModel
+    processing: Stored
     segments: int
 
     @property

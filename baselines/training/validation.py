@@ -19,7 +19,8 @@ import numpy.typing as npt
 import tyro
 
 from baselines import registry
-from baselines.agents.features import Features, Processing
+from baselines.agents.features import Features
+from baselines.agents.protocols import Transform
 from baselines.episode import added_up
 from baselines.episode import play as play_episodes
 from baselines.evaluation.metrics import lost
@@ -61,7 +62,7 @@ def validation_seeds(scenario: Scenario, episodes: int) -> tuple[int, ...]:
     return scenarios.seeds("validation", episodes if random else 1)
 
 
-def validate(actor: Actor, processing: Processing, scenario: Scenario, episodes: int) -> Score:
+def validate(actor: Actor, processing: Transform, scenario: Scenario, episodes: int) -> Score:
     """Plays episodes of the validation split with an agent.
 
     Args:
@@ -84,7 +85,7 @@ def validate(actor: Actor, processing: Processing, scenario: Scenario, episodes:
 
 
 def play(
-    actor: Actor, processing: Processing, scenario: Scenario, seeds: Sequence[int]
+    actor: Actor, processing: Transform, scenario: Scenario, seeds: Sequence[int]
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Plays episodes in step, as :func:`baselines.evaluation.rollout.rollouts` does.
 

@@ -7,8 +7,10 @@ from typing import Annotated, ClassVar, get_args
 
 import tyro
 
-from baselines.training.config.base import Algorithm, Annealed
+from baselines.agents.bilinear.processing import Bilinear
+from baselines.training.config.base import Algorithm, Annealed, JointVelocities
 from baselines.training.config.limits import MOST_BATCH, MOST_TRANSITIONS, between, count
+from ikgym.exceptions import InvalidInputError
 from ikgym.validation import known_names, number, whole_number
 
 
@@ -16,8 +18,6 @@ from ikgym.validation import known_names, number, whole_number
 class ActorOnly(Annealed):
     """What the configurations of these methods have in common."""
 
-    algorithm: Algorithm = "ppo"
-    """The kind of model that comes out, which the same algorithm can go on with."""
     n_envs: Annotated[int, tyro.conf.arg(metavar="N")] = 64
     """Arms that are stepped together, at most 10000."""
     learning_rate: Annotated[float, tyro.conf.arg(metavar="RATE")] = 1e-3
@@ -29,16 +29,17 @@ class ActorOnly(Annealed):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        known_names("algorithm", [self.algorithm], get_args(Algorithm))
         self._set("max_grad_norm", number("max_grad_norm", self.max_grad_norm, above=0.0))
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Imitate(ActorOnly):
+class Imitate(ActorOnly, JointVelocities):
     """Supervised learning of another policy, with data aggregation (DAgger, Ross et al. 2011)."""
 
     method: ClassVar[str] = "imitate"
 
+    algorithm: Algorithm = "ppo"
+    """The kind of model that comes out, which the same algorithm can go on with."""
     expert: Annotated[str, tyro.conf.arg(metavar="POLICY")] = "rhc_foresight"
     """Who is imitated, as NAME or NAME:PARAMETER=VALUE,…"""
     beta: Annotated[float, tyro.conf.arg(metavar="β")] = 0.2
@@ -61,6 +62,7 @@ class Imitate(ActorOnly):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        known_names("algorithm", [self.algorithm], get_args(Algorithm))
         self._set("beta", between("beta", self.beta, 0.0, 1.0))
         for name in ("intervention_distance", "tolerance"):
             self._set(name, number(name, getattr(self, name), above=0.0))
@@ -73,27 +75,74 @@ class Imitate(ActorOnly):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class APG(ActorOnly):
-    """Analytic policy gradient: back-propagation of the cost through the arm, over windows of some steps."""
+    """Analytic policy gradient: back-propagation of the cost through the arm, over windows of some steps.
+
+    The agent is bilinear: its network gives the matrix by which the twist that is due becomes joint velocities.
+    """
 
     method: ClassVar[str] = "apg"
 
-    window: Annotated[int, tyro.conf.arg(metavar="N")] = 100
-    """Steps through which gradients are back-propagated, from one step of Adam to the next. The way through a
-    singularity is decided some hundred steps before it; of what lies beyond the window, the agent learns nothing."""
-    windows: Annotated[int, tyro.conf.arg(metavar="N")] = 20
-    """Windows of a segment."""
+    offsets: Annotated[tuple[int, ...], tyro.conf.arg(metavar="N …")] = Bilinear.offsets
+    """Steps ahead at which the agent sees the reference trajectory, rising from 1."""
+    hidden: Annotated[tuple[int, ...], tyro.conf.arg(metavar="N …")] = (256, 256)
+    """Neurons of the hidden layers: at most 10 layers of at most 2048 neurons."""
+    n_envs: Annotated[int, tyro.conf.arg(metavar="N")] = 256
+    """Arms that are stepped together, at most 10000. At first they are spread over their episodes."""
+    learning_rate: Annotated[float, tyro.conf.arg(metavar="RATE")] = 2e-3
+    """Of Adam, in the first segment."""
+    learning_rate_end: Annotated[float, tyro.conf.arg(metavar="RATE")] = 5e-5
+    """In the last segment; in between it falls by equal factors."""
+    window: Annotated[tuple[int, ...], tyro.conf.arg(metavar="N …")] = (64, 120, 240, 480)
+    """Steps through which gradients are back-propagated, from one step of Adam to the next: these one after the other,
+    each in an equal part of the segments. The way through a singularity is decided some hundred steps before it; of
+    what lies beyond the window, the agent learns nothing."""
+    segment_steps: Annotated[int, tyro.conf.arg(metavar="N")] = 1920
+    """Steps of each arm in a segment: a multiple of each window."""
+    hold: Annotated[int, tyro.conf.arg(metavar="N")] = 8
+    """Steps for which the output of the network is held, with feedback at every step: a divisor of each window."""
     max_gradient_share: Annotated[float, tyro.conf.arg(metavar="X")] = 10.0
-    """The gradient of the network output of one arm at one step is clipped at this many times an equal share: near
+    """The gradient by what the network gives one arm is cut at this many times an equal share of a loss of 1: near
     singularities it would otherwise exceed that of all others together."""
     cost_prior_steps: Annotated[float, tyro.conf.arg(metavar="N")] = 100.0
     """Stage costs are divided by the mean of their episode so far, in which the mean cost of the reference joint path
     counts as much as this many steps: what is minimised is the logarithm of the costs of whole episodes."""
-    reset_distance: Annotated[float, tyro.conf.arg(metavar="M")] = 0.5
-    """Arms that are farther from their reference position than this, in [m], begin a new episode."""
+    reset_distance: Annotated[float, tyro.conf.arg(metavar="M")] = 0.3
+    """Arms that are farther from their reference position than this, in [m], are put back on the reference path."""
+    reset_distance_end: Annotated[float, tyro.conf.arg(metavar="M")] = 1.0
+    """The same in the segments of the last window, in which the agent learns to come back from farther away."""
+    averaging: Annotated[float, tyro.conf.arg(metavar="β")] = 0.99
+    """The agent is the exponential moving average of the weights, of which each step of Adam keeps this share."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for name in ("window", "windows"):
-            self._set(name, whole_number(name, getattr(self, name), at_least=1))
-        for name in ("max_gradient_share", "cost_prior_steps", "reset_distance"):
+        if not isinstance(self.window, tuple) or not self.window:
+            raise InvalidInputError(f"window: expected whole numbers, got {self.window!r}.")
+        self._set("hold", whole_number("hold", self.hold, at_least=1))
+        self._set("segment_steps", whole_number("segment_steps", self.segment_steps, at_least=1))
+        self._set("window", tuple(whole_number("window", steps, at_least=1) for steps in self.window))
+        for steps in self.window:
+            if steps % self.hold or self.segment_steps % steps:
+                raise InvalidInputError(
+                    f"window: expected multiples of hold, {self.hold}, that divide segment_steps, "
+                    f"{self.segment_steps}, got {steps}."
+                )
+        for name in ("max_gradient_share", "cost_prior_steps", "reset_distance", "reset_distance_end"):
             self._set(name, number(name, getattr(self, name), above=0.0))
+        self._set("averaging", between("averaging", self.averaging, 0.0, 1.0))
+
+    @property
+    def processing(self) -> Bilinear:
+        """What the agent sees, and what the outputs of its network mean."""
+        return Bilinear(self.offsets)
+
+    def window_of(self, segment: int) -> int:
+        """The window of a segment, counted from 0."""
+        return self.window[self._stage(segment)]
+
+    def reset_distance_of(self, segment: int) -> float:
+        """The reset distance of a segment, counted from 0, in [m]."""
+        last = self._stage(segment) == len(self.window) - 1
+        return self.reset_distance_end if last else self.reset_distance
+
+    def _stage(self, segment: int) -> int:
+        return segment * len(self.window) // self.segments

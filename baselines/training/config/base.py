@@ -9,6 +9,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self, get_args
 
 import tyro
 
+from baselines.agents.bilinear.processing import Bilinear
 from baselines.agents.features import Processing
 from baselines.training.config.limits import (
     MOST_ARMS,
@@ -28,8 +29,10 @@ Activation = Literal["silu", "relu", "tanh", "elu"]
 #: Kinds of models of Stable-Baselines3 that come out of a training.
 Algorithm = Literal["ppo", "sac", "td3"]
 
-#: Fields that come with the file of ``init``.
+#: Options that may come with the file of ``init``.
 SHAPE = ("base_policy", "offsets", "action_scale", "null_space", "hidden", "activation")
+#: Transforms that files can describe.
+Stored = Processing | Bilinear
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -52,17 +55,9 @@ class Config(Frozen):
     """Task coordinates to train on, if not those of the scenario. An agent trained on whole poses (pose) can be
     evaluated on scenarios that show skew coordinates, too: it gets the full orientation. Skew coordinates have a 90°
     ambiguity, and are singular there."""
-    base_policy: Annotated[str | None, tyro.conf.arg(metavar="POLICY")] = None
-    """Base policy, as NAME or NAME:PARAMETER=VALUE,…: the agent is a residual policy, which corrects its actions, and
-    a network output of 0 is the base policy. The agent stands alone if left out."""
     offsets: Annotated[tuple[int, ...], tyro.conf.arg(metavar="N …")] = Processing.offsets
     """Steps ahead at which the agent sees the reference trajectory, rising. Those that the base policy needs may, but
     need not, be among them."""
-    action_scale: Annotated[float, tyro.conf.arg(metavar="X")] = Processing.action_scale
-    """What a network output of 1 means, as a multiple of the speed of the reference trajectory ahead."""
-    null_space: Annotated[float | None, tyro.conf.arg(metavar="λ")] = None
-    """Projects network outputs into the null space of the task Jacobian, with damping λ: they then move the joints and
-    not the tool, but for directions that are nearly singular. Not projected if left out."""
     hidden: Annotated[tuple[int, ...], tyro.conf.arg(metavar="N …")] = (256, 256, 256)
     """Neurons of the hidden layers, of the actor and of critics alike: at most 10 layers of at most 2048 neurons."""
     activation: Activation = "silu"
@@ -79,8 +74,8 @@ class Config(Frozen):
     """Keep the agent of the best validation (by the geometric mean of the costs), not the last one."""
     init: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None
     """A file of an earlier run to begin from: agent.safetensors, for its actor, or model.safetensors, for its critics,
-    too, where the algorithm is the same. What the agent sees and the shape of its network come with the file:
-    base_policy, offsets, action_scale, null_space, hidden and activation."""
+    too, where the algorithm is the same. What the agent sees, what its outputs mean and the shape of its network come
+    with the file."""
 
     def __post_init__(self) -> None:
         known_names("activation", [self.activation], get_args(Activation))
@@ -100,16 +95,24 @@ class Config(Frozen):
             raise InvalidInputError(f"keep_best: expected true or false, got {self.keep_best!r}.")
         self._set("hidden", tuple(count("hidden", width, at_most=MOST_NEURONS) for width in self.hidden))
         self._check_init()
-        processing = self.processing
-        self._set("offsets", processing.offsets)
+        self._set("offsets", self.processing.offsets)
         count("offsets", self.offsets[-1], at_most=MOST_STEPS_AHEAD)
-        self._set("action_scale", processing.action_scale)
-        self._set("null_space", processing.null_space)
 
     @property
-    def processing(self) -> Processing:
+    def processing(self) -> Stored:
         """What the agent sees, and what the outputs of its network mean."""
-        return Processing(self.offsets, self.action_scale, self.base_policy, self.null_space)
+        raise NotImplementedError
+
+    @classmethod
+    def shape_of(cls, processing: Stored, sizes: tuple[int, ...], activation: str) -> dict[str, Any]:
+        """The options that come with the file of `init`, by name.
+
+        Args:
+            processing: Of the agent in the file.
+            sizes: Of its network, see :class:`baselines.agents.network.Network`.
+            activation: Likewise.
+        """
+        return {"offsets": processing.offsets, "hidden": sizes[1:-1], "activation": activation}
 
     def make_scenario(self) -> Scenario:
         """The scenario, with the task and at most the steps asked for.
@@ -148,6 +151,37 @@ class Config(Frozen):
     def _set(self, field: str, value: object) -> None:
         """Writes a field of this frozen object, while it is made."""
         object.__setattr__(self, field, value)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class JointVelocities(Config):
+    """A configuration of agents whose network outputs are joint velocities, or corrections of those of a policy."""
+
+    base_policy: Annotated[str | None, tyro.conf.arg(metavar="POLICY")] = None
+    """Base policy, as NAME or NAME:PARAMETER=VALUE,…: the agent is a residual policy, which corrects its actions, and
+    a network output of 0 is the base policy. The agent stands alone if left out."""
+    action_scale: Annotated[float, tyro.conf.arg(metavar="X")] = Processing.action_scale
+    """What a network output of 1 means, as a multiple of the speed of the reference trajectory ahead."""
+    null_space: Annotated[float | None, tyro.conf.arg(metavar="λ")] = None
+    """Projects network outputs into the null space of the task Jacobian, with damping λ: they then move the joints and
+    not the tool, but for directions that are nearly singular. Not projected if left out."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        processing = self.processing
+        self._set("action_scale", processing.action_scale)
+        self._set("null_space", processing.null_space)
+
+    @property
+    def processing(self) -> Processing:
+        """What the agent sees, and what the outputs of its network mean."""
+        return Processing(self.offsets, self.action_scale, self.base_policy, self.null_space)
+
+    @classmethod
+    def shape_of(cls, processing: Stored, sizes: tuple[int, ...], activation: str) -> dict[str, Any]:
+        """See :meth:`Config.shape_of`."""
+        own = {name: getattr(processing, name, None) for name in ("base_policy", "action_scale", "null_space")}
+        return super().shape_of(processing, sizes, activation) | own
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar, Literal, get_args
 
 import tyro
 
-from baselines.training.config.base import Annealed
+from baselines.training.config.base import Annealed, JointVelocities
 from baselines.training.config.limits import MOST_BATCH, MOST_TRANSITIONS, between, count, share
 from ikgym.exceptions import InvalidInputError
 from ikgym.validation import known_names, number, whole_number
@@ -20,7 +20,7 @@ LOG_STD = (-20.0, 2.0)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Reinforcement(Annealed):
+class Reinforcement(Annealed, JointVelocities):
     """What the methods that learn from rewards have in common."""
 
     reward: Reward = "log"

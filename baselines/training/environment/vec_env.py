@@ -76,7 +76,7 @@ class ProcessedVecEnv(VecEnvWrapper):
         episode_steps: int | None = None,
     ) -> None:
         known_names("reward", [reward], REWARDS)
-        self._view = View(processing, scenario)
+        self._processing, self._view = processing, View(processing, scenario)
         self._reward, self._scale = REWARDS[reward], np.float32(number("scale", scale, above=0.0))
         steps = scenario.steps
         if episode_steps is not None:
@@ -91,7 +91,7 @@ class ProcessedVecEnv(VecEnvWrapper):
     @property
     def processing(self) -> Processing:
         """What the agent sees, and what the outputs of its network mean."""
-        return self._view.processing
+        return self._processing
 
     def reset(self) -> Features:
         """Begins episodes in all rows, see :meth:`ikgym.sb3.RedundantIKVecEnv.reset`.

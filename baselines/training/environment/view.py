@@ -8,7 +8,8 @@ import numpy as np
 import numpy.typing as npt
 import torch
 
-from baselines.agents.features import Features, Processing
+from baselines.agents.features import Features
+from baselines.agents.protocols import Transform
 from baselines.agents.view import AgentView, Seen
 from baselines.policy import Batch, Memory, Problem
 from ikgym.exceptions import ResetNeededError
@@ -32,7 +33,7 @@ class View:
         InvalidInputError: The base policy is refused, see :func:`baselines.agents.base_policy.make_base_policy`.
     """
 
-    def __init__(self, processing: Processing, scenario: Scenario) -> None:
+    def __init__(self, processing: Transform, scenario: Scenario) -> None:
         self.processing, self.problem = processing, Problem.of(scenario)
         self._view = AgentView.of(processing, self.problem)
         self._memory: Memory | None = None

@@ -1,6 +1,7 @@
 """Presets: options of a method in a TOML file, by the names that they have in its configuration.
 
-A file may name its ``method``; one that does not is for all methods that have its options.
+A file may name its ``method``; one that does not is for all methods that have its options. A file of tables, each
+named after a method, is for these.
 """
 
 from __future__ import annotations
@@ -45,8 +46,9 @@ def read(preset: str) -> dict[str, Any]:
         raise InvalidInputError(f"The preset {file} is nested too deeply.") from None
     except ValueError as e:
         raise InvalidInputError(f"The preset {file} is no TOML: {e}.") from None
-    for name in {"base_policy", "expert"} & options.keys():
-        refuse_trust(options[name], f"The preset {file}: {name}")
+    for table in (options, *_tables(options).values()):
+        for name in {"base_policy", "expert"} & table.keys():
+            refuse_trust(table[name], f"The preset {file}: {name}")
     return options
 
 
@@ -65,7 +67,20 @@ def configure(kind: type[Config], preset: str | None) -> tuple[Config, frozenset
         InvalidInputError: The preset is for another method, or a value is refused.
     """
     options = {} if preset is None else read(preset)
-    method = options.pop("method", kind.method)
-    if method != kind.method:
-        raise InvalidInputError(f"The preset {preset} is for {method}, not for {kind.method}.")
+    meant = methods_of(options)
+    if meant and kind.method not in meant:
+        raise InvalidInputError(f"The preset {preset} is for {', '.join(meant)}, not for {kind.method}.")
+    options = _tables(options).get(kind.method, options)
+    options.pop("method", None)
     return kind.from_json(options), frozenset(options)
+
+
+def methods_of(options: dict[str, Any]) -> tuple[str, ...]:
+    """The methods that the options of a preset are for; none for those that are for all."""
+    tables = tuple(_tables(options))
+    return tables or ((options["method"],) if "method" in options else ())
+
+
+def _tables(options: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    """Options by method."""
+    return {name: table for name, table in options.items() if isinstance(table, dict)}

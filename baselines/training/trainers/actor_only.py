@@ -10,36 +10,26 @@ import torch
 from torch import Tensor, nn
 
 from baselines.training.config.actor_only import ActorOnly
-from baselines.training.environment.vec_env import ProcessedVecEnv
 from baselines.training.trainer import SegmentMetrics
-from baselines.training.trainers.initial_weights import begin_from
-from baselines.training.trainers.models import mean_network, new_model, squash_of
 from ikgym.scenarios import Scenario
 
 
 class ActorTrainer(abc.ABC):
-    """Trains the actor of a model of Stable-Baselines3 by Adam, see :class:`baselines.training.trainer.Trainer`.
+    """Trains an actor by Adam, see :class:`baselines.training.trainer.Trainer`.
 
     Args:
         config: Of the method.
         scenario: What is to be tracked.
         seed: Of the run.
-
-    Raises:
-        UnknownNameError: There is no such base policy.
-        InvalidInputError: `init` does not suit.
+        model: What is evaluated and kept.
+        actor: What is trained.
     """
 
-    def __init__(self, config: ActorOnly, scenario: Scenario, seed: int) -> None:
+    def __init__(self, config: ActorOnly, scenario: Scenario, seed: int, model: Any, actor: nn.Module) -> None:
         self.processing, self.segments = config.processing, config.segments
         self._config, self._scenario, self._seed = config, scenario, seed
-        env = ProcessedVecEnv(1, scenario, config.processing)
-        self.model: Any = new_model(config.algorithm, env, config.hidden, config.activation)
-        if config.init is not None:
-            begin_from(self.model, config)
-        self._actor = mean_network(self.model)
-        self._squashed = squash_of(config.algorithm)
-        self._adam = torch.optim.Adam(self._actor.parameters(), lr=config.learning_rate)
+        self.model, self._actor = model, actor
+        self._adam = torch.optim.Adam(actor.parameters(), lr=config.learning_rate)
 
     @property
     def steps(self) -> int:
@@ -64,11 +54,6 @@ class ActorTrainer(abc.ABC):
         self._adam.load_state_dict(copy.deepcopy(state["adam"]))
         self.model.num_timesteps = state["steps"]
 
-    def _outputs(self, features: Tensor) -> Tensor:
-        """The actor's outputs, with gradients. Shapes (N, f) and (N, n), float32."""
-        mean: Tensor = self._actor(features)
-        return mean.tanh() if self._squashed == "tanh" else mean
-
     def _descend(self, loss: Tensor) -> bool:
         """One step of Adam; False where the gradient is not finite, and nothing was done."""
         self._adam.zero_grad()
@@ -82,9 +67,3 @@ class ActorTrainer(abc.ABC):
     def _set_learning_rate(self, number: int) -> None:
         for group in self._adam.param_groups:
             group["lr"] = self._config.learning_rate_of(number)
-
-    def _finished(self) -> None:
-        """Lets all that copies the actor follow it."""
-        target = getattr(self.model.policy, "actor_target", None)
-        if target is not None:
-            target.load_state_dict(self.model.policy.actor.state_dict())

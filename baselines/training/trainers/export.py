@@ -1,4 +1,4 @@
-"""What a run leaves: a model for Stable-Baselines3 and for `--init`, and the same agent for :mod:`baselines`."""
+"""What a run leaves: an agent for :mod:`baselines`, and where there are critics, the model for Stable-Baselines3."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from typing import Any
 
 from stable_baselines3.common.base_class import BaseAlgorithm
 
+from baselines.agents.features import Processing
 from baselines.agents.files import save_agent
 from baselines.agents.sb3_zip import save_zip
 from baselines.training.config.base import Activation
@@ -16,7 +17,7 @@ from ikgym.scenarios import Scenario
 
 
 def export(trainer: Trainer, activation: Activation, folder: Folder, scenario: Scenario, about: dict[str, Any]) -> None:
-    """Writes `model.zip`, `model.safetensors` and `agent.safetensors`.
+    """Writes `agent.safetensors`; of a model of Stable-Baselines3 `model.zip` and `model.safetensors`, too.
 
     Args:
         trainer: Whose model is written.
@@ -28,8 +29,9 @@ def export(trainer: Trainer, activation: Activation, folder: Folder, scenario: S
     Raises:
         ResultsError: A file cannot be written.
     """
-    model: BaseAlgorithm = trainer.model
+    model, processing = trainer.model, trainer.processing
     training = {name: about[name] for name in ("method", "seed", "training", "kept", "versions")}
-    save_zip(model, folder.zip, trainer.processing, scenario)
-    save_model(model, folder.model, activation, trainer.processing, scenario)
-    save_agent(folder.agent, actor_network(model, activation), trainer.processing, scenario, training)
+    if isinstance(model, BaseAlgorithm) and isinstance(processing, Processing):
+        save_zip(model, folder.zip, processing, scenario)
+        save_model(model, folder.model, activation, processing, scenario)
+    save_agent(folder.agent, actor_network(model, activation), processing, scenario, training)

@@ -17,11 +17,13 @@ from baselines.episode import play as play_episodes
 from baselines.policy import Memory, Problem
 from baselines.spec import parse_policy
 from baselines.training.config.actor_only import Imitate
+from baselines.training.environment.vec_env import ProcessedVecEnv
 from baselines.training.environment.view import View
 from baselines.training.randomness import episode_seed, sequence
 from baselines.training.trainer import SegmentMetrics
 from baselines.training.trainers.actor_only import ActorTrainer
-from baselines.training.trainers.models import network_outputs
+from baselines.training.trainers.initial_weights import begin_from
+from baselines.training.trainers.models import mean_network, network_outputs, new_model, squash_of
 from ikgym.outcome import observation
 from ikgym.preview import furthest, offsets
 from ikgym.scenarios import Scenario
@@ -50,7 +52,12 @@ class ImitateTrainer(ActorTrainer):
     _config: Imitate
 
     def __init__(self, config: Imitate, scenario: Scenario, seed: int) -> None:
-        super().__init__(config, scenario, seed)
+        env = ProcessedVecEnv(1, scenario, config.processing)
+        model = new_model(config.algorithm, env, config.hidden, config.activation)
+        if config.init is not None:
+            begin_from(model, config)
+        super().__init__(config, scenario, seed, model, mean_network(model))
+        self._squashed = squash_of(config.algorithm)
         name, parameters = parse_policy(config.expert)
         self._expert = registry.make(name, scenario, **parameters)
         view = View(config.processing, scenario)
@@ -96,6 +103,17 @@ class ImitateTrainer(ActorTrainer):
         self.model.num_timesteps += costs.size
         mean = float(np.exp(np.mean(np.log(np.maximum(added_up(costs), 1e-300)))))
         return mixture.examples(), mean
+
+    def _outputs(self, features: Tensor) -> Tensor:
+        """The actor's outputs, with gradients. Shapes (N, f) and (N, n), float32."""
+        mean: Tensor = self._actor(features)
+        return mean.tanh() if self._squashed == "tanh" else mean
+
+    def _finished(self) -> None:
+        """Lets all that copies the actor follow it."""
+        target = getattr(self.model.policy, "actor_target", None)
+        if target is not None:
+            target.load_state_dict(self.model.policy.actor.state_dict())
 
     def _learn(self) -> float:
         """One gradient step on the Cauchy loss ln(1 + |error|² / tolerance²).

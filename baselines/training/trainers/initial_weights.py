@@ -9,7 +9,7 @@ import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
 from torch import nn
 
-from baselines.training.config.base import SHAPE, Config
+from baselines.training.config.base import Config
 from baselines.training.errors import TrainingError
 from baselines.training.trainers.model_file import InitialWeights, load_weights
 from baselines.training.trainers.models import algorithm_of, mean_network, squash_of
@@ -29,15 +29,10 @@ def inherit(config: Config, given: Collection[str]) -> Config:
     if config.init is None:
         return config
     file = load_weights(config.init)
-    inherited: dict[str, Any] = {
-        "base_policy": file.processing.base_policy,
-        "offsets": file.processing.offsets,
-        "action_scale": file.processing.action_scale,
-        "null_space": file.processing.null_space,
-        "hidden": tuple(file.network.sizes[1:-1]),
-        "activation": file.network.activation,
-    }
-    for name in SHAPE:
+    if not isinstance(file.processing, type(config.processing)):
+        raise TrainingError(f"{file.source} holds an agent of another structure than {config.method} trains.")
+    inherited = config.shape_of(file.processing, file.network.sizes, file.network.activation)
+    for name in inherited:
         asked = getattr(config, name)
         if name in given and asked != inherited[name]:
             raise TrainingError(
@@ -59,8 +54,7 @@ def begin_from(model: BaseAlgorithm, config: Config) -> None:
     """
     assert config.init is not None
     file, algorithm = load_weights(config.init), algorithm_of(model)
-    if file.processing != config.processing:
-        raise TrainingError(f"{file.source} was trained with {file.processing}, which is not that of this run.")
+    _check_processing(file, config)
     if file.network.squash != squash_of(algorithm):
         fitting = "ppo" if file.network.squash == "clip" else "sac or td3"
         raise TrainingError(
@@ -71,8 +65,34 @@ def begin_from(model: BaseAlgorithm, config: Config) -> None:
         )
     if file.algorithm == algorithm:
         _load_policy(model, file)
-    else:
-        _load_actor(model, file)
+        return
+    _load_actor(mean_network(model), file)
+    policy: Any = model.policy
+    target: Any = getattr(policy, "actor_target", None)
+    if target is not None:
+        target.load_state_dict(policy.actor.state_dict())
+
+
+def begin_actor_from(actor: nn.Sequential, config: Config) -> None:
+    """Gives an actor the weights of a trained one.
+
+    Args:
+        actor: An untrained one, made as `config` says.
+        config: With an `init`.
+
+    Raises:
+        ResultsError: The file cannot be read.
+        TrainingError: It has another shape.
+    """
+    assert config.init is not None
+    file = load_weights(config.init)
+    _check_processing(file, config)
+    _load_actor(actor, file)
+
+
+def _check_processing(file: InitialWeights, config: Config) -> None:
+    if file.processing != config.processing:
+        raise TrainingError(f"{file.source} was trained with {file.processing}, which is not that of this run.")
 
 
 def _load_policy(model: BaseAlgorithm, file: InitialWeights) -> None:
@@ -83,8 +103,8 @@ def _load_policy(model: BaseAlgorithm, file: InitialWeights) -> None:
         raise TrainingError(f"Cannot begin from {file.source}: {' '.join(str(e).split())[:300]}") from None
 
 
-def _load_actor(model: BaseAlgorithm, file: InitialWeights) -> None:
-    layers = [module for module in mean_network(model) if isinstance(module, nn.Linear)]
+def _load_actor(actor: nn.Sequential, file: InitialWeights) -> None:
+    layers = [module for module in actor if isinstance(module, nn.Linear)]
     shapes = [tuple(layer.weight.shape) for layer in layers]
     if shapes != [weights.shape for weights in file.network.weights]:
         raise TrainingError(f"{file.source} has layers of {file.network.sizes}, which are not those of this run.")
@@ -92,7 +112,3 @@ def _load_actor(model: BaseAlgorithm, file: InitialWeights) -> None:
         for layer, weights, bias in zip(layers, file.network.weights, file.network.biases, strict=True):
             layer.weight.copy_(torch.tensor(weights))
             layer.bias.copy_(torch.tensor(bias))
-        target: Any = getattr(model.policy, "actor_target", None)
-        if target is not None:
-            actor: Any = model.policy.actor
-            target.load_state_dict(actor.state_dict())

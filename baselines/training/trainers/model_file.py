@@ -20,14 +20,13 @@ from safetensors.numpy import save as save_tensors
 from stable_baselines3.common.base_class import BaseAlgorithm
 from torch import Tensor, nn
 
-from baselines.agents.features import Processing
 from baselines.agents.files import check_described, description, digest, load_agent
 from baselines.agents.network import Network
 from baselines.agents.untrusted import parse_json, read
 from baselines.files import json_files, write
-from baselines.training.config.base import Activation, Algorithm
+from baselines.training.config.base import Activation, Algorithm, Stored
 from baselines.training.errors import TrainingError
-from baselines.training.trainers.models import algorithm_of, mean_network, squash_of
+from baselines.training.trainers.models import Model, algorithm_of, mean_network, squash_of_model
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 from ikgym.scenarios import Scenario
 
@@ -50,25 +49,25 @@ class InitialWeights:
     """
 
     source: str
-    processing: Processing
+    processing: Stored
     network: Network
     algorithm: Algorithm | None = None
     policy: Mapping[str, Tensor] = dataclasses.field(default_factory=dict)
 
 
-def actor_network(model: BaseAlgorithm, activation: Activation) -> Network:
+def actor_network(model: Model, activation: Activation) -> Network:
     """The actor of a model, as agents have it."""
     layers = [module for module in mean_network(model) if isinstance(module, nn.Linear)]
     return Network(
         tuple(layer.weight.detach().numpy() for layer in layers),
         tuple(layer.bias.detach().numpy() for layer in layers),
         activation,
-        squash_of(algorithm_of(model)),
+        squash_of_model(model),
     )
 
 
 def save_model(
-    model: BaseAlgorithm, file: pathlib.Path, activation: Activation, processing: Processing, scenario: Scenario
+    model: BaseAlgorithm, file: pathlib.Path, activation: Activation, processing: Stored, scenario: Scenario
 ) -> None:
     """Writes all weights of a model, in one go.
 
@@ -113,7 +112,7 @@ def load_weights(file: pathlib.Path) -> InitialWeights:
     if isinstance(text, str):
         return _parse(str(file), content, parse_json(str(file), text.encode()))
     agent = load_agent(file)
-    if not isinstance(agent.network, Network) or not isinstance(agent.processing, Processing):
+    if not isinstance(agent.network, Network) or not isinstance(agent.processing, Stored):
         raise TrainingError(f"{file} was not trained here: it does not see the features of an agent.")
     return InitialWeights(agent.source, agent.processing, agent.network)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Literal
 
 import numpy as np
@@ -11,25 +11,19 @@ import torch
 from stable_baselines3 import PPO, SAC, TD3
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.logger import Logger
-from torch import nn
+from torch import Tensor, nn
 
 from baselines.agents.features import Features
 from baselines.training.config.base import Activation, Algorithm
 from baselines.training.environment.vec_env import ProcessedVecEnv
+from baselines.training.networks import ACTIVATIONS, QUIET, ActorModel
 
-ACTIVATIONS: dict[Activation, type[nn.Module]] = {
-    "silu": nn.SiLU,
-    "relu": nn.ReLU,
-    "tanh": nn.Tanh,
-    "elu": nn.ELU,
-}
 ALGORITHMS: dict[Algorithm, type[BaseAlgorithm]] = {"ppo": PPO, "sac": SAC, "td3": TD3}
 
-#: The last layer's first weights are made this much smaller: an agent begins near its base policy, or near rest.
-QUIET = 0.01
-
 #: How network outputs are kept within ±1.
-Squash = Literal["clip", "tanh"]
+Squash = Literal["clip", "tanh", "linear"]
+#: What a run trains.
+Model = BaseAlgorithm | ActorModel
 
 
 def new_model(
@@ -99,12 +93,19 @@ def squash_of(algorithm: Algorithm) -> Squash:
     return "clip" if algorithm == "ppo" else "tanh"
 
 
-def mean_network(model: BaseAlgorithm) -> nn.Sequential:
+def squash_of_model(model: Model) -> Squash:
+    """How a model keeps its outputs within ±1; `linear` where it does not."""
+    return "linear" if isinstance(model, ActorModel) else squash_of(algorithm_of(model))
+
+
+def mean_network(model: Model) -> nn.Sequential:
     """From features to the mean of the outputs, before they are squashed; it shares the model's weights.
 
     Returns:
         Linear layers with activations in between, the last one without.
     """
+    if isinstance(model, ActorModel):
+        return model.policy
     algorithm = algorithm_of(model)
     policy: Any = model.policy
     if algorithm == "ppo":
@@ -114,7 +115,14 @@ def mean_network(model: BaseAlgorithm) -> nn.Sequential:
     return nn.Sequential(*list(policy.actor.mu)[:-1])  # without the tanh
 
 
-def network_outputs(model: BaseAlgorithm, features: Features) -> Features:
+_SQUASHED: dict[Squash, Callable[[Tensor], Tensor]] = {
+    "clip": lambda mean: mean.clamp(-1.0, 1.0),
+    "tanh": torch.tanh,
+    "linear": lambda mean: mean,
+}
+
+
+def network_outputs(model: Model, features: Features) -> Features:
     """The deterministic outputs of a model's actor.
 
     Args:
@@ -122,16 +130,16 @@ def network_outputs(model: BaseAlgorithm, features: Features) -> Features:
         features: Shape (N, f).
 
     Returns:
-        Within ±1. Shape (N, n).
+        Within ±1, unless they are linear. Shape (N, outputs).
     """
     with torch.no_grad():
         mean = mean_network(model)(torch.from_numpy(features))
-        squashed = mean.clamp(-1.0, 1.0) if squash_of(algorithm_of(model)) == "clip" else mean.tanh()
+        squashed = _SQUASHED[squash_of_model(model)](mean)
     out: Features = squashed.numpy()
     return out
 
 
-def weights_hash(model: BaseAlgorithm) -> str:
+def weights_hash(model: Model) -> str:
     """SHA-256 of all weights of a model's policy, critics included."""
     digest = hashlib.sha256()
     for name, tensor in sorted(model.policy.state_dict().items()):

@@ -305,7 +305,7 @@ class TestScenarios:
 
     def test_a_network_of_another_size(self, tmp_path):
         save_agent(tmp_path / "a.safetensors", network((5, 7)), Processing(offsets=OFFSETS), FAST)
-        with pytest.raises(InvalidInputError, match=r"from \d+ features to 7 joints, got 5 and 7"):
+        with pytest.raises(InvalidInputError, match=r"from \d+ features to 7 outputs, got 5 and 7"):
             baselines.make("agent", FAST, path=str(tmp_path / "a.safetensors"))
 
 

@@ -32,7 +32,7 @@ FEW: dict[str, dict[str, Any]] = {
     "sac": {"buffer_size": 200, "train_freq": 5, "gradient_steps": 2},
     "td3": {"buffer_size": 200, "train_freq": 5, "gradient_steps": 2},
     "imitate": {"expert": "dls", "gradient_steps": 3},
-    "apg": {"window": 8, "windows": 2},
+    "apg": {"hold": 4, "window": (8, 16), "segment_steps": 16},
 }
 
 

@@ -7,7 +7,7 @@ import json
 import pytest
 
 from baselines.training import presets
-from baselines.training.config.base import Config, differences
+from baselines.training.config.base import Config, JointVelocities, differences
 from baselines.training.config.reinforcement import PPO, SAC, TD3
 from baselines.training.methods import METHODS, get
 from ikgym.exceptions import InvalidInputError, UnknownNameError
@@ -17,7 +17,8 @@ KINDS = [method.config for method in METHODS.values()]
 
 @pytest.mark.parametrize("kind", KINDS, ids=METHODS)
 def test_json_holds_all_of_it(kind):
-    config = kind(hidden=(3, 4), offsets=(1, 5), base_policy="dls")
+    over = {"base_policy": "dls"} if issubclass(kind, JointVelocities) else {}
+    config = kind(hidden=(3, 4), offsets=(1, 5), **over)
     values = json.loads(json.dumps(config.to_json()))
     assert kind.from_json(values) == config
     assert differences(values, config.to_json()) == []
@@ -84,9 +85,9 @@ def test_methods():
 @pytest.mark.parametrize("name", presets.names())
 def test_presets_that_come_along(name):
     """Each suits its method, or all of them."""
-    method = presets.read(name).get("method")
+    meant = presets.methods_of(presets.read(name))
     for kind in KINDS:
-        if method in (None, kind.method):
+        if kind.method in (meant or METHODS):
             config, given = presets.configure(kind, name)
             assert isinstance(config, Config)
             assert given
@@ -100,6 +101,14 @@ def test_preset_files(tmp_path):
     assert (config, given) == (PPO(hidden=(5,), n_epochs=2), {"hidden", "n_epochs"})
     with pytest.raises(InvalidInputError, match="is for ppo, not for sac"):
         presets.configure(SAC, str(file))
+    file.write_text("[ppo]\nn_epochs = 3\n[imitate]\nexpert = 'agent:path=a.zip,trust=True'\n")
+    with pytest.raises(InvalidInputError, match=r"The preset .*mine.toml: expert: .*trust"):
+        presets.configure(PPO, str(file))
+    file.write_text("[ppo]\nn_epochs = 3\n[sac]\ntau = 0.5\n")
+    assert presets.configure(PPO, str(file)) == (PPO(n_epochs=3), {"n_epochs"})
+    assert presets.configure(SAC, str(file)) == (SAC(tau=0.5), {"tau"})
+    with pytest.raises(InvalidInputError, match="is for ppo, sac, not for td3"):
+        presets.configure(TD3, str(file))
     file.write_text("n_epoch = 2\n")
     with pytest.raises(UnknownNameError, match=r"no option of ppo 'n_epoch'\. Did you mean 'n_epochs'"):
         presets.configure(PPO, str(file))

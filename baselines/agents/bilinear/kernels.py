@@ -1,0 +1,164 @@
+"""Kernels of the bilinear actor: its features, their gradient, and what the output of its network means."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from baselines.agents.bilinear.twists import is_turned, shown_joints, turn, turn_gradient, twist, twist_size
+from baselines.agents.feature_kernels import SLOWEST
+from ikgym.jit import kernel
+
+#: Fewer steps left than this are seen: only then does the end of an episode matter.
+STEPS_LEFT = 500.0
+
+
+@kernel
+def mean_twists(kind, dt, offsets, nominal, error, out):
+    """The mean velocities between reference poses ahead.
+
+    Args:
+        kind: Of task coordinates, see :mod:`ikgym.task_kernels`.
+        dt: Δt in [s].
+        offsets: Shape (p,).
+        nominal: Reference task coordinates at the offsets. Shape (p, m).
+        error: Scratch. Shape (6,).
+        out: Receives the mean twists between the offsets in [m/s] and [rad/s]. Shape (p - 1, w).
+
+    Returns:
+        The speed s of what is ahead: their root mean square, and a little more.
+    """
+    square = 0.0
+    for i in range(out.shape[0]):
+        twist(kind, nominal[i + 1], nominal[i], error, out[i])
+        duration = (offsets[i + 1] - offsets[i]) * dt
+        for a in range(out.shape[1]):
+            out[i, a] /= duration
+            square += out[i, a] * out[i, a]
+    return SLOWEST + math.sqrt(square / out.size)
+
+
+@kernel
+def feature_row(kind, prismatic, axis, q, ahead, speed, remaining, out):
+    """The features of one arm, see :class:`baselines.agents.bilinear.processing.Bilinear`.
+
+    Args:
+        kind: Of task coordinates.
+        prismatic: Which joints are prismatic. Shape (n,).
+        axis: Of joint 1. Shape (3,).
+        q: Joint coordinates in [rad] or [m]. Shape (n,).
+        ahead: Mean twists; turned in place. Shape (p - 1, w).
+        speed: s.
+        remaining: Steps left.
+        out: Receives the features. Shape (f,).
+    """
+    turned, at = is_turned(kind, prismatic), 0
+    for j in range(1 if turned else 0, q.shape[0]):
+        if prismatic[j]:
+            out[at] = q[j]
+            at += 1
+        else:
+            out[at], out[at + 1] = math.sin(q[j]), math.cos(q[j])
+            at += 2
+    for i in range(ahead.shape[0]):
+        if turned:
+            turn(axis, -q[0], ahead[i])
+        for a in range(ahead.shape[1]):
+            out[at] = ahead[i, a] / speed
+            at += 1
+    out[at], out[at + 1] = math.log(speed), min(remaining / STEPS_LEFT, 1.0)
+
+
+@kernel
+def feature_rows(kind, prismatic, axis, dt, offsets, q, nominal, remaining, out, speed):
+    """:func:`feature_row`, row by row.
+
+    Entered once a `predict`, with its arrays one by one as in :func:`baselines.agents.feature_kernels.feature_rows`.
+
+    Args:
+        kind: Of task coordinates.
+        prismatic: Shape (n,).
+        axis: Shape (3,).
+        dt: Δt in [s].
+        offsets: Shape (p,).
+        q: Shape (B, n).
+        nominal: At the offsets. Shape (B, p, m).
+        remaining: Shape (B, 1).
+        out: Receives the features. Shape (B, f).
+        speed: Receives the speeds. Shape (B,).
+    """
+    error, ahead = np.empty(6), np.empty((offsets.shape[0] - 1, twist_size(kind)))
+    for row in range(q.shape[0]):
+        speed[row] = mean_twists(kind, dt, offsets, nominal[row], error, ahead)
+        feature_row(kind, prismatic, axis, q[row], ahead, speed[row], remaining[row, 0], out[row])
+
+
+@kernel
+def new_features(kind, prismatic, axis, dt, offsets, q, nominal, remaining):
+    """:func:`feature_rows` in an array of their own, as float32: made here, it takes a fifth of the time."""
+    size = shown_joints(kind, prismatic) + (offsets.shape[0] - 1) * twist_size(kind) + 2
+    out, speed = np.empty((q.shape[0], size), np.float32), np.empty(q.shape[0])
+    feature_rows(kind, prismatic, axis, dt, offsets, q, nominal, remaining, out, speed)
+    return out
+
+
+@kernel
+def feature_gradient_rows(kind, prismatic, axis, features, gradient, out):
+    """From the gradient by the features to that by the joint coordinates, row by row.
+
+    The speed of what is ahead does not depend on where the arm is.
+
+    Args:
+        kind: Of task coordinates.
+        prismatic: Shape (n,).
+        axis: Shape (3,).
+        features: What :func:`feature_rows` gave. Shape (B, f).
+        gradient: By the features. Shape (B, f).
+        out: Receives the gradient. Shape (B, n).
+    """
+    turned, n = is_turned(kind, prismatic), prismatic.shape[0]
+    for row in range(features.shape[0]):
+        x, g, at = features[row], gradient[row], 0
+        out[row, 0] = 0.0
+        for j in range(1 if turned else 0, n):
+            if prismatic[j]:
+                out[row, j] = g[at]
+                at += 1
+            else:
+                out[row, j] = g[at] * x[at + 1] - g[at + 1] * x[at]
+                at += 2
+        if turned:
+            out[row, 0] = turn_gradient(axis, x[at:-2], g[at:-2])
+
+
+@kernel
+def action_rows(kind, prismatic, axis, dt, offsets, velocity_limit, q, pose, nominal, output, out):
+    """The actions that network outputs mean, row by row: q̇ = G v + h s.
+
+    Args:
+        kind: Of task coordinates.
+        prismatic: Shape (n,).
+        axis: Shape (3,).
+        dt: Δt in [s].
+        offsets: Shape (p,).
+        velocity_limit: Shape (n,).
+        q: Shape (B, n).
+        pose: Measured task coordinates. Shape (B, m).
+        nominal: At the offsets. Shape (B, p, m).
+        output: Row j of G and h_j, joint by joint. Shape (B, n (w + 1)).
+        out: Receives fractions of the velocity limit. Shape (B, n).
+    """
+    turned, n, w = is_turned(kind, prismatic), q.shape[1], twist_size(kind)
+    error, due, ahead = np.empty(6), np.empty(w), np.empty((offsets.shape[0] - 1, w))
+    for row in range(q.shape[0]):
+        speed, lead = mean_twists(kind, dt, offsets, nominal[row], error, ahead), offsets[0] * dt
+        twist(kind, nominal[row, 0], pose[row], error, due)
+        if turned:
+            turn(axis, -q[row, 0], due)
+        for j in range(n):
+            own = output[row, j * (w + 1) : (j + 1) * (w + 1)]
+            qdot = own[w] * speed
+            for a in range(w):
+                qdot += own[a] * due[a] / lead
+            out[row, j] = qdot / velocity_limit[j]

@@ -1,0 +1,139 @@
+"""What the bilinear actor sees, and what the output of its network means."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from collections.abc import Mapping
+from typing import Any, ClassVar, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from baselines.agents.bilinear.kernels import action_rows, new_features
+from baselines.agents.bilinear.twists import shown_joints, twist_size
+from baselines.agents.features import Features
+from baselines.policy import Batch, Problem
+from ikgym.exceptions import InvalidInputError
+from ikgym.validation import FloatArray, Frozen, known_names, whole_number
+
+
+@dataclasses.dataclass(frozen=True)
+class Bilinear(Frozen):
+    """q̇ = G v + h s: joint velocities linear in the twist that is due, with G and h from the network.
+
+    v is the twist that removes the error from the next reference pose within Δt: feedback and feed-forward in one. The
+    law is homogeneous in the error, so that an error of 10 % in G still removes nine tenths of what is missing in each
+    step, whatever its size; the network need not be precise to be accurate. s is the speed of what is ahead, 0.02 and
+    the root mean square of the mean twists shown, and h s moves the arm in its null space. (G, h) depend on the joint
+    coordinates and on the reference trajectory, and change slowly: they may be held for some steps.
+
+    Twists are seen from the frame of joint 1, which a turn of joint 1 does not change, so that nothing has to be
+    learned twice. Where joint 1 is prismatic, and for skew coordinates, which are no vector, they stay in the base
+    frame. A twist has w components: 3 for tasks of position alone, else 6; an error of the tool's axis is that of the
+    shortest rotation. The features are, with the offsets o_1 < o_2 < … and v_i the mean twist from o_i to o_(i+1):
+
+    | number | feature |
+    |---|---|
+    | 2 each | sin q_j and cos q_j of revolute joints, but for joint 1 where twists are seen from its frame |
+    | 1 each | q_j of prismatic joints |
+    | w each | v_i / s |
+    | 1 | ln s |
+    | 1 | steps left, as a share of 500, at most 1 |
+
+    Args:
+        offsets: o, steps ahead at which the reference is seen, rising from 1, at least two.
+
+    Raises:
+        InvalidInputError: Offsets do not rise from 1.
+    """
+
+    offsets: tuple[int, ...] = (1, 10, 40, 80, 130, 200, 300, 450, 650, 900)
+
+    #: The offsets as kernels take them.
+    _ahead: npt.NDArray[np.int64] = dataclasses.field(init=False, repr=False, compare=False)
+
+    #: What files call it.
+    kind: ClassVar[str] = "bilinear"
+
+    def __post_init__(self) -> None:
+        offsets = tuple(whole_number("offsets", o, at_least=1) for o in self.offsets)
+        rising = all(a < b for a, b in itertools.pairwise(offsets))
+        if len(offsets) < 2 or offsets[0] != 1 or not rising:
+            raise InvalidInputError(f"offsets: expected at least two, rising from 1, got {self.offsets}.")
+        ahead = np.array(offsets, dtype=np.int64)
+        ahead.flags.writeable = False
+        for field, value in {"offsets": offsets, "_ahead": ahead}.items():
+            object.__setattr__(self, field, value)
+
+    @property
+    def base_policy(self) -> None:
+        """There is none."""
+        return
+
+    @property
+    def null_space(self) -> None:
+        """Outputs go through no projector."""
+        return
+
+    def to_json(self) -> dict[str, Any]:
+        """The fields, as JSON has them."""
+        return {"kind": self.kind, "offsets": list(self.offsets)}
+
+    @classmethod
+    def from_json(cls, values: Mapping[str, Any]) -> Self:
+        """What :meth:`to_json` gave.
+
+        Raises:
+            UnknownNameError: There is a key that is none of the fields.
+            InvalidInputError: A value is refused.
+        """
+        known_names("field of the processing", values, ["kind", "offsets"])
+        return cls(tuple(values.get("offsets", cls.offsets)))
+
+    def size(self, problem: Problem) -> int:
+        """The number of features."""
+        kind = problem.task.kind
+        shown: int = shown_joints(kind, problem.model.chain.prismatic)
+        return shown + (len(self.offsets) - 1) * int(twist_size(kind)) + 2
+
+    def outputs(self, problem: Problem) -> int:
+        """The number of network outputs: row j of G and h_j, joint by joint."""
+        return problem.model.joints * (int(twist_size(problem.task.kind)) + 1)
+
+    def features(self, problem: Problem, batch: Batch, base: FloatArray | None = None) -> Features:
+        """The features of a batch; see :meth:`baselines.agents.features.Processing.features`."""
+        del base
+        chain = problem.model.chain
+        out: Features = new_features(
+            problem.task.kind,
+            chain.prismatic,
+            chain.axes[0],
+            problem.dt,
+            self._ahead,
+            batch.q,
+            batch.nominal,
+            batch.remaining,
+        )
+        return out
+
+    def action(
+        self, problem: Problem, batch: Batch, output: npt.NDArray[Any], base: FloatArray | None = None
+    ) -> FloatArray:
+        """Actions, as fractions of the velocity limit; see :meth:`baselines.agents.features.Processing.action`."""
+        del base
+        out, chain = np.empty(batch.q.shape), problem.model.chain
+        action_rows(
+            problem.task.kind,
+            chain.prismatic,
+            chain.axes[0],
+            problem.dt,
+            self._ahead,
+            problem.velocity_limit,
+            batch.q,
+            batch.pose,
+            batch.nominal,
+            output,
+            out,
+        )
+        return out

@@ -1,0 +1,207 @@
+"""Kernel: the adjoint of a segment, step by step backwards, with exact kinematic Jacobians.
+
+With λ the gradient of the loss by the joint coordinates after a step, and μ that by the velocities applied in it, both
+are led back through the stops, the limits of acceleration and velocity, the bilinear law and the error of the task.
+What a limit holds back has the gradient of what is left: none by the command, that by the last velocity where the
+acceleration is at its limit, and −1/Δt by where the joint was where it comes to stand at a stop.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from baselines.agents.bilinear.twists import (
+    error_gradient,
+    error_kind,
+    is_turned,
+    turn,
+    turn_gradient,
+    twist,
+    twist_size,
+)
+from baselines.training.gradients.segment import commanded
+from ikgym import cost_kernels, task_kernels
+from ikgym.cost_kernels import P_X_INSIDE
+from ikgym.jit import inlined, kernel, uncounted
+from ikgym.kinematics import forward_and_jacobian
+from ikgym.limit_kernels import CHANGE, FASTEST, LOWER, UPPER, within
+
+Floats = npt.NDArray[np.float64]
+
+
+class Gradient(NamedTuple):
+    """The gradient of a number by what a segment begins with.
+
+    Attributes:
+        q: By the joint coordinates; that by those after the segment at first. Shape (N, n).
+        qdot: By the joint velocities applied before it; likewise. Shape (N, n).
+        output: By (G, h). Shape (N, n (w + 1)).
+    """
+
+    q: Floats
+    qdot: Floats
+    output: Floats
+
+
+class Place(NamedTuple):
+    """What is known of the arm at one configuration, and room for Jacobians of the error there.
+
+    Attributes:
+        rotation: Of the tool. Shape (3, 3).
+        position: Of the tool point in [m]. Shape (3,).
+        pose: Task coordinates. Shape (m,).
+        geometric: Geometric Jacobian. Shape (6, n).
+        task_jacobian: What :func:`ikgym.task_kernels.jacobian` gives, in its first rows. Shape (at least e, n).
+        jacobian: What :func:`ikgym.task_kernels.error_jacobian` gives. Shape (at least e, n).
+    """
+
+    rotation: Floats
+    position: Floats
+    pose: Floats
+    geometric: Floats
+    task_jacobian: Floats
+    jacobian: Floats
+
+
+@kernel
+def adjoint(task, rows, output, path, by_loss, gradient, start, stop):
+    """Leads gradients back through a segment.
+
+    Args:
+        task: A :class:`baselines.training.gradients.segment.Task`.
+        rows: What the segment was given; `spent`, `played` and `usual` are not looked at.
+        output: As in the segment.
+        path: What the segment made of it.
+        by_loss: The gradient by the loss of each arm; weights count as constants. Shape (N,).
+        gradient: A :class:`Gradient`; changed in place.
+        start: The first row that is meant.
+        stop: The row after the last.
+    """
+    chain, kind, e, dt, velocity_limit, limits, cost = task
+    nominal, _, steps, speed = rows[:4]
+    q_path, qdot_path, weights = path[:3]
+    by_q, by_qdot, by_output = gradient
+    prismatic, axis, m, n = chain.prismatic, chain.axes[0], nominal.shape[2], q_path.shape[2]
+    turned, w, of_twist = is_turned(kind, prismatic), twist_size(kind), error_kind(kind)
+    size = 5 if kind == task_kernels.AXIS else w
+    pose, task_jacobian, jacobian = np.empty(m), np.empty((max(e, 6), n)), np.empty((max(e, 6), n))
+    place = Place(np.empty((3, 3)), np.empty(3), pose, np.empty((6, n)), task_jacobian, jacobian)
+    error, by_error, due, by_due = np.empty(max(e, 6)), np.empty(max(e, 6)), np.empty(w), np.empty(w)
+    for row in range(start, stop):
+        lambda_, mu, into = by_q[row], by_qdot[row], by_output[row]
+        into[:] = 0.0
+        look(chain, kind, q_path[row, steps[row]], place)
+        for t in range(steps[row] - 1, -1, -1):
+            target, weight = nominal[row, t], weights[row, t] * by_loss[row]
+            q, last, reached, applied = q_path[row, t], qdot_path[row, t], q_path[row, t + 1], qdot_path[row, t + 1]
+            if weight != 0.0:
+                task_kernels.error(kind, target, pose, error[:e])
+                for a in range(e):
+                    by_error[a] = weight * cost_kernels.gradient(error[a], cost.delta_x, P_X_INSIDE, cost.p_x)
+                for j in range(n):
+                    mu[j] += weight * cost_kernels.gradient(applied[j], cost.delta_qdot, cost.p_in, cost.p_out)
+                through_error(kind, target, place, error[:e], by_error[:e], lambda_)
+            look(chain, kind, q, place)
+            twist(kind, target, pose, error, due)
+            if turned:
+                turn(axis, -q[0], due)
+            by_due[:] = 0.0
+            for j in range(n):
+                asked = commanded(output[row], j, due, speed[row], dt)
+                move, by = (last[j], q[j], reached[j]), (lambda_[j], mu[j])
+                by_asked, lambda_[j], mu[j] = unlimited(limits, velocity_limit, j, asked, move, by, dt)
+                through_law(output[row], j, by_asked, due, speed[row], dt, into, by_due)
+            if turned:
+                lambda_[0] += turn_gradient(axis, due, by_due)
+                turn(axis, q[0], by_due)
+            error_gradient(kind, target, by_due, by_error[:size])
+            task_kernels.error(of_twist, target, pose, error[:size])
+            through_error(of_twist, target, place, error[:size], by_error[:size], lambda_)
+
+
+@uncounted
+def look(chain, kind, q, place):
+    """Where the tool is at some joint coordinates of shape (n,), and how it moves: fills a :class:`Place`."""
+    forward_and_jacobian(chain, q, place.rotation, place.position, place.geometric)
+    task_kernels.coordinates(kind, place.rotation, place.position, place.pose)
+
+
+@uncounted
+def through_error(kind, target, place, error, by_error, lambda_):
+    """Adds to the gradient by the joint coordinates what comes of that by the error of the task.
+
+    Args:
+        kind: Of task coordinates.
+        target: Reference task coordinates. Shape (m,).
+        place: A :class:`Place`.
+        error: Of the task. Shape (e,).
+        by_error: The gradient by it. Shape (e,).
+        lambda_: That by the joint coordinates. Shape (n,).
+    """
+    e = error.shape[0]
+    task_jacobian, jacobian = place.task_jacobian[:e], place.jacobian[:e]
+    task_kernels.jacobian(kind, place.rotation, place.geometric, task_jacobian)
+    task_kernels.error_jacobian(kind, target, place.pose, error, task_jacobian, jacobian)
+    for a in range(e):
+        for j in range(lambda_.shape[0]):
+            lambda_[j] += by_error[a] * jacobian[a, j]
+
+
+@inlined
+def through_law(output, j, by_asked, due, speed, dt, into, by_due):
+    """Adds to the gradients by (G, h) and by the twist that is due what comes of that by a joint's command.
+
+    Args:
+        output: (G, h). Shape (n (w + 1),).
+        j: The joint.
+        by_asked: The gradient by its command.
+        due: The twist. Shape (w,).
+        speed: s.
+        dt: Δt in [s].
+        into: The gradient by (G, h). Shape (n (w + 1),).
+        by_due: The gradient by the twist. Shape (w,).
+    """
+    w, scaled = due.shape[0], by_asked / dt
+    own = j * (w + 1)
+    for a in range(w):
+        into[own + a] += scaled * due[a]
+        by_due[a] += scaled * output[own + a]
+    into[own + w] += by_asked * speed
+
+
+@inlined
+def unlimited(limits, velocity_limit, j, asked, move, by, dt):
+    """Leads the gradients of joint ``j`` back through what :func:`ikgym.simulation.step` does to a command.
+
+    Args:
+        limits: Shape (4, n), or (0, n).
+        velocity_limit: Shape (n,).
+        j: The joint.
+        asked: The command in [rad/s] or [m/s].
+        move: The velocity applied in the step before; the coordinate before this step in [rad] or [m], and after it.
+        by: The gradients by the coordinate after the step, and by the velocity applied in it.
+        dt: Δt in [s].
+
+    Returns:
+        The gradients by the command, by the coordinate before, and by the velocity before.
+    """
+    last, here, reached = move
+    lambda_, mu = by
+    by_last, passes = 0.0, abs(asked) <= velocity_limit[j]
+    if limits.shape[0] == 0:
+        return (dt * lambda_ + mu if passes else 0.0), lambda_, by_last
+    allowed = within(asked, velocity_limit[j])
+    passes = passes and abs(allowed) <= limits[FASTEST, j]
+    allowed = within(allowed, limits[FASTEST, j])
+    accelerates = abs(allowed - last) <= limits[CHANGE, j]
+    velocity = allowed if accelerates else last + within(allowed - last, limits[CHANGE, j])
+    if not limits[LOWER, j] <= here + dt * velocity <= limits[UPPER, j]:
+        stands = abs(reached - here) / dt <= limits[FASTEST, j]
+        return 0.0, (-mu / dt if stands else 0.0), by_last
+    by_velocity = dt * lambda_ + mu
+    if not accelerates:
+        return 0.0, lambda_, by_velocity
+    return (by_velocity if passes else 0.0), lambda_, by_last

@@ -1,0 +1,133 @@
+"""N arms, each in an episode of its own, between segments."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import torch
+
+from baselines.training.gradients.segment import Rows
+from ikgym.scenarios import Scenario
+from ikgym.validation import FloatArray
+
+Indices = npt.NDArray[np.int64]
+
+#: Steps between those that the mean cost of the reference joint path is taken from.
+EVERY = 16
+#: Added to that mean, so that an arm at rest has something to be compared with.
+LEAST = 1e-3
+
+
+class Arms:
+    """N arms, each in an episode of its own, and the reference trajectories of these.
+
+    Args:
+        scenario: What is to be tracked.
+        rows: N.
+        offsets: Steps ahead at which the reference is seen.
+    """
+
+    def __init__(self, scenario: Scenario, rows: int, offsets: tuple[int, ...]) -> None:
+        n, m = scenario.joints, scenario.task.size
+        self._scenario, self._offsets = scenario, np.array(offsets)
+        self._counted = np.append(scenario.counted(), np.zeros(offsets[-1], dtype=np.bool_))
+        self._every = np.arange(rows)[:, None]
+        self._nominal = np.empty((rows, scenario.steps + offsets[-1] + 1, m))
+        # Where the reference joint path is; NaN where there is none.
+        self._path = np.full((rows, scenario.steps + 1, n), np.nan)
+        self.q, self.qdot = torch.zeros(rows, n, dtype=torch.float64), torch.zeros(rows, n, dtype=torch.float64)
+        self.seed, self.made = np.zeros((2, rows), dtype=np.int64)
+        self.usual, self.spent, self.played = np.ones(rows), np.zeros(rows), np.zeros(rows)
+
+    @property
+    def ended(self) -> npt.NDArray[np.bool_]:
+        """Whose episode is over. Shape (N,)."""
+        return self.made >= self._scenario.steps
+
+    @property
+    def remaining(self) -> FloatArray:
+        """Steps left. Shape (N, 1)."""
+        return (self._scenario.steps - self.made)[:, None].astype(np.float64)
+
+    @property
+    def ahead(self) -> FloatArray:
+        """Reference task coordinates at the offsets. Shape (N, p, m)."""
+        out: FloatArray = self._nominal[self._every, self.made[:, None] + self._offsets]
+        return out
+
+    def rows(self, steps: int, speed: FloatArray) -> Rows:
+        """What is to be done in a segment.
+
+        Args:
+            steps: K.
+            speed: s of each arm. Shape (N,).
+        """
+        at = self.made[:, None] + np.arange(1, steps + 1)
+        left = np.minimum(self._scenario.steps - self.made, steps)
+        return Rows(self._nominal[self._every, at], self._counted[at], left, speed, self.usual, self.spent, self.played)
+
+    def begin(self, rows: Indices, seeds: Indices, at: Indices) -> None:
+        """Begins episodes, or enters them after some steps, where their reference joint path is then.
+
+        Args:
+            rows: Which arms. Shape (R,).
+            seeds: Reset seeds. Shape (R,).
+            at: Steps that are left out; 0 where there is no joint path. Shape (R,).
+        """
+        for row, seed in zip(rows.tolist(), seeds.tolist(), strict=True):
+            self._know(row, seed)
+        self._put(rows, at)
+
+    def give_up(self, rows: Indices) -> None:
+        """Puts arms that are lost back on their reference joint paths, or to the starts where there are none."""
+        self._put(rows, np.where(self._follows[rows], self.made[rows], 0))
+
+    def state(self) -> dict[str, Any]:
+        """Where they are."""
+        numbers = {name: torch.from_numpy(getattr(self, name).copy()) for name in ("seed", "made", "spent", "played")}
+        return {"q": self.q.detach().clone(), "qdot": self.qdot.detach().clone(), **numbers}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Goes on from what :meth:`state` gave."""
+        for row, seed in enumerate(state["seed"].tolist()):
+            self._know(row, seed)
+        self.q, self.qdot = state["q"].clone(), state["qdot"].clone()
+        for name in ("made", "spent", "played"):
+            setattr(self, name, state[name].numpy().copy())
+
+    @property
+    def _follows(self) -> npt.NDArray[np.bool_]:
+        """Whether there is a reference joint path. Shape (N,)."""
+        known: npt.NDArray[np.bool_] = ~np.isnan(self._path[:, 0, 0])
+        return known
+
+    def _put(self, rows: Indices, at: Indices) -> None:
+        """Puts arms where their episodes are after some steps, at the velocity of the reference, at rest at first."""
+        q, qdot = self.q.detach().numpy().copy(), self.qdot.detach().numpy().copy()
+        q[rows] = self._path[rows, at]
+        qdot[rows] = (q[rows] - self._path[rows, np.maximum(at - 1, 0)]) / self._scenario.dt
+        first = [row for row, k in zip(rows.tolist(), at.tolist(), strict=True) if k == 0]
+        if first:
+            episodes = [self._scenario.episode(int(self.seed[row])) for row in first]
+            q[first], qdot[first] = self._scenario.first_q_of(episodes), 0.0
+        chosen = torch.zeros(len(q), 1, dtype=torch.bool)
+        chosen[torch.from_numpy(rows)] = True
+        # The others keep their gradients.
+        self.q = torch.where(chosen, torch.from_numpy(q), self.q)
+        self.qdot = torch.where(chosen, torch.from_numpy(qdot), self.qdot)
+        self.made[rows], self.spent[rows], self.played[rows] = at, 0.0, 0.0
+
+    def _know(self, row: int, seed: int) -> None:
+        """The reference of an arm's episode."""
+        scenario = self._scenario
+        self.seed[row] = seed
+        self._nominal[row] = scenario.nominal(seed, int(self._offsets[-1]))
+        path = scenario.nominal_joint_path(seed)
+        if path is None:
+            self._path[row], self.usual[row] = np.nan, 1.0
+            return
+        self._path[row] = path
+        usual = scenario.cost.velocity((path[1::EVERY] - path[:-1:EVERY]) / scenario.dt)
+        self.usual[row] = float(np.mean(usual)) + LEAST

@@ -1,0 +1,135 @@
+"""The bilinear law in PyTorch: features and segments, whose gradients are compiled."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+from torch.autograd.function import once_differentiable
+
+from baselines.agents.bilinear.kernels import feature_gradient_rows, feature_rows
+from baselines.agents.bilinear.processing import Bilinear
+from baselines.policy import Problem
+from baselines.training.gradients.adjoint import Gradient, adjoint
+from baselines.training.gradients.segment import Path, Rows, Task, segment
+from ikgym.exceptions import InvalidInputError
+from ikgym.parallel import in_chunks
+from ikgym.scenarios import Scenario
+from ikgym.validation import FloatArray
+
+#: Rows that are worth a thread.
+GRAIN = 32
+
+
+class Law:
+    """The bilinear actor's law on the arm of a scenario, for N rows at a time, in float64.
+
+    Args:
+        scenario: What is to be tracked.
+        processing: What the actor sees.
+
+    Raises:
+        InvalidInputError: The scenario's plant is not ideal, or it does not show the pose at its start.
+    """
+
+    def __init__(self, scenario: Scenario, processing: Bilinear) -> None:
+        if not scenario.plant.ideal:
+            raise InvalidInputError(
+                f"Scenario {scenario.name!r}: expected an ideal plant, whose gradient is known, got {scenario.plant}."
+            )
+        if scenario.initial_pose is not None:
+            raise InvalidInputError(f"Scenario {scenario.name!r}: its first pose is not that of the arm.")
+        problem = Problem.of(scenario)
+        self.inputs, self.outputs = processing.size(problem), processing.outputs(problem)
+        self.task = Task.of(scenario)
+        self._chain, self._offsets = scenario.model.chain, np.array(processing.offsets)
+
+    def features(self, q: Tensor, nominal: FloatArray, remaining: FloatArray) -> tuple[Tensor, FloatArray]:
+        """See :class:`Bilinear`.
+
+        Args:
+            q: Joint coordinates in [rad] or [m]. Shape (N, n), float64.
+            nominal: Reference task coordinates at the offsets. Shape (N, p, m).
+            remaining: Steps left. Shape (N, 1).
+
+        Returns:
+            Features of shape (N, f), float64, and speeds of shape (N,).
+        """
+        speed = np.empty(len(nominal))
+        out: Tensor = _Features.apply(q, self, nominal, remaining, speed)  # type: ignore[no-untyped-call]
+        return out, speed
+
+    def move(
+        self, q: Tensor, qdot: Tensor, output: Tensor, rows: Rows, prior: float
+    ) -> tuple[Tensor, Tensor, Tensor, FloatArray]:
+        """A segment of steps, see :func:`baselines.training.gradients.segment.segment`.
+
+        Args:
+            q: Joint coordinates in [rad] or [m]. Shape (N, n), float64.
+            qdot: Joint velocities last applied, in [rad/s] or [m/s]. Shape (N, n), float64.
+            output: (G, h). Shape (N, n (w + 1)), float64.
+            rows: What to do; must not be changed before the gradient is known, but for `spent` and `played`.
+            prior: Steps that the usual cost counts as much as.
+
+        Returns:
+            Joint coordinates and velocities after it, the weighed costs of shape (N,), and the position errors at its
+            end in [m], of shape (N,).
+        """
+        path = Path.empty(len(rows.steps), rows.nominal.shape[1], q.shape[1])
+        ends: Any = _Segment.apply(q, qdot, output, self, rows, prior, path)  # type: ignore[no-untyped-call]
+        return *ends, path.distance
+
+
+class _Features(torch.autograd.Function):
+    @staticmethod
+    def forward(ctx: Any, q: Tensor, law: Law, nominal: FloatArray, remaining: FloatArray, speed: FloatArray) -> Tensor:
+        task, chain, joints = law.task, law._chain, q.detach().numpy()
+        out = np.empty((len(joints), law.inputs))
+
+        def work(start: int, stop: int) -> None:
+            some = slice(start, stop)
+            arrays = joints[some], nominal[some], remaining[some], out[some], speed[some]
+            feature_rows(task.kind, chain.prismatic, chain.axes[0], task.dt, law._offsets, *arrays)
+
+        in_chunks(work, len(out), GRAIN)
+        ctx.law, ctx.features = law, out
+        return torch.from_numpy(out)
+
+    @staticmethod
+    @once_differentiable
+    def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor, None, None, None, None]:
+        law, chain = ctx.law, ctx.law._chain
+        out = np.empty((len(gradient), len(chain.prismatic)))
+        given = np.ascontiguousarray(gradient.numpy())
+        feature_gradient_rows(law.task.kind, chain.prismatic, chain.axes[0], ctx.features, given, out)
+        return torch.from_numpy(out), None, None, None, None
+
+
+class _Segment(torch.autograd.Function):
+    @staticmethod
+    def forward(
+        ctx: Any, q: Tensor, qdot: Tensor, output: Tensor, law: Law, rows: Rows, prior: float, path: Path
+    ) -> tuple[Tensor, Tensor, Tensor]:
+        count, held = len(q), np.ascontiguousarray(output.detach().numpy())
+        path.q[:, 0], path.qdot[:, 0] = q.detach().numpy(), qdot.detach().numpy()
+        in_chunks(lambda start, stop: segment(law.task, rows, prior, held, path, start, stop), count, GRAIN)
+        ctx.law, ctx.rows, ctx.path, ctx.held = law, rows, path, held
+        last = np.arange(count), rows.steps
+        return torch.from_numpy(path.q[last]), torch.from_numpy(path.qdot[last]), torch.from_numpy(path.loss)
+
+    @staticmethod
+    @once_differentiable
+    def backward(
+        ctx: Any, by_q: Tensor, by_qdot: Tensor, by_loss: Tensor
+    ) -> tuple[Tensor, Tensor, Tensor, None, None, None, None]:
+        gradient = Gradient(by_q.numpy().copy(), by_qdot.numpy().copy(), np.empty(ctx.held.shape))
+        weights = np.ascontiguousarray(by_loss.numpy())
+        in_chunks(
+            lambda start, stop: adjoint(ctx.law.task, ctx.rows, ctx.held, ctx.path, weights, gradient, start, stop),
+            len(weights),
+            GRAIN,
+        )
+        by = [torch.from_numpy(array) for array in gradient]
+        return by[0], by[1], by[2], None, None, None, None

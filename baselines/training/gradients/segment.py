@@ -1,0 +1,169 @@
+"""Kernel: some steps of N arms under the bilinear law with a (G, h) that is held, and feedback at every step."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from baselines.agents.bilinear.twists import is_turned, turn, twist, twist_size
+from ikgym import cost_kernels, task_kernels
+from ikgym.arms.limits import limit_rows
+from ikgym.cost_kernels import CostParameters
+from ikgym.jit import inlined, kernel
+from ikgym.kinematics import Chain, forward
+from ikgym.limit_kernels import LOWER, UPPER, driven, stopped, within
+from ikgym.scenarios import Scenario
+
+Floats = npt.NDArray[np.float64]
+
+
+class Task(NamedTuple):
+    """What is the same in all arms and at all times.
+
+    Attributes:
+        chain: The arm.
+        kind: Of task coordinates, see :mod:`ikgym.task_kernels`.
+        error_size: e.
+        dt: Δt in [s].
+        velocity_limit: What an action of 1 means, in [rad/s] or [m/s]. Shape (n,).
+        limits: What :func:`ikgym.arms.limits.limit_rows` gives. Shape (4, n), or (0, n) where there are none.
+        cost: Of the tracking error and of the joint velocities.
+    """
+
+    chain: Chain
+    kind: int
+    error_size: int
+    dt: float
+    velocity_limit: Floats
+    limits: Floats
+    cost: CostParameters
+
+    @classmethod
+    def of(cls, scenario: Scenario) -> Task:
+        """That of a scenario."""
+        limits = limit_rows(scenario.arm, scenario.largest_qdot, scenario.dt)
+        velocity_limit, cost = scenario.velocity_limit.copy(), scenario.cost.parameters
+        return cls(
+            scenario.arm.chain, scenario.task.kind, scenario.task.error_size, scenario.dt, velocity_limit, limits, cost
+        )
+
+
+class Rows(NamedTuple):
+    """What the arms are to do in a segment, and what they have done before.
+
+    Attributes:
+        nominal: Reference task coordinates after each of the K steps. Shape (N, K, m).
+        counted: Whether the cost of each step counts. Shape (N, K).
+        steps: Steps to make, at most K. Shape (N,).
+        speed: s, see :mod:`baselines.agents.bilinear`. Shape (N,).
+        usual: A stage cost that each episode's costs are compared with until they are known. Shape (N,).
+        spent: The cost of the episode so far; written. Shape (N,).
+        played: Steps that it was spent in; written. Shape (N,).
+    """
+
+    nominal: Floats
+    counted: npt.NDArray[np.bool_]
+    steps: npt.NDArray[np.int64]
+    speed: Floats
+    usual: Floats
+    spent: Floats
+    played: Floats
+
+
+class Path(NamedTuple):
+    """What the arms did, as the adjoint needs it.
+
+    Attributes:
+        q: Joint coordinates in [rad] or [m]. Shape (N, K + 1, n).
+        qdot: Joint velocities applied before them, in [rad/s] or [m/s]. Shape (N, K + 1, n).
+        weight: What each stage cost is multiplied by; 0 where it does not count. Shape (N, K).
+        loss: The weighed costs, added up. Shape (N,).
+        distance: The position error at the end in [m]. Shape (N,).
+    """
+
+    q: Floats
+    qdot: Floats
+    weight: Floats
+    loss: Floats
+    distance: Floats
+
+    @classmethod
+    def empty(cls, rows: int, steps: int, n: int) -> Path:
+        """Room for N arms and K steps."""
+        q, qdot = np.empty((2, rows, steps + 1, n))
+        return cls(q, qdot, np.empty((rows, steps)), np.empty(rows), np.empty(rows))
+
+
+@kernel
+def segment(task, rows, prior, output, path, start, stop):
+    """Moves arms.
+
+    Args:
+        task: A :class:`Task`.
+        rows: A :class:`Rows`; `spent` and `played` go on.
+        prior: Steps that `usual` counts as much as.
+        output: (G, h) of each arm, see :func:`baselines.agents.bilinear.kernels.action_rows`. Shape (N, n (w + 1)).
+        path: A :class:`Path` with the first `q` and `qdot`; receives all else.
+        start: The first row that is meant.
+        stop: The row after the last.
+    """
+    chain, kind, e, dt, velocity_limit, limits, cost = task
+    nominal, counted, steps, speed, usual, spent, played = rows
+    q_path, qdot_path, weights, loss, distance = path
+    prismatic, axis, m, n = chain.prismatic, chain.axes[0], nominal.shape[2], q_path.shape[2]
+    turned, w, limited = is_turned(kind, prismatic), twist_size(kind), limits.shape[0] > 0
+    rotation, position, pose = np.empty((3, 3)), np.empty(3), np.empty(m)
+    error, due, held = np.empty(max(e, 6)), np.empty(w), np.zeros((1, 3))
+    for row in range(start, stop):
+        loss[row] = distance[row] = 0.0
+        forward(chain, q_path[row, 0], rotation, position)
+        task_kernels.coordinates(kind, rotation, position, pose)
+        for t in range(steps[row]):
+            target = nominal[row, t]
+            q, qdot, reached, applied = q_path[row, t], qdot_path[row, t], q_path[row, t + 1], qdot_path[row, t + 1]
+            twist(kind, target, pose, error, due)
+            if turned:
+                turn(axis, -q[0], due)
+            for j in range(n):
+                asked = commanded(output[row], j, due, speed[row], dt)
+                applied[j] = within(asked, velocity_limit[j])
+                if limited:
+                    applied[j] = driven(limits, j, applied[j], qdot[j], 0.0, held, 0)
+                reached[j] = q[j] + dt * applied[j]
+                if limited and not limits[LOWER, j] <= reached[j] <= limits[UPPER, j]:
+                    reached[j], applied[j] = stopped(limits, j, q[j], reached[j], dt)
+            forward(chain, reached, rotation, position)
+            task_kernels.coordinates(kind, rotation, position, pose)
+            task_kernels.error(kind, target, pose, error[:e])
+            played[row] += 1.0
+            weights[row, t] = 0.0
+            if counted[row, t]:
+                stage = cost_kernels.tracking(cost, error[:e]) + cost_kernels.velocity(cost, applied)
+                spent[row] += stage
+                weights[row, t] = (played[row] + prior) / (spent[row] + prior * usual[row])
+                loss[row] += weights[row, t] * stage
+        if steps[row] > 0:
+            distance[row] = missing(target, position)
+
+
+@inlined
+def commanded(output, j, due, speed, dt):
+    """The velocity that joint ``j`` is asked for: row j of G times the twist that is due, and h_j s."""
+    w = due.shape[0]
+    velocity = output[j * (w + 1) + w] * speed
+    for a in range(w):
+        velocity += output[j * (w + 1) + a] * due[a] / dt
+    return velocity
+
+
+@inlined
+def missing(target, position):
+    """The distance of a position from that of reference task coordinates, whose last three it is, in [m]."""
+    m, square = target.shape[0], 0.0
+    for i in range(3):
+        difference = target[m - 3 + i] - position[i]
+        square += difference * difference
+    return math.sqrt(square)

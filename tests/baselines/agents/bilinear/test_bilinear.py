@@ -1,0 +1,205 @@
+"""The bilinear actor: what it sees, and what its outputs mean."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from gymnasium.utils import seeding
+
+import baselines
+from baselines.agents.bilinear.kernels import feature_gradient_rows, feature_rows
+from baselines.agents.bilinear.processing import Bilinear
+from baselines.agents.files import load_agent, save_agent
+from baselines.agents.network import Network
+from baselines.evaluation.rollout import rollouts
+from baselines.policy import Batch, Problem
+from ikgym import arms, scenarios, tasks
+from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.simulator import Simulator
+from tests.comparison import identical
+
+OFFSETS = (1, 5, 20)
+ROWS = 6
+
+
+def problem_of(arm="varga7", task="pose"):
+    problem = Problem.of(scenarios.get("varga7-random"))
+    arm = arms.get(arm)
+    return problem.replace(model=arm, task=tasks.get(task), velocity_limit=np.linspace(1.0, 2.0, arm.joints))
+
+
+def batch_of(problem, seed=0, turned=0.0):
+    """Arms somewhere, and references near them; all of it turned about the axis of joint 1."""
+    rng, arm, task = np.random.default_rng(seed), problem.model, problem.task
+    q = rng.uniform(-1.0, 1.0, (ROWS, arm.joints))
+    way = q[:, None] + rng.normal(scale=0.05, size=(ROWS, len(OFFSETS), arm.joints))
+    q[:, 0] += turned
+    way[:, :, 0] += turned
+    pose, nominal = task.coordinates(*arm.forward(q)), task.coordinates(*arm.forward(way))
+    return Batch(q, np.zeros_like(q), pose, nominal, rng.uniform(0.0, 900.0, (ROWS, 1)))
+
+
+def features(problem, batch):
+    return Bilinear(OFFSETS).features(problem, batch)
+
+
+def outputs(problem, seed=1):
+    return np.random.default_rng(seed).normal(size=(ROWS, Bilinear(OFFSETS).outputs(problem))).astype(np.float32)
+
+
+def qdot(problem, batch, output):
+    return Bilinear(OFFSETS).action(problem, batch, output) * problem.velocity_limit
+
+
+@pytest.mark.parametrize("task", ["position", "matrix", "pose", "axis"])
+def test_a_turn_of_joint_1_changes_nothing(task):
+    problem = problem_of(task=task)
+    here, there = batch_of(problem), batch_of(problem, turned=0.8)
+    np.testing.assert_allclose(features(problem, there), features(problem, here), atol=2e-5)
+    output = outputs(problem)
+    np.testing.assert_allclose(qdot(problem, there, output), qdot(problem, here, output), rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize(("arm", "task"), [("tiago", "pose"), ("varga7", "skew")])
+def test_without_a_frame_that_turns_joint_1_is_seen(arm, task):
+    """Nothing is turned where joint 1 is prismatic or coordinates are no vector: what joint 1 does is seen then."""
+    problem = problem_of(arm, task)
+    here, there = batch_of(problem), batch_of(problem, turned=0.8)
+    assert np.abs(features(problem, there)[:, :2] - features(problem, here)[:, :2]).max() > 0.1
+
+
+@pytest.mark.parametrize(("arm", "task", "wanted"), [
+    ("varga7", "pose", 11 + 2 * 6 + 2), ("varga7", "skew", 13 + 2 * 6 + 2), ("varga7", "position", 11 + 2 * 3 + 2),
+    ("tiago", "axis", 15 + 2 * 6 + 2), ("planar2", "matrix", 2 + 2 * 6 + 2),
+])  # fmt: skip
+def test_sizes(arm, task, wanted):
+    problem = problem_of(arm, task)
+    seen = features(problem, batch_of(problem))
+    assert seen.shape == (ROWS, wanted)
+    assert seen.dtype == np.float32
+    assert Bilinear(OFFSETS).size(problem) == wanted
+    assert Bilinear(OFFSETS).outputs(problem) == problem.model.joints * (4 if task == "position" else 7)
+
+
+def test_features_in_numbers():
+    """Against the table of the docstring, where twists are plain differences."""
+    problem = problem_of(task="position")
+    batch = batch_of(problem)
+    mean = np.diff(batch.nominal, axis=1) / (np.diff(OFFSETS)[None, :, None] * problem.dt)
+    speed = 0.02 + np.sqrt((mean**2).mean((1, 2)))
+    angle = -batch.q[:, 0]  # about z
+    turn = np.array([[np.cos(angle), -np.sin(angle), 0 * angle], [np.sin(angle), np.cos(angle), 0 * angle]])
+    x, y = (np.einsum("jr,rij->ri", part, mean) for part in turn)
+    ahead = np.stack([x, y, mean[:, :, 2]], 2) / speed[:, None, None]
+    joints = [np.sin(batch.q[:, 1]), np.cos(batch.q[:, 1]), batch.q[:, 2]]
+    rest = [part(batch.q[:, j]) for j in range(3, 7) for part in (np.sin, np.cos)]
+    left = np.minimum(batch.remaining[:, 0] / 500.0, 1.0)
+    wanted = np.concatenate(
+        [np.stack(joints + rest, 1), ahead.reshape(ROWS, -1), np.stack([np.log(speed), left], 1)], 1
+    )
+    np.testing.assert_allclose(features(problem, batch), wanted, rtol=1e-6, atol=1e-6)
+    output = outputs(problem)
+    law = output.reshape(ROWS, 7, 4).astype(float)
+    due = (batch.nominal[:, 0] - batch.pose) / problem.dt
+    due = np.stack([*(np.einsum("jr,rj->r", part, due) for part in turn), due[:, 2]], 1)
+    given = np.einsum("rja,ra->rj", law[:, :, :3], due) + law[:, :, 3] * speed[:, None]
+    np.testing.assert_allclose(qdot(problem, batch, output), given, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("task", ["position", "matrix", "pose", "axis"])
+def test_the_inverse_jacobian_removes_the_error(task):
+    """With G J = I in the frame of joint 1 and h = 0, one step of a small error leaves next to nothing of it."""
+    problem = problem_of("puma560" if task != "position" else "zhang3", task)
+    arm, batch = problem.model, batch_of(problem)
+    near = batch.q + np.random.default_rng(2).normal(scale=1e-4, size=batch.q.shape)
+    target = problem.task.coordinates(*arm.forward(near))
+    batch = batch._replace(nominal=np.stack([target] * 3, 1))
+    c, s = np.cos(batch.q[:, 0]), np.sin(batch.q[:, 0])
+    jacobian = arm.jacobian(batch.q)[:, : Bilinear(OFFSETS).outputs(problem) // arm.joints - 1]
+    axis, zero = arm.chain.axes[0], np.zeros(ROWS)
+    assert axis.tolist() == [0.0, 0.0, 1.0]
+    back = np.moveaxis(np.array([[c, s, zero], [-s, c, zero], [zero, zero, zero + 1.0]]), 2, 0)
+    turned = np.concatenate([back @ jacobian[:, i : i + 3] for i in range(0, jacobian.shape[1], 3)], 1)
+    law = np.concatenate([np.linalg.pinv(turned, rcond=1e-6), np.zeros((ROWS, arm.joints, 1))], 2)
+    moved = batch.q + problem.dt * qdot(problem, batch, law.reshape(ROWS, -1).astype(np.float64))
+    after = problem.task.error(target, problem.task.coordinates(*arm.forward(moved)))
+    before = problem.task.error(target, batch.pose)
+    assert np.abs(after).max() < 0.02 * np.abs(before).max()
+
+
+@pytest.mark.parametrize("arm", ["varga7", "tiago"])
+@pytest.mark.parametrize("task", tasks.names())
+def test_gradients_of_features(arm, task):
+    problem = problem_of(arm, task)
+    batch, chain, offsets = batch_of(problem), problem.model.chain, np.array(OFFSETS)
+    size = Bilinear(OFFSETS).size(problem)
+    weights = np.random.default_rng(3).normal(size=(ROWS, size))
+
+    def seen(q):
+        out, speed = np.empty((ROWS, size)), np.empty(ROWS)
+        arrays = offsets, q, batch.nominal, batch.remaining, out, speed
+        feature_rows(problem.task.kind, chain.prismatic, chain.axes[0], problem.dt, *arrays)
+        return out
+
+    given = np.empty(batch.q.shape)
+    feature_gradient_rows(problem.task.kind, chain.prismatic, chain.axes[0], seen(batch.q), weights, given)
+    for j in range(batch.q.shape[1]):
+        step = np.zeros(batch.q.shape)
+        step[:, j] = 1e-6
+        wanted = (weights * (seen(batch.q + step) - seen(batch.q - step))).sum(1) / 2e-6
+        np.testing.assert_allclose(given[:, j], wanted, rtol=1e-6, atol=1e-7)
+
+
+def test_a_row_of_a_batch_is_the_single_call():
+    problem = problem_of()
+    batch, output = batch_of(problem), outputs(problem)
+    for row in range(ROWS):
+        alone = Batch(*[array[row : row + 1] for array in batch if array is not None])
+        assert identical(features(problem, alone), features(problem, batch)[row : row + 1])
+        assert identical(qdot(problem, alone, output[row : row + 1]), qdot(problem, batch, output)[row : row + 1])
+
+
+@pytest.fixture
+def agent(tmp_path):
+    """The file of an agent for whole poses of `varga7`."""
+    scenario, processing = scenarios.get("varga7-pose-random"), Bilinear(OFFSETS)
+    problem, rng = Problem.of(scenario), np.random.default_rng(5)
+    sizes = processing.size(problem), 16, processing.outputs(problem)
+    weights = tuple(0.1 * rng.normal(size=shape) for shape in ((16, sizes[0]), (sizes[2], 16)))
+    net = Network(weights, (np.zeros(16), np.zeros(sizes[2])), "silu", "linear")
+    save_agent(tmp_path / "a.safetensors", net, processing, scenario)
+    return tmp_path / "a.safetensors"
+
+
+def test_agents_play(agent):
+    """From their file, also where skew coordinates are shown, but no arm with other joints."""
+    read = load_agent(agent)
+    assert read.processing == Bilinear(OFFSETS)
+    scenario = scenarios.get("varga7-pose-random").replace(steps=20)
+    policy = baselines.make("agent", scenario, path=str(agent))
+    assert policy.preview == OFFSETS
+    (episode,) = rollouts(scenario, policy, [3])
+    simulator = Simulator(scenario, 1, OFFSETS)
+    simulator.reset(np.ones(1, dtype=bool), [seeding.np_random(3)[0]])
+    out, problem = simulator.observe(), Problem.of(scenario)
+    batch = Batch(*[getattr(out, name).copy() for name in Batch._fields])
+    output = read.network.forward(Bilinear(OFFSETS).features(problem, batch))
+    first = Bilinear(OFFSETS).action(problem, batch, output).astype(np.float32) * scenario.velocity_limit
+    np.testing.assert_allclose(episode.qdot[0], first[0], rtol=1e-12)
+    skew = scenarios.get("varga7-random").replace(steps=20)
+    (shown,) = rollouts(skew, baselines.make("agent", skew, path=str(agent)), [3])
+    np.testing.assert_allclose(shown.qdot, episode.qdot, rtol=1e-3, atol=1e-5)
+    with pytest.raises(InvalidInputError, match="was trained for 7 joints"):
+        baselines.make("agent", scenarios.get("zhang6-lspb"), path=str(agent))
+
+
+def test_json():
+    assert Bilinear.from_json(Bilinear(OFFSETS).to_json()) == Bilinear(OFFSETS)
+    with pytest.raises(UnknownNameError, match="no field of the processing 'offset'"):
+        Bilinear.from_json({"offset": [1, 2]})
+
+
+@pytest.mark.parametrize("offsets", [(1,), (2, 5), (1, 5, 5), (1, 2.5)])
+def test_bad_offsets(offsets):
+    with pytest.raises(InvalidInputError, match="offsets"):
+        Bilinear(offsets)
