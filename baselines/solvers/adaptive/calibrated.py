@@ -23,8 +23,8 @@ from ikgym.validation import FloatArray, number
 
 #: Second derivatives of a pose by joint zeros and tilts: those of an arm of some 1 m, in [1/m] and [1/rad].
 CURVATURE = 1.0
-#: Standard deviations of a normal number that are exceeded, to one side, once in 10,000 times.
-RARE = 3.719
+#: Standard deviations of a normal number that are exceeded, to one side, once in a million times.
+RARE = 4.753
 #: Measurements after a sudden change before the next one: where all are surprises, the noise is larger than said.
 PAUSE = 20
 
@@ -69,7 +69,7 @@ class Calibrated(Corrected):
         walk: How fast joint zeros change, as a payload changes them: standard deviation after a second, in [rad/√s] or
             [m/√s].
         jump: Standard deviation of a sudden change of joint zeros, in [rad] or [m], that is reckoned with where a pose
-            is farther from what was expected than noise brings it once in 10,000 times. 0 for none.
+            is farther from what was expected than noise brings it once in a million times. 0 for none.
         keep: Whether what is known of the arm survives the start of an episode, and is cleared with the state alone.
 
     Raises:
@@ -81,7 +81,7 @@ class Calibrated(Corrected):
     link: float = 3e-4
     axis: float = 5e-4
     pose_noise: float = 3e-4
-    pose_rotation_noise: float = 3e-4
+    pose_rotation_noise: float = 5e-4
     walk: float = 0.0
     jump: float = 1e-3
     keep: bool = False
@@ -233,6 +233,6 @@ def absorb(sensitivity, error, variances, change, covariance):
 
 @inlined
 def quantile(freedom):
-    """What chi-square exceeds once in 10,000 times (Wilson and Hilferty 1931)."""
+    """What chi-square exceeds once in a million times (Wilson and Hilferty 1931)."""
     share = 2.0 / (9.0 * freedom)
     return freedom * (1.0 - share + RARE * math.sqrt(share)) ** 3

@@ -72,7 +72,7 @@ class KalmanJacobian(Corrected):
     offset_walk: float = 0.0
     slope_walk: float = 3e-4
     pose_noise: float = 3e-4
-    pose_rotation_noise: float = 3e-4
+    pose_rotation_noise: float = 5e-4
 
     name: ClassVar[str] = "kalman_jacobian"
 
