@@ -32,7 +32,8 @@ def pair(scenario, mode, preview=2, num_envs=N):
 
 
 def short(name, steps=7):
-    return ikgym.scenarios.get(name).replace(steps=steps)
+    scenario = ikgym.scenarios.get(name)
+    return scenario.replace(steps=max(steps, int(np.max(scenario.plant.command_delay))))
 
 
 def noisy(name, steps=7):

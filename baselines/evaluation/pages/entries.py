@@ -151,8 +151,10 @@ def solver(spec: str, settings: Mapping[str, Any] = MappingProxyType({}), *, tim
     """
     name, parameters = parse_policy(spec)
     given, kind = {**parameters, **settings}, registry.get(name)
-    draws = issubclass(kind, RecedingHorizon) and (kind.starts > 1 or kind.restart_steps > 0)
-    share = FEWER if issubclass(kind, RecedingHorizon) and _costly(kind.for_scenario(get(MAIN), **given)) else 1.0
+    # Parameters that depend on the arm are known when a policy is made.
+    horizon = kind.for_scenario(get(MAIN), **given) if issubclass(kind, RecedingHorizon) else None
+    draws = horizon is not None and (horizon.starts > 1 or horizon.restart_steps > 0)
+    share = FEWER if horizon is not None and _costly(horizon) else 1.0
     if not draws:
         return Entry(spec, ((name, given),), settings=dict(settings), timed=timed, share=share)
     seeded = tuple((name, {**given, "seed": seed}) for seed in SEEDS)

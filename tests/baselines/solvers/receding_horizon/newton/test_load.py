@@ -39,7 +39,7 @@ def test_the_gradient_with_a_payload_on_the_way():
     at = place("panda", "pose", delta_x=1e-4)
     problem, workspace = at.problem._replace(load=from_knot(2)), at.workspace
     linearise(problem, at.path, at.multipliers, False, True, workspace)
-    central = differences(lambda x: merit(problem, x, at.multipliers, workspace).merit, at.path, 1e-8)
+    central = differences(lambda x: merit(problem, x, at.multipliers, workspace), at.path, 1e-8)
     got = workspace.model.gradient.ravel()
     np.testing.assert_allclose(got, central, atol=1e-4 * abs(central).max())
 
