@@ -41,8 +41,11 @@ GENERAL = (
     *("dls", "full_orientation", "null_space", "mfac", "rhc_gradient"),
     *(*HORIZONS[:2], *BLOCKED, *FULL_ORIENTATION, FORESIGHT),
 )
-#: Solvers that are damped least squares where an arm has no limits, as those of the pages.
-WITHIN_LIMITS = ("qp", "sns")
+#: Solvers made for arms with limits, and for arms that are not their model. The arms of these pages are neither.
+FOR_OTHER_ARMS = (
+    *("qp", "sns"),
+    *("adaptive_jacobian", "offset_free", "kalman_jacobian", "calibrated", "predicted", "iterative_learning"),
+)
 #: Training seeds below which a mean over them is no benchmark.
 ENOUGH = 5
 #: Episodes of each policy that are played with the clock.
@@ -122,7 +125,7 @@ def short(name: str) -> str:
 
 def compared(*besides: type) -> list[str]:
     """Specs of the registered policies that pages compare, but for references, examples, rivals and these classes."""
-    classes = {name: registry.get(name) for name in registry.names() if name not in WITHIN_LIMITS}
+    classes = {name: registry.get(name) for name in registry.names() if name not in FOR_OTHER_ARMS}
     special = {name for name, kind in classes.items() if kind.reference or kind.example or kind.rival}
     return [name for name, kind in classes.items() if name not in special and not issubclass(kind, besides)]
 
@@ -131,7 +134,7 @@ def solvers(tuned: Mapping[str, Mapping[str, Any]] = MappingProxyType({})) -> tu
     """All registered solvers as they are, some receding horizons, and what tuning made of them.
 
     References, which have privileged information, are left out, and so are examples for one scenario, solvers of other
-    projects, and agents, see :func:`shipped` and :func:`agents`; and so are :data:`WITHIN_LIMITS`.
+    projects, and agents, see :func:`shipped` and :func:`agents`; and so are :data:`FOR_OTHER_ARMS`.
 
     Args:
         tuned: The best settings of solvers, by their specs; one that they do not change is not listed twice.

@@ -30,7 +30,7 @@ def entries(horizons: Iterable[int] = HORIZONS) -> tuple[Entry, ...]:
     """All that are compared; references, which have privileged information, are nobody's choice and left out.
 
     So are examples for one scenario, solvers of other projects, and what is on the leaderboard: agents, and policies
-    that are shown other coordinates than the scenario's; and :data:`WITHIN_LIMITS`.
+    that are shown other coordinates than the scenario's; and :data:`FOR_OTHER_ARMS`.
 
     Args:
         horizons: Those of the families.
