@@ -5,7 +5,7 @@ import pytest
 import baselines
 from baselines import registry
 from baselines.agents.policy import LearnedPolicy
-from baselines.evaluation.pages.entries import SEEDS, solver
+from baselines.evaluation.pages.entries import FOR_OTHER_ARMS, SEEDS, solver
 from baselines.evaluation.pages.families import (
     BLOCKS,
     HORIZONS,
@@ -27,7 +27,7 @@ class TestEntries:
         elsewhere = {
             name for name in baselines.names() if issubclass(registry.get(name), (LearnedPolicy, FullOrientation))
         }
-        others = {"mfac_helix", "mfapc_helix", "mfapc_line", "qp", "sns"}
+        others = {"mfac_helix", "mfapc_helix", "mfapc_line", *FOR_OTHER_ARMS}
         rivals = {name for name in baselines.names() if registry.get(name).rival}  # have a page of their own
         ours = {name for name in baselines.names() if not registry.get(name).reference} - rivals
         assert there == ours - elsewhere - others
