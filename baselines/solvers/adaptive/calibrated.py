@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -17,14 +16,15 @@ from baselines.solvers.adaptive.kalman import gain_of
 from baselines.solvers.adaptive.measurements import Measurement
 from ikgym import task_kernels
 from ikgym.exceptions import InvalidInputError
-from ikgym.jit import inlined, kernel
+from ikgym.jit import kernel
 from ikgym.kinematics import forward
 from ikgym.validation import FloatArray, number
 
 #: Second derivatives of a pose by joint zeros and tilts: those of an arm of some 1 m, in [1/m] and [1/rad].
 CURVATURE = 1.0
-#: Standard deviations of a normal number that are exceeded, to one side, once in a million times.
-RARE = 4.753
+#: In squared standard deviations a measurement is expected to be e from what was expected. What it is farther than
+#: TOLERATED e adds up, and beyond ALARM the arm has changed: by noise alone about once in a million measurements.
+TOLERATED, ALARM = 2.0, 30.0
 #: Measurements after a sudden change before the next one: where all are surprises, the noise is larger than said.
 PAUSE = 20
 
@@ -38,6 +38,7 @@ class CalibrationMemory(NamedTuple):
         parameters: See :mod:`baselines.solvers.adaptive.chain_parameters`. Shape (B, p).
         covariance: Of their errors. Shape (B, p, p).
         quiet: How many measurements ago joint zeros were last taken to have changed suddenly. Shape (B,).
+        surprise: What measurements were farther than expected, added up. Shape (B,).
     """
 
     before: FloatArray
@@ -45,6 +46,7 @@ class CalibrationMemory(NamedTuple):
     parameters: FloatArray
     covariance: FloatArray
     quiet: npt.NDArray[np.int64]
+    surprise: FloatArray
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -68,8 +70,8 @@ class Calibrated(Corrected):
         pose_rotation_noise: The same of the orientation, in [rad] (or as a number, for parts of a rotation matrix).
         walk: How fast joint zeros change, as a payload changes them: standard deviation after a second, in [rad/√s] or
             [m/√s].
-        jump: Standard deviation of a sudden change of joint zeros, in [rad] or [m], that is reckoned with where a pose
-            is farther from what was expected than noise brings it once in a million times. 0 for none.
+        jump: Standard deviation of a sudden change of joint zeros, in [rad] or [m], that is reckoned with where poses
+            are farther from what was expected than noise brings them (the sum of Page 1954). 0 for none.
         keep: Whether what is known of the arm survives the start of an episode, and is cleared with the state alone.
 
     Raises:
@@ -105,7 +107,7 @@ class Calibrated(Corrected):
         deviations = np.repeat([self.zero, self.link, self.axis], [n, 3 * n + 3, 2 * n])
         covariance = np.repeat(np.diag(deviations**2)[None], rows, axis=0)
         parameters, quiet = np.zeros((rows, len(deviations))), np.full(rows, PAUSE)
-        return CalibrationMemory(*self.sensors(rows), parameters, covariance, quiet)
+        return CalibrationMemory(*self.sensors(rows), parameters, covariance, quiet, np.zeros(rows))
 
     def own_restarted(self, own: CalibrationMemory, rows: npt.NDArray[np.bool_]) -> CalibrationMemory:
         """See :meth:`Wrapper.own_restarted`; the arm is the same one as before, if it is kept."""
@@ -158,7 +160,9 @@ def calibrate_rows(rule, q, pose, then, new, known, deviation):
             arm = changed_chain(chain, parameters, offsets, axes, tool)
             known.quiet[row] += 1
             allowed = jump if known.quiet[row] > PAUSE else 0.0
-            if improve(arm, kind, variances, allowed, then[row], pose[row], parameters, covariance):
+            test = variances, allowed, known.surprise[row]
+            known.surprise[row], jumped = improve(arm, kind, test, then[row], pose[row], parameters, covariance)
+            if jumped:
                 known.quiet[row] = 0
         arm = changed_chain(chain, parameters, offsets, axes, tool)
         forward(arm, q[row] + parameters[:n], rotation, position)
@@ -167,22 +171,23 @@ def calibrate_rows(rule, q, pose, then, new, known, deviation):
 
 
 @kernel
-def improve(arm, kind, variances, jump, q, pose, parameters, covariance):
+def improve(arm, kind, rule, q, pose, parameters, covariance):
     """One step of the extended Kalman filter.
 
     Args:
         arm: The chain with the parameters.
         kind: Of task coordinates.
-        variances: Of the noises. Shape (e,).
-        jump: What is added to the variances of the joint zeros if the pose is a surprise; 0 for nothing.
+        rule: Variances of the noises, of shape (e,); what is added to the variances of the joint zeros if the arm seems
+            to have changed, 0 for nothing; and what the measurements before were farther than expected.
         q: Joint coordinates in [rad] or [m]. Shape (n,).
         pose: Measured task coordinates. Shape (m,).
         parameters: Changed in place. Shape (p,).
         covariance: Changed in place. Shape (p, p).
 
     Returns:
-        Whether the pose was a surprise, and the joint zeros are taken to have changed.
+        What this measurement and those before were farther than expected, and whether the arm is taken to have changed.
     """
+    variances, jump, before = rule
     n, e, p = q.shape[0], variances.shape[0], parameters.shape[0]
     rotation, position, predicted = np.empty((3, 3)), np.empty(3), np.empty(pose.shape[0])
     error, twist, sensitivity = np.empty(e), np.zeros((6, p)), np.empty((e, p))
@@ -192,9 +197,10 @@ def improve(arm, kind, variances, jump, q, pose, parameters, covariance):
     task_kernels.error(kind, pose, predicted, error)
     parameter_twists(arm, shifted, position, twist)
     task_kernels.jacobian(kind, rotation, twist, sensitivity)
-    surprise = absorb(sensitivity, error, variances, change, after)
-    jumped = jump > 0.0 and surprise > quantile(e)
+    surprise = max(before + absorb(sensitivity, error, variances, change, after) - TOLERATED * e, 0.0)
+    jumped = jump > 0.0 and surprise > ALARM
     if jumped:
+        surprise = 0.0
         after[:], change[:] = covariance, 0.0
         for i in range(n):
             after[i, i] += jump
@@ -202,7 +208,7 @@ def improve(arm, kind, variances, jump, q, pose, parameters, covariance):
     covariance[:] = after
     for i in range(p):
         parameters[i] += change[i]
-    return jumped
+    return surprise, jumped
 
 
 @kernel
@@ -229,10 +235,3 @@ def absorb(sensitivity, error, variances, change, covariance):
             change[i] += gain[i] * missing
         surprise += missing * missing / variance
     return surprise
-
-
-@inlined
-def quantile(freedom):
-    """What chi-square exceeds once in a million times (Wilson and Hilferty 1931)."""
-    share = 2.0 / (9.0 * freedom)
-    return freedom * (1.0 - share + RARE * math.sqrt(share)) ** 3
