@@ -6,7 +6,7 @@ from baselines import registry
 from baselines.agents.policy import LearnedPolicy
 from baselines.agents.shipped import ShippedAgent
 from baselines.evaluation.pages import entries, sets, tuning
-from baselines.evaluation.pages.entries import Training, agents, solvers
+from baselines.evaluation.pages.entries import FOR_OTHER_ARMS, Training, agents, solvers
 from baselines.files import ResultsError
 from baselines.spec import parse_policy
 from ikgym.exceptions import InvalidInputError
@@ -23,7 +23,7 @@ class TestEntries:
             for name in registry.names()
             if not (registry.get(name).reference or registry.get(name).rival)
             and not issubclass(registry.get(name), LearnedPolicy)
-        } - {"mfac_helix", "mfapc_helix", "mfapc_line", "qp", "sns"}
+        } - {"mfac_helix", "mfapc_helix", "mfapc_line", *FOR_OTHER_ARMS}
         assert {"rhc:horizon=3", "rhc:horizon=3,iterations=1", "rhc:horizon=200,iterations=1,move_blocks=27"} <= set(
             names
         )
