@@ -198,9 +198,10 @@ def _judged_by(summaries: Sequence[Summary]) -> str:
 
 
 def _spread(names: Mapping[int, str], summaries: Sequence[Summary]) -> list[Column]:
-    """The columns of the table of several episodes; none where there is one."""
+    """The columns of the table of several episodes; of one, those of matched pairs, or none."""
+    beside = _beside_ideal() if any(summary.paired for summary in summaries) else []
     if all(summary.episodes == 1 for summary in summaries):
-        return []
+        return [_policy(names), *beside] if beside else []
     by_cost_ratio = _judged_by(summaries) == "cost ratio"
 
     def column(title: str, cell: Callable[[Spread], str]) -> Column:
@@ -215,7 +216,7 @@ def _spread(names: Mapping[int, str], summaries: Sequence[Summary]) -> list[Colu
         column("worst", lambda spread: number(spread.worst)),
         column("worst seed", lambda spread: str(spread.worst_seed)),
         Column("lost", "", lambda s: str(s.lost)),
-        *(_beside_ideal() if any(summary.paired for summary in summaries) else ()),
+        *beside,
     ]
 
 

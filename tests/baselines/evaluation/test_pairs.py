@@ -94,8 +94,9 @@ def test_an_ideal_plant_that_is_played_anyway_is_not_added():
     assert [job.scenario.name for job in make_plan(given[:1], "dls").jobs] == ["panda-camera"]
 
 
-def test_tables_show_the_pairs():
-    rows = evaluate(SHORT["panda-bus"], "dls", episodes=3, pairs=True)
+@pytest.mark.parametrize("episodes", [1, 3])
+def test_tables_show_the_pairs(episodes):
+    rows = evaluate(SHORT["panda-bus"], "dls", episodes=episodes, pairs=True)
     text = report.table(rows)
     bus, plain = ([one.total_cost for one in rows if ("ideal" in one.scenario) == ideal] for ideal in (False, True))
     ratio = np.exp(np.mean(np.log(np.array(bus) / plain)))
