@@ -18,7 +18,7 @@ from ikgym.exceptions import InvalidInputError, ResetNeededError
 from ikgym.rendering import Renderer, renderer, scene, style
 from ikgym.rendering.renderer import HEIGHT, WIDTH
 
-STEPS = 8
+STEPS = 12  # the longest command delay of a scenario, at least
 
 
 @pytest.fixture(autouse=True)
