@@ -14,7 +14,7 @@ from baselines.solvers.receding_horizon.rhc import RecedingHorizon
 # Each block of the plan is so many steps longer than the one before, up to a length.
 GROWTH, LONGEST = 2.0, 100.0
 # What parameters are that are None: of arms without limits, and of those with.
-FREE = {"horizon": 3001, "iterations": 1, "starts": 20, "restart_steps": 20, "start_steps": 10}
+FREE = {"horizon": 3001, "iterations": 1, "starts": 23, "restart_steps": 20, "start_steps": 10}
 LIMITED = {"horizon": 1501, "iterations": 3, "starts": 1, "restart_steps": 0, "start_steps": 0}
 
 
@@ -26,9 +26,9 @@ class RecedingHorizonForesight(RecedingHorizon):
     out of local minima that a single plan would keep. The plan looks 3,000 steps ahead: what a redundant arm does with
     its null space now decides what motions seconds later cost. Its 56 blocks grow evenly, and reach that far without
     skipping an oscillation. Blocks that grow geometrically do skip some: of 57 knots in 1,500 steps, half lie in the
-    first tenth, and the last block has 127 steps. The first plan takes two periods of five Newton steps. Each of the 19
-    after them tries another guess with ten, which is longer than a control period of 1 ms; of 3,000 periods these are
-    0.7 %. A period behind one that ended beyond the velocity limits has four.
+    first tenth, and the last block has 127 steps. The first plan takes two periods, of three and seven Newton steps.
+    Each of the 22 after them tries another guess with ten, which is longer than a control period of 1 ms; of 3,000
+    periods these are 0.7 %. A period behind one that ended beyond the velocity limits has four.
 
     **Arms with limits** of position, velocity or acceleration. Plans are made by the interior point method, whose
     Newton steps take longer and go further: three for the plan alone are worth more than candidates. Limits turn up
@@ -38,7 +38,7 @@ class RecedingHorizonForesight(RecedingHorizon):
         horizon: As in ``rhc``. None for 3,001, and 1,501 for arms with limits.
         iterations: As in ``rhc``, where None is the optimum. Here it is 1, and 3 for arms with limits.
         move_blocks: As in ``rhc``, but None for blocks that are each 2 steps longer than the one before, up to 100.
-        starts: As in ``rhc``. None for 20, and 1 for arms with limits.
+        starts: As in ``rhc``. None for 23, and 1 for arms with limits.
         restart_steps: As in ``rhc``. None for 20, and 0 for arms with limits.
         start_steps: As in ``rhc``. None for 10, and 0 for arms with limits.
     """

@@ -127,7 +127,7 @@ def test_who_plans_by_the_interior_point_method():
         assert made == interior_point
 
 
-PRESET = {"varga7-fast": (1, 20, 20, 10), "tiago-turn": (3, 1, 0, 0), "panda-turn": (3, 1, 0, 0)}
+PRESET = {"varga7-fast": (1, 23, 20, 10), "tiago-turn": (3, 1, 0, 0), "panda-turn": (3, 1, 0, 0)}
 
 
 @pytest.mark.parametrize("scenario", PRESET)
