@@ -603,8 +603,8 @@ def test_agrees_with_ipopt_on_a_long_piece():
     agrees_with_ipopt(short(steps=300), from_rest=False)
 
 
-#: The first so many steps of ten episodes of the test set.
-PIECES = dict(zip(range(2_000_000, 2_000_010), (20, 40, 60, 80, 100, 140, 180, 220, 260, 300), strict=True))
+#: The first so many steps of episodes of the test set.
+PIECES = {2_000_002: 60, 2_000_004: 100, 2_000_006: 180, 2_000_009: 300}
 
 
 @pytest.mark.slow
