@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import contextlib
+import importlib
 import io
 import os
 import pathlib
 import re
+import shlex
 import shutil
 import sys
 from collections.abc import Callable, Sequence
-from typing import TypeVar
+from typing import Protocol, TypeVar
 
 import tyro
 
 from ikgym.exceptions import IkgymError
+from ikgym.validation import whole_number
 
 #: The console command in front of all others.
 CONSOLE = "ikgym"
@@ -39,7 +42,20 @@ EXTRAS = {
     "moviepy": "video",
 }
 
+
+class Plays(Protocol):
+    """The options of a command that plays episodes into a folder, and goes on there with ``--resume``."""
+
+    @property
+    def out(self) -> pathlib.Path | None: ...  # noqa: D102
+    @property
+    def episodes(self) -> int | None: ...  # noqa: D102
+    @property
+    def workers(self) -> int: ...  # noqa: D102
+
+
 T = TypeVar("T")
+P = TypeVar("P", bound=Plays)
 
 
 def program(name: str, otherwise: str) -> str:
@@ -106,6 +122,53 @@ def run(work: Callable[[], int], stopped: Callable[[], str] = lambda: "Stopped."
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     return code
+
+
+def run_resumable(
+    kind: type[P],
+    arguments: Sequence[str] | None,
+    prog: str,
+    manual: Callable[[str], str],
+    work: Callable[[P, str], None],
+) -> int:
+    """Reads the options of a command that plays into the folder of ``--out``, and does its work.
+
+    Args:
+        kind: Of the options.
+        arguments: What stands behind the command; taken from the process if left out.
+        prog: The name of the command.
+        manual: Gives the text of ``--help`` above the options for that name.
+        work: Is handed the options and the whole command line.
+
+    Returns:
+        The exit code, see :func:`run`.
+    """
+    given = sys.argv[1:] if arguments is None else list(arguments)
+    out = "the folder of --out"
+
+    def both() -> int:
+        nonlocal out
+        options = parse(kind, given, prog=prog, description=manual(prog))
+        out = str(options.out)
+        whole_number("workers", options.workers, at_least=1)
+        if options.episodes is not None:
+            whole_number("episodes", options.episodes, at_least=1)
+        work(options, shlex.join([*prog.split(), *given]))
+        return 0
+
+    return run(both, lambda: f"Stopped. What was finished is in {out}; continue with --resume.")
+
+
+def started(module: str) -> int:
+    """Imports the module of a command and does its work; Ctrl-C is one line from the first import on.
+
+    Args:
+        module: Its name; it has a function ``main``.
+
+    Returns:
+        The exit code, see :func:`run`.
+    """
+    return run(lambda: importlib.import_module(module).main())
 
 
 def complain(message: str) -> None:

@@ -6,11 +6,17 @@
 
 from __future__ import annotations
 
+import sys
+
+if __name__ == "__main__":  # ahead of all that takes seconds to import, so that Ctrl-C is heeded there, too
+    from baselines.command import started
+
+    sys.exit(started("baselines.reproduce"))
+
 import contextlib
 import dataclasses
 import json
 import pathlib
-import sys
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Annotated, Any
 
@@ -185,7 +191,3 @@ def _carry_out(arguments: Sequence[str]) -> int:
             print(f"{paper:8} {finding.verdict:13} {name}: {finding.evidence}")
     print(f"\nwritten to {options.out}")
     return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

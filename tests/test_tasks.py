@@ -15,7 +15,7 @@ TOLERANCE = 2e-8  # of central differences, relative to an arm's reach
 
 
 def configurations(arm):
-    """Random ones, home, stretched and folded ones, where the Jacobian loses rank."""
+    """Random ones, home, stretched and bent ones, where the Jacobian loses rank."""
     n = arm.joints
     rng = np.random.default_rng(n)
     return [*rng.uniform(-3, 3, (4, n)), np.zeros(n), np.full(n, np.pi / 2), np.eye(n)[n // 2] * np.pi]

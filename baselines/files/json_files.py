@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import collections.abc
+import contextlib
 import dataclasses
 import functools
 import json
@@ -10,10 +11,11 @@ import math
 import pathlib
 import types
 import typing
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any, TypeVar, Union
 
-from baselines.files import read_bytes
+from baselines.files import ResultsError, read_bytes
+from ikgym.exceptions import IkgymError
 
 #: Bytes of a file that are read at most; results of a hundred thousand episodes have fewer.
 MOST = 2**28
@@ -92,6 +94,27 @@ def made(kind: type[T], values: object) -> T:
     if unknown := [name for name in values if name not in hints]:
         raise JsonError(f"there is a key {unknown[0]!r} that no {kind.__name__.lower()} has")
     return kind(**{name: _typed(name, hints[name][0], value) for name, value in values.items()})
+
+
+@contextlib.contextmanager
+def reading(what: str, file: pathlib.Path, advice: str = "") -> Iterator[None]:
+    """Turns what goes wrong while a file is read into one message.
+
+    Args:
+        what: The file's content, in words.
+        file: The file.
+        advice: A sentence that ends the message.
+
+    Raises:
+        ResultsError: The file cannot be read, or what is in it is refused.
+    """
+    try:
+        yield
+    except ResultsError:
+        raise
+    except (OSError, ValueError, IkgymError) as e:
+        reason = str(e).removesuffix(".")
+        raise ResultsError(f"Cannot read {what} from {file}: {reason}. {advice}".rstrip()) from None
 
 
 def shown(value: object) -> str:

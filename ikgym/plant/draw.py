@@ -63,7 +63,7 @@ class Draws:
         self._delay = np.array(np.broadcast_to(plant.command_delay, 2), dtype=np.int64)
 
     def blank(self, rows: int) -> Arms:
-        """Room for so many arms."""
+        """Empty arrays for so many arms."""
         n = self._arm.joints
         return Arms(
             np.zeros((rows, 2, n, 3)), np.zeros((rows, 2, n, 3)), np.zeros((rows, 2, 3)), np.zeros((rows, 2, 3, 3))

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import importlib
+import runpy
 import subprocess
 import sys
 
@@ -71,6 +73,15 @@ def test_exit_codes(capsys):
     assert capsys.readouterr().err == "error: Nothing fits.\n"
     assert command.run(failing(KeyboardInterrupt()), lambda: "Stopped; all is kept.") == 130
     assert capsys.readouterr().err == "\nStopped; all is kept.\n"
+
+
+def test_ctrl_c_while_a_command_is_imported(capsys, monkeypatch):
+    monkeypatch.delitem(sys.modules, "baselines.reproduce", raising=False)
+    monkeypatch.setattr(importlib, "import_module", lambda name: failing(KeyboardInterrupt())())
+    with pytest.raises(SystemExit) as ended:
+        runpy.run_module("baselines.reproduce", run_name="__main__")
+    assert ended.value.code == 130
+    assert capsys.readouterr().err == "\nStopped.\n"
 
 
 def test_a_missing_extra_is_named(capsys):

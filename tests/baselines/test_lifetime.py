@@ -80,8 +80,9 @@ def test_workers_end_with_a_killed_parent(tmp_path, end):
 
 @needs_proc
 @pytest.mark.slow
-@pytest.mark.parametrize("end", [signal.SIGKILL, signal.SIGTERM])
-@pytest.mark.parametrize("command", [EVALUATE, TRAIN], ids=["evaluate", "train"])
+@pytest.mark.parametrize(
+    ("command", "end"), [(EVALUATE, signal.SIGTERM), (TRAIN, signal.SIGKILL)], ids=["evaluate", "train"]
+)
 def test_workers_of_commands_end_with_them(tmp_path, command, end):
     module, *options = command
     if options[-1] == "--out":
@@ -92,7 +93,7 @@ def test_workers_of_commands_end_with_them(tmp_path, command, end):
         try:
             assert wait_for(lambda: len(descendants(parent.pid)) == 2, 60.0)
             workers = descendants(parent.pid)
-            time.sleep(6.0)  # they have loaded what they need, and are at work
+            time.sleep(4.0)  # they have loaded what they need, and are at work
             assert all(map(alive, workers))
         finally:
             parent.send_signal(end)

@@ -127,7 +127,7 @@ def test_batch_equals_single_calls_and_memory_goes_by_rows(name, on):
             assert all(identical(a[0], b[i]) for a, b in zip(states[i], batched, strict=True))
 
 
-@by_rows
+@pytest.mark.parametrize(("name", "on"), [pair for pair in PAIRS if pair[1] in SHAPES])
 def test_rows_that_are_shared_out_to_threads_are_the_same(monkeypatch, name, on):
     policy = policy_for(name, on)
     if policy is None:

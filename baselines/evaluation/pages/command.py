@@ -5,8 +5,6 @@ from __future__ import annotations
 import dataclasses
 import datetime
 import pathlib
-import shlex
-import sys
 from collections.abc import Iterator, Sequence
 from typing import Annotated, Final, Literal
 
@@ -28,7 +26,6 @@ from baselines.files import write
 from baselines.files.locks import locked
 from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError
-from ikgym.validation import whole_number
 
 #: The names of the pages on the command line.
 Page = Literal["leaderboard", "cost-time", "foresight", "leaderboard-skew", "rivals", "choosing"]
@@ -263,25 +260,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         The exit code: 0, 2 where something expected went wrong, 130 after Ctrl-C.
     """
-    arguments = sys.argv[1:] if arguments is None else list(arguments)
-    prog, out = shared.program("leaderboard", PROGRAM), "the folder of --out"
+    return shared.run_resumable(Options, arguments, shared.program("leaderboard", PROGRAM), manual, _work)
 
-    def work() -> int:
-        nonlocal out
-        options = shared.parse(Options, arguments, prog=prog, description=manual(prog))
-        out = str(options.out)
-        whole_number("workers", options.workers, at_least=1)
-        if options.episodes is not None:
-            whole_number("episodes", options.episodes, at_least=1)
-        command = shlex.join([*prog.split(), *arguments])
-        if options.tune is not None:
-            print(search(options, command, options.tune))
-            print(f"written to {options.tune}")
-            return 0
-        folder = options.write or options.out or pathlib.Path()
-        for page, measurement in measured(options, command).items():
-            draw_up(measurement, page, folder)
-            print(f"written to {_file(folder, page)}")
-        return 0
 
-    return shared.run(work, lambda: f"Stopped. What was finished is in {out}; continue with --resume.")
+def _work(options: Options, command: str) -> None:
+    if options.tune is not None:
+        print(search(options, command, options.tune))
+        print(f"written to {options.tune}")
+        return
+    folder = options.write or options.out or pathlib.Path()
+    for page, measurement in measured(options, command).items():
+        draw_up(measurement, page, folder)
+        print(f"written to {_file(folder, page)}")

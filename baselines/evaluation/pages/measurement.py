@@ -18,7 +18,7 @@ from baselines.files import ResultsError, json_files, write
 from baselines.fingerprints import fingerprint
 from baselines.oracle import best_known
 from baselines.status import Status
-from ikgym.exceptions import IkgymError, InvalidInputError
+from ikgym.exceptions import InvalidInputError
 from ikgym.validation import FloatArray
 
 #: Of the files; those of another one are refused.
@@ -245,18 +245,13 @@ class Measurement:
         Raises:
             ResultsError: It cannot be read, is damaged, or has another format.
         """
-        try:
+        with json_files.reading("what was measured", file):
             content = json_files.read(file)
             if isinstance(content, dict) and (there := content.pop("format", 1)) != FORMAT:
                 raise ResultsError(f"{file}: expected format {FORMAT}, got {there!r:.60}. Measure again with --out.")
             out = json_files.made(cls, content)
             for section in out.sections:
                 _check_runs(section)
-        except (OSError, ValueError, IkgymError) as e:
-            if isinstance(e, ResultsError):
-                raise
-            reason = str(e).removesuffix(".")
-            raise ResultsError(f"Cannot read what was measured from {file}: {reason}.") from None
         return out
 
 

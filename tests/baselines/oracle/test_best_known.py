@@ -6,7 +6,6 @@ import sys
 
 import pytest
 
-import baselines
 import ikgym
 from baselines.evaluate import evaluate
 from baselines.evaluation import report, test_sets
@@ -202,10 +201,21 @@ def test_no_quick_policy_beats_a_record_on_a_short_scenario():
     nobody_beats([s for s in recorded() if s.name == "zhang6-lspb"], QUICK)
 
 
+#: What plans ahead: of the other policies none has come nearer to a record than 0.08 %.
+PLANNERS = ["rhc", "rhc_foresight"]
+#: Records that as many polished paths have led to, from different starts, are not expected to be beaten.
+AGREED = 3
+
+
+def doubtful():
+    """Names of the scenarios whose record few paths have led to."""
+    return [s.name for s in recorded() if best_known.lookup(s, 0).spread["polished_within_1e-6"] < AGREED]
+
+
 @pytest.mark.slow
-def test_no_policy_beats_a_record():
-    # but for the oracle, which is what the records come from
-    nobody_beats(recorded(), [name for name in baselines.names() if name != "oracle"])
+@pytest.mark.parametrize("name", [*doubtful(), "varga7-fast", "panda-line", "iiwa14-fast"])
+def test_no_planner_beats_a_record(name):
+    nobody_beats([ikgym.scenarios.get(name)], PLANNERS)
 
 
 def test_a_record_that_is_too_high_does_not_go_unnoticed(file):

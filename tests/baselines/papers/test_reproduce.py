@@ -13,6 +13,7 @@ import pytest
 from baselines.papers import PAPERS
 from baselines.papers.ledger import ledger
 from baselines.papers.paper import Finding
+from baselines.papers.runs import Runs
 from baselines.reproduce import main, reproduce
 
 #: The figures that can be drawn again, by their numbers in the papers.
@@ -216,20 +217,33 @@ def differs(now, then):
     return None
 
 
+#: Claims of Khan and Tar whose episodes have as many steps as those of all other claims together, two millions. They
+#: are tested where the ledger is written; a change of the method itself shows in the rows that share its episodes.
+LONG = {
+    *("compensates position", "compensates orientation"),
+    *("compensates manufacturing", "needs precise measurement"),
+}
+
+
+def test_the_long_claims_are_there():
+    assert {claim.name for claim in PAPERS["khan"].claims} >= LONG
+
+
 @pytest.mark.slow
-def test_the_ledger_is_up_to_date():
-    """Everything in full, which takes a minute or two; times may differ, verdicts may not."""
-    written = read(in_the_tree())
-    wrong = []
-    for paper, found in reproduce().items():
-        for claim, finding in found.items():
-            then = written[paper][claim]
-            if finding.verdict != then.verdict:
-                wrong.append(f"{paper}, {claim}: {finding.verdict} instead of {then.verdict}: {finding.evidence}")
-            elif not (is_time(finding.evidence) or is_time(then.evidence)) and (
-                why := differs(finding.evidence, then.evidence)
-            ):
-                wrong.append(f"{paper}, {claim}: {why}: {finding.evidence}")
+@papers
+def test_the_ledger_is_up_to_date(name):
+    """Whole episodes; times may differ, verdicts may not."""
+    written, runs, wrong = read(in_the_tree())[name], Runs(), []
+    for claim in PAPERS[name].claims:
+        if claim.name in LONG:
+            continue
+        finding, then = claim.test(runs), written[claim.name]
+        if finding.verdict != then.verdict:
+            wrong.append(f"{claim.name}: {finding.verdict} instead of {then.verdict}: {finding.evidence}")
+        elif not (is_time(finding.evidence) or is_time(then.evidence)) and (
+            why := differs(finding.evidence, then.evidence)
+        ):
+            wrong.append(f"{claim.name}: {why}: {finding.evidence}")
     assert not wrong, f"docs/papers.md is out of date: {REMEDY}\n" + "\n".join(wrong)
 
 

@@ -185,7 +185,7 @@ def test_scenarios_that_cannot_be_differentiated_are_refused():
 
 
 def test_imitation_learns():
-    """A residual agent comes to do what another setting of the policy under it does."""
+    """A residual agent comes to do what another setting of its base policy does."""
     config = Imitate(
         scenario="varga7-random",
         steps=60,

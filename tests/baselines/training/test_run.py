@@ -348,6 +348,6 @@ def test_killed_at_random_moments(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("method", [*METHODS, "imitate", "apg"])
+@pytest.mark.parametrize("method", ["ppo", "sac", "imitate", "apg"])
 def test_killed_at_many_random_moments(method, tmp_path):
-    check_kills(method, 20, tmp_path, np.random.default_rng())
+    check_kills(method, 3, tmp_path, np.random.default_rng())

@@ -14,11 +14,10 @@ from baselines import registry
 from baselines.canonical import one_line, with_list
 from baselines.evaluation.pages.elsewhere.followed import Followed, followed
 from baselines.evaluation.rollout import rollout
-from baselines.files import ResultsError, json_files, write
+from baselines.files import json_files, write
 from baselines.fingerprints import fingerprint
 from baselines.status import Status
 from ikgym import problems, scenarios
-from ikgym.exceptions import IkgymError
 from ikgym.scenarios.elsewhere import RANDOM, waypoint_steps
 
 #: Who plays, and which of them take so long that they may be given fewer random paths.
@@ -84,11 +83,8 @@ class Measured:
         Raises:
             ResultsError: It cannot be read, or is damaged.
         """
-        try:
+        with json_files.reading("what was measured", file):
             return json_files.made(cls, json_files.read(file))
-        except (OSError, ValueError, IkgymError) as e:
-            reason = str(e).removesuffix(".")
-            raise ResultsError(f"Cannot read what was measured from {file}: {reason}.") from None
 
 
 def everybody(paths: int = problems.RANDOM) -> Iterator[tuple[str, str]]:

@@ -5,8 +5,6 @@ from __future__ import annotations
 import dataclasses
 import datetime
 import pathlib
-import shlex
-import sys
 from collections.abc import Sequence
 from typing import Annotated, Any
 
@@ -24,7 +22,7 @@ from baselines.files.locks import locked
 from baselines.spec import parse_policy
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import imperfect
-from ikgym.validation import number, whole_number
+from ikgym.validation import number
 
 #: What the command is called where Python has run its module.
 PROGRAM = "python -m baselines.robustness"
@@ -112,23 +110,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         The exit code: 0, 2 where something expected went wrong, 130 after Ctrl-C.
     """
-    arguments = sys.argv[1:] if arguments is None else list(arguments)
-    prog, out = shared.program("robustness", PROGRAM), "the folder of --out"
+    return shared.run_resumable(Options, arguments, shared.program("robustness", PROGRAM), manual, _work)
 
-    def work() -> int:
-        nonlocal out
-        options = shared.parse(Options, arguments, prog=prog, description=manual(prog))
-        out = str(options.out)
-        whole_number("workers", options.workers, at_least=1)
-        whole_number("episodes", options.episodes, at_least=1)
-        found = measured(options, shlex.join([*prog.split(), *arguments]))
-        folder = options.write or options.out or pathlib.Path()
-        with locked(folder):
-            found.save(folder / "robustness.json")
-            for where, figure in drawn(found):
-                write(folder / where, small_png(figure))
-            write(folder / "robustness.md", page(found).encode())
-        print(f"written to {folder / 'robustness.md'}")
-        return 0
 
-    return shared.run(work, lambda: f"Stopped. What was finished is in {out}; continue with --resume.")
+def _work(options: Options, command: str) -> None:
+    found = measured(options, command)
+    folder = options.write or options.out or pathlib.Path()
+    with locked(folder):
+        found.save(folder / "robustness.json")
+        for where, figure in drawn(found):
+            write(folder / where, small_png(figure))
+        write(folder / "robustness.md", page(found).encode())
+    print(f"written to {folder / 'robustness.md'}")

@@ -10,8 +10,7 @@ from typing import Any, Self
 from baselines.canonical import DIGITS, one_line, rounded, with_list
 from baselines.evaluation.metrics import Row
 from baselines.evaluation.summary import Summary, by_seed, geometric_interval, geometric_mean
-from baselines.files import ResultsError, json_files, write
-from ikgym.exceptions import IkgymError
+from baselines.files import json_files, write
 
 
 @dataclasses.dataclass(frozen=True)
@@ -143,11 +142,8 @@ class Measured:
         Raises:
             ResultsError: It cannot be read, or is damaged.
         """
-        try:
+        with json_files.reading("what was measured", file):
             return json_files.made(cls, json_files.read(file))
-        except (OSError, ValueError, IkgymError) as e:
-            reason = str(e).removesuffix(".")
-            raise ResultsError(f"Cannot read what was measured from {file}: {reason}.") from None
 
 
 def _ends(interval: tuple[float, float]) -> tuple[float, float]:

@@ -18,7 +18,7 @@ from baselines.files import ResultsError, json_files, write
 from baselines.fingerprints import fingerprint
 from baselines.spec import parse_policy, refuse_trust
 from ikgym import scenarios
-from ikgym.exceptions import IkgymError, InvalidInputError
+from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
 
 #: Where the settings are that the leaderboards read, by the scenario that they were searched on.
@@ -113,14 +113,10 @@ class Tuning:
         Raises:
             ResultsError: It cannot be read, or is damaged, or belongs to a scenario or cost that has changed since.
         """
-        try:
+        with json_files.reading("settings", file, f"Search them anew with: {update(file.stem)}"):
             out = json_files.made(cls, json_files.read(file))
             for one in out.solvers:
                 refuse_trust(one.variant, str(file))
-        except (OSError, ValueError, IkgymError) as e:
-            reason = str(e).removesuffix(".")
-            again = update(file.stem)
-            raise ResultsError(f"Cannot read settings from {file}: {reason}. Search them anew with: {again}") from None
         if out.stale:
             again = update(out.scenario)
             raise ResultsError(f"{file}: {out.scenario} has changed since it was tuned on. Tune again with: {again}")

@@ -82,14 +82,14 @@ def test_few_periods_are_longer_than_others():
 
 @pytest.mark.slow
 def test_initial_guesses_one_after_the_other_lose_little():
-    """At most 0.5 % in the geometric mean against 64 of them in the first call (0.23 % on 256 episodes)."""
-    scenario, seeds = ikgym.scenarios.get(SCENARIO), ikgym.scenarios.seeds("validation", 128)
+    """At most 1 % in the geometric mean against 64 of them in the first call (0.23 % on 256 episodes)."""
+    scenario, seeds = ikgym.scenarios.get(SCENARIO), ikgym.scenarios.seeds("validation", 64)
     costs = []
     for parameters in ({}, {"start_steps": 0, "starts": 64}):
         episodes = rollouts(scenario, baselines.make("rhc_foresight", scenario, **parameters), seeds)
         costs.append([float((e.tracking_cost + e.velocity_cost).sum()) for e in episodes])
     one_by_one, at_once = np.log(costs)
-    assert np.exp(np.mean(one_by_one - at_once)) <= 1.005
+    assert np.exp(np.mean(one_by_one - at_once)) <= 1.01
 
 
 def test_initial_guesses_one_after_the_other_find_another_plan():
