@@ -24,12 +24,14 @@ class OffsetMemory(NamedTuple):
     Attributes:
         before: See :class:`Measurement`. Shape (B, h, n).
         age: See :class:`Measurement`. Shape (B, 1).
+        shown: The deviation that the base policy was shown last. Shape (B, 6).
         deviation: See :mod:`baselines.solvers.adaptive.deviation`. Shape (B, 6).
         measured: How many poses have been measured. Shape (B,).
     """
 
     before: FloatArray
     age: FloatArray
+    shown: FloatArray
     deviation: FloatArray
     measured: npt.NDArray[np.int64]
 
@@ -51,6 +53,7 @@ class OffsetFree(Corrected):
         policy: The name of the base policy.
         options: Its parameters; those left out have its defaults.
         history: See :class:`Corrected`.
+        blend: See :class:`Corrected`.
         gain: g, the share of the difference that a measurement takes over, from above 0 to 1.
 
     Raises:
