@@ -35,7 +35,7 @@ class CalibrationMemory(NamedTuple):
     Attributes:
         before: See :class:`Measurement`. Shape (B, h, n).
         age: See :class:`Measurement`. Shape (B, 1).
-        shown: The deviation that the base policy was shown last. Shape (B, 6).
+        rest: What is not blended in yet of how estimates have changed. Shape (B, 6).
         parameters: See :mod:`baselines.solvers.adaptive.chain_parameters`. Shape (B, p).
         covariance: Of their errors. Shape (B, p, p).
         quiet: How many measurements ago joint zeros were last taken to have changed suddenly. Shape (B,).
@@ -44,7 +44,7 @@ class CalibrationMemory(NamedTuple):
 
     before: FloatArray
     age: FloatArray
-    shown: FloatArray
+    rest: FloatArray
     parameters: FloatArray
     covariance: FloatArray
     quiet: npt.NDArray[np.int64]
@@ -120,10 +120,12 @@ class Calibrated(Corrected):
     def own_restarted(self, own: CalibrationMemory, rows: npt.NDArray[np.bool_]) -> CalibrationMemory:
         """See :meth:`Wrapper.own_restarted`; the arm is the same one as before, if it is kept."""
         fresh = CalibrationMemory(*super().own_restarted(own, rows))
-        kept = own._replace(before=fresh.before, age=fresh.age, shown=fresh.shown)
+        kept = own._replace(before=fresh.before, age=fresh.age, rest=fresh.rest)
         return kept if self.keep else fresh
 
-    def learn(self, batch: Batch, measured: Measurement, own: CalibrationMemory, out: FloatArray) -> CalibrationMemory:
+    def learn(
+        self, batch: Batch, measured: Measurement, own: CalibrationMemory, out: FloatArray, old: FloatArray
+    ) -> CalibrationMemory:
         """See :meth:`Corrected.learn`."""
         kept = own._replace(**{name: getattr(own, name).copy() for name in own._fields[3:]})
         known, variances = (self.problem.model.chain, self.problem.task.kind), self._variances()
@@ -131,8 +133,8 @@ class Calibrated(Corrected):
         if self.start is not None and measured.first.any():
             exact, none = np.full_like(variances, self.start**2), (0.0, 0.0)
             first = np.ascontiguousarray(batch.nominal[:, 0])
-            calibrate_rows((*known, exact, *none), batch.q, first, batch.q, measured.first, kept, out)
-        calibrate_rows((*known, variances, *changes), batch.q, batch.pose, measured.q, measured.new, kept, out)
+            calibrate_rows((*known, exact, *none), batch.q, first, batch.q, measured.first, kept, out, old)
+        calibrate_rows((*known, variances, *changes), batch.q, batch.pose, measured.q, measured.new, kept, out, old)
         return kept
 
     def _variances(self) -> FloatArray:
@@ -145,7 +147,7 @@ class Calibrated(Corrected):
 
 
 @kernel
-def calibrate_rows(rule, q, pose, then, new, known, deviation):
+def calibrate_rows(rule, q, pose, then, new, known, deviation, old):
     """Takes the measurements in, and tells the deviations, row by row.
 
     Args:
@@ -157,6 +159,7 @@ def calibrate_rows(rule, q, pose, then, new, known, deviation):
         new: Whether they are new. Shape (B,).
         known: A :class:`CalibrationMemory`, changed in place.
         deviation: Receives the deviations. Shape (B, 6).
+        old: Receives what they would be without the measurements. Shape (B, 6).
     """
     chain, kind, variances, walk, jump = rule
     n = q.shape[1]
@@ -166,18 +169,21 @@ def calibrate_rows(rule, q, pose, then, new, known, deviation):
         parameters, covariance = known.parameters[row], known.covariance[row]
         for i in range(n):
             covariance[i, i] += walk
+        forward(chain, q[row], model_rotation, model_position)
+        arm = changed_chain(chain, parameters, offsets, axes, tool)
+        forward(arm, q[row] + parameters[:n], rotation, position)
+        deviation_between(kind, rotation, position, model_rotation, model_position, old[row])
+        deviation[row] = old[row]
         if new[row]:
-            arm = changed_chain(chain, parameters, offsets, axes, tool)
             known.quiet[row] += 1
             allowed = jump if known.quiet[row] > PAUSE else 0.0
             test = variances, allowed, known.surprise[row]
             known.surprise[row], jumped = improve(arm, kind, test, then[row], pose[row], parameters, covariance)
             if jumped:
                 known.quiet[row] = 0
-        arm = changed_chain(chain, parameters, offsets, axes, tool)
-        forward(arm, q[row] + parameters[:n], rotation, position)
-        forward(chain, q[row], model_rotation, model_position)
-        deviation_between(kind, rotation, position, model_rotation, model_position, deviation[row])
+            arm = changed_chain(chain, parameters, offsets, axes, tool)
+            forward(arm, q[row] + parameters[:n], rotation, position)
+            deviation_between(kind, rotation, position, model_rotation, model_position, deviation[row])
 
 
 @kernel

@@ -57,34 +57,37 @@ class Corrected(NamedWrapper, abc.ABC):
         object.__setattr__(self, "blend", number("blend", self.blend, at_least=0.0))
 
     @abc.abstractmethod
-    def learn(self, batch: Batch, measured: Measurement, own: Any, out: FloatArray) -> Any:
+    def learn(self, batch: Batch, measured: Measurement, own: Any, out: FloatArray, old: FloatArray) -> Any:
         """Takes a measurement in.
 
         Args:
             batch: Observations.
             measured: Which rows have a new pose, and the joint coordinates where it was measured.
-            own: The wrapper's own memory, a NamedTuple whose fields `before`, `age` and `shown` are left to the base;
+            own: The wrapper's own memory, a NamedTuple whose fields `before`, `age` and `rest` are left to the base;
                 must not be changed in place.
             out: Receives the deviations at the present joint coordinates. Shape (B, 6).
+            old: Receives what they would be without the measurement. Shape (B, 6).
 
         Returns:
             What is to be remembered.
         """
 
     def sensors(self, rows: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """The fields `before`, `age` and `shown` of the memory at the start, see :func:`nothing_measured`."""
+        """The fields `before`, `age` and `rest` of the memory at the start, see :func:`nothing_measured`."""
         return *nothing_measured(rows, self.history, self.problem.model.joints), np.zeros((rows, SIZE))
 
     def solve(self, batch: Batch, memory: Memory) -> Solution:
         """See :meth:`SolverPolicy.solve`."""
         own, inside = self.split(memory)
-        rows, task, deviation = len(batch.q), self.problem.task, np.empty((len(batch.q), SIZE))
+        rows, task = len(batch.q), self.problem.task
+        deviation, old = np.empty((rows, SIZE)), np.empty((rows, SIZE))
         measured = recall(batch, self.problem.dt, own.before, own.age)
-        shown = own.shown
-        own = self.learn(batch, measured, own._replace(before=measured.before, age=measured.age), deviation)
-        share = -math.expm1(-self.problem.dt / self.blend) if self.blend > 0.0 else 1.0
-        shown = shown + np.where(measured.first, 1.0, share)[:, None] * (deviation - shown)
-        own = own._replace(shown=shown)
+        rest = own.rest
+        own = self.learn(batch, measured, own._replace(before=measured.before, age=measured.age), deviation, old)
+        # The motion of the arm is followed at once, what a measurement has changed little by little.
+        stays = math.exp(-self.problem.dt / self.blend) if self.blend > 0.0 else 0.0
+        rest = np.where(measured.first[:, None], 0.0, stays * (rest + old - deviation))
+        own, shown = own._replace(rest=rest), deviation + rest
         nominal = np.ascontiguousarray(batch.nominal[:, : furthest(self.inner.preview)])
         pose, shifted = np.empty((rows, task.size)), np.empty(nominal.shape)
         show_rows(self.problem.model.chain, task.kind, batch.q, shown, nominal, pose, shifted)

@@ -24,14 +24,14 @@ class OffsetMemory(NamedTuple):
     Attributes:
         before: See :class:`Measurement`. Shape (B, h, n).
         age: See :class:`Measurement`. Shape (B, 1).
-        shown: The deviation that the base policy was shown last. Shape (B, 6).
+        rest: What is not blended in yet of how estimates have changed. Shape (B, 6).
         deviation: See :mod:`baselines.solvers.adaptive.deviation`. Shape (B, 6).
         measured: How many poses have been measured. Shape (B,).
     """
 
     before: FloatArray
     age: FloatArray
-    shown: FloatArray
+    rest: FloatArray
     deviation: FloatArray
     measured: npt.NDArray[np.int64]
 
@@ -74,9 +74,12 @@ class OffsetFree(Corrected):
         """See :meth:`Wrapper.own_memory`."""
         return OffsetMemory(*self.sensors(rows), np.zeros((rows, SIZE)), np.zeros(rows, np.int64))
 
-    def learn(self, batch: Batch, measured: Measurement, own: OffsetMemory, out: FloatArray) -> OffsetMemory:
+    def learn(
+        self, batch: Batch, measured: Measurement, own: OffsetMemory, out: FloatArray, old: FloatArray
+    ) -> OffsetMemory:
         """See :meth:`Corrected.learn`."""
-        out[:], count = own.deviation, own.measured + measured.new
+        old[:] = out[:] = own.deviation
+        count = own.measured + measured.new
         chain, kind = self.problem.model.chain, self.problem.task.kind
         filter_rows(chain, kind, self.gain, batch.pose, measured.q, measured.new, count, out)
         return own._replace(deviation=out.copy(), measured=count)
