@@ -6,7 +6,7 @@ import functools
 import math
 from collections.abc import Hashable, Iterable
 from contextlib import nullcontext
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -17,7 +17,7 @@ from ikgym.compilation import announced
 from ikgym.exceptions import InvalidInputError
 from ikgym.inverse_kinematics import Ranges, Settings, inverse_rows
 from ikgym.kinematics import Chain
-from ikgym.validation import FloatArray, float_array, number, read_only, rotation_matrices, whole_number
+from ikgym.validation import FloatArray, float_array, number, rotation_matrices, whole_number
 
 BoolArray = npt.NDArray[np.bool_]
 
@@ -105,11 +105,17 @@ def alike(arm: Solvable, chains: Iterable[Chain], q: FloatArray, *, oriented: bo
     for row, chain in enumerate(chains):
         one = slice(row, row + 1)
         inverse_rows(
-            # Read-only as those of arms, since kernels would compile anew for others.
-            *(read_only(part.view()) for part in chain), *ranges, *NEARBY._replace(length=length),
+            *map(_locked, chain), *ranges, *NEARBY._replace(length=length),
             rotations[one], positions[one], np.array(q[one]), out[one], converged[one],
         )  # fmt: skip
     return np.clip(np.round(out, DECIMALS), arm.lower, arm.upper)
+
+
+def _locked(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """A view that is read-only, as arrays of arms are: kernels would compile anew for another one."""
+    view = array.view()
+    view.flags.writeable = False
+    return view
 
 
 @functools.lru_cache(maxsize=64)
