@@ -134,6 +134,8 @@ class Simulator:
             state.q[rows] = scenario.first_q_of(episodes) if starts is None else starts[rows]
         if self._plant is not None:
             self._plant.begin(rows, generators, arm_seeds, noise_seeds)
+            if starts is None and scenario.jogs and len(rows):
+                state.q[rows] = scenario.jogged(state.q[rows], self._plant.chains(rows))
         self._own_start[active] = starts is None
         state.qdot[active] = 0.0
         state.step[active] = 0

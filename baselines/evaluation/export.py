@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from baselines.episode import Draw
 from baselines.evaluation.rollout import Episode
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray, known_names
@@ -36,20 +37,20 @@ class Motion:
     qdot: FloatArray
 
     @classmethod
-    def of(cls, scenario: Scenario, seed: int, episode: Episode) -> Motion:
+    def of(cls, scenario: Scenario, draw: int | Draw, episode: Episode) -> Motion:
         """The motion of an episode that was played.
 
         Args:
             scenario: What was tracked.
-            seed: The reset seed.
+            draw: The reset seed, or what was drawn how.
             episode: What happened.
         """
-        arm = scenario.arm
+        arm, draw = scenario.arm, Draw.of(draw)
         return cls(
             tuple(arm.joint_names),
             tuple("m" if prismatic else "rad" for prismatic in arm.prismatic),
             scenario.times(scenario.steps + 1),
-            np.vstack([scenario.start_of(seed), episode.q]),
+            np.vstack([scenario.start_of(draw.seed, draw.arm_seed), episode.q]),
             np.vstack([np.zeros(arm.joints), episode.qdot]),
         )
 

@@ -35,7 +35,8 @@ def stripped(scenario: Scenario, seed: int, arm_seed: int | None = None) -> Scen
         return scenario
     drawn = scenario.drawn_plant(seed, arm_seed)
     kept = Plant(payload=plant.payload, payload_step=plant.payload_step) if np.any(plant.payload) else Plant()
-    return scenario.replace(arm=drawn.arm, model=scenario.model, plant=kept)
+    start = scenario.start_of(seed, arm_seed) if scenario.jogs else scenario.start
+    return scenario.replace(arm=drawn.arm, model=scenario.model, plant=kept, start=start)
 
 
 def ideal(scenario: Scenario) -> Scenario:

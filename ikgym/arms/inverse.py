@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Hashable
+from collections.abc import Hashable, Iterable
 from contextlib import nullcontext
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -25,6 +25,8 @@ BoolArray = npt.NDArray[np.bool_]
 LENGTH_OF_RADIAN = 0.25
 # Poses that are worth a thread.
 GRAIN = 64
+# How another arm's posture is looked for, next to one that is known, and the decimals of it that count.
+NEARBY, DECIMALS = Settings(1e-12, 1.0, 0, np.uint64(0)), 10
 
 
 class Solvable(Limited, Hashable, Protocol):
@@ -40,6 +42,9 @@ class Solvable(Limited, Hashable, Protocol):
 
     def reach(self, travel: npt.ArrayLike) -> float:
         """A radius around the base that the tool point never leaves, in [m]."""
+
+    def forward(self, q: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """The pose of the tool. Shapes (..., 3, 3) and (..., 3)."""
 
 
 def inverse(
@@ -77,6 +82,40 @@ def inverse(
     with nullcontext() if getattr(inverse_rows, "overloads", True) else announced("the inverse kinematics"):
         parallel.in_chunks(work, len(q), GRAIN)
     return q.reshape(*lead, arm.joints), converged.reshape(lead)[()]
+
+
+def alike(arm: Solvable, chains: Iterable[Chain], q: FloatArray, *, oriented: bool) -> FloatArray:
+    """Joint coordinates at which other arms have the poses that an arm has, the nearest within its limits to its own.
+
+    Args:
+        arm: Whose poses they are.
+        chains: The k other arms, nearly the same.
+        q: Where the arm has its poses, within its limits, in [rad] or [m]. Shape (k, n).
+        oriented: Whether orientations matter.
+
+    Returns:
+        Joint coordinates, as near to the poses as the other arms get, without the last bits in which processors
+        differ. Shape (k, n).
+    """
+    ranges, length, _ = _search(arm)
+    rotations, positions = arm.forward(q)
+    if not oriented:
+        rotations = np.empty((len(q), 0, 0))
+    out, converged = np.empty(q.shape), np.empty(len(q), dtype=np.bool_)
+    for row, chain in enumerate(chains):
+        one = slice(row, row + 1)
+        inverse_rows(
+            *map(_locked, chain), *ranges, *NEARBY._replace(length=length),
+            rotations[one], positions[one], np.array(q[one]), out[one], converged[one],
+        )  # fmt: skip
+    return np.clip(np.round(out, DECIMALS), arm.lower, arm.upper)
+
+
+def _locked(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """A view that is read-only, as arrays of arms are: kernels would compile anew for another one."""
+    view = array.view()
+    view.flags.writeable = False
+    return view
 
 
 @functools.lru_cache(maxsize=64)

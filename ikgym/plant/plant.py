@@ -35,7 +35,8 @@ class Plant(Frozen):
     show, and nothing else.
 
     *Kinematics.* Drawn anew each episode, or kept by the reset option `arm_seed`. The arm keeps the limits of
-    `scenario.arm`, and solvers go on to know `scenario.model`.
+    `scenario.arm`, and solvers go on to know `scenario.model`. Where the scenario gives no start, the arm is jogged to
+    it: episodes begin where the arm that moves has the pose that the one in the data sheet would begin with.
 
     *Drives.* In a step, in this order: delay of the command, velocity limit, acceleration limit, lag, bias and noise,
     backlash, stop. The backlash lies between drive and joint: the drive turns within it before the joint follows. It
@@ -199,6 +200,11 @@ class Plant(Frozen):
         return self._on("q_delay", "pose_delay", "pose_missing") or self.pose_every > 1
 
     @property
+    def other_arm(self) -> bool:
+        """Whether the arm that moves is not that of the data sheet, a payload aside."""
+        return self._on("zero", "link", "axis") or bool(self.arms)
+
+    @property
     def draws_arm(self) -> bool:
         """Whether episodes draw the arm or its drives, which `arm_seed` can keep."""
         ranges = (one for one in (self.bandwidth, self.command_delay) if isinstance(one, tuple))
@@ -235,7 +241,7 @@ class Plant(Frozen):
 
     @property
     def _perturbs_arm(self) -> bool:
-        return self._on("zero", "link", "axis", "payload") or bool(self.arms)
+        return self.other_arm or self._on("payload")
 
     @property
     def _driven_late(self) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
+from ikgym.kinematics import Chain
 from ikgym.plant.arm_kernels import ARM_STREAMS
 from ikgym.plant.checks import PerJoint
 from ikgym.plant.draw import Draws, arm_key, episode_key
@@ -135,6 +136,12 @@ class PlantRows:
             self.state.keys[rows, number] = [stream(np.uint64(key), ARM_STREAMS + number) for key in keys]
         for changed in (self.state.drive, self.state.play):
             changed[rows] = 0.0
+
+    def chains(self, rows: npt.NDArray[np.int64]) -> Iterator[Chain]:
+        """The arms of some rows without their payload, one after the other."""
+        for row in rows.tolist():
+            offsets, axes, tool, tool_rotation = (part[row, 0] for part in self.arms)
+            yield Chain(offsets, axes, self.drives.prismatic, tool, tool_rotation)
 
 
 def noise_key(key: int, noise_seed: int) -> int:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, Self
 
 import numpy as np
@@ -17,6 +17,7 @@ from ikgym.arms.limits import farthest, velocity_scale
 from ikgym.arms.posture import within_limits
 from ikgym.cost import TrackingCost
 from ikgym.exceptions import InvalidInputError
+from ikgym.kinematics import Chain
 from ikgym.plant import DrawnPlant, Plant
 from ikgym.plant.draw import Draws, arm_key, episode_key
 from ikgym.preview import Preview, furthest
@@ -289,7 +290,7 @@ class Scenario(Frozen):
         return np.arange(points, dtype=np.float64) * self.dt
 
     def first_q(self, trajectory: Trajectory) -> FloatArray:
-        """The joint coordinates at the start of an episode in [rad] or [m]. Shape (n,).
+        """Where the arm of the data sheet begins an episode, in [rad] or [m]. Shape (n,).
 
         Args:
             trajectory: What was drawn for the episode.
@@ -300,19 +301,43 @@ class Scenario(Frozen):
         start: FloatArray = self.first_q_of([trajectory])[0]
         return start
 
-    def start_of(self, seed: int | None = None) -> FloatArray:
-        """The joint coordinates at the start of an episode in [rad] or [m]. Shape (n,).
+    def start_of(self, seed: int | None = None, arm_seed: int | None = None) -> FloatArray:
+        """The joint coordinates at the start of an episode in [rad] or [m], those of the arm that moves. Shape (n,).
 
         Args:
-            seed: The reset seed; needed where the scenario is random.
+            seed: The reset seed; needed where the scenario is random, or its plant draws an arm.
+            arm_seed: The seed of an arm that is kept, as the reset option has it.
 
         Raises:
-            InvalidInputError: The scenario is random and there is no seed, or the arm cannot be there.
+            InvalidInputError: There is no seed where one is needed, or the arm cannot be there.
         """
-        return self.first_q(self.episode(seed))
+        q = self.first_q(self.episode(seed))
+        if not self.jogs:
+            return q
+        start: FloatArray = self.jogged(q[None], [self.drawn_plant(seed, arm_seed).arm.chain])[0]
+        return start
+
+    @property
+    def jogs(self) -> bool:
+        """Whether episodes begin where the arm that moves, not that of the data sheet, has the first pose."""
+        return self.start is None and self.plant.other_arm
+
+    def jogged(self, q: FloatArray, chains: Iterable[Chain]) -> FloatArray:
+        """Starts of arms that are not that of the data sheet: each where it has the pose that this would begin with.
+
+        Args:
+            q: Starts of the arm of the data sheet in [rad] or [m]. Shape (k, n).
+            chains: The k arms that move.
+
+        Returns:
+            Joint coordinates in [rad] or [m], as near to the poses as the arms get within the limits. Shape (k, n).
+        """
+        from ikgym.arms.inverse import alike  # its kernels take longer to load than all arms
+
+        return alike(self.arm, chains, q, oriented=self.task.has_orientation)
 
     def first_q_of(self, episodes: Sequence[Trajectory]) -> FloatArray:
-        """The joint coordinates at the start of several episodes, as :meth:`first_q` gives them. Shape (k, n).
+        """Where the arm of the data sheet begins several episodes, as :meth:`first_q` gives it. Shape (k, n).
 
         Args:
             episodes: What was drawn for the k episodes.

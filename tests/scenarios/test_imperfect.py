@@ -7,7 +7,7 @@ import pytest
 
 import ikgym
 from baselines.fingerprints import fingerprint
-from baselines.oracle.stripped import ideal
+from baselines.oracle.stripped import ideal, stripped
 from ikgym.scenarios import imperfect
 
 NAMES = tuple(imperfect.SCENARIOS)
@@ -49,3 +49,35 @@ def test_equal_kinematics():
     )  # fmt: skip
     for name in kinematics:
         assert getattr(camera, name) == getattr(slow, name) == getattr(same, name)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_arm_that_moves_begins_on_its_path(name):
+    """An operator jogs it there; where the data sheet's arm moves nothing is changed by a bit."""
+    scenario, draws = ikgym.scenarios.get(name), [1_000_000, 1_000_001]
+    env = ikgym.RedundantIKVectorEnv(2, scenario)
+    env.reset(seed=draws)
+    nominal = scenario.first_q_of([scenario.episode(seed) for seed in draws])
+    plain = not scenario.plant.other_arm
+    for row, seed in enumerate(draws):
+        start = scenario.start_of(seed)
+        np.testing.assert_array_equal(env._simulator.true_q[row], start)
+        arm = scenario.arm if plain else scenario.drawn_plant(seed).arm
+        error = scenario.task.error(scenario.nominal(seed)[0], scenario.task.coordinates(*arm.forward(start)))
+        assert abs(error).max() < 1e-9
+        assert np.array_equal(start, nominal[row]) == plain
+        np.testing.assert_array_equal(stripped(scenario, seed).start_of(seed), start)
+
+
+def test_an_arm_that_is_kept_is_jogged_and_a_start_that_is_given_is_not():
+    scenario = ikgym.scenarios.get("panda-camera")
+    env = ikgym.RedundantIKEnv(scenario)
+    env.reset(seed=1, options={"arm_seed": 5})
+    np.testing.assert_array_equal(env._simulator.true_q[0], scenario.start_of(1, 5))
+    assert abs(scenario.start_of(1, 5) - scenario.start_of(1)).max() > 1e-5
+    q = scenario.first_q(scenario.episode(1))
+    env.reset(seed=1, options={"q": q})
+    np.testing.assert_array_equal(env._simulator.true_q[0], q)
+    given = scenario.replace(start=q)
+    assert not given.jogs
+    np.testing.assert_array_equal(given.start_of(1), q)

@@ -35,6 +35,7 @@ class CalibrationMemory(NamedTuple):
     Attributes:
         before: See :class:`Measurement`. Shape (B, h, n).
         age: See :class:`Measurement`. Shape (B, 1).
+        rest: What is not blended in yet of how estimates have changed. Shape (B, 6).
         parameters: See :mod:`baselines.solvers.adaptive.chain_parameters`. Shape (B, p).
         covariance: Of their errors. Shape (B, p, p).
         quiet: How many measurements ago joint zeros were last taken to have changed suddenly. Shape (B,).
@@ -43,6 +44,7 @@ class CalibrationMemory(NamedTuple):
 
     before: FloatArray
     age: FloatArray
+    rest: FloatArray
     parameters: FloatArray
     covariance: FloatArray
     quiet: npt.NDArray[np.int64]
@@ -63,6 +65,7 @@ class Calibrated(Corrected):
         policy: The name of the base policy.
         options: Its parameters; those left out have its defaults.
         history: See :class:`Corrected`.
+        blend: See :class:`Corrected`.
         zero: Standard deviation of the joint zeros before anything is measured, in [rad] or [m]. Of at least 0.
         link: The same of each part of the offsets from joint to joint, and of the tool point, in [m].
         axis: The same of each of the two tilts of an axis, in [rad].
@@ -72,6 +75,8 @@ class Calibrated(Corrected):
             [m/√s].
         jump: Standard deviation of a sudden change of joint zeros, in [rad] or [m], that is reckoned with where poses
             are farther from what was expected than noise brings them (the sum of Page 1954). 0 for none.
+        start: How far from its reference the arm begins an episode, as a standard deviation in [m] and [rad]: where it
+            has been jogged there, that is the best measurement of all. None where it may begin anywhere.
         keep: Whether what is known of the arm survives the start of an episode, and is cleared with the state alone.
 
     Raises:
@@ -86,6 +91,7 @@ class Calibrated(Corrected):
     pose_rotation_noise: float = 5e-4
     walk: float = 0.0
     jump: float = 1e-3
+    start: float | None = None
     keep: bool = False
 
     name: ClassVar[str] = "calibrated"
@@ -98,6 +104,8 @@ class Calibrated(Corrected):
             object.__setattr__(self, name, number(name, getattr(self, name), at_least=0.0))
         for name in ("pose_noise", "pose_rotation_noise"):
             object.__setattr__(self, name, number(name, getattr(self, name), above=0.0))
+        if self.start is not None:
+            object.__setattr__(self, "start", number("start", self.start, above=0.0))
         if not isinstance(self.keep, bool):
             raise InvalidInputError(f"keep: expected True or False, got {self.keep!r}.")
 
@@ -112,17 +120,21 @@ class Calibrated(Corrected):
     def own_restarted(self, own: CalibrationMemory, rows: npt.NDArray[np.bool_]) -> CalibrationMemory:
         """See :meth:`Wrapper.own_restarted`; the arm is the same one as before, if it is kept."""
         fresh = CalibrationMemory(*super().own_restarted(own, rows))
-        kept = own._replace(before=fresh.before, age=fresh.age)
+        kept = own._replace(before=fresh.before, age=fresh.age, rest=fresh.rest)
         return kept if self.keep else fresh
 
-    def learn(self, batch: Batch, measured: Measurement, own: CalibrationMemory, out: FloatArray) -> CalibrationMemory:
+    def learn(
+        self, batch: Batch, measured: Measurement, own: CalibrationMemory, out: FloatArray, old: FloatArray
+    ) -> CalibrationMemory:
         """See :meth:`Corrected.learn`."""
-        kept = own._replace(**{name: getattr(own, name).copy() for name in own._fields[2:]})
-        model, kind, variances = self.problem.model.chain, self.problem.task.kind, self._variances()
-        walk = self.walk**2 * self.problem.dt
-        calibrate_rows(
-            (model, kind, variances, walk, self.jump**2), batch.q, batch.pose, measured.q, measured.new, kept, out
-        )
+        kept = own._replace(**{name: getattr(own, name).copy() for name in own._fields[3:]})
+        known, variances = (self.problem.model.chain, self.problem.task.kind), self._variances()
+        changes = self.walk**2 * self.problem.dt, self.jump**2
+        if self.start is not None and measured.first.any():
+            exact, none = np.full_like(variances, self.start**2), (0.0, 0.0)
+            first = np.ascontiguousarray(batch.nominal[:, 0])
+            calibrate_rows((*known, exact, *none), batch.q, first, batch.q, measured.first, kept, out, old)
+        calibrate_rows((*known, variances, *changes), batch.q, batch.pose, measured.q, measured.new, kept, out, old)
         return kept
 
     def _variances(self) -> FloatArray:
@@ -135,7 +147,7 @@ class Calibrated(Corrected):
 
 
 @kernel
-def calibrate_rows(rule, q, pose, then, new, known, deviation):
+def calibrate_rows(rule, q, pose, then, new, known, deviation, old):
     """Takes the measurements in, and tells the deviations, row by row.
 
     Args:
@@ -147,6 +159,7 @@ def calibrate_rows(rule, q, pose, then, new, known, deviation):
         new: Whether they are new. Shape (B,).
         known: A :class:`CalibrationMemory`, changed in place.
         deviation: Receives the deviations. Shape (B, 6).
+        old: Receives what they would be without the measurements. Shape (B, 6).
     """
     chain, kind, variances, walk, jump = rule
     n = q.shape[1]
@@ -156,18 +169,21 @@ def calibrate_rows(rule, q, pose, then, new, known, deviation):
         parameters, covariance = known.parameters[row], known.covariance[row]
         for i in range(n):
             covariance[i, i] += walk
+        forward(chain, q[row], model_rotation, model_position)
+        arm = changed_chain(chain, parameters, offsets, axes, tool)
+        forward(arm, q[row] + parameters[:n], rotation, position)
+        deviation_between(kind, rotation, position, model_rotation, model_position, old[row])
+        deviation[row] = old[row]
         if new[row]:
-            arm = changed_chain(chain, parameters, offsets, axes, tool)
             known.quiet[row] += 1
             allowed = jump if known.quiet[row] > PAUSE else 0.0
             test = variances, allowed, known.surprise[row]
             known.surprise[row], jumped = improve(arm, kind, test, then[row], pose[row], parameters, covariance)
             if jumped:
                 known.quiet[row] = 0
-        arm = changed_chain(chain, parameters, offsets, axes, tool)
-        forward(arm, q[row] + parameters[:n], rotation, position)
-        forward(chain, q[row], model_rotation, model_position)
-        deviation_between(kind, rotation, position, model_rotation, model_position, deviation[row])
+            arm = changed_chain(chain, parameters, offsets, axes, tool)
+            forward(arm, q[row] + parameters[:n], rotation, position)
+            deviation_between(kind, rotation, position, model_rotation, model_position, deviation[row])
 
 
 @kernel

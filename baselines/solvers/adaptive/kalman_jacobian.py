@@ -25,6 +25,7 @@ class JacobianMemory(NamedTuple):
     Attributes:
         before: See :class:`Measurement`. Shape (B, h, n).
         age: See :class:`Measurement`. Shape (B, 1).
+        rest: What is not blended in yet of how estimates have changed. Shape (B, 6).
         learnt: The deviation at the first posture, then its derivatives by the joint coordinates. Shape (B, 6, 1 + n).
         covariance: Of the errors of each of the first three rows, and of each of the last three. Shape
             (B, 2, 1 + n, 1 + n).
@@ -34,6 +35,7 @@ class JacobianMemory(NamedTuple):
 
     before: FloatArray
     age: FloatArray
+    rest: FloatArray
     learnt: FloatArray
     covariance: FloatArray
     first: FloatArray
@@ -55,6 +57,7 @@ class KalmanJacobian(Corrected):
         policy: The name of the base policy.
         options: Its parameters; those left out have its defaults.
         history: See :class:`Corrected`.
+        blend: See :class:`Corrected`.
         offset: Standard deviation of d before anything is measured, in [m] and [rad]. Of at least 0.
         slope: The same of C, in [m] and [rad] per unit of the joint coordinate.
         offset_walk: How fast d changes: standard deviation after a second.
@@ -91,9 +94,11 @@ class KalmanJacobian(Corrected):
         learnt, first = np.zeros((rows, SIZE, 1 + n)), np.zeros((rows, n))
         return JacobianMemory(*self.sensors(rows), learnt, covariance, first, np.zeros(rows, np.bool_))
 
-    def learn(self, batch: Batch, measured: Measurement, own: JacobianMemory, out: FloatArray) -> JacobianMemory:
+    def learn(
+        self, batch: Batch, measured: Measurement, own: JacobianMemory, out: FloatArray, old: FloatArray
+    ) -> JacobianMemory:
         """See :meth:`Corrected.learn`."""
-        kept = own._replace(**{name: getattr(own, name).copy() for name in own._fields[2:]})
+        kept = own._replace(**{name: getattr(own, name).copy() for name in own._fields[3:]})
         dt = self.problem.dt
         rule = (
             self.problem.model.chain,
@@ -101,12 +106,12 @@ class KalmanJacobian(Corrected):
             (self.pose_noise**2, self.pose_rotation_noise**2),
             (self.offset_walk**2 * dt, self.slope_walk**2 * dt),
         )
-        learn_rows(rule, batch.q, batch.pose, measured.q, measured.new, kept, out)
+        learn_rows(rule, batch.q, batch.pose, measured.q, measured.new, kept, out, old)
         return kept
 
 
 @kernel
-def learn_rows(rule, q, pose, then, new, known, deviation):
+def learn_rows(rule, q, pose, then, new, known, deviation, old):
     """Takes the measurements in, and tells the deviations, row by row.
 
     Args:
@@ -118,6 +123,7 @@ def learn_rows(rule, q, pose, then, new, known, deviation):
         new: Whether they are new. Shape (B,).
         known: A :class:`JacobianMemory`, changed in place.
         deviation: Receives the deviations. Shape (B, 6).
+        old: Receives what they would be without the measurements. Shape (B, 6).
     """
     chain, kind, variances, walks = rule
     n = q.shape[1]
@@ -130,6 +136,7 @@ def learn_rows(rule, q, pose, then, new, known, deviation):
         for part in range(2):
             for i in range(1 + n):
                 known.covariance[row, part, i, i] += walks[0] if i == 0 else walks[1]
+        _deviation_at(learnt, q[row], first, regressor, old[row])
         if new[row]:
             _deviation_at(learnt, then[row], first, regressor, deviation[row])
             forward(chain, then[row], rotation, position)

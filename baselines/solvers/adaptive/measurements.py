@@ -17,12 +17,14 @@ class Measurement(NamedTuple):
 
     Attributes:
         new: Whether the pose has not been seen before, and the joints are known where it was measured. Shape (B,).
+        first: Whether an episode begins. Shape (B,).
         q: The joint coordinates there, in [rad] or [m]. Shape (B, n).
         before: Joint coordinates of the last h steps, the present one first. Shape (B, h, n).
         age: How old the pose is, in steps. Shape (B, 1).
     """
 
     new: npt.NDArray[np.bool_]
+    first: npt.NDArray[np.bool_]
     q: FloatArray
     before: FloatArray
     age: FloatArray
@@ -55,7 +57,9 @@ def recall(batch: Batch, dt: float, past: FloatArray, age: FloatArray) -> Measur
     none = np.zeros((rows, 1))
     q_age = none if batch.q_age is None else batch.q_age
     pose_age = none if batch.pose_age is None else batch.pose_age
-    out = Measurement(np.empty(rows, np.bool_), np.empty((rows, n)), np.empty(past.shape), pose_age.copy())
+    out = Measurement(
+        np.empty(rows, np.bool_), age[:, 0] < 0.0, np.empty((rows, n)), np.empty(past.shape), pose_age.copy()
+    )
     recall_rows(batch.q, batch.qdot, dt, (q_age, pose_age), past, age, out.new, out.q, out.before)
     return out
 

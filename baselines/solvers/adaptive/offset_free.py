@@ -24,12 +24,14 @@ class OffsetMemory(NamedTuple):
     Attributes:
         before: See :class:`Measurement`. Shape (B, h, n).
         age: See :class:`Measurement`. Shape (B, 1).
+        rest: What is not blended in yet of how estimates have changed. Shape (B, 6).
         deviation: See :mod:`baselines.solvers.adaptive.deviation`. Shape (B, 6).
         measured: How many poses have been measured. Shape (B,).
     """
 
     before: FloatArray
     age: FloatArray
+    rest: FloatArray
     deviation: FloatArray
     measured: npt.NDArray[np.int64]
 
@@ -51,6 +53,7 @@ class OffsetFree(Corrected):
         policy: The name of the base policy.
         options: Its parameters; those left out have its defaults.
         history: See :class:`Corrected`.
+        blend: See :class:`Corrected`.
         gain: g, the share of the difference that a measurement takes over, from above 0 to 1.
 
     Raises:
@@ -71,9 +74,12 @@ class OffsetFree(Corrected):
         """See :meth:`Wrapper.own_memory`."""
         return OffsetMemory(*self.sensors(rows), np.zeros((rows, SIZE)), np.zeros(rows, np.int64))
 
-    def learn(self, batch: Batch, measured: Measurement, own: OffsetMemory, out: FloatArray) -> OffsetMemory:
+    def learn(
+        self, batch: Batch, measured: Measurement, own: OffsetMemory, out: FloatArray, old: FloatArray
+    ) -> OffsetMemory:
         """See :meth:`Corrected.learn`."""
-        out[:], count = own.deviation, own.measured + measured.new
+        old[:] = out[:] = own.deviation
+        count = own.measured + measured.new
         chain, kind = self.problem.model.chain, self.problem.task.kind
         filter_rows(chain, kind, self.gain, batch.pose, measured.q, measured.new, count, out)
         return own._replace(deviation=out.copy(), measured=count)

@@ -24,7 +24,6 @@ from benchmarks.rivals.numpy_horizon import Horizon
 from ikgym import parallel
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 from ikgym.plant import Plant
-from ikgym.scenarios import imperfect
 from ikgym.trajectories import RandomJointSpline
 from tests.comparison import identical
 
@@ -530,15 +529,16 @@ class TestCommandLine:
 # What was recorded.
 
 
+#: Test sets that the search has not got through yet: a name goes as soon as it has.
+UNFINISHED = {"panda-measured", "panda-camera", "panda-camera-slow", "panda-same-arm", "panda-payload", "panda-field"}
+
+
 def test_all_episodes_have_a_record():
     every = optimum_command.episodes((), (), ())
     missing = [
         (one.name, draw.seed) for one, draw in every if not best_known.lookup(one, draw.seed, draw.arm_seed)
     ]  # fmt: skip
-    # Those of imperfect plants have not been measured yet: as soon as one of them is, all have to be.
-    recorded = {one.scenario for one in best_known.read()}
-    missing = [key for key in missing if key[0] in recorded or key[0] not in imperfect.SCENARIOS]
-    assert not missing, f"find them with: {best_known.UPDATE}"
+    assert {name for name, _ in missing} == UNFINISHED, f"find them with: {best_known.UPDATE}"
 
 
 def reproduced(name, seed, how):

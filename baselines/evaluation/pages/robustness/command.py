@@ -22,7 +22,7 @@ from baselines.files.locks import locked
 from baselines.spec import parse_policy
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import imperfect
-from ikgym.validation import number
+from ikgym.validation import number, whole_number
 
 #: What the command is called where Python has run its module.
 PROGRAM = "python -m baselines.robustness"
@@ -41,7 +41,7 @@ class Options:
     """Folder for the page, such as docs; what was measured goes beside it as .json, pictures into images/. That of the
     results if left out."""
     policies: Annotated[tuple[str, ...], tyro.conf.arg(metavar="POLICY …")] = POLICIES
-    """Policies as NAME or NAME:PARAMETER=VALUE,…."""
+    """Policies as NAME or NAME:PARAMETER=VALUE,…, or LABEL@ one of these, which is called LABEL on the page."""
     scenario: Annotated[str, tyro.conf.arg(metavar="NAME|FILE.toml")] = imperfect.FIELD_NAME
     """Scenario of the map, whose plant stands for severity 1; of panda-field that is the worst one."""
     severities: Annotated[tuple[float, ...], tyro.conf.arg(metavar="S …")] = measure.SEVERITIES
@@ -51,6 +51,10 @@ class Options:
     sets: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME …")] = ()
     """Test sets that are played to their ends, with an ideal plant beside each: panda-ideal panda-measured … for the
     tables. None if left out."""
+    set_episodes: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
+    """The first episodes of each test set; all of them if left out."""
+    effects: bool = False
+    """Measure what each part of the plant of --scenario costs alone, too; with --episodes episodes."""
     resume: bool = False
     """Continue with the results in the folder: what is done already is not done again."""
     overwrite: bool = False
@@ -69,11 +73,12 @@ Examples:
   {prog} --policies dls rhc told --out results/map
   {prog} --policies dls rhc told --out results/map --resume --write docs
   {prog} --severities --sets {" ".join(imperfect.SCENARIOS)} --out results/sets
+  {prog} --policies dls "mended@calibrated:policy=predicted,start=1e-5" --effects --out results/map
   {prog} --scenario lab.toml --severities 0 0.5 1 2 --episodes 8 --out results/lab
   {prog} --write docs
 
 Files:
-  DIR/SCENARIO/results.json, DIR/sets/results.json   rows as those of evaluate
+  DIR/SCENARIO/results.json, DIR/sets/results.json, DIR/effects/results.json   rows as those of evaluate
   robustness.md, robustness.json, images/*.png       the page, what it is made from, and its pictures"""
 
 
@@ -88,17 +93,36 @@ def measured(options: Options, command: str) -> Measured:
             raise InvalidInputError("Expected --out, where the results go, or --write, the folder of the page.")
         return Measured.load(options.write / "robustness.json")
     severities = sorted({number("severities", one, at_least=0.0) for one in options.severities})
-    if not (severities or options.sets):
-        raise InvalidInputError("severities, sets: expected some severities, some test sets, or both; got neither.")
+    if not (severities or options.sets or options.effects):
+        raise InvalidInputError("severities, sets, effects: expected one of them at least; got neither.")
     how: dict[str, Any] = {name: getattr(options, name) for name in ("workers", "resume", "overwrite")} | {
         "progress": True
     }
-    entries = measure.entries(options.sets, options.policies, options.out, **how) if options.sets else ()
-    place = options.scenario, options.policies, options.out
+    policies = labelled(options.policies)
+    place = options.scenario, policies, options.out
+    sets = {"episodes": options.set_episodes, **how}
+    entries = measure.entries(options.sets, policies, options.out, **sets) if options.sets else ()
     cells = measure.cells(*place, severities=severities, episodes=options.episodes, **how) if severities else ()
+    effects = measure.effects(*place, episodes=options.episodes, **how) if options.effects else ()
     today = datetime.datetime.now(datetime.UTC).date().isoformat()
-    references = tuple(policy for policy in options.policies if is_reference(parse_policy(policy)[0]))
-    return Measured(command, today, describe(), options.scenario, options.episodes, references, entries, cells)
+    references = tuple(label for label, policy in policies.items() if is_reference(parse_policy(policy)[0]))
+    about = command, today, describe(), options.scenario, options.episodes, references
+    return Measured(*about, entries, cells, policies, effects)
+
+
+def labelled(policies: Sequence[str]) -> dict[str, str]:
+    """What policies are called, and what they are.
+
+    Raises:
+        InvalidInputError: Two are called the same.
+    """
+    out: dict[str, str] = {}
+    for given in policies:
+        label, mark, policy = given.partition("@")
+        if label in out:
+            raise InvalidInputError(f"policies: expected a label of its own for each, got {label!r} twice.")
+        out[label] = policy if mark else given
+    return out
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -114,6 +138,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _work(options: Options, command: str) -> None:
+    if options.set_episodes is not None:
+        whole_number("set_episodes", options.set_episodes, at_least=1)
     found = measured(options, command)
     folder = options.write or options.out or pathlib.Path()
     with locked(folder):

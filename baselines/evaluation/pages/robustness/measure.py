@@ -12,7 +12,7 @@ from tqdm import tqdm
 
 from baselines.evaluation.metrics import Row
 from baselines.evaluation.pages import measure
-from baselines.evaluation.pages.robustness.measured import Cell, Entry
+from baselines.evaluation.pages.robustness.measured import Cell, Effect, Entry
 from baselines.evaluation.plan import Job, make_plan
 from baselines.evaluation.report import is_reference
 from baselines.evaluation.results import slug
@@ -21,10 +21,20 @@ from baselines.oracle import Search, best_known, solve
 from baselines.spec import parse_policy
 from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError
+from ikgym.plant import Plant
 from ikgym.scenarios import Scenario, imperfect
 
 #: Severities of the map, from ideal to the worst.
 SEVERITIES = (0.0, 0.25, 0.5, 0.75, 1.0)
+#: The parts of a plant by what they are called, and the same with none of them.
+EFFECTS = {
+    "calibration": ("zero", "link", "axis", "arms"),
+    "payload": ("payload", "payload_step"),
+    "noise and gaps of the camera": ("pose_every", "pose_missing", "pose_noise", "pose_rotation_noise", "pose_delay"),
+    "lag of the drives": ("bandwidth",),
+    "delay of commands": ("command_delay",),
+}
+IDEAL = "ideal"
 #: How thoroughly best known costs are searched where none is recorded: on these paths many starts find the same.
 HOW = Search(starts=20, generations=0)
 
@@ -53,9 +63,45 @@ def at(name: str, place: tuple[float, float]) -> Scenario:
     return here.replace(name=f"{base.name} {place[0]:g} {place[1]:g}")
 
 
+def effects_of(plant: Plant) -> dict[str, Plant]:
+    """The parts of a plant, each with all else ideal; those that it does not have are left out."""
+    on = plant.switched_on()
+    parts = {name: {field: on[field] for field in fields if field in on} for name, fields in EFFECTS.items()}
+    return {name: Plant(**part) for name, part in parts.items() if part}
+
+
+def effects(
+    name: str, policies: Mapping[str, str], folder: pathlib.Path, *, episodes: int, **options: Any
+) -> tuple[Effect, ...]:
+    """What the parts of a scenario's plant cost, each alone, beside the same episodes with an ideal plant.
+
+    Args:
+        name: Of the scenario.
+        policies: What they are called, and what they are.
+        folder: For the results.
+        episodes: Of each policy with each effect.
+        options: Of :func:`baselines.evaluation.pages.measure.play`.
+
+    Raises:
+        IkgymError: As in :func:`baselines.evaluation.pages.measure.play`.
+    """
+    base = scenarios.find(name)
+    plants = {IDEAL: Plant(), **effects_of(base.plant)}
+    alone = {what: base.replace(name=f"{base.name}, {what}", plant=plant) for what, plant in plants.items()}
+    plans = {
+        (label, what): _untimed(make_plan(scenario, policy, episodes=episodes).jobs)
+        for label, policy in policies.items()
+        for what, scenario in alone.items()
+    }
+    rows = measure.play(plans, folder / "effects", **options)
+    return tuple(
+        Effect.of(label, what, found, rows[label, IDEAL]) for (label, what), found in rows.items() if what != IDEAL
+    )
+
+
 def cells(
     name: str,
-    policies: Sequence[str],
+    policies: Mapping[str, str],
     folder: pathlib.Path,
     *,
     severities: Sequence[float],
@@ -66,7 +112,7 @@ def cells(
 
     Args:
         name: Of the scenario.
-        policies: Names, with parameters or without.
+        policies: What they are called, and what they are: names, with parameters or without.
         folder: For the results.
         severities: Of knowledge, and of drives.
         episodes: Of each policy in each cell.
@@ -77,8 +123,8 @@ def cells(
     """
     everywhere = {place: at(name, place) for place in places(severities)}
     plans = {
-        (policy, place): _untimed(make_plan(scenario, policy, episodes=episodes).jobs)
-        for policy in policies
+        (label, place): _untimed(make_plan(scenario, policy, episodes=episodes).jobs)
+        for label, policy in policies.items()
         for place, scenario in everywhere.items()
     }
     rows = measure.play(plans, folder / slug(name), **options)
@@ -86,29 +132,45 @@ def cells(
     return tuple(Cell.of(policy, place, found, bounds[place]) for (policy, place), found in rows.items())
 
 
-def entries(sets: Sequence[str], policies: Sequence[str], folder: pathlib.Path, **options: Any) -> tuple[Entry, ...]:
+def entries(
+    sets: Sequence[str],
+    policies: Mapping[str, str],
+    folder: pathlib.Path,
+    *,
+    episodes: int | None = None,
+    **options: Any,
+) -> tuple[Entry, ...]:
     """Policies on test sets, each beside itself on an ideal plant.
 
     Args:
         sets: Names of test sets.
-        policies: Names, with parameters or without.
+        policies: What they are called, and what they are: names, with parameters or without.
         folder: For the results.
+        episodes: The first episodes of each set; all of them if left out.
         options: Of :func:`baselines.evaluation.pages.measure.play`.
 
     Raises:
         IkgymError: As in :func:`baselines.evaluation.pages.measure.play`.
     """
-    plans = {policy: _untimed(make_plan((), policy, test_sets=sets, pairs=True).jobs) for policy in policies}
+    plans = {
+        label: _first(_untimed(make_plan((), policy, test_sets=sets, pairs=True).jobs), episodes)
+        for label, policy in policies.items()
+    }
     played = measure.play(plans, folder / "sets", **options)
-    return tuple(one for policy, rows in played.items() for one in _of_policy(policy, sets, rows))
+    return tuple(one for label, rows in played.items() for one in _of_policy(label, policies[label], sets, rows))
 
 
-def _of_policy(policy: str, sets: Sequence[str], rows: Sequence[Row]) -> Iterator[Entry]:
+def _first(jobs: Sequence[Job], episodes: int | None) -> list[Job]:
+    """The jobs of the first episodes; all where there is no number."""
+    return [job for job in jobs if episodes is None or job.seed in scenarios.seeds("test", episodes)]
+
+
+def _of_policy(label: str, policy: str, sets: Sequence[str], rows: Sequence[Row]) -> Iterator[Entry]:
     reference = is_reference(parse_policy(policy)[0])
     for summary in summarise(rows):
         if summary.scenario in sets:
             own = [row for row in rows if row.scenario == summary.scenario]
-            yield Entry.of(policy, summary, own, reference=reference)
+            yield Entry.of(label, summary, own, reference=reference)
 
 
 def _bounds(

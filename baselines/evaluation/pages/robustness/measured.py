@@ -100,6 +100,36 @@ class Entry:
 
 
 @dataclasses.dataclass(frozen=True)
+class Effect:
+    """What a part of a plant costs a policy where all else is ideal.
+
+    Args:
+        policy: What it is called.
+        name: Of the effect.
+        paired: Geometric mean of the cost divided by that on the ideal plant with the same seed.
+        low: Lower end of its interval of 95 %, over the episodes.
+        high: Upper end.
+        lost: Share of the episodes in which the arm lost track.
+    """
+
+    policy: str
+    name: str
+    paired: float
+    low: float
+    high: float
+    lost: float
+
+    @classmethod
+    def of(cls, policy: str, name: str, rows: Sequence[Row], plain: Sequence[Row]) -> Self:
+        """The effect, from rows with it and rows with an ideal plant on the same seeds."""
+        costs, without = (by_seed(some, lambda row: row.total_cost) for some in (rows, plain))
+        ratios = [costs[seed] / without[seed] for seed in costs]
+        low, high = _ends(geometric_interval(ratios))
+        lost = sum(row.lost for row in rows) / len(rows)
+        return cls(policy, name, rounded(geometric_mean(ratios), DIGITS), low, high, lost)
+
+
+@dataclasses.dataclass(frozen=True)
 class Measured:
     """All that the page says.
 
@@ -112,6 +142,8 @@ class Measured:
         references: Policies with privileged information.
         entries: The policies on the test sets.
         cells: The map.
+        policies: What policies are called, and what they are: names, with parameters or without.
+        effects: What parts of the plant of the map cost, each alone.
     """
 
     command: str
@@ -122,6 +154,8 @@ class Measured:
     references: tuple[str, ...]
     entries: tuple[Entry, ...]
     cells: tuple[Cell, ...]
+    policies: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    effects: tuple[Effect, ...] = ()
 
     def save(self, file: pathlib.Path) -> None:
         """Writes it as JSON, a cell a line.
@@ -129,8 +163,9 @@ class Measured:
         Raises:
             ResultsError: The file cannot be written.
         """
-        head = {name: value for name, value in vars(self).items() if name not in {"entries", "cells", "machine"}}
-        head |= {"machine": dict(self.machine), "entries": [dataclasses.asdict(one) for one in self.entries]}
+        head = {name: value for name, value in vars(self).items() if name != "cells"}
+        head |= {name: dict(head[name]) for name in ("machine", "policies")}
+        head |= {name: [dataclasses.asdict(one) for one in head[name]] for name in ("entries", "effects")}
         write(
             file, (with_list(head, "cells", [one_line(dataclasses.asdict(one)) for one in self.cells]) + "\n").encode()
         )

@@ -10,10 +10,11 @@ from baselines.evaluation import test_sets
 from baselines.evaluation.metrics import LOST_ORIENTATION, LOST_POSITION
 from baselines.evaluation.pages.markdown import IMAGES, share, table
 from baselines.evaluation.pages.robustness import pictures
-from baselines.evaluation.pages.robustness.measured import Entry, Measured
+from baselines.evaluation.pages.robustness.measured import Effect, Entry, Measured
 from baselines.evaluation.report import NOTHING, number
 from baselines.evaluation.results import slug
 from baselines.oracle.stripped import NOTE
+from ikgym.scenarios import imperfect
 
 INTRODUCTION = f"""\
 What policies are worth on an arm that is not the one in the data sheet, whose drives lag and whose camera is slow and
@@ -42,12 +43,21 @@ cost ratio; numbers below it are the share of lost episodes."""
 BEST = "The best policy of each cell is the one that loses the fewest episodes, and among those the cheapest."
 
 
+EFFECTS = """\
+What parts of the plant of `{scenario}` cost, each with all else ideal: geometric means of the cost divided by that of
+the same policy on the ideal plant with the same seed, with intervals of 95 % over {episodes} test episodes, and in
+brackets the share of lost ones."""
+
+
 def page(measured: Measured) -> str:
     """The page."""
-    out = ["# Robustness", "", INTRODUCTION]
+    out = ["# Robustness", "", INTRODUCTION, *_legend(measured), *_missing(measured)]
     for name in dict.fromkeys(one.scenario for one in measured.entries):
         some = [one for one in measured.entries if one.scenario == name]
         out += [f"## `{name}`", "", f"{some[0].episodes} test episodes{_noise(name)}.", "", *_table(some), ""]
+    if measured.effects:
+        text = EFFECTS.format(scenario=measured.scenario, episodes=measured.episodes)
+        out += ["## What each effect costs alone", "", text, "", *_effects(measured), ""]
     if measured.cells:
         out += ["## Map", "", MAP.format(scenario=measured.scenario, episodes=measured.episodes), ""]
         out += [f"![Best policy of each cell]({_file(None)})", "", BEST, ""]
@@ -82,6 +92,48 @@ def _table(entries: Sequence[Entry]) -> list[str]:
         for one in ordered
     ]
     return table(["policy", "cost ratio", "95 %", "lost", "ideal", "× ideal", "95 %"], lines, text=(0,))
+
+
+def _legend(measured: Measured) -> list[str]:
+    """What labels stand for."""
+    own = {label: policy for label, policy in measured.policies.items() if label != policy}
+    return ["What labels stand for:", "", *(f"- `{label}` is `{policy}`" for label, policy in own.items()), ""] * bool(
+        own
+    )
+
+
+def _missing(measured: Measured) -> list[str]:
+    """What of the test sets has not been measured, and how it would be."""
+    played = {one.scenario for one in measured.entries}
+    some = {one.scenario: one.episodes for one in measured.entries if one.episodes < _all_of(one.scenario)}
+    bounds = {one.scenario: None for one in measured.entries if one.cost_ratio is None}
+    sentences = {
+        "Not measured yet: {}; `--sets` plays them.": [name for name in imperfect.SCENARIOS if name not in played],
+        "Of these only the first episodes have been played: {}.": [f"{name} ({n})" for name, n in some.items()],
+        "Best known costs are missing of {}: there are no cost ratios, only pairs.": list(bounds),
+    }
+    return [text.format(", ".join(names)) + "\n" for text, names in sentences.items() if names]
+
+
+def _all_of(name: str) -> int:
+    return test_sets.SETS[name].episodes if name in test_sets.SETS else 0
+
+
+def _effects(measured: Measured) -> list[str]:
+    """A policy a line, an effect a column."""
+    names = list(dict.fromkeys(one.name for one in measured.effects))
+    found = {(one.policy, one.name): one for one in measured.effects}
+    policies = dict.fromkeys(one.policy for one in measured.effects)
+    lines = [
+        [f"`{policy}`{' *' * (policy in measured.references)}", *(_effect(found[policy, name]) for name in names)]
+        for policy in policies
+    ]
+    return table(["policy", *names], lines, text=(0,))
+
+
+def _effect(one: Effect) -> str:
+    lost = f" ({share(one.lost)})" if one.lost else ""
+    return f"{number(one.paired)} [{_between((one.low, one.high))}]{lost}"
 
 
 def _contenders(measured: Measured) -> list[str]:

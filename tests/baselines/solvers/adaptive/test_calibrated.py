@@ -8,6 +8,7 @@ import pytest
 import baselines
 from baselines.solvers.adaptive.calibrated import PAUSE
 from baselines.solvers.adaptive.chain_parameters import parameter_twists
+from ikgym.exceptions import InvalidInputError
 from tests.baselines.solvers.adaptive.arms import PANDA, noisy, observed, path, perturbed, scenario
 from tests.baselines.solvers.adaptive.test_corrected import deviation_of, true_deviation
 from tests.comparison import identical
@@ -55,6 +56,24 @@ def test_postures_that_were_not_seen_are_predicted():
         state = learnt(policy, arm, zeros, q)
         missing[name] = np.abs(deviation_of(policy, state, elsewhere) - true_deviation(arm, zeros, elsewhere)).max()
     assert missing["calibrated"] < 0.2 * missing["offset_free"]
+
+
+def test_a_start_on_the_reference_is_the_best_measurement():
+    """The first pose is blurred, and where the arm begins is known: only the latter says where it is."""
+    (arm, zeros), on = perturbed(3), scenario()
+    q = path(4, 2)[0]
+    reference = on.task.coordinates(*arm.forward(q + zeros))
+    blurred = reference.copy()
+    blurred[-3:] += 3e-4
+    missing = []
+    for start in (None, 1e-6):
+        policy = baselines.make("calibrated", on, policy="dls", start=start)
+        seen = {**observed(on, arm, zeros, q, reference), "pose": blurred}
+        _, state = policy.predict(seen)
+        missing.append(np.abs(deviation_of(policy, state, q) - true_deviation(arm, zeros, q)).max())
+    assert missing[1] < 1e-5 < 1e-4 < missing[0]
+    with pytest.raises(InvalidInputError, match="start"):
+        baselines.make("calibrated", on, start=0.0)
 
 
 @pytest.mark.parametrize("keep", [True, False])

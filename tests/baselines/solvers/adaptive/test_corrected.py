@@ -79,8 +79,8 @@ def deviation_of(policy, state, q):
     if hasattr(own, "learnt"):
         return own.learnt[0] @ np.concatenate([[1.0], q - own.first[0]])
     out, batch = np.empty((1, 6)), type("Shown", (), {"q": q[None], "pose": np.zeros((1, 12))})
-    measured = type("Measured", (), {"new": np.zeros(1, np.bool_), "q": q[None]})
-    policy.learn(batch, measured, own, out)
+    measured = type("Measured", (), {name: np.zeros(1, np.bool_) for name in ("new", "first")} | {"q": q[None]})
+    policy.learn(batch, measured, own, out, np.empty((1, 6)))
     return out[0]
 
 
@@ -143,5 +143,28 @@ def test_the_memory_of_the_base_policy_is_its_own():
     on = scenario()
     policy = baselines.make("offset_free", on, policy="calibrated", options={"policy": "dls"})
     own, inside = policy.split(policy.memory(2))
-    assert own._fields == ("before", "age", "deviation", "measured")
+    assert own._fields == ("before", "age", "rest", "deviation", "measured")
     assert identical(tuple(inside), tuple(policy.inner.memory(2)))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_what_a_measurement_changes_is_blended_in(name):
+    """The pose of a standing arm jumps by 1 mm: at once what the base policy does is nothing, then all of it."""
+    on, q = scenario(), PANDA.home + 0.1
+    pose = on.task.coordinates(*PANDA.forward(q))
+    off = pose + np.eye(len(pose))[-1] * 1e-3
+    heights = {}
+    for blend in (0.0, 0.01):
+        policy = baselines.make(name, on, policy="dls", blend=blend, **SETTLED[name])
+        seen, state = observed(on, PANDA, np.zeros(7), q, pose), None
+        actions = []
+        for shown in (pose, *[off] * 60):
+            action, state = policy.predict({**seen, "pose": shown}, state)
+            actions.append(np.linalg.norm(action))
+        heights[blend] = np.array(actions)
+    at_once, blended = heights[0.0], heights[0.01]
+    assert blended[1] < 0.2 * at_once[1]
+    assert (np.diff(blended[1:40]) > 0.0).all()
+    np.testing.assert_allclose(blended[-1], at_once[-1], rtol=0.05)
+    with pytest.raises(InvalidInputError, match="blend"):
+        baselines.make(name, on, blend=-1.0)

@@ -15,8 +15,8 @@ from matplotlib.text import Text
 import ikgym
 from baselines.evaluation import test_sets
 from baselines.evaluation.pages.robustness import measure, pictures
-from baselines.evaluation.pages.robustness.command import main
-from baselines.evaluation.pages.robustness.measured import Cell, Entry, Measured
+from baselines.evaluation.pages.robustness.command import labelled, main
+from baselines.evaluation.pages.robustness.measured import Cell, Effect, Entry, Measured
 from baselines.evaluation.pages.robustness.page import page
 from baselines.evaluation.report import number
 from baselines.evaluation.results import read_rows
@@ -36,7 +36,8 @@ CELLS = tuple(
     for drives in (0.0, 1.0)
 )
 MEASURED = Measured(
-    "a command", "2000-01-01", {"cpu": "a machine"}, "panda-field", 4, ("told",), (ENTRY,), CELLS
+    "a command", "2000-01-01", {"cpu": "a machine"}, "panda-field", 4, ("told",), (ENTRY,), CELLS,
+    {"dls": "dls", "rhc": "rhc:iterations=1", "told": "told"}, (Effect("dls", "payload", 3.0, 2.0, 4.0, 0.25),),
 )  # fmt: skip
 
 
@@ -77,7 +78,7 @@ def test_plays_writes_and_writes_anew(short, tmp_path, capsys):
 
 
 def test_a_run_is_taken_up_again(short, tmp_path):
-    play = functools.partial(measure.cells, "panda-field", ["dls"], tmp_path, severities=[0.5], episodes=3)
+    play = functools.partial(measure.cells, "panda-field", {"dls": "dls"}, tmp_path, severities=[0.5], episodes=3)
     results = tmp_path / "panda-field" / "results.json"
     cells, whole = play(), json.loads(results.read_text())
     changed = [{**one, "total_cost": 2.0 * one["total_cost"]} for one in whole[:2]]
@@ -88,7 +89,7 @@ def test_a_run_is_taken_up_again(short, tmp_path):
 
 
 def test_ratios_are_to_the_best_known_cost_of_the_arm_that_moves(short, tmp_path):
-    cells = measure.cells("panda-field", ["dls"], tmp_path, severities=[0.5], episodes=2)
+    cells = measure.cells("panda-field", {"low gain": "dls:gain=0.1"}, tmp_path, severities=[0.5], episodes=2)
     scenario = measure.at("panda-field", (0.5, 0.5))
     rows = read_rows(tmp_path / "panda-field" / "results.json")
     bounds = [solve(scenario, one.seed, measure.HOW).cost for one in rows]
@@ -111,12 +112,47 @@ def test_tables_of_test_sets(short, tmp_path, monkeypatch):
     monkeypatch.setattr(test_sets.TestSet, "scenario", property(lambda self: scenario))
     small = test_sets.TestSet("panda-bus", 2, set_hash(scenario, ikgym.scenarios.seeds("test", 2)))
     monkeypatch.setitem(test_sets.SETS, "panda-bus", small)
-    (entry,) = measure.entries(["panda-bus"], ["dls"], tmp_path)
+    (entry,) = measure.entries(["panda-bus"], {"dls": "dls"}, tmp_path)
     assert (entry.scenario, entry.episodes, entry.reference) == ("panda-bus", 2, False)
     assert entry.paired > 1.0
     low, high = entry.paired_interval
     assert low <= entry.paired <= high
     assert entry.cost_ratio is None  # of so few steps no best known cost is recorded
+
+
+def test_the_first_episodes_of_sets(short, tmp_path, monkeypatch):
+    scenario = ikgym.scenarios.get("panda-bus").replace(steps=STEPS)
+    monkeypatch.setattr(test_sets.TestSet, "scenario", property(lambda self: scenario))
+    small = test_sets.TestSet("panda-bus", 2, set_hash(scenario, ikgym.scenarios.seeds("test", 2)))
+    monkeypatch.setitem(test_sets.SETS, "panda-bus", small)
+    (entry,) = measure.entries(["panda-bus"], {"dls": "dls"}, tmp_path, episodes=1)
+    assert entry.episodes == 1
+    text = page(dataclasses.replace(MEASURED, entries=(entry,)))
+    assert "Of these only the first episodes have been played: panda-bus (1)." in text
+    assert "Best known costs are missing of panda-bus" in text
+
+
+def test_effects_alone(short, tmp_path):
+    parts = measure.effects_of(imperfect.FIELD)
+    assert list(parts) == list(measure.EFFECTS)
+    assert {name for part in parts.values() for name in part.switched_on()} == set(imperfect.FIELD.switched_on())
+    assert list(measure.effects_of(ikgym.scenarios.get("panda-bus").plant)) == [
+        "lag of the drives",
+        "delay of commands",
+    ]
+    found = measure.effects("panda-field", {"low": "dls:gain=0.1"}, tmp_path, episodes=2)
+    assert [(one.policy, one.name) for one in found] == [("low", name) for name in parts]
+    assert all(one.low <= one.paired <= one.high for one in found)
+    assert found[0].paired > 1.0
+    rows = [row(seed=seed, total_cost=cost) for seed, cost in ((0, 2.0), (1, 8.0))]
+    effect = Effect.of("dls", "lag", rows, [row(seed=0, total_cost=1.0), row(seed=1, total_cost=1.0)])
+    assert effect.paired == pytest.approx(4.0)
+
+
+def test_labels_of_policies():
+    assert labelled(["dls", "low@dls:gain=0.1"]) == {"dls": "dls", "low": "dls:gain=0.1"}
+    with pytest.raises(InvalidInputError, match="label of its own"):
+        labelled(["dls", "dls@rhc"])
 
 
 def texts(figure):
@@ -143,6 +179,11 @@ def test_the_page():
     text = page(MEASURED)
     assert "| `dls` | 650.0 | 500.0 … 800.0 | 25 % | 1.200 | 540.0 | 400.0 … 700.0 |" in text
     assert "64 test episodes, 3 noise seeds each." in text
+    assert "- `rhc` is `rhc:iterations=1`" in text
+    assert "- `dls` is" not in text
+    assert "Not measured yet: panda-ideal" in text
+    assert "| policy | payload |" in text
+    assert "| `dls` | 3.000 [2.000 … 4.000] (25 %) |" in text
     assert text.index("Best policy of each cell") < text.index("Cost ratios of dls")
     marked = dataclasses.replace(ENTRY, policy="told", reference=True, cost_ratio=None, interval=None, paired=None)
     assert "| `told` * | – | – |" in page(dataclasses.replace(MEASURED, entries=(marked,)))
