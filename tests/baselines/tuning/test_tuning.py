@@ -109,9 +109,9 @@ def test_trials_that_are_worse_end_early(tmp_path, monkeypatch):
 @pytest.mark.slow
 def test_several_processes_share_a_budget(tmp_path):
     """Each of them plays trials, and they spend no more than what those under way add."""
-    found, studies = searched(tmp_path / "study", budget=150, workers=2)
+    found, studies = searched(tmp_path / "study", budget=64, workers=2)
     spent = sum(episodes for *_, episodes in found)
-    assert studies[0].budget <= spent <= studies[0].budget + 4
+    assert studies[0].budget <= spent < studies[0].budget + 2 * 4
     assert len({json.dumps(settings) for settings, *_ in found}) == len(found)
 
 
