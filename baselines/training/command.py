@@ -234,7 +234,7 @@ def _train(command: Command[Any], given: frozenset[str], text: str) -> int:
     )
     workers = whole_number("workers", options.workers, at_least=1)
     if options.study is not None:
-        return _study(runs, seeds, options, workers)
+        return _study(runs, seeds, options, whole_number("study", options.study, at_least=1))
     if options.study_ranges is not None:
         raise InvalidInputError("study_ranges: expected --study, the number of trials, beside it.")
     results = train_seeds(runs, seeds, workers=workers, progress=options.progress)
@@ -246,16 +246,14 @@ def _train(command: Command[Any], given: frozenset[str], text: str) -> int:
     return 2 if any(result.error for result in results) else 0
 
 
-def _study(runs: SeedRuns, seeds: Sequence[int], options: Options, workers: int) -> int:
+def _study(runs: SeedRuns, seeds: Sequence[int], options: Options, trials: int) -> int:
     # Only a search needs Optuna.
     from baselines.training.study import BEST, searched
 
-    trials = whole_number("study", options.study, at_least=1)
     if len(seeds) > 1:
         raise InvalidInputError(f"seeds: expected one for a study, got {', '.join(map(str, seeds))}.")
-    print(
-        searched(runs, seeds[0], trials=trials, ranges=options.study_ranges, workers=workers, progress=options.progress)
-    )
+    given: dict[str, Any] = {"trials": trials, "ranges": options.study_ranges, "workers": options.workers}
+    print(searched(runs, seeds[0], **given, progress=options.progress))
     print(f"\nwritten to {options.out}; train with --preset {options.out / BEST}")
     return 0
 

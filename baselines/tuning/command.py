@@ -12,8 +12,9 @@ from typing import Annotated
 import tyro
 
 from baselines import command
-from baselines.evaluation.pages.markdown import number, table
+from baselines.evaluation.pages.markdown import table
 from baselines.evaluation.pages.tuning import EPISODES, SPLIT, Tuning
+from baselines.evaluation.report import number
 from baselines.files.locks import locked
 from ikgym import scenarios
 from ikgym.validation import whole_number

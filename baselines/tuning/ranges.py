@@ -54,7 +54,7 @@ class Range:
     when: Mapping[str, Any] = dataclasses.field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        ends = [self.low, self.high]
+        ends: list[object] = [self.low, self.high]
         if self.choices and ends == [None, None] and not self.log:
             return
         if self.choices or any(isinstance(x, bool) or not isinstance(x, (int, float)) for x in ends):
@@ -74,11 +74,11 @@ class Range:
             # Optuna keeps text and numbers; a list goes by its JSON.
             values = {json.dumps(value): value for value in self.choices}
             return values[trial.suggest_categorical(self.name, list(values))]
-        if isinstance(self.low, int) and isinstance(self.high, int):
-            return trial.suggest_int(self.name, self.low, self.high, log=self.log)
-        assert self.low is not None
-        assert self.high is not None
-        return rounded(trial.suggest_float(self.name, self.low, self.high, log=self.log), DIGITS)
+        low: Any = self.low
+        high: Any = self.high
+        if isinstance(low, int) and isinstance(high, int):
+            return trial.suggest_int(self.name, low, high, log=self.log)
+        return rounded(trial.suggest_float(self.name, low, high, log=self.log), DIGITS)
 
 
 #: The ranges of each table of a file.
