@@ -38,6 +38,9 @@ EXTRAS = {
     "stable_baselines3": "train",
     "tensorboard": "train",
     "rich": "train",
+    "optuna": "train",
+    "h5py": "data",
+    "minari": "data",
     "pinocchio": "urdf",
     "moviepy": "video",
 }

@@ -47,6 +47,12 @@ class Options:
     """Replace the runs in the folder."""
     checkpoint_every: Annotated[float, tyro.conf.arg(metavar="SECONDS")] = 15.0
     """Shortest time between two checkpoints; there are none within a segment."""
+    study: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
+    """Search options by Optuna instead: N trainings with one seed, judged on validation episodes, of which those that
+    are worse than the median of the others are ended early. --workers trains some at the same time. The best options
+    are written into the folder as a preset, best.toml."""
+    study_ranges: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
+    """What --study tries: a table for the method, with a range for each option. Its own ranges if left out."""
     progress: bool = True
     """Show a progress bar."""
 
@@ -102,6 +108,7 @@ Examples:
   {prog} apg --preset quick --out runs/apg
   {prog} ppo --preset finetune --init runs/imitate/seed-0/model.safetensors --out runs/finer
   {prog} ppo --preset smoke --out runs/smoke --resume
+  {prog} ppo --preset smoke --study 30 --workers 2 --out runs/study
   {prog} repeat runs/smoke/seed-0/run.json --out runs/again
 
 Files in the folder of a run, each replaced in one go, so that it may be stopped or killed at any time:
@@ -226,6 +233,10 @@ def _train(command: Command[Any], given: frozenset[str], text: str) -> int:
         command=text,
     )
     workers = whole_number("workers", options.workers, at_least=1)
+    if options.study is not None:
+        return _study(runs, seeds, options, whole_number("study", options.study, at_least=1))
+    if options.study_ranges is not None:
+        raise InvalidInputError("study_ranges: expected --study, the number of trials, beside it.")
     results = train_seeds(runs, seeds, workers=workers, progress=options.progress)
     print(table(results))
     for result in results:
@@ -233,6 +244,18 @@ def _train(command: Command[Any], given: frozenset[str], text: str) -> int:
             print(f"error: seed {result.seed}: {result.error}", file=sys.stderr)
     print(f"\nwritten to {options.out}")
     return 2 if any(result.error for result in results) else 0
+
+
+def _study(runs: SeedRuns, seeds: Sequence[int], options: Options, trials: int) -> int:
+    # Only a search needs Optuna.
+    from baselines.training.study import BEST, searched
+
+    if len(seeds) > 1:
+        raise InvalidInputError(f"seeds: expected one for a study, got {', '.join(map(str, seeds))}.")
+    given: dict[str, Any] = {"trials": trials, "ranges": options.study_ranges, "workers": options.workers}
+    print(searched(runs, seeds[0], **given, progress=options.progress))
+    print(f"\nwritten to {options.out}; train with --preset {options.out / BEST}")
+    return 0
 
 
 def _repeat(command: Repeat) -> int:

@@ -16,15 +16,11 @@ from baselines.evaluation.machine import describe
 from baselines.evaluation.pages import cost_time, families, foresight, leaderboard, rivals, sets, tuning
 from baselines.evaluation.pages.choosing import page as choosing
 from baselines.evaluation.pages.entries import FORESIGHT, HORIZONS, Entry, agents, playing, shipped, solvers
-from baselines.evaluation.pages.markdown import table
 from baselines.evaluation.pages.measure import measure
 from baselines.evaluation.pages.measurement import Measurement, Section
-from baselines.evaluation.pages.tuning import EPISODES, tune
 from baselines.evaluation.plots.style import small_png
-from baselines.evaluation.report import number
 from baselines.files import write
 from baselines.files.locks import locked
-from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError
 
 #: The names of the pages on the command line.
@@ -59,13 +55,9 @@ class Options:
     training seeds, with DIR/seed-N/agent.safetensors and DIR/seed-N/run.json."""
     sets: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME …")] = ()
     """Test sets and scenarios of the cost-time page. If left out the test sets of whole poses, and the fixed scenarios
-    but for those that hold their points. Those of the last two pages likewise, all paths of real arms if left out. With
-    --tune the scenario whose validation episodes are played."""
-    tune: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None
-    """Search the settings of all solvers on validation episodes, and write them here; nothing else is done. The
-    leaderboards read baselines/data/tuned/SCENARIO.json."""
+    but for those that hold their points. Those of the last two pages likewise, all paths of real arms if left out."""
     episodes: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
-    """The first so many episodes of each set, or of the search, for trials."""
+    """The first so many episodes of each set, for trials."""
     quick: bool = False
     """A trial: some solvers, two episodes, one seed of each policy."""
     resume: bool = False
@@ -87,7 +79,6 @@ Plays trained agents and all solvers on test sets and scenarios, and writes the 
 foresight page.
 
 Examples:
-  {prog} --tune baselines/data/tuned/{sets.MAIN}.json --sets {sets.MAIN}
   {prog} --out results/pages --agents "PPO=results/ppo" --write docs
   {prog} --pages cost-time --out results/quick --quick
   {prog} --pages rivals choosing --out results/arms --write docs
@@ -115,7 +106,7 @@ def measured(options: Options, command: str) -> dict[str, Measurement]:
     if options.out is None:
         if options.write is None:
             raise InvalidInputError(
-                "Expected --out, where the results go, --write, the folder of the pages to be written anew, or --tune."
+                "Expected --out, where the results go, or --write, the folder of the pages to be written anew."
             )
         if options.agents:
             raise InvalidInputError("--agents are played: expected --out, where the results go.")
@@ -176,31 +167,6 @@ def text(measurement: Measurement, page: str) -> str:
     if page in REAL_ARMS:
         return REAL_ARMS[page](measurement)
     return foresight.page(measurement) if page == FORESIGHT_PAGE else cost_time.page(measurement)
-
-
-def search(options: Options, command: str, file: pathlib.Path) -> str:
-    """Searches settings, writes them, and returns them as a table.
-
-    Raises:
-        IkgymError: Something expected went wrong, see :func:`baselines.evaluation.pages.tuning.tune`.
-    """
-    if len(options.sets) > 1:
-        raise InvalidInputError(f"--tune: expected one scenario in --sets, got {', '.join(options.sets)}.")
-    (name,) = options.sets or (sets.MAIN,)
-    found = tune(
-        command,
-        _today(),
-        scenarios.get(name),
-        episodes=options.episodes or EPISODES,
-        workers=options.workers,
-        progress=True,
-    )
-    found.save(file)
-    lines = [
-        [one.spec, *map(number, (one.default, one.tuned, one.tuned / one.default)), str(dict(one.settings))]
-        for one in found.solvers
-    ]
-    return "\n".join(table(["solver", "as it is", "tuned", "ratio", "settings"], lines, text=(0, 4)))
 
 
 def _entered(options: Options) -> dict[str, dict[str, list[Entry]]]:
@@ -264,10 +230,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _work(options: Options, command: str) -> None:
-    if options.tune is not None:
-        print(search(options, command, options.tune))
-        print(f"written to {options.tune}")
-        return
     folder = options.write or options.out or pathlib.Path()
     for page, measurement in measured(options, command).items():
         draw_up(measurement, page, folder)

@@ -37,7 +37,7 @@ from baselines.evaluation.pages.measurement import (
     Section,
 )
 from baselines.evaluation.pages.statistics import geometric_interval, interval
-from baselines.evaluation.pages.tuning import Tuning
+from baselines.evaluation.pages.tuning import Tuning, update
 from baselines.evaluation.report import NOTHING, number
 from baselines.evaluation.summary import Spread
 from ikgym.validation import FloatArray
@@ -231,10 +231,10 @@ def _tuned(tuning: Tuning) -> list[str]:
         return [*out, f"No settings have been searched for this scenario: `{tuning.command}`.", ""]
     out += [
         f"Searched with `{tuning.command}` on the first {tuning.episodes} {tuning.split} episodes of "
-        f"`{tuning.scenario}`, in stages over grids, for the lowest geometric mean of the total cost (which needs no "
-        "best known cost: dividing by it changes no order). No test episode was played for it. What was searched is in "
-        f"`baselines/evaluation/pages/tuning/grids.py`, the result in `baselines/data/tuned/{tuning.scenario}.json`. "
-        "No setting lets a solver look further ahead.",
+        f"`{tuning.scenario}`, for the lowest geometric mean of the total cost (which needs no best known cost: "
+        "dividing by it changes no order). No test episode was played for it. The result is in "
+        f"`baselines/data/tuned/{tuning.scenario}.json`; `{update(tuning.scenario)}` searches anew. No setting lets a "
+        "solver look further ahead.",
         "",
     ]
     lines = [

@@ -10,8 +10,6 @@ from baselines.evaluation.pages import command, entries, families, foresight, se
 from baselines.evaluation.pages.command import main
 from baselines.evaluation.pages.entries import Entry, solver
 from baselines.evaluation.pages.measurement import Measurement
-from baselines.evaluation.pages.tuning import Tuning, tune
-from baselines.evaluation.pages.tuning.grids import product
 from tests.baselines.evaluation.pages.builders import write_runs
 
 FEW = (
@@ -62,10 +60,9 @@ def test_plays_writes_and_writes_anew(tmp_path, capsys, monkeypatch):
 @pytest.mark.parametrize(
     ("option", "value", "wanted"), [("--episodes", "0", "episodes"), ("--workers", "0", "workers")]
 )
-@pytest.mark.parametrize("more", [("--out", "out"), ("--tune", "tuned.json")])
-def test_numbers_are_checked_before_anything_is_played(tmp_path, capsys, monkeypatch, option, value, wanted, more):
+def test_numbers_are_checked_before_anything_is_played(tmp_path, capsys, monkeypatch, option, value, wanted):
     monkeypatch.chdir(tmp_path)
-    assert main([*more, option, value]) == 2
+    assert main(["--out", "out", option, value]) == 2
     assert capsys.readouterr().err == f"error: {wanted}: expected a whole number of at least 1, got {value}.\n"
     assert not list(tmp_path.iterdir())
 
@@ -77,20 +74,6 @@ def test_one_page_alone(tmp_path, capsys, monkeypatch):
     text = (tmp_path / "cost_time.md").read_text(encoding="utf-8")
     assert f"`python -m baselines.leaderboard {' '.join(arguments)}`" in text
     assert not (tmp_path / "leaderboard.md").exists()
-
-
-def test_tunes(tmp_path, capsys, monkeypatch):
-    grids = {"dls": (product(gain=(0.5,)),)}
-    assert main(["--tune", str(tmp_path / "x.json"), "--sets", "varga7-random", "varga7-pose-random"]) == 2
-    assert "--tune: expected one scenario in --sets" in capsys.readouterr().err
-    monkeypatch.setattr(command, "tune", lambda *a, **k: tune(*a, **{**k, "grids": grids}))
-    file = tmp_path / "tuned.json"
-    assert main(["--tune", str(file), "--episodes", "1"]) == 0
-    printed = capsys.readouterr().out
-    assert printed.startswith("| solver | as it is | tuned | ratio | settings |")
-    found = Tuning.load(file)
-    assert (found.solvers[0].spec, found.episodes) == ("dls", 1)
-    assert found.command.endswith("--episodes 1")
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,229 @@
+"""A search by Optuna in a folder: several processes, one journal, and whoever is stopped goes on where he was.
+
+Values are suggested by the tree-structured Parzen estimator (Bergstra et al. 2011), and trials that are worse than the
+median of those before at the same step are ended early (Golovin et al. 2017).
+"""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import multiprocessing
+import pathlib
+import signal
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from typing import Any
+
+import numpy as np
+import optuna
+from optuna.storages.journal import JournalFileBackend
+from optuna.trial import FrozenTrial, Trial, TrialState
+from tqdm import tqdm
+
+from baselines.files import ResultsError
+from baselines.lifetime import end_with_parent
+from ikgym.exceptions import IkgymError
+
+#: Where the trials of a folder are.
+JOURNAL = "study.journal"
+#: Trials that are played to their end before any is ended early.
+STARTUP = 5
+#: What counts: the states of trials from which something was learned.
+FINISHED = (TrialState.COMPLETE, TrialState.PRUNED)
+# Seconds between two looks at the journal for the bar.
+_LOOK = 0.5
+
+#: The value of a trial, which is to be low. It reports values on the way, and ends early where that is asked for.
+Objective = Callable[[Trial], float]
+
+
+class StudyError(IkgymError):
+    """A search cannot go on."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Study:
+    """One search.
+
+    Args:
+        name: What it is called in the journal.
+        objective: What is minimised; it can be sent to other processes.
+        identity: What must be the same where it is gone on with, as JSON has it.
+        budget: How much is spent before no further trial begins.
+        seed: Of what is suggested. One worker comes to the same trials, whether or not it was stopped on the way;
+            several ask in the order in which they get done.
+        spent: What a finished trial has cost, in the unit of the budget.
+    """
+
+    name: str
+    objective: Objective
+    identity: Mapping[str, Any]
+    budget: int
+    seed: int
+    spent: Callable[[FrozenTrial], int]
+
+
+def prepare(folder: pathlib.Path, studies: Sequence[Study], *, resume: bool, overwrite: bool) -> None:
+    """Makes the journal, or sees to it that the one that is there is of the same search.
+
+    Trials that were under way when a process ended are given up.
+
+    Raises:
+        ResultsError: There is a journal and neither flag is given; or it is damaged, or of another search.
+    """
+    file = folder / JOURNAL
+    if resume and overwrite:
+        raise ResultsError("--resume keeps the trials that are there, --overwrite replaces them: choose one.")
+    if file.exists() and not (resume or overwrite):
+        raise ResultsError(
+            f"{file} is there already: go on with it by --resume, replace it by --overwrite, or choose another folder."
+        )
+    try:
+        if overwrite:
+            file.unlink(missing_ok=True)
+        known = {study.study_name: study for study in _opened_all(file)}
+        for study in studies:
+            there = known.get(study.name) or _made(file, study)
+            _check_same(file, study, there)
+            for trial in there.get_trials(deepcopy=False, states=[TrialState.RUNNING]):
+                there.tell(trial.number, state=TrialState.FAIL)
+    except OSError as e:
+        raise ResultsError(f"Cannot write into {folder}: {e.strerror or e}.") from None
+    except (ValueError, KeyError) as e:  # what a damaged journal makes Optuna raise
+        raise ResultsError(f"{file} is damaged: {e}. Begin anew with --overwrite.") from None
+
+
+def search(folder: pathlib.Path, studies: Sequence[Study], *, workers: int, progress: bool) -> None:
+    """Spends the budgets of the studies, one study after the other.
+
+    Args:
+        folder: Where :func:`prepare` has made the journal.
+        studies: What is searched.
+        workers: Processes that play trials of the same study at the same time; 1 means this one.
+        progress: Whether to show a bar on stderr.
+
+    Raises:
+        StudyError: A worker process has died.
+        IkgymError: What the objective raises.
+    """
+    bar = tqdm(
+        total=sum(study.budget for study in studies),
+        disable=not progress,
+        file=sys.stderr,
+        dynamic_ncols=True,
+        mininterval=0.1 if sys.stderr.isatty() else 10.0,  # a log file has no cursor to go back with
+    )
+
+    there = [opened(folder, study.name) for study in studies]
+
+    def show() -> None:
+        done = sum(min(spent_by(study, one), study.budget) for study, one in zip(studies, there, strict=True))
+        bar.update(done - bar.n)
+
+    with bar:
+        if workers == 1:
+            for study in studies:
+                _work(folder, study, 0, show)
+        else:
+            _in_processes(folder, studies, workers, show)
+        show()
+
+
+def opened(folder: pathlib.Path, name: str) -> optuna.Study:
+    """A study of a folder."""
+    file = folder / JOURNAL
+    with _quietly():
+        pruner = optuna.pruners.MedianPruner(n_startup_trials=STARTUP)
+        return optuna.load_study(study_name=name, storage=_storage(file), pruner=pruner)
+
+
+def spent_by(study: Study, there: optuna.Study) -> int:
+    """What the finished trials of a study have cost."""
+    return sum(study.spent(trial) for trial in finished(there))
+
+
+def finished(there: optuna.Study) -> list[FrozenTrial]:
+    """The trials from which something was learned."""
+    return there.get_trials(deepcopy=False, states=FINISHED)
+
+
+def _work(folder: pathlib.Path, study: Study, worker: int, show: Callable[[], None] | None = None) -> None:
+    """Plays trials of a study until its budget is spent."""
+    there = opened(folder, study.name)
+    while spent_by(study, there) < study.budget:
+        # A generator for each trial: what is suggested depends on what is known, not on who was stopped when.
+        words = np.random.SeedSequence([study.seed, worker, len(finished(there))]).generate_state(1)
+        there.sampler = optuna.samplers.TPESampler(seed=int(words[0]))
+        with _quietly():
+            there.optimize(study.objective, n_trials=1)
+        if show is not None:
+            show()
+
+
+def _in_processes(folder: pathlib.Path, studies: Sequence[Study], workers: int, show: Callable[[], None]) -> None:
+    # Spawned, not forked: a fork would inherit numba's and the BLAS's threads without their locks' owners.
+    context = multiprocessing.get_context("spawn")
+    others = set(multiprocessing.active_children())
+    ended = False
+    with ProcessPoolExecutor(workers, context, initializer=_die_quietly) as executor:
+        try:
+            for study in studies:
+                left = {executor.submit(_work, folder, study, worker) for worker in range(workers)}
+                while left:
+                    done, left = wait(left, timeout=_LOOK)
+                    for future in done:
+                        future.result()
+                    show()
+            ended = True
+        except BrokenProcessPool:
+            raise StudyError("A worker process has died. What was finished is kept; go on with --resume.") from None
+        finally:
+            if not ended:
+                for child in set(multiprocessing.active_children()) - others:
+                    child.terminate()
+
+
+def _die_quietly() -> None:
+    end_with_parent()
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
+def _storage(file: pathlib.Path) -> optuna.storages.JournalStorage:
+    return optuna.storages.JournalStorage(JournalFileBackend(str(file)))
+
+
+def _opened_all(file: pathlib.Path) -> list[optuna.Study]:
+    with _quietly():
+        storage = _storage(file)
+        return [optuna.load_study(study_name=name, storage=storage) for name in optuna.get_all_study_names(storage)]
+
+
+def _made(file: pathlib.Path, study: Study) -> optuna.Study:
+    with _quietly():
+        there = optuna.create_study(study_name=study.name, storage=_storage(file), direction="minimize")
+        there.set_user_attr("identity", dict(study.identity))
+    return there
+
+
+def _check_same(file: pathlib.Path, study: Study, there: optuna.Study) -> None:
+    known = there.user_attrs.get("identity", {})
+    names = [name for name in {**known, **study.identity} if known.get(name) != study.identity.get(name)]
+    if names:
+        what = ", ".join(f"{name} ({known.get(name)!r} there, {study.identity.get(name)!r} here)" for name in names)
+        raise ResultsError(
+            f"{file} has another search of {study.name}: {what}. Go on with that, or choose another folder."
+        )
+
+
+@contextlib.contextmanager
+def _quietly() -> Iterator[None]:
+    """Without Optuna's line for every trial."""
+    level = optuna.logging.get_verbosity()
+    optuna.logging.set_verbosity(optuna.logging.ERROR)
+    try:
+        yield
+    finally:
+        optuna.logging.set_verbosity(level)
