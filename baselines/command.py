@@ -37,6 +37,7 @@ EXTRAS = {
     "rich": "train",
     "pinocchio": "urdf",
     "moviepy": "video",
+    "ray": "cluster",
 }
 
 T = TypeVar("T")

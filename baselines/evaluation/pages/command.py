@@ -26,6 +26,7 @@ from baselines.evaluation.plots.style import small_png
 from baselines.evaluation.report import number
 from baselines.files import write
 from baselines.files.locks import locked
+from baselines.workers import Workers
 from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError
 from ikgym.validation import whole_number
@@ -77,6 +78,8 @@ class Options:
     """Delete the results in the folder."""
     workers: Annotated[int, tyro.conf.arg(metavar="N")] = 1
     """Processes that play what is not timed. What is timed is played in one, after that."""
+    cluster: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
+    """Play what is not timed on a cluster: ray, at the address in RAY_ADDRESS."""
 
 
 #: What the command is called where Python has run its module.
@@ -123,7 +126,7 @@ def measured(options: Options, command: str) -> dict[str, Measurement]:
         if options.agents:
             raise InvalidInputError("--agents are played: expected --out, where the results go.")
         return {page: _read(_file(options.write, page).with_suffix(".json")) for page in options.pages}
-    entered = _entered(options)
+    entered, workers = _entered(options), _workers(options)
     found: dict[str, dict[str, Section]] = {page: {} for page in options.pages}
     for name in dict.fromkeys(name for by_set in entered.values() for name in by_set):
         sections = measure(
@@ -131,7 +134,7 @@ def measured(options: Options, command: str) -> dict[str, Measurement]:
             {page: by_set[name] for page, by_set in entered.items() if name in by_set},
             options.out,
             episodes=2 if options.quick and options.episodes is None else options.episodes,
-            workers=options.workers,
+            workers=workers,
             resume=options.resume,
             overwrite=options.overwrite,
             progress=True,
@@ -195,7 +198,7 @@ def search(options: Options, command: str, file: pathlib.Path) -> str:
         _today(),
         scenarios.get(name),
         episodes=options.episodes or EPISODES,
-        workers=options.workers,
+        workers=_workers(options),
         progress=True,
     )
     found.save(file)
@@ -204,6 +207,11 @@ def search(options: Options, command: str, file: pathlib.Path) -> str:
         for one in found.solvers
     ]
     return "\n".join(table(["solver", "as it is", "tuned", "ratio", "settings"], lines, text=(0, 4)))
+
+
+def _workers(options: Options) -> Workers:
+    """Who plays what is not timed."""
+    return Workers(options.workers, options.cluster)
 
 
 def _entered(options: Options) -> dict[str, dict[str, list[Entry]]]:
@@ -270,7 +278,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         nonlocal out
         options = shared.parse(Options, arguments, prog=prog, description=manual(prog))
         out = str(options.out)
-        whole_number("workers", options.workers, at_least=1)
+        _workers(options)
         if options.episodes is not None:
             whole_number("episodes", options.episodes, at_least=1)
         command = shlex.join([*prog.split(), *arguments])

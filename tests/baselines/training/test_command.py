@@ -53,7 +53,7 @@ def test_several_seeds(several, tmp_path, capsys):
 
 def test_a_seed_that_dies_takes_no_other_with_it(several, tmp_path, monkeypatch, capfd):
     """Nor do those that wait for its process to end."""
-    monkeypatch.setattr(seeds, "_child", dies_with_seed_7)
+    monkeypatch.setattr(seeds, "attempt", dies_with_seed_7)
     assert main(["ppo", *TINY, "--seeds", "7", "1", "--workers", "1", "--out", str(tmp_path)]) == 2
     assert about(tmp_path / "seed-1")["weights_sha256"] == about(several[0] / "seed-1")["weights_sha256"]
     printed = capfd.readouterr()
@@ -66,7 +66,7 @@ def test_a_seed_that_fails_or_dies_takes_no_other_with_it(several, tmp_path, mon
     for seed in (0, 1):
         (tmp_path / f"seed-{seed}").mkdir()
     (tmp_path / "seed-0" / "run.json").write_text("{")
-    monkeypatch.setattr(seeds, "_child", dies_with_seed_7)
+    monkeypatch.setattr(seeds, "attempt", dies_with_seed_7)
     code = main(["ppo", *TINY, "--seeds", "7", "0", "1", "--workers", "2", "--resume", "--out", str(tmp_path)])
     assert code == 2
     assert about(tmp_path / "seed-1")["weights_sha256"] == about(several[0] / "seed-1")["weights_sha256"]

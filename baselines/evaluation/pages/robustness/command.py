@@ -22,6 +22,7 @@ from baselines.evaluation.report import is_reference
 from baselines.files import write
 from baselines.files.locks import locked
 from baselines.spec import parse_policy
+from baselines.workers import Workers
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import imperfect
 from ikgym.validation import number, whole_number
@@ -59,6 +60,8 @@ class Options:
     """Delete the results in the folder."""
     workers: Annotated[int, tyro.conf.arg(metavar="N")] = 1
     """Processes that play."""
+    cluster: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
+    """Play, and search best known costs, on a cluster: ray, at the address in RAY_ADDRESS."""
 
 
 def manual(prog: str) -> str:
@@ -92,8 +95,9 @@ def measured(options: Options, command: str) -> Measured:
     severities = sorted({number("severities", one, at_least=0.0) for one in options.severities})
     if not (severities or options.sets):
         raise InvalidInputError("severities, sets: expected some severities, some test sets, or both; got neither.")
-    how: dict[str, Any] = {name: getattr(options, name) for name in ("workers", "resume", "overwrite")} | {
-        "progress": True
+    how: dict[str, Any] = {name: getattr(options, name) for name in ("resume", "overwrite")} | {
+        "workers": Workers(options.workers, options.cluster),
+        "progress": True,
     }
     entries = measure.entries(options.sets, options.policies, options.out, **how) if options.sets else ()
     place = options.scenario, options.policies, options.out
@@ -119,7 +123,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         nonlocal out
         options = shared.parse(Options, arguments, prog=prog, description=manual(prog))
         out = str(options.out)
-        whole_number("workers", options.workers, at_least=1)
+        Workers(options.workers, options.cluster)
         whole_number("episodes", options.episodes, at_least=1)
         found = measured(options, shlex.join([*prog.split(), *arguments]))
         folder = options.write or options.out or pathlib.Path()

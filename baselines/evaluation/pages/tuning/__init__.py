@@ -11,12 +11,13 @@ from typing import Any, NamedTuple, Self
 from baselines import registry
 from baselines.canonical import DIGITS, one_line, rounded, with_list
 from baselines.evaluation.pages.entries import Entry
-from baselines.evaluation.pages.measure import plan, play
+from baselines.evaluation.pages.measure import ALONE, plan, play
 from baselines.evaluation.pages.tuning.grids import GRIDS, Stage
 from baselines.evaluation.summary import geometric_mean
 from baselines.files import ResultsError, json_files, write
 from baselines.fingerprints import fingerprint
 from baselines.spec import parse_policy, refuse_trust
+from baselines.workers import Workers
 from ikgym import scenarios
 from ikgym.exceptions import IkgymError, InvalidInputError
 from ikgym.scenarios import Scenario
@@ -184,7 +185,7 @@ def tune(
     *,
     grids: Mapping[str, Iterable[Stage]] = GRIDS,
     episodes: int = EPISODES,
-    workers: int = 1,
+    workers: Workers = ALONE,
     progress: bool = False,
 ) -> Tuning:
     """Searches the settings with the lowest geometric mean of the total cost, stage by stage.
@@ -198,7 +199,7 @@ def tune(
         scenario: What is tuned on. Solvers that do not suit it are left out.
         grids: The stages of each solver.
         episodes: Validation episodes.
-        workers: Processes.
+        workers: Who plays.
         progress: Whether to show a bar on stderr for each stage.
 
     Raises:
@@ -226,7 +227,7 @@ def tune(
     return Tuning(command, date, scenario.name, fingerprint(scenario), SPLIT, episodes, tuple(solvers))
 
 
-def _costs(scenario: Scenario, trials: list[Trial], episodes: int, *, workers: int, progress: bool) -> list[float]:
+def _costs(scenario: Scenario, trials: list[Trial], episodes: int, *, workers: Workers, progress: bool) -> list[float]:
     """The geometric mean of each trial's total costs; infinite where one is no number."""
     plans = plan(scenario, [trial.entry for trial in trials], episodes, split=SPLIT)
     rows = play(plans, workers=workers, progress=progress)
