@@ -21,6 +21,7 @@ from baselines.evaluation.pages.entries import FORESIGHT, HORIZONS, Entry, agent
 from baselines.evaluation.pages.markdown import table
 from baselines.evaluation.pages.measure import measure
 from baselines.evaluation.pages.measurement import Measurement, Section
+from baselines.evaluation.pages.submissions.add import add
 from baselines.evaluation.pages.tuning import EPISODES, tune
 from baselines.evaluation.plots.style import small_png
 from baselines.evaluation.report import number
@@ -65,6 +66,11 @@ class Options:
     """Test sets and scenarios of the cost-time page. If left out the test sets of whole poses, and the fixed scenarios
     but for those that hold their points. Those of the last two pages likewise, all paths of real arms if left out. With
     --tune the scenario whose validation episodes are played."""
+    add: Annotated[tuple[pathlib.Path, ...], tyro.conf.arg(metavar="FOLDER …")] = ()
+    """Submissions, see docs/rules.md: each is checked, scored on the sets of the leaderboard, and added to the page in
+    --write; its rows go into --out."""
+    trust: bool = False
+    """Run the code in submissions: only in folders whose maker you know."""
     tune: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None
     """Search the settings of all solvers on validation episodes, and write them here; nothing else is done. The
     leaderboards read baselines/data/tuned/SCENARIO.json."""
@@ -97,6 +103,7 @@ Examples:
   {prog} --out results/pages --agents "PPO=results/ppo" --write docs
   {prog} --pages cost-time --out results/quick --quick
   {prog} --pages rivals choosing --out results/arms --write docs
+  {prog} --add examples/submission --out results/added --write docs
   {prog} --write docs
 
 Files:
@@ -144,6 +151,26 @@ def measured(options: Options, command: str) -> dict[str, Measurement]:
     # What several pages need was played with the first of them; each page keeps its own order.
     ordered = {page: tuple(found[page][name] for name in by_set) for page, by_set in entered.items()}
     return {page: Measurement(command, _today(), _machine(page), sections) for page, sections in ordered.items()}
+
+
+def extended(options: Options, command: str) -> dict[str, Measurement]:
+    """The leaderboards with the submissions of ``--add``.
+
+    Raises:
+        IkgymError: Something expected went wrong, see :func:`baselines.evaluation.pages.submissions.add.add`.
+    """
+    del command  # what was measured before keeps the one that measured it
+    if options.out is None or options.write is None:
+        raise InvalidInputError("--add: expected --out, where the rows go, and --write, the folder of the leaderboard.")
+    pages = [page for page in options.pages if page in LEADERBOARDS]
+    if not pages:
+        raise InvalidInputError(f"--add: expected some of {', '.join(LEADERBOARDS)} in --pages.")
+    how = {"workers": _workers(options), "resume": options.resume, "overwrite": options.overwrite}
+    found = {page: _read(_file(options.write, page).with_suffix(".json")) for page in pages}
+    return {
+        page: add(one, options.add, options.out / page, date=_today(), trust=options.trust, progress=True, **how)
+        for page, one in found.items()
+    }
 
 
 def draw_up(measurement: Measurement, page: str, folder: pathlib.Path) -> None:
@@ -287,7 +314,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             print(f"written to {options.tune}")
             return 0
         folder = options.write or options.out or pathlib.Path()
-        for page, measurement in measured(options, command).items():
+        for page, measurement in (extended if options.add else measured)(options, command).items():
             draw_up(measurement, page, folder)
             print(f"written to {_file(folder, page)}")
         return 0
