@@ -8,7 +8,7 @@ import pathlib
 import shlex
 import sys
 from collections.abc import Iterator, Sequence
-from typing import Annotated, Final, Literal
+from typing import Annotated, Any, Final, Literal
 
 import tyro
 from matplotlib.figure import Figure
@@ -165,7 +165,7 @@ def extended(options: Options, command: str) -> dict[str, Measurement]:
     pages = [page for page in options.pages if page in LEADERBOARDS]
     if not pages:
         raise InvalidInputError(f"--add: expected some of {', '.join(LEADERBOARDS)} in --pages.")
-    how = {"workers": _workers(options), "resume": options.resume, "overwrite": options.overwrite}
+    how: dict[str, Any] = {"resume": options.resume, "overwrite": options.overwrite, "workers": _workers(options)}
     found = {page: _read(_file(options.write, page).with_suffix(".json")) for page in pages}
     return {
         page: add(one, options.add, options.out / page, date=_today(), trust=options.trust, progress=True, **how)
