@@ -17,12 +17,13 @@ def test_it_ends_with_what_is_worked_out():
 
 def test_it_says_what_the_code_does():
     assert f"a block of at most {BLOCK} seeds" in PAGE
-    assert f"a relative difference of {TOLERANCE:.0e}" in PAGE
+    assert TOLERANCE == 1e-6
+    assert "a relative difference of 1e-6" in PAGE
     assert (TRIES, REPLAYED) == (3, 3)
     assert "up to three times in all" in PAGE
     assert "the first three policies" in PAGE
 
 
-@pytest.mark.parametrize(("cores", "expected"), [(1, 10.0), (2, 6.0), (3, 4.0), (100, 4.0)])
+@pytest.mark.parametrize(("cores", "expected"), [(1, 10.0), (2, 6.0), (3, 5.0), (100, 4.0)])
 def test_a_unit_goes_to_the_core_that_is_free_first(cores, expected):
     assert makespan([1.0, 2.0, 3.0, 4.0], cores) == expected
