@@ -43,6 +43,7 @@ EXTRAS = {
     "minari": "data",
     "pinocchio": "urdf",
     "moviepy": "video",
+    "ray": "cluster",
 }
 
 

@@ -30,9 +30,9 @@ from baselines.evaluation.results import Results, Rows
 from baselines.evaluation.runner import run
 from baselines.files import write
 from baselines.files.locks import locked
+from baselines.workers import Workers
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Preview, Scenario
-from ikgym.validation import whole_number
 
 
 def evaluate(
@@ -48,6 +48,7 @@ def evaluate(
     timed: int | Literal["all"] = 1,
     trust: bool = False,
     workers: int = 1,
+    cluster: str | None = None,
     out: str | pathlib.Path | None = None,
     resume: bool = False,
     overwrite: bool = False,
@@ -87,6 +88,8 @@ def evaluate(
         trust: Whether files of agents may run code of their own, see :class:`baselines.agents.policy.Agent`.
         workers: Processes that play episodes; 1 means this one. More than one need a main module that may be
             imported, that is with ``if __name__ == "__main__":``.
+        cluster: The kind of a cluster that plays what is not timed, one of :data:`baselines.workers.CLUSTERS`; None
+            for none.
         out: Where files go; nowhere if left out.
         resume: Goes on with what is in `out`.
         overwrite: Overwrites what is in `out`.
@@ -104,15 +107,17 @@ def evaluate(
         not suit a scenario.
 
     Raises:
-        UnknownNameError: There is no such scenario, policy, parameter, split, test set or format.
+        UnknownNameError: There is no such scenario, policy, parameter, split, test set, format or cluster.
         InvalidInputError: A value is out of range, a policy cannot be imported, refuses what it is shown, is shown
             nothing, cannot go to a worker or chooses no action; nothing suits any scenario; a test set has drifted or
             is to be changed; something is to be exported, and there is no `out`.
         ResultsError: `out` cannot be read or written, or is not to be gone on with; the file of an agent cannot be
             used.
-        WorkerError: A worker process has died.
+        WorkerError: Workers have died over a unit again and again, or have other costs than this machine.
+        ClusterError: There is no cluster.
+        MissingDependencyError: The package of the cluster is not installed.
     """
-    written = _formats(export, out)
+    written, who = _formats(export, out), Workers(workers, cluster)
     plan = make_plan(
         scenarios,
         policies,
@@ -131,7 +136,7 @@ def evaluate(
     folder = None if out is None else pathlib.Path(out)
     return _carry_out(
         plan,
-        workers=workers,
+        workers=who,
         out=folder,
         resume=resume,
         overwrite=overwrite,
@@ -145,7 +150,7 @@ def evaluate(
 def _carry_out(
     plan: EvaluationPlan,
     *,
-    workers: int,
+    workers: Workers,
     out: pathlib.Path | None,
     resume: bool,
     overwrite: bool,
@@ -155,7 +160,6 @@ def _carry_out(
     command: str,
     show: Callable[[Rows], None] | None = None,
 ) -> Rows:
-    whole_number("workers", workers, at_least=1)
     with contextlib.nullcontext() if out is None else locked(out):
         results = None
         if out is not None:
@@ -233,6 +237,8 @@ class Options:
     workers: Annotated[int, tyro.conf.arg(metavar="N")] = 1
     """Processes that play episodes at the same time. They change nothing but the times, which are the truer the
     fewer processes there are."""
+    cluster: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
+    """Play what is not timed on a cluster: ray, at the address in RAY_ADDRESS. What is timed is played here."""
     plots: bool = True
     """Draw plots into the folder."""
     export: Annotated[tuple[str, ...], tyro.conf.arg(metavar="FORMAT …")] = ()
@@ -264,7 +270,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         out = options.out
         if (here := str(pathlib.Path.cwd())) not in sys.path:
             sys.path.append(here)  # for modules of the user, where a console command does not look
-        written = _formats(options.export, out)
+        written, workers = _formats(options.export, out), Workers(options.workers, options.cluster)
         plan = make_plan(
             options.scenarios or (() if options.test_sets else ("varga7-fast",)),
             options.policies,
@@ -281,7 +287,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         )
         _carry_out(
             plan,
-            workers=options.workers,
+            workers=workers,
             out=options.out,
             resume=options.resume,
             overwrite=options.overwrite,

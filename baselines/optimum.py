@@ -12,20 +12,21 @@ import numpy as np
 import tyro
 from tqdm import tqdm
 
-from baselines import command, registry
+from baselines import command
 from baselines.episode import Draw
 from baselines.evaluation import test_sets as known_sets
 from baselines.oracle import best_known
 from baselines.oracle.best_known import MARGIN, MEANINGLESS
-from baselines.oracle.cache import VARIABLE, solve
-from baselines.oracle.episode import EpisodeProblem, path_of
+from baselines.oracle.cache import VARIABLE
+from baselines.oracle.episode import EpisodeProblem
 from baselines.oracle.optimum import Optimum, Search
+from baselines.oracle.several import ALONE, Wanted, find_all
 from baselines.oracle.stripped import NOTE, stripped, strips
-from baselines.spec import parse_policy
+from baselines.workers import Workers
 from ikgym import scenarios as scenario_registry
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
-from ikgym.validation import FloatArray, whole_number
+from ikgym.validation import whole_number
 
 #: A scenario, and which of its episodes is meant.
 SeededScenario = tuple[Scenario, Draw]
@@ -49,6 +50,8 @@ class Options:
     """Look on disk first, and keep there what was found."""
     update: bool = False
     """Write down what is better than the records, or of episodes that have none."""
+    cluster: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
+    """Search on a cluster: ray, at the address in RAY_ADDRESS, a core for each episode."""
     check: bool = False
     """Hold the records against what the search finds, or has on disk, played again; the exit code is 1 where one is
     missing, stale or off by more than a millionth."""
@@ -121,15 +124,21 @@ def _drawn(scenario: Scenario) -> bool:
 
 
 def optima(
-    todo: Sequence[SeededScenario], how: Search, policies: Sequence[str] = (), *, cache: bool
+    todo: Sequence[SeededScenario],
+    how: Search,
+    policies: Sequence[str] = (),
+    *,
+    cache: bool,
+    workers: Workers = ALONE,
 ) -> Iterator[tuple[Scenario, Draw, Optimum]]:
-    """Solves episodes one after the other, with a bar on stderr.
+    """Solves episodes, with a bar on stderr; workers hand them out in the order in which they are done.
 
     Args:
         todo: The episodes.
         how: How thoroughly is searched.
         policies: Whose paths are starts, too.
         cache: Whether to look on disk first, and to keep there what was found.
+        workers: Who searches.
     """
     with tqdm(
         total=len(todo),
@@ -139,26 +148,18 @@ def optima(
         bar_format="{desc}{percentage:3.0f}% |{bar}| {elapsed}<{remaining}",
         mininterval=0.1 if sys.stderr.isatty() else 10.0,
     ) as bar:
-        for number, (scenario, draw) in enumerate(todo, start=1):
-            bar.set_description(f"{scenario.name}, seed {draw.seed} ({number}/{len(todo)})")
-            true = stripped(scenario, draw.seed, draw.arm_seed)
-            given = {"how": how, "arm_seed": draw.arm_seed, "cached": cache, "tick": bar.update}
-            paths = {spec: path(true, draw.seed, spec) for spec in policies}
-            optimum = solve(scenario, draw.seed, **given, paths=paths)
-            bar.update(number - bar.n)
+        done = 0
+
+        def tick(one: Wanted, share: float) -> None:
+            bar.set_description(f"{one.scenario.name}, seed {one.draw.seed} ({done + 1}/{len(todo)})", refresh=False)
+            bar.update(share)
+
+        wanted = [Wanted(scenario, draw, how, tuple(policies), cache) for scenario, draw in todo]
+        for one, optimum in find_all(wanted, workers, tick):
+            done += 1
+            bar.update(done - bar.n)
             bar.clear()
-            yield scenario, draw, optimum
-
-
-def path(scenario: Scenario, seed: int, spec: str) -> FloatArray:
-    """The joint coordinates of an episode that a policy plays, in [rad] or [m]. Shape (steps, n).
-
-    Raises:
-        UnknownNameError: There is no such policy or parameter.
-        InvalidInputError: The text has another form, or the policy does not suit the scenario.
-    """
-    name, parameters = parse_policy(spec)
-    return path_of(registry.make(name, scenario, **parameters), scenario, seed)
+            yield one.scenario, one.draw, optimum
 
 
 def line(optimum: Optimum, note: str = "") -> str:
@@ -212,7 +213,9 @@ def _carry_out(arguments: Sequence[str]) -> int:
     options = command.parse(Options, arguments, prog=_program(), description=manual())
     kept, wrong = 0, 0
     todo = episodes(options.scenarios, options.test_sets, options.seeds)
-    for scenario, draw, optimum in optima(todo, options.search, options.policies, cache=options.cache):
+    workers = Workers(cluster=options.cluster)
+    solved = optima(todo, options.search, options.policies, cache=options.cache, workers=workers)
+    for scenario, draw, optimum in solved:
         print(line(optimum, NOTE if strips(scenario) else ""), flush=True)
         if options.check and (reason := verdict(scenario, optimum, draw.arm_seed)):
             print(f"  {reason}", flush=True)

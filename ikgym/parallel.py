@@ -11,11 +11,23 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
 _pool: ThreadPoolExecutor | None = None
+_limit: int | None = None
 
 
 def cores() -> int:
     """The number of cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    there = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return there if _limit is None else min(there, _limit)
+
+
+def limit(number: int | None) -> None:
+    """Has this process use fewer cores than the system lets it: a cluster counts them, and binds nobody to them.
+
+    Args:
+        number: The most that it uses; None for all.
+    """
+    global _limit
+    _limit = number
 
 
 def in_chunks(work: Callable[[int, int], object], rows: int, grain: int) -> None:

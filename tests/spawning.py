@@ -15,8 +15,8 @@ def random_env():
     return gym.make("ikgym:RedundantIK-v0", scenario="varga7-random", preview=1)
 
 
-def dies_with_seed_7(job, seed, connection, child=seeds._child):
-    """The life of a process that trains a seed, and is killed where the seed is 7."""
-    if seed == 7:
+def dies_with_seed_7(one, report, attempt=seeds.attempt):
+    """Trains a seed, and is killed where the seed is 7."""
+    if one.seed == 7:
         os.kill(os.getpid(), signal.SIGKILL)
-    child(job, seed, connection)
+    return attempt(one, report)

@@ -21,7 +21,7 @@ from baselines.canonical import canonical
 from baselines.evaluation.export import FORMATS, Format
 from baselines.evaluation.metrics import Row
 from baselines.evaluation.plan import EvaluationPlan, Job, Skipped
-from baselines.evaluation.runner import Played
+from baselines.evaluation.units import Played
 from baselines.files import ResultsError, archives, json_files, read_bytes, write
 from ikgym.exceptions import InvalidInputError
 from ikgym.preview import furthest

@@ -3,20 +3,14 @@
 from __future__ import annotations
 
 import contextlib
-import itertools
 import logging
-import multiprocessing
-import signal
 import sys
-from collections.abc import Generator, Iterable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
-from typing import Any, NamedTuple
+from collections.abc import Generator, Iterator, Sequence
+from typing import Any
 
 from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
-from baselines.canonical import canonical, jsonable
 from baselines.episode import Draw
 from baselines.evaluation.entrants import ForeignPolicy, check_sendable, play_wrapped
 from baselines.evaluation.export import Motion
@@ -24,57 +18,35 @@ from baselines.evaluation.machine import describe
 from baselines.evaluation.metrics import Row, measure
 from baselines.evaluation.plan import Job
 from baselines.evaluation.rollout import Episode, Player, Tick, rollout, rollouts, sequence
-from baselines.evaluation.trajectory_log import TrajectoryLog, trajectory_log
-from baselines.lifetime import end_with_parent
+from baselines.evaluation.trajectory_log import trajectory_log
+from baselines.evaluation.units import BLOCK, Checks, Done, Played, Unit, units
 from baselines.oracle import best_known
+from baselines.workers import TRIES, LostError, Report, WorkerError, Workers, finished
 from ikgym.compilation import logger
-from ikgym.exceptions import IkgymError, InvalidInputError
+from ikgym.exceptions import InvalidInputError
 from ikgym.preview import furthest
 from ikgym.scenarios import Preview, Scenario
 
-#: Most episodes that are played in step: what happens in them is in memory until all of them are done.
-MOST = 64
 
+def run(jobs: Sequence[Job], *, workers: Workers, progress: bool) -> Generator[list[Played], None, None]:
+    """Plays jobs in units, and hands out what came of each as soon as it is done.
 
-class WorkerError(IkgymError):
-    """A worker process has died."""
-
-
-class Played(NamedTuple):
-    """A job that is done.
-
-    Attributes:
-        job: What was to be done.
-        row: What came out.
-        log: The trajectory log of the episode if the job is a first one.
-        motion: The joint motion if it is to be kept.
-    """
-
-    job: Job
-    row: Row
-    log: TrajectoryLog | None
-    motion: Motion | None
-
-
-def run(jobs: Sequence[Job], *, workers: int, progress: bool) -> Generator[list[Played], None, None]:
-    """Plays jobs in batches, and hands out what came of each batch as soon as it is done.
+    On a cluster nothing is timed: what needs the clock is played here, after all else.
 
     Args:
         jobs: What is to be done.
-        workers: Processes that do it; 1 means this one.
+        workers: Who does it.
         progress: Whether to show a bar on stderr.
 
     Yields:
-        What came of the jobs of a batch.
+        What came of the jobs of a unit.
 
     Raises:
         InvalidInputError: A policy refuses what it is shown, cannot go to a worker, or chooses no action.
-        WorkerError: A worker process has died.
+        WorkerError: Workers have died over a unit again and again, or have other costs than this machine.
+        ClusterError: There is no cluster.
     """
-    parts, done = batches(jobs), 0
-    elsewhere = workers > 1 and len(parts) > 1
-    if elsewhere:
-        check_sendable({job.entrant: None for job in jobs})
+    away, here = _shared(jobs, workers)
     with tqdm(
         total=sum(job.scenario.steps for job in jobs),
         disable=not progress or not jobs,
@@ -85,25 +57,53 @@ def run(jobs: Sequence[Job], *, workers: int, progress: bool) -> Generator[list[
         # A log file has no cursor to go back with.
         mininterval=0.1 if sys.stderr.isatty() else 10.0,
     ) as bar:
-        line = _Line(bar)
+        line, done = _Line(bar), 0
+        for unit, played in _elsewhere(away, workers):
+            done += len(played)
+            line.announce(unit, done, len(jobs))
+            bar.update(sum(job.scenario.steps for job in unit.jobs))
+            yield played
+        for unit in here:
+            done += len(unit.jobs)
+            line.announce(unit, done, len(jobs))
+            with line.watching():
+                outcomes = play(unit.jobs, line.tick)
+            yield outcomes
 
-        def announce(batch: Sequence[Job]) -> None:
-            nonlocal done
-            done += len(batch)
-            job = batch[0]
-            line.describe(f"{job.scenario.name} · {job.policy} ({done}/{len(jobs)})")
 
-        if not elsewhere:
-            for batch in parts:
-                announce(batch)
-                with line.watching():
-                    outcomes = play(batch, line.tick)
-                yield outcomes
-        else:
-            for batch, played in _in_processes(parts, workers):
-                announce(batch)
-                bar.update(sum(job.scenario.steps for job in batch))
-                yield played
+def _shared(jobs: Sequence[Job], workers: Workers) -> tuple[list[Unit], list[Unit]]:
+    """What workers play, and what is played here."""
+    if workers.cluster is not None:
+        away = units((job for job in jobs if not job.timed), BLOCK)
+        return away, units(job for job in jobs if job.timed)
+    every = units(jobs)
+    return (every, []) if workers.number > 1 and len(every) > 1 else ([], every)
+
+
+def _elsewhere(away: Sequence[Unit], workers: Workers) -> Iterator[tuple[Unit, list[Played]]]:
+    """What workers make of units, checked where they are no processes of this machine."""
+    if not away:
+        return
+    check_sendable({unit.jobs[0].entrant: None for unit in away})
+    checks = None if workers.cluster is None else Checks(play)
+    with workers.pool(len(away)) as pool:
+        for unit, done in finished(pool, do, away):
+            if isinstance(done, LostError):
+                first = unit.jobs[0]
+                raise WorkerError(
+                    f"{first.policy} in {first.scenario.name}: workers have died over it {TRIES} times, the last one "
+                    f"because {done}; perhaps for want of memory: try fewer --workers. What was finished is kept; go "
+                    "on with --resume."
+                )
+            if checks is not None:
+                checks.check(unit, done)
+            yield unit, done.played
+
+
+def do(unit: Unit, report: Report) -> Done:
+    """Plays a unit, in the process of a worker."""
+    del report
+    return Done(unit.digest, play(unit.jobs))
 
 
 class _Line(logging.Handler):
@@ -116,6 +116,11 @@ class _Line(logging.Handler):
     def __init__(self, bar: Any) -> None:
         super().__init__()
         self._bar, self._description, self._compiling = bar, "", False
+
+    def announce(self, unit: Unit, done: int, total: int) -> None:
+        """Says which unit is played, or has been."""
+        first = unit.jobs[0]
+        self.describe(f"{first.scenario.name} · {first.policy} ({done}/{total})")
 
     def describe(self, text: str) -> None:
         """Says what is played."""
@@ -149,24 +154,6 @@ class _Line(logging.Handler):
             yield
         finally:
             logger.removeHandler(self)
-
-
-def batches(jobs: Iterable[Job]) -> list[list[Job]]:
-    """Jobs that are played together, in their order.
-
-    Those that are timed are played alone. So are those of a reference that is made for one episode and knows no other:
-    its jobs differ in what it is made with.
-    """
-    out: list[list[Job]] = []
-    for _, alike in itertools.groupby(jobs, _together):
-        left = list(alike)
-        size = 1 if left[0].timed else MOST
-        out += [left[first : first + size] for first in range(0, len(left), size)]
-    return out
-
-
-def _together(job: Job) -> tuple[object, ...]:
-    return job.scenario.name, job.policy, canonical(job.parameters), canonical(jsonable(job.given)), job.timed
 
 
 def play(batch: Sequence[Job], tick: Tick | None = None) -> list[Played]:
@@ -262,32 +249,3 @@ def _row(job: Job, episode: Episode) -> Row:
         best_known=best_known.cost(job.scenario, job.seed, job.arm_seed),
         ideal=job.ideal,
     )
-
-
-def _in_processes(parts: Sequence[list[Job]], workers: int) -> Iterator[tuple[list[Job], list[Played]]]:
-    # Spawned, not forked: a fork would inherit numba's and the BLAS's threads without their locks' owners.
-    context = multiprocessing.get_context("spawn")
-    others = set(multiprocessing.active_children())
-    executor = ProcessPoolExecutor(min(workers, len(parts)), context, initializer=_die_quietly)
-    finished = False
-    try:
-        futures = {executor.submit(play, batch): batch for batch in parts}
-        for future in as_completed(futures):
-            yield futures.pop(future), future.result()
-        finished = True
-    except BrokenProcessPool:
-        raise WorkerError(
-            "A worker process has died, perhaps for want of memory: try fewer --workers. What was finished is kept; "
-            "go on with --resume."
-        ) from None
-    finally:
-        if not finished:  # nobody should wait for episodes that nobody will read
-            for child in set(multiprocessing.active_children()) - others:
-                child.terminate()
-        executor.shutdown(cancel_futures=True)
-
-
-def _die_quietly() -> None:
-    """Lets Ctrl-C end a worker without a traceback, and ends it with its parent."""
-    end_with_parent()
-    signal.signal(signal.SIGINT, signal.SIG_DFL)

@@ -66,25 +66,43 @@ def solve(
     """
     scenario = scenario if isinstance(scenario, Scenario) else scenarios.get(scenario)
     seed, how = whole_number("seed", seed, at_least=0), how or Search()
-    true, plain = stripped(scenario, seed, arm_seed), ideal(scenario)
-    searched = fingerprint(true) == fingerprint(plain)
-    file = file_of(true, seed, how, polished=not searched)
-    kept = cached and not paths
-    known = _read(file) if kept else None
+    on_disk = cached and not paths
+    known = kept(scenario, seed, how, arm_seed) if on_disk else None
     if known is not None:
-        # The name is not part of the content.
-        return known.replace(scenario=scenario.name)
-    if searched:
+        return known
+    true, plain = stripped(scenario, seed, arm_seed), ideal(scenario)
+    if _same(true, plain):
         optimum = search(true, seed, how, tick, paths)
     else:
         start = solve(plain, seed, how, cached=cached, tick=tick).q
         optimum = polish(true, seed, {IDEAL: start, **(paths or {})})
-    if kept:
-        try:
-            write(file, _packed(optimum))
-        except ResultsError as e:
-            logger.warning("The optimum is not kept: %s", e)
+    if on_disk:
+        keep(optimum, scenario, seed, how, arm_seed)
     return optimum
+
+
+def kept(scenario: Scenario, seed: int, how: Search, arm_seed: int | None = None) -> Optimum | None:
+    """What lies on disk of an episode, see :func:`solve`; None where nothing does."""
+    known = _read(_place(scenario, seed, how, arm_seed))
+    # The name is not part of the content.
+    return None if known is None else known.replace(scenario=scenario.name)
+
+
+def keep(optimum: Optimum, scenario: Scenario, seed: int, how: Search, arm_seed: int | None = None) -> None:
+    """Writes an optimum where :func:`kept` looks for it; where that cannot be done, a warning says so."""
+    try:
+        write(_place(scenario, seed, how, arm_seed), _packed(optimum))
+    except ResultsError as e:
+        logger.warning("The optimum is not kept: %s", e)
+
+
+def _place(scenario: Scenario, seed: int, how: Search, arm_seed: int | None) -> pathlib.Path:
+    true = stripped(scenario, seed, arm_seed)
+    return file_of(true, seed, how, polished=not _same(true, ideal(scenario)))
+
+
+def _same(one: Scenario, other: Scenario) -> bool:
+    return fingerprint(one) == fingerprint(other)
 
 
 def folder() -> pathlib.Path:

@@ -22,6 +22,7 @@ from baselines.training import methods, presets
 from baselines.training.config.base import SHAPE, Config
 from baselines.training.errors import TrainingError
 from baselines.training.seeds import SeedResult, SeedRuns, train_seeds
+from baselines.workers import Workers
 from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError, MissingDependencyError
 from ikgym.validation import whole_number
@@ -39,6 +40,8 @@ class Options:
     """One run each."""
     workers: Annotated[int, tyro.conf.arg(metavar="N")] = 1
     """Processes that train at the same time, one seed each."""
+    cluster: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
+    """Train on a cluster: ray, at the address in RAY_ADDRESS, a core for each seed. Its nodes share the folder."""
     preset: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
     """Options of a preset, or of a file that ends in .toml; those on the command line take precedence."""
     resume: bool = False
@@ -232,7 +235,7 @@ def _train(command: Command[Any], given: frozenset[str], text: str) -> int:
         checkpoint_every=options.checkpoint_every,
         command=text,
     )
-    workers = whole_number("workers", options.workers, at_least=1)
+    workers = Workers(options.workers, options.cluster)
     if options.study is not None:
         return _study(runs, seeds, options, whole_number("study", options.study, at_least=1))
     if options.study_ranges is not None:
@@ -252,6 +255,8 @@ def _study(runs: SeedRuns, seeds: Sequence[int], options: Options, trials: int) 
 
     if len(seeds) > 1:
         raise InvalidInputError(f"seeds: expected one for a study, got {', '.join(map(str, seeds))}.")
+    if options.cluster is not None:
+        raise InvalidInputError("--cluster: a study runs on this machine; expected --workers.")
     given: dict[str, Any] = {"trials": trials, "ranges": options.study_ranges, "workers": options.workers}
     print(searched(runs, seeds[0], **given, progress=options.progress))
     print(f"\nwritten to {options.out}; train with --preset {options.out / BEST}")
@@ -277,7 +282,7 @@ def _repeat(command: Repeat) -> int:
         checkpoint_every=command.checkpoint_every,
         command=shlex.join([*_program().split(), "repeat", str(command.run)]),
     )
-    (result,) = train_seeds(runs, [about["seed"]], workers=1, progress=command.progress)
+    (result,) = train_seeds(runs, [about["seed"]], workers=Workers(), progress=command.progress)
     if result.error:
         raise TrainingError(result.error)
     if result.weights_sha256 == wanted:

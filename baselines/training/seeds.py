@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
-import multiprocessing
 import pathlib
-import signal
+import platform
 import sys
 import traceback
-from collections.abc import Sequence
-from multiprocessing.connection import Connection, wait
-from multiprocessing.context import SpawnProcess
+import uuid
+from collections.abc import Iterator, Sequence
 
 from tqdm import tqdm
 
-from baselines.lifetime import end_with_parent
+from baselines.files import write
 from baselines.training.config.base import Config
 from baselines.training.score import Score
+from baselines.workers import TRIES, LostError, Report, Workers, finished
 from ikgym.exceptions import IkgymError
 
 
@@ -98,40 +98,63 @@ class Bar:
         self._bar.close()
 
 
-def train_seeds(runs: SeedRuns, seeds: Sequence[int], *, workers: int, progress: bool) -> list[SeedResult]:
+def train_seeds(runs: SeedRuns, seeds: Sequence[int], *, workers: Workers, progress: bool) -> list[SeedResult]:
     """Trains one agent a seed.
 
     One seed is trained in this process; several in processes of their own, so that a seed that fails or dies takes no
-    other with it.
+    other with it. Nodes of a cluster write into the folder of the runs, which all of them see: a seed whose node is
+    lost goes on elsewhere from its last checkpoint.
 
     Args:
         runs: What they have in common.
         seeds: One run each.
-        workers: Processes at a time.
+        workers: Who trains.
         progress: Whether to show a bar on stderr.
 
     Returns:
         What came of each, in the order of the seeds.
+
+    Raises:
+        ClusterError: There is no cluster.
     """
     bar = Bar(runs.config.segments, len(seeds), show=progress)
     try:
-        if len(seeds) == 1:
-            return [_train(runs, seeds[0], bar)]
-        return _in_processes(runs, seeds, workers, bar)
+        if workers.cluster is None and len(seeds) == 1:
+            return [train_seed(Seed(runs, seeds[0]), lambda said: bar.advance(seeds[0], *said))]
+        return _elsewhere(runs, seeds, workers, bar)
     finally:
         bar.close()
 
 
-def _train(runs: SeedRuns, seed: int, to: Bar | Connection) -> SeedResult:
+@dataclasses.dataclass(frozen=True)
+class Seed:
+    """What a worker does.
+
+    Args:
+        runs: What all seeds have in common.
+        seed: Which.
+        mark: The name of a file in the folder of the runs that a worker of a cluster has to see; empty elsewhere.
+    """
+
+    runs: SeedRuns
+    seed: int
+    mark: str = ""
+
+
+def train_seed(one: Seed, report: Report) -> SeedResult:
+    """Trains the agent of a seed, in the process of a worker.
+
+    Args:
+        one: Which.
+        report: Told the segments that are done, and the last score.
+    """
     # PyTorch takes seconds to load, which the parent of processes has no need to do.
     from baselines.training.run import train
 
-    def on_segment(done: int, score: Score | None) -> None:
-        if isinstance(to, Bar):
-            to.advance(seed, done, score)
-        else:
-            to.send((done, score))
-
+    runs, seed = one.runs, one.seed
+    if one.mark and not (runs.out / one.mark).exists():
+        unseen = f"{platform.node()} does not see {runs.out}: expected a folder that all nodes of the cluster share"
+        return SeedResult(seed, error=unseen)
     try:
         result = train(
             runs.config,
@@ -141,7 +164,7 @@ def _train(runs: SeedRuns, seed: int, to: Bar | Connection) -> SeedResult:
             overwrite=runs.overwrite,
             checkpoint_every=runs.checkpoint_every,
             command=runs.command,
-            on_segment=on_segment,
+            on_segment=lambda done, score: report((done, score)),
         )
     except IkgymError as e:
         return SeedResult(seed, error=" ".join(str(e).split()))
@@ -152,53 +175,51 @@ def _train(runs: SeedRuns, seed: int, to: Bar | Connection) -> SeedResult:
     return SeedResult(seed, result.score, result.weights_sha256)
 
 
-def _in_processes(runs: SeedRuns, seeds: Sequence[int], workers: int, bar: Bar) -> list[SeedResult]:
-    # Spawned, not forked: a fork would inherit numba's and the BLAS's threads without their locks' owners.
-    context = multiprocessing.get_context("spawn")
-    waiting, results = list(seeds), dict[int, SeedResult]()
-    running: dict[Connection, tuple[int, SpawnProcess]] = {}
+def attempt(one: Seed, report: Report) -> SeedResult:
+    """The same, whatever goes wrong: other seeds go on."""
     try:
-        while waiting or running:
-            while waiting and len(running) < workers:
-                seed = waiting.pop(0)
-                here, there = context.Pipe(duplex=False)
-                process = context.Process(target=_child, args=(runs, seed, there), daemon=True)
-                process.start()
-                there.close()
-                running[here] = seed, process
-            for connection in [pipe for pipe in wait(list(running)) if isinstance(pipe, Connection)]:
-                seed, process = running[connection]
-                try:
-                    message = connection.recv()
-                except EOFError:
-                    process.join()
-                    died = f"its process has died ({_ending(process.exitcode)}); go on with --resume"
-                    results.setdefault(seed, SeedResult(seed, error=died))
-                    del running[connection]
-                    continue
-                if isinstance(message, SeedResult):
-                    results[seed] = message
-                else:
-                    bar.advance(seed, *message)
-    finally:
-        for _, process in running.values():  # nobody waits for them any more; their folders can be resumed
-            process.terminate()
-        for _, process in running.values():
-            process.join()
+        return train_seed(one, report)
+    except Exception as e:
+        traceback.print_exc()
+        return SeedResult(one.seed, error=f"{type(e).__name__}: {' '.join(str(e).split())}")
+
+
+def _elsewhere(runs: SeedRuns, seeds: Sequence[int], workers: Workers, bar: Bar) -> list[SeedResult]:
+    results = dict[int, SeedResult]()
+    far = workers.cluster is not None
+    shared = dataclasses.replace(runs, out=runs.out.absolute()) if far else runs
+    with workers.pool(len(seeds)) as pool, _marked(shared.out, far) as mark:
+        every = [Seed(shared, seed, mark) for seed in seeds]
+        # A process of this machine that dies has not done so by chance.
+        tries = TRIES if far else 1
+
+        def heard(one: Seed, said: tuple[int, Score | None]) -> None:
+            bar.advance(one.seed, *said)
+
+        done = finished(pool, attempt, every, tries=tries, again=_resumed, report=heard)
+        for one, result in done:
+            if isinstance(result, LostError):
+                result = SeedResult(one.seed, error=f"{result}; go on with --resume")
+            elif not result.error:
+                bar.advance(one.seed, runs.config.segments, result.score)
+            results[one.seed] = result
     return [results[seed] for seed in seeds]
 
 
-def _child(runs: SeedRuns, seed: int, connection: Connection) -> None:
-    """The life of a process."""
-    end_with_parent()
-    signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C ends it without a traceback
+def _resumed(one: Seed) -> Seed:
+    """A seed whose node was lost: it goes on from its last checkpoint."""
+    return dataclasses.replace(one, runs=dataclasses.replace(one.runs, resume=True, overwrite=False))
+
+
+@contextlib.contextmanager
+def _marked(folder: pathlib.Path, wanted: bool) -> Iterator[str]:
+    """A file by which workers tell that they see the folder of this machine; its name."""
+    if not wanted:
+        yield ""
+        return
+    file = folder / f".cluster-{uuid.uuid4().hex}"
+    write(file, b"")
     try:
-        result = _train(runs, seed, connection)
-    except Exception as e:
-        traceback.print_exc()
-        result = SeedResult(seed, error=f"{type(e).__name__}: {' '.join(str(e).split())}")
-    connection.send(result)
-
-
-def _ending(code: int | None) -> str:
-    return f"signal {signal.Signals(-code).name}" if code is not None and code < 0 else f"exit code {code}"
+        yield file.name
+    finally:
+        file.unlink(missing_ok=True)

@@ -8,13 +8,9 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-import multiprocessing
 import pathlib
-import signal
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
 from typing import Any
 
 import numpy as np
@@ -24,7 +20,8 @@ from optuna.trial import FrozenTrial, Trial, TrialState
 from tqdm import tqdm
 
 from baselines.files import ResultsError
-from baselines.lifetime import end_with_parent
+from baselines.workers import LostError, Report, Workers
+from baselines.workers import finished as done_by
 from ikgym.exceptions import IkgymError
 
 #: Where the trials of a folder are.
@@ -33,8 +30,6 @@ JOURNAL = "study.journal"
 STARTUP = 5
 #: What counts: the states of trials from which something was learned.
 FINISHED = (TrialState.COMPLETE, TrialState.PRUNED)
-# Seconds between two looks at the journal for the bar.
-_LOOK = 0.5
 
 #: The value of a trial, which is to be low. It reports values on the way, and ends early where that is asked for.
 Objective = Callable[[Trial], float]
@@ -106,7 +101,7 @@ def search(folder: pathlib.Path, studies: Sequence[Study], *, workers: int, prog
         progress: Whether to show a bar on stderr.
 
     Raises:
-        StudyError: A worker process has died.
+        StudyError: Worker processes have died again and again.
         IkgymError: What the objective raises.
     """
     bar = tqdm(
@@ -164,31 +159,18 @@ def _work(folder: pathlib.Path, study: Study, worker: int, show: Callable[[], No
 
 
 def _in_processes(folder: pathlib.Path, studies: Sequence[Study], workers: int, show: Callable[[], None]) -> None:
-    # Spawned, not forked: a fork would inherit numba's and the BLAS's threads without their locks' owners.
-    context = multiprocessing.get_context("spawn")
-    others = set(multiprocessing.active_children())
-    ended = False
-    with ProcessPoolExecutor(workers, context, initializer=_die_quietly) as executor:
-        try:
-            for study in studies:
-                left = {executor.submit(_work, folder, study, worker) for worker in range(workers)}
-                while left:
-                    done, left = wait(left, timeout=_LOOK)
-                    for future in done:
-                        future.result()
-                    show()
-            ended = True
-        except BrokenProcessPool:
-            raise StudyError("A worker process has died. What was finished is kept; go on with --resume.") from None
-        finally:
-            if not ended:
-                for child in set(multiprocessing.active_children()) - others:
-                    child.terminate()
+    with Workers(workers).pool(workers) as pool:
+        for study in studies:
+            units = [(folder, study, worker) for worker in range(workers)]
+            for _, result in done_by(pool, _share, units, report=lambda unit, said: show()):
+                if isinstance(result, LostError):
+                    reason = f"Worker processes have died again and again, the last one because {result}."
+                    raise StudyError(f"{reason} What was finished is kept; go on with --resume.")
 
 
-def _die_quietly() -> None:
-    end_with_parent()
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
+def _share(unit: tuple[pathlib.Path, Study, int], report: Report) -> None:
+    """What one of several workers does of a study."""
+    _work(*unit, show=lambda: report(None))
 
 
 def _storage(file: pathlib.Path) -> optuna.storages.JournalStorage:

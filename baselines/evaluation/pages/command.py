@@ -6,7 +6,7 @@ import dataclasses
 import datetime
 import pathlib
 from collections.abc import Iterator, Sequence
-from typing import Annotated, Final, Literal
+from typing import Annotated, Any, Final, Literal
 
 import tyro
 from matplotlib.figure import Figure
@@ -18,9 +18,11 @@ from baselines.evaluation.pages.choosing import page as choosing
 from baselines.evaluation.pages.entries import FORESIGHT, HORIZONS, Entry, agents, playing, shipped, solvers
 from baselines.evaluation.pages.measure import measure
 from baselines.evaluation.pages.measurement import Measurement, Section
+from baselines.evaluation.pages.submissions.add import add
 from baselines.evaluation.plots.style import small_png
 from baselines.files import write
 from baselines.files.locks import locked
+from baselines.workers import Workers
 from ikgym.exceptions import InvalidInputError
 
 #: The names of the pages on the command line.
@@ -56,6 +58,11 @@ class Options:
     sets: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME …")] = ()
     """Test sets and scenarios of the cost-time page. If left out the test sets of whole poses, and the fixed scenarios
     but for those that hold their points. Those of the last two pages likewise, all paths of real arms if left out."""
+    add: Annotated[tuple[pathlib.Path, ...], tyro.conf.arg(metavar="FOLDER …")] = ()
+    """Submissions, see docs/rules.md: each is checked, scored on the sets of the leaderboard, and added to the page in
+    --write; its rows go into --out."""
+    trust: bool = False
+    """Run the code in submissions: only in folders whose maker you know."""
     episodes: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
     """The first so many episodes of each set, for trials."""
     quick: bool = False
@@ -66,6 +73,8 @@ class Options:
     """Delete the results in the folder."""
     workers: Annotated[int, tyro.conf.arg(metavar="N")] = 1
     """Processes that play what is not timed. What is timed is played in one, after that."""
+    cluster: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
+    """Play what is not timed on a cluster: ray, at the address in RAY_ADDRESS."""
 
 
 #: What the command is called where Python has run its module.
@@ -82,6 +91,7 @@ Examples:
   {prog} --out results/pages --agents "PPO=results/ppo" --write docs
   {prog} --pages cost-time --out results/quick --quick
   {prog} --pages rivals choosing --out results/arms --write docs
+  {prog} --add examples/submission --out results/added --write docs
   {prog} --write docs
 
 Files:
@@ -111,7 +121,7 @@ def measured(options: Options, command: str) -> dict[str, Measurement]:
         if options.agents:
             raise InvalidInputError("--agents are played: expected --out, where the results go.")
         return {page: _read(_file(options.write, page).with_suffix(".json")) for page in options.pages}
-    entered = _entered(options)
+    entered, workers = _entered(options), _workers(options)
     found: dict[str, dict[str, Section]] = {page: {} for page in options.pages}
     for name in dict.fromkeys(name for by_set in entered.values() for name in by_set):
         sections = measure(
@@ -119,7 +129,7 @@ def measured(options: Options, command: str) -> dict[str, Measurement]:
             {page: by_set[name] for page, by_set in entered.items() if name in by_set},
             options.out,
             episodes=2 if options.quick and options.episodes is None else options.episodes,
-            workers=options.workers,
+            workers=workers,
             resume=options.resume,
             overwrite=options.overwrite,
             progress=True,
@@ -129,6 +139,26 @@ def measured(options: Options, command: str) -> dict[str, Measurement]:
     # What several pages need was played with the first of them; each page keeps its own order.
     ordered = {page: tuple(found[page][name] for name in by_set) for page, by_set in entered.items()}
     return {page: Measurement(command, _today(), _machine(page), sections) for page, sections in ordered.items()}
+
+
+def extended(options: Options, command: str) -> dict[str, Measurement]:
+    """The leaderboards with the submissions of ``--add``.
+
+    Raises:
+        IkgymError: Something expected went wrong, see :func:`baselines.evaluation.pages.submissions.add.add`.
+    """
+    del command  # what was measured before keeps the one that measured it
+    if options.out is None or options.write is None:
+        raise InvalidInputError("--add: expected --out, where the rows go, and --write, the folder of the leaderboard.")
+    pages = [page for page in options.pages if page in LEADERBOARDS]
+    if not pages:
+        raise InvalidInputError(f"--add: expected some of {', '.join(LEADERBOARDS)} in --pages.")
+    how: dict[str, Any] = {"resume": options.resume, "overwrite": options.overwrite, "workers": _workers(options)}
+    found = {page: _read(_file(options.write, page).with_suffix(".json")) for page in pages}
+    return {
+        page: add(one, options.add, options.out / page, date=_today(), trust=options.trust, progress=True, **how)
+        for page, one in found.items()
+    }
 
 
 def draw_up(measurement: Measurement, page: str, folder: pathlib.Path) -> None:
@@ -167,6 +197,11 @@ def text(measurement: Measurement, page: str) -> str:
     if page in REAL_ARMS:
         return REAL_ARMS[page](measurement)
     return foresight.page(measurement) if page == FORESIGHT_PAGE else cost_time.page(measurement)
+
+
+def _workers(options: Options) -> Workers:
+    """Who plays what is not timed."""
+    return Workers(options.workers, options.cluster)
 
 
 def _entered(options: Options) -> dict[str, dict[str, list[Entry]]]:
@@ -231,6 +266,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _work(options: Options, command: str) -> None:
     folder = options.write or options.out or pathlib.Path()
-    for page, measurement in measured(options, command).items():
+    for page, measurement in (extended if options.add else measured)(options, command).items():
         draw_up(measurement, page, folder)
         print(f"written to {_file(folder, page)}")

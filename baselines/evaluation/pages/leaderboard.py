@@ -148,7 +148,12 @@ def page(measurement: Measurement, tuning: Tuning, called: str = "leaderboard") 
     out += [*_main(section), "", f"- **Lost** is the share of runs in which the arm was {lost(section)} at some time."]
     out += [LEGEND, *fewer_episodes(section), *_medians(section)]
     out += ["## Performance profiles", "", f"![Performance profiles]({profiles})", "", PROFILE]
-    out += [*_generalisation(measurement.sections[1:]), *_tuned(tuning), *conditions(measurement)]
+    out += [
+        *_generalisation(measurement.sections[1:]),
+        *_tuned(tuning),
+        *_submitted(measurement),
+        *conditions(measurement),
+    ]
     return "\n".join(out) + "\n"
 
 
@@ -250,6 +255,27 @@ def _tuned(tuning: Tuning) -> list[str]:
     ]
     head = ["solver", "settings", "tried", "cost as it is", "cost tuned", "ratio"]
     return [*out, *table(head, lines, text=(0, 1)), ""]
+
+
+def _submitted(measurement: Measurement) -> list[str]:
+    """What others have handed in; nothing where nobody has."""
+    if not measurement.submissions:
+        return []
+    out = ["## Submissions", "", "Checked and scored by the [rules](rules.md); the digest is that of the files.", ""]
+    lines = [
+        [
+            f"`{one.name}`",
+            ", ".join(one.authors),
+            " ".join(f"`{command}`" for command in one.commands).replace("|", r"\|"),
+            ", ".join(one.tuned_on) or NOTHING,
+            one.digest,
+            one.date,
+            str(one.foresight),
+        ]
+        for one in measurement.submissions
+    ]
+    head = ["name", "authors", "commands", "tuned on", "digest", "scored", "foresight"]
+    return [*out, *table(head, lines, text=(0, 1, 2, 3, 4, 5)), ""]
 
 
 def _seeds(line: Line) -> str:

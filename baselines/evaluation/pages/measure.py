@@ -19,10 +19,13 @@ from baselines.evaluation.plan import EvaluationPlan, Job, make_plan
 from baselines.evaluation.results import Results, slug
 from baselines.evaluation.runner import run
 from baselines.files.locks import locked
+from baselines.workers import Workers
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
 
 Key = TypeVar("Key")
+#: This process alone.
+ALONE = Workers()
 
 
 def plan(
@@ -70,7 +73,7 @@ def play(
     plans: Mapping[Key, Sequence[Job]],
     folder: pathlib.Path | None = None,
     *,
-    workers: int = 1,
+    workers: Workers = ALONE,
     resume: bool = False,
     overwrite: bool = False,
     progress: bool = False,
@@ -80,14 +83,15 @@ def play(
     Args:
         plans: The jobs of each entry; an episode that several ask for is played once, timed if one of them wants it.
         folder: For the results; if left out they are kept in memory alone.
-        workers: Processes for what needs no clock.
+        workers: Who plays what needs no clock.
         resume: Continues with what is in the folder.
         overwrite: Deletes what is in the folder.
         progress: Whether to show bars on stderr.
 
     Raises:
         ResultsError: The folder cannot be read or written, or is not to be continued with.
-        WorkerError: A worker process has died.
+        WorkerError: Workers have died over a unit again and again, or have other costs than this machine.
+        ClusterError: There is no cluster.
     """
     jobs: dict[Any, Job] = {}
     for job in (job for some in plans.values() for job in some):
@@ -106,7 +110,13 @@ def play(
 
 
 def _played(
-    whole: EvaluationPlan, folder: pathlib.Path | None, *, workers: int, resume: bool, overwrite: bool, progress: bool
+    whole: EvaluationPlan,
+    folder: pathlib.Path | None,
+    *,
+    workers: Workers,
+    resume: bool,
+    overwrite: bool,
+    progress: bool,
 ) -> dict[Any, Row]:
     """The rows of a plan by the keys of its jobs."""
     rows, results = dict[Any, Row](), None
@@ -116,7 +126,7 @@ def _played(
     left = [job for job in whole.jobs if results is None or not results.done(job)]
     for timed in (False, True):
         part = [job for job in left if job.timed == timed]
-        with contextlib.closing(run(part, workers=1 if timed else workers, progress=progress)) as batches:
+        with contextlib.closing(run(part, workers=ALONE if timed else workers, progress=progress)) as batches:
             for outcomes in batches:
                 rows |= {row.key: row for _, row, *_ in outcomes}
                 if results is not None:

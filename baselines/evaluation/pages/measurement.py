@@ -210,6 +210,29 @@ class Section:
 
 
 @dataclasses.dataclass(frozen=True)
+class Submitted:
+    """A submission, see :mod:`baselines.evaluation.pages.submissions`.
+
+    Args:
+        name: That of its line.
+        authors: Who made it.
+        commands: What it was made with.
+        foresight: Steps ahead that it looks.
+        tuned_on: The splits on which anything was trained or chosen.
+        digest: Of its files, in twelve digits.
+        date: When it was scored, as YYYY-MM-DD.
+    """
+
+    name: str
+    authors: tuple[str, ...]
+    commands: tuple[str, ...]
+    foresight: int
+    tuned_on: tuple[str, ...]
+    digest: str
+    date: str
+
+
+@dataclasses.dataclass(frozen=True)
 class Measurement:
     """What a page is made from.
 
@@ -218,12 +241,14 @@ class Measurement:
         date: When, as YYYY-MM-DD.
         machine: On what, see :func:`baselines.evaluation.machine.describe`.
         sections: What came out, by sets of episodes.
+        submissions: Those of the lines that others have handed in.
     """
 
     command: str
     date: str
     machine: Mapping[str, Any]
     sections: tuple[Section, ...]
+    submissions: tuple[Submitted, ...] = ()
 
     def save(self, file: pathlib.Path) -> None:
         """Writes it as JSON, a line of the table a line.
@@ -232,6 +257,8 @@ class Measurement:
             ResultsError: The file cannot be written.
         """
         head = {"format": FORMAT, "command": self.command, "date": self.date, "machine": dict(self.machine)}
+        if self.submissions:
+            head["submissions"] = [dataclasses.asdict(one) for one in self.submissions]
         sections = []
         for one in self.sections:
             about = {name: value for name, value in vars(one).items() if name != "lines"}

@@ -20,7 +20,8 @@ from baselines.evaluation.machine import describe
 from baselines.evaluation.metrics import TIME_COLUMNS, Row
 from baselines.evaluation.plan import make_plan
 from baselines.evaluation.results import COLUMNS, Results, read_rows
-from baselines.evaluation.runner import MOST, batches, play
+from baselines.evaluation.runner import play
+from baselines.evaluation.units import MOST, units
 from baselines.files import ResultsError, write
 from baselines.spec import parse_policy
 from ikgym import cost_kernels
@@ -181,7 +182,7 @@ def test_two_scenarios_of_one_name_are_refused():
 
 def test_episodes_of_a_policy_in_a_scenario_are_played_together():
     jobs = make_plan(["varga7-random", "varga7-fast"], ["dls", "dls:damping=1e-2"], episodes=MOST + 3, timed=2).jobs
-    parts = batches(jobs)
+    parts = [unit.jobs for unit in units(jobs)]
     assert [job for part in parts for job in part] == list(jobs)
     assert [len(part) for part in parts] == [1, 1, MOST, 1] * 2 + [1, 1]
     assert [part[0].timed for part in parts] == [True, True, False, False] * 2 + [True, True]
@@ -191,7 +192,7 @@ def test_episodes_of_a_policy_in_a_scenario_are_played_together():
 
 def test_a_reference_that_knows_one_episode_plays_it_alone():
     jobs = make_plan("varga7-random", "follow_nominal", episodes=4).jobs
-    assert [len(part) for part in batches(jobs)] == [1] * 4
+    assert [len(unit.jobs) for unit in units(jobs)] == [1] * 4
 
 
 @pytest.mark.parametrize(("timed", "expected"), [(1, 1), (2, 2), (9, 5), ("all", 5)])

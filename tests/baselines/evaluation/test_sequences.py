@@ -15,7 +15,8 @@ from baselines.evaluate import evaluate
 from baselines.evaluation import test_sets
 from baselines.evaluation.plan import make_plan
 from baselines.evaluation.rollout import rollout, sequence
-from baselines.evaluation.runner import batches, play
+from baselines.evaluation.runner import play
+from baselines.evaluation.units import units
 from baselines.policy import Solution, SolverPolicy, statuses
 from ikgym import Plant
 from ikgym.exceptions import InvalidInputError
@@ -76,7 +77,7 @@ def test_five_episodes_have_one_arm():
 
 def test_all_ways_to_play_them_are_the_same():
     jobs = [dataclasses.replace(job, timed=False) for job in jobs_of(noise_seeds=2)]
-    (together,) = batches(jobs)
+    (together,) = [unit.jobs for unit in units(jobs)]
     whole = {one.job.key: one.row.total_cost for one in play(together)}
     assert len(set(whole.values())) == len(jobs) == 14
     by_itself = [play([job])[0] for job in (jobs[9], jobs[13])]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import contextlib
 import importlib.util
 import json
 import pathlib
@@ -19,7 +20,9 @@ from baselines.training.config.reinforcement import PPO
 from baselines.training.errors import TrainingError
 from baselines.training.folder import FORMAT
 from baselines.training.seeds import SeedRuns
+from baselines.workers import Workers
 from tests.baselines.training.small import about, timeless
+from tests.baselines.workers.losing import LosingPool
 from tests.spawning import dies_with_seed_7
 
 ROOT = pathlib.Path(__file__).parents[3]
@@ -53,7 +56,7 @@ def test_several_seeds(several, tmp_path, capsys):
 
 def test_a_seed_that_dies_takes_no_other_with_it(several, tmp_path, monkeypatch, capfd):
     """Nor do those that wait for its process to end."""
-    monkeypatch.setattr(seeds, "_child", dies_with_seed_7)
+    monkeypatch.setattr(seeds, "attempt", dies_with_seed_7)
     assert main(["ppo", *TINY, "--seeds", "7", "1", "--workers", "1", "--out", str(tmp_path)]) == 2
     assert about(tmp_path / "seed-1")["weights_sha256"] == about(several[0] / "seed-1")["weights_sha256"]
     printed = capfd.readouterr()
@@ -66,7 +69,7 @@ def test_a_seed_that_fails_or_dies_takes_no_other_with_it(several, tmp_path, mon
     for seed in (0, 1):
         (tmp_path / f"seed-{seed}").mkdir()
     (tmp_path / "seed-0" / "run.json").write_text("{")
-    monkeypatch.setattr(seeds, "_child", dies_with_seed_7)
+    monkeypatch.setattr(seeds, "attempt", dies_with_seed_7)
     code = main(["ppo", *TINY, "--seeds", "7", "0", "1", "--workers", "2", "--resume", "--out", str(tmp_path)])
     assert code == 2
     assert about(tmp_path / "seed-1")["weights_sha256"] == about(several[0] / "seed-1")["weights_sha256"]
@@ -329,3 +332,22 @@ def test_a_run_json_grants_no_trust(tmp_path, capsys, expert):
     said = capsys.readouterr().err
     assert "run.json: expert: trust is given on the command line or by the caller, never by a file" in said
     assert not (tmp_path / "ran").exists()
+
+
+def test_a_seed_whose_node_is_lost_goes_on_elsewhere(several, tmp_path, monkeypatch, capsys):
+    pool = LosingPool(lost=[0])
+    monkeypatch.setattr(Workers, "pool", lambda self, units: pool)
+    assert main(["ppo", *TINY, "--seeds", "1", "--cluster", "ray", "--overwrite", "--out", str(tmp_path)]) == 0
+    assert about(tmp_path / "seed-1")["weights_sha256"] == about(several[0] / "seed-1")["weights_sha256"]
+    first, again = pool.units
+    assert (first.runs.resume, first.runs.overwrite) == (False, True)
+    assert (again.runs.resume, again.runs.overwrite) == (True, False)
+    assert not list(tmp_path.glob(".cluster-*"))
+    capsys.readouterr()
+
+
+def test_nodes_have_to_share_the_folder(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(Workers, "pool", lambda self, units: LosingPool())
+    monkeypatch.setattr(seeds, "_marked", lambda folder, wanted: contextlib.nullcontext("not-there"))
+    assert main(["ppo", *TINY, "--seeds", "1", "--cluster", "ray", "--out", str(tmp_path)]) == 2
+    assert "expected a folder that all nodes of the cluster share" in capsys.readouterr().err

@@ -20,6 +20,7 @@ from baselines.evaluation.report import is_reference
 from baselines.files import write
 from baselines.files.locks import locked
 from baselines.spec import parse_policy
+from baselines.workers import Workers
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import imperfect
 from ikgym.validation import number, whole_number
@@ -61,6 +62,8 @@ class Options:
     """Delete the results in the folder."""
     workers: Annotated[int, tyro.conf.arg(metavar="N")] = 1
     """Processes that play."""
+    cluster: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
+    """Play, and search best known costs, on a cluster: ray, at the address in RAY_ADDRESS."""
 
 
 def manual(prog: str) -> str:
@@ -95,8 +98,9 @@ def measured(options: Options, command: str) -> Measured:
     severities = sorted({number("severities", one, at_least=0.0) for one in options.severities})
     if not (severities or options.sets or options.effects):
         raise InvalidInputError("severities, sets, effects: expected one of them at least; got neither.")
-    how: dict[str, Any] = {name: getattr(options, name) for name in ("workers", "resume", "overwrite")} | {
-        "progress": True
+    how: dict[str, Any] = {name: getattr(options, name) for name in ("resume", "overwrite")} | {
+        "workers": Workers(options.workers, options.cluster),
+        "progress": True,
     }
     policies = labelled(options.policies)
     place = options.scenario, policies, options.out

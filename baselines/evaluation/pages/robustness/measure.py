@@ -10,6 +10,7 @@ from typing import Any
 
 from tqdm import tqdm
 
+from baselines.episode import Draw
 from baselines.evaluation.metrics import Row
 from baselines.evaluation.pages import measure
 from baselines.evaluation.pages.robustness.measured import Cell, Effect, Entry
@@ -17,8 +18,10 @@ from baselines.evaluation.plan import Job, make_plan
 from baselines.evaluation.report import is_reference
 from baselines.evaluation.results import slug
 from baselines.evaluation.summary import summarise
-from baselines.oracle import Search, best_known, solve
+from baselines.oracle import Search, best_known
+from baselines.oracle.several import ALONE, Wanted, find_all
 from baselines.spec import parse_policy
+from baselines.workers import Workers
 from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError
 from ikgym.plant import Plant
@@ -128,7 +131,8 @@ def cells(
         for place, scenario in everywhere.items()
     }
     rows = measure.play(plans, folder / slug(name), **options)
-    bounds = _bounds(everywhere, scenarios.seeds("test", episodes), progress=bool(options.get("progress")))
+    how = {"progress": bool(options.get("progress")), "workers": options.get("workers", ALONE)}
+    bounds = _bounds(everywhere, scenarios.seeds("test", episodes), **how)
     return tuple(Cell.of(policy, place, found, bounds[place]) for (policy, place), found in rows.items())
 
 
@@ -174,17 +178,21 @@ def _of_policy(label: str, policy: str, sets: Sequence[str], rows: Sequence[Row]
 
 
 def _bounds(
-    everywhere: Mapping[tuple[float, float], Scenario], seeds: Sequence[int], *, progress: bool
+    everywhere: Mapping[tuple[float, float], Scenario], seeds: Sequence[int], *, progress: bool, workers: Workers
 ) -> dict[tuple[float, float], dict[int, float]]:
     """The best known cost of each episode; what is not recorded is searched, and kept on disk."""
-    out: dict[tuple[float, float], dict[int, float]] = {}
-    with tqdm(total=len(everywhere) * len(seeds), disable=not progress, unit="best known cost") as bar:
-        for place, scenario in everywhere.items():
-            for seed in seeds:
-                known = best_known.cost(scenario, seed)
-                cost = solve(scenario, seed, HOW).cost if known is None else known
-                out.setdefault(place, {})[seed] = cost
-                bar.update()
+    out: dict[tuple[float, float], dict[int, float]] = {place: {} for place in everywhere}
+    missing: dict[Wanted, tuple[float, float]] = {}
+    for (place, scenario), seed in itertools.product(everywhere.items(), seeds):
+        if (cost := best_known.cost(scenario, seed)) is not None:
+            out[place][seed] = cost
+        else:
+            missing[Wanted(scenario, Draw(seed), HOW)] = place
+    with tqdm(total=len(missing), disable=not progress, unit="best known cost") as bar:
+        # One search takes all cores of this machine; a cluster gives each a core.
+        for one, optimum in find_all(list(missing), workers if workers.cluster else ALONE):
+            out[missing[one]][one.draw.seed] = optimum.cost
+            bar.update()
     return out
 
 

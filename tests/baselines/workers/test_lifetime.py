@@ -25,7 +25,7 @@ MAIN = "import sys; from {module} import main; sys.exit(main(sys.argv[1:]))"
 
 WAIT = """
 import multiprocessing, time
-from baselines.lifetime import end_with_parent
+from baselines.workers.lifetime import end_with_parent
 
 def work():
     end_with_parent()
@@ -67,7 +67,7 @@ def wait_for(condition, seconds):
 @pytest.mark.parametrize("end", [signal.SIGKILL, signal.SIGTERM])
 def test_workers_end_with_a_killed_parent(tmp_path, end):
     (tmp_path / "wait.py").write_text(WAIT)
-    sources = {**os.environ, "PYTHONPATH": str(pathlib.Path(__file__).parents[2])}
+    sources = {**os.environ, "PYTHONPATH": str(pathlib.Path(__file__).parents[3])}
     line = [sys.executable, str(tmp_path / "wait.py")]
     with subprocess.Popen(line, stdout=subprocess.PIPE, text=True, env=sources) as parent:
         try:

@@ -1,0 +1,1 @@
+"""Submissions to the leaderboard: folders of others that are checked, scored, and added to the page."""

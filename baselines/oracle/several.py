@@ -1,0 +1,133 @@
+"""Best known costs of several episodes, one after the other or by workers."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+from collections.abc import Callable, Iterator, Sequence
+
+from baselines import registry
+from baselines.episode import Draw
+from baselines.oracle.best_known import MEANINGLESS
+from baselines.oracle.cache import keep, kept, solve
+from baselines.oracle.episode import EpisodeProblem, path_of
+from baselines.oracle.optimum import Optimum, Search
+from baselines.oracle.stripped import stripped
+from baselines.spec import parse_policy
+from baselines.workers import TOLERANCE, LostError, Report, WorkerError, Workers, finished
+from ikgym.scenarios import Scenario
+from ikgym.validation import FloatArray
+
+#: This process alone.
+ALONE = Workers()
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Wanted:
+    """An episode whose best known cost is wanted.
+
+    Args:
+        scenario: What is tracked.
+        draw: Which of its episodes.
+        how: How thoroughly is searched.
+        policies: Specs of policies whose paths are starts, too.
+        cached: Whether to look on disk first, and to keep there what was found.
+    """
+
+    scenario: Scenario
+    draw: Draw
+    how: Search
+    policies: tuple[str, ...] = ()
+    cached: bool = True
+
+
+def find(wanted: Wanted, report: Report) -> Optimum:
+    """The cheapest path that is found, in this process.
+
+    Args:
+        wanted: Of which episode.
+        report: Called now and then with the share of the work done since the last call.
+
+    Raises:
+        UnknownNameError: There is no such policy or parameter.
+        InvalidInputError: A policy does not suit the scenario, or the scenario cannot be searched.
+    """
+    scenario, draw = wanted.scenario, wanted.draw
+    true = stripped(scenario, draw.seed, draw.arm_seed)
+    paths = {spec: path(true, draw.seed, spec) for spec in wanted.policies}
+    given = {"arm_seed": draw.arm_seed, "cached": wanted.cached, "tick": report, "paths": paths}
+    return solve(scenario, draw.seed, wanted.how, **given)  # type: ignore[arg-type]  # the types of a dict are joined
+
+
+def find_all(
+    wanted: Sequence[Wanted],
+    workers: Workers = ALONE,
+    tick: Callable[[Wanted, float], None] = lambda one, share: None,
+) -> Iterator[tuple[Wanted, Optimum]]:
+    """The cheapest paths that are found; by workers in the order in which they are done.
+
+    What workers of a cluster find is played again here, and kept on the disk of this machine as well.
+
+    Args:
+        wanted: Of which episodes.
+        workers: Who searches.
+        tick: Called now and then with an episode and the share of its work done since the last call.
+
+    Raises:
+        UnknownNameError: There is no such policy or parameter.
+        InvalidInputError: A policy does not suit a scenario, or a scenario cannot be searched.
+        WorkerError: Workers have died over an episode again and again, or found another cost than there is here.
+        ClusterError: There is no cluster.
+    """
+    if workers.here:
+        for one in wanted:
+            yield one, find(one, functools.partial(tick, one))
+        return
+    left = []
+    for one in wanted:
+        known = _kept(one)
+        if known is None:
+            left.append(one)
+        else:
+            yield one, known
+    with workers.pool(len(left)) as pool:
+        for one, optimum in finished(pool, find, left, report=tick):
+            if isinstance(optimum, LostError):
+                raise WorkerError(
+                    f"{one.scenario.name}, seed {one.draw.seed}: workers have died over it, the last one because "
+                    f"{optimum}. What was found is kept."
+                )
+            _check(one, optimum)
+            if one.cached and not one.policies:
+                keep(optimum, one.scenario, one.draw.seed, one.how, one.draw.arm_seed)
+            yield one, optimum
+
+
+def path(scenario: Scenario, seed: int, spec: str) -> FloatArray:
+    """The joint coordinates of an episode that a policy plays, in [rad] or [m]. Shape (steps, n).
+
+    Raises:
+        UnknownNameError: There is no such policy or parameter.
+        InvalidInputError: The text has another form, or the policy does not suit the scenario.
+    """
+    name, parameters = parse_policy(spec)
+    return path_of(registry.make(name, scenario, **parameters), scenario, seed)
+
+
+def _kept(one: Wanted) -> Optimum | None:
+    """What lies on the disk of this machine."""
+    if not one.cached or one.policies:
+        return None
+    return kept(one.scenario, one.draw.seed, one.how, one.draw.arm_seed)
+
+
+def _check(one: Wanted, optimum: Optimum) -> None:
+    """Insists that this machine charges the same for a path."""
+    episode = EpisodeProblem.of(stripped(one.scenario, one.draw.seed, one.draw.arm_seed), one.draw.seed)
+    _, cost = episode.play(optimum.qdot)
+    if not math.isclose(cost, optimum.cost, rel_tol=TOLERANCE, abs_tol=MEANINGLESS):
+        raise WorkerError(
+            f"{one.scenario.name}, seed {one.draw.seed}: a worker found {optimum.cost!r}, whose path costs {cost!r} "
+            f"here; expected a relative difference of at most {TOLERANCE:g}. Install the same versions on all nodes."
+        )

@@ -1,0 +1,17 @@
+"""Units of work that other processes do: of this machine, or of a cluster. One interface for both."""
+
+from baselines.workers.choice import CLUSTERS, Workers
+from baselines.workers.pool import TOLERANCE, TRIES, ClusterError, LostError, Pool, Report, WorkerError, finished
+
+__all__ = [
+    "CLUSTERS",
+    "TOLERANCE",
+    "TRIES",
+    "ClusterError",
+    "LostError",
+    "Pool",
+    "Report",
+    "WorkerError",
+    "Workers",
+    "finished",
+]

@@ -1,0 +1,115 @@
+"""Episodes that workers of a cluster play: the same as here, or refused."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import pytest
+
+from baselines.evaluate import evaluate
+from baselines.evaluation import runner, units
+from baselines.evaluation.plan import make_plan
+from baselines.evaluation.results import read_rows
+from baselines.workers import WorkerError, Workers
+from tests.baselines.workers.losing import LosingPool
+
+STEPS = 5
+FAR = {"cpu": "another one"}
+
+
+@pytest.fixture
+def pool(monkeypatch):
+    """The workers of the cluster."""
+    here = LosingPool()
+    monkeypatch.setattr(Workers, "pool", lambda self, units: here)
+    return here
+
+
+@pytest.fixture
+def one_by_one(monkeypatch):
+    monkeypatch.setattr(runner, "BLOCK", 1)
+
+
+def on_another_machine(monkeypatch, factor):
+    """Has workers say that they are another machine, and cost more by a factor."""
+
+    def do(unit, report, plain=runner.do):
+        done = plain(unit, report)
+        worse = [
+            one._replace(row=dataclasses.replace(one.row, machine=FAR, total_cost=factor * one.row.total_cost))
+            for one in done.played
+        ]
+        return done._replace(played=worse)
+
+    monkeypatch.setattr(runner, "do", do)
+
+
+def play(**options):
+    return evaluate("varga7-random", "dls", episodes=4, steps=STEPS, plots=False, **options)
+
+
+def costs(rows):
+    return [(row.seed, row.total_cost, row.tracking_cost) for row in rows]
+
+
+def test_a_lost_node_changes_nothing(pool, one_by_one, tmp_path):
+    pool.lost = {0, 2}
+    rows = play(cluster="ray", out=tmp_path)
+    assert costs(rows) == costs(play())
+    assert len(pool.units) == 5  # three episodes, two of them twice
+    # Times are those of this machine alone, and a table without them has a dash.
+    assert [row.time_p50_us is None for row in rows] == [False, True, True, True]
+    assert read_rows(tmp_path / "results.json") == rows
+
+
+def test_a_unit_that_kills_every_worker_is_named_and_the_others_are_kept(pool, one_by_one, tmp_path):
+    pool.lost = {2, 3, 4}
+    with pytest.raises(WorkerError, match="dls in varga7-random: workers have died over it 3 times, the last one"):
+        play(cluster="ray", out=tmp_path)
+    kept = [row.seed for row in read_rows(tmp_path / "results.json")]
+    assert len(kept) == 2
+    before = len(pool.units)
+    assert costs(play(cluster="ray", out=tmp_path, resume=True)) == costs(play())
+    assert len(pool.units) == before + 1
+
+
+def test_blocks_of_seeds():
+    jobs = make_plan("varga7-random", "dls", episodes=20).jobs
+    assert [len(unit.jobs) for unit in units.units(jobs, units.BLOCK)] == [1, 8, 8, 3]
+
+
+def test_digests_tell_units_apart():
+    jobs = make_plan("varga7-random", ["dls", "dls:damping=1e-2"], episodes=3, steps=STEPS).jobs
+    changed = dataclasses.replace(jobs[0], scenario=jobs[0].scenario.replace(steps=STEPS + 1))
+    every = [units.Unit((job,)) for job in (*jobs, changed)]
+    assert len({unit.digest for unit in every}) == len(jobs) + 1
+    assert units.Unit((jobs[0],)).digest == every[0].digest
+
+
+def test_another_version_of_the_code_is_refused(pool, monkeypatch):
+    done = runner.do
+    monkeypatch.setattr(runner, "do", lambda unit, report: done(unit, report)._replace(digest="0" * 24))
+    with pytest.raises(WorkerError, match="has played something else than dls in varga7-random: it has ikgym"):
+        play(cluster="ray")
+
+
+@pytest.mark.parametrize(("factor", "fits"), [(1.0 + 1e-8, True), (1.0 + 1e-5, False)])
+def test_costs_of_other_processors_are_held_against_those_of_this_one(pool, monkeypatch, factor, fits, tmp_path):
+    on_another_machine(monkeypatch, factor)
+    if fits:
+        rows = play(cluster="ray", out=tmp_path)
+        assert [row.machine == FAR for row in rows] == [False, True, True, True]
+        return
+    with pytest.raises(WorkerError, match="expected a relative difference of at most 1e-06"):
+        play(cluster="ray", out=tmp_path)
+    assert not (tmp_path / "results.json").exists()
+
+
+def test_on_processors_of_one_kind_costs_are_the_same(pool, monkeypatch):
+    on_another_machine(monkeypatch, 1.0 + 1e-8)
+    here = units.describe()
+    monkeypatch.setitem(FAR, "cpu", here["cpu"])
+    for name, value in here.items():
+        monkeypatch.setitem(FAR, name, value)
+    with pytest.raises(WorkerError, match="expected a relative difference of at most 0"):
+        play(cluster="ray")

@@ -1,0 +1,63 @@
+"""Best known costs that workers find are those that are found here."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import pytest
+
+from baselines.episode import Draw
+from baselines.oracle import Search, several
+from baselines.oracle.cache import kept
+from baselines.oracle.several import Wanted, find_all
+from baselines.workers import WorkerError, Workers
+from ikgym import scenarios
+from tests.baselines.workers.losing import LosingPool
+
+HOW = Search(starts=1, chains=1, generations=0, polished=1, knots=20)
+FAR = Workers(cluster="ray")
+
+
+@pytest.fixture
+def pool(monkeypatch):
+    here = LosingPool(lost=[0])
+    monkeypatch.setattr(Workers, "pool", lambda self, units: here)
+    return here
+
+
+def wanted(*, cached=True):
+    scenario = scenarios.get("varga7-random").replace(steps=40)
+    return [Wanted(scenario, Draw(seed), HOW, cached=cached) for seed in (7_000_000, 7_000_001)]
+
+
+def costs(found):
+    return {one.draw.seed: optimum.cost for one, optimum in found}
+
+
+def test_they_are_the_same_and_kept_here(pool, monkeypatch, tmp_path):
+    monkeypatch.setenv("IKGYM_CACHE", str(tmp_path))
+    alone = costs(find_all(wanted(cached=False)))
+    assert costs(find_all(wanted(cached=False), FAR)) == alone
+    assert kept(wanted()[0].scenario, 7_000_000, HOW) is None
+    assert costs(find_all(wanted(), FAR)) == alone
+    assert kept(wanted()[0].scenario, 7_000_000, HOW).cost == alone[7_000_000]
+    asked = len(pool.units)
+    assert asked == 2 + 1 + 2  # one was lost
+    assert costs(find_all(wanted(), FAR)) == alone
+    assert len(pool.units) == asked  # an interrupted search goes on: nothing is searched twice
+
+
+def test_a_path_that_costs_something_else_here_is_refused(pool, monkeypatch):
+    def find(one, report, plain=several.find):
+        optimum = plain(one, report)
+        return dataclasses.replace(optimum, cost=optimum.cost * (1.0 - 1e-5))
+
+    monkeypatch.setattr(several, "find", find)
+    with pytest.raises(WorkerError, match="expected a relative difference of at most 1e-06"):
+        costs(find_all(wanted(cached=False), FAR))
+
+
+def test_an_episode_over_which_all_workers_die_is_named(pool):
+    pool.lost = {0, 2, 3}
+    with pytest.raises(WorkerError, match="varga7-random, seed 7000000: workers have died over it"):
+        costs(find_all(wanted(cached=False), FAR))
