@@ -211,9 +211,9 @@ def _in_sequence(batch: Sequence[Job], policy: Player, tick: Tick | None) -> lis
 
 
 def _played(job: Job, episode: Episode) -> Played:
-    about = job.scenario, job.seed, episode
-    log = trajectory_log(*about) if job.first else None
-    return Played(job, _row(job, episode), log, Motion.of(*about) if job.exported else None)
+    log = trajectory_log(job.scenario, job.draw, episode) if job.first else None
+    motion = Motion.of(job.scenario, job.seed, episode) if job.exported else None
+    return Played(job, _row(job, episode), log, motion)
 
 
 def play_episodes(
