@@ -23,9 +23,10 @@ function shown(value) {
   return digits !== 0 && (Math.abs(digits) < 1e-3 || Math.abs(digits) >= 1e5) ? digits.toExponential() : `${digits}`;
 }
 
-// The colour and the dashes of each policy, by its place among those of its scenario.
+// Colour and dashes of a policy: its own if it is one of those that are chosen, else a pale one.
 function looks(entry) {
-  const place = DATA.entries.filter((other) => other.scenario === entry.scenario).indexOf(entry);
+  const place = chosen().indexOf(entry);
+  if (place < 0) return { color: themed("links"), dash: "solid" };
   return { color: COLOURS[place % COLOURS.length], dash: DASHES[Math.floor(place / COLOURS.length) % DASHES.length] };
 }
 

@@ -1,10 +1,10 @@
 // The table works at once; Plotly, which is large, is read when it has been painted.
 
-function drawAll() {
-  drawCostTime();
-  drawErrors();
-  drawJoints();
-  return drawReplay();
+async function drawAll() {
+  for (const draw of [drawCostTime, drawErrors, drawJoints, drawReplay]) {
+    await draw();
+    await new Promise((resolve) => { setTimeout(resolve); }); // lets the browser show it, and heed the reader
+  }
 }
 
 async function begin() {

@@ -2,6 +2,7 @@
 
 const NEAREST = 1e-4; // by how much a cost ratio exceeds 1 at the lower end of its axis at most
 const SMALLEST = 1e-10; // errors below are rounding, in [m] and [rad]
+const NAMED = 14; // of more policies, only the chosen ones have their names beside their points
 
 // The scenario whose policies are compared: that of the pictures.
 const current = () => chosen()[0]?.scenario ?? (element("scenario").value || DATA.entries[0]?.scenario);
@@ -9,12 +10,20 @@ const current = () => chosen()[0]?.scenario ?? (element("scenario").value || DAT
 // The axis of a cost ratio is logarithmic in what it exceeds 1 by.
 const height = (value, ratio) => (ratio ? Math.max(value - 1, NEAREST) : Math.max(value, 1e-12));
 
+// At 1.0001, 1.001, …, 2, 10, 100, …: where each stands on the axis, and what it is called.
+function costRatioTicks() {
+  const ratios = [...[-4, -3, -2, -1, 0].map((k) => 1 + 10 ** k), ...Array.from({ length: 15 }, (_, k) => 10 ** (k + 1))];
+  const text = (ratio) => (ratio < 1e4 ? shown(ratio) : `10<sup>${Math.round(Math.log10(ratio))}</sup>`);
+  return { tickvals: ratios.map((ratio) => ratio - 1), ticktext: ratios.map(text) };
+}
+
 function drawCostTime() {
   const all = DATA.entries.filter((entry) => entry.scenario === current());
   const ratio = all.every((entry) => entry.quantity === "cost ratio");
   const usable = all.filter((e) => e.time !== null && e.value !== null && (ratio || e.quantity === "total cost"));
   const picked = new Set(chosen());
-  const points = usable.map((entry) => {
+  usable.sort((a, b) => a.time - b.time);
+  const points = usable.map((entry, place) => {
     const y = height(entry.value, ratio);
     const bar = entry.low === null ? undefined : {
       type: "data", symmetric: false, thickness: 1.5, width: 4,
@@ -23,8 +32,9 @@ function drawCostTime() {
     const look = looks(entry);
     const between = entry.low === null ? "" : `<br>95 %: ${shown(entry.low)} … ${shown(entry.high)}`;
     return {
-      type: "scatter", mode: "markers+text", x: [entry.time], y: [y], error_y: bar,
-      text: [escaped(label(entry))], textposition: "top center", textfont: { size: 11 }, cliponaxis: false,
+      type: "scatter", mode: picked.has(entry) || usable.length <= NAMED ? "markers+text" : "markers", x: [entry.time], y: [y], error_y: bar,
+      text: [escaped(label(entry))], textposition: place % 2 ? "bottom center" : "top center", cliponaxis: false,
+      textfont: { size: picked.has(entry) ? 12 : 10.5, color: themed(picked.has(entry) ? "ink" : "quiet") },
       marker: {
         color: look.color, size: picked.has(entry) ? 13 : 9, symbol: entry.reference ? "diamond-open" : "circle",
         line: { color: entry.reference ? look.color : themed("card"), width: entry.reference ? 2 : 1 },
@@ -34,8 +44,7 @@ function drawCostTime() {
       showlegend: false,
     };
   });
-  const powers = Array.from({ length: 13 }, (_, k) => k - 4);
-  const ticks = ratio ? { tickvals: powers.map((k) => 10 ** k), ticktext: powers.map((k) => shown(1 + 10 ** k)) } : {};
+  const ticks = ratio ? costRatioTicks() : { exponentformat: "power", dtick: 1 };
   const quantity = ratio ? "cost ratio" : "total cost";
   Plotly.react("cost-time", points, layout({
     height: 440, margin: { l: 56, r: 24, t: 20, b: 44 }, hovermode: "closest",
@@ -48,7 +57,7 @@ function drawCostTime() {
     (missing ? `${missing} without a time or a finite cost ${missing === 1 ? "is" : "are"} not shown.` : "");
 }
 
-// Line `width` steps wide for each chosen policy; a panel and its axes say where.
+// A line in the colour of a policy; `place` is the number of its panel, as names of axes have it.
 function curve(entry, x, y, place, rest) {
   const look = looks(entry);
   return {
@@ -72,7 +81,7 @@ function drawErrors() {
       const errors = column(array(entry, kind), 0).map((value) => (value < SMALLEST ? SMALLEST : value));
       traces.push(curve(entry, column(array(entry, "time"), 0), errors, place, { showlegend: k === 0 }));
     }
-    axes[`yaxis${place}`] = axis({ type: "log", title: { text: kinds[kind] }, exponentformat: "power" });
+    axes[`yaxis${place}`] = axis({ type: "log", title: { text: kinds[kind] }, exponentformat: "power", dtick: 1 });
     const last = k === present.length - 1;
     axes[`xaxis${place}`] = axis({ title: { text: last ? "time [s]" : "" }, matches: k ? "x" : undefined });
   });

@@ -2,7 +2,7 @@
 
 const MOST_SCENES = 4; // browsers keep few WebGL contexts
 const CURSOR_EVERY = 150; // [ms] between two moves of the line in the plots of errors: drawing them takes a while
-const PLAYER = { time: 0, end: 0, playing: false, last: 0, busy: false, moved: 0, scenes: [] };
+const PLAYER = { time: 0, end: 0, turn: 0, playing: false, last: 0, busy: false, moved: 0, scenes: [] };
 const LIMITS = ["joint", "acceleration", "velocity", "stop"];
 const LIMIT_WORDS = ["", "acceleration limit", "velocity limit", "stop"];
 
@@ -23,7 +23,6 @@ function placed(points) {
 
 const GAP = [null, null, null];
 const triples = (flat) => Array.from({ length: flat.length / 3 }, (_, k) => flat.slice(3 * k, 3 * k + 3));
-const triple = (from, k) => row(from, k);
 
 // The last row that is not after a time.
 function rowAt(entry, time) {
@@ -47,7 +46,7 @@ function moving(scene, k) {
   const joints = entry.series.joint_ends.map((end) => points[end]);
   const states = row(array(entry, "limit"), k);
   return {
-    at: [scene.path.slice(0, k + 1), points, joints, axes, [triple(array(entry, "nominal"), k)]].map(placed),
+    at: [scene.path.slice(0, k + 1), points, joints, axes, [row(array(entry, "nominal"), k)]].map(placed),
     colours: states.map((state) => themed(LIMITS[state])), sizes: states.map((state) => (state ? 11 : 7)), states,
   };
 }
@@ -57,14 +56,13 @@ function traces(scene) {
   const line = (name, points, look, rest) =>
     ({ ...kind, name, mode: "lines", hoverinfo: "skip", showlegend: false, line: look, ...placed(points), ...rest });
   const { at, colours, sizes } = moving(scene, 0);
-  const nominal = array(scene.entry, "nominal");
-  const reference = nominal.shape.length ? triples(Array.from(nominal.values)) : [];
+  const reference = triples(Array.from(array(scene.entry, "nominal").values));
   const axisColours = ["x", "y", "z"].flatMap((name) => Array(3).fill(themed(name)));
   const frame = WEBGL ? { color: axisColours, width: 6 } : { color: themed("x"), width: 2.5 };
   const dots = (name, marker, where) => ({ ...line(name, [], {}), mode: "markers", marker, ...where });
   return [
-    line("reference path", reference, { color: themed("reference"), width: WEBGL ? 8 : 5 }, { opacity: WEBGL ? 1 : 0.7 }),
-    { ...line("actual path", [], { color: themed("actual"), width: WEBGL ? 4 : 2 }), ...at[0] },
+    line("reference path", reference, { color: themed("reference"), width: 3 }),
+    { ...line("actual path", [], { color: themed("actual"), width: WEBGL ? 7 : 4 }), ...at[0] },
     { ...line("links", [], { color: themed("links"), width: WEBGL ? 12 : 5 }), ...at[1] },
     dots("joints", { color: colours, size: sizes, line: { color: themed("ink"), width: 1 } }, at[2]),
     { ...line("tool frame", [], frame), ...at[3] },
@@ -107,7 +105,7 @@ function sceneLayout(box) {
   });
   return layout({ ...flat, margin: { l: 0, r: 0, t: 0, b: 0 }, scene: {
     xaxis: sides(0, "x"), yaxis: sides(1, "y"), zaxis: sides(2, "z"), aspectmode: "data", dragmode: "turntable",
-    camera: { eye: { x: 1.35, y: 1.35, z: 0.75 }, projection: { type: "orthographic" } },
+    camera: { eye: { x: 1.15, y: 1.15, z: 0.6 }, projection: { type: "orthographic" } },
   } });
 }
 
@@ -129,12 +127,16 @@ function figureFor(scene) {
 function turnTogether(scene) {
   scene.plot.on("plotly_relayout", (change) => {
     const camera = change["scene.camera"];
-    if (!camera) return;
-    for (const other of PLAYER.scenes) if (other !== scene) Plotly.relayout(other.plot, { "scene.camera": camera });
+    if (!camera || PLAYER.turning) return; // the others say so, too
+    PLAYER.turning = true;
+    const others = PLAYER.scenes.filter((other) => other !== scene);
+    Promise.all(others.map((other) => Plotly.relayout(other.plot, { "scene.camera": camera })))
+      .finally(() => { PLAYER.turning = false; });
   });
 }
 
 async function drawReplay() {
+  const turn = (PLAYER.turn += 1);
   for (const scene of PLAYER.scenes) Plotly.purge(scene.plot);
   const picked = chosen();
   const able = picked.filter((entry) => entry.series?.arrays.points);
@@ -156,6 +158,7 @@ async function drawReplay() {
   element("play").disabled = !entries.length;
   for (const scene of PLAYER.scenes) {
     await Plotly.newPlot(scene.plot, traces(scene), sceneLayout(box), { ...CONFIG, displayModeBar: false });
+    if (turn !== PLAYER.turn) return; // another choice was made meanwhile
     if (WEBGL) turnTogether(scene);
   }
   await showTime();
@@ -251,10 +254,9 @@ function preparePlayer() {
     Home: () => seek(0), End: () => seek(PLAYER.end),
   };
   document.addEventListener("keydown", (event) => {
-    const own = event.target.closest("input, select, button, summary, a, .scroll");
-    const ours = !own || (own.id === "time" && event.key !== " " ? keys[event.key] : false);
-    if (!(event.key in keys) || !(ours || (own?.id === "time" && event.key === " "))) return;
-    if (event.ctrlKey || event.altKey || event.metaKey || !PLAYER.scenes.length) return;
+    const own = event.target.closest("input, select, button, summary, a, .scroll"); // has keys of its own
+    if (!(event.key in keys) || (own && own.id !== "time") || !PLAYER.scenes.length) return;
+    if (event.ctrlKey || event.altKey || event.metaKey) return;
     event.preventDefault();
     keys[event.key]();
   });

@@ -47,6 +47,7 @@ function choose(line) {
   swatches();
 }
 
+// The colours that the chosen ones have in the pictures.
 function swatches() {
   for (const line of LINES) {
     const box = boxOf(line);
