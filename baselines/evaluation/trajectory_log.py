@@ -32,9 +32,9 @@ def trajectory_log(scenario: Scenario, seed: int | Draw, episode: Episode) -> Tr
         nominal joint path; ``prismatic`` says which joints are prismatic, ``lower``, ``upper`` and ``velocity_limit``
         what the arm is limited to, infinite where it is not, all of shape (n,). Where it has limits of acceleration,
         ``acceleration_limit`` (n,), and ``qddot`` (k, n): the change of q̇ in the step by Δt, from rest at the start.
-        For replays, at f <= :data:`FRAMES` of these steps, whose rows are ``frame`` (f,): ``joint_points`` (f, n, 2, 3),
-        where the joints of the arm that moves begin and end, ``tool`` (f, 3), both in [m], and ``tool_rotation``
-        (f, 3, 3).
+        For replays, at f <= :data:`FRAMES` of these steps, whose rows are ``frame`` (f,): ``joint_points``
+        (f, n, 2, 3), where the joints of the arm that moves begin and end, ``tool`` (f, 3), both in [m], and
+        ``tool_rotation`` (f, 3, 3).
     """
     draw = Draw.of(seed)
     after = np.flatnonzero(scenario.counted())

@@ -11,9 +11,7 @@ from baselines.canonical import canonical
 from baselines.evaluation.html.entries import Entry
 from baselines.evaluation.html.series import BUDGET, thinned
 from baselines.evaluation.metrics import Row
-from baselines.evaluation.report import is_reference, labels
 from baselines.evaluation.results import Results
-from baselines.evaluation.summary import Summary, by_seed, geometric_interval
 
 
 def packed(rows: Sequence[Row]) -> dict[str, Any]:

@@ -10,6 +10,7 @@ from html import escape
 from baselines.evaluation.html.entries import Entry
 from baselines.evaluation.report import NOTHING, number
 
+
 @dataclasses.dataclass(frozen=True)
 class Column:
     """A column of the table.

@@ -6,7 +6,7 @@ from baselines.evaluate import evaluate
 from tests.limited import limited
 
 #: What a scenario must not be able to do to a page.
-NASTY = "<script>alert(1)</script> & \"co'\""
+NASTY = '<script>alert(1)</script> & "co\'"'
 STEPS, EPISODES = 450, 3
 
 
