@@ -2,6 +2,7 @@
 
 const MOST_SCENES = 4; // browsers keep few WebGL contexts
 const CURSOR_EVERY = 150; // [ms] between two moves of the line in the plots of errors: drawing them takes a while
+const LONGEST = 100; // [ms] that a picture may move the replay on, at its speed
 const PLAYER = { time: 0, end: 0, turn: 0, playing: false, last: 0, busy: false, moved: 0, scenes: [] };
 const LIMITS = ["joint", "acceleration", "velocity", "stop"];
 const LIMIT_WORDS = ["", "acceleration limit", "velocity limit", "stop"];
@@ -230,7 +231,8 @@ function setPlaying(playing) {
 
 async function tick(now) {
   if (!PLAYER.playing) return;
-  const passed = Math.max(now - PLAYER.last, 0) / 1e3;
+  // Where a picture takes long, the replay is slower than it should be, and skips nothing.
+  const passed = Math.min(Math.max(now - PLAYER.last, 0), LONGEST) / 1e3;
   PLAYER.last = now;
   await seek(PLAYER.time + passed * Number(element("speed").value));
   if (PLAYER.time >= PLAYER.end) setPlaying(false);
