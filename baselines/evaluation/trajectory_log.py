@@ -67,7 +67,8 @@ def trajectory_log(scenario: Scenario, seed: int | Draw, episode: Episode) -> Tr
 def frame_rows(rows: int, most: int) -> npt.NDArray[np.int64]:
     """At most so many of some rows, evenly spread; the last one always."""
     count = min(rows, most)
-    return np.ceil(np.arange(1, count + 1) * (rows / count)).astype(np.int64) - 1
+    frames: npt.NDArray[np.int64] = -(-np.arange(1, count + 1) * rows // count) - 1
+    return frames
 
 
 def _arm_in_space(scenario: Scenario, draw: Draw, q: FloatArray, made: npt.NDArray[np.int64]) -> TrajectoryLog:
