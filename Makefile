@@ -20,7 +20,7 @@ $(STAMP): pyproject.toml constraints.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable ".[dev]"
 	@touch $@
 
-demo: $(STAMP) ## Evaluate ten policies (DEMO=all: all) on the default scenario: table and plots in results/demo
+demo: $(STAMP) ## Evaluate ten policies (DEMO=all: all) on the default scenario: results/demo/report.html
 	$(BIN)/ikgym evaluate --scenarios varga7-fast --policies $(DEMO) --out results/demo --overwrite
 
 test: $(STAMP) ## Run the tests that are not marked slow

@@ -23,6 +23,7 @@ from baselines import command
 from baselines.evaluation import report
 from baselines.evaluation.entrants import ALL, AnyPolicy, Wrap
 from baselines.evaluation.export import formats
+from baselines.evaluation.html import PAGE, page
 from baselines.evaluation.machine import describe
 from baselines.evaluation.manual import manual
 from baselines.evaluation.plan import EvaluationPlan, make_plan
@@ -53,6 +54,7 @@ def evaluate(
     resume: bool = False,
     overwrite: bool = False,
     plots: bool = True,
+    report_page: bool = True,
     export: str | Iterable[str] = (),
     noise_seeds: int = 1,
     pairs: bool = False,
@@ -94,6 +96,7 @@ def evaluate(
         resume: Goes on with what is in `out`.
         overwrite: Overwrites what is in `out`.
         plots: Whether to draw plots; needs `out`.
+        report_page: Whether to write report.html, which shows table, plots and replays; needs `out`.
         export: What the joint motion of each episode is written as: ``"csv"``, ``"joint-trajectory"`` or both, see
             :mod:`baselines.evaluation.export`; needs `out`.
         noise_seeds: How often each episode is played, with other noise in sensors and drives, the same for all
@@ -141,6 +144,7 @@ def evaluate(
         resume=resume,
         overwrite=overwrite,
         plots=plots,
+        report_page=report_page,
         export=written,
         progress=progress,
         command="baselines.evaluate.evaluate(…)",
@@ -155,6 +159,7 @@ def _carry_out(
     resume: bool,
     overwrite: bool,
     plots: bool,
+    report_page: bool,
     export: Sequence[str],
     progress: bool,
     command: str,
@@ -175,7 +180,7 @@ def _carry_out(
         if show is not None:  # before the plots, which take a while
             show(of_all)
         if results is not None:
-            _finish(results, plan, plots=plots, progress=progress, command=command)
+            _finish(results, plan, plots=plots, report_page=report_page, progress=progress, command=command)
         return of_all
 
 
@@ -187,7 +192,9 @@ def _formats(names: str | Iterable[str], out: object) -> tuple[str, ...]:
     return found
 
 
-def _finish(results: Results, plan: EvaluationPlan, *, plots: bool, progress: bool, command: str) -> None:
+def _finish(
+    results: Results, plan: EvaluationPlan, *, plots: bool, report_page: bool, progress: bool, command: str
+) -> None:
     """Writes what is made from the rows."""
     pictures = {}
     if plots:
@@ -200,6 +207,8 @@ def _finish(results: Results, plan: EvaluationPlan, *, plots: bool, progress: bo
     now = datetime.datetime.now(datetime.UTC)
     text = report.readme(results.rows, plan.skipped, command=command, date=now, pictures=pictures)
     write(results.directory / "README.md", text.encode())
+    if report_page:
+        write(results.directory / PAGE, page(results, plan.skipped, command=command, date=now))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -241,6 +250,8 @@ class Options:
     """Play what is not timed on a cluster: ray, at the address in RAY_ADDRESS. What is timed is played here."""
     plots: bool = True
     """Draw plots into the folder."""
+    report: bool = True
+    """Write report.html into the folder: table, plots and replays in one page, which opens without a network."""
     export: Annotated[tuple[str, ...], tyro.conf.arg(metavar="FORMAT …")] = ()
     """Write the joint motion of each episode into the folder: csv for times, joint coordinates and velocities as a
     table, joint-trajectory for a message of ROS 2 as JSON, or both."""
@@ -292,6 +303,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             resume=options.resume,
             overwrite=options.overwrite,
             plots=options.plots,
+            report_page=options.report,
             export=written,
             progress=True,
             command=shlex.join([*_program().split(), *arguments]),
@@ -300,7 +312,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             ),
         )
         if out is not None:
-            print(f"\nwritten to {out}")
+            print(f"\nwritten to {out}" + (f"; open {out / PAGE} in a browser" if options.report else ""))
         return 0
 
     return command.run(

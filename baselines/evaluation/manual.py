@@ -38,6 +38,7 @@ Files in the folder of --out, each replaced in one go, so that a run may be stop
   results.json  a list of rows, one an episode, written anew after each batch
   results.csv   the same as a table
   README.md     tables, plots and conditions
+  report.html   tables that sort and filter, plots, and replays of the arms: open it in a browser
   plots/        for each scenario: tracking and errors, joint velocities, joint paths, cost against time
   series/       what the plots show, as .npz
   export/       with --export, the joint motion of each episode

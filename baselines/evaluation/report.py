@@ -62,7 +62,7 @@ def table(rows: Sequence[Row], skipped: Sequence[Skipped] = (), *, operations: b
             parts.append(f"{_judged_by(summaries)} over the episodes of {scenario}\n{plain(spread, summaries, width)}")
         if operations:
             parts.append(f"operations in one step of {scenario}, mean\n{plain(_operations(names), summaries, width)}")
-    notes = _notes(rows)
+    notes = remarks(rows)
     if absent:
         notes.append(f"left out at {width} characters a line: {', '.join(absent)}")
     notes += [f"skipped: {s.policy} in {s.scenario}: {s.reason}" for s in skipped]
@@ -103,7 +103,7 @@ def readme(
             for caption, file in files:
                 out += [f"![{_escaped(caption)}]({quote(file.as_posix())})", "", f"*{_escaped(caption)}.*", ""]
             out += ["</details>", ""] if collapsed else []
-    out += ["## Notes", "", *(f"- {_escaped(note)}" for note in _notes(rows)), ""]
+    out += ["## Notes", "", *(f"- {_escaped(note)}" for note in remarks(rows)), ""]
     if skipped:
         out += ["Skipped, since the policy does not suit the scenario:", ""]
         out += [f"- {s.policy} in {s.scenario}: {_escaped(s.reason)}" for s in skipped] + [""]
@@ -116,7 +116,7 @@ def readme(
             out.append(f"| {_escaped(scenario)} | {_escaped(names[id(summary)])} | {values} |")
     out += ["", "## Conditions", "", f"- command: `{command}`", f"- finished: {date:%Y-%m-%d %H:%M} UTC"]
     machines = list({tuple(row.machine.items()): row.machine for row in rows}.values())
-    out += [f"- machine: {_escaped(_machine(machine))}" for machine in machines]
+    out += [f"- machine: {_escaped(machine_in_words(machine))}" for machine in machines]
     if len(machines) > 1:
         out += ["- The rows were measured on different machines: their times cannot be compared."]
     out += [
@@ -263,7 +263,8 @@ def _markdown(columns: Sequence[Column], summaries: Sequence[Summary]) -> list[s
     return [f"| {' | '.join(line)} |" for line in (heads, rules, *cells)]
 
 
-def _notes(rows: Sequence[Row]) -> list[str]:
+def remarks(rows: Sequence[Row]) -> list[str]:
+    """What has to be said below the tables."""
     notes = [REFERENCE_NOTE] * any(is_reference(row.policy) for row in rows)
     notes += [STOP_NOTE] * any(row.steps_at_joint_limit for row in rows)
     notes.append(
@@ -300,7 +301,8 @@ def _beaten(rows: Sequence[Row]) -> list[str]:
     ]
 
 
-def _machine(machine: Mapping[str, Any]) -> str:
+def machine_in_words(machine: Mapping[str, Any]) -> str:
+    """A line on what was measured on."""
     words = dict(machine)
     cpu, cores = words.pop("cpu", "unknown CPU"), words.pop("cores", "?")
     return f"{cpu}, {cores} cores, " + ", ".join(f"{name} {value}" for name, value in words.items())

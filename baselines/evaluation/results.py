@@ -185,7 +185,7 @@ class Results:
 
     def _clear(self) -> None:
         """Removes what an evaluation writes, and nothing else that may lie in the folder."""
-        stale = [self._file, self.directory / "results.csv", self.directory / "README.md"]
+        stale = [self.directory / name for name in (self._file.name, "results.csv", "README.md", "report.html")]
         stale += self.directory.glob("series/*/*.npz")
         stale += self.directory.glob("plots/*/*.png")
         stale += [file for kind in FORMATS.values() for file in self.directory.glob(f"export/*/*{kind.suffix}")]

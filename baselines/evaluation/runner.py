@@ -198,7 +198,7 @@ def _in_sequence(batch: Sequence[Job], policy: Player, tick: Tick | None) -> lis
 
 
 def _played(job: Job, episode: Episode) -> Played:
-    log = trajectory_log(job.scenario, job.seed, episode) if job.first else None
+    log = trajectory_log(job.scenario, job.draw, episode) if job.first else None
     motion = Motion.of(job.scenario, job.draw, episode) if job.exported else None
     return Played(job, _row(job, episode), log, motion)
 

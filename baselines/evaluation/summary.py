@@ -89,6 +89,8 @@ class Summary:
         orientation_error_max: The largest, in [rad]; None without an orientation.
         qdot_peak: The largest, in [rad/s] or [m/s].
         steps_at_joint_limit: Their sum.
+        steps_at_velocity_limit: Likewise.
+        steps_at_acceleration_limit: Likewise.
         time_p50_us: Median of the medians, in [µs]; None, like all times, where no episode was timed.
         time_p99_us: The largest, in [µs].
         deadline_misses: Their sum.
@@ -112,6 +114,8 @@ class Summary:
     orientation_error_max: float | None
     qdot_peak: float
     steps_at_joint_limit: int
+    steps_at_velocity_limit: int
+    steps_at_acceleration_limit: int
     time_p50_us: float | None
     time_p99_us: float | None
     deadline_misses: int | None
@@ -240,6 +244,8 @@ def _summary(rows: Sequence[Row], ideal: Sequence[Row] | None) -> Summary:
         orientation_error_max=max(angles) if angles else None,
         qdot_peak=max(row.qdot_peak for row in rows),
         steps_at_joint_limit=sum(row.steps_at_joint_limit for row in rows),
+        steps_at_velocity_limit=sum(row.steps_at_velocity_limit for row in rows),
+        steps_at_acceleration_limit=sum(row.steps_at_acceleration_limit for row in rows),
         time_p50_us=clocked.p50_us,
         time_p99_us=clocked.p99_us,
         deadline_misses=sum(misses) if misses else None,

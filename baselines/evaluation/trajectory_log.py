@@ -7,19 +7,23 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from baselines.episode import Draw
 from baselines.evaluation.rollout import Episode
 from ikgym.scenarios import Scenario
+from ikgym.validation import FloatArray
 
+#: Most pictures of a replay.
+FRAMES = 400
 #: Arrays by name, see :func:`trajectory_log`.
 TrajectoryLog = dict[str, npt.NDArray[Any]]
 
 
-def trajectory_log(scenario: Scenario, seed: int, episode: Episode) -> TrajectoryLog:
+def trajectory_log(scenario: Scenario, seed: int | Draw, episode: Episode) -> TrajectoryLog:
     """What plots show of an episode, at the steps that count.
 
     Args:
         scenario: What was tracked.
-        seed: The reset seed.
+        seed: The reset seed, or what is drawn how.
         episode: What happened.
 
     Returns:
@@ -28,12 +32,16 @@ def trajectory_log(scenario: Scenario, seed: int, episode: Episode) -> Trajector
         nominal joint path; ``prismatic`` says which joints are prismatic, ``lower``, ``upper`` and ``velocity_limit``
         what the arm is limited to, infinite where it is not, all of shape (n,). Where it has limits of acceleration,
         ``acceleration_limit`` (n,), and ``qddot`` (k, n): the change of q̇ in the step by Δt, from rest at the start.
+        For replays, at f <= :data:`FRAMES` of these steps, whose rows are ``frame`` (f,): ``joint_points``
+        (f, n, 2, 3), where the joints of the arm that moves begin and end, ``tool`` (f, 3), both in [m], and
+        ``tool_rotation`` (f, 3, 3).
     """
+    draw = Draw.of(seed)
     after = np.flatnonzero(scenario.counted())
     kept = after - 1
     log: TrajectoryLog = {
         "time": after * scenario.dt,
-        "nominal": scenario.nominal(seed)[after],
+        "nominal": scenario.nominal(draw.seed)[after],
         "pose": episode.pose[kept],
         "q": episode.q[kept],
         "qdot": episode.qdot[kept],
@@ -49,7 +57,28 @@ def trajectory_log(scenario: Scenario, seed: int, episode: Episode) -> Trajector
         start = np.zeros((1, scenario.joints))
         log["qddot"] = (np.diff(episode.qdot, axis=0, prepend=start) / scenario.dt)[kept]
         log["acceleration_limit"] = scenario.arm.acceleration_limit
-    path = scenario.nominal_joint_path(seed)
+    path = scenario.nominal_joint_path(draw.seed)
     if path is not None:
         log["nominal_q"] = path[after]
-    return log
+    frames = frame_rows(len(kept), FRAMES)
+    return log | {"frame": frames, **_arm_in_space(scenario, draw, log["q"][frames], after[frames])}
+
+
+def frame_rows(rows: int, most: int) -> npt.NDArray[np.int64]:
+    """At most so many of some rows, evenly spread; the last one always."""
+    count = min(rows, most)
+    frames: npt.NDArray[np.int64] = -(-np.arange(1, count + 1) * rows // count) - 1
+    return frames
+
+
+def _arm_in_space(scenario: Scenario, draw: Draw, q: FloatArray, made: npt.NDArray[np.int64]) -> TrajectoryLog:
+    """Where the arm is after so many steps: the one that moves, and not the one in the data sheet."""
+    plant = scenario.drawn_plant(draw.seed, draw.arm_seed)
+    arms = [plant.loaded_arm if steps >= plant.payload_step else plant.arm for steps in made]
+    places = [arm.forward(row) for arm, row in zip(arms, q, strict=True)]
+    points = np.array([arm.joint_points(row) for arm, row in zip(arms, q, strict=True)])
+    return {
+        "joint_points": points.astype(np.float32),
+        "tool": np.array([position for _, position in places], dtype=np.float32),
+        "tool_rotation": np.array([rotation for rotation, _ in places], dtype=np.float32),
+    }

@@ -86,7 +86,7 @@ def test_names_import_no_policy_and_read_no_agent():
         names = baselines.names()
         assert "rhc" in names and "agent_alone" in names and "oracle" in names
         print([m for m in sys.modules if m.startswith(("baselines.solvers", "baselines.agents", "baselines.oracle",
-            "baselines.evaluation", "matplotlib", "torch", "ray", "minari", "h5py", "optuna"))])
+            "baselines.evaluation", "matplotlib", "plotly", "torch", "ray", "minari", "h5py", "optuna"))])
         print([file for file in opened if file.endswith(".safetensors")])
         assert len(opened) > 10
         """

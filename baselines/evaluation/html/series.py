@@ -1,0 +1,106 @@
+"""Trajectory logs as the page shows them: thinned, and as text."""
+
+from __future__ import annotations
+
+import base64
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from baselines.evaluation.trajectory_log import FRAMES, TrajectoryLog, frame_rows
+from ikgym.validation import FloatArray
+
+#: Bytes that the series of a page may take together, as far as each of them has :data:`FEWEST` rows.
+BUDGET, FEWEST = 5_000_000, 50
+#: How near to a limit a joint is at it: in [rad] or [m] for a stop, as a share for other limits.
+AT_LIMIT = 1e-6
+#: What a joint may be at, from the least to the most severe; the page has a colour for each number.
+FREE, ACCELERATION, VELOCITY, STOP = range(4)
+
+
+def thinned(log: TrajectoryLog, size: int) -> dict[str, Any]:
+    """A log at some of its steps, such that no peak is lost: between two of them, the worst is shown.
+
+    Args:
+        log: See :func:`baselines.evaluation.trajectory_log.trajectory_log`.
+        size: Bytes that it may take as text.
+
+    Returns:
+        ``arrays`` as :func:`encoded` gives them: ``time``, ``nominal`` positions, ``points`` of the links from the base
+        to the tool, ``rotation`` of the tool, and ``q`` at the frames that are kept; of all steps since the one before,
+        the largest errors, the ``qdot`` and ``qddot`` that are largest in magnitude, and the worst ``limit``. Besides
+        how many steps there were (``rows``), the limits, which joints are prismatic, and which of the points stand for
+        a joint's end (``joint_ends``). Without what a replay needs where the log has no frames.
+    """
+    frames = log.get("frame", frame_rows(len(log["time"]), FRAMES))
+    picked = frame_rows(len(frames), max(FEWEST, size // _row_size(log["q"].shape[1])))
+    rows = frames[picked]
+    starts = np.concatenate([[0], rows[:-1] + 1])
+    arrays: dict[str, npt.NDArray[Any]] = {name: log[name][rows] for name in ("time", "q")}
+    arrays["nominal"] = log["nominal"][rows][:, -3:]
+    for name in ("position_error", "orientation_error"):
+        if name in log:
+            arrays[name] = np.fmax.reduceat(log[name], starts)
+    arrays |= {name: _largest(log[name], starts) for name in ("qdot", "qddot") if name in log}
+    arrays["limit"] = np.maximum.reduceat(limits(log), starts)
+    out: dict[str, Any] = {"rows": len(log["time"]), "prismatic": log["prismatic"].tolist()}
+    if "joint_points" in log:
+        arrays["points"], out["joint_ends"] = _links(log, picked)
+        arrays["rotation"] = log["tool_rotation"][picked].reshape(-1, 9)
+    bounds = ("lower", "upper", "velocity_limit", "acceleration_limit")
+    out |= {name: _listed(log[name]) for name in bounds if name in log}
+    return out | {"arrays": {name: encoded(values) for name, values in arrays.items()}}
+
+
+def limits(log: TrajectoryLog) -> npt.NDArray[np.uint8]:
+    """Which limit each joint is at: :data:`FREE`, :data:`ACCELERATION`, :data:`VELOCITY` or :data:`STOP`; (k, n)."""
+    out = np.full(log["q"].shape, FREE, dtype=np.uint8)
+    if "qddot" in log:
+        out[np.abs(log["qddot"]) >= (1.0 - AT_LIMIT) * log["acceleration_limit"]] = ACCELERATION
+    out[np.abs(log["qdot"]) >= (1.0 - AT_LIMIT) * log["velocity_limit"]] = VELOCITY
+    out[(log["q"] <= log["lower"] + AT_LIMIT) | (log["q"] >= log["upper"] - AT_LIMIT)] = STOP
+    return out
+
+
+def encoded(values: npt.NDArray[Any]) -> dict[str, Any]:
+    """An array as JSON: its bytes in base64, since JSON has no numbers that are not finite, and in single precision."""
+    kept = values.astype(np.uint8 if values.dtype == np.uint8 else "<f4")
+    kind = "u1" if kept.dtype == np.uint8 else "f4"
+    return {"type": kind, "shape": list(kept.shape), "data": base64.b64encode(kept.tobytes()).decode("ascii")}
+
+
+def decoded(array: Mapping[str, Any]) -> npt.NDArray[Any]:
+    """What :func:`encoded` was given, in single precision."""
+    return np.frombuffer(base64.b64decode(array["data"]), dtype="<" + array["type"]).reshape(array["shape"])
+
+
+def _row_size(joints: int) -> int:
+    """Bytes of a row as text, at most: base64 takes four for three."""
+    numbers = 2 * joints + 3 * (2 * joints + 2) + joints + 9 + 6
+    return (4 * numbers + joints) * 4 // 3
+
+
+def _largest(values: FloatArray, starts: npt.NDArray[np.int64]) -> FloatArray:
+    """Of each stretch of rows, and of each joint, the value that is largest in magnitude, with its sign."""
+    high, low = np.fmax.reduceat(values, starts), np.fmin.reduceat(values, starts)
+    return np.where(-low > high, low, high)
+
+
+def _links(log: TrajectoryLog, picked: npt.NDArray[np.int64]) -> tuple[npt.NDArray[Any], list[int]]:
+    """The points that the links go through, of shape (f, p, 3), and which of them are the ends of joints."""
+    joints = log["joint_points"][picked]
+    columns = [np.zeros((len(picked), 3))]
+    ends = []
+    for joint, prismatic in enumerate(log["prismatic"].tolist()):
+        # A revolute joint begins where it ends.
+        columns += [joints[:, joint, 0]] * prismatic + [joints[:, joint, 1]]
+        ends.append(len(columns) - 1)
+    return np.stack([*columns, log["tool"][picked]], axis=1), ends
+
+
+def _listed(values: FloatArray) -> list[float | None]:
+    """Limits as JSON; None stands for none."""
+    return [value if math.isfinite(value) else None for value in values.tolist()]

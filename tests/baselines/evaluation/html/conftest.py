@@ -1,0 +1,20 @@
+"""A folder of results with its report, made once for all tests of the page."""
+
+import pytest
+
+from baselines.evaluate import evaluate
+from tests.limited import limited
+
+#: What a scenario must not be able to do to a page.
+NASTY = '<script>alert(1)</script> & "co\'"'
+STEPS, EPISODES = 450, 3
+
+
+@pytest.fixture(scope="session")
+def folder(tmp_path_factory):
+    """Two scenarios, the first of which has limits that are reached, and one policy that none else has."""
+    out = tmp_path_factory.mktemp("report")
+    scenarios = [limited(steps=STEPS, name=NASTY, dt=0.001), limited(steps=20, name="short")]
+    policies = ["dls", "moore_penrose", "dls:damping=0.05", "follow_nominal"]
+    evaluate(scenarios, policies, episodes=EPISODES, out=out, plots=False)
+    return out
