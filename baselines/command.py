@@ -37,6 +37,9 @@ EXTRAS = {
     "rich": "train",
     "pinocchio": "urdf",
     "moviepy": "video",
+    "trimesh": "view",
+    "viser": "view",
+    "yourdfpy": "view",
 }
 
 T = TypeVar("T")
@@ -106,6 +109,12 @@ def run(work: Callable[[], int], stopped: Callable[[], str] = lambda: "Stopped."
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     return code
+
+
+def find_own_modules() -> None:
+    """Lets modules in the current folder be imported, where a console command does not look."""
+    if (here := str(pathlib.Path.cwd())) not in sys.path:
+        sys.path.append(here)
 
 
 def complain(message: str) -> None:
