@@ -17,6 +17,17 @@ class Pose(NamedTuple):
     rotation: FloatArray
     position: FloatArray
 
+    @classmethod
+    def at(cls, position: npt.ArrayLike, wxyz: npt.ArrayLike) -> Pose:
+        """The pose of a position in [m] and a unit quaternion (w, x, y, z)."""
+        w, x, y, z = np.asarray(wxyz, dtype=np.float64)
+        rotation = np.array([
+            [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+            [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
+            [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
+        ])  # fmt: skip
+        return cls(rotation, np.array(position, dtype=np.float64))
+
 
 class Approach:
     """A reference pose that goes to its target in a straight line, about one axis, with constant speeds.

@@ -57,6 +57,8 @@ class Stage:
             Shape (steps + 1, 3, 3).
         path: Positions of the reference in [m]. Shape (steps + 1, 3).
         errors: Errors of position in [m] and of orientation in [rad] at the start.
+        pace: How far a reference goes in a step that follows a target: in [m] as far as the scenario's own does on
+            average in a whole episode, and in [rad] what counts as much for :meth:`ikgym.arms.Arm.inverse`.
     """
 
     scenario: Scenario
@@ -65,6 +67,7 @@ class Stage:
     rotations: FloatArray
     path: FloatArray
     errors: tuple[float, float]
+    pace: tuple[float, float]
 
     @classmethod
     def of(cls, scenario: str | Scenario, seed: int = 0, steps: int | None = None) -> Stage:
@@ -79,7 +82,7 @@ class Stage:
             UnknownNameError: There is no such scenario.
             InvalidInputError: The seed or the number of steps is not valid.
         """
-        found = scenarios.find(scenario)
+        whole = found = scenarios.find(scenario)
         if steps is not None:
             found = found.replace(steps=min(whole_number("steps", steps, at_least=1), found.steps))
         simulator = Simulator(found, None, 1)
@@ -87,24 +90,21 @@ class Stage:
         simulator.reset(np.ones(1, dtype=np.bool_), [generator])
         out = simulator.observe()
         errors = float(out.position_error[0]), float(out.orientation_error[0])
-        start = simulator.true_q[0].copy()
-        return cls(found, seed, start, _rotations(found, seed, start), simulator.nominal_positions(0), errors)
+        start, pace = simulator.true_q[0].copy(), _pace(whole, seed)
+        return cls(found, seed, start, _rotations(found, seed, start), simulator.nominal_positions(0), errors, pace)
 
     def pose(self, step: int) -> Pose:
         """Where the reference is after so many steps."""
         return Pose(self.rotations[step], self.path[step])
 
-    def pace(self) -> tuple[float, float]:
-        """How fast the reference goes on average.
 
-        Returns:
-            Distance in [m], and what turns count as, in [rad], in one step. A radian counts as much as it does for
-            :meth:`ikgym.arms.Arm.inverse`.
-        """
-        scenario, whole = self.scenario, size(self.scenario.arm)
-        shift = float(np.linalg.norm(np.diff(self.path, axis=0), axis=1).sum()) / scenario.steps
-        shift = shift or SLOW * whole * scenario.dt
-        return shift, shift / (LENGTH_OF_RADIAN * whole)
+def _pace(scenario: Scenario, seed: int) -> tuple[float, float]:
+    """How far a reference goes in a step, on average; and the angle that counts as much for an inverse kinematics."""
+    whole, points = size(scenario.arm), scenario.points()
+    path = scenario.frames(scenario.episode(seed), int(points[-1]) + 1)[points, -3:]
+    shift = float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum()) / scenario.steps
+    shift = shift or SLOW * whole * scenario.dt
+    return shift, shift / (LENGTH_OF_RADIAN * whole)
 
 
 def _rotations(scenario: Scenario, seed: int, start: FloatArray) -> FloatArray:

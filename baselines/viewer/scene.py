@@ -109,18 +109,6 @@ def colour(number: int) -> Colour:
     return _rgb(COLOURS[number % len(COLOURS)])
 
 
-def pose_of(handle: Any) -> Pose:
-    """Where a handle of viser is."""
-    w, *xyz = np.asarray(handle.wxyz, dtype=np.float64)
-    x, y, z = xyz
-    rotation = np.array([
-        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
-        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
-        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
-    ])  # fmt: skip
-    return Pose(rotation, np.array(handle.position, dtype=np.float64))
-
-
 def _move(handle: Any, pose: Pose) -> None:
     handle.position, handle.wxyz = pose.position, quaternion(np.ascontiguousarray(pose.rotation))
 

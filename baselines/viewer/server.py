@@ -12,8 +12,9 @@ from typing import Any
 
 import viser
 
+from baselines.viewer.approach import Pose
 from baselines.viewer.panel import Panel
-from baselines.viewer.scene import Scene, Shaper, pose_of
+from baselines.viewer.scene import Scene, Shaper
 from baselines.viewer.session import Session
 from ikgym.exceptions import InvalidInputError
 
@@ -32,7 +33,7 @@ def serving(host: str, port: int) -> Iterator[Any]:
     Raises:
         InvalidInputError: It cannot listen there.
     """
-    server = viser.ViserServer(host, _free_port(host, port), label="ikgym view", verbose=False)
+    server = viser.ViserServer(host, free_port(host, port), label="ikgym view", verbose=False)
     try:
         yield server
     finally:
@@ -54,7 +55,7 @@ class Viewer:
         self._scene = Scene(server, session, shaper and shaper(server))
         self._panel = Panel(server, session, self._asked.put, lambda apart: self._scene.put_apart(apart=apart))
         target = self._scene.target
-        target.on_update(lambda _: self._asked.put(lambda: session.aim(pose_of(target))))
+        target.on_update(lambda _: self._asked.put(lambda: session.aim(Pose.at(target.position, target.wxyz))))
         server.on_client_connect(lambda client: self._scene.look(client.camera))
         self._said = 0.0
 
@@ -80,8 +81,12 @@ class Viewer:
             self._panel.show(shown)
 
 
-def _free_port(host: str, port: int) -> int:
-    """The port, if nobody listens there: viser would take the next one and say nothing."""
+def free_port(host: str, port: int) -> int:
+    """A port, if nobody listens there; one that is free for 0. viser would take the next one and say nothing.
+
+    Raises:
+        InvalidInputError: It cannot be listened on.
+    """
     with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
         try:
             probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

@@ -64,7 +64,7 @@ class Session:
     def __init__(self, stage: Stage, replays: Sequence[Replay], followers: Sequence[Follower | None]) -> None:
         self.stage, self.replays, self._followers = stage, list(replays), list(followers)
         self._reader = Reader(stage.scenario.arm, stage.scenario.task)
-        self._approach = Approach(stage.pose(0), *stage.pace())
+        self._approach = Approach(stage.pose(0), *stage.pace)
         self._q = [replay.q[0] for replay in self.replays]
         self.duration = float(self.replays[0].times[-1])
         self.mode, self.playing, self.time, self.speed = Mode.PLAY, False, 0.0, 1.0

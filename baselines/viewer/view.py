@@ -88,12 +88,13 @@ def main(arguments: Sequence[str] | None = None, stop: threading.Event | None = 
         options = command.parse(Options, arguments, prog=_program(), description=manual())
         command.find_own_modules()
         # What is missing is said before episodes are played.
-        from baselines.viewer.server import Viewer, serving
+        from baselines.viewer.server import Viewer, free_port, serving
 
+        port = free_port(options.host, options.port)
         stage = Stage.of(options.scenario, options.seed, options.steps)
         shaper = _shaper(stage, options.urdf)
-        with serving(options.host, options.port) as server:
-            session = session_of(stage, options.policy, progress=True)
+        session = session_of(stage, options.policy, progress=True)
+        with serving(options.host, port) as server:
             viewer = Viewer(server, session, shaper)
             print(f"http://{server.get_host()}:{server.get_port()}  (Ctrl-C ends it)", flush=True)
             viewer.run(threading.Event() if stop is None else stop)
