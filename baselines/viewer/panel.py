@@ -75,22 +75,26 @@ def readings(session: Session, shown: Sequence[Shown]) -> str:
     moment = f"t = {session.time:.3f} s" if session.mode is Mode.PLAY else session.mode.value
     if session.mode is Mode.FOLLOW and session.kept < 0.95:
         moment += f"; the policies keep up with {session.kept:.0%} of the speed"
-    return "\n\n".join([f"*{moment}*", *(f"**{one.policy}**: {'; '.join(_said(arm, one))}" for one in shown)])
+    return "\n\n".join([f"*{moment}*", *("\n".join(_said(arm, one)) for one in shown)])
 
 
 def _said(arm: Arm, one: Shown) -> list[str]:
-    said = [one.status]
+    """A head and a list of what is known."""
+    reading, errors = one.reading, []
     if np.isfinite(one.position_error):
-        said.append(f"error {1e3 * one.position_error:.3g} mm")
+        errors.append(f"{1e3 * one.position_error:.3g} mm")
     if np.isfinite(one.orientation_error):
-        said.append(f"{1e3 * one.orientation_error:.3g} mrad")
-    said.append(f"manipulability {one.reading.manipulability:.3g} ({one.reading.share:.0%} of the largest found)")
-    joint = int(np.argmin(one.reading.margins))
-    if np.isfinite(one.reading.margins[joint]):
+        errors.append(f"{1e3 * one.orientation_error:.3g} mrad")
+    said = [f"**{one.policy}**: {one.status}\n"]
+    if errors:
+        said.append(f"- error {', '.join(errors)}")
+    said.append(f"- manipulability {reading.manipulability:.3g}, {reading.share:.0%} of the largest found")
+    joint = int(np.argmin(reading.margins))
+    if np.isfinite(reading.margins[joint]):
         unit = "m" if arm.prismatic[joint] else "rad"
-        said.append(f"nearest limit: {arm.joint_names[joint]}, {one.reading.margins[joint]:.3g} {unit} away")
+        said.append(f"- {arm.joint_names[joint]} is {reading.margins[joint]:.3g} {unit} from its limit")
     if np.isfinite(one.cost):
-        said.append(f"cost so far {one.cost:.4g}")
+        said.append(f"- cost so far {one.cost:.4g}")
     return said
 
 

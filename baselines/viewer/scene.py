@@ -20,7 +20,7 @@ from ikgym.validation import FloatArray
 Shaper = Callable[[str, Colour], Shape]
 
 # Distances and sizes, as shares of the arm's reach.
-APART, TARGET, AXES, AXES_RADIUS, BALL, BELOW, EYE, LOOKED_AT = 1.1, 0.16, 0.09, 0.004, 0.012, 0.08, 1.9, 0.3
+APART, TARGET, AXES, AXES_RADIUS, BALL, BELOW, EYE, LOOKED_AT = 1.1, 0.16, 0.09, 0.004, 0.012, 0.08, 1.5, 0.3
 
 
 class Scene:
@@ -61,9 +61,10 @@ class Scene:
 
     def look(self, camera: Any) -> None:
         """Turns the camera of a browser to the arms."""
-        middle = -0.5 * APART * self._size * (len(self._roots) - 1)
-        far = EYE * self._size * (1.0 + 0.35 * (len(self._roots) - 1))
-        camera.position = (far, middle - 0.35 * far, 0.6 * far)
+        others = len(self._roots) - 1
+        # The panel is on the right: what is looked at lies beside the middle of the arms.
+        middle, far = (0.5 - 0.5 * APART * others) * self._size, EYE * self._size * (1.0 + 0.3 * others)
+        camera.position = (far, middle, 0.6 * far)
         camera.look_at = (0.0, middle, LOOKED_AT * self._size)
 
     def show(self, shown: Sequence[Shown]) -> None:

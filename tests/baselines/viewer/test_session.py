@@ -123,9 +123,11 @@ def test_readings_name_policies_errors_and_limits(session):
     assert "**dls**: applied" in text
     assert "**qp**" in text
     assert text.count("manipulability") == 2
-    assert "nearest limit: joint" in text or "nearest limit: panda_joint" in text
-    assert "mm" in text
-    assert "mrad" in text
+    one = session.shown()[0]
+    assert f"error {1e3 * one.position_error:.3g} mm, {1e3 * one.orientation_error:.3g} mrad" in text
+    nearest = int(np.argmin(one.reading.margins))
+    name = session.stage.scenario.arm.joint_names[nearest]
+    assert f"{name} is {one.reading.margins[nearest]:.3g} rad from its limit" in text
     assert "cost so far" in text
 
 
@@ -137,4 +139,4 @@ def test_privileged_information_plays_only():
     assert reference.status == PLAYS_ONLY
     np.testing.assert_array_equal(reference.q, session.stage.start)
     assert np.abs(solver.q - session.stage.start).max() > 0.0
-    assert "nearest limit" not in readings(session, session.shown())  # an arm without limits
+    assert "from its limit" not in readings(session, session.shown())  # an arm without limits
