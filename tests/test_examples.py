@@ -5,18 +5,28 @@ from __future__ import annotations
 import runpy
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-EXAMPLES = sorted(Path(__file__).parents[1].glob("examples/[0-9]*.py"))
+ROOT = Path(__file__).parents[1] / "examples"
+EXAMPLES = sorted(ROOT.glob("[0-9]*.py"))
 
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
 def test_example(example, capsys, tmp_path):
-    arguments = {"04_video": (tmp_path / "video.mp4", 40)}.get(example.stem, ())
+    video = tmp_path / "video.mp4"
+    arguments = {"04_video": (video, 40), "06_ppo": (1,)}.get(example.stem, ())
     runpy.run_path(str(example))["main"](*arguments)
     assert capsys.readouterr().out.strip()
-    if arguments:
-        assert arguments[0].stat().st_size > 1000
+    assert video.exists() == (example.stem == "04_video")
+
+
+@pytest.mark.slow
+def test_the_ppo_of_the_example_learns(capsys):
+    """Rewards are minus the decimal logarithm of 1 + cost: what is learned takes off a power of ten."""
+    rewards = runpy.run_path(str(ROOT / "06_ppo.py"))["main"](20)
+    capsys.readouterr()
+    assert np.mean(rewards[-3:]) > rewards[0] + 1.0
 
 
 def test_there_are_examples():

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import yourdfpy
-from viser.extras import ViserUrdf
 
 from baselines.viewer.readings import Reading
 from ikgym.arms import Arm
@@ -70,15 +69,20 @@ class Meshes:
 
     def __init__(self, server: Any, root: str, model: Any, arm: Arm) -> None:
         self._model, self._arm = model, arm
-        base = np.asarray(np.linalg.inv(_base(model, arm)), dtype=np.float64)
-        frame = server.scene.add_frame(f"{root}/urdf", show_axes=False)
-        frame.position, frame.wxyz = base[:3, 3], _wxyz(base[:3, :3])
-        self._urdf = ViserUrdf(server, model, root_node_name=f"{root}/urdf")
+        self._to_base = np.asarray(np.linalg.inv(_base(model, arm)), dtype=np.float64)
+        self._meshes = {
+            node: server.scene.add_mesh_trimesh(f"{root}/{number}", model.scene.geometry[model.scene.graph[node][1]])
+            for number, node in enumerate(model.scene.graph.nodes_geometry)
+        }
 
     def show(self, q: FloatArray, reading: Reading) -> None:
         """See :class:`baselines.viewer.solids.Shape`; meshes keep the colours of their file."""
         del reading
-        self._urdf.update_cfg(_configuration(self._model, self._arm.joint_names, q))
+        self._model.update_cfg(_configuration(self._model, self._arm.joint_names, q))
+        for node, mesh in self._meshes.items():
+            there = self._to_base @ self._model.get_transform(node)
+            mesh.position = there[:3, 3]
+            mesh.wxyz = quaternion(np.ascontiguousarray(there[:3, :3]))
 
 
 def _configuration(model: Any, names: Sequence[str], q: FloatArray) -> FloatArray:
@@ -105,7 +109,3 @@ def _difference(model: Any, arm: Arm) -> float:
         tool[:3, :3], tool[:3, 3] = arm.forward(q)
         ways.append(np.linalg.inv(np.linalg.inv(_base(model, arm)) @ model.get_transform(last)) @ tool)
     return float(np.ptp(ways, axis=0).max())
-
-
-def _wxyz(rotation: FloatArray) -> FloatArray:
-    return np.array(quaternion(np.ascontiguousarray(rotation)))

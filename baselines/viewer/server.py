@@ -20,6 +20,8 @@ from ikgym.exceptions import InvalidInputError
 
 # Pictures and readings a second.
 PICTURES, READINGS = 30.0, 5.0
+# Longest wait in [s] for the server to end.
+PATIENCE = 5.0
 
 
 @contextlib.contextmanager
@@ -33,11 +35,15 @@ def serving(host: str, port: int) -> Iterator[Any]:
     Raises:
         InvalidInputError: It cannot listen there.
     """
+    others = set(threading.enumerate())
     server = viser.ViserServer(host, free_port(host, port), label="ikgym view", verbose=False)
+    listening = [thread for thread in threading.enumerate() if thread.daemon and thread not in others]
     try:
         yield server
     finally:
         server.stop()
+        for thread in listening:  # nobody listens any more when this returns
+            thread.join(PATIENCE)
 
 
 class Viewer:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import re
 import socket
 import sys
@@ -9,6 +10,7 @@ import threading
 import time
 import urllib.error
 import urllib.request
+import warnings
 
 import numpy as np
 import pytest
@@ -49,8 +51,21 @@ class Browser:
         self.say("TransformControlsUpdate", name=target.name, wxyz=target.wxyz.tolist(), position=position.tolist())
 
 
+def collect():
+    """viser leaves its event loop to the garbage collector, which would complain of it in the middle of other tests."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ResourceWarning)
+        gc.collect()
+
+
+@pytest.fixture(scope="module", autouse=True)
+def collected():
+    yield
+    collect()
+
+
 @pytest.fixture(scope="module")
-def server():
+def server(collected):
     with servers.serving(HOST, 0) as made:
         yield made
 
@@ -137,6 +152,7 @@ def test_it_runs_until_it_is_told_to_stop(capsys):
     port = int(re.search(r"http://127.0.0.1:(\d+)", capsys.readouterr().out)[1])
     with pytest.raises(urllib.error.URLError):
         urllib.request.urlopen(f"http://{HOST}:{port}", timeout=1)
+    collect()
 
 
 def test_a_port_in_use_is_an_error(capsys):
