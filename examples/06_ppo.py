@@ -1,7 +1,8 @@
 """PPO in one file on the native vector environment, in the manner of CleanRL: needs ``pip install "ikgym[train]"``.
 
-The task is turned into one that plain reinforcement learning can learn from: the agent sees the error in the tool's
-position over the next steps and moves the arm; its reward is the logarithm of the cost.
+The task is made one that plain reinforcement learning gets better at within a minute: episodes of a tenth of a second,
+features in which errors are of the size of 1, and the logarithm of the cost as reward. Agents that keep up with solvers
+take more, see docs/agents.md.
 """
 
 import sys
@@ -12,11 +13,11 @@ import torch
 from torch import nn
 from torch.distributions import Normal
 
-import ikgym  # noqa: F401  # registers the environment
+import ikgym  # registers the environment
 
 ENVS, STEPS, EPOCHS, MINIBATCHES = 64, 100, 4, 8
-GAMMA, LAMBDA, CLIP, RATE, LARGEST_GRADIENT = 0.95, 0.95, 0.2, 3e-4, 0.5
-SCENARIO, PREVIEW = "varga7-random", 2
+GAMMA, LAMBDA, CLIP, RATE, LARGEST_GRADIENT = 0.9, 0.95, 0.2, 1e-3, 0.5
+SCENARIO, PREVIEW = ikgym.scenarios.get("varga7-random").replace(steps=STEPS), 2
 
 
 def features(observation: dict) -> torch.Tensor:
@@ -39,7 +40,7 @@ class Agent(nn.Module):
     def __init__(self, inputs: int, joints: int) -> None:
         super().__init__()
         self.critic, self.actor = network(inputs, 1, 1.0), network(inputs, joints, 0.01)
-        self.log_std = nn.Parameter(torch.full((joints,), -2.0))
+        self.log_std = nn.Parameter(torch.full((joints,), -3.0))
 
     def policy(self, seen: torch.Tensor) -> Normal:
         """Actions for what is seen."""

@@ -59,7 +59,7 @@ class Panel:
         session = self._session
         self._readings.content = readings(session, shown)
         self._play.label = "Pause" if session.playing else "Play"
-        if session.playing:
+        if session.mode is Mode.PLAY:
             self._time.value = session.time
         if session.mode is not Mode.HAND:
             for slider, coordinate in zip(self._joints, shown[0].q.tolist(), strict=True):

@@ -20,7 +20,7 @@ from ikgym.validation import FloatArray
 Shaper = Callable[[str, Colour], Shape]
 
 # Distances and sizes, as shares of the arm's reach.
-APART, TARGET, AXES, AXES_RADIUS, BALL, BELOW, EYE, LOOKED_AT = 1.1, 0.16, 0.09, 0.004, 0.012, 0.08, 1.5, 0.3
+APART, TARGET, AXES, AXES_RADIUS, BALL, BELOW, EYE, LOOKED_AT = 1.1, 0.16, 0.09, 0.004, 0.012, 0.08, 1.2, 0.3
 
 
 class Scene:
