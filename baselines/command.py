@@ -44,6 +44,9 @@ EXTRAS = {
     "pinocchio": "urdf",
     "moviepy": "video",
     "ray": "cluster",
+    "trimesh": "view",
+    "viser": "view",
+    "yourdfpy": "view",
 }
 
 
@@ -173,6 +176,12 @@ def started(module: str) -> int:
         The exit code, see :func:`run`.
     """
     return run(lambda: importlib.import_module(module).main())
+
+
+def find_own_modules() -> None:
+    """Lets modules in the current folder be imported, where a console command does not look."""
+    if (here := str(pathlib.Path.cwd())) not in sys.path:
+        sys.path.append(here)
 
 
 def complain(message: str) -> None:

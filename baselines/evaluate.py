@@ -279,8 +279,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         nonlocal out
         options = command.parse(Options, arguments, prog=_program(), description=manual())
         out = options.out
-        if (here := str(pathlib.Path.cwd())) not in sys.path:
-            sys.path.append(here)  # for modules of the user, where a console command does not look
+        command.find_own_modules()
         written, workers = _formats(options.export, out), Workers(options.workers, options.cluster)
         plan = make_plan(
             options.scenarios or (() if options.test_sets else ("varga7-fast",)),

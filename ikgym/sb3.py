@@ -42,6 +42,10 @@ class RedundantIKVecEnv(VecEnv):
     | `terminal_observation` | the last observation; the one returned is already the first of the next episode |
     | `episode` | `r`, `l`, `t`: return, length in steps, time since the environment was made in [s], as of `Monitor` |
 
+    Gymnasium's vector environment, `gym.make_vec(…)`, is another interface: a model that is given one says "The
+    environment is of type <class 'ikgym.vector_env.RedundantIKVectorEnv'>, not a Gymnasium environment". This class
+    takes its place.
+
     As `r` is the sum of the float64 rewards before any wrapper, `env_is_wrapped(Monitor)` is true.
 
     >>> from stable_baselines3 import PPO
@@ -62,6 +66,11 @@ class RedundantIKVecEnv(VecEnv):
     def __init__(
         self, num_envs: int = 1, scenario: str | Scenario = "varga7-fast", preview: Preview = 2, commands: int = 0
     ) -> None:
+        if isinstance(num_envs, gym.vector.VectorEnv):
+            raise InvalidInputError(
+                f"num_envs: expected how many arms, got Gymnasium's vector environment, {type(num_envs).__name__}, "
+                "which Stable-Baselines3 cannot step: RedundantIKVecEnv(N, scenario, preview) has the same arms for it."
+            )
         self._envs = RedundantIKVectorEnv(num_envs, scenario, preview, AutoresetMode.SAME_STEP, commands=commands)
         self.scenario = self._envs.scenario
         worst, most = self.scenario.largest_step_cost(), float(np.finfo(np.float32).max)

@@ -24,6 +24,8 @@ COMMANDS = {
     "reproduce": ("draw the figures of the papers again, and test their claims", "baselines.reproduce"),
     "leaderboard": ("compare agents and solvers on the test sets", "baselines.leaderboard"),
     "robustness": ("map what imperfect plants cost policies", "baselines.robustness"),
+    "view": ("show policies side by side in a browser, live and in an episode", "baselines.viewer.view"),
+    "video": ("write an episode as a video", "baselines.viewer.video"),
     "oracle": ("search the best known costs", "baselines.optimum"),
 }
 

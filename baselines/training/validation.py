@@ -81,6 +81,8 @@ def validate(actor: Actor, processing: Transform, scenario: Scenario, episodes: 
         cost_ratio=None if reference is None else geometric_mean(ratios.tolist()),
         worst=float(ratios.max()),
         lost=float(np.mean([lost(distance, angle) for distance, angle in zip(errors, angles, strict=True)])),
+        position_error_max_mm=1e3 * float(errors.mean()),
+        orientation_error_max_mrad=1e3 * float(angles.mean()) if scenario.task.has_orientation else None,
     )
 
 

@@ -32,10 +32,11 @@ class Renderer:
             memory and unseen where the backend has no windows.
         title: Stands above the picture.
         has_orientation: Whether there is an orientation error to show.
+        width: Of the picture in [px], a multiple of 4; it is half as high, and all in it grows with it.
     """
 
-    def __init__(self, arm: Arm, mode: str, *, title: str, has_orientation: bool) -> None:
-        self._arm, self._human = arm, mode == "human"
+    def __init__(self, arm: Arm, mode: str, *, title: str, has_orientation: bool, width: int = WIDTH) -> None:
+        self._arm, self._human, self._dpi = arm, mode == "human", DPI * width / WIDTH
         self._title, self._has_orientation = title, has_orientation
         self._scene: Scene | None = None
         self._in_window = False
@@ -87,12 +88,12 @@ class Renderer:
         states between them are passed over, the first and the last one never.
 
         Returns:
-            The picture in mode ``"rgb_array"``, fresh, of shape (HEIGHT, WIDTH, 3); None in mode ``"human"``.
+            The picture in mode ``"rgb_array"``, fresh, of shape (width / 2, width, 3); None in mode ``"human"``.
         """
         if self._human and not self._due():
             return None
         if self._scene is None:
-            figure = self._window() if self._human else _in_memory()
+            figure = self._window() if self._human else _in_memory(self._dpi)
             self._scene = Scene(figure, self._arm, self._title, self._has_orientation)
             self._staged = False
         scene, k = self._scene, self._states
@@ -139,14 +140,14 @@ class Renderer:
         _, framework = registry.resolve_backend(backend)  # type: ignore[no-untyped-call]
         if framework is None:
             logger.info("render_mode 'human' shows nothing: matplotlib's backend %r has no windows.", backend)
-            return _in_memory()
-        figure = plt.figure(figsize=(WIDTH / DPI, HEIGHT / DPI), dpi=DPI)
+            return _in_memory(self._dpi)
+        figure = plt.figure(figsize=(WIDTH / DPI, HEIGHT / DPI), dpi=self._dpi)
         figure.show()
         self._in_window = True
         return figure
 
 
-def _in_memory() -> Figure:
-    figure = Figure(figsize=(WIDTH / DPI, HEIGHT / DPI), dpi=DPI)
+def _in_memory(dpi: float) -> Figure:
+    figure = Figure(figsize=(WIDTH / DPI, HEIGHT / DPI), dpi=dpi)
     FigureCanvasAgg(figure)
     return figure

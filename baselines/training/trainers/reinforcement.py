@@ -79,6 +79,7 @@ class ReinforcementTrainer(abc.ABC):
         with self._actor_frozen() if number < self._config.critic_warmup else contextlib.nullcontext():
             self._learn()
         metrics = {name: float(value) for name, value in model.logger.name_to_value.items()}
+        metrics["rollout/ep_rew_mean"] = float(np.mean([episode["r"] for episode in model.ep_info_buffer]))
         # Of the shorter ones of the curriculum, what a whole one would cost.
         costs = [-episode["r"] * self._scenario.steps / episode["l"] for episode in model.ep_info_buffer]
         metrics["train/cost"] = float(np.exp(np.mean(np.log(np.maximum(costs, np.finfo(np.float64).tiny)))))

@@ -169,7 +169,9 @@ def test_tensorboard_holds_each_step_once(finished, gone_on_with):
     for each in (finished[1], gone_on_with):
         events = EventAccumulator(str(each / "tensorboard")).Reload()
         assert [event.step for event in events.Scalars("train/cost")] == [80, 160, 240]
-        assert [event.step for event in events.Scalars("validation/cost")] == [0, 160, 240]
+        assert [event.step for event in events.Scalars("rollout/ep_rew_mean")] == [80, 160, 240]
+        for name in ("cost", "position_error_max_mm", "orientation_error_max_mrad"):
+            assert [event.step for event in events.Scalars(f"validation/{name}")] == [0, 160, 240]
 
 
 def test_the_last_agent_is_kept_on_request(tmp_path):

@@ -37,6 +37,8 @@ def test_outputs_of_zero_score_like_the_base_policy(base_policy):
     assert score.cost == pytest.approx(geometric_mean(wanted), rel=1e-12)
     assert (score.cost_ratio, score.episodes, score.lost) == (None, 3, 0.0)
     assert score.worst == pytest.approx(max(wanted), rel=1e-12)
+    assert score.position_error_max_mm == pytest.approx(1e3 * np.mean(errors), rel=1e-12)
+    assert score.orientation_error_max_mrad == pytest.approx(1e3 * np.mean(angles), rel=1e-12)
 
 
 def test_lost_arms_are_counted():

@@ -1,0 +1,136 @@
+"""A video of an episode: one picture a policy, all at the same moment."""
+
+from __future__ import annotations
+
+import itertools
+import pathlib
+import tempfile
+from collections.abc import Iterable, Iterator, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from baselines.files import write
+from baselines.viewer.replay import Replay, Stage
+from ikgym.exceptions import InvalidInputError
+from ikgym.rendering import Renderer
+from ikgym.rendering.renderer import WIDTH
+from ikgym.validation import number, whole_number
+
+Picture = npt.NDArray[np.uint8]
+
+# The narrowest and widest pictures of one policy in [px]: letters can be read, and video players take them.
+NARROWEST, WIDEST = 480, 3840
+# A video takes even sizes, and pictures are half as high as wide.
+STEP = 4
+
+
+def columns(policies: int) -> int:
+    """How many pictures of policies stand beside each other."""
+    return 1 if policies == 1 else 2
+
+
+def moments(stage: Stage, fps: float, speed: float) -> npt.NDArray[np.int64]:
+    """The steps that are drawn, from the start to the end of the episode.
+
+    Args:
+        stage: What policies are shown on.
+        fps: Pictures a second.
+        speed: Seconds of the episode in one second of the video.
+
+    Returns:
+        Numbers of steps, rising. Shape (pictures,).
+
+    Raises:
+        InvalidInputError: One of them is not above 0.
+    """
+    steps = stage.scenario.steps
+    between = number("speed", speed, above=0.0) / number("fps", fps, above=0.0) / stage.scenario.dt
+    return np.append(np.rint(np.arange(0.0, steps, between)), steps).astype(np.int64)
+
+
+def pictures(
+    stage: Stage, replays: Sequence[Replay], steps: npt.NDArray[np.int64], *, width: int | None = None
+) -> Iterator[Picture]:
+    """Draws an episode.
+
+    Args:
+        stage: What policies are shown on.
+        replays: What they did.
+        steps: Which steps are drawn, rising.
+        width: Of one policy's picture in [px]; the renderer's own if left out.
+
+    Yields:
+        Pictures with the policies in two columns, row by row. Shape (height, width, 3).
+
+    Raises:
+        InvalidInputError: The width is not valid, see :func:`checked_width`.
+    """
+    wide = WIDTH if width is None else checked_width(width)
+    drawn = [_drawn(stage, replay, steps, wide) for replay in replays]
+    for side_by_side in zip(*drawn, strict=True):
+        yield _tiled(side_by_side, columns(len(replays)))
+
+
+def checked_width(width: int) -> int:
+    """A width of pictures in [px].
+
+    Raises:
+        InvalidInputError: It is no multiple of 4 from 480 to 3840.
+    """
+    if whole_number("width", width, at_least=NARROWEST) > WIDEST or width % STEP:
+        raise InvalidInputError(f"width: expected a multiple of {STEP} from {NARROWEST} to {WIDEST} [px], got {width}.")
+    return width
+
+
+def write_video(file: pathlib.Path, content: Iterable[Picture], fps: float) -> None:
+    """Writes pictures as an H.264 video, in one go when all of them are drawn.
+
+    Args:
+        file: Where to write, ending in ``.mp4``.
+        content: The pictures, all of one even size.
+        fps: Pictures a second.
+
+    Raises:
+        ModuleNotFoundError: moviepy is not installed.
+        ResultsError: The file cannot be written.
+    """
+    from moviepy.video.io.ffmpeg_writer import FFMPEG_VideoWriter
+
+    left = iter(content)
+    first = next(left)
+    with tempfile.TemporaryDirectory() as folder:
+        draft = pathlib.Path(folder) / "draft.mp4"
+        height, width, _ = first.shape
+        with FFMPEG_VideoWriter(str(draft), (width, height), fps, codec="libx264", preset="medium") as video:
+            for picture in itertools.chain([first], left):
+                video.write_frame(picture)
+        write(file, draft.read_bytes())
+
+
+def _drawn(stage: Stage, replay: Replay, steps: npt.NDArray[np.int64], width: int) -> Iterator[Picture]:
+    scenario = stage.scenario
+    renderer = Renderer(
+        scenario.arm,
+        "rgb_array",
+        title=f"{scenario.name}: {replay.policy}",
+        has_orientation=scenario.task.has_orientation,
+        width=width,
+    )
+    renderer.begin(stage.path, scenario.steps * scenario.dt)
+    known = 0
+    for step in steps.tolist():
+        for k in range(known, step + 1):
+            renderer.add(replay.q[k], replay.position_error[k], replay.orientation_error[k], replay.times[k])
+        known = max(known, step + 1)
+        picture = renderer.draw()
+        assert picture is not None  # of a renderer in memory
+        yield picture
+
+
+def _tiled(pictures: Sequence[Picture], across: int) -> Picture:
+    """Pictures of one size row by row, white where one is missing."""
+    missing = -len(pictures) % across
+    every = [*pictures, *[np.full_like(pictures[0], 255)] * missing]
+    rows = [np.hstack(every[k : k + across]) for k in range(0, len(every), across)]
+    return np.vstack(rows)

@@ -1,0 +1,116 @@
+"""The controls beside the scene, and what is said in them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from baselines.viewer.readings import slider_range
+from baselines.viewer.session import Mode, Session, Shown
+from ikgym.arms import Arm
+from ikgym.validation import FloatArray
+
+#: Runs what a browser asked for, between two pictures.
+Later = Callable[[Callable[[], object]], object]
+
+#: Seconds shown in one second.
+SPEEDS = (0.02, 0.05, 0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 50.0)
+
+LEGEND = (
+    "Drag the target, or a joint; *Play* goes back to the episode. Joints: grey free, yellow near a limit, red at it. "
+    "Tool: from red (singular) to green by its manipulability."
+)
+
+
+class Panel:
+    """Sliders, buttons and readings.
+
+    Args:
+        server: Of viser.
+        session: What they act on.
+        later: Takes what is to be done to the session.
+        put_apart: Puts the arms beside each other, or in one place.
+    """
+
+    def __init__(self, server: Any, session: Session, later: Later, put_apart: Callable[[bool], None]) -> None:
+        self._session, gui = session, server.gui
+        scenario = session.stage.scenario
+        gui.add_markdown(f"**{scenario.name}**, seed {session.stage.seed}\n\n{LEGEND}")
+        with gui.add_folder("Episode"):
+            self._play = gui.add_button("Play")
+            self._time = gui.add_slider("time [s]", 0.0, session.duration, session.duration / 1000.0, 0.0)
+            speed = gui.add_dropdown("speed", tuple(f"{s:g}" for s in SPEEDS), "1")
+            apart = gui.add_checkbox("side by side", initial_value=True)
+        with gui.add_folder("Now"):
+            self._readings = gui.add_markdown("")
+        with gui.add_folder("Joints"):
+            self._joints = _sliders(gui, scenario.arm, session.stage.start)
+        self._play.on_click(lambda _: later(session.toggle))
+        _on_user(self._time, lambda: later(lambda: session.scrub(self._time.value)))
+        _on_user(speed, lambda: later(lambda: setattr(session, "speed", float(speed.value))))
+        _on_user(apart, lambda: later(lambda: put_apart(apart.value)))
+        for slider in self._joints:
+            _on_user(slider, lambda: later(self._place))
+
+    def show(self, shown: Sequence[Shown]) -> None:
+        """Says what is to be seen; the sliders of the joints show those of the first policy."""
+        session = self._session
+        self._readings.content = readings(session, shown)
+        self._play.label = "Pause" if session.playing else "Play"
+        if session.mode is Mode.PLAY:
+            self._time.value = session.time
+        if session.mode is not Mode.HAND:
+            for slider, coordinate in zip(self._joints, shown[0].q.tolist(), strict=True):
+                slider.value = min(max(coordinate, slider.min), slider.max)
+
+    def _place(self) -> None:
+        self._session.place(np.array([slider.value for slider in self._joints]))
+
+
+def readings(session: Session, shown: Sequence[Shown]) -> str:
+    """What is said of each policy, as Markdown."""
+    arm = session.stage.scenario.arm
+    moment = f"t = {session.time:.3f} s" if session.mode is Mode.PLAY else session.mode.value
+    if session.mode is Mode.FOLLOW and session.kept < 0.95:
+        moment += f"; the policies keep up with {session.kept:.0%} of the speed"
+    return "\n\n".join([f"*{moment}*", *("\n".join(_said(arm, one)) for one in shown)])
+
+
+def _said(arm: Arm, one: Shown) -> list[str]:
+    """A head and a list of what is known."""
+    reading, errors = one.reading, []
+    if np.isfinite(one.position_error):
+        errors.append(f"{1e3 * one.position_error:.3g} mm")
+    if np.isfinite(one.orientation_error):
+        errors.append(f"{1e3 * one.orientation_error:.3g} mrad")
+    said = [f"**{one.policy}**: {one.status}\n"]
+    if errors:
+        said.append(f"- error {', '.join(errors)}")
+    said.append(f"- manipulability {reading.manipulability:.3g}, {reading.share:.0%} of the largest found")
+    joint = int(np.argmin(reading.margins))
+    if np.isfinite(reading.margins[joint]):
+        unit = "m" if arm.prismatic[joint] else "rad"
+        said.append(f"- {arm.joint_names[joint]} is {reading.margins[joint]:.3g} {unit} from its limit")
+    if np.isfinite(one.cost):
+        said.append(f"- cost so far {one.cost:.4g}")
+    return said
+
+
+def _sliders(gui: Any, arm: Arm, start: FloatArray) -> list[Any]:
+    """One slider a joint, within its limits; farther where the start is."""
+    low, high = slider_range(arm)
+    low, high = np.minimum(low, start), np.maximum(high, start)
+    units = ["m" if prismatic else "rad" for prismatic in arm.prismatic]
+    return [
+        gui.add_slider(f"{name} [{unit}]", first, last, (last - first) / 1000.0, value)
+        for name, unit, first, last, value in zip(
+            arm.joint_names, units, low.tolist(), high.tolist(), start.tolist(), strict=True
+        )
+    ]
+
+
+def _on_user(handle: Any, then: Callable[[], object]) -> None:
+    """Calls when somebody has moved a control, not when the program has."""
+    handle.on_update(lambda event: then() if event.client is not None else None)

@@ -1,0 +1,90 @@
+"""What the viewer says of a posture: its manipulability, how far the joints are from their limits, and the colours."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from ikgym.arms import Arm
+from ikgym.tasks import Task
+from ikgym.validation import FloatArray
+
+#: Colours (red, green, blue) of joints that are free, near a limit, and at one.
+FREE, NEAR, AT = (150, 150, 150), (230, 159, 0), (213, 94, 0)
+
+# A joint is near a limit within this share of its range, or this distance in [rad] or [m] where that is less.
+NEAR_SHARE, NEAR_MOST = 0.05, 0.1
+# Distance in [rad] or [m] that rounding leaves between a joint and the limit that it stands at.
+TOUCHING = 1e-9
+# Postures that say what manipulability an arm can have.
+POSTURES = 512
+
+
+class Reading(NamedTuple):
+    """What is said of a posture.
+
+    Attributes:
+        manipulability: Yoshikawa's w = √det(J Jᵀ), of the linear rows where the task has no orientation.
+        share: The same as a share of the largest among random postures, between 0 and 1.
+        margins: Distances of the joints from their nearest limit in [rad] or [m], inf without limits. Shape (n,).
+        colours: Of the joints. Shape (n, 3).
+    """
+
+    manipulability: float
+    share: float
+    margins: FloatArray
+    colours: npt.NDArray[np.uint8]
+
+
+class Reader:
+    """Reads postures of one arm.
+
+    Args:
+        arm: The arm that moves.
+        task: Says which rows of the Jacobian count.
+    """
+
+    def __init__(self, arm: Arm, task: Task) -> None:
+        self._arm, self._rows = arm, 6 if task.has_orientation and arm.joints >= 6 else 3
+        self._near = np.minimum(NEAR_SHARE * (arm.upper - arm.lower), NEAR_MOST)
+        low, high = slider_range(arm)
+        postures = np.random.default_rng(0).uniform(low, high, (POSTURES, arm.joints))
+        self.largest = float(self.manipulability(postures).max())
+
+    def manipulability(self, q: FloatArray) -> FloatArray:
+        """√det(J Jᵀ) of postures, of shape (..., n) in [rad] or [m]. Shape (...)."""
+        jacobian = self._arm.jacobian(q)[..., : self._rows, :]
+        # The product of the singular values; the root of a determinant loses half of the digits.
+        values: FloatArray = np.linalg.svd(jacobian, compute_uv=False).prod(axis=-1)
+        return values
+
+    def read(self, q: FloatArray) -> Reading:
+        """What is said of a posture, of shape (n,) in [rad] or [m]."""
+        margins = np.minimum(q - self._arm.lower, self._arm.upper - q)
+        colours = np.full((self._arm.joints, 3), FREE, dtype=np.uint8)
+        colours[margins <= self._near] = NEAR
+        colours[margins <= TOUCHING] = AT
+        found = float(self.manipulability(q))
+        return Reading(found, min(found / self.largest, 1.0) if self.largest else 0.0, margins, colours)
+
+
+def slider_range(arm: Arm) -> tuple[FloatArray, FloatArray]:
+    """What joints are moved between by hand: their limits, a turn either way or half the reach where there is none.
+
+    Returns:
+        Lowest and highest joint coordinates in [rad] or [m], each of shape (n,).
+    """
+    usual = np.where(arm.prismatic, 0.5 * (arm.reach(np.zeros(arm.joints)) or 1.0), np.pi)
+    return (
+        np.where(np.isfinite(arm.lower), arm.lower, np.minimum(-usual, arm.upper - usual)),
+        np.where(np.isfinite(arm.upper), arm.upper, np.maximum(usual, arm.lower + usual)),
+    )
+
+
+def share_colour(share: float) -> tuple[int, int, int]:
+    """From vermilion at 0, a singular posture, to bluish green at 1."""
+    bad, good = np.array((213, 94, 0)), np.array((0, 158, 115))
+    red, green, blue = (bad + np.clip(share, 0.0, 1.0) * (good - bad)).astype(int).tolist()
+    return red, green, blue

@@ -1,0 +1,94 @@
+"""The command ``ikgym video``: an episode as a film for papers and talks, policies side by side."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import importlib
+import pathlib
+import sys
+from collections.abc import Sequence
+from typing import Annotated
+
+import tyro
+from tqdm import tqdm
+
+from baselines import command
+from baselines.viewer.film import checked_width, moments, pictures, write_video
+from baselines.viewer.replay import Stage, named, play
+from ikgym.exceptions import InvalidInputError
+
+
+@dataclasses.dataclass(frozen=True)
+class Options:
+    """What the command line takes."""
+
+    out: Annotated[pathlib.Path, tyro.conf.arg(metavar="FILE.mp4")]
+    """The file to write."""
+    scenario: Annotated[str, tyro.conf.arg(metavar="NAME")] = "varga7-fast"
+    """Name of a scenario, FILE.toml or MODULE:ATTRIBUTE."""
+    policy: Annotated[tuple[str, ...], tyro.conf.arg(metavar="POLICY …")] = ("dls",)
+    """Policies that are shown side by side, as evaluate takes them."""
+    seed: Annotated[int, tyro.conf.arg(metavar="N")] = 0
+    """Reset seed of the episode."""
+    steps: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
+    """Most steps of the episode. The scenario's own number if left out."""
+    fps: Annotated[float, tyro.conf.arg(metavar="N")] = 30.0
+    """Pictures in one second of the video."""
+    speed: Annotated[float, tyro.conf.arg(metavar="X")] = 1.0
+    """Seconds of the episode in one second of the video: 0.1 is ten times slower than the arm."""
+    width: Annotated[int, tyro.conf.arg(metavar="PIXELS")] = 960
+    """Width of one policy's picture, which is half as high. Several policies stand in two columns."""
+
+
+def manual() -> str:
+    """The text of ``--help`` above the options."""
+    prog = _program()
+    return f"""\
+Draws an episode as an H.264 video: the arm, the paths and the errors over time, several policies at the same moment.
+Needs pip install "ikgym[video]".
+
+Examples:
+  {prog} --scenario panda-circle --policy dls --out circle.mp4
+  {prog} --scenario varga7-fast --policy dls rhc rhc_foresight --speed 0.2 --width 1280 --out talk.mp4"""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """The command line.
+
+    Args:
+        arguments: What stands behind the command; taken from the process if left out.
+
+    Returns:
+        The exit code: 0, 2 where something expected went wrong, 130 after Ctrl-C.
+    """
+    arguments = sys.argv[1:] if arguments is None else list(arguments)
+    return command.run(lambda: _film(command.parse(Options, arguments, prog=_program(), description=manual())))
+
+
+def _film(options: Options) -> int:
+    command.find_own_modules()
+    importlib.import_module("moviepy")  # what is missing is said before episodes are played
+    if options.out.suffix != ".mp4":
+        raise InvalidInputError(f"out: expected a file that ends in .mp4, got {str(options.out)!r}.")
+    width, names = checked_width(options.width), named(options.policy)
+    stage = Stage.of(options.scenario, options.seed, options.steps)
+    steps = moments(stage, options.fps, options.speed)
+    replays = [play(stage, name) for name in names]
+    content = tqdm(
+        pictures(stage, replays, steps, width=width),
+        total=len(steps),
+        unit="picture",
+        file=sys.stderr,
+        dynamic_ncols=True,
+    )
+    write_video(options.out, content, options.fps)
+    print(f"{options.out}: {len(steps)} pictures, {len(steps) / options.fps:.1f} s")
+    return 0
+
+
+_program = functools.partial(command.program, "video", "python -m baselines.viewer.video")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,133 @@
+"""The command ``ikgym view``: solvers side by side in a browser, live and in an episode."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import pathlib
+import sys
+import threading
+from collections.abc import Sequence
+from typing import Annotated, Any
+
+import tyro
+from tqdm import tqdm
+
+from baselines import command
+from baselines.viewer.following import followers
+from baselines.viewer.replay import Stage, named, play
+from baselines.viewer.session import Session
+from ikgym.exceptions import InvalidInputError
+
+
+@dataclasses.dataclass(frozen=True)
+class Options:
+    """What the command line takes."""
+
+    scenario: Annotated[str, tyro.conf.arg(metavar="NAME")] = "varga7-fast"
+    """Name of a scenario, FILE.toml or MODULE:ATTRIBUTE."""
+    policy: Annotated[tuple[str, ...], tyro.conf.arg(metavar="POLICY …")] = ("dls",)
+    """Policies that are shown side by side, as evaluate takes them."""
+    seed: Annotated[int, tyro.conf.arg(metavar="N")] = 0
+    """Reset seed of the episode."""
+    steps: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
+    """Most steps of the episode. The scenario's own number if left out."""
+    urdf: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None
+    """A URDF file of the arm, whose meshes are shown. Cylinders if left out, unless the arm was read from such a
+    file that has meshes."""
+    host: Annotated[str, tyro.conf.arg(metavar="HOST")] = "127.0.0.1"
+    """Address to listen on; 0.0.0.0 lets other machines in, who may then move the arms."""
+    port: Annotated[int, tyro.conf.arg(metavar="PORT")] = 8080
+    """Port to listen on; 0 for one that is free."""
+
+
+def manual() -> str:
+    """The text of ``--help`` above the options."""
+    prog = _program()
+    return f"""\
+Shows policies side by side in a browser: the episode, played, scrubbed, slowly or fast; and arms that follow a target
+that you drag, each by its own policy, called as on a real arm: no drives, sensors or other imperfections of the
+scenario's plant. Joints are moved by sliders within their limits. Needs pip install "ikgym[view]".
+
+Examples:
+  {prog} --scenario panda-circle --policy dls rhc
+  {prog} --scenario varga7-random --seed 2000000 --policy mfac rhc_foresight
+  {prog} --scenario lab.toml --policy dls --urdf lab.urdf"""
+
+
+def session_of(stage: Stage, policies: Sequence[str], *, progress: bool = False) -> Session:
+    """What is shown of policies.
+
+    Args:
+        stage: What they are shown on.
+        policies: Their names, as the command line takes them.
+        progress: Whether to show a bar on stderr while they play the episode.
+
+    Raises:
+        UnknownNameError: There is no such policy or parameter.
+        InvalidInputError: There is no policy, or one does not suit the scenario.
+    """
+    names = named(policies)
+    bar = tqdm(names, disable=not progress, file=sys.stderr, unit="policy", dynamic_ncols=True)
+    return Session(stage, [play(stage, policy) for policy in bar], followers(stage, names))
+
+
+def main(arguments: Sequence[str] | None = None, stop: threading.Event | None = None) -> int:
+    """The command line.
+
+    Args:
+        arguments: What stands behind the command; taken from the process if left out.
+        stop: Ends the viewer when it is set; only Ctrl-C does if left out.
+
+    Returns:
+        The exit code: 0, 2 where something expected went wrong, 130 after Ctrl-C.
+    """
+    arguments = sys.argv[1:] if arguments is None else list(arguments)
+
+    def work() -> int:
+        options = command.parse(Options, arguments, prog=_program(), description=manual())
+        command.find_own_modules()
+        # What is missing is said before episodes are played.
+        from baselines.viewer.server import Viewer, free_port, serving
+
+        port = free_port(options.host, options.port)
+        stage = Stage.of(options.scenario, options.seed, options.steps)
+        shaper = _shaper(stage, options.urdf)
+        session = session_of(stage, options.policy, progress=True)
+        with serving(options.host, port) as server:
+            viewer = Viewer(server, session, shaper)
+            print(f"http://{server.get_host()}:{server.get_port()}  (Ctrl-C ends it)", flush=True)
+            viewer.run(threading.Event() if stop is None else stop)
+        return 0
+
+    return command.run(work)
+
+
+def _shaper(stage: Stage, file: pathlib.Path | None) -> Any:
+    """Who makes the arms from meshes; None where they are cylinders.
+
+    Raises:
+        InvalidInputError: The file that was given is not of the arm.
+    """
+    arm = stage.scenario.arm
+    source = arm.urdf.file if file is None and arm.urdf is not None else file
+    if source is None:
+        return None
+    from baselines.viewer.meshes import Meshes, read_urdf
+
+    try:
+        read_urdf(source, arm)
+    except InvalidInputError as e:
+        if file is not None:
+            raise
+        command.complain(f"{e} Cylinders are shown.")
+        return None
+    # Each arm in the scene moves a model of its own.
+    return lambda server: lambda root, _: Meshes(server, root, read_urdf(source, arm), arm)
+
+
+_program = functools.partial(command.program, "view", "python -m baselines.viewer.view")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,117 @@
+"""Videos: what is drawn when, and files that can be played."""
+
+from __future__ import annotations
+
+import subprocess
+
+import numpy as np
+import pytest
+
+from baselines.console import main
+from baselines.viewer import film
+from baselines.viewer.film import checked_width, moments, pictures, write_video
+from baselines.viewer.replay import Stage, play
+from ikgym.exceptions import InvalidInputError
+
+WIDTH = 480
+
+
+@pytest.fixture(scope="module")
+def stage():
+    return Stage.of("panda-circle", steps=30)
+
+
+def test_steps_that_are_drawn(stage):
+    assert moments(stage, 100.0, 1.0).tolist() == [0, 10, 20, 30]
+    assert moments(stage, 100.0, 0.5).tolist() == [0, 5, 10, 15, 20, 25, 30]
+    assert moments(stage, 50.0, 1.25).tolist() == [0, 25, 30]  # the end is always there
+    slow = moments(stage, 100.0, 0.05)
+    assert (slow[0], slow[-1]) == (0, 30)
+    assert len(slow) == 61
+
+
+@pytest.mark.parametrize(("fps", "speed", "name"), [(0.0, 1.0, "fps"), (30.0, -1.0, "speed")])
+def test_fps_and_speed_are_above_0(stage, fps, speed, name):
+    with pytest.raises(InvalidInputError, match=name):
+        moments(stage, fps, speed)
+
+
+@pytest.mark.parametrize("width", [479, 482, 3844, 480.0])
+def test_widths(width):
+    with pytest.raises(InvalidInputError, match="width"):
+        checked_width(width)
+    assert checked_width(640) == 640
+
+
+def test_policies_stand_in_two_columns(stage):
+    one = play(stage, "dls")
+    steps = moments(stage, 50.0, 1.5)
+    (alone, *_) = drawn = list(pictures(stage, [one], steps, width=WIDTH))
+    assert len(drawn) == 2
+    assert alone.shape == (WIDTH // 2, WIDTH, 3)
+    (three, *_) = pictures(stage, [one] * 3, steps[:1], width=WIDTH)
+    assert three.shape == (WIDTH, 2 * WIDTH, 3)
+    np.testing.assert_array_equal(three[: WIDTH // 2, :WIDTH], alone)
+    np.testing.assert_array_equal(three[WIDTH // 2 :, :WIDTH], alone)
+    assert (three[WIDTH // 2 :, WIDTH:] == 255).all()
+    assert (drawn[1] != alone).any()
+
+
+def decoded(file):
+    ffmpeg = pytest.importorskip("imageio_ffmpeg").get_ffmpeg_exe()
+    decode = [ffmpeg, "-v", "error", "-i", str(file), "-f", "rawvideo", "-pix_fmt", "rgb24", "-"]
+    return np.frombuffer(subprocess.run(decode, check=True, capture_output=True).stdout, dtype=np.uint8)
+
+
+def test_the_command_writes_a_video(tmp_path, capsys):
+    pytest.importorskip("moviepy")
+    file = tmp_path / "new" / "two.mp4"
+    options = ["--scenario", "panda-circle", "--steps", "20", "--fps", "100", "--width", str(WIDTH)]
+    assert main(["video", *options, "--policy", "dls", "qp", "--out", str(file)]) == 0
+    assert "two.mp4: 3 pictures" in capsys.readouterr().out
+    frames = decoded(file).reshape(-1, WIDTH // 2, 2 * WIDTH, 3)
+    assert len(frames) == 3
+    assert (frames[0] != frames[-1]).any()
+    assert list(file.parent.iterdir()) == [file]
+
+
+def test_a_video_that_breaks_off_leaves_the_old_one(tmp_path):
+    pytest.importorskip("moviepy")
+    file = tmp_path / "old.mp4"
+    file.write_bytes(b"old")
+
+    def breaking():
+        yield np.zeros((240, 480, 3), dtype=np.uint8)
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        write_video(file, breaking(), 30.0)
+    assert file.read_bytes() == b"old"
+    assert list(tmp_path.iterdir()) == [file]
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--out", "x.gif"], "out: expected a file that ends in .mp4, got 'x.gif'."),
+        (["--out", "x.mp4", "--policy", "dlss"], "There is no policy 'dlss'. Did you mean 'dls'?"),
+        (["--out", "x.mp4", "--width", "481"], "width: expected a multiple of 4"),
+        (["--out", "x.mp4", "--fps", "0"], "fps: expected a finite number above 0"),
+        (["--out", "x.mp4", "--scenario", "panda-cirkle"], "Did you mean 'panda-circle'?"),
+    ],
+)
+def test_mistakes(options, message, capsys, tmp_path, monkeypatch):
+    pytest.importorskip("moviepy")
+    monkeypatch.chdir(tmp_path)
+    assert main(["video", "--steps", "2", *options]) == 2
+    assert message in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_without_moviepy_the_extra_is_named(capsys, monkeypatch):
+    import sys
+
+    monkeypatch.setitem(sys.modules, "moviepy", None)
+    monkeypatch.setattr(film, "pictures", None)  # nothing is drawn before
+    assert main(["video", "--out", "x.mp4"]) == 2
+    assert capsys.readouterr().err == 'error: This needs moviepy: pip install "ikgym[video]"\n'

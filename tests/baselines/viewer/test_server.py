@@ -1,0 +1,189 @@
+"""The viewer serves a page, shows what the session says, does what a browser asks, and ends."""
+
+from __future__ import annotations
+
+import gc
+import re
+import socket
+import sys
+import threading
+import time
+import urllib.error
+import urllib.request
+import warnings
+
+import numpy as np
+import pytest
+
+from baselines.console import main
+from baselines.viewer import view
+from baselines.viewer.replay import Stage
+from baselines.viewer.session import Mode
+from baselines.viewer.view import session_of
+from ikgym.exceptions import InvalidInputError
+
+pytest.importorskip("viser")
+import msgspec
+from websockets.sync.client import connect
+
+from baselines.viewer import server as servers
+
+HOST = "127.0.0.1"
+
+
+class Browser:
+    """What a page of viser's says to the server."""
+
+    def __init__(self, connection):
+        self.connection = connection
+        self.say(
+            "ViewerCamera", wxyz=[1, 0, 0, 0], position=[3, 0, 1], fov=1.0, near=0.1, far=99.0, aspect=1.0,
+            look_at=[0, 0, 0], up_direction=[0, 0, 1],
+        )  # fmt: skip
+
+    def say(self, kind, **content):
+        self.connection.send(msgspec.msgpack.encode({"type": f"{kind}Message", **content}))
+
+    def set(self, control, value):
+        self.say("GuiUpdate", uuid=control._impl.uuid, updates={"value": value})
+
+    def drag(self, target, position):
+        self.say("TransformControlsUpdate", name=target.name, wxyz=target.wxyz.tolist(), position=position.tolist())
+
+
+def collect():
+    """viser leaves its event loop to the garbage collector, which would complain of it in the middle of other tests."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ResourceWarning)
+        gc.collect()
+
+
+@pytest.fixture(scope="module", autouse=True)
+def collected():
+    yield
+    collect()
+
+
+@pytest.fixture(scope="module")
+def server(collected):
+    with servers.serving(HOST, 0) as made:
+        yield made
+
+
+@pytest.fixture
+def viewer(server):
+    server.scene.reset()
+    server.gui.reset()
+    return servers.Viewer(server, session_of(Stage.of("panda-circle", steps=20), ["dls", "qp"]))
+
+
+@pytest.fixture
+def browser(server, viewer):
+    with connect(f"ws://{HOST}:{server.get_port()}", max_size=None, max_queue=None) as connection:
+        made = Browser(connection)
+        wait_for(viewer, server.get_clients)
+        yield made
+
+
+def wait_for(viewer, condition):
+    """Shows pictures in which no time passes until something has come about."""
+    for _ in range(500):
+        viewer.tick(0.0)
+        if condition():
+            return
+        time.sleep(0.02)
+    pytest.fail("nothing has come of it in 10 s")
+
+
+def test_it_serves_the_page(server):
+    with urllib.request.urlopen(f"http://{HOST}:{server.get_port()}", timeout=10) as answer:
+        assert b"<html" in answer.read().lower()
+
+
+def test_a_browser_is_told_the_scene(browser):
+    told = b""
+    while not all(name in told for name in (b"/policy_1", b"joint_6", b"panda-circle**, seed 0", b"Play")):
+        told += browser.connection.recv(timeout=10)
+
+
+def test_what_is_played_is_shown(viewer):
+    viewer.session.toggle()
+    viewer.tick(0.01)
+    session = viewer.session
+    np.testing.assert_allclose(viewer._scene.target.position, session.stage.path[10], atol=1e-12)
+    frame = viewer._scene._arms[1]._frames[2]
+    q = session.replays[1].q[10]
+    np.testing.assert_allclose(frame.wxyz, [np.cos(q[2] / 2), *(np.sin(q[2] / 2) * session.stage.scenario.arm.axes[2])])
+
+
+def test_buttons_and_sliders_do_what_they_say(viewer, browser):
+    session, panel = viewer.session, viewer._panel
+    browser.set(panel._play, True)
+    wait_for(viewer, lambda: session.playing)
+    browser.set(panel._time, 0.012)
+    wait_for(viewer, lambda: session.step == 12)
+    assert not session.playing
+    browser.set(panel._joints[3], -1.0)
+    wait_for(viewer, lambda: session.mode is Mode.HAND)
+    assert session.shown()[0].q[3] == -1.0
+
+
+def test_what_the_program_sets_is_not_taken_for_a_user(viewer):
+    viewer.session.scrub(0.01)
+    viewer.tick(1.0)  # readings and sliders are due
+    viewer.tick(0.0)
+    assert viewer.session.mode is Mode.PLAY
+    assert viewer._panel._joints[0].value == pytest.approx(viewer.session.shown()[0].q[0])
+    assert "dls" in viewer._panel._readings.content
+
+
+def test_a_target_that_is_dragged_is_followed(viewer, browser):
+    session, target = viewer.session, viewer._scene.target
+    browser.drag(target, target.position + np.array([0.0, 0.0, 0.01]))
+    wait_for(viewer, lambda: session.mode is Mode.FOLLOW)
+    viewer.tick(0.01)
+    assert session.reference.position[2] > session.stage.path[0, 2]
+
+
+def test_it_runs_until_it_is_told_to_stop(capsys):
+    stop = threading.Event()
+    threading.Timer(0.5, stop.set).start()
+    assert view.main(["--scenario", "panda-circle", "--steps", "2", "--port", "0"], stop) == 0
+    port = int(re.search(r"http://127.0.0.1:(\d+)", capsys.readouterr().out)[1])
+    with pytest.raises(urllib.error.URLError):
+        urllib.request.urlopen(f"http://{HOST}:{port}", timeout=1)
+    collect()
+
+
+def test_a_port_in_use_is_an_error(capsys):
+    with socket.socket() as taken:
+        taken.bind((HOST, 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        with pytest.raises(InvalidInputError, match=f"port: expected one that is free .*, got {port}"):
+            servers.free_port(HOST, port)
+        assert main(["view", "--steps", "2", "--port", str(port)]) == 2
+    assert "port: expected one that is free" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--policy", "dlss"], "There is no policy 'dlss'. Did you mean 'dls'?"),
+        (["--scenario", "panda-cirkle"], "Did you mean 'panda-circle'?"),
+        (["--port", "70000"], "port: expected"),
+        (["--urdf", "nowhere.urdf"], "urdf: expected a file, got 'nowhere.urdf'."),
+    ],
+)
+def test_mistakes(options, message, capsys):
+    assert main(["view", "--steps", "2", *(options if "--port" in options else ["--port", "0", *options])]) == 2
+    assert message in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("package", ["viser", "trimesh"])
+def test_without_it_the_extra_is_named(package, capsys, monkeypatch):
+    for name in [name for name in sys.modules if name.startswith("baselines.viewer.")]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, package, None)
+    assert main(["view", "--steps", "2", "--port", "0"]) == 2
+    assert capsys.readouterr().err == f'error: This needs {package}: pip install "ikgym[view]"\n'
