@@ -6,6 +6,7 @@ A test fails where a page does not hold what this writes.
 from __future__ import annotations
 
 import dataclasses
+import functools
 import inspect
 import re
 from collections.abc import Iterable
@@ -20,8 +21,10 @@ from baselines.evaluation import test_sets as sets
 from baselines.evaluation.report import NOTHING
 from baselines.oracle import best_known
 from baselines.oracle.best_known import MARGIN
+from baselines.papers import PAPERS
 from baselines.registry import get
 from baselines.status import Status
+from docs.paper_pages import figures, verdicts
 
 PAGES = Path(__file__).parent
 
@@ -166,7 +169,10 @@ TABLES = {
     "statuses": statuses,
     "test_sets": test_sets,
     "records": records,
+    **{f"verdicts_{name}": functools.partial(verdicts, paper) for name, paper in PAPERS.items()},
 }
+#: What is no table.
+TEXTS = {f"figures_{name}": functools.partial(figures, paper) for name, paper in PAPERS.items()}
 
 
 def markdown(rows: Iterable[tuple[str, ...]]) -> str:
@@ -180,7 +186,7 @@ def filled(text: str) -> str:
     """A page with its tables written anew."""
     return re.sub(
         r"(<!-- table: (\w+) -->\n).*?(<!-- end -->)",
-        lambda m: f"{m[1]}{markdown(TABLES[m[2]]())}\n{m[3]}",
+        lambda m: f"{m[1]}{TEXTS[m[2]]() if m[2] in TEXTS else markdown(TABLES[m[2]]())}\n{m[3]}",
         text,
         flags=re.DOTALL,
     )
@@ -188,7 +194,7 @@ def filled(text: str) -> str:
 
 def main() -> None:
     """Writes the tables into the pages."""
-    for page in sorted(PAGES.glob("*.md")):
+    for page in sorted(PAGES.rglob("*.md")):
         page.write_text(filled(page.read_text(encoding="utf-8")), encoding="utf-8")
 
 

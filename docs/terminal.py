@@ -22,17 +22,17 @@ def terminal() -> Iterator[None]:
         yield
 
 
+def called(arguments: Sequence[str]) -> bool:
+    """Calls the command with what stands behind ``ikgym``; whether it failed."""
+    return bool(main(arguments))
+
+
 def manual_of(*words: str) -> str:
     """What ``ikgym WORDS --help`` prints."""
     out = io.StringIO()
     with terminal(), contextlib.redirect_stdout(out), contextlib.suppress(SystemExit):
-        main([*words, "--help"])
+        called([*words, "--help"])
     return without_spaces(out.getvalue())
-
-
-def called(arguments: Sequence[str]) -> bool:
-    """Calls the command; whether it failed."""
-    return bool(main(arguments))
 
 
 def without_spaces(text: str) -> str:

@@ -48,10 +48,16 @@ class Roles(griffe.Extension):
 
     def _link(self, target: str, scope: str) -> str:
         """A link to what is meant where the site describes it, and its name where it does not."""
-        there = [path for path in self._paths[target.rpartition(".")[2]] if f".{path}".endswith(f".{target}")]
+        there = self._meant(target)
         if not there:
             if importlib.util.find_spec(target.partition(".")[0]) is None:
                 _log.warning(f"{scope}: its docstring refers to {target!r}, which does not exist")
             return f"`{target}`"
         nearest = max(there, key=lambda path: len(os.path.commonprefix([path, scope])))
         return f'<autoref identifier="{nearest}" optional>`{target}`</autoref>'
+
+    def _meant(self, target: str) -> list[str]:
+        """The paths that end with the target; of what a class has inherited, those of the name that it has."""
+        owner, _, name = target.rpartition(".")
+        exact = [path for path in self._paths[name] if f".{path}".endswith(f".{target}")]
+        return exact or (self._paths[name] if owner and self._meant(owner) else [])

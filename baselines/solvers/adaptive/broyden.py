@@ -94,7 +94,7 @@ class Broyden(DampedLeastSquares):
         return broyden_rows
 
     def numbers(self) -> tuple[Any, ...]:
-        """See :meth:`TaskFeedback.numbers`."""
+        """See :meth:`ResolvedRate.numbers`."""
         return self.damping, self.motion, self.learns == "correction"
 
     def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:

@@ -62,7 +62,7 @@ class GramSchmidt(ResolvedRate):
         return gram_schmidt_rows
 
     def numbers(self) -> tuple[Any, ...]:
-        """See :meth:`TaskFeedback.numbers`."""
+        """See :meth:`ResolvedRate.numbers`."""
         return self.truncation, self.full_rank
 
     def invert(self, jacobian: FloatArray, shift: FloatArray) -> tuple[FloatArray, npt.NDArray[np.int64]]:

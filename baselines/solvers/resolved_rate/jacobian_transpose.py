@@ -68,7 +68,7 @@ class JacobianTranspose(ResolvedRate):
         return jacobian_transpose_rows
 
     def numbers(self) -> tuple[Any, ...]:
-        """See :meth:`TaskFeedback.numbers`."""
+        """See :meth:`ResolvedRate.numbers`."""
         return self.rank_tolerance, self.full_rank, self._weights
 
     def invert(self, jacobian: FloatArray, shift: FloatArray) -> tuple[FloatArray, npt.NDArray[np.int64]]:

@@ -96,7 +96,7 @@ class NullSpace(MoorePenrose):
         return null_space_rows
 
     def numbers(self) -> tuple[Any, ...]:
-        """See :meth:`TaskFeedback.numbers`."""
+        """See :meth:`ResolvedRate.numbers`."""
         lines = 0
         if self.objective == "manipulability":
             lines = 6 if self.problem.task.has_orientation else 3

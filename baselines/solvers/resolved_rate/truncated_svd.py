@@ -50,7 +50,7 @@ class TruncatedSVD(ResolvedRate):
         return pseudoinverse_step_rows
 
     def numbers(self) -> tuple[Any, ...]:
-        """See :meth:`TaskFeedback.numbers`."""
+        """See :meth:`ResolvedRate.numbers`."""
         return self.threshold, self.full_rank, np.ones(self.problem.model.joints)
 
     def invert(self, jacobian: FloatArray, shift: FloatArray) -> tuple[FloatArray, npt.NDArray[np.int64]]:

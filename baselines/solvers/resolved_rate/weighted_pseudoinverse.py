@@ -52,7 +52,7 @@ class WeightedPseudoinverse(MoorePenrose):
         object.__setattr__(self, "_root", read_only(np.sqrt(weights)))
 
     def numbers(self) -> tuple[Any, ...]:
-        """See :meth:`TaskFeedback.numbers`."""
+        """See :meth:`ResolvedRate.numbers`."""
         return self.rank_tolerance, self.full_rank, self._root
 
     def invert(self, jacobian: FloatArray, shift: FloatArray) -> tuple[FloatArray, npt.NDArray[np.int64]]:
