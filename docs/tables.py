@@ -9,7 +9,7 @@ import dataclasses
 import functools
 import inspect
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import numpy as np
@@ -158,6 +158,12 @@ def plant() -> list[tuple[str, ...]]:
     return [("key", "meaning", "off")] + [(f"`{n}`", m, f"`{defaults[n]!r}`") for n, m in meanings.items()]
 
 
+def demo() -> str:
+    """The table of the README."""
+    readme = (PAGES.parent / "README.md").read_text(encoding="utf-8")
+    return readme.partition("<!-- demo -->\n")[2].partition("\n<!-- end -->")[0]
+
+
 TABLES = {
     "plant": plant,
     "arms": arms,
@@ -172,7 +178,10 @@ TABLES = {
     **{f"verdicts_{name}": functools.partial(verdicts, paper) for name, paper in PAPERS.items()},
 }
 #: What is no table.
-TEXTS = {f"figures_{name}": functools.partial(figures, paper) for name, paper in PAPERS.items()}
+TEXTS: dict[str, Callable[[], str]] = {
+    "demo": demo,
+    **{f"figures_{name}": functools.partial(figures, paper) for name, paper in PAPERS.items()},
+}
 
 
 def markdown(rows: Iterable[tuple[str, ...]]) -> str:
