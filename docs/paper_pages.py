@@ -64,8 +64,7 @@ CAPTIONS: dict[str, dict[int, str]] = {
         8: f"{_SOLUTION} {_Q1} with reduced precision of the orientation",
         9: f"{_ERROR} with reduced motion of q₇ and q₈",
         10: f"{_SOLUTION} {_Q1} with reduced motion of q₇ and q₈",
-        11: "The joint coordinates for the generation of the nominal trajectory by using only q₇ and q₈ in the canonical"
-        " approximate model",
+        11: f"The joint coordinates for the generation of the {_Q7Q8}",
         12: f"Tracking of a {_Q7Q8}",
         13: f"The tracking error of the end-point and the orientation for the {_Q7Q8}",
         14: f"{_SOLUTION} the {_Q7Q8}",

@@ -47,7 +47,7 @@ def _printed(kind: str, content: str, names: dict[str, Any]) -> str:
             failed = False
         else:
             lines = content.replace("\\\n", " ").splitlines()
-            failed = any([called(shlex.split(line, comments=True)[1:]) for line in lines])
+            failed = sum(called(shlex.split(line, comments=True)[1:]) for line in lines) > 0
     return without_spaces(out.getvalue() + (err.getvalue() if failed else "")) + "\n"
 
 

@@ -15,11 +15,13 @@ import pytest
 import baselines
 import ikgym
 from baselines import console, registry
+from baselines.agents.features import Processing
 from baselines.console import main
 from baselines.evaluate import evaluate
 from baselines.oracle import best_known
 from baselines.oracle.best_known import beaten
 from baselines.papers import PAPERS
+from baselines.policy import Problem
 from docs.paper_pages import CAPTIONS, picture
 from docs.tables import PAGES, filled
 from docs.tutorial import PAGES as TUTORIALS
@@ -67,7 +69,8 @@ def test_readme_snippets_run(capsys):
 
 def test_scenarios_snippets_run(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(ikgym.scenarios._registry, "_makers", dict(ikgym.scenarios._registry._makers))
+    for part in ("_makers", "_made"):
+        monkeypatch.setattr(ikgym.scenarios._registry, part, dict(getattr(ikgym.scenarios._registry, part)))
     inverse, published, path, own = snippets_of("scenarios.md")
     names: dict = {}
     exec(inverse, names)
@@ -82,11 +85,23 @@ def test_scenarios_snippets_run(tmp_path, monkeypatch):
     assert ikgym.scenarios.load("mine.toml").steps == names["scenario"].steps
 
 
+class Features(gym.Env):
+    """Spaces of what the page on agents takes a model to have been trained on."""
+
+    observation_space = gym.spaces.Box(
+        -np.inf,
+        np.inf,
+        (Processing((1, 2, 10, 30, 60, 120)).size(Problem.of(ikgym.scenarios.get("varga7-random"))),),
+        np.float32,
+    )
+    action_space = gym.spaces.Box(-1.0, 1.0, (7,), np.float32)
+
+
 def test_the_snippet_on_agents_converts_a_zip(tmp_path, monkeypatch):
     ppo = pytest.importorskip("stable_baselines3").PPO
     monkeypatch.chdir(tmp_path)
+    ppo("MlpPolicy", Features(), device="cpu").save("model.zip")
     (snippet,) = snippets_of("agents.md")
-    monkeypatch.setattr(ppo, "load", lambda *_, **__: features_model(ppo))
     exec(snippet, {})
     assert (tmp_path / "agent.safetensors").stat().st_size > 1000
 

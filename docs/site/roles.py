@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
-import os
+import itertools
 import re
 from collections import defaultdict
 from typing import Any
@@ -53,7 +53,7 @@ class Roles(griffe.Extension):
             if importlib.util.find_spec(target.partition(".")[0]) is None:
                 _log.warning(f"{scope}: its docstring refers to {target!r}, which does not exist")
             return f"`{target}`"
-        nearest = max(there, key=lambda path: len(os.path.commonprefix([path, scope])))
+        nearest = max(there, key=lambda path: _shared(path, scope))
         return f'<autoref identifier="{nearest}" optional>`{target}`</autoref>'
 
     def _meant(self, target: str) -> list[str]:
@@ -61,3 +61,9 @@ class Roles(griffe.Extension):
         owner, _, name = target.rpartition(".")
         exact = [path for path in self._paths[name] if f".{path}".endswith(f".{target}")]
         return exact or (self._paths[name] if owner and self._meant(owner) else [])
+
+
+def _shared(one: str, other: str) -> int:
+    """How many names two paths share from the beginning on."""
+    pairs = zip(one.split("."), other.split("."), strict=False)
+    return sum(1 for _ in itertools.takewhile(lambda pair: pair[0] == pair[1], pairs))
