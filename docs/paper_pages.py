@@ -64,7 +64,7 @@ CAPTIONS: dict[str, dict[int, str]] = {
         8: f"{_SOLUTION} {_Q1} with reduced precision of the orientation",
         9: f"{_ERROR} with reduced motion of q₇ and q₈",
         10: f"{_SOLUTION} {_Q1} with reduced motion of q₇ and q₈",
-        11: f"The joint coordinates for the generation of the {_Q7Q8}",
+        11: f"The joint coordinates for the generation of the {_Q7Q8.replace('generated ', '')}",
         12: f"Tracking of a {_Q7Q8}",
         13: f"The tracking error of the end-point and the orientation for the {_Q7Q8}",
         14: f"{_SOLUTION} the {_Q7Q8}",

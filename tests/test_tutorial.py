@@ -49,7 +49,7 @@ def marked(page):
     return pytest.param(page, id=page.stem, marks=pytest.mark.slow if page.stem in LONGER else ())
 
 
-@pytest.mark.parametrize("page", map(marked, PAGES))
+@pytest.mark.parametrize("page", [marked(page) for page in PAGES])
 def test_it_runs_and_prints_what_the_page_says(page, tmp_path):
     if page.stem == "training":
         pytest.importorskip("torch")
