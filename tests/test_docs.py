@@ -97,6 +97,7 @@ class Features(gym.Env):
     action_space = gym.spaces.Box(-1.0, 1.0, (7,), np.float32)
 
 
+@pytest.mark.slow
 def test_the_snippet_on_agents_converts_a_zip(tmp_path, monkeypatch):
     ppo = pytest.importorskip("stable_baselines3").PPO
     monkeypatch.chdir(tmp_path)
