@@ -8,7 +8,7 @@ DEMO := moore_penrose truncated_svd dls null_space full_orientation mfac rhc_gra
 FUZZ := 20000
 PYTEST := $(BIN)/python -m pytest -n auto --dist worksteal
 
-.PHONY: help setup demo test slow fuzz check format lint types layers bench rivals clean
+.PHONY: help setup demo test slow fuzz check format lint types layers docs bench rivals clean
 
 help: ## Show this list
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /  make \1\t/' | expand -t 18
@@ -52,6 +52,9 @@ check: ## All that CI runs: format, lint, types, layers, tests, slow tests
 	$(MAKE) --no-print-directory layers
 	$(MAKE) --no-print-directory test
 	$(MAKE) --no-print-directory slow
+
+docs: $(STAMP) ## Build the documentation as a site in results/site; a broken link or reference fails
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
 
 bench: $(STAMP) ## Measure speed beside other environments, libraries and solvers: report in results/bench
 	$(BIN)/python -m benchmarks

@@ -6,9 +6,10 @@ A test fails where a page does not hold what this writes.
 from __future__ import annotations
 
 import dataclasses
+import functools
 import inspect
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import numpy as np
@@ -20,8 +21,10 @@ from baselines.evaluation import test_sets as sets
 from baselines.evaluation.report import NOTHING
 from baselines.oracle import best_known
 from baselines.oracle.best_known import MARGIN
+from baselines.papers import PAPERS
 from baselines.registry import get
 from baselines.status import Status
+from docs.paper_pages import figures, verdicts
 
 PAGES = Path(__file__).parent
 
@@ -155,6 +158,12 @@ def plant() -> list[tuple[str, ...]]:
     return [("key", "meaning", "off")] + [(f"`{n}`", m, f"`{defaults[n]!r}`") for n, m in meanings.items()]
 
 
+def demo() -> str:
+    """The table of the README."""
+    readme = (PAGES.parent / "README.md").read_text(encoding="utf-8")
+    return readme.partition("<!-- demo -->\n")[2].partition("\n<!-- end -->")[0]
+
+
 TABLES = {
     "plant": plant,
     "arms": arms,
@@ -166,6 +175,12 @@ TABLES = {
     "statuses": statuses,
     "test_sets": test_sets,
     "records": records,
+    **{f"verdicts_{name}": functools.partial(verdicts, paper) for name, paper in PAPERS.items()},
+}
+#: What is no table.
+TEXTS: dict[str, Callable[[], str]] = {
+    "demo": demo,
+    **{f"figures_{name}": functools.partial(figures, paper) for name, paper in PAPERS.items()},
 }
 
 
@@ -180,7 +195,7 @@ def filled(text: str) -> str:
     """A page with its tables written anew."""
     return re.sub(
         r"(<!-- table: (\w+) -->\n).*?(<!-- end -->)",
-        lambda m: f"{m[1]}{markdown(TABLES[m[2]]())}\n{m[3]}",
+        lambda m: f"{m[1]}{TEXTS[m[2]]() if m[2] in TEXTS else markdown(TABLES[m[2]]())}\n{m[3]}",
         text,
         flags=re.DOTALL,
     )
@@ -188,7 +203,7 @@ def filled(text: str) -> str:
 
 def main() -> None:
     """Writes the tables into the pages."""
-    for page in sorted(PAGES.glob("*.md")):
+    for page in sorted(PAGES.rglob("*.md")):
         page.write_text(filled(page.read_text(encoding="utf-8")), encoding="utf-8")
 
 

@@ -1,22 +1,20 @@
-"""Runs the tutorial word by word, and writes what it prints into the page: ``python -m docs.tutorial``."""
+"""Runs the tutorials word by word, and writes what they print into their pages: ``python -m docs.tutorial``."""
 
 from __future__ import annotations
 
 import contextlib
 import io
-import os
 import re
 import shlex
 import sys
 import tempfile
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 from unittest import mock
 
-from baselines.console import main as console
+from docs.terminal import called, terminal, without_spaces
 
-PAGE = Path(__file__).parent / "tutorial.md"
+PAGES = (Path(__file__).parent / "tutorial.md", *sorted((Path(__file__).parent / "tutorials").glob("*.md")))
 # A block, with the name of the file that it is; blocks of text are what the block before has printed.
 _BLOCK = re.compile(r"(?:<!-- file: (?P<file>\S+) -->\n)?```(?P<kind>\w*)\n(?P<content>.*?)```\n", re.DOTALL)
 
@@ -36,15 +34,8 @@ def played(text: str, folder: Path) -> str:
             printed = _printed(found["kind"], found["content"], names)
         return found[0]
 
-    with contextlib.chdir(folder), _terminal():
+    with contextlib.chdir(folder), mock.patch.object(sys, "path", [str(folder), *sys.path]), terminal():
         return _BLOCK.sub(replaced, text)
-
-
-@contextlib.contextmanager
-def _terminal() -> Iterator[None]:
-    """The command as it is called on a terminal with 110 characters a line."""
-    with mock.patch.object(sys, "argv", ["ikgym"]), mock.patch.dict(os.environ, {"COLUMNS": "110"}):
-        yield
 
 
 def _printed(kind: str, content: str, names: dict[str, Any]) -> str:
@@ -52,20 +43,20 @@ def _printed(kind: str, content: str, names: dict[str, Any]) -> str:
     out, err = io.StringIO(), io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
         if kind == "python":
-            exec(compile(content, PAGE.name, "exec", dont_inherit=True), names)
+            exec(compile(content, "tutorial", "exec", dont_inherit=True), names)
             failed = False
         else:
-            codes = [console(shlex.split(line)[1:]) for line in content.splitlines()]
-            failed = any(codes)
-    text = out.getvalue() + (err.getvalue() if failed else "")
-    return "\n".join(line.rstrip() for line in text.strip().splitlines()) + "\n"
+            lines = content.replace("\\\n", " ").splitlines()
+            failed = sum(called(shlex.split(line, comments=True)[1:]) for line in lines) > 0
+    return without_spaces(out.getvalue() + (err.getvalue() if failed else "")) + "\n"
 
 
 def main() -> None:
-    """Writes the page anew."""
-    with tempfile.TemporaryDirectory() as folder:
-        text = played(PAGE.read_text(encoding="utf-8"), Path(folder))
-    PAGE.write_text(text, encoding="utf-8")
+    """Writes the pages anew."""
+    for page in PAGES:
+        with tempfile.TemporaryDirectory() as folder:
+            text = played(page.read_text(encoding="utf-8"), Path(folder))
+        page.write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -15,18 +15,24 @@ import pytest
 import baselines
 import ikgym
 from baselines import console, registry
+from baselines.agents.features import Processing
 from baselines.console import main
 from baselines.evaluate import evaluate
 from baselines.oracle import best_known
 from baselines.oracle.best_known import beaten
+from baselines.papers import PAPERS
+from baselines.policy import Problem
+from docs.paper_pages import CAPTIONS, picture
 from docs.tables import PAGES, filled
+from docs.tutorial import PAGES as TUTORIALS
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
-PROSE = [*ROOT.glob("*.md"), *sorted(PAGES.glob("*.md"))]
+WRITTEN = sorted(PAGES.rglob("*.md"))
+PROSE = [*ROOT.glob("*.md"), *WRITTEN]
 
 
-@pytest.mark.parametrize("page", sorted(PAGES.glob("*.md")), ids=lambda page: page.name)
+@pytest.mark.parametrize("page", WRITTEN, ids=lambda page: str(page.relative_to(PAGES)))
 def test_tables_are_up_to_date(page):
     text = page.read_text(encoding="utf-8")
     assert filled(text) == text, "write the tables anew with: python -m docs.tables"
@@ -61,14 +67,66 @@ def test_readme_snippets_run(capsys):
     assert cost == pytest.approx(cells()["dls"]["total cost"], rel=1e-3)
 
 
-def test_the_snippet_on_inverse_kinematics_meets_its_pose():
-    page = (PAGES / "scenarios.md").read_text(encoding="utf-8")
-    (snippet,) = (text for text in re.findall(r"```python\n(.*?)```", page, re.DOTALL) if "inverse(" in text)
+def test_scenarios_snippets_run(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for part in ("_makers", "_made"):
+        monkeypatch.setattr(ikgym.scenarios._registry, part, dict(getattr(ikgym.scenarios._registry, part)))
+    inverse, published, path, own = snippets_of("scenarios.md")
     names: dict = {}
-    exec(snippet, names)
+    exec(inverse, names)
     assert names["converged"]
     there = names["arm"].forward(names["q"])[1]
     np.testing.assert_allclose(there, names["position"] + [0.1, 0.2, -0.1], atol=1e-9)
+    exec(published, names)
+    assert len(names["greedy"]) == len(names["waypoints"].positions)
+    exec(path, names)
+    exec(own, names)
+    assert names["env"].unwrapped.scenario.name == "planar4-wave"
+    assert ikgym.scenarios.load("mine.toml").steps == names["scenario"].steps
+
+
+class Features(gym.Env):
+    """Spaces of what the page on agents takes a model to have been trained on."""
+
+    observation_space = gym.spaces.Box(
+        -np.inf,
+        np.inf,
+        (Processing((1, 2, 10, 30, 60, 120)).size(Problem.of(ikgym.scenarios.get("varga7-random"))),),
+        np.float32,
+    )
+    action_space = gym.spaces.Box(-1.0, 1.0, (7,), np.float32)
+
+
+@pytest.mark.slow
+def test_the_snippet_on_agents_converts_a_zip(tmp_path, monkeypatch):
+    ppo = pytest.importorskip("stable_baselines3").PPO
+    monkeypatch.chdir(tmp_path)
+    ppo("MlpPolicy", Features(), device="cpu").save("model.zip")
+    (snippet,) = snippets_of("agents.md")
+    exec(snippet, {})
+    assert (tmp_path / "agent.safetensors").stat().st_size > 1000
+
+
+@pytest.mark.parametrize("paper", PAPERS)
+def test_snippets_on_papers_run(paper, capsys):
+    (snippet,) = snippets_of(f"papers/{paper}.md")
+    exec(snippet, {})
+    number, status = capsys.readouterr().out.split()
+    assert np.isfinite(float(number))
+    assert status != "diverged"
+
+
+def test_no_page_has_snippets_that_nobody_runs():
+    here = {"README.md", "evaluation.md", "policies.md", "scenarios.md", "agents.md"}
+    run = {ROOT / "README.md", *TUTORIALS, *(PAGES / name for name in here), *(PAGES / "papers").glob("*.md")}
+    with_snippets = {page for page in PROSE if "```python" in page.read_text(encoding="utf-8")}
+    assert with_snippets <= run
+
+
+def test_each_figure_of_a_paper_has_its_caption_and_its_picture():
+    for name, paper in PAPERS.items():
+        assert [figure.number for figure in paper.figures] == list(CAPTIONS[name])
+        assert all(picture(name, figure.number).exists() for figure in paper.figures)
 
 
 def test_the_policy_of_the_readme_follows_the_reference():
@@ -179,7 +237,7 @@ def test_what_readme_says_of_its_table():
     assert 50 < cells()["rhc_gradient"]["p50 [µs]"] / cells()["dls"]["p50 [µs]"] < 80
 
 
-@pytest.mark.parametrize("page", PROSE, ids=lambda page: page.name)
+@pytest.mark.parametrize("page", PROSE, ids=lambda page: str(page.relative_to(ROOT)))
 def test_links_and_commands_exist(page):
     text = page.read_text(encoding="utf-8")
     for target in re.findall(r"\]\(([^)#]+)\)", text):

@@ -1,18 +1,23 @@
-"""The tutorial: all of it is run, in a folder of its own, and prints what the page says."""
+"""The tutorials: all of them are run, each in a folder of its own, and print what their pages say."""
 
 from __future__ import annotations
 
 import re
+import shlex
 
 import pytest
 
 import baselines
-from docs.tutorial import PAGE, played
+from baselines import registry
+from docs.terminal import manual_of
+from docs.tutorial import PAGES, played
 
-TEXT = PAGE.read_text(encoding="utf-8")
+TEXT = PAGES[0].read_text(encoding="utf-8")
+#: Pages that take longer; their commands are looked at by a test that always runs.
+LONGER = {"reproducing", "training", "wrong_models"}
 REMEDY = "write it anew with: python -m docs.tutorial"
 #: The end of a line of the table of solvers: p50, p99 and misses, which are measured with a clock, and the status.
-CLOCK = re.compile(r"\S+ +\S+ +\d+ +(applied|saturated|converged)$", re.MULTILINE)
+CLOCK = re.compile(rf"\S+ +\S+ +\d+ +({'|'.join(s.label for s in baselines.Status)}|unknown)$", re.MULTILINE)
 
 
 def tokens(text):
@@ -33,11 +38,49 @@ def differences(one, other):
     return found or (first[len(second) :] + second[len(first) :])
 
 
-def test_it_runs_and_prints_what_the_page_says(tmp_path):
-    text = played(TEXT, tmp_path)
-    assert not differences(text, TEXT), REMEDY
-    exported = sorted(file.name for file in (tmp_path / "results" / "export" / "weld").iterdir())
-    assert [name.rpartition("-seed-0")[2] for name in exported] == [".csv", ".json"]
+@pytest.fixture(autouse=True)
+def names_stay_as_they_were(monkeypatch):
+    """A tutorial registers a policy."""
+    monkeypatch.setattr(registry, "_places", dict(registry._places))
+    monkeypatch.setattr(registry, "_classes", dict(registry._classes))
+
+
+def marked(page):
+    return pytest.param(page, id=page.stem, marks=pytest.mark.slow if page.stem in LONGER else ())
+
+
+@pytest.mark.parametrize("page", [marked(page) for page in PAGES])
+def test_it_runs_and_prints_what_the_page_says(page, tmp_path):
+    if page.stem == "training":
+        pytest.importorskip("torch")
+    said = page.read_text(encoding="utf-8")
+    text = played(said, tmp_path)
+    assert not differences(text, said), REMEDY
+    if page.stem == "tutorial":
+        exported = sorted(file.name for file in (tmp_path / "results" / "export" / "weld").iterdir())
+        assert [name.rpartition("-seed-0")[2] for name in exported] == [".csv", ".json"]
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if page.stem in LONGER], ids=lambda page: page.stem)
+def test_longer_ones_are_code_and_commands_with_options_that_exist(page):
+    text = page.read_text(encoding="utf-8")
+    for snippet in re.findall(r"```python\n(.*?)```", text, re.DOTALL):
+        compile(snippet, page.name, "exec")
+    lines = "".join(re.findall(r"```sh\n(.*?)```", text, re.DOTALL)).replace("\\\n", " ").splitlines()
+    assert lines
+    for line in lines:
+        words = shlex.split(line, comments=True)
+        options = {word for word in words if word.startswith("--")}
+        which = words[1:3] if words[1] == "train" else words[1:2]
+        assert words[0] == "ikgym"
+        assert options <= set(re.findall(r"--[\w-]+", manual_of(*which))), line
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if page.stem != "tutorial"], ids=lambda page: page.stem)
+def test_each_says_what_it_prints(page):
+    text = page.read_text(encoding="utf-8")
+    assert "`python -m docs.tutorial` runs it" in " ".join(text.split())
+    assert "```text\n```" not in text, REMEDY
 
 
 def test_a_page_that_says_something_else_is_noticed(tmp_path):

@@ -180,7 +180,8 @@ def parse(arguments: Sequence[str]) -> tuple[Command[Any] | Repeat, frozenset[st
     """What a command line asks for.
 
     Returns:
-        The command, and the names of the options in :data:`common.SHAPE` that it gives, be it by a preset.
+        The command, and the names of the options in :data:`baselines.training.config.base.SHAPE` that it gives, be it
+        by a preset.
 
     Raises:
         UnknownNameError: There is no such preset, or the method has no option that the preset gives.

@@ -1,0 +1,1 @@
+"""What MkDocs runs to make a site of these pages: ``make docs``."""
