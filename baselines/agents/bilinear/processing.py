@@ -11,10 +11,10 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.agents.bilinear.kernels import action_rows, new_features
-from baselines.agents.bilinear.twists import shown_joints, twist_size
 from baselines.agents.features import Features
 from baselines.policy import Batch, Problem
 from ikgym.exceptions import InvalidInputError
+from ikgym.rl.twists import shown_joints, twist_size
 from ikgym.validation import FloatArray, Frozen, known_names, whole_number
 
 
