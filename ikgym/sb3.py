@@ -205,11 +205,18 @@ class LearningVecEnv(RedundantIKVecEnv):
     up the rewards that the agent sees.
 
     Args:
-        envs: What :func:`ikgym.rl.make_vec` gave, in the mode ``"SameStep"``.
+        num_envs: N.
+        scenario: A scenario or what names one, see `ikgym.scenarios.find`.
+        learning: How it is wrapped.
+
+    Raises:
+        UnknownNameError: There is no such scenario.
+        InvalidInputError: A value is refused.
     """
 
-    def __init__(self, envs: Any) -> None:
-        self._take(envs)
+    def __init__(self, num_envs: int, scenario: str | Scenario, learning: rl.Learning) -> None:
+        self.learning = learning
+        self._take(learning.arms(scenario, num_envs, AutoresetMode.SAME_STEP))
 
 
 def make_vec(scenario: str | Scenario, num_envs: int = 1, **changes: Any) -> LearningVecEnv:
@@ -227,7 +234,7 @@ def make_vec(scenario: str | Scenario, num_envs: int = 1, **changes: Any) -> Lea
         UnknownNameError: There is no such scenario or field.
         InvalidInputError: A value is refused.
     """
-    return LearningVecEnv(rl.make_vec(scenario, num_envs, autoreset_mode=AutoresetMode.SAME_STEP, **changes))
+    return LearningVecEnv(num_envs, scenario, rl.Learning().replace(**changes))
 
 
 def _plain(value: Any) -> Any:

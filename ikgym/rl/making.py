@@ -46,12 +46,23 @@ class Learning(Frozen):
     history: int = 1
     commands: int = 0
 
-    def shown(self) -> dict[str, Any]:
+    def arm(self, scenario: str | Scenario) -> gym.Env[Any, Any]:
+        """One arm of a scenario, wrapped."""
+        env: gym.Env[Any, Any] = self._wrap(RedundantIKEnv(scenario, **self._shown()), wrappers)
+        return env
+
+    def arms(self, scenario: str | Scenario, num_envs: int, autoreset_mode: str | AutoresetMode) -> Any:
+        """N arms of a scenario, wrapped."""
+        return self._wrap(
+            RedundantIKVectorEnv(num_envs, scenario, autoreset_mode=autoreset_mode, **self._shown()), vector
+        )
+
+    def _shown(self) -> dict[str, Any]:
         """What the environment itself is made with."""
         return {"preview": self.preview, "commands": self.commands, "lost_distance": self.lost_distance}
 
-    def wrap(self, env: Any, kinds: Any) -> Any:
-        """Wraps an environment by the wrappers of a module."""
+    def _wrap(self, env: Any, kinds: Any) -> Any:
+        """An environment in the wrappers of a module."""
         env = kinds.RelativeAction(env, self.share, self.largest, self.furthest)
         env = kinds.LogReward(env, self.scale, self.charge)
         env = kinds.AgentObservation(env, self.furthest)
@@ -69,9 +80,7 @@ def make(scenario: str | Scenario, **changes: Any) -> gym.Env[Any, Any]:
         UnknownNameError: There is no such scenario or field.
         InvalidInputError: A value is refused.
     """
-    learning = _changed(changes)
-    env: gym.Env[Any, Any] = learning.wrap(RedundantIKEnv(scenario, **learning.shown()), wrappers)
-    return env
+    return Learning().replace(**changes).arm(scenario)
 
 
 def make_vec(
@@ -93,11 +102,5 @@ def make_vec(
         UnknownNameError: There is no such scenario, mode or field.
         InvalidInputError: A value is refused.
     """
-    learning = _changed(changes)
-    envs = RedundantIKVectorEnv(num_envs, scenario, autoreset_mode=autoreset_mode, **learning.shown())
-    wrapped: gym.vector.VectorEnv[Any, Any, Any] = learning.wrap(envs, vector)
-    return wrapped
-
-
-def _changed(changes: dict[str, Any]) -> Learning:
-    return Learning().replace(**changes)
+    envs: gym.vector.VectorEnv[Any, Any, Any] = Learning().replace(**changes).arms(scenario, num_envs, autoreset_mode)
+    return envs

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from baselines.agents.network import forward_rows
 from ikgym.jit import kernel
 from ikgym.rl.feature_kernels import feature_row, mean_twists
 from ikgym.rl.twists import is_turned, shown_joints, turn, turn_gradient, twist, twist_size
@@ -101,3 +102,48 @@ def action_rows(kind, prismatic, axis, dt, offsets, velocity_limit, q, pose, nom
             for a in range(w):
                 qdot += own[a] * due[a] / lead
             out[row, j] = qdot / velocity_limit[j]
+
+
+@kernel
+def law_rows(
+    kind,
+    prismatic,
+    axis,
+    dt,
+    offsets,
+    velocity_limit,
+    weights,
+    biases,
+    sizes,
+    activation,
+    squash,
+    q,
+    pose,
+    nominal,
+    remaining,
+    out,
+):
+    """The whole law, row by row: :func:`new_features`, the network, :func:`action_rows`, in one call from Python.
+
+    Args:
+        kind: Of task coordinates.
+        prismatic: Shape (n,).
+        axis: Shape (3,).
+        dt: Δt in [s].
+        offsets: Shape (p,).
+        velocity_limit: Shape (n,).
+        weights: See :func:`baselines.agents.network.forward_rows`.
+        biases: See there.
+        sizes: See there.
+        activation: See there.
+        squash: See there.
+        q: Shape (B, n).
+        pose: Shape (B, m).
+        nominal: At the offsets. Shape (B, p, m).
+        remaining: Shape (B, 1).
+        out: Receives fractions of the velocity limit. Shape (B, n).
+    """
+    features = new_features(kind, prismatic, axis, dt, offsets, q, nominal, remaining)
+    output = np.empty((q.shape[0], sizes[sizes.shape[0] - 1]), np.float32)
+    forward_rows(weights, biases, sizes, activation, squash, features, output)
+    action_rows(kind, prismatic, axis, dt, offsets, velocity_limit, q, pose, nominal, output, out)
