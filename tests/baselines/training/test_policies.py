@@ -24,8 +24,12 @@ def scenario():
 
 
 @pytest.mark.parametrize(("kind", "policy", "parameters"), [
-    (PPO, "MlpPolicy", SHORT), (SAC, "MlpPolicy", LATE), (TD3, "MlpPolicy", LATE),
-    (PPO, BilinearPPOPolicy, SHORT), (SAC, BilinearSACPolicy, LATE), (TD3, BilinearTD3Policy, LATE),
+    (PPO, "MlpPolicy", SHORT),
+    pytest.param(SAC, "MlpPolicy", LATE, marks=pytest.mark.slow),
+    pytest.param(TD3, "MlpPolicy", LATE, marks=pytest.mark.slow),
+    (PPO, BilinearPPOPolicy, SHORT),
+    (SAC, BilinearSACPolicy, LATE),
+    pytest.param(TD3, BilinearTD3Policy, LATE, marks=pytest.mark.slow),
 ])  # fmt: skip
 def test_models_learn_and_act_the_same_from_their_file(tmp_path, kind, policy, parameters):
     envs = ikgym.sb3.make_vec(scenario(), 2)
@@ -58,7 +62,7 @@ def test_weights_of_the_bilinear_actor_are_trained(kind, policy, parameters):
 
 def test_actions_are_homogeneous_in_what_is_due():
     """Twice as far from the path, the velocity that takes it back is twice as large: G does not change."""
-    model = PPO(BilinearPPOPolicy, ikgym.sb3.make_vec(scenario(), 1), device="cpu", seed=0, **SHORT)
+    model = PPO(BilinearPPOPolicy, ikgym.sb3.make_vec(scenario(), 2), device="cpu", seed=0, **SHORT)
     actor = model.policy.mlp_extractor.policy_net
     features = torch.from_numpy(rl.make(scenario()).reset(seed=0)[0])[None]
     n, w = actor.joints, actor.twist
@@ -69,7 +73,7 @@ def test_actions_are_homogeneous_in_what_is_due():
 
 
 def test_agents_with_a_history_are_not_exported(tmp_path):
-    envs = ikgym.sb3.make_vec(scenario(), 1, history=2)
+    envs = ikgym.sb3.make_vec(scenario(), 2, history=2)
     model = PPO("MlpPolicy", envs, device="cpu", **SHORT)
     with pytest.raises(InvalidInputError, match="no history"):
         export(model, envs, tmp_path / "agent.safetensors")
