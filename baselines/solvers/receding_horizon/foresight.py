@@ -14,8 +14,10 @@ from baselines.solvers.receding_horizon.rhc import RecedingHorizon
 # Each block of the plan is so many steps longer than the one before, up to a length.
 GROWTH, LONGEST = 2.0, 100.0
 # What parameters are that are None: of arms without limits, and of those with.
-FREE = {"horizon": 3001, "iterations": 1, "starts": 20, "restart_steps": 20, "start_steps": 10}
-LIMITED = {"horizon": 1501, "iterations": 3, "starts": 1, "restart_steps": 0, "start_steps": 0}
+FREE = {"horizon": 3001, "iterations": 1, "starts": 23, "restart_steps": 20, "start_steps": 10}
+LIMITED = {"iterations": 3, "starts": 1, "restart_steps": 0, "start_steps": 0}
+# Of arms with limits: how far ahead in [s], and the control period in [s] for which blocks have the lengths above.
+AHEAD, PERIOD = 1.5, 1e-3
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -26,19 +28,21 @@ class RecedingHorizonForesight(RecedingHorizon):
     out of local minima that a single plan would keep. The plan looks 3,000 steps ahead: what a redundant arm does with
     its null space now decides what motions seconds later cost. Its 56 blocks grow evenly, and reach that far without
     skipping an oscillation. Blocks that grow geometrically do skip some: of 57 knots in 1,500 steps, half lie in the
-    first tenth, and the last block has 127 steps. The first plan takes two periods of five Newton steps. Each of the 19
-    after them tries another guess with ten, which is longer than a control period of 1 ms; of 3,000 periods these are
-    0.7 %. A period behind one that ended beyond the velocity limits has four.
+    first tenth, and the last block has 127 steps. The first plan takes two periods, of three and seven Newton steps.
+    Each of the 22 after them tries another guess with ten, which is longer than a control period of 1 ms; of 3,000
+    periods these are 0.7 %. A period behind one that ended beyond the velocity limits has four.
 
     **Arms with limits** of position, velocity or acceleration. Plans are made by the interior point method, whose
     Newton steps take longer and go further: three for the plan alone are worth more than candidates. Limits turn up
-    in the far end of a plan that so few steps cannot settle, so that it looks 1,500 steps ahead.
+    in the far end of a plan that so few steps cannot settle, so that it looks 1.5 s ahead, at whatever control period;
+    the lengths of its blocks are those of 1 ms in time, too, since the path turns as quickly for a slow controller.
 
     Args:
-        horizon: As in ``rhc``. None for 3,001, and 1,501 for arms with limits.
+        horizon: As in ``rhc``. None for 3,001, and 1.5 s for arms with limits.
         iterations: As in ``rhc``, where None is the optimum. Here it is 1, and 3 for arms with limits.
-        move_blocks: As in ``rhc``, but None for blocks that are each 2 steps longer than the one before, up to 100.
-        starts: As in ``rhc``. None for 20, and 1 for arms with limits.
+        move_blocks: As in ``rhc``, but None for blocks that are each 2 steps longer than the one before, up to 100; for
+            arms with limits each 2 ms longer, up to 0.1 s.
+        starts: As in ``rhc``. None for 23, and 1 for arms with limits.
         restart_steps: As in ``rhc``. None for 20, and 0 for arms with limits.
         start_steps: As in ``rhc``. None for 10, and 0 for arms with limits.
     """
@@ -55,7 +59,8 @@ class RecedingHorizonForesight(RecedingHorizon):
 
     def __post_init__(self) -> None:
         """Settles what depends on the arm."""
-        for name, value in (LIMITED if self.interior_point else FREE).items():
+        ahead = {"horizon": 1 + max(1, round(AHEAD / self.problem.dt))}
+        for name, value in (LIMITED | ahead if self.interior_point else FREE).items():
             if getattr(self, name) is None:
                 object.__setattr__(self, name, value)
         super().__post_init__()
@@ -68,5 +73,6 @@ class RecedingHorizonForesight(RecedingHorizon):
     def _knots(self) -> npt.NDArray[np.int64]:
         """Steps from now to the knots. Shape (K,)."""
         if self.move_blocks is None:
-            return evenly_growing_offsets(self.horizon - 1, GROWTH, LONGEST)  # type: ignore[operator]
+            share = PERIOD / self.problem.dt if self.interior_point else 1.0
+            return evenly_growing_offsets(self.horizon - 1, share * GROWTH, max(1.0, share * LONGEST))  # type: ignore[operator]
         return super()._knots()

@@ -63,7 +63,7 @@ class RecedingHorizon(CompiledPolicy):
         restart_rate: Newton steps of the restart candidate in one control period.
         seed: Of the random guesses, which are the same in all episodes.
         start_steps: Newton steps of an initial guess in a period, where they are spread over the first periods: the
-            first plan comes from the first guess, with half of its steps in each of the first two periods, and each of
+            first plan comes from the first guess, with its steps shared by the first two periods, and each of
             ``starts`` - 1 periods after them goes on with another guess, as with a restart candidate, until it is
             cheaper than the plan or unpromising. A later candidate begins in a period without a Newton step of it, so
             that no period has both. 0 to try all guesses in the first period, which takes that much longer.

@@ -42,7 +42,6 @@ CAVEATS = """\
 - A waypoint every {period:g} s, {steps} control steps from one to the next, the thresholds at the waypoints only.
 - Starts: the first one that RL-ITG publishes for a path. CppFlow prescribes none: of {postures} solutions from random
   postures, the one farthest from the limits; another start can turn a failure into a success, and the other way round.
-- `rhc_foresight` was played as it was when it looked 1,500 steps ahead, all others as they are.
 - Times were taken while other processes shared the machine, one call of `predict` at a time."""
 HEAD = ["", "passes", "position [mm]", "orientation [°]", "joint step [°]", "torso step [cm]", "beyond limits"]
 TAIL = ["length [rad]", "stop", "velocity", "p50 [µs]"]

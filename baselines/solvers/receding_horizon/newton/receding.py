@@ -37,8 +37,8 @@ _CONVERGED, _LIMIT, _SATURATED = int(Status.CONVERGED), int(Status.ITERATION_LIM
 KEPT = 1e-5
 # Newton steps of the initial plan at least, and of a plan that is to be brought to its optimum.
 STEPS_OF_THE_FIRST, STEPS_TO_THE_OPTIMUM = 30, 300
-# Periods that share the Newton steps of the initial plan, where guesses are spread over periods.
-PERIODS_OF_THE_FIRST = 2
+# Periods that share the Newton steps of the initial plan where guesses are spread over periods, and those of the first.
+PERIODS_OF_THE_FIRST, SHARE_OF_THE_FIRST = 2, 0.3
 # Behind so many periods beyond the velocity limits another plan is begun beside it.
 RETRY = 4
 
@@ -203,7 +203,7 @@ def _plan_row(problem, settings, old_grid, plans, counts, workspace):
     first = period < (PERIODS_OF_THE_FIRST if spread else 1)
     starting = spread and not first and counts[TRIED] + 1 < settings.starts
     retried = far > 0 and far % RETRY == 0
-    steps = _newton_steps(settings, first, far > 0 and not (starting or retried))
+    steps = _newton_steps(settings, period if first else -1, far > 0 and not (starting or retried))
     whole = plan_in(plans[0], all_knots, n)
     minimum, made = _plan(problem, settings, steps, period, old_grid, whole, workspace)
     if far > 0 and not starting:
@@ -222,15 +222,17 @@ def _newton_steps(settings, first, hurried):
 
     Args:
         settings: :class:`settings.PlanSettings`.
-        first: Whether the first plan is made.
+        first: Which of the periods of the first plan this is, -1 for none.
         hurried: Whether the period before ended beyond the velocity limits, and there is time to make up for it.
     """
     if settings.iterations < 0:
         return -1
-    if not first:
+    # The first period has the initial guess besides, which takes as long as some Newton steps.
+    begin = int(SHARE_OF_THE_FIRST * settings.start_steps)
+    if first < 0:
         least = settings.recovery_steps if hurried else 0
     elif settings.start_steps > 0:
-        least = (settings.start_steps + PERIODS_OF_THE_FIRST - 1) // PERIODS_OF_THE_FIRST
+        least = begin if first == 0 else settings.start_steps - begin
     else:
         least = STEPS_OF_THE_FIRST
     return max(least, settings.iterations)

@@ -82,7 +82,7 @@ def test_few_periods_are_longer_than_others():
 
 @pytest.mark.slow
 def test_initial_guesses_one_after_the_other_lose_little():
-    """At most 0.5 % in the geometric mean against 64 of them in the first call (0.49 % on 256 episodes)."""
+    """At most 0.5 % in the geometric mean against 64 of them in the first call (0.23 % on 256 episodes)."""
     scenario, seeds = ikgym.scenarios.get(SCENARIO), ikgym.scenarios.seeds("validation", 128)
     costs = []
     for parameters in ({}, {"start_steps": 0, "starts": 64}):
