@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import pathlib
+import re
+
 import numpy as np
 import pytest
 import torch
@@ -91,3 +94,12 @@ def test_a_lost_track_is_no_truncation():
     assert info["TimeLimit.truncated"] is False
     assert info["episode"]["l"] < 400
     assert info["terminal_observation"].shape == envs.observation_space.shape
+
+
+def test_the_snippet_of_the_page_runs(tmp_path, monkeypatch):
+    page = (pathlib.Path(__file__).parents[3] / "docs" / "agents.md").read_text(encoding="utf-8")
+    (snippet,) = (text for text in re.findall(r"```python\n(.*?)```", page, re.DOTALL) if "make_vec" in text)
+    monkeypatch.chdir(tmp_path)
+    exec(compile(snippet, "agents.md", "exec", dont_inherit=True), {})
+    agent = baselines.make("agent", "panda-random", path="mine.safetensors")
+    assert agent.preview == (10, 40, 100)
