@@ -76,9 +76,7 @@ def main() -> None:
     parser.add_argument("--episodes", type=int, default=64, help="that are followed")
     parser.add_argument("--every", type=int, default=8, help="rollouts between two validations")
     parser.add_argument("--threads", type=int, default=2, help="of PyTorch")
-    parser.add_argument(
-        "--test", action="store_true", help="measure on the split `test` in the end: once, when all is chosen"
-    )
+    parser.add_argument("--test", action="store_true", help="measure on the test episodes in the end: once")
     arguments = parser.parse_args()
     torch.set_num_threads(arguments.threads)
     model = PPO("MlpPolicy", ikgym.sb3.make_vec(arguments.scenario, 8), seed=arguments.seed, device="cpu")

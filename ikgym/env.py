@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
 from typing import Any, ClassVar
 
 import gymnasium as gym
@@ -13,13 +12,14 @@ from gymnasium.envs.registration import EnvSpec
 
 from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError, ResetNeededError
+from ikgym.options import checked_distance, checked_options
 from ikgym.outcome import OBSERVED as OBSERVED
 from ikgym.outcome import Observation, observation
 from ikgym.scenarios import Preview, Scenario
 from ikgym.scenarios.entering import has_joint_path
 from ikgym.simulator import Simulator
 from ikgym.spaces import action_space, observation_space
-from ikgym.validation import FloatArray, known_names, number, shortened
+from ikgym.validation import FloatArray
 
 #: The keys of `info` after a step; the orientation error is there where the task has an orientation.
 REPORTED = ("tracking_cost", "velocity_cost", "position_error", "orientation_error", "clipped", "at_limit", "time")
@@ -283,27 +283,3 @@ def limited(spec: EnvSpec | None, scenario: Scenario) -> EnvSpec | None:
     spec = copy.copy(spec)
     spec.max_episode_steps = scenario.steps
     return spec
-
-
-def checked_distance(distance: float | None) -> float | None:
-    """The distance at which a track is lost, or None.
-
-    Raises:
-        InvalidInputError: It is no number above 0.
-    """
-    return None if distance is None else number("lost_distance", distance, above=0.0)
-
-
-def checked_options(options: dict[str, Any] | None, known: Sequence[str]) -> dict[str, Any]:
-    """The options of a reset.
-
-    Raises:
-        UnknownNameError: There is no such option.
-        InvalidInputError: They are no dict.
-    """
-    if options is None:
-        return {}
-    if not isinstance(options, dict):
-        raise InvalidInputError(f"options: expected None or a dict, got {shortened(options)}.")
-    known_names("option of reset", options, known)
-    return options

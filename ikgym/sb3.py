@@ -12,8 +12,9 @@ import numpy.typing as npt
 from gymnasium.vector import AutoresetMode
 
 from ikgym import rl
-from ikgym.env import OPTIONS, REPORTED, checked_options
+from ikgym.env import OPTIONS, REPORTED
 from ikgym.exceptions import InvalidInputError, MissingDependencyError
+from ikgym.options import checked_options
 from ikgym.rows import ArmRow
 from ikgym.scenarios import Preview, Scenario
 from ikgym.simulator import Observation

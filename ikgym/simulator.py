@@ -11,7 +11,6 @@ import numpy.typing as npt
 
 from ikgym import simulation
 from ikgym.arms.limits import limit_rows
-from ikgym.arms.posture import within_limits
 from ikgym.compilation import announced
 from ikgym.exceptions import InvalidInputError
 from ikgym.memory import afford, of_rows
@@ -24,10 +23,10 @@ from ikgym.plant.rows import PlantRows, checked_arm_seeds
 from ikgym.preview import FARTHEST as FARTHEST
 from ikgym.preview import Preview, offsets
 from ikgym.scenarios import Scenario
-from ikgym.scenarios.entering import checked_steps, on_path
+from ikgym.scenarios.entering import checked_starts, checked_steps, on_path
 from ikgym.simulation import Constants, State
 from ikgym.trajectories import Trajectory
-from ikgym.validation import FloatArray, float_array, shortened, whole_number
+from ikgym.validation import FloatArray, shortened, whole_number
 
 # Rows worth a thread of their own: below, handing over costs more than it saves.
 GRAIN_STEP = 256
@@ -151,30 +150,8 @@ class Simulator:
             self._enter(entered, [shared[row] for row in entered.tolist()], steps[entered], starts)
 
     def checked_starts(self, q: npt.ArrayLike | None) -> FloatArray | None:
-        """Starts that a user asks for.
-
-        Args:
-            q: Joint coordinates in [rad] or [m], of shape (n,) for all rows, or (N, n). None for the scenario's own.
-
-        Returns:
-            One start a row, of shape (N, n), or None.
-
-        Raises:
-            InvalidInputError: A start has a wrong shape, is not finite, out of range or outside the arm's limits.
-        """
-        if q is None:
-            return None
-        joints, bound = self.scenario.joints, self.scenario.start_bound()
-        starts = float_array("options['q']", q)
-        if starts.shape not in {(joints,), (self.rows, joints)}:
-            raise InvalidInputError(f"options['q']: expected shape ({joints},), got {starts.shape}.")
-        within_limits("options['q']", starts, self.scenario.arm)
-        if (np.abs(starts) > bound).any():
-            raise InvalidInputError(
-                f"options['q']: expected absolute values of at most {np.round(bound, 4).tolist()} in [rad] or [m], "
-                f"got {shortened(starts.tolist())}."
-            )
-        return np.broadcast_to(starts, (self.rows, joints))
+        """Starts that a user asks for, see :func:`ikgym.scenarios.entering.checked_starts`."""
+        return checked_starts(q, self.rows, self.scenario)
 
     def checked_arm_seeds(self, given: Any) -> list[int | None] | None:
         """Seeds of arms that a user asks for, see :func:`ikgym.plant.rows.checked_arm_seeds`."""

@@ -1,4 +1,4 @@
-"""Episodes that are entered after some steps, where their reference joint path is then."""
+"""Where arms begin: at starts of one's own, or after some steps, where their reference joint path is then."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ikgym.arms.posture import within_limits
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios.scenario import Scenario
 from ikgym.trajectories import Trajectory
-from ikgym.validation import FloatArray, whole_number
+from ikgym.validation import FloatArray, float_array, shortened, whole_number
 
 Steps = npt.NDArray[np.int64]
 
@@ -20,6 +20,35 @@ Steps = npt.NDArray[np.int64]
 def has_joint_path(scenario: Scenario) -> bool:
     """Whether the reference trajectory is a joint path, on which episodes can be entered."""
     return scenario.trajectory.joint_bound() is not None
+
+
+def checked_starts(q: npt.ArrayLike | None, rows: int, scenario: Scenario) -> FloatArray | None:
+    """Starts that a user asks for.
+
+    Args:
+        q: Joint coordinates in [rad] or [m], of shape (n,) for all rows, or (N, n). None for the scenario's own.
+        rows: N.
+        scenario: What is tracked.
+
+    Returns:
+        One start a row, of shape (N, n), or None.
+
+    Raises:
+        InvalidInputError: A start has a wrong shape, is not finite, out of range or outside the arm's limits.
+    """
+    if q is None:
+        return None
+    joints, bound = scenario.joints, scenario.start_bound()
+    starts = float_array("options['q']", q)
+    if starts.shape not in {(joints,), (rows, joints)}:
+        raise InvalidInputError(f"options['q']: expected shape ({joints},), got {starts.shape}.")
+    within_limits("options['q']", starts, scenario.arm)
+    if (np.abs(starts) > bound).any():
+        raise InvalidInputError(
+            f"options['q']: expected absolute values of at most {np.round(bound, 4).tolist()} in [rad] or [m], "
+            f"got {shortened(starts.tolist())}."
+        )
+    return np.broadcast_to(starts, (rows, joints))
 
 
 def checked_steps(given: Any, rows: int, scenario: Scenario) -> Steps | None:

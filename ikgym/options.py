@@ -1,4 +1,4 @@
-"""What users of a vector environment say of its rows, checked: seeds, masks, and how ended rows go on."""
+"""What users ask of an environment and of its rows, checked: options, seeds, masks, and how ended rows go on."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy.typing as npt
 from gymnasium.vector import AutoresetMode
 
 from ikgym.exceptions import InvalidInputError, UnknownNameError
-from ikgym.validation import shortened, whole_number
+from ikgym.validation import known_names, number, shortened, whole_number
 
 
 def checked_seeds(seed: int | Sequence[int | None] | None, rows: int) -> Sequence[int | None]:
@@ -61,3 +61,27 @@ def checked_mode(mode: str | AutoresetMode) -> AutoresetMode:
         return AutoresetMode(mode)
     except ValueError:
         raise UnknownNameError("autoreset mode", mode, [m.value for m in AutoresetMode]) from None
+
+
+def checked_distance(distance: float | None) -> float | None:
+    """The distance at which a track is lost, or None.
+
+    Raises:
+        InvalidInputError: It is no number above 0.
+    """
+    return None if distance is None else number("lost_distance", distance, above=0.0)
+
+
+def checked_options(options: dict[str, Any] | None, known: Sequence[str]) -> dict[str, Any]:
+    """The options of a reset.
+
+    Raises:
+        UnknownNameError: There is no such option.
+        InvalidInputError: They are no dict.
+    """
+    if options is None:
+        return {}
+    if not isinstance(options, dict):
+        raise InvalidInputError(f"options: expected None or a dict, got {shortened(options)}.")
+    known_names("option of reset", options, known)
+    return options
