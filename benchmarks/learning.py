@@ -50,7 +50,7 @@ class Watch(BaseCallback):
         now = time.process_time()
         self._spent, self._since = self._spent + now - self._since, now
         self._bar.update(self._spent / 60.0 - self._bar.n)
-        return self._spent < 60.0 * self._arguments.minutes
+        return bool(self._spent < 60.0 * self._arguments.minutes)
 
     def _on_rollout_start(self) -> None:
         self._on_step()

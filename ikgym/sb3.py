@@ -97,6 +97,7 @@ class RedundantIKVecEnv(VecEnv):
             InvalidInputError: Seeds or options are not valid, or some rows have a start and others do not. The
                 episodes go on then, and seeds and options stay as they are.
         """
+        observation: Observation
         observation, _ = self._envs.reset(seed=self._seeds, options=self._checked_options())
         self._reset_seeds()
         self._reset_options()

@@ -7,7 +7,6 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
-from gymnasium import spaces
 from gymnasium.utils import RecordConstructorArgs
 
 from ikgym.outcome import Observation
@@ -59,10 +58,11 @@ class AgentObservation(gym.ObservationWrapper[Features, Any, Observation], Recor
 
     def observation(self, observation: Observation) -> Features:
         """The features of an observation. Shape (f,)."""
-        return self._view.see(batched(observation))[0]
+        out: Features = self._view.see(batched(observation))[0]
+        return out
 
 
-class RelativeAction(gym.Wrapper[Any, npt.NDArray[np.float32], Observation, Any], RecordConstructorArgs):
+class RelativeAction(gym.Wrapper[Any, Any, Observation, Any], RecordConstructorArgs):
     """Actions in the unit of what is asked for: joint velocity = action · share · s (0.2 + |v̂|).
 
     s and v̂ are those of :class:`AgentObservation`. The same action moves a slow arm slowly and a fast one fast, and
@@ -131,7 +131,7 @@ class LogReward(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
         return observation, out[0].item(), terminated, truncated, info
 
 
-class History(gym.Wrapper[Features, Any, Features, Any], RecordConstructorArgs):
+class History(gym.Wrapper[Any, Any, Features, Any], RecordConstructorArgs):
     """The last observations side by side, newest first: shape (length · f,).
 
     Where measurements are late or missing, what an arm was told and showed before says where it is by now. Before there
@@ -149,7 +149,7 @@ class History(gym.Wrapper[Features, Any, Features, Any], RecordConstructorArgs):
         RecordConstructorArgs.__init__(self, length=length)
         super().__init__(env)
         self._length = whole_number("length", length, at_least=1)
-        self.observation_space: spaces.Box = history_box(env.observation_space, self._length)
+        self.observation_space = history_box(env.observation_space, self._length)
         self._kept = np.zeros((self._length, 0), dtype=np.float32)
 
     def reset(
