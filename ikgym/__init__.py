@@ -11,7 +11,7 @@ from typing import Any
 
 import gymnasium as gym
 
-from ikgym import arms, exceptions, problems, rotations, scenarios, tasks, trajectories
+from ikgym import arms, exceptions, problems, rl, rotations, scenarios, tasks, trajectories
 from ikgym.arms import Arm
 from ikgym.cost import TrackingCost
 from ikgym.env import RedundantIKEnv
@@ -31,6 +31,7 @@ __all__ = [
     "arms",
     "exceptions",
     "problems",
+    "rl",
     "rotations",
     "scenarios",
     "tasks",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
 from typing import Any, ClassVar
 
 import gymnasium as gym
@@ -13,17 +12,19 @@ from gymnasium.envs.registration import EnvSpec
 
 from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError, ResetNeededError
+from ikgym.options import checked_distance, checked_options
 from ikgym.outcome import OBSERVED as OBSERVED
 from ikgym.outcome import Observation, observation
 from ikgym.scenarios import Preview, Scenario
+from ikgym.scenarios.entering import has_joint_path
 from ikgym.simulator import Simulator
 from ikgym.spaces import action_space, observation_space
-from ikgym.validation import FloatArray, known_names, shortened
+from ikgym.validation import FloatArray
 
 #: The keys of `info` after a step; the orientation error is there where the task has an orientation.
 REPORTED = ("tracking_cost", "velocity_cost", "position_error", "orientation_error", "clipped", "at_limit", "time")
 #: The keys that the options of a reset may have.
-OPTIONS = ("q", "arm_seed")
+OPTIONS = ("q", "arm_seed", "step")
 
 
 class RedundantIKEnv(gym.Env[Any, Any]):
@@ -102,11 +103,16 @@ class RedundantIKEnv(gym.Env[Any, Any]):
     drives that k draws, for this episode, whatever the seed; it is an error where the plant draws neither, as that of
     an ideal plant. `reset(options={"q": …})` starts elsewhere, within the limits of the arm. A
     joint without limits starts at most 2π [rad] or [m] from home (or as far as the scenario's own start, if that is
-    farther).
+    farther). `reset(options={"step": k})` enters the episode after k of its steps, where its reference joint path is
+    then and at the velocity that it has; with `q` beside it, there and at rest. Sensors and drives remember an arm that
+    was like that before. It is an error where the reference is a path of the tool alone.
 
     ## Episode end
     Truncated by the environment itself after the scenario's `steps`, which `spec.max_episode_steps` repeats for
-    wrappers that ask for it; never terminated.
+    wrappers that ask for it. Terminated where the position error exceeds `lost_distance`, if there is one. The next
+    reset that says nothing else then enters another episode at the step at which the last one was lost, on its joint
+    path (at its beginning where the reference is a path of the tool alone), so that all parts of episodes are seen
+    alike by those who still lose their track early.
 
     Args:
         scenario: A scenario or what names one: a registered name, a file ending in `.toml`, or
@@ -114,11 +120,12 @@ class RedundantIKEnv(gym.Env[Any, Any]):
         preview: How many steps ahead the nominal coordinates are shown, or which ones.
         render_mode: None, `"human"` (a window) or `"rgb_array"`.
         commands: h, how many of the last commands are shown.
+        lost_distance: Position error in [m] beyond which the arm has lost its track, and its episode ends.
 
     Raises:
         UnknownNameError: There is no such scenario.
-        InvalidInputError: The scenario, the preview, the number of commands or the render mode is not valid, or there
-            is no memory for so many steps.
+        InvalidInputError: The scenario, the preview, the number of commands, the distance or the render mode is not
+            valid, or there is no memory for so many steps.
     """
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": ["human", "rgb_array"], "render_fps": 50}  # type: ignore[misc]
@@ -129,6 +136,7 @@ class RedundantIKEnv(gym.Env[Any, Any]):
         preview: Preview = 2,
         render_mode: str | None = None,
         commands: int = 0,
+        lost_distance: float | None = None,
     ) -> None:
         if render_mode is not None and render_mode not in self.metadata["render_modes"]:
             raise InvalidInputError(
@@ -141,10 +149,18 @@ class RedundantIKEnv(gym.Env[Any, Any]):
         self._simulator = Simulator(self.scenario, None, preview, commands=commands)
         self.observation_space = observation_space(self.scenario, preview, commands)
         self.action_space = action_space(self.scenario)
-        self._step = -1  # no episode yet
+        self._step, self._ended = -1, True  # no episode yet
         self._steps, self._dt = self.scenario.steps, self.scenario.dt
+        self.lost_distance = checked_distance(lost_distance)
+        self._resumed: int | None = None
+        self._entered = has_joint_path(self.scenario)
         self._has_orientation = self.scenario.task.has_orientation
         self._renderer: Any = None if render_mode is None else _renderer(self.scenario, render_mode)
+
+    @property
+    def preview(self) -> tuple[int, ...]:
+        """How many steps ahead the reference is shown."""
+        return self._simulator.preview
 
     @property
     def spec(self) -> EnvSpec | None:  # an attribute of the base, which gym.make() sets
@@ -163,7 +179,8 @@ class RedundantIKEnv(gym.Env[Any, Any]):
         Args:
             seed: Chooses the trajectory of a random scenario, and whatever its plant draws.
             options: ``{"q": …}`` starts at other joint coordinates, in [rad] or [m], of shape (n,); ``{"arm_seed": k}``
-                has the arm and the drives that k draws, whatever the seed.
+                has the arm and the drives that k draws, whatever the seed; ``{"step": k}`` enters the episode after k
+                steps, on its reference joint path.
 
         Returns:
             The first observation, and an empty info.
@@ -171,14 +188,17 @@ class RedundantIKEnv(gym.Env[Any, Any]):
         Raises:
             UnknownNameError: There is no such option.
             InvalidInputError: The options are no dict, the start has a wrong shape, is not finite, out of range or
-                outside the limits, or the seed of the arm is none, or there is nothing that it could keep.
+                outside the limits, or the seed of the arm is none, or there is nothing that it could keep; or there is
+                no such step, or no joint path that says where the arm is then.
         """
         options = checked_options(options, OPTIONS)
         starts = self._simulator.checked_starts(options.get("q"))
         arm_seeds = self._simulator.checked_arm_seeds(options.get("arm_seed"))
+        resumed = self._resumed if seed is None and not {"q", "step"} & options.keys() else None
+        steps = self._simulator.checked_steps(options.get("step", resumed))
         super().reset(seed=seed)
-        self._simulator.reset(np.ones(1, dtype=np.bool_), [self.np_random], starts, arm_seeds)
-        self._step = 0
+        self._simulator.reset(np.ones(1, dtype=np.bool_), [self.np_random], starts, arm_seeds, steps=steps)
+        self._step, self._ended, self._resumed = 0 if steps is None else int(steps[0]), False, None
         out = self._simulator.observe()
         if self._renderer is not None:
             self._renderer.begin(self._simulator.nominal_positions(0), self._steps * self._dt)
@@ -194,11 +214,11 @@ class RedundantIKEnv(gym.Env[Any, Any]):
             ResetNeededError: There is no episode, or it has ended.
             InvalidInputError: The action is not finite or of a wrong shape; the state stays as it was.
         """
-        if not 0 <= self._step < self._steps:
+        if self._ended:
             raise ResetNeededError(
                 "step() needs an episode: call reset() first."
                 if self._step < 0
-                else f"The episode has ended after {self._steps} steps: call reset() first."
+                else f"The episode has ended after {self._step} steps: call reset() first."
             )
         seen, (tracking, velocity, position, orientation, clipped), held = self._simulator.step_one(action)
         self._step += 1
@@ -215,7 +235,11 @@ class RedundantIKEnv(gym.Env[Any, Any]):
         info["time"] = self._step * self._dt
         if self._renderer is not None:
             self._draw_later(self._simulator.true_q[0].copy(), position, orientation)
-        return seen, -(tracking + velocity), False, self._step == self._steps, info
+        lost, over = self.lost_distance is not None and position > self.lost_distance, self._step == self._steps
+        if lost and not over and self._entered:
+            self._resumed = self._step
+        self._ended = lost or over
+        return seen, -(tracking + velocity), lost, over, info
 
     def render(self) -> npt.NDArray[np.uint8] | None:
         """Draws the arm, the nominal and the actual path, and the error over time.
@@ -259,18 +283,3 @@ def limited(spec: EnvSpec | None, scenario: Scenario) -> EnvSpec | None:
     spec = copy.copy(spec)
     spec.max_episode_steps = scenario.steps
     return spec
-
-
-def checked_options(options: dict[str, Any] | None, known: Sequence[str]) -> dict[str, Any]:
-    """The options of a reset.
-
-    Raises:
-        UnknownNameError: There is no such option.
-        InvalidInputError: They are no dict.
-    """
-    if options is None:
-        return {}
-    if not isinstance(options, dict):
-        raise InvalidInputError(f"options: expected None or a dict, got {shortened(options)}.")
-    known_names("option of reset", options, known)
-    return options

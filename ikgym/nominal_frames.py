@@ -60,18 +60,19 @@ class NominalFrames:
         """Where the target after k steps is in a table. Shape (steps + furthest preview + 1,)."""
         return self._point % self.shape[1]
 
-    def begin(self, tables: FloatArray, rows: Integers, episodes: Sequence[Trajectory]) -> None:
+    def begin(self, tables: FloatArray, rows: Integers, episodes: Sequence[Trajectory], steps: Integers) -> None:
         """Begins new episodes of a random scenario.
 
         Args:
             tables: What :meth:`allocate` gave.
             rows: Which rows begin one. Shape (k,).
             episodes: Their trajectories.
+            steps: Steps after which they are entered. Shape (k,).
         """
         for row, episode in zip(rows.tolist(), episodes, strict=True):
             self._episodes[row] = episode
-        self._blocks_known[rows] = 0
-        self.look_ahead(tables, rows, np.zeros(len(rows), dtype=np.int64))
+        self._blocks_known[rows] = self._point[steps] // self._block
+        self.look_ahead(tables, rows, steps)
 
     def look_ahead(self, tables: FloatArray, rows: Integers, steps: Integers) -> None:
         """Sees to it that rows know all frames that they need after so many steps. Shapes (k,)."""

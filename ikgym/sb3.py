@@ -11,8 +11,10 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium.vector import AutoresetMode
 
-from ikgym.env import OPTIONS, REPORTED, checked_options
+from ikgym import rl
+from ikgym.env import OPTIONS, REPORTED
 from ikgym.exceptions import InvalidInputError, MissingDependencyError
+from ikgym.options import checked_options
 from ikgym.rows import ArmRow
 from ikgym.scenarios import Preview, Scenario
 from ikgym.simulator import Observation
@@ -71,25 +73,30 @@ class RedundantIKVecEnv(VecEnv):
                 f"num_envs: expected how many arms, got Gymnasium's vector environment, {type(num_envs).__name__}, "
                 "which Stable-Baselines3 cannot step: RedundantIKVecEnv(N, scenario, preview) has the same arms for it."
             )
-        self._envs = RedundantIKVectorEnv(num_envs, scenario, preview, AutoresetMode.SAME_STEP, commands=commands)
-        self.scenario = self._envs.scenario
-        worst, most = self.scenario.largest_step_cost(), float(np.finfo(np.float32).max)
+        envs = RedundantIKVectorEnv(num_envs, scenario, preview, AutoresetMode.SAME_STEP, commands=commands)
+        worst, most = envs.scenario.largest_step_cost(), float(np.finfo(np.float32).max)
         if worst > most:
             raise InvalidInputError(
-                f"Scenario {self.scenario.name!r}: expected steps that cost at most {most:.3g}, since rewards of "
+                f"Scenario {envs.scenario.name!r}: expected steps that cost at most {most:.3g}, since rewards of "
                 f"Stable-Baselines3 are in float32, got up to {worst:.3g}."
             )
-        self._rows = [ArmRow(self._envs, index) for index in range(num_envs)]
+        self._take(envs)
+
+    def _take(self, envs: Any) -> None:
+        """Takes over a vector environment that begins new episodes in the same step."""
+        self._envs, self.scenario = envs, envs.scenario
+        self._rows = [ArmRow(envs, index) for index in range(envs.num_envs)]
         self._actions: npt.NDArray[Any] | None = None
-        self._returns = np.zeros(num_envs)
+        self._returns, self._lengths = np.zeros(envs.num_envs), np.zeros(envs.num_envs, dtype=np.int64)
         self._made = time.perf_counter()
-        super().__init__(num_envs, self._envs.single_observation_space, self._envs.single_action_space)
+        super().__init__(envs.num_envs, envs.single_observation_space, envs.single_action_space)
 
     def reset(self) -> Observation:
         """Begins episodes in all rows, with what `seed()` and `set_options()` have left for this reset.
 
         Row i is seeded with seed + i; without a seed it goes on with its generator. An option ``{"q": …}`` of shape
-        (n,), in [rad] or [m], starts elsewhere, ``{"arm_seed": k}`` keeps the arm that k draws.
+        (n,), in [rad] or [m], starts elsewhere, ``{"arm_seed": k}`` keeps the arm that k draws, ``{"step": k}`` enters
+        the episode after k steps.
 
         Returns:
             The first observations, each of shape (N, …).
@@ -99,11 +106,12 @@ class RedundantIKVecEnv(VecEnv):
             InvalidInputError: Seeds or options are not valid, or some rows have a start and others do not. The
                 episodes go on then, and seeds and options stay as they are.
         """
+        observation: Observation
         observation, _ = self._envs.reset(seed=self._seeds, options=self._checked_options())
         self._reset_seeds()
         self._reset_options()
         self._actions = None
-        self._returns[:] = 0.0
+        self._returns[:], self._lengths[:] = 0.0, 0
         return observation
 
     def step_async(self, actions: npt.NDArray[Any]) -> None:
@@ -122,17 +130,19 @@ class RedundantIKVecEnv(VecEnv):
                 then.
         """
         actions, self._actions = self._actions, None
-        observation, rewards, _, ended, final = self._envs.step(actions)  # type: ignore[arg-type]  # None is refused
+        observation, rewards, terminated, truncated, final = self._envs.step(actions)
+        ended = terminated | truncated
         self._returns += rewards
+        self._lengths += 1
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         for row in np.flatnonzero(ended).tolist():
             infos[row] = {
                 **{key: _plain(final["final_info"][key][row]) for key in REPORTED if key in final["final_info"]},
-                "TimeLimit.truncated": True,
+                "TimeLimit.truncated": bool(truncated[row] and not terminated[row]),
                 "terminal_observation": final["final_obs"][row],
                 "episode": self._summary(row),
             }
-        self._returns[ended] = 0.0
+        self._returns[ended], self._lengths[ended] = 0.0, 0
         return observation, rewards.astype(np.float32), ended, infos
 
     def close(self) -> None:
@@ -174,7 +184,7 @@ class RedundantIKVecEnv(VecEnv):
         """What `Monitor` says of an episode, rounded as it does."""
         return {
             "r": round(self._returns[row].item(), 6),
-            "l": self.scenario.steps,
+            "l": int(self._lengths[row]),
             "t": round(time.perf_counter() - self._made, 6),
         }
 
@@ -183,8 +193,8 @@ class RedundantIKVecEnv(VecEnv):
         if len(self._options) != self.num_envs:
             raise InvalidInputError(f"options: expected {self.num_envs}, one a row, got {len(self._options)}.")
         given = [checked_options(options, OPTIONS) for options in self._options]
-        arm_seeds = [options.get("arm_seed") for options in given]
-        kept = {} if all(seed is None for seed in arm_seeds) else {"arm_seed": arm_seeds}
+        columns = {name: [options.get(name) for options in given] for name in ("arm_seed", "step")}
+        kept = {name: column for name, column in columns.items() if any(value is not None for value in column)}
         return {**kept, **self._checked_starts([options.get("q") for options in given])}
 
     def _checked_starts(self, starts: list[Any]) -> dict[str, FloatArray]:
@@ -197,6 +207,45 @@ class RedundantIKVecEnv(VecEnv):
                 f"options: expected a start 'q' for all rows or for none, got {len(given)} of {self.num_envs}."
             )
         return {"q": np.stack(given)}
+
+
+class LearningVecEnv(RedundantIKVecEnv):
+    """N arms, wrapped for learning as :func:`ikgym.rl.make_vec` has them, for Stable-Baselines3.
+
+    As :class:`RedundantIKVecEnv` in all else: `TimeLimit.truncated` is False where a track is lost, and `episode` sums
+    up the rewards that the agent sees.
+
+    Args:
+        num_envs: N.
+        scenario: A scenario or what names one, see `ikgym.scenarios.find`.
+        learning: How it is wrapped.
+
+    Raises:
+        UnknownNameError: There is no such scenario.
+        InvalidInputError: A value is refused.
+    """
+
+    def __init__(self, num_envs: int, scenario: str | Scenario, learning: rl.Learning) -> None:
+        self.learning = learning
+        self._take(learning.arms(scenario, num_envs, AutoresetMode.SAME_STEP))
+
+
+def make_vec(scenario: str | Scenario, num_envs: int = 1, **changes: Any) -> LearningVecEnv:
+    """N arms, wrapped for learning, for Stable-Baselines3.
+
+    >>> from stable_baselines3 import PPO
+    >>> model = PPO("MlpPolicy", make_vec("panda-random", 8))
+
+    Args:
+        scenario: A scenario or what names one, see `ikgym.scenarios.find`.
+        num_envs: N.
+        changes: Fields of :class:`ikgym.rl.Learning` that are not as usual.
+
+    Raises:
+        UnknownNameError: There is no such scenario or field.
+        InvalidInputError: A value is refused.
+    """
+    return LearningVecEnv(num_envs, scenario, rl.Learning().replace(**changes))
 
 
 def _plain(value: Any) -> Any:

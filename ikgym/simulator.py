@@ -11,7 +11,6 @@ import numpy.typing as npt
 
 from ikgym import simulation
 from ikgym.arms.limits import limit_rows
-from ikgym.arms.posture import within_limits
 from ikgym.compilation import announced
 from ikgym.exceptions import InvalidInputError
 from ikgym.memory import afford, of_rows
@@ -24,8 +23,10 @@ from ikgym.plant.rows import PlantRows, checked_arm_seeds
 from ikgym.preview import FARTHEST as FARTHEST
 from ikgym.preview import Preview, offsets
 from ikgym.scenarios import Scenario
+from ikgym.scenarios.entering import checked_starts, checked_steps, on_path
 from ikgym.simulation import Constants, State
-from ikgym.validation import FloatArray, float_array, shortened, whole_number
+from ikgym.trajectories import Trajectory
+from ikgym.validation import FloatArray, shortened, whole_number
 
 # Rows worth a thread of their own: below, handing over costs more than it saves.
 GRAIN_STEP = 256
@@ -117,6 +118,7 @@ class Simulator:
         starts: FloatArray | None = None,
         arm_seeds: Sequence[int | None] | None = None,
         noise_seeds: Sequence[int] | None = None,
+        steps: npt.NDArray[np.int64] | None = None,
     ) -> None:
         """Begins new episodes.
 
@@ -126,6 +128,7 @@ class Simulator:
             starts: What :meth:`checked_starts` gave; the scenario's own starts if left out. Shape (N, n).
             arm_seeds: What :meth:`checked_arm_seeds` gave, one a row; arms are drawn with their episodes if left out.
             noise_seeds: Which noise of drives and sensors, one a row; 0 is that of the generator, as if left out.
+            steps: What :meth:`checked_steps` gave: episodes are entered after so many steps. Shape (N,).
         """
         scenario, state = self.scenario, self._state
         rows = np.flatnonzero(active)
@@ -139,38 +142,26 @@ class Simulator:
         self._own_start[active] = starts is None
         state.qdot[active] = 0.0
         state.step[active] = 0
+        if steps is None:
+            steps = np.zeros(self.rows, dtype=np.int64)
         if scenario.random:
-            self._nominal.begin(state.frames, rows, episodes)
+            self._nominal.begin(state.frames, rows, episodes, steps[rows])
+        entered = rows[steps[rows] > 0]
+        if len(entered):
+            shared = dict(zip(rows.tolist(), episodes, strict=True))
+            self._enter(entered, [shared[row] for row in entered.tolist()], steps[entered], starts)
 
     def checked_starts(self, q: npt.ArrayLike | None) -> FloatArray | None:
-        """Starts that a user asks for.
-
-        Args:
-            q: Joint coordinates in [rad] or [m], of shape (n,) for all rows, or (N, n). None for the scenario's own.
-
-        Returns:
-            One start a row, of shape (N, n), or None.
-
-        Raises:
-            InvalidInputError: A start has a wrong shape, is not finite, out of range or outside the arm's limits.
-        """
-        if q is None:
-            return None
-        joints, bound = self.scenario.joints, self.scenario.start_bound()
-        starts = float_array("options['q']", q)
-        if starts.shape not in {(joints,), (self.rows, joints)}:
-            raise InvalidInputError(f"options['q']: expected shape ({joints},), got {starts.shape}.")
-        within_limits("options['q']", starts, self.scenario.arm)
-        if (np.abs(starts) > bound).any():
-            raise InvalidInputError(
-                f"options['q']: expected absolute values of at most {np.round(bound, 4).tolist()} in [rad] or [m], "
-                f"got {shortened(starts.tolist())}."
-            )
-        return np.broadcast_to(starts, (self.rows, joints))
+        """Starts that a user asks for, see :func:`ikgym.scenarios.entering.checked_starts`."""
+        return checked_starts(q, self.rows, self.scenario)
 
     def checked_arm_seeds(self, given: Any) -> list[int | None] | None:
         """Seeds of arms that a user asks for, see :func:`ikgym.plant.rows.checked_arm_seeds`."""
         return checked_arm_seeds(given, self.rows, self.scenario.plant, self.scenario.name)
+
+    def checked_steps(self, given: Any) -> npt.NDArray[np.int64] | None:
+        """Steps after which a user enters episodes, see :func:`ikgym.scenarios.entering.checked_steps`."""
+        return checked_steps(given, self.rows, self.scenario)
 
     def observe(self, active: npt.NDArray[np.bool_] | None = None, out: Outcome | None = None) -> Outcome:
         """What the arms show before a step.
@@ -245,6 +236,25 @@ class Simulator:
     def steps_made(self) -> npt.NDArray[np.int64]:
         """Steps made in each row's episode. Shape (N,)."""
         return self._state.step
+
+    def _enter(
+        self,
+        rows: npt.NDArray[np.int64],
+        episodes: Sequence[Trajectory],
+        steps: npt.NDArray[np.int64],
+        starts: FloatArray | None,
+    ) -> None:
+        """Enters episodes that have begun: on their joint path in its motion, or at a start at rest."""
+        state = self._state
+        if starts is None:
+            state.q[rows], state.qdot[rows] = on_path(self.scenario, episodes, steps)
+        if self._plant is not None:
+            # Sensors and drives remember an arm that has always been as it is now: its first measurement, everywhere.
+            active = np.zeros(self.rows, dtype=np.bool_)
+            active[rows] = True
+            self._run(active, self._new(self._count), moving=False)
+            self._plant.settle(rows, state.qdot[rows], steps)
+        state.step[rows] = steps
 
     def _accept(self, actions: npt.ArrayLike, active: npt.NDArray[np.bool_]) -> None:
         """Takes actions over, if they are good, and prepares the active rows for their step."""

@@ -15,14 +15,16 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
 from ikgym import scenarios
-from ikgym.env import OPTIONS, RedundantIKEnv, checked_options, limited
-from ikgym.exceptions import InvalidInputError, ResetNeededError, UnknownNameError
+from ikgym.env import OPTIONS, RedundantIKEnv, limited
+from ikgym.exceptions import InvalidInputError, ResetNeededError
+from ikgym.options import checked_distance, checked_mask, checked_mode, checked_options, checked_seeds
 from ikgym.outcome import Observation, Outcome, observation
 from ikgym.rows import ArmRow
 from ikgym.scenarios import Preview, Scenario
+from ikgym.scenarios.entering import has_joint_path
 from ikgym.simulator import Simulator
 from ikgym.spaces import action_space, observation_space
-from ikgym.validation import FloatArray, shortened, whole_number
+from ikgym.validation import FloatArray, whole_number
 
 Flags = npt.NDArray[np.bool_]
 Infos = dict[str, Any]
@@ -46,7 +48,7 @@ class RedundantIKVectorEnv(gym.vector.VectorEnv[Observation, npt.NDArray[np.floa
 
     `reset(options={"reset_mask": mask})` resets just the rows where the mask, a Boolean array of shape (N,), is
     true; `options={"q": …}` starts elsewhere, with shape (n,) for all rows or (N, n); `options={"arm_seed": …}` keeps
-    arms, one number for all rows or one a row.
+    arms, and `options={"step": …}` enters episodes after so many steps, one number for all rows or one a row.
 
     Args:
         num_envs: N.
@@ -56,11 +58,12 @@ class RedundantIKVectorEnv(gym.vector.VectorEnv[Observation, npt.NDArray[np.floa
         render_mode: None; there is nothing to see of N arms. Make a single environment to render.
         max_episode_steps: None or the scenario's own number of steps, as Gymnasium hands it over from a `spec`.
         commands: h, how many of the last commands are shown.
+        lost_distance: Position error in [m] beyond which an arm has lost its track, and its episode ends.
 
     Raises:
         UnknownNameError: There is no such scenario or autoreset mode.
-        InvalidInputError: N, the scenario, the preview, the render mode, the number of steps or of commands is not
-            valid, or there is no memory for N arms.
+        InvalidInputError: N, the scenario, the preview, the render mode, the distance, the number of steps or of
+            commands is not valid, or there is no memory for N arms.
     """
 
     def __init__(
@@ -72,13 +75,14 @@ class RedundantIKVectorEnv(gym.vector.VectorEnv[Observation, npt.NDArray[np.floa
         render_mode: str | None = None,
         max_episode_steps: int | None = None,
         commands: int = 0,
+        lost_distance: float | None = None,
     ) -> None:
         if render_mode is not None:
             raise InvalidInputError(
                 f"render_mode: expected None for the vector environment, got {render_mode!r}; render a single one."
             )
         self.num_envs = whole_number("num_envs", num_envs, at_least=1)
-        self.autoreset_mode = _autoreset_mode(autoreset_mode)
+        self.autoreset_mode = checked_mode(autoreset_mode)
         self.metadata = {**RedundantIKEnv.metadata, "autoreset_mode": self.autoreset_mode}
         self.scenario = scenarios.find(scenario)
         if max_episode_steps not in (None, self.scenario.steps):
@@ -92,10 +96,19 @@ class RedundantIKVectorEnv(gym.vector.VectorEnv[Observation, npt.NDArray[np.floa
         self.single_action_space = action_space(self.scenario)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
+        self.lost_distance = checked_distance(lost_distance)
+        self._entered = has_joint_path(self.scenario)
+        # Steps after which the rows that have lost their track enter their next episode; 0 elsewhere.
+        self._resumed = np.zeros(self.num_envs, dtype=np.int64)
         self._generators: list[np.random.Generator | None] = [None] * self.num_envs
         self._seeds: list[int | None] = [None] * self.num_envs
         self._begun = np.zeros(self.num_envs, dtype=np.bool_)
         self._ended = np.zeros(self.num_envs, dtype=np.bool_)
+
+    @property
+    def preview(self) -> tuple[int, ...]:
+        """How many steps ahead the reference is shown."""
+        return self._simulator.preview
 
     @property
     def spec(self) -> EnvSpec | None:  # an attribute of the base, which gym.make_vec() sets
@@ -127,28 +140,31 @@ class RedundantIKVectorEnv(gym.vector.VectorEnv[Observation, npt.NDArray[np.floa
         Args:
             seed: Row i is seeded with seed + i, or with the i-th of a sequence; None goes on with its generator.
             options: ``{"reset_mask": …}`` of shape (N,), ``{"q": …}`` of shape (n,) or (N, n), ``{"arm_seed": …}`` one
-                number for all rows, or one a row, None where the arm is drawn with the episode.
+                number for all rows, or one a row, None where the arm is drawn with the episode, ``{"step": …}``
+                likewise, None where an episode begins.
 
         Returns:
             The observations of all rows, and empty infos.
 
         Raises:
             UnknownNameError: There is no such option.
-            InvalidInputError: Seeds, mask, starts or seeds of arms are of a wrong shape or type. Nothing has changed
-                then.
+            InvalidInputError: Seeds, mask, starts, seeds of arms or steps are of a wrong shape or type. Nothing has
+                changed then.
             ResetNeededError: The mask leaves out a row that has never been reset.
         """
         options = checked_options(options, (*OPTIONS, "reset_mask"))
-        seeds = self._checked_seeds(seed)
-        mask = self._checked_mask(options.get("reset_mask"))
+        seeds = checked_seeds(seed, self.num_envs)
+        mask = checked_mask(options.get("reset_mask"), self.num_envs)
         if not (self._begun | mask).all():
             raise ResetNeededError("The first reset must begin episodes in all rows: leave out the reset_mask.")
         starts = self._simulator.checked_starts(options.get("q"))
         arm_seeds = self._simulator.checked_arm_seeds(options.get("arm_seed"))
+        resumed = [int(k) if s is None else 0 for k, s in zip(self._resumed, seeds, strict=True)]
+        steps = self._simulator.checked_steps(options.get("step", None if "q" in options else resumed))
         for row in np.flatnonzero(mask).tolist():
             if seeds[row] is not None:
                 self._generators[row], self._seeds[row] = seeding.np_random(seeds[row])
-        self._begin(mask, starts, arm_seeds)
+        self._begin(mask, starts, arm_seeds, steps)
         return observation(self._simulator.observe()), {}
 
     def step(self, actions: npt.NDArray[np.float32]) -> tuple[Observation, FloatArray, Flags, Flags, Infos]:
@@ -170,7 +186,12 @@ class RedundantIKVectorEnv(gym.vector.VectorEnv[Observation, npt.NDArray[np.floa
         out = self._simulator.step(actions, stepping)
         rewards = -(out.tracking_cost + out.velocity_cost)
         rewards[waiting] = 0.0
-        ended = stepping & (self._simulator.steps_made == self.scenario.steps)
+        made = self._simulator.steps_made
+        over = stepping & (made == self.scenario.steps)
+        lost = stepping & (out.position_error > (np.inf if self.lost_distance is None else self.lost_distance))
+        ended = over | lost
+        if self._entered:
+            self._resumed[stepping] = np.where(lost & ~over, made, 0)[stepping]
         same_step = self.autoreset_mode is AutoresetMode.SAME_STEP and bool(ended.any())
         infos: Infos = {}
         if same_step:
@@ -179,10 +200,10 @@ class RedundantIKVectorEnv(gym.vector.VectorEnv[Observation, npt.NDArray[np.floa
         infos.update(self._infos(out, stepping & ~ended if same_step else stepping))
         beginning = ended if same_step else waiting
         if beginning.any():
-            self._begin(beginning)
+            self._begin(beginning, steps=self._resumed.copy())
             self._simulator.observe(beginning, out)
         self._ended = np.zeros_like(ended) if same_step else ended
-        return observation(out), rewards, np.zeros_like(ended), ended.copy(), infos
+        return observation(out), rewards, lost, over, infos
 
     def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
         """What `get_attr` finds in the rows; what can be called is called, as `SyncVectorEnv` does.
@@ -227,10 +248,15 @@ class RedundantIKVectorEnv(gym.vector.VectorEnv[Observation, npt.NDArray[np.floa
         return [ArmRow(self, index) for index in range(self.num_envs)]
 
     def _begin(
-        self, mask: Flags, starts: FloatArray | None = None, arm_seeds: Sequence[int | None] | None = None
+        self,
+        mask: Flags,
+        starts: FloatArray | None = None,
+        arm_seeds: Sequence[int | None] | None = None,
+        steps: npt.NDArray[np.int64] | None = None,
     ) -> None:
         generators = {row: self.generator(row)[0] for row in np.flatnonzero(mask).tolist()}
-        self._simulator.reset(mask, generators, starts, arm_seeds)
+        self._simulator.reset(mask, generators, starts, arm_seeds, steps=steps)
+        self._resumed[mask] = 0
         self._begun |= mask
         self._ended = self._ended & ~mask
 
@@ -256,39 +282,6 @@ class RedundantIKVectorEnv(gym.vector.VectorEnv[Observation, npt.NDArray[np.floa
         if self.scenario.arm.limited:
             infos["at_limit"] += (out.at_limit * rows[:, None]).astype(np.int64)
         return infos
-
-    def _checked_seeds(self, seed: int | Sequence[int | None] | None) -> Sequence[int | None]:
-        if seed is None:
-            return [None] * self.num_envs
-        if isinstance(seed, (int, np.integer)):
-            first = whole_number("seed", seed, at_least=0)
-            return [first + row for row in range(self.num_envs)]
-        if not isinstance(seed, (list, tuple)):
-            raise InvalidInputError(f"seed: expected None, a whole number or a list of them, got {seed!r}.")
-        seeds = [None if s is None else whole_number("seed", s, at_least=0) for s in seed]
-        if len(seeds) != self.num_envs:
-            raise InvalidInputError(f"seed: expected {self.num_envs} seeds, one a row, got {len(seeds)}.")
-        return seeds
-
-    def _checked_mask(self, mask: Any) -> Flags:
-        if mask is None:
-            return np.ones(self.num_envs, dtype=np.bool_)
-        if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_ or mask.shape != (self.num_envs,):
-            raise InvalidInputError(
-                f"options['reset_mask']: expected a Boolean array of shape ({self.num_envs},), got {shortened(mask)}."
-            )
-        if not mask.any():
-            raise InvalidInputError("options['reset_mask']: expected at least one true entry, got none.")
-        return mask
-
-
-def _autoreset_mode(mode: str | AutoresetMode) -> AutoresetMode:
-    if isinstance(mode, AutoresetMode):
-        return mode
-    try:
-        return AutoresetMode(mode)
-    except ValueError:
-        raise UnknownNameError("autoreset mode", mode, [m.value for m in AutoresetMode]) from None
 
 
 def _rows_of(observation: Observation, rows: Flags) -> npt.NDArray[np.object_]:

@@ -10,11 +10,10 @@ from baselines.solvers.linear_algebra import damped_step
 from ikgym import task_kernels
 from ikgym.jit import inlined, kernel
 from ikgym.kinematics import forward_and_jacobian
+from ikgym.rl.feature_kernels import SLOWEST
 
 #: Beyond this no feature goes: asinh has turned 1e5 into 12 there.
 LARGEST = 12.0
-#: Added to the speed of what is to come, in [m/s], [rad/s] or [1/s]: at rest there is nothing to measure by.
-SLOWEST = 0.02
 
 
 @inlined

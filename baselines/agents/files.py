@@ -19,6 +19,7 @@ from baselines.agents.bilinear.processing import Bilinear
 from baselines.agents.features import Processing
 from baselines.agents.network import Network, Singles
 from baselines.agents.protocols import AgentFile, StoredTransform
+from baselines.agents.relative import Relative
 from baselines.agents.untrusted import parse_json, read, refuse
 from baselines.canonical import canonical
 from baselines.files import write
@@ -158,7 +159,7 @@ def parse_header(source: str, content: bytes) -> dict[str, Any]:
     return about
 
 
-def check_described(source: str, about: Mapping[str, Any]) -> Processing | Bilinear:
+def check_described(source: str, about: Mapping[str, Any]) -> Processing | Bilinear | Relative:
     """The processing in what :func:`description` wrote, all of it being of the right type.
 
     Raises:
@@ -166,8 +167,8 @@ def check_described(source: str, about: Mapping[str, Any]) -> Processing | Bilin
     """
     try:
         values = dict(about["processing"])
-        kind = Bilinear if values.get("kind") == Bilinear.kind else Processing
-        processing = kind.from_json(values)
+        kinds: dict[Any, type[Bilinear | Relative]] = {Bilinear.kind: Bilinear, Relative.kind: Relative}
+        processing = kinds.get(values.get("kind"), Processing).from_json(values)
         _check_types(about, processing)
     except _UNREADABLE as e:
         refuse(source, f"is no agent that this version can read: {_said(e)}")

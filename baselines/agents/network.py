@@ -52,7 +52,7 @@ class Network(Frozen):
     #: Inputs, widths of the hidden layers, and outputs.
     sizes: tuple[int, ...] = dataclasses.field(init=False)
     #: The arguments of the kernel that never change.
-    _constants: tuple[object, ...] = dataclasses.field(init=False, repr=False)
+    constants: tuple[object, ...] = dataclasses.field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         known_name("activation", self.activation, ACTIVATIONS)
@@ -70,7 +70,7 @@ class Network(Frozen):
         for array in (*weights, *biases, *packed):
             array.flags.writeable = False
         constants = (*packed, ACTIVATIONS.index(self.activation), SQUASHES.index(self.squash))
-        fields = {"weights": weights, "biases": biases, "sizes": sizes, "_constants": constants}
+        fields = {"weights": weights, "biases": biases, "sizes": sizes, "constants": constants}
         for name, value in fields.items():
             object.__setattr__(self, name, value)
 
@@ -101,7 +101,7 @@ class Network(Frozen):
                 f"features: expected float32 of shape (any, {self.inputs}), got {features.dtype} {features.shape}."
             )
         out = np.empty((len(features), self.outputs), dtype=np.float32)
-        forward_rows(*self._constants, np.ascontiguousarray(features), out)
+        forward_rows(*self.constants, np.ascontiguousarray(features), out)
         return out
 
 

@@ -92,14 +92,13 @@ class LearnedPolicy(Wrapper, abc.ABC):
         own, inside = self.split(memory)
         if self._resolves:
             batch, own = orientation.resolve_orientation(self.problem, batch, own)
-        seen = self.view.see(batch, inside)
-        fractions = self.view.action(seen, self.file.network.forward(seen.features))
+        fractions, step = self.view.act(batch, inside, self.file.network)
         qdot = fractions * self.problem.velocity_limit
-        if seen.step is None:
+        if step is None:
             return Solution(qdot, own, statuses(len(qdot)), np.ones(len(qdot), dtype=np.int64))
         # Where the base policy has converged, its action with a correction has not.
-        status = np.maximum(seen.step.status, int(Status.APPLIED))
-        return self.solution(qdot, own, seen.step._replace(status=status))
+        status = np.maximum(step.status, int(Status.APPLIED))
+        return self.solution(qdot, own, step._replace(status=status))
 
     def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
         """Those of the base policy, or a measurement; what a projector into the null space takes."""

@@ -9,8 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.agents.base_policy import SharedPreview, make_base_policy
+from baselines.agents.bilinear.processing import Bilinear
 from baselines.agents.features import Features
-from baselines.agents.protocols import Transform
+from baselines.agents.network import Network
+from baselines.agents.protocols import Actor, Transform
 from baselines.policy import Batch, Memory, Problem, SolverPolicy
 from baselines.wrapper import InnerStep
 from ikgym.validation import FloatArray
@@ -74,6 +76,23 @@ class AgentView:
             base = step.action.astype(np.float64)
         own = batch._replace(nominal=self.preview.for_agent(batch.nominal))
         return Seen(self.processing.features(self.problem, own, base), own, base, step)
+
+    def act(self, batch: Batch, memory: Memory, network: Actor) -> tuple[FloatArray, InnerStep | None]:
+        """What an agent does.
+
+        Args:
+            batch: As in :meth:`see`.
+            memory: Of the base policy.
+            network: The agent's.
+
+        Returns:
+            Fractions of the velocity limit, and what else the base policy did.
+        """
+        if isinstance(self.processing, Bilinear) and isinstance(network, Network):
+            own = batch._replace(nominal=self.preview.for_agent(batch.nominal))
+            return self.processing.law(self.problem, own, network), None
+        seen = self.see(batch, memory)
+        return self.action(seen, network.forward(seen.features)), seen.step
 
     def action(self, seen: Seen, output: npt.NDArray[Any]) -> FloatArray:
         """What network outputs mean, as fractions of the velocity limit.

@@ -143,6 +143,19 @@ class PlantRows:
             offsets, axes, tool, tool_rotation = (part[row, 0] for part in self.arms)
             yield Chain(offsets, axes, self.drives.prismatic, tool, tool_rotation)
 
+    def settle(self, rows: npt.NDArray[np.int64], qdot: FloatArray, steps: npt.NDArray[np.int64]) -> None:
+        """Has rows remember nothing but their first measurement and a velocity, as after a long time of both.
+
+        Args:
+            rows: Which rows, observed at their first step. Shape (k,).
+            qdot: In [rad/s] or [m/s]. Shape (k, n).
+            steps: When this is, in steps. Shape (k,).
+        """
+        state = self.state
+        for ring in (state.q, state.pose):
+            ring[rows] = ring[rows, :1]
+        state.commands[rows], state.drive[rows], state.shown_step[rows] = qdot[:, None], qdot, steps
+
 
 def noise_key(key: int, noise_seed: int) -> int:
     """The key of an episode's noises: its own, or that of a stream far from those of its effects."""

@@ -2,72 +2,12 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
-from baselines.agents.bilinear.twists import is_turned, shown_joints, turn, turn_gradient, twist, twist_size
-from baselines.agents.feature_kernels import SLOWEST
+from baselines.agents.network import forward_rows
 from ikgym.jit import kernel
-
-#: Fewer steps left than this are seen: only then does the end of an episode matter.
-STEPS_LEFT = 500.0
-
-
-@kernel
-def mean_twists(kind, dt, offsets, nominal, error, out):
-    """The mean velocities between reference poses ahead.
-
-    Args:
-        kind: Of task coordinates, see :mod:`ikgym.task_kernels`.
-        dt: Δt in [s].
-        offsets: Shape (p,).
-        nominal: Reference task coordinates at the offsets. Shape (p, m).
-        error: Scratch. Shape (6,).
-        out: Receives the mean twists between the offsets in [m/s] and [rad/s]. Shape (p - 1, w).
-
-    Returns:
-        The speed s of what is ahead: their root mean square, and a little more.
-    """
-    square = 0.0
-    for i in range(out.shape[0]):
-        twist(kind, nominal[i + 1], nominal[i], error, out[i])
-        duration = (offsets[i + 1] - offsets[i]) * dt
-        for a in range(out.shape[1]):
-            out[i, a] /= duration
-            square += out[i, a] * out[i, a]
-    return SLOWEST + math.sqrt(square / out.size)
-
-
-@kernel
-def feature_row(kind, prismatic, axis, q, ahead, speed, remaining, out):
-    """The features of one arm, see :class:`baselines.agents.bilinear.processing.Bilinear`.
-
-    Args:
-        kind: Of task coordinates.
-        prismatic: Which joints are prismatic. Shape (n,).
-        axis: Of joint 1. Shape (3,).
-        q: Joint coordinates in [rad] or [m]. Shape (n,).
-        ahead: Mean twists; turned in place. Shape (p - 1, w).
-        speed: s.
-        remaining: Steps left.
-        out: Receives the features. Shape (f,).
-    """
-    turned, at = is_turned(kind, prismatic), 0
-    for j in range(1 if turned else 0, q.shape[0]):
-        if prismatic[j]:
-            out[at] = q[j]
-            at += 1
-        else:
-            out[at], out[at + 1] = math.sin(q[j]), math.cos(q[j])
-            at += 2
-    for i in range(ahead.shape[0]):
-        if turned:
-            turn(axis, -q[0], ahead[i])
-        for a in range(ahead.shape[1]):
-            out[at] = ahead[i, a] / speed
-            at += 1
-    out[at], out[at + 1] = math.log(speed), min(remaining / STEPS_LEFT, 1.0)
+from ikgym.rl.feature_kernels import feature_row, mean_twists
+from ikgym.rl.twists import is_turned, shown_joints, turn, turn_gradient, twist, twist_size
 
 
 @kernel
@@ -162,3 +102,48 @@ def action_rows(kind, prismatic, axis, dt, offsets, velocity_limit, q, pose, nom
             for a in range(w):
                 qdot += own[a] * due[a] / lead
             out[row, j] = qdot / velocity_limit[j]
+
+
+@kernel
+def law_rows(
+    kind,
+    prismatic,
+    axis,
+    dt,
+    offsets,
+    velocity_limit,
+    weights,
+    biases,
+    sizes,
+    activation,
+    squash,
+    q,
+    pose,
+    nominal,
+    remaining,
+    out,
+):
+    """The whole law, row by row: :func:`new_features`, the network, :func:`action_rows`, in one call from Python.
+
+    Args:
+        kind: Of task coordinates.
+        prismatic: Shape (n,).
+        axis: Shape (3,).
+        dt: Δt in [s].
+        offsets: Shape (p,).
+        velocity_limit: Shape (n,).
+        weights: See :func:`baselines.agents.network.forward_rows`.
+        biases: See there.
+        sizes: See there.
+        activation: See there.
+        squash: See there.
+        q: Shape (B, n).
+        pose: Shape (B, m).
+        nominal: At the offsets. Shape (B, p, m).
+        remaining: Shape (B, 1).
+        out: Receives fractions of the velocity limit. Shape (B, n).
+    """
+    features = new_features(kind, prismatic, axis, dt, offsets, q, nominal, remaining)
+    output = np.empty((q.shape[0], sizes[sizes.shape[0] - 1]), np.float32)
+    forward_rows(weights, biases, sizes, activation, squash, features, output)
+    action_rows(kind, prismatic, axis, dt, offsets, velocity_limit, q, pose, nominal, output, out)

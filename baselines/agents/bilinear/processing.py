@@ -10,11 +10,12 @@ from typing import Any, ClassVar, Self
 import numpy as np
 import numpy.typing as npt
 
-from baselines.agents.bilinear.kernels import action_rows, new_features
-from baselines.agents.bilinear.twists import shown_joints, twist_size
+from baselines.agents.bilinear.kernels import action_rows, law_rows, new_features
 from baselines.agents.features import Features
+from baselines.agents.network import Network
 from baselines.policy import Batch, Problem
 from ikgym.exceptions import InvalidInputError
+from ikgym.rl.twists import shown_joints, twist_size
 from ikgym.validation import FloatArray, Frozen, known_names, whole_number
 
 
@@ -134,6 +135,25 @@ class Bilinear(Frozen):
             batch.pose,
             batch.nominal,
             output,
+            out,
+        )
+        return out
+
+    def law(self, problem: Problem, batch: Batch, network: Network) -> FloatArray:
+        """:meth:`action` of what a network says of :meth:`features`, bit for bit, in one compiled call."""
+        out, chain = np.empty(batch.q.shape), problem.model.chain
+        law_rows(
+            problem.task.kind,
+            chain.prismatic,
+            chain.axes[0],
+            problem.dt,
+            self._ahead,
+            problem.velocity_limit,
+            *network.constants,
+            batch.q,
+            batch.pose,
+            batch.nominal,
+            batch.remaining,
             out,
         )
         return out

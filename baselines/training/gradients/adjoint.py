@@ -13,7 +13,13 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from baselines.agents.bilinear.twists import (
+from baselines.training.gradients.segment import commanded
+from ikgym import cost_kernels, task_kernels
+from ikgym.cost_kernels import P_X_INSIDE
+from ikgym.jit import inlined, kernel, uncounted
+from ikgym.kinematics import forward_and_jacobian
+from ikgym.limit_kernels import CHANGE, FASTEST, LOWER, UPPER, within
+from ikgym.rl.twists import (
     error_gradient,
     error_kind,
     is_turned,
@@ -22,12 +28,6 @@ from baselines.agents.bilinear.twists import (
     twist,
     twist_size,
 )
-from baselines.training.gradients.segment import commanded
-from ikgym import cost_kernels, task_kernels
-from ikgym.cost_kernels import P_X_INSIDE
-from ikgym.jit import inlined, kernel, uncounted
-from ikgym.kinematics import forward_and_jacobian
-from ikgym.limit_kernels import CHANGE, FASTEST, LOWER, UPPER, within
 
 Floats = npt.NDArray[np.float64]
 

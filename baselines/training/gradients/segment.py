@@ -8,13 +8,13 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from baselines.agents.bilinear.twists import is_turned, turn, twist, twist_size
 from ikgym import cost_kernels, task_kernels
 from ikgym.arms.limits import limit_rows
 from ikgym.cost_kernels import CostParameters
 from ikgym.jit import inlined, kernel
 from ikgym.kinematics import Chain, forward
 from ikgym.limit_kernels import LOWER, UPPER, driven, stopped, within
+from ikgym.rl.twists import is_turned, turn, twist, twist_size
 from ikgym.scenarios import Scenario
 
 Floats = npt.NDArray[np.float64]

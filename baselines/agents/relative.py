@@ -1,0 +1,149 @@
+"""What agents see and do that were trained in the environments of :mod:`ikgym.rl`."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any, ClassVar, Literal, Self, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from baselines.agents.features import Features
+from baselines.policy import Batch, Problem
+from ikgym.exceptions import InvalidInputError
+from ikgym.preview import offsets as checked_offsets
+from ikgym.rl.feature_kernels import LEAST, observe_rows, unit_rows
+from ikgym.rl.twists import shown_joints, twist_size
+from ikgym.validation import FloatArray, Frozen, known_name, known_names, number
+
+Squash = Literal["clip", "tanh"]
+
+
+@dataclasses.dataclass(frozen=True)
+class Relative(Frozen):
+    """Joint velocities in units of what is asked for, from the features of :class:`ikgym.rl.AgentObservation`.
+
+    The velocity of a joint is a · s (0.2 + |v̂|), with a = gain · x, kept within ±largest. x is the network output; of a
+    bilinear network it is (G v̂ + h) / (0.2 + |v̂|), where row j of G and h_j are its outputs.
+
+    Args:
+        offsets: Steps ahead at which the reference is seen, rising, at least two.
+        furthest: Where |v̂| is cut, above 0.
+        largest: In units, above 0.
+        gain: Above 0.
+        squash: What keeps a within its bounds: `clip` cuts it, `tanh` is largest · tanh(a / largest).
+        bilinear: Whether the network gives G and h.
+
+    Raises:
+        InvalidInputError: A value is out of its range.
+        UnknownNameError: There is no such squash.
+    """
+
+    offsets: tuple[int, ...]
+    furthest: float
+    largest: float = 1.0
+    gain: float = 1.0
+    squash: Squash = "clip"
+    bilinear: bool = False
+
+    #: What files call it.
+    kind: ClassVar[str] = "relative"
+
+    def __post_init__(self) -> None:
+        offsets = checked_offsets(self.offsets)
+        if len(offsets) < 2:
+            raise InvalidInputError(f"offsets: expected at least two steps ahead, got {self.offsets}.")
+        known_name("squash", self.squash, get_args(Squash))
+        if not isinstance(self.bilinear, bool):
+            raise InvalidInputError(f"bilinear: expected true or false, got {self.bilinear!r}.")
+        values = {name: number(name, getattr(self, name), above=0.0) for name in ("furthest", "largest", "gain")}
+        for field, value in {"offsets": offsets, **values}.items():
+            object.__setattr__(self, field, value)
+
+    @property
+    def base_policy(self) -> None:
+        """There is none."""
+        return
+
+    @property
+    def null_space(self) -> None:
+        """Outputs go through no projector."""
+        return
+
+    def to_json(self) -> dict[str, Any]:
+        """The fields, as JSON has them."""
+        return {"kind": self.kind, **dataclasses.asdict(self), "offsets": list(self.offsets)}
+
+    @classmethod
+    def from_json(cls, values: Mapping[str, Any]) -> Self:
+        """What :meth:`to_json` gave.
+
+        Raises:
+            UnknownNameError: There is a key that is none of the fields.
+            InvalidInputError: A value is refused.
+        """
+        names = [field.name for field in dataclasses.fields(cls)]
+        known_names("field of the processing", values, ["kind", *names])
+        fields = {name: values[name] for name in names}
+        return cls(**{**fields, "offsets": tuple(fields["offsets"])})
+
+    def size(self, problem: Problem) -> int:
+        """The number of features."""
+        kind = problem.task.kind
+        w, shown = int(twist_size(kind)), int(shown_joints(kind, problem.model.chain.prismatic))
+        return shown + len(self.offsets) * w + 3 + problem.model.joints
+
+    def outputs(self, problem: Problem) -> int:
+        """The number of network outputs."""
+        n = problem.model.joints
+        return n * (int(twist_size(problem.task.kind)) + 1) if self.bilinear else n
+
+    def features(self, problem: Problem, batch: Batch, base: FloatArray | None = None) -> Features:
+        """The features of a batch; see :meth:`baselines.agents.features.Processing.features`."""
+        del base
+        out, unit = np.empty((len(batch.q), self.size(problem)), np.float32), np.empty(len(batch.q))
+        observe_rows(*self._constants(problem), *batch[:5], out, unit)
+        return out
+
+    def action(
+        self, problem: Problem, batch: Batch, output: npt.NDArray[Any], base: FloatArray | None = None
+    ) -> FloatArray:
+        """Actions, as fractions of the velocity limit; see :meth:`baselines.agents.features.Processing.action`."""
+        del base
+        unit, n = np.empty(len(batch.q)), problem.model.joints
+        unit_rows(*self._constants(problem), batch.q, batch.pose, batch.nominal, unit)
+        said = output.astype(np.float64)
+        if self.bilinear:
+            said = asked(said, self.features(problem, batch), n)
+        said *= self.gain
+        if self.squash == "clip":
+            said = np.clip(said, -self.largest, self.largest)
+        else:
+            said = self.largest * np.tanh(said / self.largest)
+        velocity: FloatArray = said * unit[:, None] / problem.velocity_limit
+        return velocity
+
+    def _constants(self, problem: Problem) -> tuple[Any, ...]:
+        chain = problem.model.chain
+        ahead = np.array(self.offsets, dtype=np.int64)
+        return problem.task.kind, chain.prismatic, chain.axes[0], problem.dt, ahead, self.furthest
+
+
+def asked(output: FloatArray, features: Features, n: int) -> FloatArray:
+    """(G v̂ + h) / (0.2 + |v̂|) from network outputs and the features that end with v̂ / (0.2 + |v̂|) and what follows.
+
+    Args:
+        output: Row j of G and h_j, joint by joint. Shape (B, n (w + 1)).
+        features: Shape (B, f).
+        n: Joints.
+
+    Returns:
+        Shape (B, n).
+    """
+    rows = output.reshape(len(output), n, -1)
+    w = rows.shape[2] - 1
+    due = features[:, -n - 1 - w : -n].astype(np.float64)
+    due[:, w] /= LEAST
+    out: FloatArray = (rows * due[:, None]).sum(axis=2)
+    return out

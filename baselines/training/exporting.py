@@ -1,0 +1,82 @@
+"""Models of Stable-Baselines3 that were trained behind :func:`ikgym.sb3.make_vec`, as files of agents."""
+
+from __future__ import annotations
+
+import pathlib
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import torch
+from stable_baselines3.common.base_class import BaseAlgorithm
+from torch import nn
+
+from baselines.agents.features import Features
+from baselines.agents.files import save_agent
+from baselines.agents.network import Network
+from baselines.agents.relative import Relative, Squash
+from baselines.agents.sb3_zip import network_of_model
+from baselines.policy import Problem
+from baselines.training.networks import ACTIVATIONS
+from baselines.training.policies import BilinearActor
+from ikgym.exceptions import InvalidInputError
+from ikgym.preview import offsets
+from ikgym.sb3 import LearningVecEnv
+
+
+def export(
+    model: BaseAlgorithm, envs: LearningVecEnv, file: pathlib.Path, training: Mapping[str, Any] | None = None
+) -> str:
+    """Writes a model as an agent that needs no learning library: ``ikgym evaluate --policies agent:FILE`` plays it.
+
+    Args:
+        model: PPO, A2C, SAC, TD3 or DDPG with Stable-Baselines3's `MlpPolicy`, or with one of
+            :mod:`baselines.training.policies`.
+        envs: What it was trained in, without a history.
+        file: Where to; usually ``NAME.safetensors``.
+        training: How, in whatever JSON can say.
+
+    Returns:
+        The agent's hash.
+
+    Raises:
+        InvalidInputError: The model is another, or the environment shows more than such agents see.
+        ResultsError: The file cannot be written.
+    """
+    learning, scenario = envs.learning, envs.scenario
+    actor = next((module for module in model.policy.modules() if isinstance(module, BilinearActor)), None)
+    if actor is None:
+        network, tanh = _unsquashed(network_of_model(model.policy, model.policy_kwargs))
+        gain = learning.largest if tanh else learning.share
+    else:
+        network, tanh, gain = _layers(actor.network), hasattr(model.policy, "critic"), 1.0
+    squash: Squash = "tanh" if tanh else "clip"
+    ahead = offsets(learning.preview)
+    processing = Relative(ahead, learning.furthest, learning.largest, gain, squash, actor is not None)
+    problem = Problem.of(scenario)
+    sizes, needed = (network.inputs, network.outputs), (processing.size(problem), processing.outputs(problem))
+    if sizes != needed:
+        raise InvalidInputError(
+            f"model: expected a network from {needed[0]} features to {needed[1]} outputs, got {sizes[0]} and "
+            f"{sizes[1]}; agents see no history and no commands."
+        )
+    return save_agent(file, network, processing, scenario, training)
+
+
+def _unsquashed(network: Network) -> tuple[Network, bool]:
+    """A network with linear outputs, and whether tanh was behind them."""
+    linear = Network(network.weights, network.biases, network.activation, "linear")
+    return linear, network.squash == "tanh"
+
+
+def _layers(layers: nn.Sequential) -> Network:
+    """The layers of a bilinear actor."""
+    linear = [layer for layer in layers if isinstance(layer, nn.Linear)]
+    kinds = [name for name, kind in ACTIVATIONS.items() if any(type(layer) is kind for layer in layers)]
+
+    def numbers(tensor: torch.Tensor) -> Features:
+        out: Features = tensor.detach().cpu().numpy().astype(np.float32)
+        return out
+
+    weights, biases = [numbers(layer.weight) for layer in linear], [numbers(layer.bias) for layer in linear]
+    return Network(tuple(weights), tuple(biases), *kinds, "linear")

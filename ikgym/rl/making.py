@@ -1,0 +1,106 @@
+"""Environments as agents learn in them: all wrappers, in the order in which they belong."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import gymnasium as gym
+from gymnasium.vector import AutoresetMode
+
+from ikgym.env import RedundantIKEnv
+from ikgym.rl import vector, wrappers
+from ikgym.scenarios import Preview, Scenario
+from ikgym.validation import Frozen
+from ikgym.vector_env import RedundantIKVectorEnv
+
+
+@dataclasses.dataclass(frozen=True)
+class Learning(Frozen):
+    """How an environment is wrapped for learning.
+
+    The defaults are those with which PPO of Stable-Baselines3 learns with its own defaults. With a lead of ten steps a
+    joint within an acceleration limit can follow what it is told, and with |v̂| cut at 5 an arm that is far off is not
+    told to be there at once. Noise of one standard deviation of 1 is a quarter of the velocity that is asked for.
+
+    Args:
+        preview: Steps ahead at which the reference is shown, at least two; the arm is to be at the first of them by
+            then.
+        lost_distance: Position error in [m] at which an episode ends; None for never.
+        share: See :class:`ikgym.rl.RelativeAction`.
+        largest: See there.
+        furthest: See there.
+        scale: See :class:`ikgym.rl.LogReward`.
+        charge: See there.
+        history: How many observations are seen side by side, see :class:`ikgym.rl.History`.
+        commands: How many of the last commands are seen.
+    """
+
+    preview: Preview = (10, 40, 100)
+    lost_distance: float | None = 0.1
+    share: float = 0.25
+    largest: float = 1.0
+    furthest: float = 5.0
+    scale: float = 0.02
+    charge: float = 100.0
+    history: int = 1
+    commands: int = 0
+
+    def arm(self, scenario: str | Scenario) -> gym.Env[Any, Any]:
+        """One arm of a scenario, wrapped."""
+        env: gym.Env[Any, Any] = self._wrap(RedundantIKEnv(scenario, **self._shown()), wrappers)
+        return env
+
+    def arms(self, scenario: str | Scenario, num_envs: int, autoreset_mode: str | AutoresetMode) -> Any:
+        """N arms of a scenario, wrapped."""
+        return self._wrap(
+            RedundantIKVectorEnv(num_envs, scenario, autoreset_mode=autoreset_mode, **self._shown()), vector
+        )
+
+    def _shown(self) -> dict[str, Any]:
+        """What the environment itself is made with."""
+        return {"preview": self.preview, "commands": self.commands, "lost_distance": self.lost_distance}
+
+    def _wrap(self, env: Any, kinds: Any) -> Any:
+        """An environment in the wrappers of a module."""
+        env = kinds.RelativeAction(env, self.share, self.largest, self.furthest)
+        env = kinds.LogReward(env, self.scale, self.charge)
+        env = kinds.AgentObservation(env, self.furthest)
+        return env if self.history == 1 else kinds.History(env, self.history)
+
+
+def make(scenario: str | Scenario, **changes: Any) -> gym.Env[Any, Any]:
+    """One arm, wrapped for learning.
+
+    Args:
+        scenario: A scenario or what names one, see `ikgym.scenarios.find`.
+        changes: Fields of :class:`Learning` that are not as usual.
+
+    Raises:
+        UnknownNameError: There is no such scenario or field.
+        InvalidInputError: A value is refused.
+    """
+    return Learning().replace(**changes).arm(scenario)
+
+
+def make_vec(
+    scenario: str | Scenario,
+    num_envs: int = 1,
+    *,
+    autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+    **changes: Any,
+) -> gym.vector.VectorEnv[Any, Any, Any]:
+    """N arms, wrapped for learning and stepped by one kernel; bit for bit a `SyncVectorEnv` of :func:`make`.
+
+    Args:
+        scenario: A scenario or what names one, see `ikgym.scenarios.find`.
+        num_envs: N.
+        autoreset_mode: A mode of Gymnasium, or its value such as ``"SameStep"``.
+        changes: Fields of :class:`Learning` that are not as usual.
+
+    Raises:
+        UnknownNameError: There is no such scenario, mode or field.
+        InvalidInputError: A value is refused.
+    """
+    envs: gym.vector.VectorEnv[Any, Any, Any] = Learning().replace(**changes).arms(scenario, num_envs, autoreset_mode)
+    return envs

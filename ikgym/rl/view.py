@@ -1,0 +1,107 @@
+"""What agents see of N arms, and the unit that their velocities are measured in: what all wrappers share."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from gymnasium import spaces
+
+from ikgym.exceptions import InvalidInputError
+from ikgym.outcome import Observation
+from ikgym.rl.feature_kernels import FASTEST, observe_rows, unit_rows
+from ikgym.rl.twists import is_turned, shown_joints, twist_size
+from ikgym.scenarios import Scenario
+from ikgym.validation import FloatArray, number
+
+Features = npt.NDArray[np.float32]
+
+#: Where |v̂| is cut.
+FURTHEST = 20.0
+#: Ages of measurements are seen as a share of so many steps.
+OLDEST = 100.0
+#: The logarithm of a speed is not beyond.
+LARGEST_LOG = 30.0
+
+
+class AgentView:
+    """Features and units of N arms of a scenario.
+
+    Args:
+        env: The environment, single or vector, for its scenario and its preview.
+        furthest: Where |v̂| is cut, above 0.
+
+    Raises:
+        InvalidInputError: The environment shows less than two reference poses, or `furthest` is out of its range.
+    """
+
+    def __init__(self, env: Any, furthest: float) -> None:
+        scenario, preview = env.unwrapped.scenario, env.unwrapped.preview
+        if len(preview) < 2:
+            raise InvalidInputError(f"preview: expected at least two steps ahead, got {preview}.")
+        self.furthest = number("furthest", furthest, above=0.0)
+        chain = scenario.model.chain
+        offsets = np.array(preview, dtype=np.int64)
+        self._shared = scenario.task.kind, chain.prismatic, chain.axes[0], scenario.dt, offsets, self.furthest
+        space = getattr(env.unwrapped, "single_observation_space", env.unwrapped.observation_space)
+        self._more = [key for key in ("q_age", "pose_age", "commands") if key in space.spaces]
+        bounds = [bound(scenario, len(preview)), *(self._bound(key, space[key]) for key in self._more)]
+        lower, upper = np.concatenate([low for low, _ in bounds]), np.concatenate([high for _, high in bounds])
+        self._size = len(bounds[0][0])
+        self.space = spaces.Box(lower.astype(np.float32), upper.astype(np.float32), dtype=np.float32)
+
+    def see(self, observation: Observation) -> Features:
+        """The features of N arms. Shape (N, f)."""
+        rows = len(observation["q"])
+        out, unit = np.empty((rows, *self.space.shape), dtype=np.float32), np.empty(rows)
+        features = np.empty((rows, self._size), dtype=np.float32)
+        keys = ("q", "qdot", "pose", "nominal", "remaining")
+        observe_rows(*self._shared, *(observation[key] for key in keys), features, unit)
+        out[:, : self._size], at = features, self._size
+        for key in self._more:
+            part = observation[key].reshape(rows, -1)
+            scale = unit[:, None] if key == "commands" else OLDEST
+            limit = FASTEST if key == "commands" else 1.0
+            out[:, at : at + part.shape[1]] = np.clip(part / scale, -limit, limit)
+            at += part.shape[1]
+        return out
+
+    def unit(self, observation: Observation) -> FloatArray:
+        """S (0.2 + |v̂|) of N arms, in [rad/s] or [m/s]. Shape (N,)."""
+        out = np.empty(len(observation["q"]))
+        unit_rows(*self._shared, observation["q"], observation["pose"], observation["nominal"], out)
+        return out
+
+    @staticmethod
+    def _bound(key: str, space: spaces.Box) -> tuple[FloatArray, FloatArray]:
+        limit = np.ones(math.prod(space.shape))
+        return (-FASTEST * limit, FASTEST * limit) if key == "commands" else (0.0 * limit, limit)
+
+
+def bound(scenario: Scenario, shown: int) -> tuple[FloatArray, FloatArray]:
+    """Lower and upper bounds of the features, whatever happens, in the order of :class:`ikgym.rl.AgentObservation`.
+
+    Args:
+        scenario: What is tracked.
+        shown: p, the number of steps ahead that are shown.
+    """
+    kind, prismatic = scenario.task.kind, scenario.model.chain.prismatic
+    w, joints = int(twist_size(kind)), np.ones(int(shown_joints(kind, prismatic)))
+    at = 0
+    for j in range(1 if is_turned(kind, prismatic) else 0, scenario.joints):
+        if prismatic[j]:
+            joints[at] = scenario.joint_bound()[j]
+        at += 1 if prismatic[j] else 2
+    # Each part of the mean twists is at most the root of their number times their root mean square, which is below s.
+    ahead = np.full((shown - 1) * w, math.sqrt((shown - 1) * w))
+    upper = np.concatenate([joints, ahead, [LARGEST_LOG, 1.0], np.ones(w), [1.0], np.full(scenario.joints, FASTEST)])
+    lower = -upper
+    lower[len(joints) + len(ahead) + 1] = lower[len(joints) + len(ahead) + 2 + w] = 0.0
+    return lower, upper
+
+
+def batched(observation: Observation) -> Observation:
+    """An observation of one arm as that of one row."""
+    return {key: value[None] for key, value in observation.items()}

@@ -1,0 +1,107 @@
+"""Where arms begin: at starts of one's own, or after some steps, where their reference joint path is then."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ikgym.arms.posture import within_limits
+from ikgym.exceptions import InvalidInputError
+from ikgym.scenarios.scenario import Scenario
+from ikgym.trajectories import Trajectory
+from ikgym.validation import FloatArray, float_array, shortened, whole_number
+
+Steps = npt.NDArray[np.int64]
+
+
+def has_joint_path(scenario: Scenario) -> bool:
+    """Whether the reference trajectory is a joint path, on which episodes can be entered."""
+    return scenario.trajectory.joint_bound() is not None
+
+
+def checked_starts(q: npt.ArrayLike | None, rows: int, scenario: Scenario) -> FloatArray | None:
+    """Starts that a user asks for.
+
+    Args:
+        q: Joint coordinates in [rad] or [m], of shape (n,) for all rows, or (N, n). None for the scenario's own.
+        rows: N.
+        scenario: What is tracked.
+
+    Returns:
+        One start a row, of shape (N, n), or None.
+
+    Raises:
+        InvalidInputError: A start has a wrong shape, is not finite, out of range or outside the arm's limits.
+    """
+    if q is None:
+        return None
+    joints, bound = scenario.joints, scenario.start_bound()
+    starts = float_array("options['q']", q)
+    if starts.shape not in {(joints,), (rows, joints)}:
+        raise InvalidInputError(f"options['q']: expected shape ({joints},), got {starts.shape}.")
+    within_limits("options['q']", starts, scenario.arm)
+    if (np.abs(starts) > bound).any():
+        raise InvalidInputError(
+            f"options['q']: expected absolute values of at most {np.round(bound, 4).tolist()} in [rad] or [m], "
+            f"got {shortened(starts.tolist())}."
+        )
+    return np.broadcast_to(starts, (rows, joints))
+
+
+def checked_steps(given: Any, rows: int, scenario: Scenario) -> Steps | None:
+    """Steps after which a user asks to enter episodes.
+
+    Args:
+        given: A whole number for all rows, or one a row, where None stands for the beginning.
+        rows: N.
+        scenario: What is tracked.
+
+    Returns:
+        One a row, of shape (N,), or None where nothing is asked for.
+
+    Raises:
+        InvalidInputError: They are no such numbers, not one a row, or there is no joint path to enter on.
+    """
+    if given is None:
+        return None
+    steps = list(given) if isinstance(given, (tuple, list, np.ndarray)) else [given] * rows
+    if len(steps) != rows:
+        raise InvalidInputError(f"options['step']: expected {rows} steps, one a row, got {len(steps)}.")
+    checked = [0 if k is None else whole_number("options['step']", k, at_least=0) for k in steps]
+    if max(checked) >= scenario.steps:
+        raise InvalidInputError(
+            f"options['step']: expected steps below the {scenario.steps} of the episode, got {max(checked)}."
+        )
+    if any(checked) and not has_joint_path(scenario):
+        raise InvalidInputError(
+            f"options['step']: expected a scenario whose reference trajectory is a joint path, so that it says where "
+            f"the arm is after {max(checked)} steps; that of {scenario.name!r} is a path of the tool."
+        )
+    return np.array(checked, dtype=np.int64)
+
+
+def on_path(scenario: Scenario, episodes: Sequence[Trajectory], steps: Steps) -> tuple[FloatArray, FloatArray]:
+    """Where reference joint paths are after some steps, and their velocities in the last of these.
+
+    Args:
+        scenario: What is tracked.
+        episodes: What was drawn for the k episodes.
+        steps: At least 1 each. Shape (k,).
+
+    Returns:
+        Joint coordinates in [rad] or [m], and joint velocities in [rad/s] or [m/s], none beyond what the arm can have
+        applied. Shapes (k, n).
+
+    Raises:
+        InvalidInputError: The arm cannot be there; the message names the joint.
+    """
+    points = scenario.points()
+    at = np.stack([points[steps - 1], points[steps]], axis=1) * scenario.dt
+    paths = np.stack([one.joint_path(times) for one, times in zip(episodes, at, strict=True)])  # type: ignore[misc]
+    q: FloatArray = paths[:, 1]
+    within_limits(f"Reference joint path of scenario {scenario.name!r}", q, scenario.arm)
+    limit = scenario.largest_qdot
+    return q, np.clip((q - paths[:, 0]) / scenario.dt, -limit, limit)

@@ -1,0 +1,105 @@
+"""Policies of Stable-Baselines3 with a bilinear actor: they learn, and act the same from their file."""
+
+from __future__ import annotations
+
+import pathlib
+import re
+
+import numpy as np
+import pytest
+import torch
+from stable_baselines3 import PPO, SAC, TD3
+
+import baselines
+import ikgym
+import ikgym.sb3
+from baselines.training.exporting import export
+from baselines.training.policies import BilinearPPOPolicy, BilinearSACPolicy, BilinearTD3Policy
+from ikgym import rl
+from ikgym.exceptions import InvalidInputError
+
+SHORT = {"n_steps": 8, "batch_size": 16, "n_epochs": 1}
+LATE = {"learning_starts": 8, "batch_size": 8, "buffer_size": 100}
+
+
+def scenario():
+    return ikgym.scenarios.get("panda-random").replace(steps=20)
+
+
+@pytest.mark.parametrize(("kind", "policy", "parameters"), [
+    (PPO, "MlpPolicy", SHORT),
+    pytest.param(SAC, "MlpPolicy", LATE, marks=pytest.mark.slow),
+    pytest.param(TD3, "MlpPolicy", LATE, marks=pytest.mark.slow),
+    (PPO, BilinearPPOPolicy, SHORT),
+    (SAC, BilinearSACPolicy, LATE),
+    pytest.param(TD3, BilinearTD3Policy, LATE, marks=pytest.mark.slow),
+])  # fmt: skip
+def test_models_learn_and_act_the_same_from_their_file(tmp_path, kind, policy, parameters):
+    envs = ikgym.sb3.make_vec(scenario(), 2)
+    model = kind(policy, envs, device="cpu", seed=0, **parameters).learn(32)
+    export(model, envs, tmp_path / "agent.safetensors")
+    agent = baselines.make("agent", scenario(), path=str(tmp_path / "agent.safetensors"))
+    env = rl.make(scenario())
+    features, _ = env.reset(seed=1)
+    plain = ikgym.RedundantIKEnv(scenario(), preview=agent.preview)
+    seen, _ = plain.reset(seed=1)
+    for _ in range(20):
+        said, _ = model.predict(features, deterministic=True)
+        action, _ = agent.predict(seen)
+        features, *_, info = env.step(said)
+        seen, *_, same = plain.step(action)
+        assert info["position_error"] == pytest.approx(same["position_error"], rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("kind", "policy", "parameters"), [(PPO, BilinearPPOPolicy, SHORT), (SAC, BilinearSACPolicy, LATE)]
+)
+def test_weights_of_the_bilinear_actor_are_trained(kind, policy, parameters):
+    model = kind(policy, ikgym.sb3.make_vec(scenario(), 2), device="cpu", seed=0, **parameters)
+    before = {name: tensor.clone() for name, tensor in model.policy.named_parameters()}
+    model.learn(64)
+    changed = {name for name, tensor in model.policy.named_parameters() if not torch.equal(tensor, before[name])}
+    assert any("network.0.weight" in name for name in changed)
+    assert any("value_net" in name or "critic" in name for name in changed)
+
+
+def test_actions_are_homogeneous_in_what_is_due():
+    """Twice as far from the path, the velocity that takes it back is twice as large: G does not change."""
+    model = PPO(BilinearPPOPolicy, ikgym.sb3.make_vec(scenario(), 2), device="cpu", seed=0, **SHORT)
+    actor = model.policy.mlp_extractor.policy_net
+    features = torch.from_numpy(rl.make(scenario()).reset(seed=0)[0])[None]
+    n, w = actor.joints, actor.twist
+    rows = actor.network(features).reshape(n, w + 1)
+    due = features[0, -n - 1 - w : -n - 1]
+    wanted = (rows[:, :w] @ due + rows[:, w] * features[0, -n - 1] / 0.2) / actor.share
+    assert torch.allclose(actor(features)[0], wanted, atol=1e-6)
+
+
+def test_agents_with_a_history_are_not_exported(tmp_path):
+    envs = ikgym.sb3.make_vec(scenario(), 2, history=2)
+    model = PPO("MlpPolicy", envs, device="cpu", **SHORT)
+    with pytest.raises(InvalidInputError, match="no history"):
+        export(model, envs, tmp_path / "agent.safetensors")
+
+
+def test_a_lost_track_is_no_truncation():
+    envs = ikgym.sb3.make_vec(scenario().replace(steps=400), 2, lost_distance=0.01)
+    envs.seed(0)
+    envs.reset()
+    for _ in range(400):
+        _, _, ended, infos = envs.step(np.full((2, 7), 4.0, dtype=np.float32))
+        if ended.any():
+            break
+    info = infos[np.flatnonzero(ended)[0]]
+    assert info["TimeLimit.truncated"] is False
+    assert info["episode"]["l"] < 400
+    assert info["terminal_observation"].shape == envs.observation_space.shape
+
+
+def test_the_snippet_of_the_page_runs(tmp_path, monkeypatch):
+    page = (pathlib.Path(__file__).parents[3] / "docs" / "agents.md").read_text(encoding="utf-8")
+    (snippet,) = (text for text in re.findall(r"```python\n(.*?)```", page, re.DOTALL) if "make_vec" in text)
+    monkeypatch.chdir(tmp_path)
+    exec(compile(snippet, "agents.md", "exec", dont_inherit=True), {})
+    agent = baselines.make("agent", "panda-random", path="mine.safetensors")
+    assert agent.preview == (10, 40, 100)

@@ -1,0 +1,105 @@
+"""Episodes that are entered after some steps, and go on after a loss of track."""
+
+from __future__ import annotations
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+import ikgym
+from ikgym.exceptions import InvalidInputError
+
+SCENARIOS = ("varga7-random", "panda-random", "varga7-fast")
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_an_episode_is_entered_on_its_joint_path(name):
+    scenario = ikgym.scenarios.get(name)
+    env = ikgym.RedundantIKEnv(scenario, preview=2)
+    observation, _ = env.reset(seed=4, options={"step": 250})
+    path = scenario.nominal_joint_path(4)
+    nominal = scenario.nominal(4, preview=2)
+    assert np.array_equal(observation["q"], path[250])
+    assert np.allclose(observation["qdot"], (path[250] - path[249]) / scenario.dt, rtol=0.0, atol=1e-9)
+    assert np.array_equal(observation["nominal"], nominal[251:253])
+    assert observation["remaining"] == scenario.steps - 250
+    assert env.observation_space.contains(observation)
+    *_, info = env.step(env.action_space.sample())
+    assert info["time"] == 251 * scenario.dt
+
+
+def test_blocks_of_reference_poses_begin_where_an_episode_is_entered():
+    """Rows whose reference is computed block by block see what those see that know all of it."""
+    from ikgym.simulator import Simulator
+
+    scenario = ikgym.scenarios.get("varga7-random")
+    seen = []
+    for memory in (2**26, 8 * 12 * 2 * 40):
+        simulator = Simulator(scenario, 2, (1, 5), memory)
+        steps = simulator.checked_steps([700, 3])
+        simulator.reset(np.ones(2, dtype=bool), list(map(np.random.default_rng, range(2))), steps=steps)
+        for _ in range(60):
+            out = simulator.step(np.zeros((2, 7)))
+        seen.append(out.numbers)
+    assert np.array_equal(*seen)
+
+
+def test_rows_enter_one_by_one():
+    envs = gym.make_vec("RedundantIK-v0", num_envs=3, scenario="varga7-random")
+    observation, _ = envs.reset(seed=0, options={"step": [None, 5, 900]})
+    assert observation["remaining"].ravel().tolist() == [1000, 995, 100]
+    observation, _ = envs.reset(options={"step": 7, "reset_mask": np.array([True, False, True])})
+    assert observation["remaining"].ravel().tolist() == [993, 995, 993]
+
+
+def test_sensors_and_drives_remember_the_arm_as_it_is():
+    """With everything late and slow, what is seen at the entry is the arm there, and not where episodes begin."""
+    plant = ikgym.Plant(q_delay=3, pose_delay=7, pose_every=5)
+    scenario = ikgym.scenarios.get("panda-random").replace(plant=plant)
+    env = ikgym.RedundantIKEnv(scenario, preview=2, commands=2)
+    observation, _ = env.reset(seed=2, options={"step": 301})
+    q = scenario.nominal_joint_path(2)[301]
+    rotation, position = scenario.arm.forward(q)
+    assert np.array_equal(observation["q"], q)
+    assert np.allclose(observation["pose"], scenario.task.coordinates(rotation, position), rtol=0.0, atol=1e-12)
+    assert np.array_equal(observation["commands"], np.tile(observation["qdot"], (2, 1)))
+
+
+def test_a_start_of_ones_own_is_entered_at_rest():
+    scenario = ikgym.scenarios.get("varga7-random")
+    env = ikgym.RedundantIKEnv(scenario)
+    observation, _ = env.reset(seed=0, options={"step": 10, "q": np.zeros(7)})
+    assert not observation["q"].any()
+    assert not observation["qdot"].any()
+    assert observation["remaining"] == scenario.steps - 10
+
+
+@pytest.mark.parametrize(
+    ("step", "said"), [(1000, "below the 1000"), (-1, "at least 0"), (1.5, "whole"), ([1, 2], "1 steps")]
+)
+def test_wrong_steps_are_refused(step, said):
+    env = ikgym.RedundantIKEnv("varga7-random")
+    with pytest.raises(InvalidInputError, match=said):
+        env.reset(seed=0, options={"step": step})
+
+
+def test_paths_of_the_tool_alone_cannot_be_entered():
+    with pytest.raises(InvalidInputError, match="path of the tool"):
+        ikgym.RedundantIKEnv("panda-circle").reset(options={"step": 1})
+
+
+def test_a_lost_track_ends_the_episode_and_the_next_one_goes_on_from_there():
+    env = ikgym.RedundantIKEnv("varga7-random", lost_distance=0.05)
+    env.reset(seed=0)
+    lost = False
+    while not lost:
+        observation, _, lost, over, info = env.step(np.ones(7, dtype=np.float32))
+        assert not over
+    assert info["position_error"] > 0.05
+    with pytest.raises(ikgym.exceptions.ResetNeededError, match="has ended"):
+        env.step(np.ones(7, dtype=np.float32))
+    left = observation["remaining"]
+    assert env.reset()[0]["remaining"] == left
+    assert env.reset()[0]["remaining"] == 1000  # only the first time
+    with pytest.raises(InvalidInputError, match="lost_distance"):
+        ikgym.RedundantIKEnv("varga7-random", lost_distance=-1.0)
