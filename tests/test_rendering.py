@@ -383,14 +383,16 @@ def test_a_video_can_be_recorded(tmp_path):
     for _ in range(STEPS):
         *_, truncated, _ = move(env)
     assert truncated
+    frames = np.array(env.recorded_frames)
+    assert frames.shape == (STEPS + 1, HEIGHT, WIDTH, 3)
+    assert all((a != b).any() for a, b in itertools.pairwise(frames))
     env.close()
     (video,) = tmp_path.glob("videos/*.mp4")
     decode = [ffmpeg, "-v", "error", "-i", str(video), "-f", "rawvideo", "-pix_fmt", "rgb24", "-"]
     played = subprocess.run(decode, check=True, capture_output=True)
     assert played.stderr == b""
-    frames = np.frombuffer(played.stdout, dtype=np.uint8).reshape(-1, HEIGHT, WIDTH, 3)
-    assert len(frames) == STEPS + 1
-    assert (frames[0] != frames[-1]).any()
+    shown = np.frombuffer(played.stdout, dtype=np.uint8).reshape(-1, HEIGHT, WIDTH, 3)
+    assert (shown[0] != shown[-1]).any()  # encoders and decoders may drop frames at either end
 
 
 @pytest.mark.parametrize("mode", ["ansi", "", 3])
