@@ -12,9 +12,8 @@ from benchmarks.effort import FULL, Effort
 from benchmarks.pose_solvers import MET, OURS, REFERENCE, RIVALS, Solve
 from benchmarks.table import Column, Table
 from ikgym.arms import Arm
-from ikgym.arms.inverse import BoolArray
 from ikgym.rotations import geodesic_angle
-from ikgym.validation import FloatArray
+from ikgym.validation import BoolArray, FloatArray
 
 ARMS = ("panda", "iiwa14")
 #: All solvers have their turns at so many parts of the poses.

@@ -90,14 +90,14 @@ def first_not_finite(actions, active):
 
 
 @inlined
-def show_nominal(kind, frames, point, k, preview, out):
+def _show_nominal(kind, frames, point, k, preview, out):
     """The nominal task coordinates ahead of step ``k``. ``out`` has shape (p, m)."""
     for i in range(preview.shape[0]):
         task_kernels.frame_coordinates(kind, frames[point[k + preview[i]]], out[i])
 
 
 @inlined
-def errors(kind, frame, rotation, position):
+def _errors(kind, frame, rotation, position):
     """The position error of a pose in [m], and the orientation error in [rad], NaN where the task has no orientation.
 
     Args:
@@ -120,7 +120,7 @@ def errors(kind, frame, rotation, position):
 
 
 @inlined
-def tracking(kind, cost, frame, pose, nominal, error):
+def _tracking(kind, cost, frame, pose, nominal, error):
     """Φ^X of task coordinates.
 
     Args:
@@ -134,6 +134,34 @@ def tracking(kind, cost, frame, pose, nominal, error):
     task_kernels.frame_coordinates(kind, frame, nominal)
     task_kernels.error(kind, nominal, pose, error)
     return cost_kernels.tracking(cost, error)
+
+
+@inlined
+def show_row(constants, cost, state, row, pose, frame, shown):
+    """Shows where the tool of a row is, what lies ahead of it, its errors, and what the step costs.
+
+    Args:
+        constants: A :class:`Constants`.
+        cost: A :class:`CostParameters`.
+        state: A :class:`State`, with the row's step counted.
+        row: Its number.
+        pose: Receives the task coordinates. Shape (m,).
+        frame: Orientation of the tool and tool point in [m], of shapes (3, 3) and (3,); then what is worked with, of
+            shapes (m,) and (e,).
+        shown: The parts of an outcome up to the joints that are held back, written in place.
+    """
+    kind, point, tables, k = constants.kind, constants.point, state.frames, state.step[row]
+    rotation, position, nominal, error = frame
+    task_kernels.coordinates(kind, rotation, position, pose)
+    frames = tables[row if tables.shape[0] > 1 else 0]
+    _show_nominal(kind, frames, point, k, constants.preview, shown[3][row])
+    shown[4][row, 0] = constants.steps - k
+    target = frames[point[k]]
+    shown[7][row], shown[8][row] = _errors(kind, target, rotation, position)
+    shown[5][row] = shown[6][row] = 0.0
+    if constants.counted[k]:
+        shown[5][row] = _tracking(kind, cost, target, pose, nominal, error)
+        shown[6][row] = cost_kernels.velocity(cost, state.qdot[row])
 
 
 @kernel
@@ -196,8 +224,7 @@ def step(
 @uncounted
 def _rows(chain, constants, cost, state, shown, active, moving, start, stop):
     """The rows of :func:`step`, with the parts of the outcome in a tuple."""
-    kind, point, preview, tables = constants.kind, constants.point, constants.preview, state.frames
-    q, qdot, made, m = state.q, state.qdot, state.step, shown[2].shape[1]
+    q, qdot, m = state.q, state.qdot, shown[2].shape[1]
     # Each call has the scratch of its first row to itself.
     rotation, position = state.scratch[start, :9].reshape(3, 3), state.scratch[start, 9:12]
     nominal, error = state.scratch[start, 12 : 12 + m], state.scratch[start, 12 + m :]
@@ -208,23 +235,12 @@ def _rows(chain, constants, cost, state, shown, active, moving, start, stop):
         shown[10][row, 0] = shown[10][row, 1] = shown[10][row, 2] = 0.0
         if moving:
             _move(constants, state, row, shown[9], shown[10])
-            made[row] += 1
-        k = made[row]
+            state.step[row] += 1
         for j in range(q.shape[1]):
             shown[0][row, j] = q[row, j]
             shown[1][row, j] = qdot[row, j]
         forward(chain, q[row], rotation, position)
-        pose = shown[2][row]
-        task_kernels.coordinates(kind, rotation, position, pose)
-        frames = tables[row if tables.shape[0] > 1 else 0]
-        show_nominal(kind, frames, point, k, preview, shown[3][row])
-        shown[4][row, 0] = constants.steps - k
-        frame = frames[point[k]]
-        shown[7][row], shown[8][row] = errors(kind, frame, rotation, position)
-        shown[5][row] = shown[6][row] = 0.0
-        if constants.counted[k]:
-            shown[5][row] = tracking(kind, cost, frame, pose, nominal, error)
-            shown[6][row] = cost_kernels.velocity(cost, qdot[row])
+        show_row(constants, cost, state, row, shown[2][row], (rotation, position, nominal, error), shown)
 
 
 @inlined

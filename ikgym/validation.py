@@ -13,6 +13,8 @@ import numpy.typing as npt
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 
 FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+BoolArray = npt.NDArray[np.bool_]
 
 # What is this close to unit length, or to a rotation, was meant to be one, and is made one exactly.
 UNIT_TOLERANCE = 1e-6

@@ -274,19 +274,15 @@ def test_long_curves_are_thinned_and_keep_their_peaks():
     assert line.get_xdata()[-1] == pytest.approx(0.001 * (states - 1))
 
 
-#: Arms, joint coordinates and errors that are drawn at the worst: each value once in the fast run, all together in the
-#: slow one, since the picture of the arm and the curves of its errors do not know each other.
-WORST = {
+#: Arms, joint coordinates and errors that are drawn at the worst: each value once, not all together, since the picture
+#: of the arm and the curves of its errors do not know each other.
+WORST = [
     *(("varga7", 0.0, error) for error in (0.0, 1e-300, 1e6, 1e300, np.inf)),
     *(("varga7", 1e6, 0.0), ("varga7", -1e9, np.inf), ("puma560", 1e6, 1e-300), ("puma560", -1e9, 1e300)),
-}
-EXTREMES = [
-    pytest.param(*extreme, marks=() if extreme in WORST else pytest.mark.slow)
-    for extreme in itertools.product(["varga7", "puma560"], [0.0, 1e6, -1e9], [0.0, 1e-300, 1e6, 1e300, np.inf])
 ]
 
 
-@pytest.mark.parametrize(("name", "q", "error"), EXTREMES)
+@pytest.mark.parametrize(("name", "q", "error"), WORST)
 def test_nothing_is_too_far_or_too_small_to_be_drawn(name, q, error):
     arm = arms.get(name)
     drawn = Renderer(arm, "rgb_array", title="$diverges_", has_orientation=True)
@@ -383,14 +379,16 @@ def test_a_video_can_be_recorded(tmp_path):
     for _ in range(STEPS):
         *_, truncated, _ = move(env)
     assert truncated
+    frames = np.array(env.recorded_frames)
+    assert frames.shape == (STEPS + 1, HEIGHT, WIDTH, 3)
+    assert all((a != b).any() for a, b in itertools.pairwise(frames))
     env.close()
     (video,) = tmp_path.glob("videos/*.mp4")
     decode = [ffmpeg, "-v", "error", "-i", str(video), "-f", "rawvideo", "-pix_fmt", "rgb24", "-"]
     played = subprocess.run(decode, check=True, capture_output=True)
     assert played.stderr == b""
-    frames = np.frombuffer(played.stdout, dtype=np.uint8).reshape(-1, HEIGHT, WIDTH, 3)
-    assert len(frames) == STEPS + 1
-    assert (frames[0] != frames[-1]).any()
+    shown = np.frombuffer(played.stdout, dtype=np.uint8).reshape(-1, HEIGHT, WIDTH, 3)
+    assert (shown[0] != shown[-1]).any()  # encoders and decoders may drop frames at either end
 
 
 @pytest.mark.parametrize("mode", ["ansi", "", 3])

@@ -40,13 +40,22 @@ def noisy(name, steps=7):
     return short(name, steps).replace(plant=NOISE)
 
 
-@pytest.mark.parametrize("mode", list(AutoresetMode), ids=lambda mode: mode.value)
-@pytest.mark.parametrize(
-    "scenario",
-    every_scenario(short)
-    + [
+EPISODES = [
+    *every_scenario(short),
+    *(
         pytest.param(one, id=f"{one.name}-{one.steps}-{one.plant.noise}")
         for one in (noisy("varga7-random"), short("khan8-q1", 130), limited(), limited(plant=NOISE))
+    ),
+]
+
+
+@pytest.mark.parametrize(
+    ("scenario", "mode"),
+    [
+        pytest.param(*one.values, mode, id=f"{one.id}-{mode.value}", marks=one.marks)
+        for one in EPISODES
+        for mode in AutoresetMode
+        if not one.marks or mode is AutoresetMode.NEXT_STEP  # those of the slow run differ in what an episode is alone
     ],
 )
 def test_bit_identical_to_sync_over_whole_episodes(scenario, mode):

@@ -17,9 +17,7 @@ from ikgym.compilation import announced
 from ikgym.exceptions import InvalidInputError
 from ikgym.inverse_kinematics import Ranges, Settings, inverse_rows
 from ikgym.kinematics import Chain
-from ikgym.validation import FloatArray, float_array, number, rotation_matrices, whole_number
-
-BoolArray = npt.NDArray[np.bool_]
+from ikgym.validation import BoolArray, FloatArray, float_array, number, rotation_matrices, whole_number
 
 # What an angle of 1 rad counts as, in lengths of the whole arm. From 0.1 to 0.8 differ by less than a fifth.
 LENGTH_OF_RADIAN = 0.25

@@ -7,17 +7,13 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ikgym import cost_kernels, task_kernels
 from ikgym.jit import inlined, kernel, uncounted
 from ikgym.kinematics import Chain, forward
 from ikgym.limit_kernels import FASTEST, LOWER, SLACK, UPPER, driven, stopped, within
 from ikgym.outcome import more_parts, parts, size
 from ikgym.plant.drive_kernels import counter_of, disturbed, engaged, filtered, remembered
 from ikgym.plant.sensor_kernels import NOISE, measure_pose, measure_q
-from ikgym.simulation import commanded, errors, show_nominal, tracking
-
-Floats = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
+from ikgym.simulation import Floats, Integers, commanded, show_row
 
 _parts, _more_parts, _size = inlined(parts), inlined(more_parts), inlined(size)
 
@@ -109,8 +105,7 @@ def step(constants, cost, drives, sensors, arms, state, plant, numbers, active, 
 @uncounted
 def _rows(constants, cost, drives, sensors, arms, state, plant, shown, more, active, moving, start, stop):
     """The rows of :func:`step`, with the parts of the outcome in two tuples."""
-    kind, point, preview = constants.kind, constants.point, constants.preview
-    q, qdot, made, tables = state.q, state.qdot, state.step, state.frames
+    q, qdot = state.q, state.qdot
     offsets, axes, tool, tool_rotation = arms.offsets, arms.axes, arms.tool, arms.tool_rotation
     n, m, scratch = q.shape[1], plant.shown.shape[1], state.scratch
     rotation, position = scratch[start, :9].reshape(3, 3), scratch[start, 9:12]
@@ -122,29 +117,19 @@ def _rows(constants, cost, drives, sensors, arms, state, plant, shown, more, act
         shown[10][row, 0] = shown[10][row, 1] = shown[10][row, 2] = 0.0
         if moving:
             _drive(constants, drives, state, plant, row, shown[9], shown[10])
-            made[row] += 1
-        k = made[row]
+            state.step[row] += 1
+        k = state.step[row]
         loaded = 1 if k >= drives.payload_step else 0
         chain = Chain(
             offsets[row, loaded], axes[row, loaded], drives.prismatic, tool[row, loaded], tool_rotation[row, loaded]
         )
         forward(chain, q[row], rotation, position)
-        pose = more[4][row]
-        task_kernels.coordinates(kind, rotation, position, pose)
-        frames = tables[row if tables.shape[0] > 1 else 0]
-        show_nominal(kind, frames, point, k, preview, shown[3][row])
-        shown[4][row, 0] = constants.steps - k
-        frame = frames[point[k]]
-        shown[7][row], shown[8][row] = errors(kind, frame, rotation, position)
-        shown[5][row] = shown[6][row] = 0.0
-        if constants.counted[k]:
-            shown[5][row] = tracking(kind, cost, frame, pose, nominal, error)
-            shown[6][row] = cost_kernels.velocity(cost, qdot[row])
+        show_row(constants, cost, state, row, more[4][row], (rotation, position, nominal, error), shown)
         for j in range(n):
             shown[1][row, j] = qdot[row, j]
             more[3][row, j] = q[row, j]
         _recall(constants.limits, plant.commands, row, k, more[2])
-        _sense(sensors, plant, kind, row, k, q, rotation, position, shown, more)
+        _sense(sensors, plant, constants.kind, row, k, q, rotation, position, shown, more)
 
 
 @inlined

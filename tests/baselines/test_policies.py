@@ -77,14 +77,12 @@ PAIRS = [(name, on) for name in baselines.names() for on in [*ONE_OF_EACH, AXIS.
 contract = pytest.mark.parametrize(("name", "on"), PAIRS)
 
 #: One scenario for each number of joints, task and kind of limits: all that the order in which rows are worked off can
-#: depend on. All others are in the slow run.
+#: depend on.
 SHAPES = {
     *("varga7-fast", "planar2-bent", "zhang3-helix", "zhang6-lspb", "khan8-q7q8"),
     *("panda-circle", "tiago-raster", "iiwa14-random", AXIS.name),
 }
-by_rows = pytest.mark.parametrize(
-    ("name", "on"), [pytest.param(*pair, marks=() if pair[1] in SHAPES else pytest.mark.slow) for pair in PAIRS]
-)
+by_rows = pytest.mark.parametrize(("name", "on"), [pair for pair in PAIRS if pair[1] in SHAPES])
 
 
 def observations(on, preview, rows):
@@ -127,7 +125,7 @@ def test_batch_equals_single_calls_and_memory_goes_by_rows(name, on):
             assert all(identical(a[0], b[i]) for a, b in zip(states[i], batched, strict=True))
 
 
-@pytest.mark.parametrize(("name", "on"), [pair for pair in PAIRS if pair[1] in SHAPES])
+@by_rows
 def test_rows_that_are_shared_out_to_threads_are_the_same(monkeypatch, name, on):
     policy = policy_for(name, on)
     if policy is None:

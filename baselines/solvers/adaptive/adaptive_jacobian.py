@@ -17,7 +17,7 @@ from ikgym import task_kernels
 from ikgym.exceptions import InvalidInputError
 from ikgym.jit import kernel
 from ikgym.kinematics import forward_and_jacobian
-from ikgym.validation import FloatArray, number, whole_number
+from ikgym.validation import FloatArray, IntArray, number, whole_number
 
 
 class AdaptiveMemory(NamedTuple):
@@ -25,12 +25,11 @@ class AdaptiveMemory(NamedTuple):
 
     Attributes:
         before: See :class:`Measurement`. Shape (B, h, n).
-        age: See :class:`Measurement`. Shape (B, 1).
+        age: See :class:`Measurement`; below 0 where there was no step before. Shape (B, 1).
         nominal: X^N(k). Shape (B, m).
         pose: The last measured pose. Shape (B, m).
         then: The joint coordinates where it was measured, in [rad] or [m]. Shape (B, n).
         parameters: θ̂, see :mod:`baselines.solvers.adaptive.chain_parameters`. Shape (B, p).
-        known: Whether there was a step before. Shape (B,).
     """
 
     before: FloatArray
@@ -39,7 +38,6 @@ class AdaptiveMemory(NamedTuple):
     pose: FloatArray
     then: FloatArray
     parameters: FloatArray
-    known: npt.NDArray[np.bool_]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -92,8 +90,7 @@ class AdaptiveJacobian(SolverPolicy):
         """An :class:`AdaptiveMemory` without a step before, of the model as it is."""
         n, m = self.problem.model.joints, self.problem.task.size
         sensors, pose = nothing_measured(rows, self.history, n), np.zeros((rows, m))
-        parameters, known = np.zeros((rows, 6 * n + 3)), np.zeros(rows, np.bool_)
-        return AdaptiveMemory(*sensors, pose, pose.copy(), np.zeros((rows, n)), parameters, known)
+        return AdaptiveMemory(*sensors, pose, pose.copy(), np.zeros((rows, n)), np.zeros((rows, 6 * n + 3)))
 
     def solve(self, batch: Batch, memory: Memory) -> Solution:
         """See :meth:`SolverPolicy.solve`."""
@@ -102,16 +99,16 @@ class AdaptiveJacobian(SolverPolicy):
         measured = recall(batch, problem.dt, own.before, own.age)
         new, target = measured.new[:, None], batch.nominal[:, 0].copy()
         pose, then = np.where(new, batch.pose, own.pose), np.where(new, measured.q, own.then)
-        present = np.where(own.known[:, None], own.nominal, pose)
+        present = np.where(own.age >= 0.0, own.nominal, pose)
         jacobian, shift, qdot = np.empty((rows, e, n)), np.empty((rows, e)), np.empty((rows, n))
         parameters, rule = own.parameters.copy(), (problem.model.chain, problem.task.kind, self.gain, self.adaptation)
         last = measured.before[:, min(1, self.history - 1)]
         adapt_rows(rule, (batch.q, last, then), (pose, present, target), parameters, jacobian, shift)
         damped_rows(jacobian, shift, self.damping, qdot)
-        kept = AdaptiveMemory(measured.before, measured.age, target, pose, then, parameters, np.ones_like(own.known))
+        kept = AdaptiveMemory(measured.before, measured.age, target, pose, then, parameters)
         return Solution(qdot / problem.dt, kept, statuses(rows), np.ones(rows, np.int64))
 
-    def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
+    def count(self, iterations: IntArray) -> tuple[npt.ArrayLike, ...]:
         """Jacobians here, a step ago, and where the pose was measured."""
         return 0, 3, 1, 1
 

@@ -12,10 +12,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from ikgym.jit import inlined, kernel
-from ikgym.validation import FloatArray
+from ikgym.validation import BoolArray, FloatArray, IntArray
 
 #: How much of a residual stays from step to step: what drifts, such as a bias, is no sign of a delay.
 HIGH_PASS = 0.98
@@ -37,7 +36,7 @@ class Hypotheses(NamedTuple):
         lag: The T that is assumed at first, in steps.
     """
 
-    delays: npt.NDArray[np.int64]
+    delays: IntArray
     lags: FloatArray
     delay: int
     lag: float
@@ -64,14 +63,14 @@ class PredictedMemory(NamedTuple):
         offset: Measured task coordinates minus those that the model has at the same time, filtered. Shape (B, m).
     """
 
-    begun: npt.NDArray[np.bool_]
+    begun: BoolArray
     measured: FloatArray
     velocity: FloatArray
     path: FloatArray
     residual: FloatArray
     squares: FloatArray
-    samples: npt.NDArray[np.int64]
-    delay: npt.NDArray[np.int64]
+    samples: IntArray
+    delay: IntArray
     lag: FloatArray
     sent: FloatArray
     arm_q: FloatArray

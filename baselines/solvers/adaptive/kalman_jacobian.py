@@ -6,7 +6,6 @@ import dataclasses
 from typing import ClassVar, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from baselines.policy import Batch
 from baselines.solvers.adaptive.corrected import Corrected
@@ -16,7 +15,7 @@ from baselines.solvers.adaptive.measurements import Measurement
 from ikgym import task_kernels
 from ikgym.jit import kernel
 from ikgym.kinematics import forward
-from ikgym.validation import FloatArray, number
+from ikgym.validation import BoolArray, FloatArray, number
 
 
 class JacobianMemory(NamedTuple):
@@ -39,7 +38,7 @@ class JacobianMemory(NamedTuple):
     learnt: FloatArray
     covariance: FloatArray
     first: FloatArray
-    known: npt.NDArray[np.bool_]
+    known: BoolArray
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

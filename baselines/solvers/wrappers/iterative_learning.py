@@ -6,14 +6,13 @@ import dataclasses
 from typing import ClassVar, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from baselines.policy import Batch, Memory, Solution
 from baselines.wrapper import NamedWrapper
 from ikgym.exceptions import InvalidInputError
 from ikgym.jit import kernel
 from ikgym.preview import offsets
-from ikgym.validation import FloatArray, number, whole_number
+from ikgym.validation import BoolArray, FloatArray, IntArray, number, whole_number
 
 # Reference coordinates of the same path agree to this.
 SAME = 1e-9
@@ -36,8 +35,8 @@ class LearningMemory(NamedTuple):
     error: FloatArray
     weight: FloatArray
     reference: FloatArray
-    begun: npt.NDArray[np.int64]
-    steps: npt.NDArray[np.int64]
+    begun: IntArray
+    steps: IntArray
     first: FloatArray
 
 
@@ -108,7 +107,7 @@ class IterativeLearning(NamedWrapper):
             np.zeros((rows, m)),
         )
 
-    def restarted(self, memory: Memory, rows: npt.NDArray[np.bool_]) -> Memory:
+    def restarted(self, memory: Memory, rows: BoolArray) -> Memory:
         """Where an episode begins, the errors of the last one are learnt; the inner policy starts anew."""
         if not self.keep:
             return super().restarted(memory, rows)

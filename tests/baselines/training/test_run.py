@@ -351,5 +351,5 @@ def test_killed_at_random_moments(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("method", ["ppo", "sac", "imitate", "apg"])
-def test_killed_at_many_random_moments(method, tmp_path):
-    check_kills(method, 3, tmp_path, np.random.default_rng())
+def test_any_method_may_be_killed_at_a_random_moment(method, tmp_path):
+    check_kills(method, 1, tmp_path, np.random.default_rng())

@@ -75,7 +75,7 @@ def test_workers_end_with_a_killed_parent(tmp_path, end):
             assert all(map(alive, workers))
         finally:
             parent.send_signal(end)
-        assert wait_for(lambda: not any(map(alive, workers)), 5.0)
+        assert wait_for(lambda: not any(map(alive, workers)), 30.0)
 
 
 @needs_proc
@@ -97,4 +97,4 @@ def test_workers_of_commands_end_with_them(tmp_path, command, end):
             assert all(map(alive, workers))
         finally:
             parent.send_signal(end)
-        assert wait_for(lambda: not any(map(alive, workers)), 5.0)
+        assert wait_for(lambda: not any(map(alive, workers)), 30.0)
