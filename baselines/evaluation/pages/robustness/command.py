@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import datetime
 import pathlib
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Annotated, Any
 
 import tyro
@@ -21,7 +21,7 @@ from baselines.files import write
 from baselines.files.locks import locked
 from baselines.spec import parse_policy
 from baselines.workers import Workers
-from ikgym.exceptions import InvalidInputError
+from ikgym.exceptions import InvalidInputError, UnknownNameError
 from ikgym.scenarios import imperfect
 from ikgym.validation import number, whole_number
 
@@ -54,6 +54,8 @@ class Options:
     tables. None if left out."""
     set_episodes: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
     """The first episodes of each test set; all of them if left out."""
+    whole: Annotated[tuple[str, ...], tyro.conf.arg(metavar="LABEL@SET …")] = ()
+    """Policies of --policies that play all episodes of a test set of --sets, whatever --set-episodes says."""
     effects: bool = False
     """Measure what each part of the plant of --scenario costs alone, too; with --episodes episodes."""
     resume: bool = False
@@ -76,6 +78,7 @@ Examples:
   {prog} --policies dls rhc told --out results/map
   {prog} --policies dls rhc told --out results/map --resume --write docs
   {prog} --severities --sets {" ".join(imperfect.SCENARIOS)} --out results/sets
+  {prog} --severities --sets panda-bus --set-episodes 4 --whole told@panda-bus --out results/sets --resume
   {prog} --policies dls "mended@calibrated:policy=predicted,start=1e-5" --effects --out results/map
   {prog} --scenario lab.toml --severities 0 0.5 1 2 --episodes 8 --out results/lab
   {prog} --write docs
@@ -104,7 +107,7 @@ def measured(options: Options, command: str) -> Measured:
     }
     policies = labelled(options.policies)
     place = options.scenario, policies, options.out
-    sets = {"episodes": options.set_episodes, **how}
+    sets = {"episodes": options.set_episodes, "whole": whole(options.whole, policies, options.sets), **how}
     entries = measure.entries(options.sets, policies, options.out, **sets) if options.sets else ()
     cells = measure.cells(*place, severities=severities, episodes=options.episodes, **how) if severities else ()
     effects = measure.effects(*place, episodes=options.episodes, **how) if options.effects else ()
@@ -127,6 +130,28 @@ def labelled(policies: Sequence[str]) -> dict[str, str]:
             raise InvalidInputError(f"policies: expected a label of its own for each, got {label!r} twice.")
         out[label] = policy if mark else given
     return out
+
+
+def whole(given: Sequence[str], policies: Iterable[str], sets: Sequence[str]) -> frozenset[tuple[str, str]]:
+    """Labels of policies, and the test sets that they play to their ends.
+
+    Args:
+        given: LABEL@SET, each.
+        policies: All labels.
+        sets: All test sets that are played.
+
+    Raises:
+        UnknownNameError: There is no such label, or the set is not played.
+    """
+    out = []
+    for one in given:
+        label, _, name = one.rpartition("@")
+        if label not in policies:
+            raise UnknownNameError("label", label, policies)
+        if name not in sets:
+            raise UnknownNameError("set among --sets", name, sets)
+        out.append((label, name))
+    return frozenset(out)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

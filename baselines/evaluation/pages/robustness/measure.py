@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import pathlib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from tqdm import tqdm
@@ -142,6 +142,7 @@ def entries(
     folder: pathlib.Path,
     *,
     episodes: int | None = None,
+    whole: Collection[tuple[str, str]] = (),
     **options: Any,
 ) -> tuple[Entry, ...]:
     """Policies on test sets, each beside itself on an ideal plant.
@@ -151,22 +152,34 @@ def entries(
         policies: What they are called, and what they are: names, with parameters or without.
         folder: For the results.
         episodes: The first episodes of each set; all of them if left out.
+        whole: Policies and sets that are played to their ends all the same.
         options: Of :func:`baselines.evaluation.pages.measure.play`.
 
     Raises:
         IkgymError: As in :func:`baselines.evaluation.pages.measure.play`.
     """
     plans = {
-        label: _first(_untimed(make_plan((), policy, test_sets=sets, pairs=True).jobs), episodes)
+        label: _first(
+            _untimed(make_plan((), policy, test_sets=sets, pairs=True).jobs),
+            episodes,
+            {name for one, name in whole if one == label},
+        )
         for label, policy in policies.items()
     }
     played = measure.play(plans, folder / "sets", **options)
     return tuple(one for label, rows in played.items() for one in _of_policy(label, policies[label], sets, rows))
 
 
-def _first(jobs: Sequence[Job], episodes: int | None) -> list[Job]:
-    """The jobs of the first episodes; all where there is no number."""
-    return [job for job in jobs if episodes is None or job.seed in scenarios.seeds("test", episodes)]
+def _first(jobs: Sequence[Job], episodes: int | None, whole: Collection[str]) -> list[Job]:
+    """The jobs of the first episodes, and all of whole sets and of the ideal episodes beside them."""
+    if episodes is None:
+        return list(jobs)
+    first = scenarios.seeds("test", episodes)
+    return [
+        job
+        for job in jobs
+        if job.seed in first or job.scenario.name in whole or (whole and job.scenario.plant.ideal)
+    ]  # fmt: skip
 
 
 def _of_policy(label: str, policy: str, sets: Sequence[str], rows: Sequence[Row]) -> Iterator[Entry]:

@@ -15,7 +15,7 @@ from matplotlib.text import Text
 import ikgym
 from baselines.evaluation import test_sets
 from baselines.evaluation.pages.robustness import measure, pictures
-from baselines.evaluation.pages.robustness.command import labelled, main
+from baselines.evaluation.pages.robustness.command import labelled, main, whole
 from baselines.evaluation.pages.robustness.measured import Cell, Effect, Entry, Measured
 from baselines.evaluation.pages.robustness.page import page
 from baselines.evaluation.report import number
@@ -23,7 +23,7 @@ from baselines.evaluation.results import read_rows
 from baselines.files import ResultsError
 from baselines.fingerprints import set_hash
 from baselines.oracle import Search, cache, search, solve
-from ikgym.exceptions import InvalidInputError
+from ikgym.exceptions import InvalidInputError, UnknownNameError
 from ikgym.scenarios import imperfect
 from tests.baselines.evaluation.test_report import row
 
@@ -128,8 +128,33 @@ def test_the_first_episodes_of_sets(short, tmp_path, monkeypatch):
     (entry,) = measure.entries(["panda-bus"], {"dls": "dls"}, tmp_path, episodes=1)
     assert entry.episodes == 1
     text = page(dataclasses.replace(MEASURED, entries=(entry,)))
-    assert "Of these only the first episodes have been played: panda-bus (1)." in text
+    assert "more than the first episodes, as their tables say: panda-bus." in text
+    assert "\n1 test episodes.\n" in text
     assert "Best known costs are missing of panda-bus" in text
+
+
+def test_some_policies_play_whole_sets(short, tmp_path, monkeypatch):
+    scenario = ikgym.scenarios.get("panda-bus").replace(steps=STEPS)
+    monkeypatch.setattr(test_sets.TestSet, "scenario", property(lambda self: scenario))
+    small = test_sets.TestSet("panda-bus", 3, set_hash(scenario, ikgym.scenarios.seeds("test", 3)))
+    monkeypatch.setitem(test_sets.SETS, "panda-bus", small)
+    policies = {"low": "dls:gain=0.1", "dls": "dls"}
+    some = measure.entries(["panda-bus"], policies, tmp_path, episodes=1, whole={("dls", "panda-bus")})
+    assert {one.policy: one.episodes for one in some} == {"low": 1, "dls": 3}
+    on_ideal = [one for one in read_rows(tmp_path / "sets" / "results.json") if one.scenario != "panda-bus"]
+    assert len(on_ideal) == 4  # an ideal episode beside each
+    text = page(dataclasses.replace(MEASURED, entries=some))
+    assert "\n3 or 1 test episodes.\n" in text
+    assert text.count("| 3 | –") == 1
+
+
+def test_whole_sets_are_named_by_label_and_set():
+    assert whole(["a@b@panda-bus"], ["a@b"], ["panda-bus"]) == {("a@b", "panda-bus")}
+    assert not whole([], ["dls"], [])
+    with pytest.raises(UnknownNameError, match=r"There is no label 'dsl'\. Did you mean 'dls'"):
+        whole(["dsl@panda-bus"], ["dls"], ["panda-bus"])
+    with pytest.raises(UnknownNameError, match="no set among --sets 'panda-bsu'"):
+        whole(["dls@panda-bsu"], ["dls"], ["panda-bus"])
 
 
 def test_effects_alone(short, tmp_path):
@@ -177,7 +202,7 @@ def test_a_policy_that_loses_nothing_is_better():
 
 def test_the_page():
     text = page(MEASURED)
-    assert "| `dls` | 650.0 | 500.0 … 800.0 | 25 % | 1.200 | 540.0 | 400.0 … 700.0 |" in text
+    assert "| `dls` | 64 | 650.0 | 500.0 … 800.0 | 25 % | 1.200 | 540.0 | 400.0 … 700.0 |" in text
     assert "64 test episodes, 3 noise seeds each." in text
     assert "- `rhc` is `rhc:iterations=1`" in text
     assert "- `dls` is" not in text
@@ -186,7 +211,19 @@ def test_the_page():
     assert "| `dls` | 3.000 [2.000 … 4.000] (25 %) |" in text
     assert text.index("Best policy of each cell") < text.index("Cost ratios of dls")
     marked = dataclasses.replace(ENTRY, policy="told", reference=True, cost_ratio=None, interval=None, paired=None)
-    assert "| `told` * | – | – |" in page(dataclasses.replace(MEASURED, entries=(marked,)))
+    assert "| `told` * | 64 | – | – |" in page(dataclasses.replace(MEASURED, entries=(marked,)))
+
+
+def test_goals_are_held_against_the_best_of_those_that_played_most():
+    cheap = dataclasses.replace(ENTRY, policy="rhc", cost_ratio=1.2, interval=(1.1, 1.3), lost=0.0)
+    few = dataclasses.replace(cheap, policy="few", episodes=4, cost_ratio=1.1)
+    told = dataclasses.replace(cheap, policy="told", reference=True, cost_ratio=1.02)
+    text = page(dataclasses.replace(MEASURED, entries=(ENTRY, few, told, cheap)))
+    assert "| panda-camera | `rhc` | 64 | 1.200 | 1.100 … 1.300 | 0 % | 1.020 | 1.400 | yes |" in text
+    for changed in ({"cost_ratio": 1.41}, {"lost": 0.01}):
+        missed = dataclasses.replace(cheap, **changed)
+        assert "| 1.400 | no |" in page(dataclasses.replace(MEASURED, entries=(missed,)))
+    assert "## Goals" not in page(dataclasses.replace(MEASURED, entries=(told,)))
 
 
 def test_what_is_saved_is_read(tmp_path):
