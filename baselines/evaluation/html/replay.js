@@ -184,11 +184,16 @@ async function tick(now) {
 
 // By a picture, forward or backward.
 function stepBy(pictures) {
-  const scene = PLAYER.scenes[0];
-  if (!scene) return;
-  const { values } = array(scene.entry, "time");
-  const k = Math.min(Math.max(rowAt(scene.entry, PLAYER.time) + pictures, 0), values.length - 1);
-  seek(values[k]);
+  const { entry } = PLAYER.scenes[0];
+  const { values } = array(entry, "time");
+  seek(values[Math.min(Math.max(rowAt(entry, PLAYER.time) + pictures, 0), values.length - 1)]);
+}
+
+// Whether a key is meant for the replay: it is in sight, and nothing that has keys of its own has the focus.
+function isMeant({ key, target, ctrlKey, altKey, metaKey }) {
+  if (ctrlKey || altKey || metaKey || !PLAYER.scenes.some((scene) => scene.inSight)) return false;
+  const own = target.closest("input, select, button, summary, a, .scroll");
+  return !own || own.id === "time" || (own.id === "play" && key !== " ");
 }
 
 function preparePlayer() {
@@ -201,9 +206,7 @@ function preparePlayer() {
     Home: () => seek(0), End: () => seek(PLAYER.end),
   };
   document.addEventListener("keydown", (event) => {
-    const own = event.target.closest("input, select, button, summary, a, .scroll"); // has keys of its own
-    if (!(event.key in keys) || (own && own.id !== "time") || !PLAYER.scenes.some((scene) => scene.inSight)) return;
-    if (event.ctrlKey || event.altKey || event.metaKey) return;
+    if (!(event.key in keys) || !isMeant(event)) return;
     event.preventDefault();
     keys[event.key]();
   });

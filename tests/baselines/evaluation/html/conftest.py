@@ -47,11 +47,16 @@ def full_folder(folder, tmp_path_factory):
     return out
 
 
+def nasty_policy(number):
+    """The name of a policy that would like to be an element, the end of one, or a place in a template of Plotly."""
+    return f"<img src=x onerror=alert({number})></script>%{{y}}"
+
+
 def _drawn(row, policy, seed, rng):
     """A row with other numbers."""
     numbers = {field.name: getattr(row, field.name) for field in dataclasses.fields(row)}
     drawn = {name: float(rng.lognormal()) for name, value in numbers.items() if isinstance(value, float)}
     counts = {status: int(rng.integers(1, 1000)) for status in ("converged", "unknown")}
     return dataclasses.replace(
-        row, policy=f"policy_{policy}", seed=seed, cost_ratio=float(rng.lognormal()), status_counts=counts, **drawn
+        row, policy=nasty_policy(policy), seed=seed, cost_ratio=float(rng.lognormal()), status_counts=counts, **drawn
     )

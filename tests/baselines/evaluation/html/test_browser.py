@@ -7,7 +7,7 @@ import shutil
 import pytest
 
 from baselines.evaluation.html import PAGE
-from tests.baselines.evaluation.html.conftest import NASTY
+from tests.baselines.evaluation.html.conftest import NASTY, nasty_policy
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 #: Drawn by the processor, and quiet: no profile of somebody, no calls home.
@@ -24,7 +24,7 @@ THREE = ["dls", "moore_penrose", "dls:damping=0.05"]
 ONE_SCENE = """addEventListener("DOMContentLoaded", () => {
   for (const box of [...document.querySelectorAll("#results input:checked")].slice(1)) box.checked = false;
 })"""
-READY = 120_000  # [ms]: space is drawn by the processor, which may have other work
+READY = 60_000
 
 
 @contextlib.contextmanager
@@ -42,7 +42,7 @@ def browser(*flags):
 
 
 @contextlib.contextmanager
-def opened(started, folder, *, width=1000, script=""):
+def opened(started, folder, *, width=1100, script=""):
     """The page, on which nothing may go wrong.
 
     Args:
@@ -180,10 +180,6 @@ class TestDrawn:
         page.evaluate("for (let k = 0; k <= 40; k += 1) seek(PLAYER.end * k / 40)")
         drawn(page)
         last = page.evaluate("row(array(PLAYER.scenes[0].entry, 'nominal'), 399)")
-        page.evaluate("seek(0)")
-        drawn(page)
-        page.evaluate("seek(PLAYER.end)")
-        drawn(page)
         assert page.evaluate("PLAYER.scenes[0].plot.data[5].y[0]") == page.evaluate(f"placed([{last}]).y[0]")
 
     def test_keys_play_and_go_by_pictures(self, page):
@@ -201,6 +197,13 @@ class TestDrawn:
         page.wait_for_function("PLAYER.playing && PLAYER.time > 0")
         page.keyboard.press("Space")
         page.wait_for_function("!PLAYER.playing && !PLAYER.busy")
+        page.locator("#play").focus()
+        page.keyboard.press("Home")
+        page.wait_for_function("PLAYER.time === 0")
+        page.keyboard.press("Space")
+        page.wait_for_function("PLAYER.playing")
+        page.keyboard.press("Space")
+        assert not page.evaluate("PLAYER.playing")
         page.get_by_label("Filter").focus()
         page.keyboard.press("Space")
         assert page.get_by_label("Filter").input_value() == " "  # where one writes, it is a letter
@@ -278,3 +281,19 @@ def test_pages_are_seen_soon(flat, folder, full_folder):
             if min(times) < most:
                 break
         assert min(times) < most
+
+
+@pytest.mark.slow
+def test_a_full_page_is_drawn_and_names_stay_names(flat, full_folder):
+    with opened(flat, full_folder) as tab:
+        drawn(tab)
+        assert set(column(tab, "policy")) == {nasty_policy(number) for number in range(25)}
+        (name,) = set(tab.locator("#replay figcaption b").all_text_contents()[:1])
+        assert name in tab.locator("#cost-time .textpoint").all_text_contents()
+        assert name in tab.locator("#errors .legendtext").all_text_contents()
+        tab.locator("#cost-time .point").first.hover(force=True)
+        seen = tab.locator("#cost-time .hovertext").text_content()
+        assert any(nasty_policy(number) in seen for number in range(25))
+        tab.locator("#episodes summary").click()
+        tab.wait_for_function("document.querySelectorAll('#episodes tr').length === 501")
+        assert "The first 500 of 6400" in tab.locator("#episodes-note").text_content()
