@@ -14,6 +14,9 @@ const themed = (name) => getComputedStyle(document.documentElement).getPropertyV
 // Plotly reads texts as HTML; names are none.
 const escaped = (text) => text.replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;");
 
+// Lets the browser show what was drawn, and heed the reader.
+const painted = () => new Promise((resolve) => { setTimeout(resolve); });
+
 const label = (entry) => entry.policy + (entry.reference ? " *" : "");
 
 // A number with four significant digits.

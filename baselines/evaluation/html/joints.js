@@ -53,7 +53,7 @@ function drawJoints() {
     const unit = (entries[0].series.prismatic[joint] ? "m" : "rad") + suffix;
     axes[`yaxis${place}`] = axis({ range, title: { text: `${symbol}<sub>${joint + 1}</sub> [${unit}]`, standoff: 4 } });
     axes[`xaxis${place}`] = axis({
-      matches: joint ? "x" : undefined, title: { text: joint >= joints - columns ? "time [s]" : "" },
+      matches: joint ? "x" : undefined, title: { text: joint >= (lines - 1) * columns ? "time [s]" : "" },
     });
   }
   Plotly.react("joints", traces, layout({

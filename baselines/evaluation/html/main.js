@@ -3,7 +3,7 @@
 async function drawAll() {
   for (const draw of [drawCostTime, drawErrors, drawJoints, drawReplay]) {
     await draw();
-    await new Promise((resolve) => { setTimeout(resolve); }); // lets the browser show it, and heed the reader
+    await painted();
   }
 }
 

@@ -20,7 +20,7 @@ from baselines.evaluation.results import Results
 #: The file in a folder of results.
 PAGE = "report.html"
 #: In the order in which they are run: later ones use earlier ones.
-SCRIPTS = ("data.js", "table.js", "plots.js", "joints.js", "replay.js", "main.js")
+SCRIPTS = ("data.js", "table.js", "plots.js", "joints.js", "scene.js", "replay.js", "main.js")
 #: Where a part of the page goes in the template.
 PLACE = re.compile(r"\[\[(\w+)\]\]")
 

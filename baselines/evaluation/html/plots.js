@@ -2,7 +2,7 @@
 
 const NEAREST = 1e-4; // by how much a cost ratio exceeds 1 at the lower end of its axis at most
 const SMALLEST = 1e-10; // errors below are rounding, in [m] and [rad]
-const NAMED = 14; // of more policies, only the chosen ones have their names beside their points
+const LETTER = [6.5, 14]; // width and height of one, about, in [px]
 
 // The scenario whose policies are compared: that of the pictures.
 const current = () => chosen()[0]?.scenario ?? (element("scenario").value || DATA.entries[0]?.scenario);
@@ -17,44 +17,76 @@ function costRatioTicks() {
   return { tickvals: ratios.map((ratio) => ratio - 1), ticktext: ratios.map(text) };
 }
 
-function drawCostTime() {
+// Where the name of each point stands, in [px]; "" where it would hide another one: hovering shows it. First come, first served.
+function textPositions(points, names, limit) {
+  const boxes = points.map(([x, y]) => [x - 6, x + 6, y - 6, y + 6]);
+  const apart = (a, b) => a[1] < b[0] || a[0] > b[1] || a[3] < b[2] || a[2] > b[3];
+  const free = (box) => box[0] > 0 && box[1] < limit && boxes.every((other) => apart(box, other));
+  return points.map(([x, y], k) => {
+    const [width, height] = [LETTER[0] * names[k].length, LETTER[1]];
+    const sides = {
+      "top center": [x - width / 2, x + width / 2, y - 8 - height, y - 8],
+      "bottom center": [x - width / 2, x + width / 2, y + 8, y + 8 + height],
+      "middle right": [x + 9, x + 9 + width, y - height / 2, y + height / 2],
+      "middle left": [x - 9 - width, x - 9, y - height / 2, y + height / 2],
+    };
+    const side = Object.keys(sides).find((name) => free(sides[name])) ?? "";
+    if (side) boxes.push(sides[side]);
+    return side;
+  });
+}
+
+// A point of the picture of costs and times, with its interval.
+function costPoint(entry, ratio) {
+  const y = height(entry.value, ratio);
+  const bar = entry.low === null ? undefined : {
+    type: "data", symmetric: false, thickness: 1.5, width: 4,
+    array: [height(entry.high, ratio) - y], arrayminus: [y - height(entry.low, ratio)],
+  };
+  const between = entry.low === null ? "" : `<br>95 %: ${shown(entry.low)} … ${shown(entry.high)}`;
+  const [look, picked] = [looks(entry), chosen().includes(entry)];
+  return {
+    type: "scatter", mode: "markers", x: [entry.time], y: [y], error_y: bar, cliponaxis: false, showlegend: false,
+    text: [escaped(label(entry))], textfont: { size: picked ? 12 : 10.5, color: themed(picked ? "ink" : "quiet") },
+    marker: {
+      color: look.color, size: picked ? 13 : 9, symbol: entry.reference ? "diamond-open" : "circle",
+      line: { color: entry.reference ? look.color : themed("card"), width: entry.reference ? 2 : 1 },
+    },
+    hoverinfo: "text",
+    hovertext: `<b>${escaped(label(entry))}</b><br>${entry.quantity} ${shown(entry.value)}${between}` +
+      `<br>${shown(entry.time)} µs a step`,
+  };
+}
+
+// Names go where the points, once drawn, leave room for them.
+async function nameCostPoints(entries) {
+  const drawn = element("cost-time");
+  const { xaxis, yaxis, height: outer, margin } = drawn.layout;
+  const share = ({ range }, value) => (Math.log10(value) - range[0]) / (range[1] - range[0]);
+  const [width, tall] = [drawn.clientWidth - margin.l - margin.r, outer - margin.t - margin.b];
+  const places = drawn.data.map(({ x, y }) => [width * share(xaxis, x[0]), tall * (1 - share(yaxis, y[0]))]);
+  const positions = textPositions(places, entries.map(label), width);
+  const modes = positions.map((side) => (side ? "markers+text" : "markers"));
+  if (modes.length) await Plotly.restyle(drawn, { mode: modes, textposition: positions.map((side) => side || "top center") });
+}
+
+async function drawCostTime() {
   const all = DATA.entries.filter((entry) => entry.scenario === current());
   const ratio = all.every((entry) => entry.quantity === "cost ratio");
   const usable = all.filter((e) => e.time !== null && e.value !== null && (ratio || e.quantity === "total cost"));
-  const picked = new Set(chosen());
-  usable.sort((a, b) => a.time - b.time);
-  const points = usable.map((entry, place) => {
-    const y = height(entry.value, ratio);
-    const bar = entry.low === null ? undefined : {
-      type: "data", symmetric: false, thickness: 1.5, width: 4,
-      array: [height(entry.high, ratio) - y], arrayminus: [y - height(entry.low, ratio)],
-    };
-    const look = looks(entry);
-    const between = entry.low === null ? "" : `<br>95 %: ${shown(entry.low)} … ${shown(entry.high)}`;
-    return {
-      type: "scatter", mode: picked.has(entry) || usable.length <= NAMED ? "markers+text" : "markers", x: [entry.time], y: [y], error_y: bar,
-      text: [escaped(label(entry))], textposition: place % 2 ? "bottom center" : "top center", cliponaxis: false,
-      textfont: { size: picked.has(entry) ? 12 : 10.5, color: themed(picked.has(entry) ? "ink" : "quiet") },
-      marker: {
-        color: look.color, size: picked.has(entry) ? 13 : 9, symbol: entry.reference ? "diamond-open" : "circle",
-        line: { color: entry.reference ? look.color : themed("card"), width: entry.reference ? 2 : 1 },
-      },
-      hovertemplate: `<b>${escaped(label(entry))}</b><br>${entry.quantity} ${shown(entry.value)}${between}` +
-        `<br>${shown(entry.time)} µs a step<extra></extra>`,
-      showlegend: false,
-    };
-  });
+  const picked = chosen();
+  usable.sort((a, b) => picked.includes(b) - picked.includes(a) || a.value - b.value);
   const ticks = ratio ? costRatioTicks() : { exponentformat: "power", dtick: 1 };
-  const quantity = ratio ? "cost ratio" : "total cost";
-  Plotly.react("cost-time", points, layout({
-    height: 440, margin: { l: 56, r: 24, t: 20, b: 44 }, hovermode: "closest",
-    xaxis: axis({ type: "log", title: { text: "median time per step [µs]" }, dtick: "D2" }),
-    yaxis: axis({ type: "log", title: { text: quantity }, ...ticks }),
-  }), CONFIG);
   const missing = all.length - usable.length;
   element("cost-note").textContent =
     (ratio ? "The axis of the cost ratio is logarithmic in what it exceeds 1 by. " : "") +
     (missing ? `${missing} without a time or a finite cost ${missing === 1 ? "is" : "are"} not shown.` : "");
+  await Plotly.react("cost-time", usable.map((entry) => costPoint(entry, ratio)), layout({
+    height: 440, margin: { l: 56, r: 24, t: 20, b: 44 }, hovermode: "closest",
+    xaxis: axis({ type: "log", title: { text: "median time per step [µs]" }, dtick: "D2" }),
+    yaxis: axis({ type: "log", title: { text: ratio ? "cost ratio" : "total cost" }, ...ticks }),
+  }), CONFIG);
+  await nameCostPoints(usable);
 }
 
 // A line in the colour of a policy; `place` is the number of its panel, as names of axes have it.

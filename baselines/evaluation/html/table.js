@@ -108,6 +108,7 @@ function showEpisodes() {
 function prepareTable(changed) {
   const scenarios = [...new Set(LINES.map((line) => line.dataset.scenario))];
   const select = element("scenario");
+  element("results").classList.toggle("single", scenarios.length === 1);
   if (scenarios.length !== 1) select.add(new Option("all", ""));
   for (const name of scenarios) select.add(new Option(name, name));
   for (const head of document.querySelectorAll("#results thead th[aria-sort]")) {

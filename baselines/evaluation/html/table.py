@@ -79,7 +79,7 @@ COLUMNS = (
 
 def table(all_entries: Sequence[Entry]) -> str:
     """The table as HTML; the number of a line is that of its entry in the data."""
-    heads = [("policy", "* has privileged information", "name"), ("scenario", "what was tracked", "")]
+    heads = [("policy", "* has privileged information", "name"), ("scenario", "what was tracked", "scenario")]
     heads += [(column.title, column.about, "number" * (column.title != "status")) for column in COLUMNS]
     out = ['<table id="results"><thead><tr><th class="pick" scope="col"><span class="hidden">in pictures</span></th>']
     out += [
@@ -94,7 +94,7 @@ def table(all_entries: Sequence[Entry]) -> str:
             f'<tr data-entry="{place}" data-scenario="{escape(entry.scenario)}"><td class="pick">'
             f'<input type="checkbox" aria-label="{name} in {escape(entry.scenario)}: show in the pictures"></td>',
             f'<th scope="row" class="name" data-value="{escape(entry.policy)}">{name}</th>',
-            f'<td data-value="{escape(entry.scenario)}">{escape(entry.scenario)}</td>',
+            f'<td class="scenario" data-value="{escape(entry.scenario)}">{escape(entry.scenario)}</td>',
             *(column.cell(entry) for column in COLUMNS),
             "</tr>",
         ]

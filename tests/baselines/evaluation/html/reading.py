@@ -4,7 +4,12 @@ from __future__ import annotations
 
 import html.parser
 import json
+import pathlib
 from typing import Any
+
+from baselines.evaluation.machine import describe
+from baselines.evaluation.plan import EvaluationPlan
+from baselines.evaluation.results import Results
 
 VOID = {"meta", "link", "input", "br"}
 
@@ -69,3 +74,8 @@ class Page(html.parser.HTMLParser):
             {name: (attributes.get("data-value"), text) for name, (attributes, text) in zip(names, line, strict=True)}
             for line in lines
         ]
+
+
+def results_of(folder: pathlib.Path) -> Results:
+    """What is in a folder of results, from whatever it was."""
+    return Results(folder, EvaluationPlan((), ()), describe(), resume=True)
