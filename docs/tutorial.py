@@ -1,4 +1,4 @@
-"""Runs the tutorials word by word, and writes what they print into their pages: ``python -m docs.tutorial``."""
+"""Runs tutorials word by word, and writes what they print into their pages: ``python -m docs.tutorial [PAGE …]``."""
 
 from __future__ import annotations
 
@@ -52,8 +52,9 @@ def _printed(kind: str, content: str, names: dict[str, Any]) -> str:
 
 
 def main() -> None:
-    """Writes the pages anew."""
-    for page in PAGES:
+    """Writes the pages anew, those that are named or all."""
+    wanted = sys.argv[1:] or [page.stem for page in PAGES]
+    for page in (page for page in PAGES if page.stem in wanted):
         with tempfile.TemporaryDirectory() as folder:
             text = played(page.read_text(encoding="utf-8"), Path(folder))
         page.write_text(text, encoding="utf-8")
