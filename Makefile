@@ -53,8 +53,12 @@ check: ## All that CI runs: format, lint, types, layers, tests, slow tests
 	$(MAKE) --no-print-directory test
 	$(MAKE) --no-print-directory slow
 
-docs: $(STAMP) ## Build the documentation as a site in results/site; a broken link or reference fails
+docs: results/demo/report.html ## Build the documentation as a site in results/site; a broken link or reference fails
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
+	@echo 'results/site/index.html; to search in it: python -m http.server --directory results/site'
+
+results/demo/report.html: | $(STAMP)
+	$(MAKE) --no-print-directory demo
 
 bench: $(STAMP) ## Measure speed beside other environments, libraries and solvers: report in results/bench
 	$(BIN)/python -m benchmarks

@@ -21,10 +21,14 @@ def executed(file: Path) -> Any:
 
 
 def main() -> None:
-    """Writes the notebook anew."""
+    """Writes the notebook anew, without what goes to stderr: progress, and that kernels are compiled."""
     import nbformat
 
-    nbformat.write(executed(FILE), FILE)
+    notebook = executed(FILE)
+    for cell in notebook.cells:
+        if cell.cell_type == "code":
+            cell.outputs = [output for output in cell.outputs if output.get("name") != "stderr"]
+    nbformat.write(notebook, FILE)
 
 
 if __name__ == "__main__":

@@ -93,21 +93,44 @@ def picture(paper: str, number: int) -> Path:
 
 
 def figures(paper: Paper) -> str:
-    """Each figure: how the paper describes it, what ours shows, and ours."""
+    """Each figure: how the paper describes it, what ours shows, ours, and what came out of what is said of it."""
     return "\n".join(
         f"### Figure {figure.number}\n\n"
         f"The paper: “{CAPTIONS[paper.name][figure.number]}”<br>\nHere: {figure.title}\n\n"
         f"![Figure {figure.number}: {figure.title}](../images/papers/{picture(paper.name, figure.number).name})\n"
+        f"{_said_of(paper, figure.number)}"
         for figure in paper.figures
     )
 
 
+def _said_of(paper: Paper, number: int) -> str:
+    """A table of the claims that rest on a figure; nothing if there are none."""
+    rows = [
+        f"| {claim} | {evidence} | {verdict} |\n"
+        for claim, where, _, evidence, verdict in _ledger(paper)[1:]
+        if number in figures_in(where)
+    ]
+    head = "\n| claim | what came out here | verdict |\n|---|---|---|\n"
+    return head + "".join(rows) if rows else ""
+
+
+def figures_in(where: str) -> set[int]:
+    """The figures that the place of a claim names, as in ``"section 4.2, fig. 3 and 4"``."""
+    lists = re.findall(r"fig\. (\d+(?:(?:, | and | to )\d+)*)", where)
+    ranges = re.findall(r"(\d+)(?: to (\d+))?", " ".join(lists))
+    return {number for first, last in ranges for number in range(int(first), int(last or first) + 1)}
+
+
 def verdicts(paper: Paper) -> list[tuple[str, ...]]:
     """One line a claim, from the ledger."""
+    return [(claim, where, verdict) for claim, where, *_, verdict in _ledger(paper)]
+
+
+def _ledger(paper: Paper) -> list[list[str]]:
+    """The ledger's table on a paper: claim, where, how it was tested, what came out, verdict; its head first."""
     section = LEDGER.read_text(encoding="utf-8").split(f"## {paper.title}\n")[1].split("\n## ")[0]
     lines = re.findall(r"^\| (.*) \|$", section, re.MULTILINE)
-    rows = [re.split(r"(?<!\\) \| ", line) for line in lines]
-    return [(claim, where, verdict) for claim, where, *_, verdict in rows]
+    return [re.split(r"(?<!\\) \| ", line) for line in lines]
 
 
 def main() -> None:

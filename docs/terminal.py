@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import io
 import os
 import sys
@@ -27,6 +28,7 @@ def called(arguments: Sequence[str]) -> bool:
     return bool(main(arguments))
 
 
+@functools.cache
 def manual_of(*words: str) -> str:
     """What ``ikgym WORDS --help`` prints."""
     out = io.StringIO()

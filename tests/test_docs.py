@@ -22,8 +22,9 @@ from baselines.oracle import best_known
 from baselines.oracle.best_known import beaten
 from baselines.papers import PAPERS
 from baselines.policy import Problem
-from docs.paper_pages import CAPTIONS, picture
+from docs.paper_pages import CAPTIONS, figures_in, picture
 from docs.tables import PAGES, filled
+from docs.terminal import manual_of
 from docs.tutorial import PAGES as TUTORIALS
 
 ROOT = Path(__file__).parents[1]
@@ -102,7 +103,7 @@ def test_the_snippet_on_agents_converts_a_zip(tmp_path, monkeypatch):
     ppo = pytest.importorskip("stable_baselines3").PPO
     monkeypatch.chdir(tmp_path)
     ppo("MlpPolicy", Features(), device="cpu").save("model.zip")
-    (snippet,) = snippets_of("agents.md")
+    (snippet,) = [snippet for snippet in snippets_of("agents.md") if "model.zip" in snippet]
     exec(snippet, {})
     assert (tmp_path / "agent.safetensors").stat().st_size > 1000
 
@@ -127,6 +128,19 @@ def test_each_figure_of_a_paper_has_its_caption_and_its_picture():
     for name, paper in PAPERS.items():
         assert [figure.number for figure in paper.figures] == list(CAPTIONS[name])
         assert all(picture(name, figure.number).exists() for figure in paper.figures)
+
+
+def test_claims_stand_below_the_figures_that_they_rest_on():
+    assert figures_in("section 3; section 4.2, fig. 8 and 5; section 6") == {5, 8}
+    assert figures_in("section 4.3, fig. 12 to 15") == {12, 13, 14, 15}
+    assert figures_in("section 5; fig. 6, 15, 18") == {6, 15, 18}
+    assert figures_in("section 4.1, eq. 2") == set()
+    for name, paper in PAPERS.items():
+        below = (PAGES / "papers" / f"{name}.md").read_text(encoding="utf-8").partition("## The figures")[2]
+        parts = dict(re.findall(r"### Figure (\d+)\n(.*?)(?=### |<!-- end)", below, re.DOTALL))
+        for claim in paper.claims:
+            assert ("fig." in claim.where) == bool(figures_in(claim.where))
+            assert all(claim.text in parts[str(number)] for number in figures_in(claim.where)), claim.name
 
 
 def test_the_policy_of_the_readme_follows_the_reference():
@@ -189,6 +203,33 @@ def test_commands_of_the_documentation_exist():
     text = "\n".join(page.read_text(encoding="utf-8") for page in PROSE if page.name != "CHANGELOG.md")
     for word in re.findall(r"^(?:\$ )?ikgym (\w+)|`ikgym (\w+)", text, re.MULTILINE):
         assert max(word) in {*console.COMMANDS, *console.LISTS}
+
+
+#: What stands for ``ikgym WORD`` where Python runs a module or a file.
+OTHERWISE = {
+    "python -m baselines.optimum": "ikgym oracle",
+    "python -m baselines.": "ikgym ",
+    "python train.py": "ikgym train",
+}
+
+
+def lines_for_the_terminal(page: Path) -> list[str]:
+    """The commands in a page's blocks of ``sh`` that ``ikgym`` knows as well."""
+    blocks = "".join(re.findall(r"```sh\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL))
+    lines = blocks.replace("\\\n", " ").splitlines()
+    for one, other in OTHERWISE.items():
+        lines = [line.replace(one, other) for line in lines]
+    known = {*console.COMMANDS, *console.LISTS}
+    return [line for line in lines if re.match(r"ikgym (\w+)( |$)", line) and line.split()[1] in known]
+
+
+@pytest.mark.parametrize("page", [page for page in PROSE if lines_for_the_terminal(page)], ids=lambda page: page.stem)
+def test_options_of_commands_exist(page):
+    for line in lines_for_the_terminal(page):
+        words = shlex.split(line, comments=True)[1:]
+        which = words[:2] if words[0] == "train" and not words[1].startswith("-") else words[:1]
+        options = {word.partition("=")[0] for word in words if word.startswith("--")} - {"--help"}
+        assert options <= set(re.findall(r"--[\w-]+", manual_of(*which))), line
 
 
 def test_readme_says_what_is_out_of_scope():

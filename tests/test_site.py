@@ -95,12 +95,51 @@ def test_the_notebook_shows_what_it_shows_when_it_is_run():
 
 
 @needs_docs
+def test_the_landing_page_shows_the_replay_or_says_that_there_is_none(tmp_path, caplog):
+    from mkdocs.config import load_config
+
+    from docs.site import replay
+
+    landing = (ROOT / "docs" / "README.md").read_text(encoding="utf-8")
+    assert "built without" in replay.placed(landing, there=False)
+    assert "<iframe" not in replay.placed(landing, there=False)
+    assert f'src="{replay.PAGE}#' in replay.placed(landing, there=True)
+    settings = load_config(str(ROOT / "mkdocs.yml"), extra={"report": "results/none/report.html"})
+    with caplog.at_level("INFO", logger="mkdocs"):
+        assert replay.file(settings) is None
+    assert "no results/none/report.html: the landing page is without a replay" in caplog.text
+
+
+@needs_docs
+def test_with_broken_links_there_is_no_site(tmp_path):
+    from mkdocs.commands.build import build
+    from mkdocs.config import load_config
+    from mkdocs.exceptions import Abort
+
+    folders = {"docs_dir": str(tmp_path / "docs"), "site_dir": str(tmp_path / "site")}
+    (tmp_path / "docs").mkdir()
+
+    def built(text):
+        (tmp_path / "docs" / "index.md").write_text(f"# Title\n\n{text}", encoding="utf-8")
+        build(load_config(str(ROOT / "mkdocs.yml"), **folders, nav=["index.md"], hooks=[], plugins=["autorefs"]))
+
+    built("[x](index.md#title)")
+    with pytest.raises(Abort, match="4 warnings"):
+        built("[x](nowhere.md) [x](index.md#nothing) [x][ikgym.nothing] ![x](no.png)")
+
+
+@needs_docs
 @pytest.mark.slow
 def test_it_builds_strictly_and_asks_for_nothing_from_elsewhere(tmp_path):
-    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(tmp_path)]
-    environment = {**os.environ, "NO_MKDOCS_2_WARNING": "1"}
+    report = tmp_path / "report.html"
+    report.write_text("<h2 id='replay-head'>Replay</h2>", encoding="utf-8")
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(tmp_path / "site")]
+    environment = {**os.environ, "NO_MKDOCS_2_WARNING": "1", "REPORT": str(report)}
     done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
+    tmp_path /= "site"
+    assert (tmp_path / "replay.html").read_bytes() == report.read_bytes()
+    assert '<iframe src="replay.html#' in (tmp_path / "index.html").read_text(encoding="utf-8")
     for page in ("index", "papers/varga", "tutorials/first_policy", "reference/ikgym", "notebooks/panda"):
         text = (tmp_path / f"{page}.html").read_text(encoding="utf-8")
         assert not re.findall(r'<(?:script|link|img)[^>]+(?:src|href)="(?:https?:)?//', text)

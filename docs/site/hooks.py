@@ -9,7 +9,7 @@ from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
 
-from docs.site import notebooks, reference
+from docs.site import notebooks, reference, replay
 
 ROOT = Path(__file__).parents[2]
 #: Pages that GitHub wants at the root, by their names on the site.
@@ -25,11 +25,14 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         pages[name] = (ROOT / source).read_text(encoding="utf-8").replace("](docs/", "](")
     for name, text in pages.items():
         files.append(File.generated(config, name, content=text))
+    if report := replay.file(config):
+        files.append(report)
     return files
 
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
-    """Leads links to pages at the root, and to notebooks, to where the site has them."""
+    """Leads links to pages at the root, and to notebooks, to where the site has them, and shows the replay."""
+    markdown = replay.placed(markdown, there=replay.PAGE in files.src_uris)
     up = "../" * page.file.src_uri.count("/")
     for name, source in AT_THE_ROOT.items():
         markdown = re.sub(rf"\]\((?:\.\./)+{re.escape(source)}", f"]({up}{name}", markdown)
