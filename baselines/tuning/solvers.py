@@ -103,7 +103,7 @@ def planned(
     episodes: int = EPISODES,
     budget: int,
     seed: int,
-) -> list[Study]:
+) -> list[Study[Cost]]:
     """The searches, checked before anything is played.
 
     Args:
@@ -191,7 +191,7 @@ def stated(file: pathlib.Path | None = None) -> Ranges:
     return {**read(FILE), **(read(file) if file is not None else {})}
 
 
-def result(folder: pathlib.Path, studies: Sequence[Study], scenario: Scenario, command: str) -> Tuning:
+def result(folder: pathlib.Path, studies: Sequence[Study[Cost]], scenario: Scenario, command: str) -> Tuning:
     """What came of the searches.
 
     Args:
@@ -201,14 +201,13 @@ def result(folder: pathlib.Path, studies: Sequence[Study], scenario: Scenario, c
         command: What searched.
     """
     today = datetime.datetime.now(datetime.UTC).date().isoformat()
-    episodes = len(studies[0].objective.seeds)  # type: ignore[attr-defined]  # those of :func:`planned`
+    episodes = len(studies[0].objective.seeds)
     tuned = tuple(_tuned(folder, study) for study in studies)
     return Tuning(command, today, scenario.name, fingerprint(scenario), SPLIT, episodes, tuned)
 
 
-def _tuned(folder: pathlib.Path, study: Study) -> Tuned:
+def _tuned(folder: pathlib.Path, study: Study[Cost]) -> Tuned:
     cost = study.objective
-    assert isinstance(cost, Cost)
     trials = finished(opened(folder, study.name))
     whole = [(trial.value, trial.user_attrs["settings"]) for trial in trials if trial.state.name == "COMPLETE"]
     default = cost.as_it_is()

@@ -15,11 +15,11 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 import optuna
-from optuna.storages.journal import JournalFileBackend
+from optuna.storages.journal import JournalFileBackend, JournalFileOpenLock
 from optuna.trial import FrozenTrial, Trial, TrialState
 from tqdm import tqdm
 
@@ -38,6 +38,7 @@ _LOOK = 0.5
 
 #: The value of a trial, which is to be low. It reports values on the way, and ends early where that is asked for.
 Objective = Callable[[Trial], float]
+ObjectiveT = TypeVar("ObjectiveT", bound=Objective)
 
 
 class StudyError(IkgymError):
@@ -45,7 +46,7 @@ class StudyError(IkgymError):
 
 
 @dataclasses.dataclass(frozen=True)
-class Study:
+class Study(Generic[ObjectiveT]):
     """One search.
 
     Args:
@@ -59,17 +60,17 @@ class Study:
     """
 
     name: str
-    objective: Objective
+    objective: ObjectiveT
     identity: Mapping[str, Any]
     budget: int
     seed: int
     spent: Callable[[FrozenTrial], int]
 
 
-def prepare(folder: pathlib.Path, studies: Sequence[Study], *, resume: bool, overwrite: bool) -> None:
+def prepare(folder: pathlib.Path, studies: Sequence[Study[Any]], *, resume: bool, overwrite: bool) -> None:
     """Makes the journal, or sees to it that the one that is there is of the same search.
 
-    Trials that were under way when a process ended are given up.
+    Trials that were under way when a process ended are given up. The caller has the folder to itself.
 
     Raises:
         ResultsError: There is a journal and neither flag is given; or it is damaged, or of another search.
@@ -84,6 +85,7 @@ def prepare(folder: pathlib.Path, studies: Sequence[Study], *, resume: bool, ove
     try:
         if overwrite:
             file.unlink(missing_ok=True)
+        _mend(file)
         known = {study.study_name: study for study in _opened_all(file)}
         for study in studies:
             there = known.get(study.name) or _made(file, study)
@@ -96,7 +98,7 @@ def prepare(folder: pathlib.Path, studies: Sequence[Study], *, resume: bool, ove
         raise ResultsError(f"{file} is damaged: {e}. Begin anew with --overwrite.") from None
 
 
-def search(folder: pathlib.Path, studies: Sequence[Study], *, workers: int, progress: bool) -> None:
+def search(folder: pathlib.Path, studies: Sequence[Study[Any]], *, workers: int, progress: bool) -> None:
     """Spends the budgets of the studies, one study after the other.
 
     Args:
@@ -140,7 +142,7 @@ def opened(folder: pathlib.Path, name: str) -> optuna.Study:
         return optuna.load_study(study_name=name, storage=_storage(file), pruner=pruner)
 
 
-def spent_by(study: Study, there: optuna.Study) -> int:
+def spent_by(study: Study[Any], there: optuna.Study) -> int:
     """What the finished trials of a study have cost."""
     return sum(study.spent(trial) for trial in finished(there))
 
@@ -150,7 +152,7 @@ def finished(there: optuna.Study) -> list[FrozenTrial]:
     return there.get_trials(deepcopy=False, states=FINISHED)
 
 
-def _work(folder: pathlib.Path, study: Study, worker: int, show: Callable[[], None] | None = None) -> None:
+def _work(folder: pathlib.Path, study: Study[Any], worker: int, show: Callable[[], None] | None = None) -> None:
     """Plays trials of a study until its budget is spent."""
     there = opened(folder, study.name)
     while spent_by(study, there) < study.budget:
@@ -163,7 +165,7 @@ def _work(folder: pathlib.Path, study: Study, worker: int, show: Callable[[], No
             show()
 
 
-def _in_processes(folder: pathlib.Path, studies: Sequence[Study], workers: int, show: Callable[[], None]) -> None:
+def _in_processes(folder: pathlib.Path, studies: Sequence[Study[Any]], workers: int, show: Callable[[], None]) -> None:
     # Spawned, not forked: a fork would inherit numba's and the BLAS's threads without their locks' owners.
     context = multiprocessing.get_context("spawn")
     others = set(multiprocessing.active_children())
@@ -192,7 +194,18 @@ def _die_quietly() -> None:
 
 
 def _storage(file: pathlib.Path) -> optuna.storages.JournalStorage:
-    return optuna.storages.JournalStorage(JournalFileBackend(str(file)))
+    # Optuna's default is a symbolic link, which a relative path leaves dangling: who meets a left one waits for ever.
+    return optuna.storages.JournalStorage(JournalFileBackend(str(file), lock_obj=JournalFileOpenLock(str(file))))
+
+
+def _mend(file: pathlib.Path) -> None:
+    """Removes what a killed process may have left: Optuna's lock, and a line that was not written to its end."""
+    file.with_name(f"{file.name}.lock").unlink(missing_ok=True)
+    if not file.exists():
+        return
+    with file.open("r+b") as journal:
+        content = journal.read()
+        journal.truncate(content.rfind(b"\n") + 1)
 
 
 def _opened_all(file: pathlib.Path) -> list[optuna.Study]:
@@ -201,14 +214,14 @@ def _opened_all(file: pathlib.Path) -> list[optuna.Study]:
         return [optuna.load_study(study_name=name, storage=storage) for name in optuna.get_all_study_names(storage)]
 
 
-def _made(file: pathlib.Path, study: Study) -> optuna.Study:
+def _made(file: pathlib.Path, study: Study[Any]) -> optuna.Study:
     with _quietly():
         there = optuna.create_study(study_name=study.name, storage=_storage(file), direction="minimize")
         there.set_user_attr("identity", dict(study.identity))
     return there
 
 
-def _check_same(file: pathlib.Path, study: Study, there: optuna.Study) -> None:
+def _check_same(file: pathlib.Path, study: Study[Any], there: optuna.Study) -> None:
     known = there.user_attrs.get("identity", {})
     names = [name for name in {**known, **study.identity} if known.get(name) != study.identity.get(name)]
     if names:

@@ -137,6 +137,28 @@ def test_what_was_interrupted_is_resumed(short, written, tmp_path, monkeypatch, 
     assert same(folder, written)
 
 
+def test_what_a_killed_process_leaves_hinders_nobody(short, written, tmp_path, monkeypatch):
+    """Files that were not written to their end, and a data set that was about to be replaced."""
+    folder, wanted = tmp_path / "dls-v0", planned(short, "dls:damping=1e-2", episodes=EPISODES)
+    (folder / ".data.tmp").mkdir(parents=True)
+    for name in (".dataset.json.7.tmp", ".scenario.toml.7.tmp", ".data.tmp/main_data.hdf5"):
+        (folder / name).write_text("hal")
+    write(wanted, folder)
+    assert same(folder, written)
+
+    def stop(path):
+        raise Interrupted
+
+    with monkeypatch.context() as patched:
+        patched.setattr("shutil.rmtree", stop)
+        with pytest.raises(Interrupted):
+            write(wanted, folder, overwrite=True)
+    assert not (folder / "data").exists()
+    write(wanted, folder, resume=True)
+    assert same(folder, written)
+    assert sorted(file.name for file in folder.iterdir()) == ["data", "dataset.json", "scenario.toml"]
+
+
 @pytest.mark.slow
 def test_a_process_that_is_killed_is_resumed(tmp_path):
     """Killed again and again, until it is through: the same data set as that of a process that nobody killed."""
