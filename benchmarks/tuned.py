@@ -58,7 +58,7 @@ def compared(command: Command, published: Tuning) -> list[str]:
     studies = [_study(published, one, command.seed) for one in beside]
     with locked(command.out):
         prepare(command.out, studies, resume=True, overwrite=False)
-        search(command.out, studies, workers=1, progress=True)
+        search(command.out, studies, workers=1, unit="episode", progress=True)
         found = solvers.result(command.out, studies, scenario, f"python -m benchmarks.tuned --out {command.out}")
         found.save(command.out / "tuned.json")
     rows = [_row(published, one, new, study) for one, new, study in zip(beside, found.solvers, studies, strict=True)]

@@ -20,7 +20,7 @@ from baselines.training.config.base import Config
 from baselines.training.errors import TrainingError
 from baselines.training.score import Score
 from baselines.training.seeds import SeedRuns
-from baselines.tuning.ranges import Range, read, suggested
+from baselines.tuning.ranges import Range, ends, read, suggested
 from baselines.tuning.study import Study, finished, opened, prepare, search
 from ikgym.exceptions import InvalidInputError
 from ikgym.validation import known_names
@@ -112,7 +112,7 @@ def searched(
     study = planned(runs, seed, trials, ranges)
     with locked(runs.out):
         prepare(runs.out, [study], resume=runs.resume, overwrite=runs.overwrite)
-        search(runs.out, [study], workers=workers, progress=progress)
+        search(runs.out, [study], workers=workers, unit="trial", progress=progress)
         ended = finished(opened(runs.out, study.name))
         without = Counter(trial.user_attrs["error"] for trial in ended if "error" in trial.user_attrs)
         whole = {trial.value: trial for trial in ended if trial.state.name == "COMPLETE" and trial.value is not None}
@@ -134,7 +134,8 @@ def planned(runs: SeedRuns, seed: int, trials: int, ranges: pathlib.Path | None)
 
     Raises:
         UnknownNameError: A range is of an option that the method has not.
-        InvalidInputError: No range is stated for the method, or the file of ranges cannot be read.
+        InvalidInputError: No range is stated for the method, the method refuses an end of one, or the file of ranges
+            cannot be read.
     """
     config = runs.config
     tables = read(ranges or FILE)
@@ -145,6 +146,8 @@ def planned(runs: SeedRuns, seed: int, trials: int, ranges: pathlib.Path | None)
             f"{ranges or FILE.name}, there are: {', '.join(tables) or 'none'}."
         )
     known_names(f"option of {config.method}", [one.name for one in lines], config.to_json())
+    for options in ends(lines, {}):
+        with_options(config, options)
     identity = {
         "config": config.to_json(),
         "fingerprint": fingerprint(config.make_scenario()),

@@ -98,13 +98,14 @@ def prepare(folder: pathlib.Path, studies: Sequence[Study[Any]], *, resume: bool
         raise ResultsError(f"{file} is damaged: {e}. Begin anew with --overwrite.") from None
 
 
-def search(folder: pathlib.Path, studies: Sequence[Study[Any]], *, workers: int, progress: bool) -> None:
+def search(folder: pathlib.Path, studies: Sequence[Study[Any]], *, workers: int, unit: str, progress: bool) -> None:
     """Spends the budgets of the studies, one study after the other.
 
     Args:
         folder: Where :func:`prepare` has made the journal.
         studies: What is searched.
         workers: Processes that play trials of the same study at the same time; 1 means this one.
+        unit: Of the budgets, for the bar.
         progress: Whether to show a bar on stderr.
 
     Raises:
@@ -115,6 +116,7 @@ def search(folder: pathlib.Path, studies: Sequence[Study[Any]], *, workers: int,
         total=sum(study.budget for study in studies),
         disable=not progress,
         file=sys.stderr,
+        unit=unit,
         dynamic_ncols=True,
         mininterval=0.1 if sys.stderr.isatty() else 10.0,  # a log file has no cursor to go back with
     )

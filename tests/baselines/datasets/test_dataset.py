@@ -89,8 +89,9 @@ def test_costs_are_those_of_an_evaluation_and_say_where_they_come_from(written, 
 
 
 def test_it_is_found_by_name_and_has_its_environment(tmp_path, monkeypatch, capsys):
-    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
-    arguments = ["--scenario", "varga7-random", "--policy", "dls", "--episodes", "1", "--out", str(tmp_path / "dls-v1")]
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("MINARI_DATASETS_PATH", "sets")
+    arguments = ["--scenario", "varga7-random", "--policy", "dls", "--episodes", "1", "--out", "sets/dls-v1"]
     assert main([*arguments, "--split", "validation", "--preview", "3"]) == 0
     assert 'minari.load_dataset("dls-v1")' in capsys.readouterr().out
     data = minari.load_dataset("dls-v1")

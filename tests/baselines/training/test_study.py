@@ -116,6 +116,7 @@ def test_trials_that_diverge_or_are_worse(tmp_path, monkeypatch):
     [
         ("[sac]\ntau = { low = 0.1, high = 0.2 }", InvalidInputError, r"No range is stated for an option of ppo"),
         ("[ppo]\ntau = { low = 0.1, high = 0.2 }", UnknownNameError, "There is no option of ppo 'tau'"),
+        ("[ppo]\nlearning_rate = { low = -0.1, high = 0.2 }", InvalidInputError, "learning_rate: expected"),
     ],
 )
 def test_ranges_that_are_none(tmp_path, text, error, message):

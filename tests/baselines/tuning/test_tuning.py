@@ -22,6 +22,7 @@ from baselines.tuning.ranges import Range, read, suggested
 from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 
+RANGES = str(Path(__file__).with_name("refused.toml"))
 ROOT = Path(__file__).parents[3]
 SKEW = scenarios.get(sets.SKEW)
 SHORT = SKEW.replace(name="short", steps=30)
@@ -34,7 +35,7 @@ def searched(folder, budget=60, episodes=4, resume=False, workers=1, **changes):
     )
     folder.mkdir(exist_ok=True)
     study.prepare(folder, studies, resume=resume, overwrite=False)
-    study.search(folder, studies, workers=workers, progress=False)
+    study.search(folder, studies, workers=workers, unit="episode", progress=False)
     return trials(folder), studies
 
 
@@ -229,6 +230,14 @@ def test_a_fixed_parameter_is_not_searched():
         ("[dls]\ngain = { low = 0.0, high = 0.5, log = true }", InvalidInputError, "above 0 where log is true"),
         ("[dls]\ngain = { low = 0.0, hihg = 0.5 }", UnknownNameError, "Did you mean 'high'"),
         ('[dls]\ngain = { low = "a", high = 0.5 }', InvalidInputError, "two numbers, or choices"),
+        ("[dls]\ngain = { low = 0.1, high = inf }", InvalidInputError, "expected low below high"),
+        ('[dls]\ngain = { choices = "abc" }', InvalidInputError, "expected a list of choices"),
+        ('[dls]\ngain = { low = 1, high = 2, when = { rule = "a" } }', InvalidInputError, "when as a table of lists"),
+        (
+            '[dls]\ngain = { low = 1, high = 2, when = { rule = ["a"] } }',
+            UnknownNameError,
+            "parameter above gain 'rule'",
+        ),
     ],
 )
 def test_ranges_that_are_none(tmp_path, text, error, message):
@@ -278,6 +287,9 @@ def test_the_command(tmp_path, capsys):
         ({"--seed": "-1"}, "seed: expected a whole number of at least 0, got -1."),
         ({"--budget": "100"}, "budget: expected episodes for two trials at least, 128, got 100"),
         ({"--ranges": "nowhere.toml"}, "Cannot read the ranges nowhere.toml"),
+        ({"--ranges": RANGES, "--policies": "dls"}, "damping: expected a finite number above 0, got -1.0."),
+        ({"--ranges": RANGES, "--policies": "mfac"}, "There is no damping rule 'zzz'"),
+        ({"--ranges": RANGES, "--policies": "follow_nominal"}, "There is no parameter of follow_nominal 'gain'"),
     ],
 )
 def test_mistakes_are_one_line_before_anything_is_played(changes, message, tmp_path, monkeypatch, capsys):
