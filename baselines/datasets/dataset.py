@@ -174,7 +174,7 @@ def _put_together(
     job = wanted.jobs[0]
     preview: Any = job.preview
     storage = MinariStorage.new(
-        data,
+        data.absolute(),  # of a relative path Minari makes another one when it adds up sizes
         observation_space=observation_space(job.scenario, preview, job.make().commands),
         action_space=action_space(job.scenario),
         env_spec=_env_spec(job),

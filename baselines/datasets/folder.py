@@ -61,6 +61,7 @@ class Folder:
         if resume and overwrite:
             raise ResultsError("--resume keeps the episodes that are there, --overwrite replaces them: choose one.")
         with self._errors():
+            self._remove_drafts()
             self._refuse_strangers()
             if self.about.exists() and not overwrite:
                 if not resume:
@@ -107,21 +108,27 @@ class Folder:
             ResultsError: It cannot be written.
         """
         with self._errors():
-            shutil.rmtree(self.draft, ignore_errors=True)
             yield self.draft
             self.draft.replace(self.data)
             self.tidy()
 
     def tidy(self) -> None:
-        """Removes the blocks of a data set that is complete, and what a killed process has left."""
-        shutil.rmtree(self.draft, ignore_errors=True)
+        """Removes the blocks of a data set that is complete."""
         shutil.rmtree(self.blocks, ignore_errors=True)
 
     def _block(self, number: int) -> pathlib.Path:
         return self.blocks / f"{number:06}.npz"
 
+    def _remove_drafts(self) -> None:
+        """Removes what a process that was killed while it wrote has left."""
+        for file in (self.about, self.scenario):
+            for draft in self.path.glob(f".{file.name}.*.tmp"):
+                draft.unlink()
+        if self.draft.exists():
+            shutil.rmtree(self.draft)
+
     def _refuse_strangers(self) -> None:
-        known = {one.name for one in (self.about, self.scenario, self.blocks, self.data, self.draft)} | {LOCK}
+        known = {one.name for one in (self.about, self.scenario, self.blocks, self.data)} | {LOCK}
         others = sorted(file.name for file in self.path.iterdir() if file.name not in known)
         if others or (not self.about.exists() and any(file.name != LOCK for file in self.path.iterdir())):
             there = ", ".join(others) or "files without a dataset.json"
@@ -140,10 +147,11 @@ class Folder:
             raise ResultsError(f"{self.path} has another data set: {what}. Go on with that, or choose another folder.")
 
     def _clear(self) -> None:
-        """Removes what a data set consists of. First what says that there is one."""
-        self.about.unlink(missing_ok=True)
+        """Removes the episodes of a data set; a process that is killed meanwhile leaves one that lacks some."""
         self.scenario.unlink(missing_ok=True)
-        for folder in (self.data, self.blocks, self.draft):
+        if self.data.exists():
+            self.data.replace(self.draft)
+        for folder in (self.draft, self.blocks):
             if folder.exists():
                 shutil.rmtree(folder)
 

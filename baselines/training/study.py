@@ -6,6 +6,7 @@ import dataclasses
 import json
 import math
 import pathlib
+from collections import Counter
 from typing import Any
 
 import optuna
@@ -19,7 +20,7 @@ from baselines.training.config.base import Config
 from baselines.training.errors import TrainingError
 from baselines.training.score import Score
 from baselines.training.seeds import SeedRuns
-from baselines.tuning.ranges import Range, read, suggested
+from baselines.tuning.ranges import Range, ends, read, suggested
 from baselines.tuning.study import Study, finished, opened, prepare, search
 from ikgym.exceptions import InvalidInputError
 from ikgym.validation import known_names
@@ -45,10 +46,12 @@ class Training:
     ranges: tuple[Range, ...]
 
     def __call__(self, trial: Trial) -> float:
-        """The geometric mean of the costs of the kept agent; infinite where the weights diverge.
+        """The geometric mean of the costs of the kept agent.
+
+        It is infinite where the weights diverge, or the method refuses the options: which ones suit each other depends
+        on the scenario, such as divisors of what is collected in an episode.
 
         Raises:
-            InvalidInputError: The method refuses a value.
             TrialPruned: It is ended early, as its validations are worse than those of others.
         """
         # PyTorch takes seconds to load.
@@ -56,18 +59,17 @@ class Training:
 
         options = suggested(trial, self.ranges, {})
         trial.set_user_attr("options", options)
-        config = with_options(self.runs.config, options)
 
         def on_segment(done: int, score: Score | None) -> None:
             if score is None or not math.isfinite(score.cost):
                 return
             trial.report(score.cost, done)
-            if done < config.segments and trial.should_prune():
+            if done < self.runs.config.segments and trial.should_prune():
                 raise optuna.TrialPruned
 
         try:
             result = train(
-                config,
+                with_options(self.runs.config, options),
                 self.seed,
                 self.runs.out / f"trial-{trial.number}",
                 overwrite=True,
@@ -75,7 +77,7 @@ class Training:
                 command=self.runs.command,
                 on_segment=on_segment,
             )
-        except TrainingError as e:
+        except (TrainingError, InvalidInputError) as e:
             trial.set_user_attr("error", str(e))
             return math.inf
         return result.score.cost
@@ -110,23 +112,30 @@ def searched(
     study = planned(runs, seed, trials, ranges)
     with locked(runs.out):
         prepare(runs.out, [study], resume=runs.resume, overwrite=runs.overwrite)
-        search(runs.out, [study], workers=workers, progress=progress)
-        whole = [trial for trial in finished(opened(runs.out, study.name)) if trial.state.name == "COMPLETE"]
-        best = min(whole, key=lambda trial: trial.value if trial.value is not None else math.inf)
-        if best.value is None or not math.isfinite(best.value):
-            raise TrainingError(f"The weights diverged in all trials; see {runs.out} for their ranges.")
+        search(runs.out, [study], workers=workers, unit="trial", progress=progress)
+        ended = finished(opened(runs.out, study.name))
+        without = Counter(trial.user_attrs["error"] for trial in ended if "error" in trial.user_attrs)
+        whole = {trial.value: trial for trial in ended if trial.state.name == "COMPLETE" and trial.value is not None}
+        best = whole[min(whole)]
+        if not math.isfinite(min(whole)):
+            raise TrainingError(f"None of {len(ended)} trials has an agent: {'; '.join(without)}")
         write(runs.out / BEST, _toml({"method": runs.config.method, **best.user_attrs["options"]}).encode())
-    lines = [f"{name} = {value!r}" for name, value in best.user_attrs["options"].items()]
-    head = f"best of {trials} trials: trial {best.number}, cost {best.value:.5g} on validation episodes"
-    return "\n".join([head, *lines])
+    return "\n".join(
+        [
+            f"best of {len(ended)} trials: trial {best.number}, cost {best.value:.5g} on validation episodes",
+            *(f"{name} = {value!r}" for name, value in best.user_attrs["options"].items()),
+            *(f"without an agent, {count} of them: {error}" for error, count in without.items()),
+        ]
+    )
 
 
-def planned(runs: SeedRuns, seed: int, trials: int, ranges: pathlib.Path | None) -> Study:
+def planned(runs: SeedRuns, seed: int, trials: int, ranges: pathlib.Path | None) -> Study[Training]:
     """The search, checked before anything is trained.
 
     Raises:
         UnknownNameError: A range is of an option that the method has not.
-        InvalidInputError: No range is stated for the method, or the file of ranges cannot be read.
+        InvalidInputError: No range is stated for the method, the method refuses an end of one, or the file of ranges
+            cannot be read.
     """
     config = runs.config
     tables = read(ranges or FILE)
@@ -137,6 +146,8 @@ def planned(runs: SeedRuns, seed: int, trials: int, ranges: pathlib.Path | None)
             f"{ranges or FILE.name}, there are: {', '.join(tables) or 'none'}."
         )
     known_names(f"option of {config.method}", [one.name for one in lines], config.to_json())
+    for options in ends(lines, {}):
+        with_options(config, options)
     identity = {
         "config": config.to_json(),
         "fingerprint": fingerprint(config.make_scenario()),

@@ -112,7 +112,7 @@ def searched(options: Options, text: str) -> str:
     )
     with locked(options.out):
         prepare(options.out, studies, resume=options.resume, overwrite=options.overwrite)
-        search(options.out, studies, workers=options.workers, progress=True)
+        search(options.out, studies, workers=options.workers, unit="episode", progress=True)
         found = result(options.out, studies, scenario, text)
         found.save(options.out / "tuned.json")
     return shown(found)

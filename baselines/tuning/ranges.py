@@ -14,9 +14,10 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
 import pathlib
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from optuna.trial import Trial
@@ -62,7 +63,7 @@ class Range:
                 f"range of {self.name}: expected low and high, two numbers, or choices, got {ends} and {self.choices}."
             )
         low, high = self.low or 0.0, self.high or 0.0
-        if not low < high or (self.log and low <= 0.0):
+        if not -math.inf < low < high < math.inf or (self.log and low <= 0.0):
             raise InvalidInputError(
                 f"range of {self.name}: expected low below high, above 0 where log is true, got {self.low} and "
                 f"{self.high}."
@@ -102,25 +103,45 @@ def read(file: pathlib.Path) -> Ranges:
 
 
 def _table(file: pathlib.Path, name: str, table: object) -> tuple[Range, ...]:
-    keys = [field.name for field in dataclasses.fields(Range)][1:]
     if not isinstance(table, Mapping) or not all(isinstance(line, Mapping) for line in table.values()):
         raise InvalidInputError(
             f"The ranges {file}: expected a table of ranges by parameter in {name!r}, got {table!r}."
         )
-    for line in table.values():
-        known_names("key of a range", line, keys)
-    return tuple(
-        Range(parameter, **{**line, "choices": tuple(line.get("choices", ()))}) for parameter, line in table.items()
-    )
+    out: list[Range] = []
+    for parameter, line in table.items():
+        out.append(_range(parameter, line))
+        known_names(f"parameter above {parameter}", out[-1].when, [one.name for one in out[:-1]])
+    return tuple(out)
 
 
-def suggested(trial: Trial, ranges: tuple[Range, ...], given: Mapping[str, Any]) -> dict[str, Any]:
+def _range(parameter: str, line: Mapping[str, Any]) -> Range:
+    known_names("key of a range", line, [field.name for field in dataclasses.fields(Range)][1:])
+    choices, when = line.get("choices", []), line.get("when", {})
+    if not isinstance(choices, list) or not isinstance(line.get("log", False), bool):
+        raise InvalidInputError(f"range of {parameter}: expected a list of choices, and log as true or false.")
+    if not isinstance(when, Mapping) or not all(isinstance(values, list) and values for values in when.values()):
+        raise InvalidInputError(f"range of {parameter}: expected when as a table of lists of values, got {when!r}.")
+    return Range(parameter, **{**line, "choices": tuple(choices)})
+
+
+def suggested(trial: Trial, ranges: Sequence[Range], given: Mapping[str, Any]) -> dict[str, Any]:
     """The parameters that a trial tries, those with a dot within what is given of the parameter that they are in."""
     out: dict[str, Any] = {}
     for one in ranges:
-        if any(out.get(name) not in values for name, values in one.when.items()):
-            continue
-        outer, _, inner = one.name.partition(".")
-        value = one.suggest(trial)
-        out[outer] = {**given.get(outer, {}), **out.get(outer, {}), inner: value} if inner else value
+        if all(out.get(name) in values for name, values in one.when.items()):
+            out |= _placed(one.name, one.suggest(trial), {**given, **out})
     return out
+
+
+def ends(ranges: Sequence[Range], given: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+    """Each parameter by itself at the ends of its range, or with each of its choices, to see whether they are taken."""
+    for one in ranges:
+        needed = {name: values[0] for name, values in one.when.items()}
+        for value in one.choices or (one.low, one.high):
+            yield needed | _placed(one.name, value, {**given, **needed})
+
+
+def _placed(name: str, value: object, given: Mapping[str, Any]) -> dict[str, Any]:
+    """A parameter by its name; of one that it is in, the rest is as given."""
+    outer, _, inner = name.partition(".")
+    return {outer: {**given.get(outer, {}), inner: value} if inner else value}

@@ -21,7 +21,7 @@ from baselines.evaluation.rollout import rollouts
 from baselines.evaluation.summary import geometric_mean
 from baselines.fingerprints import fingerprint
 from baselines.spec import parse_policy
-from baselines.tuning.ranges import Range, Ranges, read, suggested
+from baselines.tuning.ranges import Range, Ranges, ends, read, suggested
 from baselines.tuning.study import Study, finished, opened
 from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError
@@ -103,7 +103,7 @@ def planned(
     episodes: int = EPISODES,
     budget: int,
     seed: int,
-) -> list[Study]:
+) -> list[Study[Cost]]:
     """The searches, checked before anything is played.
 
     Args:
@@ -116,7 +116,7 @@ def planned(
 
     Raises:
         UnknownNameError: There is no such policy or parameter.
-        InvalidInputError: A solver has no ranges, or does not suit the scenario.
+        InvalidInputError: A solver has no ranges, or refuses the scenario or an end of a range.
     """
     if not (scenario.random or scenario.plant.random):
         raise InvalidInputError(
@@ -130,8 +130,7 @@ def planned(
     seeds = scenarios.seeds(SPLIT, episodes)
     made = [Cost(scenario, spec, of(spec, ranges), seeds) for spec in policies or suiting(scenario, ranges)]
     for one in made:
-        name, parameters = parse_policy(one.spec)
-        registry.make(name, scenario, **parameters)
+        _check(one)
     about = {"fingerprint": fingerprint(scenario), "episodes": episodes, "seed": seed}
     return [
         Study(
@@ -144,6 +143,13 @@ def planned(
         )
         for one in made
     ]
+
+
+def _check(cost: Cost) -> None:
+    """Sees to it that a solver takes what is tried, as far as the ends of its ranges tell."""
+    name, parameters = parse_policy(cost.spec)
+    for settings in ({}, *ends(cost.ranges, parameters)):
+        registry.make(name, cost.scenario, **{**parameters, **settings})
 
 
 def of(spec: str, ranges: Ranges) -> tuple[Range, ...]:
@@ -191,7 +197,7 @@ def stated(file: pathlib.Path | None = None) -> Ranges:
     return {**read(FILE), **(read(file) if file is not None else {})}
 
 
-def result(folder: pathlib.Path, studies: Sequence[Study], scenario: Scenario, command: str) -> Tuning:
+def result(folder: pathlib.Path, studies: Sequence[Study[Cost]], scenario: Scenario, command: str) -> Tuning:
     """What came of the searches.
 
     Args:
@@ -201,14 +207,13 @@ def result(folder: pathlib.Path, studies: Sequence[Study], scenario: Scenario, c
         command: What searched.
     """
     today = datetime.datetime.now(datetime.UTC).date().isoformat()
-    episodes = len(studies[0].objective.seeds)  # type: ignore[attr-defined]  # those of :func:`planned`
+    episodes = len(studies[0].objective.seeds)
     tuned = tuple(_tuned(folder, study) for study in studies)
     return Tuning(command, today, scenario.name, fingerprint(scenario), SPLIT, episodes, tuned)
 
 
-def _tuned(folder: pathlib.Path, study: Study) -> Tuned:
+def _tuned(folder: pathlib.Path, study: Study[Cost]) -> Tuned:
     cost = study.objective
-    assert isinstance(cost, Cost)
     trials = finished(opened(folder, study.name))
     whole = [(trial.value, trial.user_attrs["settings"]) for trial in trials if trial.state.name == "COMPLETE"]
     default = cost.as_it_is()

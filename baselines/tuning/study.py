@@ -11,11 +11,11 @@ import dataclasses
 import pathlib
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 import optuna
-from optuna.storages.journal import JournalFileBackend
+from optuna.storages.journal import JournalFileBackend, JournalFileOpenLock
 from optuna.trial import FrozenTrial, Trial, TrialState
 from tqdm import tqdm
 
@@ -33,6 +33,7 @@ FINISHED = (TrialState.COMPLETE, TrialState.PRUNED)
 
 #: The value of a trial, which is to be low. It reports values on the way, and ends early where that is asked for.
 Objective = Callable[[Trial], float]
+ObjectiveT = TypeVar("ObjectiveT", bound=Objective)
 
 
 class StudyError(IkgymError):
@@ -40,7 +41,7 @@ class StudyError(IkgymError):
 
 
 @dataclasses.dataclass(frozen=True)
-class Study:
+class Study(Generic[ObjectiveT]):
     """One search.
 
     Args:
@@ -54,17 +55,17 @@ class Study:
     """
 
     name: str
-    objective: Objective
+    objective: ObjectiveT
     identity: Mapping[str, Any]
     budget: int
     seed: int
     spent: Callable[[FrozenTrial], int]
 
 
-def prepare(folder: pathlib.Path, studies: Sequence[Study], *, resume: bool, overwrite: bool) -> None:
+def prepare(folder: pathlib.Path, studies: Sequence[Study[Any]], *, resume: bool, overwrite: bool) -> None:
     """Makes the journal, or sees to it that the one that is there is of the same search.
 
-    Trials that were under way when a process ended are given up.
+    Trials that were under way when a process ended are given up. The caller has the folder to itself.
 
     Raises:
         ResultsError: There is a journal and neither flag is given; or it is damaged, or of another search.
@@ -79,6 +80,7 @@ def prepare(folder: pathlib.Path, studies: Sequence[Study], *, resume: bool, ove
     try:
         if overwrite:
             file.unlink(missing_ok=True)
+        _mend(file)
         known = {study.study_name: study for study in _opened_all(file)}
         for study in studies:
             there = known.get(study.name) or _made(file, study)
@@ -91,23 +93,25 @@ def prepare(folder: pathlib.Path, studies: Sequence[Study], *, resume: bool, ove
         raise ResultsError(f"{file} is damaged: {e}. Begin anew with --overwrite.") from None
 
 
-def search(folder: pathlib.Path, studies: Sequence[Study], *, workers: int, progress: bool) -> None:
+def search(folder: pathlib.Path, studies: Sequence[Study[Any]], *, workers: int, unit: str, progress: bool) -> None:
     """Spends the budgets of the studies, one study after the other.
 
     Args:
         folder: Where :func:`prepare` has made the journal.
         studies: What is searched.
         workers: Processes that play trials of the same study at the same time; 1 means this one.
+        unit: Of the budgets, for the bar.
         progress: Whether to show a bar on stderr.
 
     Raises:
-        StudyError: Worker processes have died again and again.
+        StudyError: A worker process has died.
         IkgymError: What the objective raises.
     """
     bar = tqdm(
         total=sum(study.budget for study in studies),
         disable=not progress,
         file=sys.stderr,
+        unit=unit,
         dynamic_ncols=True,
         mininterval=0.1 if sys.stderr.isatty() else 10.0,  # a log file has no cursor to go back with
     )
@@ -135,7 +139,7 @@ def opened(folder: pathlib.Path, name: str) -> optuna.Study:
         return optuna.load_study(study_name=name, storage=_storage(file), pruner=pruner)
 
 
-def spent_by(study: Study, there: optuna.Study) -> int:
+def spent_by(study: Study[Any], there: optuna.Study) -> int:
     """What the finished trials of a study have cost."""
     return sum(study.spent(trial) for trial in finished(there))
 
@@ -145,7 +149,7 @@ def finished(there: optuna.Study) -> list[FrozenTrial]:
     return there.get_trials(deepcopy=False, states=FINISHED)
 
 
-def _work(folder: pathlib.Path, study: Study, worker: int, show: Callable[[], None] | None = None) -> None:
+def _work(folder: pathlib.Path, study: Study[Any], worker: int, show: Callable[[], None] | None = None) -> None:
     """Plays trials of a study until its budget is spent."""
     there = opened(folder, study.name)
     while spent_by(study, there) < study.budget:
@@ -158,23 +162,34 @@ def _work(folder: pathlib.Path, study: Study, worker: int, show: Callable[[], No
             show()
 
 
-def _in_processes(folder: pathlib.Path, studies: Sequence[Study], workers: int, show: Callable[[], None]) -> None:
+def _in_processes(folder: pathlib.Path, studies: Sequence[Study[Any]], workers: int, show: Callable[[], None]) -> None:
     with Workers(workers).pool(workers) as pool:
         for study in studies:
             units = [(folder, study, worker) for worker in range(workers)]
-            for _, result in done_by(pool, _share, units, report=lambda unit, said: show()):
+            # Not tried again: who is killed may leave the journal locked, which is mended where a search begins.
+            for _, result in done_by(pool, _share, units, tries=1, report=lambda unit, said: show()):
                 if isinstance(result, LostError):
-                    reason = f"Worker processes have died again and again, the last one because {result}."
-                    raise StudyError(f"{reason} What was finished is kept; go on with --resume.")
+                    raise StudyError(f"A worker is lost: {result}. What was finished is kept; go on with --resume.")
 
 
-def _share(unit: tuple[pathlib.Path, Study, int], report: Report) -> None:
+def _share(unit: tuple[pathlib.Path, Study[Any], int], report: Report) -> None:
     """What one of several workers does of a study."""
     _work(*unit, show=lambda: report(None))
 
 
 def _storage(file: pathlib.Path) -> optuna.storages.JournalStorage:
-    return optuna.storages.JournalStorage(JournalFileBackend(str(file)))
+    # Optuna's default is a symbolic link, which a relative path leaves dangling: who meets a left one waits for ever.
+    return optuna.storages.JournalStorage(JournalFileBackend(str(file), lock_obj=JournalFileOpenLock(str(file))))
+
+
+def _mend(file: pathlib.Path) -> None:
+    """Removes what a killed process may have left: Optuna's lock, and a line that was not written to its end."""
+    file.with_name(f"{file.name}.lock").unlink(missing_ok=True)
+    if not file.exists():
+        return
+    with file.open("r+b") as journal:
+        content = journal.read()
+        journal.truncate(content.rfind(b"\n") + 1)
 
 
 def _opened_all(file: pathlib.Path) -> list[optuna.Study]:
@@ -183,14 +198,14 @@ def _opened_all(file: pathlib.Path) -> list[optuna.Study]:
         return [optuna.load_study(study_name=name, storage=storage) for name in optuna.get_all_study_names(storage)]
 
 
-def _made(file: pathlib.Path, study: Study) -> optuna.Study:
+def _made(file: pathlib.Path, study: Study[Any]) -> optuna.Study:
     with _quietly():
         there = optuna.create_study(study_name=study.name, storage=_storage(file), direction="minimize")
         there.set_user_attr("identity", dict(study.identity))
     return there
 
 
-def _check_same(file: pathlib.Path, study: Study, there: optuna.Study) -> None:
+def _check_same(file: pathlib.Path, study: Study[Any], there: optuna.Study) -> None:
     known = there.user_attrs.get("identity", {})
     names = [name for name in {**known, **study.identity} if known.get(name) != study.identity.get(name)]
     if names:

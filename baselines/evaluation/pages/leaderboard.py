@@ -235,9 +235,9 @@ def _tuned(tuning: Tuning) -> list[str]:
     if not tuning.solvers:
         return [*out, f"No settings have been searched for this scenario: `{tuning.command}`.", ""]
     out += [
-        f"Searched with `{tuning.command}` on the first {tuning.episodes} {tuning.split} episodes of "
-        f"`{tuning.scenario}`, for the lowest geometric mean of the total cost (which needs no best known cost: "
-        "dividing by it changes no order). No test episode was played for it. The result is in "
+        f"Searched on {tuning.date}, with `{tuning.command}` of that day's version, on the first {tuning.episodes} "
+        f"{tuning.split} episodes of `{tuning.scenario}`, for the lowest geometric mean of the total cost (which needs "
+        "no best known cost: dividing by it changes no order). No test episode was played for it. The result is in "
         f"`baselines/data/tuned/{tuning.scenario}.json`; `{update(tuning.scenario)}` searches anew. No setting lets a "
         "solver look further ahead.",
         "",

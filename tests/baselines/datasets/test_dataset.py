@@ -89,8 +89,9 @@ def test_costs_are_those_of_an_evaluation_and_say_where_they_come_from(written, 
 
 
 def test_it_is_found_by_name_and_has_its_environment(tmp_path, monkeypatch, capsys):
-    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
-    arguments = ["--scenario", "varga7-random", "--policy", "dls", "--episodes", "1", "--out", str(tmp_path / "dls-v1")]
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("MINARI_DATASETS_PATH", "sets")
+    arguments = ["--scenario", "varga7-random", "--policy", "dls", "--episodes", "1", "--out", "sets/dls-v1"]
     assert main([*arguments, "--split", "validation", "--preview", "3"]) == 0
     assert 'minari.load_dataset("dls-v1")' in capsys.readouterr().out
     data = minari.load_dataset("dls-v1")
@@ -135,6 +136,28 @@ def test_what_was_interrupted_is_resumed(short, written, tmp_path, monkeypatch, 
         assert played == list(range(EPISODES))
         assert sorted(file.name for file in folder.iterdir()) == ["data", "dataset.json", "scenario.toml"]
     assert same(folder, written)
+
+
+def test_what_a_killed_process_leaves_hinders_nobody(short, written, tmp_path, monkeypatch):
+    """Files that were not written to their end, and a data set that was about to be replaced."""
+    folder, wanted = tmp_path / "dls-v0", planned(short, "dls:damping=1e-2", episodes=EPISODES)
+    (folder / ".data.tmp").mkdir(parents=True)
+    for name in (".dataset.json.7.tmp", ".scenario.toml.7.tmp", ".data.tmp/main_data.hdf5"):
+        (folder / name).write_text("hal")
+    write(wanted, folder)
+    assert same(folder, written)
+
+    def stop(path):
+        raise Interrupted
+
+    with monkeypatch.context() as patched:
+        patched.setattr("shutil.rmtree", stop)
+        with pytest.raises(Interrupted):
+            write(wanted, folder, overwrite=True)
+    assert not (folder / "data").exists()
+    write(wanted, folder, resume=True)
+    assert same(folder, written)
+    assert sorted(file.name for file in folder.iterdir()) == ["data", "dataset.json", "scenario.toml"]
 
 
 @pytest.mark.slow

@@ -1,11 +1,13 @@
 """The search of hyperparameters: trials are trainings, and the best one is a preset."""
 
 import json
+import math
+from pathlib import Path
 
 import optuna
 import pytest
 
-from baselines.training import run, study
+from baselines.training import run, study, validation
 from baselines.training.command import main
 from baselines.training.errors import TrainingError
 from baselines.training.presets import read as preset
@@ -57,6 +59,35 @@ def test_its_best_trial_is_a_preset(tmp_path, ranges, capsys):
     assert about(tmp_path / "again" / "seed-0")["kept"]["validation"]["cost"] == best.value
 
 
+def test_agents_are_judged_on_validation_episodes(tmp_path, monkeypatch, ranges):
+    """And trained on those for training: what scores are published on stays unseen."""
+    real, judged = validation.play, []
+
+    def spy(actor, processing, scenario, seeds):
+        judged.extend(seeds)
+        return real(actor, processing, scenario, seeds)
+
+    monkeypatch.setattr(validation, "play", spy)
+    config = tiny("ppo", scenario="varga7-random", segments=1, evaluate_every=1)
+    study.searched(SeedRuns(config, tmp_path), 0, trials=1, ranges=Path(ranges), workers=1, progress=False)
+    assert set(judged) == {1_000_000, 1_000_001}
+
+
+def test_options_that_do_not_suit_each_other_cost_a_trial(tmp_path, capsys):
+    file = tmp_path / "ranges.toml"
+    file.write_text("[ppo]\nbatch_size = { choices = [7, 40] }\n")
+    arguments = ["ppo", *TINY, "--study-ranges", str(file), "--seeds", "1", "--out", str(tmp_path / "study")]
+    assert main([*arguments, "--study", "4"]) == 0
+    trials = opened(tmp_path / "study", "ppo").trials
+    refused = [trial for trial in trials if trial.user_attrs["options"]["batch_size"] == 7]
+    assert 0 < len(refused) < 4
+    assert {trial.value for trial in refused} == {math.inf}
+    assert f"without an agent, {len(refused)} of them: batch_size: expected a divisor" in capsys.readouterr().out
+    file.write_text("[ppo]\nbatch_size = { choices = [7] }\n")
+    assert main([*arguments[:-1], str(tmp_path / "none"), "--study", "1"]) == 2
+    assert "None of 1 trials has an agent: batch_size: expected a divisor" in capsys.readouterr().err
+
+
 def test_trials_that_diverge_or_are_worse(tmp_path, monkeypatch):
     """Those whose weights diverge cost infinitely much; those that are worse than others end early."""
     runs = SeedRuns(tiny("ppo"), tmp_path)
@@ -85,6 +116,7 @@ def test_trials_that_diverge_or_are_worse(tmp_path, monkeypatch):
     [
         ("[sac]\ntau = { low = 0.1, high = 0.2 }", InvalidInputError, r"No range is stated for an option of ppo"),
         ("[ppo]\ntau = { low = 0.1, high = 0.2 }", UnknownNameError, "There is no option of ppo 'tau'"),
+        ("[ppo]\nlearning_rate = { low = -0.1, high = 0.2 }", InvalidInputError, "learning_rate: expected"),
     ],
 )
 def test_ranges_that_are_none(tmp_path, text, error, message):

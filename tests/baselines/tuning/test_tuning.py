@@ -4,6 +4,7 @@ import json
 import math
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +22,7 @@ from baselines.tuning.ranges import Range, read, suggested
 from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 
+RANGES = str(Path(__file__).with_name("refused.toml"))
 ROOT = Path(__file__).parents[3]
 SKEW = scenarios.get(sets.SKEW)
 SHORT = SKEW.replace(name="short", steps=30)
@@ -33,7 +35,7 @@ def searched(folder, budget=60, episodes=4, resume=False, workers=1, **changes):
     )
     folder.mkdir(exist_ok=True)
     study.prepare(folder, studies, resume=resume, overwrite=False)
-    study.search(folder, studies, workers=workers, progress=False)
+    study.search(folder, studies, workers=workers, unit="episode", progress=False)
     return trials(folder), studies
 
 
@@ -88,6 +90,56 @@ def test_whoever_is_stopped_ends_with_the_same_trials(whole, tmp_path, monkeypat
     assert searched(tmp_path / "study", resume=True)[0] == found  # the budget is spent
     other, _ = searched(tmp_path / "other", seed=1)
     assert other[0] != found[0]
+
+
+def test_what_a_killed_process_leaves_hinders_nobody(whole, tmp_path, monkeypatch):
+    """Optuna's lock, a line that was not written to its end, and a trial that was under way."""
+    monkeypatch.chdir(tmp_path)
+    searched(Path("study"), budget=30)
+    journal = Path("study") / study.JOURNAL
+    before = journal.read_bytes()
+    lines = before.splitlines(keepends=True)
+    last = max(number for number, line in enumerate(lines) if b'"trial_id"' in line and b'"state":1' in line)
+    journal.write_bytes(b"".join(lines[:last]) + lines[last][:-9])
+    Path(f"{journal}.lock").write_text("")
+    found, _ = searched(Path("study"), resume=True)
+    assert found == whole[1]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("workers", ["1", "2"])
+def test_a_process_that_is_killed_is_resumed(workers, tmp_path):
+    out = tmp_path / "out"
+    command = [sys.executable, "-m", "baselines.tuning.command", "--scenario", "varga7-random", "--policies", "dls"]
+    command += ["--episodes", "2", "--budget", "60", "--workers", workers, "--out", str(out), "--resume"]
+    journal, kills = out / study.JOURNAL, 0
+    for wanted in (2, 6):
+        process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        while process.poll() is None:
+            if journal.exists() and journal.read_bytes().count(b"settings") >= wanted:
+                process.kill()
+                kills += process.wait() != 0
+            time.sleep(0.01)
+    assert kills == 2
+    assert not (out / "tuned.json").exists()
+    assert subprocess.run(command, cwd=ROOT, stdout=subprocess.DEVNULL, check=True).returncode == 0
+    assert Tuning.load(out / "tuned.json").solvers[0].tried > 6
+    assert sorted(file.name for file in out.iterdir()) == [study.JOURNAL, "tuned.json"]
+
+
+def test_no_episode_but_those_for_validation_is_played(tmp_path, monkeypatch):
+    """Whatever is searched, and however: what scores are published on stays unseen."""
+    real, seen = solvers.rollouts, []
+
+    def spy(scenario, policy, seeds):
+        seen.extend(seeds)
+        return real(scenario, policy, seeds)
+
+    monkeypatch.setattr(solvers, "rollouts", spy)
+    _, studies = searched(tmp_path / "study", budget=24, episodes=12)
+    solvers.result(tmp_path / "study", studies, SHORT, "a command")
+    assert set(seen) == set(range(1_000_000, 1_000_012))
+    assert not set(seen) & {*scenarios.SPLITS["test"], *scenarios.SPLITS["train"]}
 
 
 def test_trials_that_are_worse_end_early(tmp_path, monkeypatch):
@@ -178,6 +230,14 @@ def test_a_fixed_parameter_is_not_searched():
         ("[dls]\ngain = { low = 0.0, high = 0.5, log = true }", InvalidInputError, "above 0 where log is true"),
         ("[dls]\ngain = { low = 0.0, hihg = 0.5 }", UnknownNameError, "Did you mean 'high'"),
         ('[dls]\ngain = { low = "a", high = 0.5 }', InvalidInputError, "two numbers, or choices"),
+        ("[dls]\ngain = { low = 0.1, high = inf }", InvalidInputError, "expected low below high"),
+        ('[dls]\ngain = { choices = "abc" }', InvalidInputError, "expected a list of choices"),
+        ('[dls]\ngain = { low = 1, high = 2, when = { rule = "a" } }', InvalidInputError, "when as a table of lists"),
+        (
+            '[dls]\ngain = { low = 1, high = 2, when = { rule = ["a"] } }',
+            UnknownNameError,
+            "parameter above gain 'rule'",
+        ),
     ],
 )
 def test_ranges_that_are_none(tmp_path, text, error, message):
@@ -227,6 +287,9 @@ def test_the_command(tmp_path, capsys):
         ({"--seed": "-1"}, "seed: expected a whole number of at least 0, got -1."),
         ({"--budget": "100"}, "budget: expected episodes for two trials at least, 128, got 100"),
         ({"--ranges": "nowhere.toml"}, "Cannot read the ranges nowhere.toml"),
+        ({"--ranges": RANGES, "--policies": "dls"}, "damping: expected a finite number above 0, got -1.0."),
+        ({"--ranges": RANGES, "--policies": "mfac"}, "There is no damping rule 'zzz'"),
+        ({"--ranges": RANGES, "--policies": "follow_nominal"}, "There is no parameter of follow_nominal 'gain'"),
     ],
 )
 def test_mistakes_are_one_line_before_anything_is_played(changes, message, tmp_path, monkeypatch, capsys):
