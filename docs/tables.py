@@ -1,4 +1,4 @@
-"""Writes the tables of the documentation from the registries: ``python -m docs.tables``.
+"""Writes the tables of the documentation, and what else is worked out: ``python -m docs.tables``.
 
 A test fails where a page does not hold what this writes.
 """
@@ -22,6 +22,7 @@ from baselines.oracle import best_known
 from baselines.oracle.best_known import MARGIN
 from baselines.registry import get
 from baselines.status import Status
+from docs import cluster
 
 PAGES = Path(__file__).parent
 
@@ -168,6 +169,8 @@ TABLES = {
     "records": records,
 }
 
+TEXTS = {"cluster": cluster.paragraph}
+
 
 def markdown(rows: Iterable[tuple[str, ...]]) -> str:
     """A table, its first row the head."""
@@ -177,10 +180,10 @@ def markdown(rows: Iterable[tuple[str, ...]]) -> str:
 
 
 def filled(text: str) -> str:
-    """A page with its tables written anew."""
+    """A page with its tables and texts written anew."""
     return re.sub(
-        r"(<!-- table: (\w+) -->\n).*?(<!-- end -->)",
-        lambda m: f"{m[1]}{markdown(TABLES[m[2]]())}\n{m[3]}",
+        r"(<!-- (table|text): (\w+) -->\n).*?(<!-- end -->)",
+        lambda m: f"{m[1]}{markdown(TABLES[m[3]]()) if m[2] == 'table' else TEXTS[m[3]]()}\n{m[4]}",
         text,
         flags=re.DOTALL,
     )
