@@ -165,6 +165,7 @@ def _carry_out(
     command: str,
     show: Callable[[Rows], None] | None = None,
 ) -> Rows:
+    workers.check()
     with contextlib.nullcontext() if out is None else locked(out):
         results = None
         if out is not None:

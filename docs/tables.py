@@ -1,4 +1,4 @@
-"""Writes the tables of the documentation from the registries: ``python -m docs.tables``.
+"""Writes the tables of the documentation, and what else is worked out: ``python -m docs.tables``.
 
 A test fails where a page does not hold what this writes.
 """
@@ -24,6 +24,7 @@ from baselines.oracle.best_known import MARGIN
 from baselines.papers import PAPERS
 from baselines.registry import get
 from baselines.status import Status
+from docs import cluster
 from docs.paper_pages import figures, verdicts
 
 PAGES = Path(__file__).parent
@@ -179,6 +180,7 @@ TABLES = {
 }
 #: What is no table.
 TEXTS: dict[str, Callable[[], str]] = {
+    "cluster": cluster.paragraph,
     "demo": demo,
     **{f"figures_{name}": functools.partial(figures, paper) for name, paper in PAPERS.items()},
 }
@@ -192,7 +194,7 @@ def markdown(rows: Iterable[tuple[str, ...]]) -> str:
 
 
 def filled(text: str) -> str:
-    """A page with its tables written anew."""
+    """A page with its tables and texts written anew."""
     return re.sub(
         r"(<!-- table: (\w+) -->\n).*?(<!-- end -->)",
         lambda m: f"{m[1]}{TEXTS[m[2]]() if m[2] in TEXTS else markdown(TABLES[m[2]]())}\n{m[3]}",

@@ -19,7 +19,7 @@ from baselines.evaluation.metrics import Row, measure
 from baselines.evaluation.plan import Job
 from baselines.evaluation.rollout import Episode, Player, Tick, rollout, rollouts, sequence
 from baselines.evaluation.trajectory_log import trajectory_log
-from baselines.evaluation.units import BLOCK, Checks, Done, Played, Unit, units
+from baselines.evaluation.units import BLOCK, Checks, Done, Played, Unit, processor, units
 from baselines.oracle import best_known
 from baselines.workers import TRIES, LostError, Report, WorkerError, Workers, finished
 from ikgym.compilation import logger
@@ -103,7 +103,7 @@ def _elsewhere(away: Sequence[Unit], workers: Workers) -> Iterator[tuple[Unit, l
 def do(unit: Unit, report: Report) -> Done:
     """Plays a unit, in the process of a worker."""
     del report
-    return Done(unit.digest, play(unit.jobs))
+    return Done(unit.digest, play(unit.jobs), processor())
 
 
 class _Line(logging.Handler):

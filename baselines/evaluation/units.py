@@ -10,6 +10,8 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
+import llvmlite.binding as llvm
+
 import ikgym
 from baselines.canonical import canonical, jsonable
 from baselines.evaluation.export import Motion
@@ -55,7 +57,7 @@ class Unit:
 
     jobs: tuple[Job, ...]
 
-    @functools.cached_property
+    @property
     def digest(self) -> str:
         """What the results are merged by: of version, scenario, policy, parameters, and what is drawn how.
 
@@ -73,10 +75,18 @@ class Done(NamedTuple):
     Attributes:
         digest: Of what was done.
         played: What came out.
+        processor: On what, see :func:`processor`.
     """
 
     digest: str
     played: list[Played]
+    processor: str
+
+
+@functools.cache
+def processor() -> str:
+    """What compiled code is made for here; the name of a processor says too little of it on virtual machines."""
+    return f"{llvm.get_host_cpu_name()} {llvm.get_host_cpu_features().flatten()}"
 
 
 def units(jobs: Iterable[Job], most: int = MOST) -> list[Unit]:
@@ -109,8 +119,8 @@ class Checks:
     """
 
     def __init__(self, play: Any) -> None:
-        self._play, self._here = play, _kind(describe())
-        self._replayed: dict[str, set[str]] = {}
+        self._play, self._here = play, (_kind(describe()), processor())
+        self._replayed: dict[tuple[str, str], set[str]] = {}
 
     def check(self, unit: Unit, done: Done) -> None:
         """Insists that a unit is what it should be.
@@ -125,24 +135,31 @@ class Checks:
                 f"A worker has played something else than {first.policy} in {first.scenario.name}: it has ikgym "
                 f"{there.get('ikgym')}, here is {ikgym.__version__}. Install the same on all nodes."
             )
-        job, kind = unit.jobs[0], _kind(there)
+        job, kind = unit.jobs[0], (_kind(there), done.processor)
         replayed = self._replayed.setdefault(kind, set())
         if len(replayed) < REPLAYED and job.policy not in replayed:
             replayed.add(job.policy)
             (again,) = self._play([dataclasses.replace(job, first=False, exported=False)])
-            _compare(done.played[0].row, again.row, 0.0 if kind == self._here else TOLERANCE)
+            compare(done.played[0].row, again.row, 0.0 if kind == self._here else TOLERANCE)
 
 
-def _compare(there: Row, here: Row, tolerance: float) -> None:
+def compare(there: Row, here: Row, tolerance: float) -> None:
     """Insists on equal costs."""
     for name in ("total_cost", "tracking_cost", "velocity_cost"):
         far, near = getattr(there, name), getattr(here, name)
-        if not math.isclose(far, near, rel_tol=tolerance, abs_tol=MEANINGLESS if tolerance else 0.0):
+        if not _same(far, near, tolerance):
             raise WorkerError(
                 f"{there.policy} in {there.scenario}, seed {there.seed}: {name} is {far!r} on {_kind(there.machine)} "
                 f"and {near!r} here; expected a relative difference of at most {tolerance:g}. Nothing of that unit is "
                 "kept: install the same versions on all nodes."
             )
+
+
+def _same(one: float, other: float, tolerance: float) -> bool:
+    """Whether costs are equal, those among them that are no number."""
+    if math.isnan(one) or math.isnan(other):
+        return math.isnan(one) and math.isnan(other)
+    return math.isclose(one, other, rel_tol=tolerance, abs_tol=MEANINGLESS if tolerance else 0.0)
 
 
 def _kind(machine: Mapping[str, Any]) -> str:

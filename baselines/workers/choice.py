@@ -41,6 +41,19 @@ class Workers:
         """Whether this process does everything itself."""
         return self.cluster is None and self.number == 1
 
+    def check(self) -> None:
+        """Insists that a cluster can be reached if one is asked for: before anything is written, or overwritten.
+
+        Raises:
+            MissingDependencyError: The package of the cluster is not installed.
+            ClusterError: No address is known, or nobody answers there.
+        """
+        if self.cluster is not None:
+            # The only module that imports an extra, which few have.
+            from baselines.workers import ray_cluster
+
+            ray_cluster.check()
+
     def pool(self, units: int) -> Pool:
         """The workers for so many units, to be used as a context.
 
@@ -50,7 +63,6 @@ class Workers:
         """
         if self.cluster is None:
             return Processes(min(self.number, max(units, 1)))
-        # The only module that imports an extra, which few have.
-        from baselines.workers.ray_cluster import RayPool
+        from baselines.workers.ray_cluster import RayPool  # see above
 
         return RayPool()

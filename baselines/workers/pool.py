@@ -9,7 +9,7 @@ import traceback
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future
 from types import TracebackType
-from typing import Any, ClassVar, Generic, NamedTuple, Self, TypeVar
+from typing import Any, Generic, NamedTuple, Self, TypeVar
 
 from ikgym.exceptions import IkgymError
 
@@ -37,7 +37,7 @@ class WorkerError(IkgymError):
 
 
 class ClusterError(IkgymError):
-    """A cluster cannot be reached."""
+    """A cluster cannot be reached, or a node of it cannot do the work."""
 
 
 class Answer(NamedTuple, Generic[Result]):
@@ -81,9 +81,6 @@ def answer(function: Callable[[Unit, Report], Result], unit: Unit, report: Repor
 class Pool(abc.ABC):
     """Processes elsewhere that do units of work. Leaving the context ends them, whatever they are at."""
 
-    #: What a future raises if its worker has ended.
-    losses: ClassVar[tuple[type[BaseException], ...]] = (LostError,)
-
     @abc.abstractmethod
     def submit(self, function: Callable[[Unit, Report], Result], unit: Unit, report: Report) -> Future[Answer[Result]]:
         """Hands a unit to the next worker that is free.
@@ -92,6 +89,9 @@ class Pool(abc.ABC):
             function: What is done; a name at the top of its module, which workers can import.
             unit: What it is done to; can be pickled.
             report: Takes what the function says on its way, in any thread.
+
+        Returns:
+            The answer; raises :class:`LostError` if its worker has ended.
         """
 
     @abc.abstractmethod
@@ -130,6 +130,7 @@ def finished(
         Each unit with its result, or with how its worker ended the last time.
 
     Raises:
+        ClusterError: A node cannot do the work.
         Exception: What the function raised.
     """
     news: queue.SimpleQueue[tuple[Unit, Any] | Future[Answer[Result]]] = queue.SimpleQueue()
@@ -151,15 +152,10 @@ def finished(
         lost = item.exception()
         if lost is None:
             yield unit, item.result().unwrap()
-        elif not isinstance(lost, pool.losses):
+        elif not isinstance(lost, LostError):
             raise lost
         elif number < tries:
-            logger.warning("A worker was lost (%s); its unit is done again.", _short(lost))
+            logger.warning("A worker was lost (%s); its unit is done again.", lost)
             start(again(unit), number + 1)
         else:
-            yield unit, LostError(_short(lost))
-
-
-def _short(lost: BaseException) -> str:
-    """How a worker ended: of the pages that a cluster may say about it, the beginning."""
-    return (" ".join(str(lost).split()) or type(lost).__name__)[:200]
+            yield unit, lost

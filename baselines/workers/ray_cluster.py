@@ -9,9 +9,9 @@ import socket
 import threading
 from collections.abc import Callable
 from concurrent.futures import Future
-from typing import Any, ClassVar
+from typing import Any
 
-from baselines.workers.pool import Answer, ClusterError, Pool, Report, Result, Unit, answer
+from baselines.workers.pool import Answer, ClusterError, LostError, Pool, Report, Result, Unit, answer
 from ikgym import parallel
 from ikgym.exceptions import MissingDependencyError
 
@@ -27,6 +27,14 @@ VARIABLE = "RAY_ADDRESS"
 REACHED, CONNECTED = 5.0, 60.0
 #: How a cluster is started, in messages.
 START = "Start one by `ray start --head --port 6379`, and on other nodes `ray start --address HOST:6379`."
+#: What Ray raises where a worker or its node has ended.
+LOSSES = (
+    exceptions.WorkerCrashedError,
+    exceptions.NodeDiedError,
+    exceptions.ObjectLostError,
+    exceptions.OutOfMemoryError,
+    exceptions.LocalRayletDiedError,
+)
 
 
 class RayPool(Pool):
@@ -37,14 +45,6 @@ class RayPool(Pool):
     Raises:
         ClusterError: No address is known, or nobody answers there.
     """
-
-    losses: ClassVar[tuple[type[BaseException], ...]] = (
-        exceptions.WorkerCrashedError,
-        exceptions.NodeDiedError,
-        exceptions.ObjectLostError,
-        exceptions.OutOfMemoryError,
-        exceptions.LocalRayletDiedError,
-    )
 
     def __init__(self) -> None:
         self._own = not ray.is_initialized()
@@ -59,8 +59,16 @@ class RayPool(Pool):
         del report
         reference = self._remote.remote(function, unit)
         self._references.add(reference)
-        future: Future[Answer[Result]] = reference.future()
-        future.add_done_callback(lambda _: self._references.discard(reference))
+        future = Future[Answer[Result]]()
+
+        def settle(done: Future[Answer[Result]]) -> None:
+            self._references.discard(reference)
+            if (failed := done.exception()) is None:
+                future.set_result(done.result())
+            else:
+                future.set_exception(_translated(failed))
+
+        reference.future().add_done_callback(settle)
         return future
 
     def close(self) -> None:
@@ -77,20 +85,25 @@ def serve(function: Callable[[Unit, Report], Result], unit: Unit) -> Answer[Resu
     return answer(function, unit, lambda _: None)
 
 
+def check() -> None:
+    """Insists that an address is known, and that somebody listens there.
+
+    Raises:
+        ClusterError: It is not, or nobody does.
+    """
+    if not ray.is_initialized():
+        _reach(os.environ.get(VARIABLE, ""))
+
+
 def connect(address: str) -> None:
     """Connects to a cluster.
 
     Args:
-        address: As ``RAY_ADDRESS`` has it: HOST:PORT, ray://HOST:PORT, or auto for one on this machine.
+        address: As ``RAY_ADDRESS`` has it: HOST:PORT, or auto for one on this machine.
 
     Raises:
         ClusterError: There is no address, or no cluster.
     """
-    if not address:
-        raise ClusterError(
-            f"--cluster ray: expected its address in the environment variable {VARIABLE}, such as 127.0.0.1:6379, or "
-            f"auto for one that runs on this machine; it is not set. {START}"
-        )
     _reach(address)
     failed: list[BaseException] = []
 
@@ -112,15 +125,30 @@ def connect(address: str) -> None:
 
 def _reach(address: str) -> None:
     """Insists that somebody listens at an address."""
-    found = re.fullmatch(r"(?:ray://)?\[?([^/]+?)\]?:(\d{1,5})", address)
-    if found is None:
-        if address != "auto":
-            raise ClusterError(f"{VARIABLE}: expected HOST:PORT, ray://HOST:PORT or auto, got {address!r}.")
+    if not address:
+        raise ClusterError(
+            f"--cluster ray: expected its address in the environment variable {VARIABLE}, such as 127.0.0.1:6379, or "
+            f"auto for one that runs on this machine; it is not set. {START}"
+        )
+    if address == "auto":
         return
+    if (found := re.fullmatch(r"\[?([^/]+?)\]?:(\d{1,5})", address)) is None:
+        raise ClusterError(f"{VARIABLE}: expected HOST:PORT or auto, got {address!r}.")
     try:
         socket.create_connection((found[1], int(found[2])), timeout=REACHED).close()
     except (OSError, OverflowError) as e:
         raise ClusterError(_unreachable(address, getattr(e, "strerror", None) or str(e))) from None
+
+
+def _translated(failed: BaseException) -> LostError | ClusterError:
+    """What Ray raises instead of an answer; of the pages that it may say about it the first line, or the last one."""
+    lines = str(failed).strip().splitlines() or [type(failed).__name__]
+    if isinstance(failed, LOSSES):
+        return LostError(lines[0][:200])
+    return ClusterError(
+        f"A node of the cluster cannot do its work: {lines[-1][:400]}. Install ikgym, and whatever its policies are "
+        "made of, in the same versions on all nodes."
+    )
 
 
 def _unreachable(address: str, why: str) -> str:

@@ -97,6 +97,7 @@ def play(
     for job in (job for some in plans.values() for job in some):
         if job.key not in jobs or job.timed:
             jobs[job.key] = job
+    workers.check()
     with contextlib.nullcontext() if folder is None else locked(folder):
         rows = _played(
             EvaluationPlan(tuple(jobs.values()), ()),

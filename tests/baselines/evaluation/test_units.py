@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
+import math
 
 import pytest
 
@@ -10,8 +12,8 @@ from baselines.evaluate import evaluate
 from baselines.evaluation import runner, units
 from baselines.evaluation.plan import make_plan
 from baselines.evaluation.results import read_rows
-from baselines.workers import WorkerError, Workers
-from tests.baselines.workers.losing import LosingPool
+from baselines.workers import TOLERANCE, ClusterError, WorkerError, Workers
+from tests.baselines.workers.losing import LosingPool, instead
 
 STEPS = 5
 FAR = {"cpu": "another one"}
@@ -20,9 +22,7 @@ FAR = {"cpu": "another one"}
 @pytest.fixture
 def pool(monkeypatch):
     """The workers of the cluster."""
-    here = LosingPool()
-    monkeypatch.setattr(Workers, "pool", lambda self, units: here)
-    return here
+    return instead(monkeypatch, LosingPool())
 
 
 @pytest.fixture
@@ -30,8 +30,8 @@ def one_by_one(monkeypatch):
     monkeypatch.setattr(runner, "BLOCK", 1)
 
 
-def on_another_machine(monkeypatch, factor):
-    """Has workers say that they are another machine, and cost more by a factor."""
+def on_another_machine(monkeypatch, factor, processor=None):
+    """Has workers say that they are another machine, or processor of the same name, and cost more by a factor."""
 
     def do(unit, report, plain=runner.do):
         done = plain(unit, report)
@@ -39,13 +39,18 @@ def on_another_machine(monkeypatch, factor):
             one._replace(row=dataclasses.replace(one.row, machine=FAR, total_cost=factor * one.row.total_cost))
             for one in done.played
         ]
-        return done._replace(played=worse)
+        return done._replace(played=worse, processor=processor or done.processor)
 
     monkeypatch.setattr(runner, "do", do)
 
 
 def play(**options):
     return evaluate("varga7-random", "dls", episodes=4, steps=STEPS, plots=False, **options)
+
+
+@pytest.fixture(scope="module")
+def row():
+    return play()[0]
 
 
 def costs(rows):
@@ -105,11 +110,38 @@ def test_costs_of_other_processors_are_held_against_those_of_this_one(pool, monk
     assert not (tmp_path / "results.json").exists()
 
 
-def test_on_processors_of_one_kind_costs_are_the_same(pool, monkeypatch):
-    on_another_machine(monkeypatch, 1.0 + 1e-8)
-    here = units.describe()
-    monkeypatch.setitem(FAR, "cpu", here["cpu"])
-    for name, value in here.items():
+@pytest.mark.parametrize(
+    ("far", "near", "tolerance", "fits"),
+    [
+        (math.nan, math.nan, 0.0, True),
+        (math.inf, math.inf, 0.0, True),
+        (math.nan, 1.0, TOLERANCE, False),
+        (1.0, math.nan, TOLERANCE, False),
+        (1.0, 1.0 + 1e-15, 0.0, False),
+        (1.0, 1.0 + 1e-15, TOLERANCE, True),
+    ],
+)
+def test_equal_costs(row, far, near, tolerance, fits):
+    with contextlib.nullcontext() if fits else pytest.raises(WorkerError, match="total_cost is"):
+        units.compare(*(dataclasses.replace(row, total_cost=cost) for cost in (far, near)), tolerance)
+
+
+def test_nothing_is_overwritten_before_there_is_a_cluster(monkeypatch, tmp_path):
+    def check(self):
+        assert self.cluster == "ray"
+        raise ClusterError("nobody is there")
+
+    rows = play(out=tmp_path)
+    monkeypatch.setattr(Workers, "check", check)
+    with pytest.raises(ClusterError):
+        play(out=tmp_path, overwrite=True, cluster="ray")
+    assert read_rows(tmp_path / "results.json") == rows
+
+
+@pytest.mark.parametrize(("processor", "fits"), [(None, False), ("without AVX", True)])
+def test_on_processors_of_one_kind_costs_are_the_same(pool, monkeypatch, processor, fits):
+    for name, value in units.describe().items():
         monkeypatch.setitem(FAR, name, value)
-    with pytest.raises(WorkerError, match="expected a relative difference of at most 0"):
+    on_another_machine(monkeypatch, 1.0 + 1e-8, processor)
+    with contextlib.nullcontext() if fits else pytest.raises(WorkerError, match="relative difference of at most 0"):
         play(cluster="ray")

@@ -12,7 +12,7 @@ from baselines.oracle.cache import kept
 from baselines.oracle.several import Wanted, find_all
 from baselines.workers import WorkerError, Workers
 from ikgym import scenarios
-from tests.baselines.workers.losing import LosingPool
+from tests.baselines.workers.losing import LosingPool, instead
 
 HOW = Search(starts=1, chains=1, generations=0, polished=1, knots=20)
 FAR = Workers(cluster="ray")
@@ -20,9 +20,7 @@ FAR = Workers(cluster="ray")
 
 @pytest.fixture
 def pool(monkeypatch):
-    here = LosingPool(lost=[0])
-    monkeypatch.setattr(Workers, "pool", lambda self, units: here)
-    return here
+    return instead(monkeypatch, LosingPool(lost=[0]))
 
 
 def wanted(*, cached=True):

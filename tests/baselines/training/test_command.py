@@ -20,9 +20,8 @@ from baselines.training.config.reinforcement import PPO
 from baselines.training.errors import TrainingError
 from baselines.training.folder import FORMAT
 from baselines.training.seeds import SeedRuns
-from baselines.workers import Workers
 from tests.baselines.training.small import about, timeless
-from tests.baselines.workers.losing import LosingPool
+from tests.baselines.workers.losing import LosingPool, instead
 from tests.spawning import dies_with_seed_7
 
 ROOT = pathlib.Path(__file__).parents[3]
@@ -335,8 +334,7 @@ def test_a_run_json_grants_no_trust(tmp_path, capsys, expert):
 
 
 def test_a_seed_whose_node_is_lost_goes_on_elsewhere(several, tmp_path, monkeypatch, capsys):
-    pool = LosingPool(lost=[0])
-    monkeypatch.setattr(Workers, "pool", lambda self, units: pool)
+    pool = instead(monkeypatch, LosingPool(lost=[0]))
     assert main(["ppo", *TINY, "--seeds", "1", "--cluster", "ray", "--overwrite", "--out", str(tmp_path)]) == 0
     assert about(tmp_path / "seed-1")["weights_sha256"] == about(several[0] / "seed-1")["weights_sha256"]
     first, again = pool.units
@@ -347,7 +345,7 @@ def test_a_seed_whose_node_is_lost_goes_on_elsewhere(several, tmp_path, monkeypa
 
 
 def test_nodes_have_to_share_the_folder(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(Workers, "pool", lambda self, units: LosingPool())
+    instead(monkeypatch, LosingPool())
     monkeypatch.setattr(seeds, "_marked", lambda folder, wanted: contextlib.nullcontext("not-there"))
     assert main(["ppo", *TINY, "--seeds", "1", "--cluster", "ray", "--out", str(tmp_path)]) == 2
     assert "expected a folder that all nodes of the cluster share" in capsys.readouterr().err

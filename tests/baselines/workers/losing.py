@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from concurrent.futures import Future
 
-from baselines.workers import Pool
+from baselines.workers import Pool, Workers
 from baselines.workers.pool import LostError, answer
 
 
@@ -27,3 +27,10 @@ class LosingPool(Pool):
 
     def close(self):
         self.closed = True
+
+
+def instead(monkeypatch, pool):
+    """Has a pool stand for the workers of any cluster."""
+    monkeypatch.setattr(Workers, "check", lambda self: None)
+    monkeypatch.setattr(Workers, "pool", lambda self, units: pool)
+    return pool

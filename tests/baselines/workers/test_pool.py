@@ -81,7 +81,7 @@ def test_without_ray_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "ray", None)
     monkeypatch.delitem(sys.modules, "baselines.workers.ray_cluster", raising=False)
     with pytest.raises(MissingDependencyError, match=r'pip install "ikgym\[cluster\]"'):
-        Workers(cluster="ray").pool(1)
+        Workers(cluster="ray").check()
 
 
 def test_fewer_cores(monkeypatch):

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import os
+import pathlib
+import signal
 import socket
+import tempfile
 import time
 
 import pytest
@@ -15,7 +18,8 @@ from ray.cluster_utils import Cluster
 
 from baselines.evaluate import evaluate
 from baselines.evaluation import runner
-from baselines.workers import ClusterError, Workers, ray_cluster
+from baselines.workers import ClusterError, Workers, finished, ray_cluster
+from tests.baselines.workers.test_lifetime import needs_proc, wait_for
 
 # Ray leaves files and sockets to the garbage collector.
 pytestmark = [
@@ -24,44 +28,106 @@ pytestmark = [
     pytest.mark.filterwarnings("ignore::DeprecationWarning"),
     pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
 ]
-SMALL = {"num_cpus": 1, "object_store_memory": 80 * 2**20}
-EPISODES, STEPS = 12, 1000
+EPISODES = 12
+#: Where nodes of a test write what they are at, and which of them one is; and the file that the one that is to be
+#: killed writes when it is at its last unit.
+FOLDER, NODE, AT_WORK = "IKGYM_TEST_FOLDER", "IKGYM_TEST_NODE", "at-work"
+#: In [s]: far more than it takes.
+PATIENCE = 50
 
 
 @pytest.fixture
 def cluster(monkeypatch):
-    """Two nodes with a core each."""
-    nodes = Cluster(initialize_head=True, head_node_args={**SMALL, "include_dashboard": False})
-    monkeypatch.setenv("RAY_ADDRESS", nodes.address)
-    try:
-        yield nodes, nodes.add_node(**SMALL)
-    finally:
-        ray.shutdown()
-        nodes.shutdown()
+    """Two nodes with a core each, of which neither a process nor a file is left in the end; and their folder."""
+    # Paths of sockets are short: the folder of a test would be too long.
+    with tempfile.TemporaryDirectory(prefix="ikgym-", dir="/tmp") as folder:
+        monkeypatch.setenv("RAY_TMPDIR", folder)
+        monkeypatch.setenv("RAY_USAGE_STATS_ENABLED", "0")
+        monkeypatch.setenv("RAY_memory_monitor_refresh_ms", "0")  # others may use the memory of this machine
+        small = {"num_cpus": 1, "object_store_memory": 80 * 2**20, "plasma_directory": folder}
+        signal.signal(signal.SIGALRM, hangs)
+        signal.alarm(PATIENCE)
+        nodes = Cluster()
+        try:
+            nodes.add_node(**small, include_dashboard=False, env_vars={FOLDER: folder, NODE: "head"})
+            other = nodes.add_node(**small, env_vars={FOLDER: folder, NODE: "other"})
+            monkeypatch.setenv("RAY_ADDRESS", nodes.address)
+            yield nodes, other, pathlib.Path(folder)
+        finally:
+            signal.alarm(0)
+            ray.shutdown()
+            nodes.shutdown()
+            gone = wait_for(lambda: not at_work_in(folder), 20.0)
+    assert gone
+
+
+def hangs(number, frame):
+    raise TimeoutError(f"not done within {PATIENCE} s")
+
+
+def at_work_in(folder):
+    """Processes that have a file of a folder open, such as their log: those of Ray rename themselves."""
+    found = set()
+    for link in pathlib.Path("/proc").glob("[0-9]*/fd/*"):
+        try:
+            if str(link.readlink()).startswith(folder):
+                found.add(int(link.parts[2]))
+        except OSError:
+            pass  # closed by now, or of somebody else
+    return found - {os.getpid()}
+
+
+def do(unit, report):
+    """Plays a unit. The node that is to be killed stays at its second one; the other waits for that with its sixth."""
+    folder, node = pathlib.Path(os.environ[FOLDER]), os.environ[NODE]
+    (folder / f"{node}-{unit.jobs[0].seed}").touch()
+    number = len(list(folder.glob(f"{node}-*")))
+    if node == "other" and number == 2:
+        (folder / AT_WORK).touch()
+        time.sleep(2 * PATIENCE)
+    if node == "head" and number == EPISODES // 2:
+        wait_for((folder / AT_WORK).exists, PATIENCE)
+    return runner.do(unit, report)
 
 
 @pytest.mark.slow
+@needs_proc
 def test_one_of_two_nodes_is_killed_half_way(cluster, monkeypatch, tmp_path, caplog):
-    nodes, other = cluster
-    monkeypatch.setattr(runner, "BLOCK", 1)
+    nodes, other, folder = cluster
     check, done = runner.Checks.check, []
 
     def kill_half_way(self, unit, outcome):
         done.append(unit.digest)
         if len(done) == EPISODES // 2:
+            assert wait_for((folder / AT_WORK).exists, PATIENCE)
             nodes.remove_node(other, allow_graceful=False)
         check(self, unit, outcome)
 
-    monkeypatch.setattr(runner.Checks, "check", kill_half_way)
-    # Units of some tenths of a second, so that both nodes are at work when one is killed; what is played again here has
-    # been loaded by then.
-    given = {"scenarios": "varga7-random", "policies": "rhc", "episodes": EPISODES + 1, "steps": STEPS, "plots": False}
+    given = {"scenarios": "varga7-random", "policies": "dls", "episodes": EPISODES + 1, "steps": 50, "plots": False}
     alone = evaluate(**given)
+    for name, instead in {"BLOCK": 1, "do": do}.items():
+        monkeypatch.setattr(runner, name, instead)
+    monkeypatch.setattr(runner.Checks, "check", kill_half_way)
     rows = evaluate(**given, cluster="ray", out=tmp_path)
     assert len(done) == len(set(done)) == EPISODES
-    assert "its unit is done again" in caplog.text
+    assert caplog.text.count("its unit is done again") == 1
     assert [untimed(row) for row in rows] == [untimed(row) for row in alone]
     assert [row.time_p50_us is None for row in rows] == [False] + [True] * EPISODES
+
+
+class Unknown:
+    """What a node cannot read, such as a policy of a module that is not there."""
+
+    def __reduce__(self):
+        return __import__, ("no_such_module",)
+
+
+@pytest.mark.slow
+@needs_proc
+def test_what_nodes_cannot_import_is_said(cluster):
+    expected = "cannot do its work: .*no_such_module.* Install ikgym, and whatever its policies are made of"
+    with Workers(cluster="ray").pool(1) as pool, pytest.raises(ClusterError, match=expected):
+        list(finished(pool, runner.do, [Unknown()]))
 
 
 def untimed(row):
@@ -74,7 +140,8 @@ def untimed(row):
     ("address", "message"),
     [
         ("", "expected its address in the environment variable RAY_ADDRESS"),
-        ("nowhere", "RAY_ADDRESS: expected HOST:PORT, ray://HOST:PORT or auto, got 'nowhere'"),
+        ("nowhere", "RAY_ADDRESS: expected HOST:PORT or auto, got 'nowhere'"),
+        ("ray://127.0.0.1:1", "expected HOST:PORT or auto, got 'ray://127.0.0.1:1'"),
         ("127.0.0.1:99999", "No cluster of Ray can be reached at 127.0.0.1:99999"),
         ("closed", r"No cluster of Ray can be reached at .* \(Connection refused\)"),
     ],
@@ -84,9 +151,9 @@ def test_addresses_without_a_cluster(monkeypatch, address, message):
         with socket.socket() as free:
             free.bind(("127.0.0.1", 0))
             address = f"127.0.0.1:{free.getsockname()[1]}"
-    monkeypatch.setitem(os.environ, "RAY_ADDRESS", address)
+    monkeypatch.setenv("RAY_ADDRESS", address)
     with pytest.raises(ClusterError, match=message):
-        Workers(cluster="ray").pool(1)
+        Workers(cluster="ray").check()
 
 
 def test_one_who_does_not_answer_is_given_up(monkeypatch):

@@ -14,6 +14,9 @@ from baselines.evaluation.pages.measurement import Measurement, Section, Submitt
 from baselines.evaluation.pages.submissions.check import Submission, check_foresight, submission, taken
 from baselines.files import ResultsError
 
+#: The folder with the files of a submission, beside those with its results.
+FILES = "files"
+
 
 def add(
     measurement: Measurement,
@@ -30,7 +33,7 @@ def add(
     Args:
         measurement: What the page is made from; its first section is the main test set.
         folders: The submissions.
-        out: A folder for the results of each.
+        out: A folder for the files and the results of each.
         date: As YYYY-MM-DD.
         trust: Whether code in the folders may be run.
         overwrite: Replaces a submission of the same name, and its results.
@@ -48,7 +51,7 @@ def add(
         there, mine = [*there, one.manifest.name], [name for name in mine if name != one.manifest.name]
     # Times of another machine would stand beside those of the page as if they could be compared.
     timed = dict(measurement.machine) == describe()
-    entries = [one.entry(timed=timed) for one in found]
+    entries = [one.copied(out / one.digest / FILES).entry(timed=timed) for one in found]
     for one, entry in zip(found, entries, strict=True):
         for section in measurement.sections:
             check_foresight(entry, section.name, len(section.seeds), one.manifest.foresight)

@@ -8,14 +8,15 @@ import importlib
 import pathlib
 import sys
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, Self
 
 from baselines import registry
 from baselines.agents import untrusted
+from baselines.agents.policy import Agent
 from baselines.evaluation.pages.entries import TIMED, Entry, Training
 from baselines.evaluation.pages.measure import plan
 from baselines.evaluation.pages.submissions.manifest import FILE, Manifest, Part
-from baselines.files import ResultsError
+from baselines.files import ResultsError, write
 from ikgym.preview import furthest
 
 
@@ -41,6 +42,18 @@ class Submission:
     def runs_code(self) -> bool:
         """Whether to play it runs code of the folder in this process."""
         return any(pathlib.PurePath(part.file).suffix != untrusted.SUFFIX for part in self.manifest.parts)
+
+    def copied(self, to: pathlib.Path) -> Self:
+        """The same in another folder, where nothing but the files that it names can be found.
+
+        What is scored is just what the digest is of: neither bytecode beside a module, nor what is exchanged later.
+
+        Raises:
+            ResultsError: A file is not what the folder says any more, or the copy cannot be written.
+        """
+        for part in self.manifest.parts:
+            write(to / part.file, _checked(self.folder, part))
+        return dataclasses.replace(self, folder=to.absolute())
 
     def entry(self, *, timed: bool) -> Entry:
         """As the leaderboard plays it. Modules are imported now: only of a folder that is trusted.
@@ -85,9 +98,12 @@ def submission(folder: pathlib.Path, *, trust: bool) -> Submission:
     """
     found = Submission(folder.absolute(), Manifest.read(folder))
     for part in found.manifest.parts:
-        _check_file(folder, part)
-        if "trust" in part.parameters:
-            raise ResultsError(f"{folder / FILE}: trust is given on the command line, never by a file.")
+        _checked(folder, part)
+        if given := [name for name in Agent.decisive if name in part.parameters]:
+            raise ResultsError(
+                f"{folder / FILE}: expected no {given[0]!r} among the parameters: the file of an agent is that whose "
+                "digest is checked, and trust is given on the command line, never by a file."
+            )
     if found.runs_code and not trust:
         named = [part.file for part in found.manifest.parts if not part.file.endswith(untrusted.SUFFIX)]
         raise ResultsError(
@@ -120,17 +136,19 @@ def check_foresight(entry: Entry, name: str, episodes: int, declared: int) -> No
         )
 
 
-def _check_file(folder: pathlib.Path, part: Part) -> None:
-    """Insists on a file of the folder with the bytes that it should have."""
+def _checked(folder: pathlib.Path, part: Part) -> bytes:
+    """What is in a file of the folder: the bytes that should be."""
     file, kinds = folder / part.file, (untrusted.SUFFIX, untrusted.ZIP, ".py")
-    if not file.resolve().is_relative_to(folder.resolve()):
+    if file.resolve().parent != folder.resolve():
         raise ResultsError(f"{folder / FILE}: expected files of the folder itself, got {part.file!r}.")
     if file.suffix not in kinds:
         raise ResultsError(f"{folder / FILE}: expected a file of the kind {', '.join(kinds)}, got {part.file!r}.")
     # Also says which file may have been meant, and refuses one that is too large for an agent.
-    digest = hashlib.sha256(untrusted.read(file)).hexdigest()
+    content = untrusted.read(file)
+    digest = hashlib.sha256(content).hexdigest()
     if digest != part.sha256:
         raise ResultsError(f"{file}: expected the sha256 {part.sha256} of {FILE}, got {digest}.")
+    return content
 
 
 def _module(file: pathlib.Path) -> str:
@@ -143,7 +161,7 @@ def _module(file: pathlib.Path) -> str:
         importlib.invalidate_caches()
     try:
         found = importlib.import_module(file.stem)
-    except Exception as e:  # whatever the module of somebody else raises
+    except (Exception, SystemExit) as e:  # whatever the module of somebody else raises
         raise ResultsError(f"{file}: cannot be imported: {type(e).__name__}: {e}.") from e
     if pathlib.Path(found.__file__ or "").resolve() != file.resolve():
         raise ResultsError(f"{file}: there is another module of the name {file.stem!r}: choose one of its own.")

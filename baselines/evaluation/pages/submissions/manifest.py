@@ -18,8 +18,8 @@ FILE: Final = "submission.toml"
 MOST: Final = 2**16
 #: Names, and lines of text: they stand in tables, where these signs would mean something.
 NAME: Final = re.compile(r"[\w][\w .+-]{0,59}")
-LINE: Final = re.compile(r"[^\x00-\x1f`|<>\[\]]{1,200}")
-COMMAND: Final = re.compile(r"[^\x00-\x1f`]{1,400}")
+LINE: Final = re.compile(r"[^`|<>\[\]]{1,200}")
+COMMAND: Final = re.compile(r"[^`]{1,400}")
 DIGEST: Final = re.compile(r"[0-9a-f]{64}")
 
 
@@ -103,7 +103,7 @@ class Manifest:
         for key, pattern, values in texts:
             if key in {"authors", "commands"} and not values:
                 return f"{key}: expected at least one, got none"
-            if bad := [value for value in values if not pattern.fullmatch(value)]:
+            if bad := [value for value in values if not (pattern.fullmatch(value) and value.isprintable())]:
                 return f"{key}: expected one line of plain text, got {json_files.shown(bad[0])}"
         if self.foresight < 0:
             return f"foresight: expected at least 0 steps, got {self.foresight}"

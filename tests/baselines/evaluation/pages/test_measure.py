@@ -10,13 +10,15 @@ from baselines.evaluate import evaluate
 from baselines.evaluation import test_sets
 from baselines.evaluation.pages import sets
 from baselines.evaluation.pages.entries import Entry, agents, playing, solver
-from baselines.evaluation.pages.measure import measure, plan
+from baselines.evaluation.pages.measure import measure, plan, play
 from baselines.evaluation.pages.measurement import RESIDUAL
 from baselines.files import ResultsError
 from baselines.policy import Problem
+from baselines.workers import Workers
 from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError
 from tests.baselines.evaluation.pages.builders import KNOWN, TEST_SEEDS, fake, write_runs
+from tests.baselines.workers.losing import LosingPool, instead
 
 FEW = (
     fake(),
@@ -85,6 +87,15 @@ class TestMeasure:
         assert measure(sets.MAIN, PAGES, out, episodes=2, resume=True) == both
         with pytest.raises(ResultsError, match="--resume"):
             measure(sets.MAIN, PAGES, out, episodes=2)
+
+    def test_a_cluster_plays_what_is_not_timed(self, monkeypatch):
+        pool = instead(monkeypatch, LosingPool(lost=[0]))
+        plans = plan("varga7-pose-random-frequency", [solver("dls", timed=1)], 3)
+        (there,) = play(plans, workers=Workers(cluster="ray")).values()
+        (here,) = play(plans).values()
+        assert [row.total_cost for row in there] == [row.total_cost for row in here]
+        assert [row.time_p50_us is None for row in there] == [False, True, True]
+        assert [len(unit.jobs) for unit in pool.units] == [2, 2]
 
     def test_changed_scenarios_are_relative_to_foresight(self, out):
         there = playing("varga7-pose-random-frequency", FEW[1:])

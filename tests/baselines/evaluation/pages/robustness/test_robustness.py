@@ -23,9 +23,11 @@ from baselines.evaluation.results import read_rows
 from baselines.files import ResultsError
 from baselines.fingerprints import set_hash
 from baselines.oracle import Search, cache, search, solve
+from baselines.workers import Workers
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 from ikgym.scenarios import imperfect
 from tests.baselines.evaluation.test_report import row
+from tests.baselines.workers.losing import LosingPool, instead
 
 STEPS = 30
 ENTRY = Entry("panda-camera", "dls", False, 64, 650.0, (500.0, 800.0), 0.25, 1.2, 540.0, (400.0, 700.0))
@@ -86,6 +88,15 @@ def test_a_run_is_taken_up_again(short, tmp_path):
     (again,) = play(resume=True)
     assert json.loads(results.read_text()) == [*changed, whole[2]]  # what was there was not played again
     assert again.cost_ratio == pytest.approx(4.0 ** (1 / 3) * cells[0].cost_ratio, rel=1e-6)
+
+
+def test_a_cluster_changes_nothing(short, tmp_path, monkeypatch):
+    play = functools.partial(measure.cells, "panda-field", {"dls": "dls"}, severities=[0.5], episodes=2)
+    here = play(tmp_path / "here")
+    monkeypatch.setenv(cache.VARIABLE, str(tmp_path / "empty"))
+    pool = instead(monkeypatch, LosingPool(lost=[0, 2]))
+    assert play(tmp_path / "there", workers=Workers(cluster="ray")) == here
+    assert len(pool.units) == 1 + 2 + 2  # a block of two seeds, two best known costs, and what was lost
 
 
 def test_ratios_are_to_the_best_known_cost_of_the_arm_that_moves(short, tmp_path):

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import hashlib
+import importlib.util
 import json
 import pathlib
+import py_compile
 import re
 import shutil
 import sys
@@ -122,9 +124,13 @@ def test_the_example_is_what_it_says():
         ("sha256 = .*", 'sha256 = "5"', "expected a sha256 of 64 hexadecimal digits, got '5'"),
         ("seed-0.safetensors", "seed-1.safetensors", "does not exist. Did you mean"),
         ("seed-0.safetensors", "../seed-0.safetensors", "expected files of the folder itself, got '../seed-0"),
+        ("seed-0.safetensors", "/dev/zero", "expected files of the folder itself, got '/dev/zero'"),
         ("seed-0.safetensors", "submission.toml", "expected a file of the kind .safetensors, .zip, .py, got"),
         (r"\[\[parts\]\]", "[[parts", "is damaged"),
         ("seed = 0", "seed = 0\nparameters = {trust = true}", "trust is given on the command line, never by a file"),
+        ("seed = 0", "seed = 0\nparameters = {path = 'b.zip'}", "expected no 'path' among the parameters"),
+        ('name = "example', 'name = "\u202eexample', "name: expected one line of plain text"),
+        ('"The ikgym', '"\u202eikgym', "authors: expected one line of plain text"),
     ],
 )
 def test_what_is_refused_before_anything_is_played(folder, docs, capsys, pattern, instead, message):
@@ -133,7 +139,7 @@ def test_what_is_refused_before_anything_is_played(folder, docs, capsys, pattern
     assert add(folder, docs) == 2
     assert message in capsys.readouterr().err
     assert (docs / "leaderboard.json").read_bytes() == before
-    assert not (docs.parent / "out").exists()
+    assert not list(docs.parent.glob("out/**/results.json"))
 
 
 def test_damaged_folders(folder, tmp_path):
@@ -171,16 +177,41 @@ def test_code_is_run_only_with_trust(folder, docs, undrawn, capsys, tmp_path):
     assert (mine.training, mine.seeds, mine.preview) == (None, (), 1)
 
 
+def test_files_of_elsewhere_and_models_that_nobody_trusts(folder, tmp_path):
+    agent = folder / "seed-0.safetensors"
+    agent.rename(tmp_path / "elsewhere.safetensors")
+    agent.symlink_to(tmp_path / "elsewhere.safetensors")
+    with pytest.raises(ResultsError, match="expected files of the folder itself, got 'seed-0"):
+        submission(folder, trust=False)
+    (folder / "seed-0.zip").write_bytes(agent.read_bytes())
+    change(folder, "seed-0.safetensors", "seed-0.zip")
+    with pytest.raises(ResultsError, match=r"seed-0\.zip runs code of its own in this process"):
+        submission(folder, trust=False)
+
+
+def test_bytecode_beside_a_module_is_not_run(folder, docs, undrawn, tmp_path):
+    name, mark, other = a_module(folder), tmp_path / "was-run", tmp_path / "other.py"
+    other.write_text(f"open({str(mark)!r}, 'w').close()\n{MODULE}")
+    bytecode = importlib.util.cache_from_source(folder / f"{name}.py")
+    # Python would run it without a look at the module beside it.
+    py_compile.compile(str(other), bytecode, invalidation_mode=py_compile.PycInvalidationMode.UNCHECKED_HASH)
+    assert add(folder, docs, "--trust") == 0
+    assert not mark.exists()
+
+
 @pytest.mark.parametrize(
     ("policy", "text", "message"),
     [
         ("Told", MODULE, "Told has privileged information, and references are not ranked"),
         ("Other", MODULE, "cannot be imported"),
+        ("Mine", f"import helper_of_nobody\n{MODULE}", "cannot be imported: ModuleNotFoundError"),
         ("Mine", "1 / 0", "cannot be imported: ZeroDivisionError"),
+        ("Mine", "raise SystemExit(0)", "cannot be imported: SystemExit"),
     ],
 )
 def test_modules_that_are_refused(folder, docs, capsys, policy, text, message):
     a_module(folder, text, policy)
+    (folder / "helper_of_nobody.py").touch()  # has no digest
     assert add(folder, docs, "--trust") == 2
     assert message in capsys.readouterr().err
 
