@@ -19,8 +19,8 @@ Later = Callable[[Callable[[], object]], object]
 SPEEDS = (0.02, 0.05, 0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 50.0)
 
 LEGEND = (
-    "Drag the target, or a joint; *Play* goes back to the episode. Joints: grey free, yellow near a limit, red at it. "
-    "Tool: from red (singular) to green by its manipulability."
+    "Drag the target, or a joint; *Play* goes back to the episode. A joint is yellow near a limit, red at it. "
+    "The ball at the tool goes from red (singular) to green by its manipulability."
 )
 
 

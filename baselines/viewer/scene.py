@@ -10,8 +10,9 @@ import numpy as np
 from baselines.evaluation.plots.style import COLOURS
 from baselines.viewer.approach import Pose
 from baselines.viewer.bodies import size
+from baselines.viewer.readings import Colour
 from baselines.viewer.session import Mode, Session, Shown
-from baselines.viewer.solids import Colour, Shape, Solids, segments
+from baselines.viewer.solids import Shape, Solids, segments
 from ikgym.rendering.style import GREEN, PALE_GREEN, stride, thinned
 from ikgym.rotations import quaternion
 from ikgym.validation import FloatArray
