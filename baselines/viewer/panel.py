@@ -41,7 +41,7 @@ class Panel:
         with gui.add_folder("Episode"):
             self._play = gui.add_button("Play")
             self._time = gui.add_slider("time [s]", 0.0, session.duration, session.duration / 1000.0, 0.0)
-            speed = gui.add_dropdown("speed", tuple(f"{s:g}" for s in SPEEDS), "1")
+            speed = gui.add_dropdown("speed", tuple(f"{s:g}" for s in SPEEDS), initial_value="1")
             apart = gui.add_checkbox("side by side", initial_value=True)
         with gui.add_folder("Now"):
             self._readings = gui.add_markdown("")

@@ -13,6 +13,7 @@ from baselines.viewer.readings import FREE, Colour, Reading, share_colour
 from ikgym.arms import Arm
 from ikgym.validation import FloatArray
 
+
 class Shape(Protocol):
     """What an arm looks like."""
 

@@ -9,7 +9,10 @@ import pytest
 
 import ikgym
 from baselines.viewer.readings import AT, NEAR, Reader, share_colour
+from baselines.viewer.replay import Stage
+from baselines.viewer.view import shaper_of
 from ikgym.exceptions import InvalidInputError
+from ikgym.trajectories import Sinusoid
 
 pytest.importorskip("yourdfpy")
 trimesh = pytest.importorskip("trimesh")
@@ -119,3 +122,27 @@ def test_files_that_cannot_be_read(arm, tmp_path):
     broken.write_text("<robot")
     with pytest.raises(InvalidInputError, match="cannot be read"):
         meshes.read_urdf(broken, arm)
+
+
+@pytest.fixture
+def stage(tmp_path):
+    """Makes a stage for an arm that was read from a URDF file."""
+    pytest.importorskip("pinocchio")
+
+    def made(**changes):
+        arm = ikgym.arms.from_urdf(urdf(tmp_path, **changes))
+        sinusoid, task = Sinusoid(np.array([0.1, 0.2])), ikgym.tasks.get("position")
+        return Stage.of(ikgym.Scenario("mine", arm, task, sinusoid, velocity_limit=3.0, steps=2))
+
+    return made
+
+
+def test_an_arm_from_a_file_with_meshes_is_shown_with_them(stage, server):
+    shaper = shaper_of(stage(), None)
+    assert isinstance(shaper(server)("/root", AT), meshes.Meshes)
+    assert list(seen(server)) == ["/root/0/own", "/root/1/own", "/root/tool"]
+
+
+def test_an_arm_from_a_file_without_meshes_is_shown_as_cylinders(stage, capsys):
+    assert shaper_of(stage(shape=""), None) is None
+    assert "Cylinders are shown: urdf:" in capsys.readouterr().err
