@@ -44,9 +44,8 @@ class RedundantIKVecEnv(VecEnv):
     | `terminal_observation` | the last observation; the one returned is already the first of the next episode |
     | `episode` | `r`, `l`, `t`: return, length in steps, time since the environment was made in [s], as of `Monitor` |
 
-    Gymnasium's vector environment, `gym.make_vec(…)`, is another interface: a model that is given one says "The
-    environment is of type <class 'ikgym.vector_env.RedundantIKVectorEnv'>, not a Gymnasium environment". This class
-    takes its place.
+    Gymnasium's vector environment, `gym.make_vec(…)`, is another interface: a model that is given one says that it is
+    not a Gymnasium environment, and names this class, which takes its place.
 
     As `r` is the sum of the float64 rewards before any wrapper, `env_is_wrapped(Monitor)` is true.
 

@@ -30,7 +30,16 @@ Flags = npt.NDArray[np.bool_]
 Infos = dict[str, Any]
 
 
-class RedundantIKVectorEnv(gym.vector.VectorEnv[Observation, npt.NDArray[np.float32], npt.NDArray[Any]]):
+class _Class(type):
+    """How the class below shows itself: all that Stable-Baselines3 says of an environment that it refuses."""
+
+    def __repr__(cls) -> str:
+        return f"{super().__repr__()[:-1]}; for Stable-Baselines3 there is ikgym.sb3.RedundantIKVecEnv>"
+
+
+class RedundantIKVectorEnv(
+    gym.vector.VectorEnv[Observation, npt.NDArray[np.float32], npt.NDArray[Any]], metaclass=_Class
+):
     """N times :class:`ikgym.RedundantIKEnv`, stepped by one compiled kernel.
 
     Observation, action, reward, info and end of an episode are those of the single environment, with a leading

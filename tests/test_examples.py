@@ -29,5 +29,21 @@ def test_the_ppo_of_the_example_learns(capsys):
     assert np.mean(rewards[-3:]) > rewards[0] + 0.2
 
 
+def test_the_wrappers_of_the_example_do_what_they_say():
+    """The arm stands, so that what is missing is the error of the step; one arm and many are the same."""
+    example = runpy.run_path(str(ROOT / "07_wrappers.py"))
+    env, envs = example["one"](), example["many"](2)
+    observation, _ = env.reset(seed=0)
+    assert observation in env.observation_space
+    both, _ = envs.reset(seed=0)
+    assert both in envs.observation_space
+    np.testing.assert_array_equal(both["missing"][0], observation["missing"])
+    _, reward, *_, info = env.step(np.zeros(7, dtype=np.float32))
+    assert np.linalg.norm(observation["missing"]) == pytest.approx(1e3 * info["position_error"], rel=1e-9)
+    assert reward == pytest.approx(np.tanh(-1e-3 * (info["tracking_cost"] + info["velocity_cost"])))
+    _, rewards, *_ = envs.step(np.zeros((2, 7), dtype=np.float32))
+    assert rewards[0] == reward
+
+
 def test_there_are_examples():
     assert len(EXAMPLES) >= 4

@@ -10,9 +10,9 @@ from collections.abc import Iterable, Iterator, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from baselines.files import write
+from baselines.files import ResultsError, write
 from baselines.viewer.replay import Replay, Stage
-from ikgym.exceptions import InvalidInputError
+from ikgym.exceptions import InvalidInputError, MissingDependencyError
 from ikgym.rendering import Renderer
 from ikgym.rendering.renderer import WIDTH
 from ikgym.validation import number, whole_number
@@ -83,6 +83,25 @@ def checked_width(width: int) -> int:
     return width
 
 
+def check_ffmpeg() -> None:
+    """Sees to it that there is what writes videos: moviepy, and the program ffmpeg, which comes with it.
+
+    Raises:
+        ModuleNotFoundError: moviepy is not installed.
+        MissingDependencyError: It finds no ffmpeg that starts.
+    """
+    try:
+        from moviepy import config
+
+        starts, reason = config.try_cmd([config.FFMPEG_BINARY, "-version"])
+    except (OSError, RuntimeError) as e:  # moviepy looks for ffmpeg when it is imported
+        starts, reason = False, e
+    if not starts:
+        raise MissingDependencyError(
+            f'Videos need the program ffmpeg, which pip install "ikgym[video]" brings for most machines ({reason}).'
+        )
+
+
 def write_video(file: pathlib.Path, content: Iterable[Picture], fps: float) -> None:
     """Writes pictures as an H.264 video, in one go when all of them are drawn.
 
@@ -93,19 +112,27 @@ def write_video(file: pathlib.Path, content: Iterable[Picture], fps: float) -> N
 
     Raises:
         ModuleNotFoundError: moviepy is not installed.
-        ResultsError: The file cannot be written.
+        ResultsError: The file cannot be written, or ffmpeg has failed.
     """
+    with tempfile.TemporaryDirectory() as folder:
+        draft = pathlib.Path(folder) / "draft.mp4"
+        try:
+            _encode(draft, content, fps)
+            video = draft.read_bytes()
+        except OSError as e:
+            raise ResultsError(f"Cannot write {file}: ffmpeg has failed ({e}).") from None
+        write(file, video)
+
+
+def _encode(file: pathlib.Path, content: Iterable[Picture], fps: float) -> None:
     from moviepy.video.io.ffmpeg_writer import FFMPEG_VideoWriter
 
     left = iter(content)
     first = next(left)
-    with tempfile.TemporaryDirectory() as folder:
-        draft = pathlib.Path(folder) / "draft.mp4"
-        height, width, _ = first.shape
-        with FFMPEG_VideoWriter(str(draft), (width, height), fps, codec="libx264", preset="medium") as video:
-            for picture in itertools.chain([first], left):
-                video.write_frame(picture)
-        write(file, draft.read_bytes())
+    height, width, _ = first.shape
+    with FFMPEG_VideoWriter(str(file), (width, height), fps, codec="libx264", preset="medium") as video:
+        for picture in itertools.chain([first], left):
+            video.write_frame(picture)
 
 
 def _drawn(stage: Stage, replay: Replay, steps: npt.NDArray[np.int64], width: int) -> Iterator[Picture]:

@@ -10,14 +10,17 @@ from typing import Any
 import numpy as np
 import yourdfpy
 
-from baselines.viewer.readings import Reading
+from baselines.viewer.bodies import TOOL, size
+from baselines.viewer.readings import AT, FREE, Colour, Reading, share_colour
+from baselines.viewer.solids import add_mesh, recolour
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 from ikgym.rotations import quaternion
 from ikgym.validation import FloatArray
 
-# How far the tool may be elsewhere, in [m] and as parts of a rotation, for a file to be of an arm.
-TOLERANCE = 1e-3
+# How far the tool may be elsewhere, in [m] and as parts of a rotation, for a file to be of an arm: nobody sees that, and
+# files that have 1.57 for half of π are off by more than a millimetre.
+TOLERANCE = 5e-3
 # Postures at which that is looked at.
 POSTURES = 5
 
@@ -60,6 +63,8 @@ def read_urdf(file: pathlib.Path, arm: Arm) -> Any:
 class Meshes:
     """An arm with the meshes of a URDF file, see :class:`baselines.viewer.solids.Shape`.
 
+    Meshes keep the colours of their file; what a joint near a limit moves takes that of the limit.
+
     Args:
         server: Of viser.
         root: The name of the frame that it stands in.
@@ -70,19 +75,53 @@ class Meshes:
     def __init__(self, server: Any, root: str, model: Any, arm: Arm) -> None:
         self._model, self._arm = model, arm
         self._to_base = np.asarray(np.linalg.inv(_base(model, arm)), dtype=np.float64)
-        self._meshes = {
-            node: server.scene.add_mesh_trimesh(f"{root}/{number}", model.scene.geometry[model.scene.graph[node][1]])
+        self._meshes = [
+            _Mesh(server, f"{root}/{number}", model, node)
             for number, node in enumerate(model.scene.graph.nodes_geometry)
-        }
+        ]
+        self._joints = [_joint(model, arm.joint_names, mesh.node) for mesh in self._meshes]
+        self._tool = server.scene.add_icosphere(f"{root}/tool", radius=TOOL * size(arm))
 
     def show(self, q: FloatArray, reading: Reading) -> None:
-        """See :class:`baselines.viewer.solids.Shape`; meshes keep the colours of their file."""
-        del reading
+        """See :class:`baselines.viewer.solids.Shape`."""
         self._model.update_cfg(_configuration(self._model, self._arm.joint_names, q))
-        for node, mesh in self._meshes.items():
-            there = self._to_base @ self._model.get_transform(node)
-            mesh.position = there[:3, 3]
-            mesh.wxyz = quaternion(np.ascontiguousarray(there[:3, :3]))
+        for mesh, joint in zip(self._meshes, self._joints, strict=True):
+            mesh.show(self._to_base @ self._model.get_transform(mesh.node), _colour(reading, joint))
+        self._tool.position = self._arm.forward(q)[1]
+        recolour(self._tool, share_colour(reading.share))
+
+
+class _Mesh:
+    """A mesh of a model, and the same in one colour, one of which is seen."""
+
+    def __init__(self, server: Any, name: str, model: Any, node: str) -> None:
+        self.node = node
+        shape = model.scene.geometry[model.scene.graph[node][1]]
+        self._own = server.scene.add_mesh_trimesh(f"{name}/own", shape)
+        self._plain = add_mesh(server, f"{name}/plain", shape, AT, visible=False)
+
+    def show(self, there: FloatArray, colour: Colour) -> None:
+        """Moves it to where it is, of shape (4, 4)."""
+        position, wxyz = there[:3, 3], quaternion(np.ascontiguousarray(there[:3, :3]))
+        for mesh in (self._own, self._plain):
+            mesh.position, mesh.wxyz = position, wxyz
+        self._own.visible, self._plain.visible = colour == FREE, colour != FREE
+        recolour(self._plain, colour)
+
+
+def _joint(model: Any, names: Sequence[str], node: str) -> int | None:
+    """The joint of the arm that moves a mesh, the last one on the way to it; None where there is none."""
+    moved_by = {model.joint_map[name].child: number for number, name in enumerate(names)}
+    parents, link = model.scene.graph.transforms.parents, node
+    while link in parents:
+        link = parents[link]
+        if link in moved_by:
+            return moved_by[link]
+    return None
+
+
+def _colour(reading: Reading, joint: int | None) -> Colour:
+    return FREE if joint is None else reading.colours[joint]
 
 
 def _configuration(model: Any, names: Sequence[str], q: FloatArray) -> FloatArray:

@@ -19,8 +19,8 @@ Later = Callable[[Callable[[], object]], object]
 SPEEDS = (0.02, 0.05, 0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 50.0)
 
 LEGEND = (
-    "Drag the target, or a joint; *Play* goes back to the episode. Joints: grey free, yellow near a limit, red at it. "
-    "Tool: from red (singular) to green by its manipulability."
+    "Drag the target, or a joint; *Play* goes back to the episode. A joint is yellow near a limit, red at it. "
+    "The ball at the tool goes from red (singular) to green by its manipulability."
 )
 
 
@@ -41,7 +41,7 @@ class Panel:
         with gui.add_folder("Episode"):
             self._play = gui.add_button("Play")
             self._time = gui.add_slider("time [s]", 0.0, session.duration, session.duration / 1000.0, 0.0)
-            speed = gui.add_dropdown("speed", tuple(f"{s:g}" for s in SPEEDS), "1")
+            speed = gui.add_dropdown("speed", tuple(f"{s:g}" for s in SPEEDS), initial_value="1")
             apart = gui.add_checkbox("side by side", initial_value=True)
         with gui.add_folder("Now"):
             self._readings = gui.add_markdown("")

@@ -5,11 +5,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from ikgym.arms import Arm
 from ikgym.tasks import Task
 from ikgym.validation import FloatArray
+
+Colour = tuple[int, int, int]
 
 #: Colours (red, green, blue) of joints that are free, near a limit, and at one.
 FREE, NEAR, AT = (150, 150, 150), (230, 159, 0), (213, 94, 0)
@@ -29,13 +30,13 @@ class Reading(NamedTuple):
         manipulability: Yoshikawa's w = √det(J Jᵀ), of the linear rows where the task has no orientation.
         share: The same as a share of the largest among random postures, between 0 and 1.
         margins: Distances of the joints from their nearest limit in [rad] or [m], inf without limits. Shape (n,).
-        colours: Of the joints. Shape (n, 3).
+        colours: Of the n joints: :data:`FREE`, :data:`NEAR` or :data:`AT`.
     """
 
     manipulability: float
     share: float
     margins: FloatArray
-    colours: npt.NDArray[np.uint8]
+    colours: tuple[Colour, ...]
 
 
 class Reader:
@@ -63,11 +64,9 @@ class Reader:
     def read(self, q: FloatArray) -> Reading:
         """What is said of a posture, of shape (n,) in [rad] or [m]."""
         margins = np.minimum(q - self._arm.lower, self._arm.upper - q)
-        colours = np.full((self._arm.joints, 3), FREE, dtype=np.uint8)
-        colours[margins <= self._near] = NEAR
-        colours[margins <= TOUCHING] = AT
+        colours = map(_colour, margins.tolist(), self._near.tolist())
         found = float(self.manipulability(q))
-        return Reading(found, min(found / self.largest, 1.0) if self.largest else 0.0, margins, colours)
+        return Reading(found, min(found / self.largest, 1.0) if self.largest else 0.0, margins, tuple(colours))
 
 
 def slider_range(arm: Arm) -> tuple[FloatArray, FloatArray]:
@@ -83,8 +82,14 @@ def slider_range(arm: Arm) -> tuple[FloatArray, FloatArray]:
     )
 
 
-def share_colour(share: float) -> tuple[int, int, int]:
+def _colour(margin: float, near: float) -> Colour:
+    if margin > near:
+        return FREE
+    return NEAR if margin > TOUCHING else AT
+
+
+def share_colour(share: float) -> Colour:
     """From vermilion at 0, a singular posture, to bluish green at 1."""
     bad, good = np.array((213, 94, 0)), np.array((0, 158, 115))
-    red, green, blue = (bad + np.clip(share, 0.0, 1.0) * (good - bad)).astype(int).tolist()
+    red, green, blue = np.rint(bad + np.clip(share, 0.0, 1.0) * (good - bad)).astype(int).tolist()
     return red, green, blue

@@ -10,8 +10,9 @@ import numpy as np
 from baselines.evaluation.plots.style import COLOURS
 from baselines.viewer.approach import Pose
 from baselines.viewer.bodies import size
+from baselines.viewer.readings import Colour
 from baselines.viewer.session import Mode, Session, Shown
-from baselines.viewer.solids import Colour, Shape, Solids, segments
+from baselines.viewer.solids import Shape, Solids, segments
 from ikgym.rendering.style import GREEN, PALE_GREEN, stride, thinned
 from ikgym.rotations import quaternion
 from ikgym.validation import FloatArray
@@ -52,7 +53,9 @@ class Scene:
             scale=TARGET * whole,
             disable_rotations=not session.stage.scenario.task.has_orientation,
         )
+        self._target_at: Pose | None = None
         self.put_apart(apart=True)
+        self.show(session.shown())
 
     def put_apart(self, *, apart: bool) -> None:
         """Puts the arms beside each other, or all of them in one place."""
@@ -79,7 +82,14 @@ class Scene:
             _move(self._references[i], reference)
             for path in self._paths[i]:
                 path.visible = playing
-        if self._session.mode is not Mode.FOLLOW:  # then the target is where it has been dragged
+        self._show_target(reference)
+
+    def _show_target(self, reference: Pose) -> None:
+        """Moves the target with the reference; just when this has moved, or it would be taken out of a user's hand."""
+        if self._session.mode is Mode.FOLLOW:
+            self._target_at = None  # it is where it has been dragged
+        elif self._target_at is None or not all(map(np.array_equal, self._target_at, reference)):
+            self._target_at = reference
             _move(self.target, reference)
 
     def _reference(self, i: int) -> Any:

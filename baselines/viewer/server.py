@@ -61,7 +61,12 @@ class Viewer:
         self._scene = Scene(server, session, shaper and shaper(server))
         self._panel = Panel(server, session, self._asked.put, lambda apart: self._scene.put_apart(apart=apart))
         target = self._scene.target
-        target.on_update(lambda _: self._asked.put(lambda: session.aim(Pose.at(target.position, target.wxyz))))
+
+        def dragged(_: object) -> None:
+            pose = Pose.at(target.position, target.wxyz)  # now: the picture may move it before it comes to that
+            self._asked.put(lambda: session.aim(pose))
+
+        target.on_update(dragged)
         server.on_client_connect(lambda client: self._scene.look(client.camera))
         self._said = 0.0
 

@@ -9,11 +9,9 @@ import numpy as np
 import trimesh
 
 from baselines.viewer.bodies import BASE, Body, bodies, joint_frames
-from baselines.viewer.readings import FREE, Reading, share_colour
+from baselines.viewer.readings import FREE, Colour, Reading, share_colour
 from ikgym.arms import Arm
 from ikgym.validation import FloatArray
-
-Colour = tuple[int, int, int]
 
 
 class Shape(Protocol):
@@ -39,13 +37,8 @@ class Solids:
         self._frames = [server.scene.add_frame(name, show_axes=False) for name in names[1:]]
         self._joints: dict[int, Any] = {}
         for number, body in enumerate(bodies(arm)):
-            mesh = _mesh(body)
-            handle = server.scene.add_mesh_simple(
-                f"{names[body.frame - BASE]}/{body.kind}_{number}",
-                vertices=np.asarray(mesh.vertices, dtype=np.float32),
-                faces=np.asarray(mesh.faces, dtype=np.uint32),
-                color=colour if body.kind == "link" else FREE,
-            )
+            name = f"{names[body.frame - BASE]}/{body.kind}_{number}"
+            handle = add_mesh(server, name, _mesh(body), colour if body.kind == "link" else FREE)
             if body.joint is not None:
                 self._joints[body.joint] = handle
             if body.kind == "tool":
@@ -56,8 +49,18 @@ class Solids:
         for frame, position, wxyz in zip(self._frames, *joint_frames(self._arm, q), strict=True):
             frame.position, frame.wxyz = position, wxyz
         for joint, handle in self._joints.items():
-            _recolour(handle, tuple(reading.colours[joint].tolist()))
-        _recolour(self._tool, share_colour(reading.share))
+            recolour(handle, reading.colours[joint])
+        recolour(self._tool, share_colour(reading.share))
+
+
+def add_mesh(server: Any, name: str, mesh: Any, colour: Colour, *, visible: bool = True) -> Any:
+    """Adds a mesh of trimesh's in one colour, which can be changed.
+
+    Returns:
+        The handle of viser's.
+    """
+    vertices, faces = np.asarray(mesh.vertices, dtype=np.float32), np.asarray(mesh.faces, dtype=np.uint32)
+    return server.scene.add_mesh_simple(name, vertices=vertices, faces=faces, color=colour, visible=visible)
 
 
 def segments(points: FloatArray) -> FloatArray:
@@ -79,7 +82,7 @@ def _mesh(body: Body) -> Any:
     return trimesh.creation.cylinder(body.radius, segment=[body.start, body.end], sections=24)
 
 
-def _recolour(handle: Any, colour: Any) -> None:
-    # Each change is a message to the browser.
+def recolour(handle: Any, colour: Colour) -> None:
+    """Changes the colour of a handle of viser's, if it is another one: each change is a message to the browser."""
     if tuple(handle.color) != colour:
         handle.color = colour

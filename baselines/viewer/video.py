@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import importlib
 import pathlib
 import sys
 from collections.abc import Sequence
@@ -14,7 +13,7 @@ import tyro
 from tqdm import tqdm
 
 from baselines import command
-from baselines.viewer.film import checked_width, moments, pictures, write_video
+from baselines.viewer.film import check_ffmpeg, checked_width, moments, pictures, write_video
 from baselines.viewer.replay import Stage, named, play
 from ikgym.exceptions import InvalidInputError
 
@@ -68,7 +67,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _film(options: Options) -> int:
     command.find_own_modules()
-    importlib.import_module("moviepy")  # what is missing is said before episodes are played
+    check_ffmpeg()  # what is missing is said before episodes are played
     if options.out.suffix != ".mp4":
         raise InvalidInputError(f"out: expected a file that ends in .mp4, got {str(options.out)!r}.")
     width, names = checked_width(options.width), named(options.policy)

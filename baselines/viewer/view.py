@@ -92,7 +92,7 @@ def main(arguments: Sequence[str] | None = None, stop: threading.Event | None = 
 
         port = free_port(options.host, options.port)
         stage = Stage.of(options.scenario, options.seed, options.steps)
-        shaper = _shaper(stage, options.urdf)
+        shaper = shaper_of(stage, options.urdf)
         session = session_of(stage, options.policy, progress=True)
         with serving(options.host, port) as server:
             viewer = Viewer(server, session, shaper)
@@ -103,8 +103,12 @@ def main(arguments: Sequence[str] | None = None, stop: threading.Event | None = 
     return command.run(work)
 
 
-def _shaper(stage: Stage, file: pathlib.Path | None) -> Any:
+def shaper_of(stage: Stage, file: pathlib.Path | None) -> Any:
     """Who makes the arms from meshes; None where they are cylinders.
+
+    Args:
+        stage: What policies are shown on.
+        file: A URDF file of the arm; the one that the arm was read from if left out.
 
     Raises:
         InvalidInputError: The file that was given is not of the arm.
@@ -120,7 +124,7 @@ def _shaper(stage: Stage, file: pathlib.Path | None) -> Any:
     except InvalidInputError as e:
         if file is not None:
             raise
-        command.complain(f"{e} Cylinders are shown.")
+        print(f"Cylinders are shown: {e}", file=sys.stderr)
         return None
     # Each arm in the scene moves a model of its own.
     return lambda server: lambda root, _: Meshes(server, root, read_urdf(source, arm), arm)

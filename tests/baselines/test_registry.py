@@ -89,6 +89,7 @@ def test_names_import_no_policy_and_read_no_agent():
             "baselines.evaluation", "matplotlib", "plotly", "torch", "ray", "minari", "h5py", "optuna"))])
         print([file for file in opened if file.endswith(".safetensors")])
         assert len(opened) > 10
+        assert not {"moviepy", "trimesh", "viser", "yourdfpy"} & set(sys.modules)
         """
     )
     assert printed == "[]\n[]\n"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from stable_baselines3 import PPO
@@ -11,6 +13,7 @@ from baselines.evaluate import evaluate
 from baselines.training import callback as callbacks
 from baselines.training.callback import ValidationCallback
 from baselines.training.validation import validation_seeds
+from docs.tables import PAGES
 from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 from ikgym.sb3 import RedundantIKVecEnv
@@ -47,6 +50,16 @@ def test_what_is_logged_is_what_is_measured(scenario, tmp_path, monkeypatch):
     assert logged["position_error_rms_mm"] == pytest.approx(wanted, rel=1e-9)
     wanted = 1e3 * np.mean([row.orientation_error_max for row in rows])
     assert logged["orientation_error_max_mrad"] == pytest.approx(wanted, rel=1e-9)
+
+
+@pytest.mark.slow
+def test_the_snippet_of_the_page_logs_to_tensorboard(tmp_path, monkeypatch):
+    snippets = re.findall(r"```python\n(.*?)```", (PAGES / "agents.md").read_text(encoding="utf-8"), re.DOTALL)
+    (snippet,) = [snippet for snippet in snippets if "ValidationCallback" in snippet]
+    monkeypatch.chdir(tmp_path)
+    exec(snippet, {})
+    names = EventAccumulator(str(tmp_path / "runs" / "mine" / "PPO_1")).Reload().Tags()["scalars"]
+    assert {"validation/cost_ratio", "validation/position_error_max_mm", "validation/position_error_rms_mm"} <= {*names}
 
 
 def test_costs_are_over_the_best_known_where_there_is_one(scenario):

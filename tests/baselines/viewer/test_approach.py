@@ -27,9 +27,7 @@ def near(pose, other):
     np.testing.assert_allclose(pose.rotation, other.rotation, atol=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("distance", "angle", "steps"), [(0.5, 0.0, 50), (0.0, 1.0, 20), (0.5, 1.0, 50), (0.1, 2.0, 40)]
-)
+@pytest.mark.parametrize(("distance", "angle", "steps"), WAYS)
 def test_it_arrives_after_the_steps_that_the_slower_part_needs(distance, angle, steps):
     way, target = approach(distance, angle)
     near(way.pose, START)

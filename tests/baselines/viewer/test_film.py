@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
+import sys
 
 import numpy as np
 import pytest
 
 from baselines.console import main
+from baselines.files import ResultsError
 from baselines.viewer import film
 from baselines.viewer.film import checked_width, moments, pictures, write_video
 from baselines.viewer.replay import Stage, play
@@ -109,9 +112,32 @@ def test_mistakes(options, message, capsys, tmp_path, monkeypatch):
 
 
 def test_without_moviepy_the_extra_is_named(capsys, monkeypatch):
-    import sys
-
     monkeypatch.setitem(sys.modules, "moviepy", None)
     monkeypatch.setattr(film, "pictures", None)  # nothing is drawn before
     assert main(["video", "--out", "x.mp4"]) == 2
     assert capsys.readouterr().err == 'error: This needs moviepy: pip install "ikgym[video]"\n'
+
+
+@pytest.mark.parametrize("found", [True, False])
+def test_without_ffmpeg_the_extra_is_named(found, capsys, monkeypatch, tmp_path):
+    """Whether moviepy has found one that does not start, or none when it was imported."""
+    config = pytest.importorskip("moviepy.config")
+    if found:
+        monkeypatch.setattr(config, "FFMPEG_BINARY", str(tmp_path / "ffmpeg"))
+    else:
+        monkeypatch.setenv("FFMPEG_BINARY", str(tmp_path / "ffmpeg"))
+        monkeypatch.delitem(sys.modules, "moviepy.config")
+        monkeypatch.delattr("moviepy.config")
+    monkeypatch.setattr(film, "pictures", None)  # nothing is drawn before
+    assert main(["video", "--out", "x.mp4"]) == 2
+    assert capsys.readouterr().err.startswith(
+        'error: Videos need the program ffmpeg, which pip install "ikgym[video]" brings for most machines ('
+    )
+
+
+def test_an_ffmpeg_that_fails_is_an_error(tmp_path, monkeypatch):
+    writer = pytest.importorskip("moviepy.video.io.ffmpeg_writer")
+    monkeypatch.setattr(writer, "FFMPEG_BINARY", shutil.which("false"))
+    with pytest.raises(ResultsError, match="ffmpeg has failed"):
+        write_video(tmp_path / "x.mp4", [np.zeros((240, 480, 3), dtype=np.uint8)] * 2, 30.0)
+    assert list(tmp_path.iterdir()) == []

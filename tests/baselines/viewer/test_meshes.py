@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import types
+
 import numpy as np
 import pytest
 
 import ikgym
-from baselines.viewer.readings import Reader
+from baselines.viewer.readings import AT, NEAR, Reader, share_colour
+from baselines.viewer.replay import Stage
+from baselines.viewer.view import shaper_of
 from ikgym.exceptions import InvalidInputError
+from ikgym.trajectories import Sinusoid
 
 pytest.importorskip("yourdfpy")
 trimesh = pytest.importorskip("trimesh")
@@ -22,7 +27,7 @@ def arm():
     """Two links of 1 m in a plane, the base of which is 0.5 m above the floor."""
     return ikgym.Arm(
         name="two", offsets=[[0.0, 0.0, 0.5], [1.0, 0.0, 0.0]], axes=[[0.0, 0.0, 1.0]] * 2, tool=[1.0, 0.0, 0.0],
-        joint_names=JOINTS,
+        lower=[-1.0, -1.0], upper=[1.0, 1.0], joint_names=JOINTS,
     )  # fmt: skip
 
 
@@ -47,22 +52,54 @@ class Server:
     def __init__(self):
         self.scene, self.handles = self, {}
 
-    def add_mesh_trimesh(self, name, mesh):
-        self.handles[name] = handle = type("Handle", (), {"mesh": mesh})()
+    def add(self, name, mesh=None, color=(0, 0, 0), visible=True, **content):
+        self.handles[name] = handle = types.SimpleNamespace(mesh=mesh, color=color, visible=visible)
         return handle
 
+    add_mesh_trimesh = add_mesh_simple = add_icosphere = add
 
-def test_meshes_move_with_the_arm(arm, tmp_path):
-    server = Server()
-    shown = meshes.Meshes(server, "/root", meshes.read_urdf(urdf(tmp_path), arm), arm)
-    q = np.array([0.3, 0.9])
-    shown.show(q, Reader(arm, ikgym.tasks.get("position")).read(q))
-    assert [name.rpartition("/")[0] for name in server.handles] == ["/root", "/root"]
-    places = np.array([handle.position for handle in server.handles.values()])
-    np.testing.assert_allclose(places, arm.joint_points(q)[:, 1], atol=1e-6)
-    last = list(server.handles.values())[-1]
-    np.testing.assert_allclose(last.wxyz, [np.cos(0.6), 0.0, 0.0, np.sin(0.6)], atol=1e-6)
+
+@pytest.fixture
+def server():
+    return Server()
+
+
+@pytest.fixture
+def shown(arm, server, tmp_path):
+    """Shows a posture."""
+    made = meshes.Meshes(server, "/root", meshes.read_urdf(urdf(tmp_path), arm), arm)
+    return lambda q: made.show(np.array(q), Reader(arm, ikgym.tasks.get("position")).read(np.array(q)))
+
+
+def seen(server):
+    return {name: handle for name, handle in server.handles.items() if handle.visible}
+
+
+def test_meshes_move_with_the_arm(arm, server, shown):
+    shown([0.3, 0.5])
+    assert list(seen(server)) == ["/root/0/own", "/root/1/own", "/root/tool"]
+    places = np.array([handle.position for handle in seen(server).values()])
+    wanted = [*arm.joint_points(np.array([0.3, 0.5]))[:, 1], arm.forward(np.array([0.3, 0.5]))[1]]
+    np.testing.assert_allclose(places, wanted, atol=1e-6)
+    last = server.handles["/root/1/own"]
+    np.testing.assert_allclose(last.wxyz, [np.cos(0.4), 0.0, 0.0, np.sin(0.4)], atol=1e-6)
     np.testing.assert_allclose(last.mesh.bounds[:, 0], [0.0, 1.0], atol=1e-6)
+
+
+@pytest.mark.parametrize(("elbow", "colour"), [(0.99, NEAR), (1.0, AT)])
+def test_what_a_joint_near_its_limit_moves_has_the_colour_of_the_limit(server, shown, elbow, colour):
+    shown([0.3, elbow])
+    assert list(seen(server)) == ["/root/0/own", "/root/1/plain", "/root/tool"]
+    handle = server.handles["/root/1/plain"]
+    assert handle.color == colour
+    np.testing.assert_allclose(handle.wxyz, [np.cos((0.3 + elbow) / 2), 0.0, 0.0, np.sin((0.3 + elbow) / 2)], atol=1e-6)
+    shown([0.3, 0.5])
+    assert "/root/1/own" in seen(server)
+
+
+def test_the_ball_at_the_tool_says_how_manipulable_the_arm_is(server, shown):
+    shown([0.3, 0.0])
+    assert server.handles["/root/tool"].color == share_colour(0.0)
 
 
 @pytest.mark.parametrize(
@@ -85,3 +122,27 @@ def test_files_that_cannot_be_read(arm, tmp_path):
     broken.write_text("<robot")
     with pytest.raises(InvalidInputError, match="cannot be read"):
         meshes.read_urdf(broken, arm)
+
+
+@pytest.fixture
+def stage(tmp_path):
+    """Makes a stage for an arm that was read from a URDF file."""
+    pytest.importorskip("pinocchio")
+
+    def made(**changes):
+        arm = ikgym.arms.from_urdf(urdf(tmp_path, **changes))
+        sinusoid, task = Sinusoid(np.array([0.1, 0.2])), ikgym.tasks.get("position")
+        return Stage.of(ikgym.Scenario("mine", arm, task, sinusoid, velocity_limit=3.0, steps=2))
+
+    return made
+
+
+def test_an_arm_from_a_file_with_meshes_is_shown_with_them(stage, server):
+    shaper = shaper_of(stage(), None)
+    assert isinstance(shaper(server)("/root", AT), meshes.Meshes)
+    assert list(seen(server)) == ["/root/0/own", "/root/1/own", "/root/tool"]
+
+
+def test_an_arm_from_a_file_without_meshes_is_shown_as_cylinders(stage, capsys):
+    assert shaper_of(stage(shape=""), None) is None
+    assert "Cylinders are shown: urdf:" in capsys.readouterr().err
