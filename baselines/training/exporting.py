@@ -49,7 +49,7 @@ def export(
         network, tanh = _unsquashed(network_of_model(model.policy, model.policy_kwargs))
         gain = learning.largest if tanh else learning.share
     else:
-        network, tanh, gain = _layers(actor.network), hasattr(model.policy, "critic"), 1.0
+        network, tanh, gain = _layers(actor.network), hasattr(model.policy, "critic"), learning.largest
     squash: Squash = "tanh" if tanh else "clip"
     ahead = offsets(learning.preview)
     processing = Relative(ahead, learning.furthest, learning.largest, gain, squash, actor is not None)

@@ -96,7 +96,7 @@ def test_actions_are_in_the_unit_of_what_is_asked_for():
     features, _ = agent.reset(seed=1, options={"step": 300})
     env.reset(seed=1, options={"step": 300})
     n, w = 7, 6
-    due, share = features[-n - 1 - w : -n - 1], features[-n - 1]
+    due, share, seen = features[:w], features[w], features[3 * n : 4 * n]
     # The direction is v̂ / (0.2 + |v̂|), beside 0.2 / (0.2 + |v̂|): together they have a length of 1.
     assert math.isclose(np.linalg.norm(due) + share, 1.0, rel_tol=1e-6)
     moved, *_ = env.step(np.ones(n, dtype=np.float32))
@@ -104,7 +104,7 @@ def test_actions_are_in_the_unit_of_what_is_asked_for():
     assert np.allclose(moved["qdot"], moved["qdot"][0])  # every joint the same velocity
     velocity = (before[300] - before[299]) / scenario.dt
     unit = moved["qdot"][0] / 0.5
-    assert np.allclose(features[-n:], np.clip(velocity / unit, -4.0, 4.0), atol=1e-5)
+    assert np.allclose(seen, np.clip(velocity / unit, -4.0, 4.0), atol=1e-5)
 
 
 def test_rewards_are_logarithms_and_a_lost_track_is_charged():

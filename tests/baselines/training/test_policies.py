@@ -66,12 +66,12 @@ def test_weights_of_the_bilinear_actor_are_trained(kind, policy, parameters):
 def test_actions_are_homogeneous_in_what_is_due():
     """Twice as far from the path, the velocity that takes it back is twice as large: G does not change."""
     model = PPO(BilinearPPOPolicy, ikgym.sb3.make_vec(scenario(), 2), device="cpu", seed=0, **SHORT)
-    actor = model.policy.mlp_extractor.policy_net
+    actor = model.policy.mlp_extractor.policy_net.actor
     features = torch.from_numpy(rl.make(scenario()).reset(seed=0)[0])[None]
     n, w = actor.joints, actor.twist
+    assert (n, w) == (7, 6)
     rows = actor.network(features).reshape(n, w + 1)
-    due = features[0, -n - 1 - w : -n - 1]
-    wanted = (rows[:, :w] @ due + rows[:, w] * features[0, -n - 1] / 0.2) / actor.share
+    wanted = rows[:, :w] @ features[0, :w] + rows[:, w] * features[0, w] / 0.2
     assert torch.allclose(actor(features)[0], wanted, atol=1e-6)
 
 
