@@ -25,7 +25,7 @@ from ikgym.sb3 import LearningVecEnv
 
 
 def export(
-    model: BaseAlgorithm, envs: LearningVecEnv, file: pathlib.Path, training: Mapping[str, Any] | None = None
+    model: BaseAlgorithm, envs: LearningVecEnv, file: str | pathlib.Path, training: Mapping[str, Any] | None = None
 ) -> str:
     """Writes a model as an agent that needs no learning library: ``ikgym evaluate --policies agent:FILE`` plays it.
 
@@ -60,7 +60,7 @@ def export(
             f"model: expected a network from {needed[0]} features to {needed[1]} outputs, got {sizes[0]} and "
             f"{sizes[1]}; agents see no history and no commands."
         )
-    return save_agent(file, network, processing, scenario, training)
+    return save_agent(pathlib.Path(file), network, processing, scenario, training)
 
 
 def _unsquashed(network: Network) -> tuple[Network, bool]:

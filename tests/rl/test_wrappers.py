@@ -107,6 +107,27 @@ def test_actions_are_in_the_unit_of_what_is_asked_for():
     assert np.allclose(seen, np.clip(velocity / unit, -4.0, 4.0), atol=1e-5)
 
 
+@pytest.mark.parametrize(("name", "turned"), [
+    ("varga7-random", False), ("varga7-pose-random", True), ("tiago-turn", False), ("panda-random", True),
+])  # fmt: skip
+def test_what_joints_can_do_is_their_column_of_the_jacobian_times_what_is_due(name, turned):
+    env = ikgym.RedundantIKEnv(name, preview=PREVIEW)
+    env.reset(seed=2)
+    seen, *_ = env.step(np.full(env.action_space.shape, 0.5, dtype=np.float32))
+    scenario, agent = env.scenario, rl.AgentObservation(env)
+    features = agent.observation(seen).astype(np.float64)
+    assert agent.observation_space.contains(features.astype(np.float32))
+    rotation, _, jacobian = scenario.model.forward_and_jacobian(seen["q"])
+    if scenario.task.name == "skew":
+        jacobian = scenario.task.jacobian(rotation, jacobian)
+    due, n = features[:6].reshape(2, 3), scenario.joints
+    if turned:
+        due = due @ ikgym.rotations.rodrigues(scenario.model.chain.axes[0], seen["q"][0]).T
+    products = np.concatenate([jacobian[:3].T @ due[0], jacobian[3:].T @ due[1]])
+    assert np.allclose(features[7 : 7 + 2 * n], products, atol=1e-6)
+    assert np.ptp(products) > 0.1
+
+
 def test_rewards_are_logarithms_and_a_lost_track_is_charged():
     kept = {"scenario": short(), "preview": PREVIEW, "lost_distance": 0.05}
     plain, env = gym.make("RedundantIK-v0", **kept), rl.LogReward(gym.make("RedundantIK-v0", **kept), 0.1, 50.0)
