@@ -34,10 +34,12 @@ class AgentView:
         furthest: Where |v̂| is cut, above 0.
 
     Raises:
-        InvalidInputError: The environment shows less than two reference poses, or `furthest` is out of its range.
+        InvalidInputError: The environment is another, its observation has been changed, it shows less than two
+            reference poses, or `furthest` is out of its range.
     """
 
     def __init__(self, env: Any, furthest: float) -> None:
+        space = _own_space(env)
         scenario, preview = env.unwrapped.scenario, env.unwrapped.preview
         if len(preview) < 2:
             raise InvalidInputError(f"preview: expected at least two steps ahead, got {preview}.")
@@ -45,7 +47,6 @@ class AgentView:
         offsets = np.array(preview, dtype=np.int64)
         self._kind, self._chain = scenario.task.kind, scenario.model.chain
         self._ahead = scenario.dt, offsets, self.furthest
-        space = getattr(env.unwrapped, "single_observation_space", env.unwrapped.observation_space)
         self._more = [key for key in ("q_age", "pose_age", "commands") if key in space.spaces]
         bounds = [bound(scenario, len(preview)), *(self._bound(key, space[key]) for key in self._more)]
         lower, upper = np.concatenate([low for low, _ in bounds]), np.concatenate([high for _, high in bounds])
@@ -78,6 +79,18 @@ class AgentView:
     def _bound(key: str, space: spaces.Box) -> tuple[FloatArray, FloatArray]:
         limit = np.ones(math.prod(space.shape))
         return (-FASTEST * limit, FASTEST * limit) if key == "commands" else (0.0 * limit, limit)
+
+
+def _own_space(env: Any) -> spaces.Dict:
+    """The space of what an environment of this package shows, of one row."""
+    if not isinstance(getattr(env.unwrapped, "scenario", None), Scenario):
+        raise InvalidInputError(f"env: expected an environment RedundantIK-v0, single or vector, got {env}.")
+    name = "single_observation_space" if hasattr(env, "single_observation_space") else "observation_space"
+    space, own = getattr(env, name), getattr(env.unwrapped, name)
+    if space != own:
+        raise InvalidInputError(f"env: expected its own observation, wrapped by nothing that changes it, got {space}.")
+    found: spaces.Dict = own
+    return found
 
 
 def bound(scenario: Scenario, shown: int) -> tuple[FloatArray, FloatArray]:

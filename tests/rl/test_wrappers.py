@@ -156,6 +156,12 @@ def test_wrong_use_is_refused():
         rl.make(short(), preview=1)
     with pytest.raises(UnknownNameError, match="lost_distance"):
         rl.make(short(), lost_distanc=1.0)
+    with pytest.raises(InvalidInputError, match="RedundantIK-v0"):
+        rl.RelativeAction(gym.make("CartPole-v1"))
+    with pytest.raises(InvalidInputError, match="its own observation"):
+        rl.RelativeAction(env)
+    with pytest.raises(InvalidInputError, match="its own observation"):
+        rl.vector.RelativeAction(envs)
     for wrong in ({"lost_distance": 0.0}, {"share": 0.0}, {"scale": -1.0}, {"charge": 0.5}, {"history": 0}):
         with pytest.raises(InvalidInputError):
             rl.make(short(), **wrong)

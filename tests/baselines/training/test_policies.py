@@ -28,11 +28,11 @@ def scenario():
 
 @pytest.mark.parametrize(("kind", "policy", "parameters"), [
     (PPO, "MlpPolicy", SHORT),
-    pytest.param(SAC, "MlpPolicy", LATE, marks=pytest.mark.slow),
-    pytest.param(TD3, "MlpPolicy", LATE, marks=pytest.mark.slow),
+    (SAC, "MlpPolicy", LATE),
+    (TD3, "MlpPolicy", LATE),
     (PPO, BilinearPPOPolicy, SHORT),
     (SAC, BilinearSACPolicy, LATE),
-    pytest.param(TD3, BilinearTD3Policy, LATE, marks=pytest.mark.slow),
+    (TD3, BilinearTD3Policy, LATE),
 ])  # fmt: skip
 def test_models_learn_and_act_the_same_from_their_file(tmp_path, kind, policy, parameters):
     envs = ikgym.sb3.make_vec(scenario(), 2)
@@ -73,6 +73,23 @@ def test_actions_are_homogeneous_in_what_is_due():
     rows = actor.network(features).reshape(n, w + 1)
     wanted = rows[:, :w] @ features[0, :w] + rows[:, w] * features[0, w] / 0.2
     assert torch.allclose(actor(features)[0], wanted, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("name", "changes", "size"),
+    [("planar2-bent", {}, 3), ("panda-camera-slow", {"history": 2, "commands": 2}, 6), ("tiago-turn", {}, 6)],
+)
+def test_the_space_says_how_many_features_are_due(name, changes, size):
+    """Bilinear actors suit all arms and tasks, and whatever else is observed."""
+    envs = ikgym.sb3.make_vec(name, 2, **changes)
+    model = PPO(BilinearPPOPolicy, envs, device="cpu", seed=0, **SHORT).learn(16)
+    actor = model.policy.mlp_extractor.policy_net.actor
+    assert (actor.twist, actor.joints) == (size, envs.scenario.joints)
+
+
+def test_exploration_that_depends_on_the_state_is_refused():
+    with pytest.raises(InvalidInputError, match="use_sde"):
+        SAC(BilinearSACPolicy, ikgym.sb3.make_vec(scenario(), 2), device="cpu", use_sde=True, **LATE)
 
 
 def test_agents_with_a_history_are_not_exported(tmp_path):
