@@ -48,6 +48,7 @@ def statements(snippet: str) -> list[str]:
     return [line for line in snippet.splitlines() if line.strip() and not line.startswith(("import", "from"))]
 
 
+@pytest.mark.usefixtures("one_thread")
 def test_readme_snippets_run(capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     snippets = [snippet for snippet in re.findall(r"```python\n(.*?)```", README, re.DOTALL) if "class" not in snippet]

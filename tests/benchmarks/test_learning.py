@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-import torch
+import pytest
 from stable_baselines3 import PPO
 
 from benchmarks import learning
@@ -30,14 +30,11 @@ def test_a_linear_law_of_the_features_follows_paths_to_centimetres():
     assert np.median(lost) > 0.15
 
 
+@pytest.mark.usefixtures("one_thread")
 def test_training_ends_in_time_and_says_how_far_it_is(monkeypatch, capsys):
     def short(policy, envs, **parameters):
         return PPO(policy, envs, n_steps=8, batch_size=16, n_epochs=1, **parameters)
 
     monkeypatch.setattr(learning, "PPO", short)
-    threads = torch.get_num_threads()
-    try:
-        learning.main(["--minutes", "0.001", "--episodes", "2", "--every", "1000"])
-    finally:
-        torch.set_num_threads(threads)
+    learning.main(["--minutes", "0.001", "--episodes", "2", "--every", "1000"])
     assert "validation: median" in capsys.readouterr().out

@@ -18,6 +18,8 @@ from baselines.training.policies import BilinearPPOPolicy, BilinearSACPolicy, Bi
 from ikgym import rl
 from ikgym.exceptions import InvalidInputError
 
+pytestmark = pytest.mark.usefixtures("one_thread")
+
 SHORT = {"n_steps": 8, "batch_size": 16, "n_epochs": 1}
 LATE = {"learning_starts": 8, "batch_size": 8, "buffer_size": 100}
 
