@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import time
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -49,7 +50,7 @@ class Watch(BaseCallback):
     def _on_step(self) -> bool:
         now = time.process_time()
         self._spent, self._since = self._spent + now - self._since, now
-        self._bar.update(self._spent / 60.0 - self._bar.n)
+        self._bar.update(min(self._spent / 60.0, self._bar.total) - self._bar.n)
         return bool(self._spent < 60.0 * self._arguments.minutes)
 
     def _on_rollout_start(self) -> None:
@@ -59,6 +60,9 @@ class Watch(BaseCallback):
         self._rollouts += 1
         self._since = time.process_time()  # validation does not count
 
+    def _on_training_end(self) -> None:
+        self._bar.close()
+
 
 def said(model: Any, arguments: argparse.Namespace, split: str, spent: float, steps: int) -> str:
     """One line of what has been reached."""
@@ -67,17 +71,21 @@ def said(model: Any, arguments: argparse.Namespace, split: str, spent: float, st
     return f"{spent / 60.0:6.2f} min {steps:9d} steps  {split}: median {median:8.2f} mm, 9 of 10 {p90:8.2f} mm"
 
 
-def main() -> None:
-    """Trains and measures."""
+def main(given: Sequence[str] | None = None) -> None:
+    """Trains and measures.
+
+    Args:
+        given: Of the command line; that of this process if left out.
+    """
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--minutes", type=float, default=10.0, help="of processor time")
     parser.add_argument("--scenario", default="panda-random")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--episodes", type=int, default=64, help="that are followed")
     parser.add_argument("--every", type=int, default=8, help="rollouts between two validations")
-    parser.add_argument("--threads", type=int, default=2, help="of PyTorch")
+    parser.add_argument("--threads", type=int, default=1, help="of PyTorch")
     parser.add_argument("--test", action="store_true", help="measure on the test episodes in the end: once")
-    arguments = parser.parse_args()
+    arguments = parser.parse_args(given)
     torch.set_num_threads(arguments.threads)
     model = PPO("MlpPolicy", ikgym.sb3.make_vec(arguments.scenario, 8), seed=arguments.seed, device="cpu")
     watch = Watch(arguments)

@@ -16,3 +16,14 @@ settings.load_profile("ikgym")
 def optima_of_our_own(tmp_path_factory):
     """Tests neither read nor fill the user's folder of optima."""
     os.environ["IKGYM_CACHE"] = str(tmp_path_factory.mktemp("optima"))
+
+
+@pytest.fixture
+def one_thread():
+    """Torch's threads spend their time waiting for each other in networks this small."""
+    import torch
+
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    yield
+    torch.set_num_threads(before)

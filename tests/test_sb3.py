@@ -9,7 +9,6 @@ import warnings
 import gymnasium as gym
 import numpy as np
 import pytest
-import torch
 from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.monitor import Monitor
@@ -295,15 +294,6 @@ def test_evaluate_policy():
         results.append(evaluate_policy(policy, env, n_eval_episodes=6, return_episode_rewards=True))
     assert results[0] == results[1] == results[2]
     assert results[0][1] == [5] * 6
-
-
-@pytest.fixture
-def one_thread():
-    """Torch's threads spend their time waiting for each other in networks this small."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(before)
 
 
 LEARNERS = {

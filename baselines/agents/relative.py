@@ -92,7 +92,7 @@ class Relative(Frozen):
         """The number of features."""
         kind = problem.task.kind
         w, shown = int(twist_size(kind)), int(shown_joints(kind, problem.model.chain.prismatic))
-        return shown + len(self.offsets) * w + 3 + problem.model.joints
+        return shown + len(self.offsets) * w + 3 + (w // 3 + 1) * problem.model.joints
 
     def outputs(self, problem: Problem) -> int:
         """The number of network outputs."""
@@ -103,7 +103,7 @@ class Relative(Frozen):
         """The features of a batch; see :meth:`baselines.agents.features.Processing.features`."""
         del base
         out, unit = np.empty((len(batch.q), self.size(problem)), np.float32), np.empty(len(batch.q))
-        observe_rows(*self._constants(problem), *batch[:5], out, unit)
+        observe_rows(problem.task.kind, problem.model.chain, *self._ahead(problem), *batch[:5], out, unit)
         return out
 
     def action(
@@ -112,7 +112,7 @@ class Relative(Frozen):
         """Actions, as fractions of the velocity limit; see :meth:`baselines.agents.features.Processing.action`."""
         del base
         unit, n = np.empty(len(batch.q)), problem.model.joints
-        unit_rows(*self._constants(problem), batch.q, batch.pose, batch.nominal, unit)
+        unit_rows(problem.task.kind, *self._ahead(problem), batch.pose, batch.nominal, unit)
         said = output.astype(np.float64)
         if self.bilinear:
             said = asked(said, self.features(problem, batch), n)
@@ -124,14 +124,12 @@ class Relative(Frozen):
         velocity: FloatArray = said * unit[:, None] / problem.velocity_limit
         return velocity
 
-    def _constants(self, problem: Problem) -> tuple[Any, ...]:
-        chain = problem.model.chain
-        ahead = np.array(self.offsets, dtype=np.int64)
-        return problem.task.kind, chain.prismatic, chain.axes[0], problem.dt, ahead, self.furthest
+    def _ahead(self, problem: Problem) -> tuple[Any, ...]:
+        return problem.dt, np.array(self.offsets, dtype=np.int64), self.furthest
 
 
 def asked(output: FloatArray, features: Features, n: int) -> FloatArray:
-    """(G v̂ + h) / (0.2 + |v̂|) from network outputs and the features that end with v̂ / (0.2 + |v̂|) and what follows.
+    """(G v̂ + h) / (0.2 + |v̂|) from network outputs and the features that begin with v̂ / (0.2 + |v̂|).
 
     Args:
         output: Row j of G and h_j, joint by joint. Shape (B, n (w + 1)).
@@ -143,7 +141,7 @@ def asked(output: FloatArray, features: Features, n: int) -> FloatArray:
     """
     rows = output.reshape(len(output), n, -1)
     w = rows.shape[2] - 1
-    due = features[:, -n - 1 - w : -n].astype(np.float64)
+    due = features[:, : w + 1].astype(np.float64)
     due[:, w] /= LEAST
     out: FloatArray = (rows * due[:, None]).sum(axis=2)
     return out

@@ -25,7 +25,7 @@ from ikgym.sb3 import LearningVecEnv
 
 
 def export(
-    model: BaseAlgorithm, envs: LearningVecEnv, file: pathlib.Path, training: Mapping[str, Any] | None = None
+    model: BaseAlgorithm, envs: LearningVecEnv, file: str | pathlib.Path, training: Mapping[str, Any] | None = None
 ) -> str:
     """Writes a model as an agent that needs no learning library: ``ikgym evaluate --policies agent:FILE`` plays it.
 
@@ -49,7 +49,7 @@ def export(
         network, tanh = _unsquashed(network_of_model(model.policy, model.policy_kwargs))
         gain = learning.largest if tanh else learning.share
     else:
-        network, tanh, gain = _layers(actor.network), hasattr(model.policy, "critic"), 1.0
+        network, tanh, gain = _layers(actor.network), hasattr(model.policy, "critic"), learning.largest
     squash: Squash = "tanh" if tanh else "clip"
     ahead = offsets(learning.preview)
     processing = Relative(ahead, learning.furthest, learning.largest, gain, squash, actor is not None)
@@ -60,7 +60,7 @@ def export(
             f"model: expected a network from {needed[0]} features to {needed[1]} outputs, got {sizes[0]} and "
             f"{sizes[1]}; agents see no history and no commands."
         )
-    return save_agent(file, network, processing, scenario, training)
+    return save_agent(pathlib.Path(file), network, processing, scenario, training)
 
 
 def _unsquashed(network: Network) -> tuple[Network, bool]:

@@ -1,4 +1,4 @@
-"""Kernels of what agents see: joint coordinates, and the twists ahead in the unit of their own speed."""
+"""Kernels of what agents see: what is due, what joints can do about it, and the twists ahead, in their own unit."""
 
 from __future__ import annotations
 
@@ -6,7 +6,9 @@ import math
 
 import numpy as np
 
+from ikgym import task_kernels
 from ikgym.jit import kernel
+from ikgym.kinematics import forward_and_jacobian
 from ikgym.rl.twists import is_turned, turn, twist, twist_size
 
 #: Added to the speed of what is ahead, in [m/s], [rad/s] or [1/s]: at rest there is nothing to measure by.
@@ -76,28 +78,23 @@ def feature_row(kind, prismatic, axis, q, ahead, speed, remaining, out):
 
 
 @kernel
-def command_unit(kind, prismatic, axis, lead, furthest, q, pose, nominal, speed, error, due):
+def command_unit(kind, lead, furthest, pose, nominal, speed, error, due):
     """The twist that is due, as a share of itself and a little more, and the unit of velocities that goes with it.
 
     Args:
         kind: Of task coordinates.
-        prismatic: Which joints are prismatic. Shape (n,).
-        axis: Of joint 1. Shape (3,).
         lead: Time in which the arm is to be at the next reference pose, in [s].
         furthest: Where |v̂| is cut.
-        q: Joint coordinates in [rad] or [m]. Shape (n,).
         pose: Measured task coordinates. Shape (m,).
         nominal: The next reference task coordinates. Shape (m,).
         speed: s.
         error: Scratch. Shape (6,).
-        due: Receives v̂ / (0.2 + |v̂|) with v̂ = v / s, seen from the frame of joint 1. Shape (w,).
+        due: Receives v̂ / (0.2 + |v̂|) with v̂ = v / s, in the base frame. Shape (w,).
 
     Returns:
         0.2 / (0.2 + |v̂|), and the unit s (0.2 + |v̂|) in [rad/s] or [m/s].
     """
     twist(kind, nominal, pose, error, due)
-    if is_turned(kind, prismatic):
-        turn(axis, -q[0], due)
     square = 0.0
     for a in range(due.shape[0]):
         due[a] /= lead * speed
@@ -111,13 +108,39 @@ def command_unit(kind, prismatic, axis, lead, furthest, q, pose, nominal, speed,
 
 
 @kernel
-def observe_rows(kind, prismatic, axis, dt, offsets, furthest, q, qdot, pose, nominal, remaining, out, unit):
+def along_joints(kind, chain, q, due, rotation, position, jacobians, out):
+    """What each joint can do about the twist that is due: its column of the Jacobian times the twist.
+
+    Args:
+        kind: Of task coordinates.
+        chain: The arm's model, see :class:`ikgym.kinematics.Chain`.
+        q: Joint coordinates in [rad] or [m]. Shape (n,).
+        due: As :func:`command_unit` gives it. Shape (w,).
+        rotation: Scratch. Shape (3, 3).
+        position: Scratch. Shape (3,).
+        jacobians: Scratch. Shape (2, 6, n).
+        out: Receives the products, those of the first three components first. Shape (w // 3 * n,).
+    """
+    rows, n = jacobians[0], q.shape[0]
+    forward_and_jacobian(chain, q, rotation, position, rows)
+    if kind == task_kernels.SKEW:
+        rows = jacobians[1]
+        task_kernels.jacobian(kind, rotation, jacobians[0], rows)
+    for first in range(0, due.shape[0], 3):
+        for j in range(n):
+            product = 0.0
+            for a in range(first, first + 3):
+                product += rows[a, j] * due[a]
+            out[first // 3 * n + j] = min(max(product, -FASTEST), FASTEST)
+
+
+@kernel
+def observe_rows(kind, chain, dt, offsets, furthest, q, qdot, pose, nominal, remaining, out, unit):
     """What agents see, row by row, see :class:`ikgym.rl.AgentObservation`.
 
     Args:
         kind: Of task coordinates.
-        prismatic: Shape (n,).
-        axis: Of joint 1. Shape (3,).
+        chain: The arm's model, see :class:`ikgym.kinematics.Chain`.
         dt: Δt in [s].
         offsets: Steps ahead at which the reference is seen. Shape (p,).
         furthest: Where |v̂| is cut.
@@ -131,30 +154,31 @@ def observe_rows(kind, prismatic, axis, dt, offsets, furthest, q, qdot, pose, no
     """
     w, n = twist_size(kind), q.shape[1]
     error, due, ahead = np.empty(6), np.empty(w), np.empty((offsets.shape[0] - 1, w))
-    shown = out.shape[1] - w - 1 - n
+    rotation, position, jacobians, along = np.empty((3, 3)), np.empty(3), np.empty((2, 6, n)), np.empty(w // 3 * n)
+    axis = chain.axes[0]
+    moving = w + 1 + along.shape[0]
     for row in range(q.shape[0]):
-        speed = mean_twists(kind, dt, offsets, nominal[row], error, ahead)
-        features = out[row]
-        feature_row(kind, prismatic, axis, q[row], ahead, speed, remaining[row, 0], features[:shown])
-        features[shown + w], unit[row] = command_unit(
-            kind, prismatic, axis, offsets[0] * dt, furthest, q[row], pose[row], nominal[row, 0], speed, error, due
+        speed, features = mean_twists(kind, dt, offsets, nominal[row], error, ahead), out[row]
+        features[w], unit[row] = command_unit(
+            kind, offsets[0] * dt, furthest, pose[row], nominal[row, 0], speed, error, due
         )
-        for a in range(w):
-            features[shown + a] = due[a]
+        along_joints(kind, chain, q[row], due, rotation, position, jacobians, along)
+        if is_turned(kind, chain.prismatic):
+            turn(axis, -q[row, 0], due)
+        features[:w], features[w + 1 : moving] = due, along
         for j in range(n):
-            features[shown + w + 1 + j] = min(max(qdot[row, j] / unit[row], -FASTEST), FASTEST)
+            features[moving + j] = min(max(qdot[row, j] / unit[row], -FASTEST), FASTEST)
+        feature_row(kind, chain.prismatic, axis, q[row], ahead, speed, remaining[row, 0], features[moving + n :])
 
 
 @kernel
-def unit_rows(kind, prismatic, axis, dt, offsets, furthest, q, pose, nominal, out):
+def unit_rows(kind, dt, offsets, furthest, pose, nominal, out):
     """The unit of velocities of each row, as :func:`observe_rows` gives it. ``out`` has shape (N,)."""
     w = twist_size(kind)
     error, due, ahead = np.empty(6), np.empty(w), np.empty((offsets.shape[0] - 1, w))
-    for row in range(q.shape[0]):
+    for row in range(pose.shape[0]):
         speed = mean_twists(kind, dt, offsets, nominal[row], error, ahead)
-        _, out[row] = command_unit(
-            kind, prismatic, axis, offsets[0] * dt, furthest, q[row], pose[row], nominal[row, 0], speed, error, due
-        )
+        _, out[row] = command_unit(kind, offsets[0] * dt, furthest, pose[row], nominal[row, 0], speed, error, due)
 
 
 @kernel

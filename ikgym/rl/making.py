@@ -41,7 +41,7 @@ class Learning(Frozen):
     share: float = 0.25
     largest: float = 1.0
     furthest: float = 5.0
-    scale: float = 0.02
+    scale: float = 0.005
     charge: float = 100.0
     history: int = 1
     commands: int = 0

@@ -34,18 +34,19 @@ class AgentView:
         furthest: Where |v̂| is cut, above 0.
 
     Raises:
-        InvalidInputError: The environment shows less than two reference poses, or `furthest` is out of its range.
+        InvalidInputError: The environment is another, its observation has been changed, it shows less than two
+            reference poses, or `furthest` is out of its range.
     """
 
     def __init__(self, env: Any, furthest: float) -> None:
+        space = _own_space(env)
         scenario, preview = env.unwrapped.scenario, env.unwrapped.preview
         if len(preview) < 2:
             raise InvalidInputError(f"preview: expected at least two steps ahead, got {preview}.")
         self.furthest = number("furthest", furthest, above=0.0)
-        chain = scenario.model.chain
         offsets = np.array(preview, dtype=np.int64)
-        self._shared = scenario.task.kind, chain.prismatic, chain.axes[0], scenario.dt, offsets, self.furthest
-        space = getattr(env.unwrapped, "single_observation_space", env.unwrapped.observation_space)
+        self._kind, self._chain = scenario.task.kind, scenario.model.chain
+        self._ahead = scenario.dt, offsets, self.furthest
         self._more = [key for key in ("q_age", "pose_age", "commands") if key in space.spaces]
         bounds = [bound(scenario, len(preview)), *(self._bound(key, space[key]) for key in self._more)]
         lower, upper = np.concatenate([low for low, _ in bounds]), np.concatenate([high for _, high in bounds])
@@ -58,7 +59,7 @@ class AgentView:
         out, unit = np.empty((rows, *self.space.shape), dtype=np.float32), np.empty(rows)
         features = np.empty((rows, self._size), dtype=np.float32)
         keys = ("q", "qdot", "pose", "nominal", "remaining")
-        observe_rows(*self._shared, *(observation[key] for key in keys), features, unit)
+        observe_rows(self._kind, self._chain, *self._ahead, *(observation[key] for key in keys), features, unit)
         out[:, : self._size], at = features, self._size
         for key in self._more:
             part = observation[key].reshape(rows, -1)
@@ -71,13 +72,25 @@ class AgentView:
     def unit(self, observation: Observation) -> FloatArray:
         """S (0.2 + |v̂|) of N arms, in [rad/s] or [m/s]. Shape (N,)."""
         out = np.empty(len(observation["q"]))
-        unit_rows(*self._shared, observation["q"], observation["pose"], observation["nominal"], out)
+        unit_rows(self._kind, *self._ahead, observation["pose"], observation["nominal"], out)
         return out
 
     @staticmethod
     def _bound(key: str, space: spaces.Box) -> tuple[FloatArray, FloatArray]:
         limit = np.ones(math.prod(space.shape))
         return (-FASTEST * limit, FASTEST * limit) if key == "commands" else (0.0 * limit, limit)
+
+
+def _own_space(env: Any) -> spaces.Dict:
+    """The space of what an environment of this package shows, of one row."""
+    if not isinstance(getattr(env.unwrapped, "scenario", None), Scenario):
+        raise InvalidInputError(f"env: expected an environment RedundantIK-v0, single or vector, got {env}.")
+    name = "single_observation_space" if hasattr(env, "single_observation_space") else "observation_space"
+    space, own = getattr(env, name), getattr(env.unwrapped, name)
+    if space != own:
+        raise InvalidInputError(f"env: expected its own observation, wrapped by nothing that changes it, got {space}.")
+    found: spaces.Dict = own
+    return found
 
 
 def bound(scenario: Scenario, shown: int) -> tuple[FloatArray, FloatArray]:
@@ -96,10 +109,16 @@ def bound(scenario: Scenario, shown: int) -> tuple[FloatArray, FloatArray]:
         at += 1 if prismatic[j] else 2
     # Each part of the mean twists is at most the root of their number times their root mean square, which is below s.
     ahead = np.full((shown - 1) * w, math.sqrt((shown - 1) * w))
-    upper = np.concatenate([joints, ahead, [LARGEST_LOG, 1.0], np.ones(w), [1.0], np.full(scenario.joints, FASTEST)])
+    moving = np.full((w // 3 + 1) * scenario.joints, FASTEST)
+    upper = np.concatenate([np.ones(w + 1), moving, joints, ahead, [LARGEST_LOG, 1.0]])
     lower = -upper
-    lower[len(joints) + len(ahead) + 1] = lower[len(joints) + len(ahead) + 2 + w] = 0.0
+    lower[w] = lower[-1] = 0.0
     return lower, upper
+
+
+def due_size(space: spaces.Box) -> int:
+    """w, of the twist that such features begin with; the share after it is the first of them that is not negative."""
+    return int(np.argmax(space.low == 0.0))
 
 
 def batched(observation: Observation) -> Observation:

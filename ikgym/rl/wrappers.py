@@ -27,14 +27,16 @@ class AgentObservation(gym.ObservationWrapper[Features, Any, Observation], Recor
 
     | number | feature |
     |---|---|
+    | w | v̂ / (0.2 + |v̂|), with |v̂| cut at `furthest` |
+    | 1 | 0.2 / (0.2 + |v̂|) |
+    | n or 2 n | what each joint can do about it: v̂ / (0.2 + |v̂|) times its column of the Jacobian, position and \
+orientation apart, cut at ±4 |
+    | n | joint velocities in units of s (0.2 + |v̂|), cut at ±4 |
     | 2 each | sin q_j and cos q_j of revolute joints, but for joint 1 where twists are seen from its frame |
     | 1 each | q_j of prismatic joints |
     | w each | v_i / s |
     | 1 | ln s |
     | 1 | steps left, as a share of 500, at most 1 |
-    | w | v̂ / (0.2 + |v̂|), with |v̂| cut at `furthest` |
-    | 1 | 0.2 / (0.2 + |v̂|) |
-    | n | joint velocities in units of s (0.2 + |v̂|), cut at ±4 |
     | 1 each | ages of `q` and `pose` as a share of 100 steps, where sensors are slow or late |
     | h n | the last h commands, like the joint velocities, where the environment shows them |
 

@@ -96,7 +96,7 @@ def test_actions_are_in_the_unit_of_what_is_asked_for():
     features, _ = agent.reset(seed=1, options={"step": 300})
     env.reset(seed=1, options={"step": 300})
     n, w = 7, 6
-    due, share = features[-n - 1 - w : -n - 1], features[-n - 1]
+    due, share, seen = features[:w], features[w], features[3 * n : 4 * n]
     # The direction is v̂ / (0.2 + |v̂|), beside 0.2 / (0.2 + |v̂|): together they have a length of 1.
     assert math.isclose(np.linalg.norm(due) + share, 1.0, rel_tol=1e-6)
     moved, *_ = env.step(np.ones(n, dtype=np.float32))
@@ -104,7 +104,28 @@ def test_actions_are_in_the_unit_of_what_is_asked_for():
     assert np.allclose(moved["qdot"], moved["qdot"][0])  # every joint the same velocity
     velocity = (before[300] - before[299]) / scenario.dt
     unit = moved["qdot"][0] / 0.5
-    assert np.allclose(features[-n:], np.clip(velocity / unit, -4.0, 4.0), atol=1e-5)
+    assert np.allclose(seen, np.clip(velocity / unit, -4.0, 4.0), atol=1e-5)
+
+
+@pytest.mark.parametrize(("name", "turned"), [
+    ("varga7-random", False), ("varga7-pose-random", True), ("tiago-turn", False), ("panda-random", True),
+])  # fmt: skip
+def test_what_joints_can_do_is_their_column_of_the_jacobian_times_what_is_due(name, turned):
+    env = ikgym.RedundantIKEnv(name, preview=PREVIEW)
+    env.reset(seed=2)
+    seen, *_ = env.step(np.full(env.action_space.shape, 0.5, dtype=np.float32))
+    scenario, agent = env.scenario, rl.AgentObservation(env)
+    features = agent.observation(seen).astype(np.float64)
+    assert agent.observation_space.contains(features.astype(np.float32))
+    rotation, _, jacobian = scenario.model.forward_and_jacobian(seen["q"])
+    if scenario.task.name == "skew":
+        jacobian = scenario.task.jacobian(rotation, jacobian)
+    due, n = features[:6].reshape(2, 3), scenario.joints
+    if turned:
+        due = due @ ikgym.rotations.rodrigues(scenario.model.chain.axes[0], seen["q"][0]).T
+    products = np.concatenate([jacobian[:3].T @ due[0], jacobian[3:].T @ due[1]])
+    assert np.allclose(features[7 : 7 + 2 * n], products, atol=1e-6)
+    assert np.ptp(products) > 0.1
 
 
 def test_rewards_are_logarithms_and_a_lost_track_is_charged():
@@ -135,6 +156,12 @@ def test_wrong_use_is_refused():
         rl.make(short(), preview=1)
     with pytest.raises(UnknownNameError, match="lost_distance"):
         rl.make(short(), lost_distanc=1.0)
+    with pytest.raises(InvalidInputError, match="RedundantIK-v0"):
+        rl.RelativeAction(gym.make("CartPole-v1"))
+    with pytest.raises(InvalidInputError, match="its own observation"):
+        rl.RelativeAction(env)
+    with pytest.raises(InvalidInputError, match="its own observation"):
+        rl.vector.RelativeAction(envs)
     for wrong in ({"lost_distance": 0.0}, {"share": 0.0}, {"scale": -1.0}, {"charge": 0.5}, {"history": 0}):
         with pytest.raises(InvalidInputError):
             rl.make(short(), **wrong)

@@ -18,6 +18,8 @@ from baselines.training.policies import BilinearPPOPolicy, BilinearSACPolicy, Bi
 from ikgym import rl
 from ikgym.exceptions import InvalidInputError
 
+pytestmark = pytest.mark.usefixtures("one_thread")
+
 SHORT = {"n_steps": 8, "batch_size": 16, "n_epochs": 1}
 LATE = {"learning_starts": 8, "batch_size": 8, "buffer_size": 100}
 
@@ -28,11 +30,11 @@ def scenario():
 
 @pytest.mark.parametrize(("kind", "policy", "parameters"), [
     (PPO, "MlpPolicy", SHORT),
-    pytest.param(SAC, "MlpPolicy", LATE, marks=pytest.mark.slow),
-    pytest.param(TD3, "MlpPolicy", LATE, marks=pytest.mark.slow),
+    (SAC, "MlpPolicy", LATE),
+    (TD3, "MlpPolicy", LATE),
     (PPO, BilinearPPOPolicy, SHORT),
     (SAC, BilinearSACPolicy, LATE),
-    pytest.param(TD3, BilinearTD3Policy, LATE, marks=pytest.mark.slow),
+    (TD3, BilinearTD3Policy, LATE),
 ])  # fmt: skip
 def test_models_learn_and_act_the_same_from_their_file(tmp_path, kind, policy, parameters):
     envs = ikgym.sb3.make_vec(scenario(), 2)
@@ -66,13 +68,30 @@ def test_weights_of_the_bilinear_actor_are_trained(kind, policy, parameters):
 def test_actions_are_homogeneous_in_what_is_due():
     """Twice as far from the path, the velocity that takes it back is twice as large: G does not change."""
     model = PPO(BilinearPPOPolicy, ikgym.sb3.make_vec(scenario(), 2), device="cpu", seed=0, **SHORT)
-    actor = model.policy.mlp_extractor.policy_net
+    actor = model.policy.mlp_extractor.policy_net.actor
     features = torch.from_numpy(rl.make(scenario()).reset(seed=0)[0])[None]
     n, w = actor.joints, actor.twist
+    assert (n, w) == (7, 6)
     rows = actor.network(features).reshape(n, w + 1)
-    due = features[0, -n - 1 - w : -n - 1]
-    wanted = (rows[:, :w] @ due + rows[:, w] * features[0, -n - 1] / 0.2) / actor.share
+    wanted = rows[:, :w] @ features[0, :w] + rows[:, w] * features[0, w] / 0.2
     assert torch.allclose(actor(features)[0], wanted, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("name", "changes", "size"),
+    [("planar2-bent", {}, 3), ("panda-camera-slow", {"history": 2, "commands": 2}, 6), ("tiago-turn", {}, 6)],
+)
+def test_the_space_says_how_many_features_are_due(name, changes, size):
+    """Bilinear actors suit all arms and tasks, and whatever else is observed."""
+    envs = ikgym.sb3.make_vec(name, 2, **changes)
+    model = PPO(BilinearPPOPolicy, envs, device="cpu", seed=0, **SHORT).learn(16)
+    actor = model.policy.mlp_extractor.policy_net.actor
+    assert (actor.twist, actor.joints) == (size, envs.scenario.joints)
+
+
+def test_exploration_that_depends_on_the_state_is_refused():
+    with pytest.raises(InvalidInputError, match="use_sde"):
+        SAC(BilinearSACPolicy, ikgym.sb3.make_vec(scenario(), 2), device="cpu", use_sde=True, **LATE)
 
 
 def test_agents_with_a_history_are_not_exported(tmp_path):
