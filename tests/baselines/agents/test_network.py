@@ -91,7 +91,7 @@ def test_networks_are_frozen_copies():
     weights[0][:] = 7.0
     for other in (net, copy.deepcopy(net), pickle.loads(pickle.dumps(net))):
         assert identical(other.forward(np.ones((1, 3), dtype=np.float32)), before)
-        arrays = [*other.weights, *other.biases, *(a for a in other._constants if isinstance(a, np.ndarray))]
+        arrays = [*other.weights, *other.biases, *(a for a in other.constants if isinstance(a, np.ndarray))]
         assert not any(array.flags.writeable for array in arrays)
     assert net.sizes == (3, 2)
     assert (net.inputs, net.outputs) == (3, 2)

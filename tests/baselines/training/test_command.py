@@ -257,29 +257,22 @@ def test_ctrl_c(tmp_path, capsys, monkeypatch):
     assert f"is in {tmp_path}; go on with --resume" in capsys.readouterr().err
 
 
-class Pipe:
-    """Keeps what a child tells."""
-
-    sent = None
-
-    def send(self, message):
-        self.sent = message
+def silent(said):
+    """Takes what a worker says on its way."""
 
 
-def test_expected_errors_of_a_child_are_told(tmp_path):
+def test_expected_errors_of_a_seed_are_told(tmp_path):
     (tmp_path / "seed-0").mkdir()
     (tmp_path / "seed-0" / "run.json").write_text("{")
-    pipe = Pipe()
-    seeds._child(SeedRuns(PPO(), tmp_path, resume=True), 0, pipe)
-    assert pipe.sent.seed == 0
-    assert "run.json is damaged" in pipe.sent.error
+    result = seeds.attempt(seeds.Seed(SeedRuns(PPO(), tmp_path, resume=True), 0), silent)
+    assert result.seed == 0
+    assert "run.json is damaged" in result.error
 
 
-def test_unexpected_errors_of_a_child_are_told(tmp_path, monkeypatch, capfd):
-    monkeypatch.setattr(seeds, "_train", lambda *_: 1 / 0)
-    pipe = Pipe()
-    seeds._child(SeedRuns(PPO(), tmp_path), 3, pipe)
-    assert pipe.sent.error == "ZeroDivisionError: division by zero"
+def test_unexpected_errors_of_a_seed_are_told(tmp_path, monkeypatch, capfd):
+    monkeypatch.setattr(seeds, "train_seed", lambda *_: 1 / 0)
+    result = seeds.attempt(seeds.Seed(SeedRuns(PPO(), tmp_path), 3), silent)
+    assert result.error == "ZeroDivisionError: division by zero"
     assert "Traceback" in capfd.readouterr().err
 
 

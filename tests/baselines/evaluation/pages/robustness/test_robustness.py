@@ -24,6 +24,7 @@ from baselines.files import ResultsError
 from baselines.fingerprints import set_hash
 from baselines.oracle import Search, cache, search, solve
 from baselines.workers import Workers
+from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 from ikgym.scenarios import imperfect
 from tests.baselines.evaluation.test_report import row
@@ -47,6 +48,7 @@ MEASURED = Measured(
 def short(monkeypatch, tmp_path):
     """Scenarios of some steps, and best known costs that are searched within them."""
     monkeypatch.setenv(cache.VARIABLE, str(tmp_path / "cache"))
+    monkeypatch.setattr(scenarios._registry, "_made", {})  # short ones would be there for all tests to come
     monkeypatch.setattr(imperfect, "STEPS", STEPS)
     monkeypatch.setattr(imperfect, "FIELD", imperfect.FIELD.replace(payload_step=STEPS // 2))
     monkeypatch.setattr(measure, "HOW", Search(starts=0, generations=0))
