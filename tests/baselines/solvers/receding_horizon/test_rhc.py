@@ -113,8 +113,7 @@ def test_plans_are_as_cheap_as_ipopts(name):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("horizon", [3, 10, 30])
-@pytest.mark.parametrize("name", VARGA)
+@pytest.mark.parametrize(("name", "horizon"), list(zip(VARGA, (3, 10, 30, 30), strict=True)))
 def test_plans_are_as_cheap_as_ipopts_at_many_states(name, horizon):
     check_against_ipopt(name, horizon, 20 if horizon < 30 else 8)  # of each of four kinds
 
