@@ -223,6 +223,7 @@ def test_goals_are_held_against_the_best_of_those_that_played_most():
     for changed in ({"cost_ratio": 1.41}, {"lost": 0.01}):
         missed = dataclasses.replace(cheap, **changed)
         assert "| 1.400 | no |" in page(dataclasses.replace(MEASURED, entries=(missed,)))
+    assert "| 1.400 | yes, so far |" in page(dataclasses.replace(MEASURED, entries=(few,)))
     assert "## Goals" not in page(dataclasses.replace(MEASURED, entries=(told,)))
 
 
