@@ -45,7 +45,8 @@ def solve(
     """The cheapest joint path of an episode that a search finds: the best known one, certified by nobody.
 
     Drives and sensors of the plant are left out, see :mod:`baselines.oracle.stripped`. Where the arm is not that of the
-    data sheet, the search is that of the episode with an ideal plant, and its path is polished on the arm that moves.
+    data sheet, the search is that of the episode with an ideal plant, and the path of the same poses is polished on the
+    arm that moves.
 
     Args:
         scenario: What is tracked, or its name.
@@ -74,7 +75,8 @@ def solve(
     if _same(true, plain):
         optimum = search(true, seed, how, tick, paths)
     else:
-        start = solve(plain, seed, how, cached=cached, tick=tick).q
+        best = solve(plain, seed, how, cached=cached, tick=tick).q
+        start = plain.jogged(best, [true.arm.chain] * len(best))  # a third of the Newton steps from `best` itself
         optimum = polish(true, seed, {IDEAL: start, **(paths or {})})
     if on_disk:
         keep(optimum, scenario, seed, how, arm_seed)
@@ -128,7 +130,7 @@ def file_of(scenario: Scenario, seed: int, how: Search, *, polished: bool = Fals
         how: The search.
         polished: Whether it was that of the episode with an ideal plant, whose path was polished.
     """
-    what = canonical([episode_hash(scenario, seed), dataclasses.asdict(how), VERSION, *["polished"] * polished])
+    what = canonical([episode_hash(scenario, seed), dataclasses.asdict(how), VERSION, *["moved, polished"] * polished])
     return folder() / "oracle" / f"{hashlib.sha256(what.encode()).hexdigest()[:24]}.npz"
 
 

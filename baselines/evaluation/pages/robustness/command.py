@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import datetime
 import pathlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Annotated, Any
 
 import tyro
@@ -49,6 +49,8 @@ class Options:
     """Severities of knowledge and of drives, from 0. None for no map."""
     episodes: Annotated[int, tyro.conf.arg(metavar="N")] = 4
     """Test episodes of each policy in each cell of the map."""
+    mapped: Annotated[tuple[str, ...], tyro.conf.arg(metavar="LABEL …")] = ()
+    """Policies of --policies that are on the map and play each part of the plant alone. All of them if left out."""
     sets: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME …")] = ()
     """Test sets that are played to their ends, with an ideal plant beside each: panda-ideal panda-measured … for the
     tables. None if left out."""
@@ -106,7 +108,7 @@ def measured(options: Options, command: str) -> Measured:
         "progress": True,
     }
     policies = labelled(options.policies)
-    place = options.scenario, policies, options.out
+    place = options.scenario, some_of(policies, options.mapped), options.out
     sets = {"episodes": options.set_episodes, "whole": whole(options.whole, policies, options.sets), **how}
     entries = measure.entries(options.sets, policies, options.out, **sets) if options.sets else ()
     cells = measure.cells(*place, severities=severities, episodes=options.episodes, **how) if severities else ()
@@ -130,6 +132,18 @@ def labelled(policies: Sequence[str]) -> dict[str, str]:
             raise InvalidInputError(f"policies: expected a label of its own for each, got {label!r} twice.")
         out[label] = policy if mark else given
     return out
+
+
+def some_of(policies: Mapping[str, str], labels: Sequence[str]) -> dict[str, str]:
+    """The policies of some labels; all where none is given.
+
+    Raises:
+        UnknownNameError: There is no such label.
+    """
+    for label in labels:
+        if label not in policies:
+            raise UnknownNameError("label", label, policies)
+    return {label: policies[label] for label in labels or policies}
 
 
 def whole(given: Sequence[str], policies: Iterable[str], sets: Sequence[str]) -> frozenset[tuple[str, str]]:

@@ -47,7 +47,8 @@ BEST = "The best policy of each cell is the one that loses the fewest episodes, 
 GOALS = {"panda-measured": 1.15, "panda-camera": 1.4, "panda-bus": 1.25, "panda-field": 1.5}
 REACHED = """\
 The best policy without privileged information of those that have played the most episodes, beside `told`. A goal is
-reached where its cost ratio is not above it, and no episode is lost."""
+reached where its cost ratio is not above it, and no episode is lost; of sets that it has not played to their ends that
+is said so far. `told` may have played fewer episodes than the policy: each table says how many."""
 EFFECTS = """\
 What parts of the plant of `{scenario}` cost, each with all else ideal: geometric means of the cost divided by that of
 the same policy on the ideal plant with the same seed, with intervals of 95 % over {episodes} test episodes, and in
@@ -98,6 +99,7 @@ def _goal(name: str, entries: Sequence[Entry]) -> list[str]:
     best = min((one for one in known if one.episodes == most), key=lambda one: (one.lost > 0.0, one.cost_ratio))
     told = min((one.cost_ratio for one in entries if one.reference and one.cost_ratio is not None), default=None)
     reached = "yes" if best.cost_ratio is not None and best.cost_ratio <= GOALS[name] and not best.lost else "no"
+    reached += "" if most >= _all_of(name) else ", so far"
     about = [name, f"`{best.policy}`", str(best.episodes), number(best.cost_ratio), _between(best.interval)]
     return [*about, share(best.lost), number(told), number(GOALS[name]), reached]
 

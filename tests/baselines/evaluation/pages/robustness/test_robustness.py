@@ -15,7 +15,7 @@ from matplotlib.text import Text
 import ikgym
 from baselines.evaluation import test_sets
 from baselines.evaluation.pages.robustness import measure, pictures
-from baselines.evaluation.pages.robustness.command import labelled, main, whole
+from baselines.evaluation.pages.robustness.command import labelled, main, some_of, whole
 from baselines.evaluation.pages.robustness.measured import Cell, Effect, Entry, Measured
 from baselines.evaluation.pages.robustness.page import page
 from baselines.evaluation.report import number
@@ -170,6 +170,16 @@ def test_whole_sets_are_named_by_label_and_set():
         whole(["dls@panda-bsu"], ["dls"], ["panda-bus"])
 
 
+def test_some_policies_are_on_the_map(short, tmp_path):
+    assert main([*arguments(tmp_path, "--mapped", "dls"), "--episodes", "1"]) == 0
+    found = Measured.load(tmp_path / "docs" / "robustness.json")
+    assert [cell.policy for cell in found.cells] == ["dls"]
+    assert list(found.policies) == ["dls", "told:policy=dls"]
+    assert some_of({"a": "dls", "b": "rhc"}, ()) == {"a": "dls", "b": "rhc"}
+    with pytest.raises(UnknownNameError, match="There is no label 'dsl'"):
+        some_of({"dls": "dls"}, ["dsl"])
+
+
 def test_effects_alone(short, tmp_path):
     parts = measure.effects_of(imperfect.FIELD)
     assert list(parts) == list(measure.EFFECTS)
@@ -236,6 +246,7 @@ def test_goals_are_held_against_the_best_of_those_that_played_most():
     for changed in ({"cost_ratio": 1.41}, {"lost": 0.01}):
         missed = dataclasses.replace(cheap, **changed)
         assert "| 1.400 | no |" in page(dataclasses.replace(MEASURED, entries=(missed,)))
+    assert "| 1.400 | yes, so far |" in page(dataclasses.replace(MEASURED, entries=(few,)))
     assert "## Goals" not in page(dataclasses.replace(MEASURED, entries=(told,)))
 
 
