@@ -27,18 +27,21 @@ ONE_SCENE = """addEventListener("DOMContentLoaded", () => {
 READY = 60_000
 
 
-@contextlib.contextmanager
-def browser(*flags):
+@pytest.fixture(scope="module")
+def launch():
+    """Starts a browser with more flags; there can be only one Playwright at a time."""
     sync_api = pytest.importorskip("playwright.sync_api", reason="no playwright: pip install 'ikgym[dev]'")
     found = next(filter(None, map(shutil.which, NAMES)), None)
     if found is None:
         pytest.skip(f"no browser: none of {', '.join(NAMES)} is installed")
-    with sync_api.sync_playwright() as playwright:
-        started = playwright.chromium.launch(executable_path=found, args=[*FLAGS, *flags], timeout=READY)
-        try:
-            yield started
-        finally:
-            started.close()
+    with sync_api.sync_playwright() as playwright:  # at its end, browsers end
+        yield lambda *flags: playwright.chromium.launch(executable_path=found, args=[*FLAGS, *flags], timeout=READY)
+
+
+@pytest.fixture(scope="module")
+def flat(launch):
+    """A browser without WebGL: quick where the processor would have to draw space."""
+    return launch("--disable-3d-apis")
 
 
 @contextlib.contextmanager
@@ -102,8 +105,8 @@ def time(tab):
     return tab.evaluate("PLAYER.time")
 
 
-def test_the_table_works_before_anything_is_drawn(folder):
-    with browser() as started, opened(started, folder, script=TABLE_ALONE) as tab:
+def test_the_table_works_before_anything_is_drawn(flat, folder):
+    with opened(flat, folder, script=TABLE_ALONE) as tab:
         sorts_and_filters(tab)
         assert tab.title().startswith(NASTY)
 
@@ -119,13 +122,6 @@ def first_paint(tab):
     """In [ms] from when the page was asked for."""
     tab.wait_for_function("performance.getEntriesByName('first-contentful-paint').length")
     return tab.evaluate("performance.getEntriesByName('first-contentful-paint')[0].startTime")
-
-
-@pytest.fixture(scope="module")
-def flat():
-    """A browser without WebGL: quick where the processor would have to draw space."""
-    with browser("--disable-3d-apis") as started:
-        yield started
 
 
 @pytest.fixture(scope="module")
@@ -257,8 +253,8 @@ def test_it_fits_400_pixels(flat, folder):
 
 
 @pytest.mark.slow
-def test_space_is_drawn_moves_and_turns(folder):
-    with browser(*SOFTWARE) as started, opened(started, folder, script=ONE_SCENE) as tab:
+def test_space_is_drawn_moves_and_turns(launch, folder):
+    with opened(launch(*SOFTWARE), folder, width=400, script=ONE_SCENE) as tab:
         drawn(tab)
         assert tab.evaluate("WEBGL")
         assert tab.locator("#replay canvas").count() >= 1
