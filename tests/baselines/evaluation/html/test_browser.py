@@ -112,10 +112,12 @@ def test_the_table_works_before_anything_is_drawn(flat, folder):
 
 
 def drawn(tab):
-    """Goes to the replay, away from all controls, and waits until its scenes are there."""
+    """Goes to the replay, with no control in focus, and waits until its scenes are there, at the time of the player."""
     tab.wait_for_selector("html[data-ready]")
-    tab.locator("#replay-head").click()
-    tab.wait_for_function("PLAYER.scenes.every((scene) => scene.plot.data && scene.at === PLAYER.time) && !PLAYER.busy")
+    tab.locator("#replay .scene").first.scroll_into_view_if_needed()
+    tab.evaluate("document.activeElement.blur()")
+    here = "scene.inSight && scene.plot.data && scene.at === PLAYER.time"
+    tab.wait_for_function(f"PLAYER.scenes.every((scene) => {here}) && !PLAYER.busy")
 
 
 def first_paint(tab):
@@ -238,8 +240,8 @@ def test_it_fits_400_pixels(flat, folder):
         tab.keyboard.press("Space")
         assert not tab.evaluate("PLAYER.playing")  # this key scrolls where there is no replay
         tab.keyboard.press("Home")
-        tab.locator("#replay-head").click()
-        tab.wait_for_function(f"{drawn_here}[0] && !PLAYER.busy")
+        tab.locator("#replay .scene").first.scroll_into_view_if_needed()
+        tab.wait_for_function(f"{drawn_here}[0] && PLAYER.scenes[0].inSight && !PLAYER.busy")
         assert not tab.evaluate(drawn_here)[2]
         assert tab.evaluate("document.documentElement.scrollWidth") == 400
         for name in ("#play", "#time", "#filter", "#cost-time", "#joints", "#replay figure >> nth=0"):
