@@ -200,7 +200,7 @@ function preparePlayer() {
   element("play").addEventListener("click", () => setPlaying(!PLAYER.playing));
   element("time").addEventListener("input", (event) => seek(Number(event.target.value)));
   element("view").addEventListener("change", (event) => turn(VIEWS[event.target.value]));
-  element("view").parentElement.hidden = !WEBGL;
+  element("view").closest("div").hidden = !WEBGL;
   const keys = {
     " ": () => setPlaying(!PLAYER.playing), ArrowLeft: () => stepBy(-1), ArrowRight: () => stepBy(1),
     Home: () => seek(0), End: () => seek(PLAYER.end),

@@ -19,8 +19,8 @@ function placed(points) {
 const seenFrom = (x, y, z, up = { x: 0, y: 0, z: 1 }) =>
   ({ eye: { x, y, z }, up, center: { x: 0, y: 0, z: 0 }, projection: { type: "orthographic" } });
 const VIEWS = {
-  oblique: seenFrom(1, 1, 0.5), front: seenFrom(1.5, 0, 0), side: seenFrom(0, 1.5, 0),
-  above: seenFrom(0, 0, 1.5, { x: 0, y: 1, z: 0 }),
+  oblique: seenFrom(1, 1, 0.5), front: seenFrom(1.7, 0, 0), side: seenFrom(0, 1.7, 0),
+  above: seenFrom(0, 0, 1.7, { x: 0, y: 1, z: 0 }),
 };
 
 const LIMITS = ["joint", "acceleration", "velocity", "stop"]; // colours of a joint, by what it is at

@@ -265,7 +265,13 @@ def test_files(tmp_path):
         assert json.loads(cells["parameters"]) == row.parameters
         assert json.loads(cells["machine"]) == row.machine
         assert cells["cost_ratio"] == ""
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["README.md", "report.html", "results.csv", "results.json", "series"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == [
+        "README.md",
+        "report.html",
+        "results.csv",
+        "results.json",
+        "series",
+    ]
     assert len(list(tmp_path.glob("series/varga7-random/*.npz"))) == 3
     assert len(list(tmp_path.glob("series/zhang3-helix/*.npz"))) == 2
 

@@ -49,7 +49,7 @@ def full_folder(folder, tmp_path_factory):
 
 def nasty_policy(number):
     """The name of a policy that would like to be an element, the end of one, or a place in a template of Plotly."""
-    return f"<img src=x onerror=alert({number})></script>%{{y}}"
+    return f"<b>{number}</b><img src=x onerror=alert()></script>%{{y}}"
 
 
 def _drawn(row, policy, seed, rng):

@@ -27,18 +27,21 @@ ONE_SCENE = """addEventListener("DOMContentLoaded", () => {
 READY = 60_000
 
 
-@contextlib.contextmanager
-def browser(*flags):
+@pytest.fixture(scope="module")
+def launch():
+    """Starts a browser with more flags; there can be only one Playwright at a time."""
     sync_api = pytest.importorskip("playwright.sync_api", reason="no playwright: pip install 'ikgym[dev]'")
     found = next(filter(None, map(shutil.which, NAMES)), None)
     if found is None:
         pytest.skip(f"no browser: none of {', '.join(NAMES)} is installed")
-    with sync_api.sync_playwright() as playwright:
-        started = playwright.chromium.launch(executable_path=found, args=[*FLAGS, *flags], timeout=READY)
-        try:
-            yield started
-        finally:
-            started.close()
+    with sync_api.sync_playwright() as playwright:  # at its end, browsers end
+        yield lambda *flags: playwright.chromium.launch(executable_path=found, args=[*FLAGS, *flags], timeout=READY)
+
+
+@pytest.fixture(scope="module")
+def flat(launch):
+    """A browser without WebGL: quick where the processor would have to draw space."""
+    return launch("--disable-3d-apis")
 
 
 @contextlib.contextmanager
@@ -93,6 +96,17 @@ def sorts_and_filters(tab):
     tab.get_by_label("Scenario").select_option("")
 
 
+def names_apart(tab):
+    """How many names there are in the picture of costs, none of which hides another one."""
+    boxes = tab.locator("#cost-time .textpoint").evaluate_all(
+        """(texts) => texts.map((text) => text.getBoundingClientRect())
+            .map((box) => [box.left, box.right, box.top, box.bottom])"""
+    )
+    for (left, right, top, bottom), other in itertools.combinations(boxes, 2):
+        assert right <= other[0] or other[1] <= left or bottom <= other[2] or other[3] <= top
+    return len(boxes)
+
+
 def arm(tab):
     """Where the links of the first replay are."""
     return tab.evaluate("(() => { const { x, y } = PLAYER.scenes[0].plot.data[2]; return [...x, ...y]; })()")
@@ -102,30 +116,25 @@ def time(tab):
     return tab.evaluate("PLAYER.time")
 
 
-def test_the_table_works_before_anything_is_drawn(folder):
-    with browser() as started, opened(started, folder, script=TABLE_ALONE) as tab:
+def test_the_table_works_before_anything_is_drawn(flat, folder):
+    with opened(flat, folder, script=TABLE_ALONE) as tab:
         sorts_and_filters(tab)
         assert tab.title().startswith(NASTY)
 
 
 def drawn(tab):
-    """Goes to the replay, away from all controls, and waits until its scenes are there."""
+    """Goes to the replay, with no control in focus, and waits until its scenes are there, at the time of the player."""
     tab.wait_for_selector("html[data-ready]")
-    tab.locator("#replay-head").click()
-    tab.wait_for_function("PLAYER.scenes.every((scene) => scene.plot.data && scene.at === PLAYER.time) && !PLAYER.busy")
+    tab.locator("#replay .scene").first.scroll_into_view_if_needed()
+    tab.evaluate("document.activeElement.blur()")
+    here = "scene.inSight && scene.plot.data && scene.at === PLAYER.time"
+    tab.wait_for_function(f"PLAYER.scenes.every((scene) => {here}) && !PLAYER.busy")
 
 
 def first_paint(tab):
     """In [ms] from when the page was asked for."""
     tab.wait_for_function("performance.getEntriesByName('first-contentful-paint').length")
     return tab.evaluate("performance.getEntriesByName('first-contentful-paint')[0].startTime")
-
-
-@pytest.fixture(scope="module")
-def flat():
-    """A browser without WebGL: quick where the processor would have to draw space."""
-    with browser("--disable-3d-apis") as started:
-        yield started
 
 
 @pytest.fixture(scope="module")
@@ -148,15 +157,6 @@ class TestDrawn:
         assert "no WebGL" in note
         assert page.evaluate("PLAYER.scenes.map((scene) => scene.plot.data[0].type)") == ["scatter"] * 3
         assert page.get_by_label("View").is_hidden()
-
-    def test_names_in_the_picture_of_costs_do_not_overlap(self, page):
-        boxes = page.locator("#cost-time .textpoint").evaluate_all(
-            """(texts) => texts.map((text) => text.getBoundingClientRect())
-                .map((box) => [box.left, box.right, box.top, box.bottom])"""
-        )
-        assert len(boxes) >= 3
-        for (left, right, top, bottom), other in itertools.combinations(boxes, 2):
-            assert right <= other[0] or other[1] <= left or bottom <= other[2] or other[3] <= top
 
     def test_it_sorts_and_filters(self, page):
         sorts_and_filters(page)
@@ -242,8 +242,8 @@ def test_it_fits_400_pixels(flat, folder):
         tab.keyboard.press("Space")
         assert not tab.evaluate("PLAYER.playing")  # this key scrolls where there is no replay
         tab.keyboard.press("Home")
-        tab.locator("#replay-head").click()
-        tab.wait_for_function(f"{drawn_here}[0] && !PLAYER.busy")
+        tab.locator("#replay .scene").first.scroll_into_view_if_needed()
+        tab.wait_for_function(f"{drawn_here}[0] && PLAYER.scenes[0].inSight && !PLAYER.busy")
         assert not tab.evaluate(drawn_here)[2]
         assert tab.evaluate("document.documentElement.scrollWidth") == 400
         for name in ("#play", "#time", "#filter", "#cost-time", "#joints", "#replay figure >> nth=0"):
@@ -257,8 +257,8 @@ def test_it_fits_400_pixels(flat, folder):
 
 
 @pytest.mark.slow
-def test_space_is_drawn_moves_and_turns(folder):
-    with browser(*SOFTWARE) as started, opened(started, folder, script=ONE_SCENE) as tab:
+def test_space_is_drawn_moves_and_turns(launch, folder):
+    with opened(launch(*SOFTWARE), folder, width=400, script=ONE_SCENE) as tab:
         drawn(tab)
         assert tab.evaluate("WEBGL")
         assert tab.locator("#replay canvas").count() >= 1
@@ -290,6 +290,7 @@ def test_a_full_page_is_drawn_and_names_stay_names(flat, full_folder):
         assert set(column(tab, "policy")) == {nasty_policy(number) for number in range(25)}
         (name,) = set(tab.locator("#replay figcaption b").all_text_contents()[:1])
         assert name in tab.locator("#cost-time .textpoint").all_text_contents()
+        assert 3 <= names_apart(tab) < 25
         assert name in tab.locator("#errors .legendtext").all_text_contents()
         tab.locator("#cost-time .point").first.hover(force=True)
         seen = tab.locator("#cost-time .hovertext").text_content()
