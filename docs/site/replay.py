@@ -11,10 +11,17 @@ from mkdocs.structure.files import File
 
 #: Its name on the site.
 PAGE = "replay.html"
+#: Where the replay begins in it.
+PART = "replay-head"
 
 _PLACE = re.compile(r"<!-- replay -->\n.*?<!-- end -->", re.DOTALL)
+# An address with #PART would scroll the landing page as well. Pictures above need a moment for their height. From disk
+# browsers keep frames apart, and the report stays at its top, the table.
+_AT_THE_PART = f"""\
+const page = contentDocument, part = page?.getElementById('{PART}');
+setTimeout(() => page?.defaultView.scrollBy(0, part?.getBoundingClientRect().top ?? 0), 1000)"""
 _SHOWN = f"""\
-<iframe src="{PAGE}#replay-head" title="Report of make demo: table, pictures and replay" loading="lazy"
+<iframe src="{PAGE}" title="Report of make demo: table, pictures and replay" loading="lazy" onload="{_AT_THE_PART}"
 style="width: 100%; height: 40rem; border: 1px solid; border-radius: 0.2rem"></iframe>
 
 [Open the report by itself]({PAGE})"""
