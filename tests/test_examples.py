@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import runpy
 from pathlib import Path
 
@@ -12,12 +13,17 @@ EXAMPLES = sorted(Path(__file__).parents[1].glob("examples/[0-9]*.py"))
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
 def test_example(example, capsys, tmp_path):
-    small = {"04_video": (tmp_path / "video.mp4", 40), "09_behaviour_cloning": (2, 1, 1)}
+    small = {"04_video": (tmp_path / "video.mp4", 40), "09_behaviour_cloning": (2, 3, 1)}
     arguments = small.get(example.stem, ())
     runpy.run_path(str(example))["main"](*arguments)
-    assert capsys.readouterr().out.strip()
+    printed = capsys.readouterr().out
+    assert printed.strip()
     if example.stem == "04_video":
         assert arguments[0].stat().st_size > 1000
+    if example.stem == "09_behaviour_cloning":
+        first, *_, last = map(float, re.findall(r"loss ([\d.]+)", printed))
+        assert last < 0.8 * first
+        assert re.search(r"^Clone, seed 1000000: cost \d", printed, re.MULTILINE)
 
 
 def test_there_are_examples():
