@@ -28,7 +28,7 @@ class RecedingHorizonForesight(RecedingHorizon):
     out of local minima that a single plan would keep. The plan looks 3,000 steps ahead: what a redundant arm does with
     its null space now decides what motions seconds later cost. Its 56 blocks grow evenly, and reach that far without
     skipping an oscillation. Blocks that grow geometrically do skip some: of 57 knots in 1,500 steps, half lie in the
-    first tenth, and the last block has 127 steps. The first plan takes two periods, of three and seven Newton steps.
+    first tenth, and the last block has 127 steps. The first plan takes two periods, of four and six Newton steps.
     Each of the 22 after them tries another guess with ten, which is longer than a control period of 1 ms; of 3,000
     periods these are 0.7 %. A period behind one that ended beyond the velocity limits has four.
 

@@ -38,7 +38,7 @@ KEPT = 1e-5
 # Newton steps of the initial plan at least, and of a plan that is to be brought to its optimum.
 STEPS_OF_THE_FIRST, STEPS_TO_THE_OPTIMUM = 30, 300
 # Periods that share the Newton steps of the initial plan where guesses are spread over periods, and those of the first.
-PERIODS_OF_THE_FIRST, SHARE_OF_THE_FIRST = 2, 0.3
+PERIODS_OF_THE_FIRST, SHARE_OF_THE_FIRST = 2, 0.4
 # Behind so many periods beyond the velocity limits another plan is begun beside it.
 RETRY = 4
 
