@@ -23,7 +23,17 @@ def test_example(example, capsys, tmp_path):
     if example.stem == "09_behaviour_cloning":
         first, *_, last = map(float, re.findall(r"loss ([\d.]+)", printed))
         assert last < 0.8 * first
-        assert re.search(r"^Clone, seed 1000000: cost \d", printed, re.MULTILINE)
+
+
+@pytest.mark.slow
+def test_a_clone_of_dls_follows_the_path(capsys):
+    """On an episode that is not in its data set."""
+    (example,) = (one for one in EXAMPLES if one.stem == "09_behaviour_cloning")
+    runpy.run_path(str(example))["main"](16, 5, 1)
+    (error,) = re.findall(
+        r"^Clone, seed 1000000: cost .*, error up to ([\d.]+) mm$", capsys.readouterr().out, re.MULTILINE
+    )
+    assert 0.01 < float(error) < 5.0
 
 
 def test_there_are_examples():
