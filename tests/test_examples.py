@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import runpy
 from pathlib import Path
 
@@ -15,9 +16,13 @@ EXAMPLES = sorted(ROOT.glob("[0-9]*.py"))
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
 def test_example(example, capsys, tmp_path):
     video = tmp_path / "video.mp4"
-    small = {"04_video": (video, 40), "06_ppo": (1,), "08_behaviour_cloning": (2, 1, 1)}
+    small = {"04_video": (video, 40), "06_ppo": (1,), "08_behaviour_cloning": (2, 3, 1)}
     runpy.run_path(str(example))["main"](*small.get(example.stem, ()))
-    assert capsys.readouterr().out.strip()
+    printed = capsys.readouterr().out
+    assert printed.strip()
+    if example.stem == "08_behaviour_cloning":
+        first, *_, last = map(float, re.findall(r"loss ([\d.]+)", printed))
+        assert last < 0.8 * first
     assert video.exists() == (example.stem == "04_video")
 
 
@@ -43,6 +48,17 @@ def test_the_wrappers_of_the_example_do_what_they_say():
     assert reward == pytest.approx(np.tanh(-1e-3 * (info["tracking_cost"] + info["velocity_cost"])))
     _, rewards, *_ = envs.step(np.zeros((2, 7), dtype=np.float32))
     assert rewards[0] == reward
+
+
+@pytest.mark.slow
+def test_a_clone_of_dls_follows_the_path(capsys):
+    """On an episode that is not in its data set."""
+    (example,) = (one for one in EXAMPLES if one.stem == "08_behaviour_cloning")
+    runpy.run_path(str(example))["main"](16, 5, 1)
+    (error,) = re.findall(
+        r"^Clone, seed 1000000: cost .*, error up to ([\d.]+) mm$", capsys.readouterr().out, re.MULTILINE
+    )
+    assert 0.01 < float(error) < 5.0
 
 
 def test_there_are_examples():
