@@ -11,13 +11,13 @@ from typing import Any, NamedTuple, Self
 from baselines import registry
 from baselines.canonical import DIGITS, one_line, rounded, with_list
 from baselines.evaluation.pages.entries import Entry
-from baselines.evaluation.pages.measure import ALONE, plan, play
+from baselines.evaluation.pages.measure import plan, play
 from baselines.evaluation.pages.tuning.grids import GRIDS, Stage
 from baselines.evaluation.summary import geometric_mean
 from baselines.files import ResultsError, json_files, write
 from baselines.fingerprints import fingerprint
 from baselines.spec import parse_policy, refuse_trust
-from baselines.workers import Workers
+from baselines.workers import ALONE, Workers
 from ikgym import scenarios
 from ikgym.exceptions import IkgymError, InvalidInputError
 from ikgym.scenarios import Scenario
