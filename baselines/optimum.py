@@ -20,9 +20,9 @@ from baselines.oracle.best_known import MARGIN, MEANINGLESS
 from baselines.oracle.cache import VARIABLE
 from baselines.oracle.episode import EpisodeProblem
 from baselines.oracle.optimum import Optimum, Search
-from baselines.oracle.several import ALONE, Wanted, find_all
+from baselines.oracle.several import Wanted, find_all
 from baselines.oracle.stripped import NOTE, stripped, strips
-from baselines.workers import Workers
+from baselines.workers import ALONE, Workers
 from ikgym import scenarios as scenario_registry
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario

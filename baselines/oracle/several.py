@@ -15,12 +15,9 @@ from baselines.oracle.episode import EpisodeProblem, path_of
 from baselines.oracle.optimum import Optimum, Search
 from baselines.oracle.stripped import stripped
 from baselines.spec import parse_policy
-from baselines.workers import TOLERANCE, LostError, Report, WorkerError, Workers, finished
+from baselines.workers import ALONE, TOLERANCE, LostError, Report, WorkerError, Workers, finished
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray
-
-#: This process alone.
-ALONE = Workers()
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -22,7 +22,7 @@ from baselines.training import methods, presets
 from baselines.training.config.base import SHAPE, Config
 from baselines.training.errors import TrainingError
 from baselines.training.seeds import SeedResult, SeedRuns, train_seeds
-from baselines.workers import Workers
+from baselines.workers import ALONE, Workers
 from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError, MissingDependencyError
 from ikgym.validation import whole_number
@@ -283,7 +283,7 @@ def _repeat(command: Repeat) -> int:
         checkpoint_every=command.checkpoint_every,
         command=shlex.join([*_program().split(), "repeat", str(command.run)]),
     )
-    (result,) = train_seeds(runs, [about["seed"]], workers=Workers(), progress=command.progress)
+    (result,) = train_seeds(runs, [about["seed"]], workers=ALONE, progress=command.progress)
     if result.error:
         raise TrainingError(result.error)
     if result.weights_sha256 == wanted:

@@ -66,3 +66,7 @@ class Workers:
         from baselines.workers.ray_cluster import RayPool  # see above
 
         return RayPool()
+
+
+#: This process, and no other.
+ALONE = Workers()

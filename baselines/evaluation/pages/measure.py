@@ -19,13 +19,11 @@ from baselines.evaluation.plan import EvaluationPlan, Job, make_plan
 from baselines.evaluation.results import Results, slug
 from baselines.evaluation.runner import run
 from baselines.files.locks import locked
-from baselines.workers import Workers
+from baselines.workers import ALONE, Workers
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
 
 Key = TypeVar("Key")
-#: This process alone.
-ALONE = Workers()
 
 
 def plan(

@@ -19,9 +19,9 @@ from baselines.evaluation.report import is_reference
 from baselines.evaluation.results import slug
 from baselines.evaluation.summary import summarise
 from baselines.oracle import Search, best_known
-from baselines.oracle.several import ALONE, Wanted, find_all
+from baselines.oracle.several import Wanted, find_all
 from baselines.spec import parse_policy
-from baselines.workers import Workers
+from baselines.workers import ALONE, Workers
 from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError
 from ikgym.plant import Plant
