@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import re
 import socket
 import sys
@@ -10,7 +9,6 @@ import threading
 import time
 import urllib.error
 import urllib.request
-import warnings
 
 import numpy as np
 import pytest
@@ -53,21 +51,8 @@ class Browser:
         self.say("TransformControlsUpdate", name=target.name, wxyz=target.wxyz.tolist(), position=position.tolist())
 
 
-def collect():
-    """viser leaves its event loop to the garbage collector, which would complain of it in the middle of other tests."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", ResourceWarning)
-        gc.collect()
-
-
-@pytest.fixture(scope="module", autouse=True)
-def collected():
-    yield
-    collect()
-
-
 @pytest.fixture(scope="module")
-def server(collected):
+def server():
     with servers.serving(HOST, 0) as made:
         yield made
 
@@ -177,8 +162,7 @@ def test_it_runs_until_it_is_told_to_stop(capsys, monkeypatch):
     port = int(re.search(r"http://127.0.0.1:(\d+)", capsys.readouterr().out)[1])
     with pytest.raises(urllib.error.URLError):
         urllib.request.urlopen(f"http://{HOST}:{port}", timeout=PATIENCE)
-    assert [thread for thread in threading.enumerate() if thread not in before and "asyncio" not in thread.name] == []
-    collect()
+    assert not {thread for thread in threading.enumerate() if thread.daemon} - before
 
 
 def test_a_port_in_use_is_an_error(capsys):
