@@ -80,7 +80,7 @@ class Meshes:
             for number, node in enumerate(model.scene.graph.nodes_geometry)
         ]
         self._joints = [_joint(model, arm.joint_names, mesh.node) for mesh in self._meshes]
-        self._tool = server.scene.add_icosphere(f"{root}/tool", radius=TOOL * size(arm))
+        self._tool = server.scene.add_icosphere(f"{root}/tool", radius=TOOL * size(arm), color=FREE)
 
     def show(self, q: FloatArray, reading: Reading) -> None:
         """See :class:`baselines.viewer.solids.Shape`."""

@@ -26,8 +26,8 @@ import msgspec
 from websockets.sync.client import connect
 
 from baselines.viewer import server as servers
+from tests.baselines.viewer.conftest import HOST
 
-HOST = "127.0.0.1"
 PATIENCE = 60.0  # [s]: the machine may have other work
 
 
@@ -51,16 +51,8 @@ class Browser:
         self.say("TransformControlsUpdate", name=target.name, wxyz=target.wxyz.tolist(), position=position.tolist())
 
 
-@pytest.fixture(scope="module")
-def server():
-    with servers.serving(HOST, 0) as made:
-        yield made
-
-
 @pytest.fixture
 def viewer(server):
-    server.scene.reset()
-    server.gui.reset()
     return servers.Viewer(server, session_of(Stage.of("panda-circle", steps=20), ["dls", "qp"]))
 
 
