@@ -111,8 +111,18 @@ def test_what_the_program_sets_is_not_taken_for_a_user(viewer):
     viewer.tick(1.0)  # readings and sliders are due
     viewer.tick(0.0)
     assert viewer.session.mode is Mode.PLAY
-    assert viewer._panel._joints[0].value == pytest.approx(viewer.session.shown()[0].q[0])
+    assert viewer._panel._joints[0].value == pytest.approx(viewer.session.shown()[0].q[0], abs=1e-4)
     assert "dls" in viewer._panel._readings.content
+
+
+def test_controls_are_told_what_is_new_alone(viewer):
+    told = []
+    viewer._panel._joints[0].on_update(told.append)
+    viewer.tick(1.0)
+    assert told == []
+    viewer.session.scrub(0.01)
+    viewer.tick(1.0)
+    assert len(told) == 1
 
 
 def test_a_target_that_is_dragged_is_followed(viewer, browser):
