@@ -113,7 +113,7 @@ def _sliders(gui: Any, arm: Arm, start: FloatArray) -> list[Any]:
 
 
 def _set(control: Any, value: float) -> None:
-    """Shows a value, if it looks different: viser sends it in any case, and slow browsers then take back what users do."""
+    """Shows a value, if it looks different: viser sends it in any case, and slow browsers take back what users do."""
     if control.value != (shown := round(value, DIGITS)):
         control.value = shown
 
