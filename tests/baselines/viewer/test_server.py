@@ -118,7 +118,7 @@ def test_what_the_program_sets_is_not_taken_for_a_user(viewer):
 def test_controls_are_told_what_is_new_alone(viewer):
     viewer.tick(1.0)
     told = []
-    viewer._panel._joints[0].on_update(told.append)
+    viewer._panel._time.on_update(told.append)
     viewer.tick(1.0)
     assert told == []
     viewer.session.scrub(0.01)
