@@ -13,7 +13,7 @@ from ikgym.validation import FloatArray
 BASE = -1
 
 # Radii and lengths of solids, as shares of the arm's reach.
-LINK, JOINT, JOINT_HALF, TOOL, RAIL = 0.016, 0.026, 0.034, 0.014, 0.009
+LINK, JOINT, JOINT_HALF, TOOL, RAIL = 0.016, 0.026, 0.034, 0.026, 0.009
 # Links that are shorter than this share of the reach are within their joints.
 SHORTEST = 1e-6
 

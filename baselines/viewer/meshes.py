@@ -18,8 +18,8 @@ from ikgym.exceptions import InvalidInputError
 from ikgym.rotations import quaternion
 from ikgym.validation import FloatArray
 
-# How far the tool may be elsewhere, in [m] and as parts of a rotation, for a file to be of an arm: nobody sees that,
-# and files that have 1.57 for half of π are off by more than a millimetre.
+# How far the tool may be elsewhere, in [m] and as parts of a rotation, for a file to be of an arm: files that have 1.57
+# for half of π are off by more than a millimetre.
 TOLERANCE = 5e-3
 # Postures at which that is looked at.
 POSTURES = 5
@@ -80,7 +80,7 @@ class Meshes:
             for number, node in enumerate(model.scene.graph.nodes_geometry)
         ]
         self._joints = [_joint(model, arm.joint_names, mesh.node) for mesh in self._meshes]
-        self._tool = server.scene.add_icosphere(f"{root}/tool", radius=TOOL * size(arm))
+        self._tool = server.scene.add_icosphere(f"{root}/tool", radius=TOOL * size(arm), color=FREE)
 
     def show(self, q: FloatArray, reading: Reading) -> None:
         """See :class:`baselines.viewer.solids.Shape`."""

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from baselines.status import Status
 from baselines.viewer.readings import slider_range
 from baselines.viewer.session import Mode, Session, Shown
 from ikgym.arms import Arm
@@ -17,6 +18,9 @@ Later = Callable[[Callable[[], object]], object]
 
 #: Seconds shown in one second.
 SPEEDS = (0.02, 0.05, 0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 50.0)
+
+# Digits behind the point of a slider's value.
+DIGITS = 4
 
 LEGEND = (
     "Drag the target, or a joint; *Play* goes back to the episode. A joint is yellow near a limit, red at it. "
@@ -48,11 +52,10 @@ class Panel:
         with gui.add_folder("Joints"):
             self._joints = _sliders(gui, scenario.arm, session.stage.start)
         self._play.on_click(lambda _: later(session.toggle))
-        _on_user(self._time, lambda: later(lambda: session.scrub(self._time.value)))
-        _on_user(speed, lambda: later(lambda: setattr(session, "speed", float(speed.value))))
-        _on_user(apart, lambda: later(lambda: put_apart(apart.value)))
-        for slider in self._joints:
-            _on_user(slider, lambda: later(self._place))
+        _on_user([self._time], later, session.scrub)
+        _on_user([speed], later, lambda chosen: setattr(session, "speed", float(chosen)))
+        _on_user([apart], later, put_apart)
+        _on_user(self._joints, later, lambda *q: session.place(np.array(q)))
 
     def show(self, shown: Sequence[Shown]) -> None:
         """Says what is to be seen; the sliders of the joints show those of the first policy."""
@@ -60,13 +63,10 @@ class Panel:
         self._readings.content = readings(session, shown)
         self._play.label = "Pause" if session.playing else "Play"
         if session.mode is Mode.PLAY:
-            self._time.value = session.time
+            _set(self._time, session.time)
         if session.mode is not Mode.HAND:
             for slider, coordinate in zip(self._joints, shown[0].q.tolist(), strict=True):
-                slider.value = min(max(coordinate, slider.min), slider.max)
-
-    def _place(self) -> None:
-        self._session.place(np.array([slider.value for slider in self._joints]))
+                _set(slider, min(max(coordinate, slider.min), slider.max))
 
 
 def readings(session: Session, shown: Sequence[Shown]) -> str:
@@ -85,7 +85,8 @@ def _said(arm: Arm, one: Shown) -> list[str]:
         errors.append(f"{1e3 * one.position_error:.3g} mm")
     if np.isfinite(one.orientation_error):
         errors.append(f"{1e3 * one.orientation_error:.3g} mrad")
-    said = [f"**{one.policy}**: {one.status}\n"]
+    known = one.status != Status.UNKNOWN.label
+    said = [f"**{one.policy}**{f': {one.status}' if known else ''}\n"]
     if errors:
         said.append(f"- error {', '.join(errors)}")
     said.append(f"- manipulability {reading.manipulability:.3g}, {reading.share:.0%} of the largest found")
@@ -111,6 +112,22 @@ def _sliders(gui: Any, arm: Arm, start: FloatArray) -> list[Any]:
     ]
 
 
-def _on_user(handle: Any, then: Callable[[], object]) -> None:
-    """Calls when somebody has moved a control, not when the program has."""
-    handle.on_update(lambda event: then() if event.client is not None else None)
+def _set(control: Any, value: float) -> None:
+    """Shows a value, if it looks different: viser sends it in any case, and slow browsers take back what users do."""
+    if control.value != (shown := round(value, DIGITS)):
+        control.value = shown
+
+
+def _on_user(controls: Sequence[Any], later: Later, then: Callable[..., object]) -> None:
+    """Hands over the values of controls when somebody has moved one of them, not when the program has.
+
+    They are read at once: before the session takes them, the program may show others.
+    """
+
+    def moved(event: Any) -> None:
+        if event.client is not None:
+            values = [control.value for control in controls]
+            later(lambda: then(*values))
+
+    for control in controls:
+        control.on_update(moved)

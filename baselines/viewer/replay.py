@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+import sys
 from collections.abc import Sequence
 
 import numpy as np
 from gymnasium.utils import seeding
+from tqdm import tqdm
 
 import baselines
 from baselines.viewer.approach import Pose
@@ -124,6 +126,22 @@ def named(policies: Sequence[str]) -> tuple[str, ...]:
     if not policies:
         raise InvalidInputError("policy: expected at least one, got none.")
     return tuple(dict.fromkeys(policies))
+
+
+def play_all(stage: Stage, policies: Sequence[str], *, progress: bool = False) -> list[Replay]:
+    """Plays the episode with each policy.
+
+    Args:
+        stage: What policies are shown on.
+        policies: Their names, as the command line takes them.
+        progress: Whether to show a bar on stderr.
+
+    Raises:
+        UnknownNameError: There is no such policy or parameter.
+        InvalidInputError: A policy does not suit the scenario, or a parameter is refused.
+    """
+    bar = tqdm(policies, disable=not progress, file=sys.stderr, unit="policy", dynamic_ncols=True)
+    return [play(stage, policy) for policy in bar]
 
 
 def play(stage: Stage, policy: str) -> Replay:

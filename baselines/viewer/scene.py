@@ -21,7 +21,11 @@ from ikgym.validation import FloatArray
 Shaper = Callable[[str, Colour], Shape]
 
 # Distances and sizes, as shares of the arm's reach.
-APART, TARGET, AXES, AXES_RADIUS, BALL, BELOW, EYE, LOOKED_AT = 1.1, 0.16, 0.09, 0.004, 0.012, 0.08, 1.2, 0.3
+APART, TARGET, AXES, AXES_RADIUS, BALL, BELOW = 1.1, 0.16, 0.09, 0.004, 0.012, 0.08
+# How far the camera is from one arm, and how much farther for each other one; how high what it looks at is.
+FAR, FARTHER, LOOKED_AT = 1.4, 1.0, 0.3
+# Vertical field of view of the camera in [rad], and by which part of half of what it sees the panel moves the middle.
+VIEW, BESIDE = 0.7, 0.4
 
 
 class Scene:
@@ -65,9 +69,11 @@ class Scene:
     def look(self, camera: Any) -> None:
         """Turns the camera of a browser to the arms."""
         others = len(self._roots) - 1
+        far = (FAR + FARTHER * others) * self._size
         # The panel is on the right: what is looked at lies beside the middle of the arms.
-        middle, far = (0.5 - 0.5 * APART * others) * self._size, EYE * self._size * (1.0 + 0.3 * others)
-        camera.position = (far, middle, 0.6 * far)
+        middle = -0.5 * APART * others * self._size + BESIDE * far * np.tan(0.5 * VIEW)
+        camera.fov = VIEW
+        camera.position = (0.9 * far, middle + 0.3 * far, (0.3 + LOOKED_AT) * far)
         camera.look_at = (0.0, middle, LOOKED_AT * self._size)
 
     def show(self, shown: Sequence[Shown]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import queue
 import socket
@@ -44,6 +45,21 @@ def serving(host: str, port: int) -> Iterator[Any]:
         server.stop()
         for thread in listening:  # nobody listens any more when this returns
             thread.join(PATIENCE)
+        _close(server.get_event_loop())
+
+
+def _close(loop: asyncio.AbstractEventLoop) -> None:
+    """Closes the loop that viser leaves behind with its tasks, of which Python would complain when it collects them."""
+    if not (loop.is_running() or loop.is_closed()):
+        loop.run_until_complete(_cancel_others())
+        loop.close()
+
+
+async def _cancel_others() -> None:
+    others = asyncio.all_tasks() - {asyncio.current_task()}
+    for task in others:
+        task.cancel()
+    await asyncio.gather(*others, return_exceptions=True)
 
 
 class Viewer:

@@ -14,7 +14,7 @@ from tqdm import tqdm
 
 from baselines import command
 from baselines.viewer.film import check_ffmpeg, checked_width, moments, pictures, write_video
-from baselines.viewer.replay import Stage, named, play
+from baselines.viewer.replay import Stage, named, play_all
 from ikgym.exceptions import InvalidInputError
 
 
@@ -73,7 +73,7 @@ def _film(options: Options) -> int:
     width, names = checked_width(options.width), named(options.policy)
     stage = Stage.of(options.scenario, options.seed, options.steps)
     steps = moments(stage, options.fps, options.speed)
-    replays = [play(stage, name) for name in names]
+    replays = play_all(stage, names, progress=True)
     content = tqdm(
         pictures(stage, replays, steps, width=width),
         total=len(steps),

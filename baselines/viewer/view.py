@@ -11,11 +11,10 @@ from collections.abc import Sequence
 from typing import Annotated, Any
 
 import tyro
-from tqdm import tqdm
 
 from baselines import command
 from baselines.viewer.following import followers
-from baselines.viewer.replay import Stage, named, play
+from baselines.viewer.replay import Stage, named, play_all
 from baselines.viewer.session import Session
 from ikgym.exceptions import InvalidInputError
 
@@ -68,8 +67,7 @@ def session_of(stage: Stage, policies: Sequence[str], *, progress: bool = False)
         InvalidInputError: There is no policy, or one does not suit the scenario.
     """
     names = named(policies)
-    bar = tqdm(names, disable=not progress, file=sys.stderr, unit="policy", dynamic_ncols=True)
-    return Session(stage, [play(stage, policy) for policy in bar], followers(stage, names))
+    return Session(stage, play_all(stage, names, progress=progress), followers(stage, names))
 
 
 def main(arguments: Sequence[str] | None = None, stop: threading.Event | None = None) -> int:

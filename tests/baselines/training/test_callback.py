@@ -31,7 +31,13 @@ def test_what_is_logged_is_what_is_measured(scenario, tmp_path, monkeypatch):
     monkeypatch.setattr(callbacks, "reference_costs", lambda digest, seeds: known)
     env = RedundantIKVecEnv(2, scenario)
     model = PPO(
-        "MultiInputPolicy", env, n_steps=STEPS, batch_size=2 * STEPS, device="cpu", tensorboard_log=str(tmp_path)
+        "MultiInputPolicy",
+        env,
+        n_steps=STEPS,
+        batch_size=2 * STEPS,
+        n_epochs=1,
+        device="cpu",
+        tensorboard_log=str(tmp_path),
     )
     model.learn(3 * 2 * STEPS, callback=ValidationCallback(scenario, every=2 * STEPS, episodes=2))
     events = EventAccumulator(str(tmp_path / "PPO_1")).Reload()

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import types
-
 import numpy as np
 import pytest
 
@@ -46,60 +44,48 @@ def urdf(folder, length=1.0, joints=JOINTS, shape='<mesh filename="link.stl"/>')
     return file
 
 
-class Server:
-    """The part of viser's that meshes need."""
-
-    def __init__(self):
-        self.scene, self.handles = self, {}
-
-    def add(self, name, mesh=None, color=(0, 0, 0), visible=True, **content):
-        self.handles[name] = handle = types.SimpleNamespace(mesh=mesh, color=color, visible=visible)
-        return handle
-
-    add_mesh_trimesh = add_mesh_simple = add_icosphere = add
-
-
-@pytest.fixture
-def server():
-    return Server()
-
-
 @pytest.fixture
 def shown(arm, server, tmp_path):
-    """Shows a posture."""
+    """The arm in viser's scene, at a posture."""
     made = meshes.Meshes(server, "/root", meshes.read_urdf(urdf(tmp_path), arm), arm)
-    return lambda q: made.show(np.array(q), Reader(arm, ikgym.tasks.get("position")).read(np.array(q)))
+
+    def show(*q):
+        made.show(np.array(q), Reader(arm, ikgym.tasks.get("position")).read(np.array(q)))
+        return made
+
+    return show
 
 
-def seen(server):
-    return {name: handle for name, handle in server.handles.items() if handle.visible}
+def seen(made):
+    """The handles of the meshes that are seen, each with whether it has the colours of its file."""
+    assert all(mesh._own.visible != mesh._plain.visible for mesh in made._meshes)
+    return [(mesh._own, True) if mesh._own.visible else (mesh._plain, False) for mesh in made._meshes]
 
 
-def test_meshes_move_with_the_arm(arm, server, shown):
-    shown([0.3, 0.5])
-    assert list(seen(server)) == ["/root/0/own", "/root/1/own", "/root/tool"]
-    places = np.array([handle.position for handle in seen(server).values()])
-    wanted = [*arm.joint_points(np.array([0.3, 0.5]))[:, 1], arm.forward(np.array([0.3, 0.5]))[1]]
-    np.testing.assert_allclose(places, wanted, atol=1e-6)
-    last = server.handles["/root/1/own"]
+def test_meshes_move_with_the_arm(arm, shown):
+    made, q = shown(0.3, 0.5), np.array([0.3, 0.5])
+    (first, own), (last, own_as_well) = seen(made)
+    assert own
+    assert own_as_well
+    np.testing.assert_allclose([first.position, last.position], arm.joint_points(q)[:, 1], atol=1e-6)
     np.testing.assert_allclose(last.wxyz, [np.cos(0.4), 0.0, 0.0, np.sin(0.4)], atol=1e-6)
-    np.testing.assert_allclose(last.mesh.bounds[:, 0], [0.0, 1.0], atol=1e-6)
+    np.testing.assert_allclose(made._tool.position, arm.forward(q)[1], atol=1e-6)
 
 
 @pytest.mark.parametrize(("elbow", "colour"), [(0.99, NEAR), (1.0, AT)])
-def test_what_a_joint_near_its_limit_moves_has_the_colour_of_the_limit(server, shown, elbow, colour):
-    shown([0.3, elbow])
-    assert list(seen(server)) == ["/root/0/own", "/root/1/plain", "/root/tool"]
-    handle = server.handles["/root/1/plain"]
-    assert handle.color == colour
+def test_what_a_joint_near_its_limit_moves_has_the_colour_of_the_limit(shown, elbow, colour):
+    (_, first_own), (handle, own) = seen(shown(0.3, elbow))
+    assert first_own
+    assert not own
+    assert tuple(handle.color) == colour
     np.testing.assert_allclose(handle.wxyz, [np.cos((0.3 + elbow) / 2), 0.0, 0.0, np.sin((0.3 + elbow) / 2)], atol=1e-6)
-    shown([0.3, 0.5])
-    assert "/root/1/own" in seen(server)
+    np.testing.assert_allclose(np.ptp(handle.vertices, axis=0), [1.0, 0.1, 0.1], atol=1e-6)
+    assert [own for _, own in seen(shown(0.3, 0.5))] == [True, True]
 
 
-def test_the_ball_at_the_tool_says_how_manipulable_the_arm_is(server, shown):
-    shown([0.3, 0.0])
-    assert server.handles["/root/tool"].color == share_colour(0.0)
+def test_the_ball_at_the_tool_says_how_manipulable_the_arm_is(shown):
+    assert tuple(shown(0.3, 0.0)._tool.color) == share_colour(0.0)
+    assert tuple(shown(0.3, 0.8)._tool.color) != share_colour(0.0)
 
 
 @pytest.mark.parametrize(
@@ -138,9 +124,9 @@ def stage(tmp_path):
 
 
 def test_an_arm_from_a_file_with_meshes_is_shown_with_them(stage, server):
-    shaper = shaper_of(stage(), None)
-    assert isinstance(shaper(server)("/root", AT), meshes.Meshes)
-    assert list(seen(server)) == ["/root/0/own", "/root/1/own", "/root/tool"]
+    made = shaper_of(stage(), None)(server)("/root", AT)
+    assert isinstance(made, meshes.Meshes)
+    assert len(made._meshes) == 2
 
 
 def test_an_arm_from_a_file_without_meshes_is_shown_as_cylinders(stage, capsys):
