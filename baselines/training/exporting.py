@@ -14,7 +14,7 @@ from torch import nn
 from baselines.agents.features import Features
 from baselines.agents.files import save_agent
 from baselines.agents.network import Network
-from baselines.agents.relative import Relative, Squash
+from baselines.agents.relative.processing import Relative, Squash
 from baselines.agents.sb3_zip import network_of_model
 from baselines.policy import Problem
 from baselines.training.networks import ACTIVATIONS
