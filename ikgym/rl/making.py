@@ -31,18 +31,18 @@ class Learning(Frozen):
         largest: See there.
         furthest: See there.
         scale: See :class:`ikgym.rl.LogReward`.
-        charge: See there.
+        horizon: See there.
         history: How many observations are seen side by side, see :class:`ikgym.rl.History`.
         commands: How many of the last commands are seen.
     """
 
     preview: Preview = (10, 40, 100)
     lost_distance: float | None = 0.1
-    share: float = 0.25
-    largest: float = 1.0
+    share: float = 0.4
+    largest: float = 2.0
     furthest: float = 5.0
     scale: float = 0.005
-    charge: float = 100.0
+    horizon: float = 100.0
     history: int = 1
     commands: int = 0
 
@@ -64,7 +64,7 @@ class Learning(Frozen):
     def _wrap(self, env: Any, kinds: Any) -> Any:
         """An environment in the wrappers of a module."""
         env = kinds.RelativeAction(env, self.share, self.largest, self.furthest)
-        env = kinds.LogReward(env, self.scale, self.charge)
+        env = kinds.LogReward(env, self.scale, self.horizon)
         env = kinds.AgentObservation(env, self.furthest)
         return env if self.history == 1 else kinds.History(env, self.history)
 
