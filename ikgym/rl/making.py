@@ -38,7 +38,7 @@ class Learning(Frozen):
 
     preview: Preview = (10, 40, 100)
     lost_distance: float | None = 0.1
-    share: float = 0.4
+    share: float = 1.0
     largest: float = 2.0
     furthest: float = 5.0
     scale: float = 0.005
