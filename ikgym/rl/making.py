@@ -19,9 +19,10 @@ from ikgym.vector_env import RedundantIKVectorEnv
 class Learning(Frozen):
     """How an environment is wrapped for learning.
 
-    The defaults are those with which PPO of Stable-Baselines3 learns with its own defaults. With a lead of ten steps a
-    joint within an acceleration limit can follow what it is told, and with |v̂| cut at 5 an arm that is far off is not
-    told to be there at once. Noise of one standard deviation of 1 is a quarter of the velocity that is asked for.
+    The defaults are for PPO of Stable-Baselines3 with its own defaults. With a lead of ten steps a joint within an
+    acceleration limit can follow what it is told, and with |v̂| cut at 5 an arm that is far off is not told to be there
+    at once. Noise of one standard deviation of 1 is as large as the velocity that is asked for: with less of it, what
+    one action has done is lost among the others.
 
     Args:
         preview: Steps ahead at which the reference is shown, at least two; the arm is to be at the first of them by

@@ -41,33 +41,21 @@ def velocity_rows(bilinear, squashed, gain, largest, velocity_limit, features, u
 
 
 @kernel
-def law_rows(
-    kind,
-    chain,
-    dt,
-    offsets,
-    furthest,
-    bilinear,
-    squashed,
-    gain,
-    largest,
-    velocity_limit,
-    weights,
-    biases,
-    sizes,
-    activation,
-    squash,
-    q,
-    qdot,
-    pose,
-    nominal,
-    remaining,
-    out,
-):
+def law_rows(ahead, meaning, velocity_limit, network, batch, out):
     """The whole law, row by row: :func:`ikgym.rl.feature_kernels.observe_rows`, the network, :func:`velocity_rows`.
 
-    Arguments are theirs, and of :func:`baselines.agents.network.forward_rows`.
+    Args:
+        ahead: The first five arguments of `observe_rows`.
+        meaning: The first four of :func:`velocity_rows`.
+        velocity_limit: In [rad/s] or [m/s]. Shape (n,).
+        network: The first five of :func:`baselines.agents.network.forward_rows`.
+        batch: q, q̇, pose, reference and steps left, as of `observe_rows`.
+        out: Receives fractions of the velocity limit. Shape (B, n).
     """
+    kind, chain, dt, offsets, furthest = ahead
+    bilinear, squashed, gain, largest = meaning
+    weights, biases, sizes, activation, squash = network
+    q, qdot, pose, nominal, remaining = batch
     features, unit = np.empty((q.shape[0], sizes[0]), np.float32), np.empty(q.shape[0])
     observe_rows(kind, chain, dt, offsets, furthest, q, qdot, pose, nominal, remaining, features, unit)
     output = np.empty((q.shape[0], sizes[sizes.shape[0] - 1]), np.float32)

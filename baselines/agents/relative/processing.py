@@ -121,7 +121,7 @@ class Relative(Frozen):
     def law(self, problem: Problem, batch: Batch, network: Network) -> FloatArray:
         """:meth:`action` of what a network says of :meth:`features`, bit for bit, in one compiled call."""
         out = np.empty(batch.q.shape)
-        law_rows(*self._ahead(problem), *self._output, problem.velocity_limit, *network.constants, *batch[:5], out)
+        law_rows(self._ahead(problem), self._output, problem.velocity_limit, network.constants, tuple(batch[:5]), out)
         return out
 
     def _observe(self, problem: Problem, batch: Batch) -> tuple[Features, FloatArray]:
