@@ -19,7 +19,7 @@ from baselines.agents.bilinear.processing import Bilinear
 from baselines.agents.features import Processing
 from baselines.agents.network import Network, Singles
 from baselines.agents.protocols import AgentFile, StoredTransform
-from baselines.agents.relative import Relative
+from baselines.agents.relative.processing import Relative
 from baselines.agents.untrusted import parse_json, read, refuse
 from baselines.canonical import canonical
 from baselines.files import write

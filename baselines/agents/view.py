@@ -13,6 +13,7 @@ from baselines.agents.bilinear.processing import Bilinear
 from baselines.agents.features import Features
 from baselines.agents.network import Network
 from baselines.agents.protocols import Actor, Transform
+from baselines.agents.relative.processing import Relative
 from baselines.policy import Batch, Memory, Problem, SolverPolicy
 from baselines.wrapper import InnerStep
 from ikgym.validation import FloatArray
@@ -88,7 +89,7 @@ class AgentView:
         Returns:
             Fractions of the velocity limit, and what else the base policy did.
         """
-        if isinstance(self.processing, Bilinear) and isinstance(network, Network):
+        if isinstance(self.processing, (Bilinear, Relative)) and isinstance(network, Network):
             own = batch._replace(nominal=self.preview.for_agent(batch.nominal))
             return self.processing.law(self.problem, own, network), None
         seen = self.see(batch, memory)

@@ -6,19 +6,16 @@ import pathlib
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
 from torch import nn
 
 from baselines.agents.features import Features
 from baselines.agents.files import save_agent
 from baselines.agents.network import Network
-from baselines.agents.relative import Relative, Squash
+from baselines.agents.relative.processing import Relative, Squash
 from baselines.agents.sb3_zip import network_of_model
 from baselines.policy import Problem
-from baselines.training.networks import ACTIVATIONS
-from baselines.training.policies import BilinearActor
+from baselines.training.policies import ACTIVATION, BilinearActor
 from ikgym.exceptions import InvalidInputError
 from ikgym.preview import offsets
 from ikgym.sb3 import LearningVecEnv
@@ -72,11 +69,15 @@ def _unsquashed(network: Network) -> tuple[Network, bool]:
 def _layers(layers: nn.Sequential) -> Network:
     """The layers of a bilinear actor."""
     linear = [layer for layer in layers if isinstance(layer, nn.Linear)]
-    kinds = [name for name, kind in ACTIVATIONS.items() if any(type(layer) is kind for layer in layers)]
+    weights, biases = ([numbers(layer) for layer in linear] for numbers in (_weight, _bias))
+    return Network(tuple(weights), tuple(biases), ACTIVATION, "linear")
 
-    def numbers(tensor: torch.Tensor) -> Features:
-        out: Features = tensor.detach().cpu().numpy().astype(np.float32)
-        return out
 
-    weights, biases = [numbers(layer.weight) for layer in linear], [numbers(layer.bias) for layer in linear]
-    return Network(tuple(weights), tuple(biases), *kinds, "linear")
+def _weight(layer: nn.Linear) -> Features:
+    out: Features = layer.weight.detach().cpu().numpy()
+    return out
+
+
+def _bias(layer: nn.Linear) -> Features:
+    out: Features = layer.bias.detach().cpu().numpy()
+    return out

@@ -7,10 +7,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, cast
 
 import torch
-from gymnasium import spaces
 from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.torch_layers import MlpExtractor
 from stable_baselines3.sac.policies import Actor as SACActor
@@ -19,10 +18,14 @@ from stable_baselines3.td3.policies import Actor as TD3Actor
 from stable_baselines3.td3.policies import TD3Policy
 from torch import Tensor, nn
 
-from baselines.training.networks import ActorModel
+from baselines.training.config.base import Activation
+from baselines.training.networks import QUIET, ActorModel
 from ikgym.exceptions import InvalidInputError
 from ikgym.rl.feature_kernels import LEAST
 from ikgym.rl.view import due_size
+
+#: Of the network behind G and h.
+ACTIVATION: Activation = "silu"
 
 
 class BilinearActor(nn.Module):
@@ -37,23 +40,24 @@ class BilinearActor(nn.Module):
         hidden: Neurons of the hidden layers.
     """
 
-    def __init__(self, space: spaces.Box, joints: int, hidden: Sequence[int]) -> None:
+    def __init__(self, space: Any, joints: int, hidden: Sequence[int]) -> None:
         super().__init__()
         self.joints, self.twist = joints, due_size(space)
-        self.network = ActorModel.new((*space.shape, *hidden, joints * (self.twist + 1)), "silu").policy
+        self.network = ActorModel.new((*space.shape, *hidden, joints * (self.twist + 1)), ACTIVATION).policy
 
     def forward(self, features: Tensor) -> Tensor:
         """Mean velocities in units. Shape (B, n)."""
         w = self.twist
         due = torch.cat([features[:, :w], features[:, w : w + 1] / LEAST], dim=1)
         rows = self.network(features).reshape(-1, self.joints, w + 1)
-        return (rows * due[:, None]).sum(dim=2)
+        out: Tensor = (rows * due[:, None]).sum(dim=2)
+        return out
 
 
 class _Scaled(nn.Module):
     """Velocities in units as actions of a box whose bound is the largest velocity."""
 
-    def __init__(self, actor: BilinearActor, space: spaces.Box) -> None:
+    def __init__(self, actor: BilinearActor, space: Any) -> None:
         super().__init__()
         self.actor, self.bound = actor, float(space.high[0])
 
@@ -68,7 +72,7 @@ class _Extractor(MlpExtractor):
 
     def __init__(self, actor: _Scaled, *args: Any) -> None:
         super().__init__(*args)
-        self.policy_net, self.latent_dim_pi = actor, actor.actor.joints
+        self.policy_net, self.latent_dim_pi = nn.Sequential(actor), actor.actor.joints
 
 
 class BilinearPPOPolicy(ActorCriticPolicy):
@@ -82,9 +86,10 @@ class BilinearPPOPolicy(ActorCriticPolicy):
 
     def _build(self, lr_schedule: Any) -> None:
         super()._build(lr_schedule)
-        self.action_net = nn.Identity()  # what the actor says are the actions
-        self.mlp_extractor.policy_net.actor.network[-1].weight.data.mul_(0.01)  # after the orthogonal initialisation
-        self.optimizer = self.optimizer_class(self.parameters(), lr=lr_schedule(1), **self.optimizer_kwargs)
+        self.action_net: nn.Module = nn.Identity()  # what the actor says are the actions
+        scaled, optimizer = cast(_Scaled, self.mlp_extractor.policy_net[0]), cast(Any, self.optimizer_class)
+        cast(nn.Linear, scaled.actor.network[-1]).weight.data.mul_(QUIET)  # after the orthogonal initialisation
+        self.optimizer = optimizer(self.parameters(), lr=lr_schedule(1), **self.optimizer_kwargs)
 
 
 class _BilinearSACActor(SACActor):
@@ -93,7 +98,9 @@ class _BilinearSACActor(SACActor):
         if self.use_sde:
             raise InvalidInputError("use_sde: expected False for a bilinear actor, got True.")
         self.mu = BilinearActor(self.observation_space, _joints(self.action_space), self.net_arch)
-        self.latent_pi, self.log_std = nn.Identity(), nn.Sequential(self.latent_pi, self.log_std)
+        head: Any = self.log_std
+        self.log_std = nn.Sequential(self.latent_pi, head)  # type: ignore[assignment]  # declared for use_sde
+        self.latent_pi = nn.Sequential()
 
 
 class BilinearSACPolicy(SACPolicy):

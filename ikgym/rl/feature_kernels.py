@@ -182,15 +182,23 @@ def unit_rows(kind, dt, offsets, furthest, pose, nominal, out):
 
 
 @kernel
-def log_rewards(rewards, terminated, scale, charge, out):
+def log_rewards(rewards, tracking, terminated, scale, horizon, before, out):
     """Rewards of agents, in one loop for one arm and for many, see :class:`ikgym.rl.LogReward`.
 
     Args:
         rewards: −cost. Shape (N,).
+        tracking: Tracking costs. Shape (N,).
         terminated: Where a track is lost. Shape (N,).
         scale: See there.
-        charge: See there.
+        horizon: See there.
+        before: log(1 + tracking cost) of the last step, 0 where an episode begins; that of this one takes its place.
+            Shape (N,).
         out: Receives the rewards. Shape (N,).
     """
     for row in range(rewards.shape[0]):
-        out[row] = 0.0 - scale * (charge if terminated[row] else 1.0) * math.log1p(-rewards[row])
+        level, total = math.log1p(tracking[row]), math.log1p(-rewards[row])
+        if terminated[row]:
+            out[row] = scale * horizon * (before[row] - total)
+        else:
+            out[row] = scale * (horizon * before[row] - (horizon - 1.0) * level - total)
+        before[row] = level

@@ -42,6 +42,12 @@ class ArmsWrapper(VectorWrapper[Any, Any, Any, Any, Any]):
         self.single_observation_space, self.observation_space = space, batch_space(space, self.num_envs)
 
 
+def beginning(options: dict[str, Any] | None, rows: int) -> Flags:
+    """Which rows a reset with such options begins. Shape (N,)."""
+    mask: Flags | None = (options or {}).get("reset_mask")
+    return np.ones(rows, dtype=np.bool_) if mask is None else mask
+
+
 class AgentObservation(ArmsWrapper):
     """:class:`ikgym.rl.AgentObservation` of N arms: features of shape (N, f), and of each last observation.
 
@@ -112,21 +118,31 @@ class LogReward(ArmsWrapper):
     Args:
         env: The vector environment.
         scale: Above 0.
-        charge: At least 1.
+        horizon: At least 1.
 
     Raises:
         InvalidInputError: A parameter is out of its range.
     """
 
-    def __init__(self, env: Any, scale: float = 0.1, charge: float = 100.0) -> None:
+    def __init__(self, env: Any, scale: float = 0.1, horizon: float = 100.0) -> None:
         super().__init__(env)
-        self._scale, self._charge = number("scale", scale, above=0.0), number("charge", charge, at_least=1.0)
+        self._scale, self._horizon = number("scale", scale, above=0.0), number("horizon", horizon, at_least=1.0)
+        self._before = np.zeros(self.num_envs)
+
+    def reset(self, *, seed: Any = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
+        """Begins episodes, in all rows or in those of a mask."""
+        found = self.env.reset(seed=seed, options=options)
+        self._before[beginning(options, self.num_envs)] = 0.0
+        return found
 
     def step(self, actions: Any) -> StepReturn:
         """One step of all arms."""
         observation, rewards, terminated, truncated, infos = self.env.step(actions)
-        out = np.empty(self.num_envs)
-        log_rewards(rewards, terminated, self._scale, self._charge, out)
+        out, tracking = np.empty(self.num_envs), np.zeros(self.num_envs)
+        for seen in (infos, infos.get("final_info", {})):  # rows that have ended are in the latter alone
+            tracking += seen.get("tracking_cost", 0.0)
+        log_rewards(rewards, tracking, terminated, self._scale, self._horizon, self._before, out)
+        self._before[terminated | truncated] = 0.0
         return observation, out, terminated, truncated, infos
 
 
@@ -152,10 +168,9 @@ class History(ArmsWrapper):
     def reset(self, *, seed: Any = None, options: dict[str, Any] | None = None) -> tuple[Features, dict[str, Any]]:
         """Begins episodes, in all rows or in those of a mask."""
         observation, infos = self.env.reset(seed=seed, options=options)
-        mask = (options or {}).get("reset_mask")
-        beginning = np.ones(self.num_envs, dtype=np.bool_) if mask is None else mask
-        self._begin(observation, beginning)
-        self._ended = self._ended & ~beginning
+        rows = beginning(options, self.num_envs)
+        self._begin(observation, rows)
+        self._ended = self._ended & ~rows
         return self._shown, infos
 
     def step(self, actions: Any) -> StepReturn:

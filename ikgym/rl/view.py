@@ -76,7 +76,7 @@ class AgentView:
         return out
 
     @staticmethod
-    def _bound(key: str, space: spaces.Box) -> tuple[FloatArray, FloatArray]:
+    def _bound(key: str, space: Any) -> tuple[FloatArray, FloatArray]:
         limit = np.ones(math.prod(space.shape))
         return (-FASTEST * limit, FASTEST * limit) if key == "commands" else (0.0 * limit, limit)
 

@@ -105,31 +105,44 @@ class RelativeAction(gym.Wrapper[Any, Any, Observation, Any], RecordConstructorA
 
 
 class LogReward(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
-    """−scale · log(1 + stage cost) in place of −stage cost; more of it where the track is lost.
+    """The logarithm of the stage cost in place of the cost, and how much nearer each step has come.
 
-    Stage costs span ten decades, and a critic that has to tell 1 from 2 must not see 1e9. Rewards are negative: an
-    episode that ends early would be a cheap one. So the last reward of a terminated episode counts `charge` times, as
-    if the arm had stayed where it was for so many steps.
+    Stage costs span ten decades, and a critic that has to tell 1 from 2 must not see 1e9. With L = log(1 + stage cost)
+    and T = log(1 + tracking cost) of a step k, and H = `horizon`:
+
+        reward(k) = scale · (H T(k - 1) - (H - 1) T(k) - L(k))
+
+    This is −scale · L(k), shaped by the potential −scale · H T, which changes no policy's rank where 1 / (1 − γ) = H
+    (Ng, Harada & Russell 1999): an agent need not learn first that an arm that is off its path stays off. Where a track
+    is lost, the reward is scale · H (T(k - 1) - L(k)), as if the arm had stayed there: to end early saves nothing.
+    T is 0 before an episode begins.
 
     Args:
-        env: The environment.
+        env: The environment, or one around it whose `info` has its tracking cost.
         scale: Above 0.
-        charge: At least 1. The same as 1 / (1 − γ) charges what a critic would expect of an arm that stays lost.
+        horizon: Steps that a critic looks ahead, 1 / (1 − γ); at least 1.
 
     Raises:
         InvalidInputError: A parameter is out of its range.
     """
 
-    def __init__(self, env: gym.Env[Any, Any], scale: float = 0.1, charge: float = 100.0) -> None:
-        RecordConstructorArgs.__init__(self, scale=scale, charge=charge)
+    def __init__(self, env: gym.Env[Any, Any], scale: float = 0.1, horizon: float = 100.0) -> None:
+        RecordConstructorArgs.__init__(self, scale=scale, horizon=horizon)
         super().__init__(env)
-        self._scale, self._charge = number("scale", scale, above=0.0), number("charge", charge, at_least=1.0)
+        self._scale, self._horizon = number("scale", scale, above=0.0), number("horizon", horizon, at_least=1.0)
+        self._before = np.zeros(1)
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
+        """Begins an episode."""
+        found = self.env.reset(seed=seed, options=options)
+        self._before[0] = 0.0
+        return found
 
     def step(self, action: Any) -> StepReturn:
         """One step of the environment."""
         observation, reward, terminated, truncated, info = self.env.step(action)
-        out = np.empty(1)
-        log_rewards(np.array([reward], dtype=np.float64), np.array([terminated]), self._scale, self._charge, out)
+        rewards, tracking, out = np.array([float(reward)]), np.array([float(info["tracking_cost"])]), np.empty(1)
+        log_rewards(rewards, tracking, np.array([terminated]), self._scale, self._horizon, self._before, out)
         return observation, out[0].item(), terminated, truncated, info
 
 

@@ -113,13 +113,15 @@ def load_weights(file: pathlib.Path) -> InitialWeights:
         return _parse(str(file), content, parse_json(str(file), text.encode()))
     agent = load_agent(file)
     if not isinstance(agent.network, Network) or not isinstance(agent.processing, Stored):
-        raise TrainingError(f"{file} was not trained here: it does not see the features of an agent.")
+        raise _trained_elsewhere(agent.source)
     return InitialWeights(agent.source, agent.processing, agent.network)
 
 
 def _parse(source: str, content: bytes, about: dict[str, Any]) -> InitialWeights:
     claimed = about.pop("hash", None)
     processing = check_described(source, about)
+    if not isinstance(processing, Stored):
+        raise _trained_elsewhere(source)
     try:
         arrays = load_tensors(content)
         if claimed != (found := digest(sorted(arrays.items()), about)):
@@ -140,6 +142,10 @@ def _parse(source: str, content: bytes, about: dict[str, Any]) -> InitialWeights
     except (SafetensorError, InvalidInputError, UnknownNameError, KeyError, ValueError, TypeError) as e:
         reason = " ".join(str(e).split())[:300] or type(e).__name__
         raise TrainingError(f"Cannot begin from {source}: {reason}") from None
+
+
+def _trained_elsewhere(source: str) -> TrainingError:
+    return TrainingError(f"{source} was not trained here: it does not see the features of an agent.")
 
 
 def _metadata(content: bytes) -> dict[str, Any]:

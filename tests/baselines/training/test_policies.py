@@ -68,7 +68,7 @@ def test_weights_of_the_bilinear_actor_are_trained(kind, policy, parameters):
 def test_actions_are_homogeneous_in_what_is_due():
     """Twice as far from the path, the velocity that takes it back is twice as large: G does not change."""
     model = PPO(BilinearPPOPolicy, ikgym.sb3.make_vec(scenario(), 2), device="cpu", seed=0, **SHORT)
-    actor = model.policy.mlp_extractor.policy_net.actor
+    actor = model.policy.mlp_extractor.policy_net[0].actor
     features = torch.from_numpy(rl.make(scenario()).reset(seed=0)[0])[None]
     n, w = actor.joints, actor.twist
     assert (n, w) == (7, 6)
@@ -85,7 +85,7 @@ def test_the_space_says_how_many_features_are_due(name, changes, size):
     """Bilinear actors suit all arms and tasks, and whatever else is observed."""
     envs = ikgym.sb3.make_vec(name, 2, **changes)
     model = PPO(BilinearPPOPolicy, envs, device="cpu", seed=0, **SHORT).learn(16)
-    actor = model.policy.mlp_extractor.policy_net.actor
+    actor = model.policy.mlp_extractor.policy_net[0].actor
     assert (actor.twist, actor.joints) == (size, envs.scenario.joints)
 
 

@@ -10,10 +10,12 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.agents.features import Features
+from baselines.agents.network import Network
+from baselines.agents.relative.kernels import law_rows, velocity_rows
 from baselines.policy import Batch, Problem
 from ikgym.exceptions import InvalidInputError
 from ikgym.preview import offsets as checked_offsets
-from ikgym.rl.feature_kernels import LEAST, observe_rows, unit_rows
+from ikgym.rl.feature_kernels import observe_rows
 from ikgym.rl.twists import shown_joints, twist_size
 from ikgym.validation import FloatArray, Frozen, known_name, known_names, number
 
@@ -46,6 +48,7 @@ class Relative(Frozen):
     gain: float = 1.0
     squash: Squash = "clip"
     bilinear: bool = False
+    _steps: npt.NDArray[np.int64] = dataclasses.field(init=False, repr=False, compare=False)
 
     #: What files call it.
     kind: ClassVar[str] = "relative"
@@ -58,7 +61,9 @@ class Relative(Frozen):
         if not isinstance(self.bilinear, bool):
             raise InvalidInputError(f"bilinear: expected true or false, got {self.bilinear!r}.")
         values = {name: number(name, getattr(self, name), above=0.0) for name in ("furthest", "largest", "gain")}
-        for field, value in {"offsets": offsets, **values}.items():
+        steps = np.array(offsets, dtype=np.int64)
+        steps.flags.writeable = False
+        for field, value in {"offsets": offsets, "_steps": steps, **values}.items():
             object.__setattr__(self, field, value)
 
     @property
@@ -73,7 +78,8 @@ class Relative(Frozen):
 
     def to_json(self) -> dict[str, Any]:
         """The fields, as JSON has them."""
-        return {"kind": self.kind, **dataclasses.asdict(self), "offsets": list(self.offsets)}
+        fields = {name: getattr(self, name) for name in _fields()}
+        return {"kind": self.kind, **fields, "offsets": list(self.offsets)}
 
     @classmethod
     def from_json(cls, values: Mapping[str, Any]) -> Self:
@@ -83,9 +89,8 @@ class Relative(Frozen):
             UnknownNameError: There is a key that is none of the fields.
             InvalidInputError: A value is refused.
         """
-        names = [field.name for field in dataclasses.fields(cls)]
-        known_names("field of the processing", values, ["kind", *names])
-        fields = {name: values[name] for name in names}
+        known_names("field of the processing", values, ["kind", *_fields()])
+        fields = {name: values[name] for name in _fields()}
         return cls(**{**fields, "offsets": tuple(fields["offsets"])})
 
     def size(self, problem: Problem) -> int:
@@ -102,46 +107,39 @@ class Relative(Frozen):
     def features(self, problem: Problem, batch: Batch, base: FloatArray | None = None) -> Features:
         """The features of a batch; see :meth:`baselines.agents.features.Processing.features`."""
         del base
-        out, unit = np.empty((len(batch.q), self.size(problem)), np.float32), np.empty(len(batch.q))
-        observe_rows(problem.task.kind, problem.model.chain, *self._ahead(problem), *batch[:5], out, unit)
-        return out
+        return self._observe(problem, batch)[0]
 
     def action(
         self, problem: Problem, batch: Batch, output: npt.NDArray[Any], base: FloatArray | None = None
     ) -> FloatArray:
         """Actions, as fractions of the velocity limit; see :meth:`baselines.agents.features.Processing.action`."""
         del base
-        unit, n = np.empty(len(batch.q)), problem.model.joints
-        unit_rows(problem.task.kind, *self._ahead(problem), batch.pose, batch.nominal, unit)
-        said = output.astype(np.float64)
-        if self.bilinear:
-            said = asked(said, self.features(problem, batch), n)
-        said *= self.gain
-        if self.squash == "clip":
-            said = np.clip(said, -self.largest, self.largest)
-        else:
-            said = self.largest * np.tanh(said / self.largest)
-        velocity: FloatArray = said * unit[:, None] / problem.velocity_limit
-        return velocity
+        out = np.empty(batch.q.shape)
+        velocity_rows(*self._output, problem.velocity_limit, *self._observe(problem, batch), output, out)
+        return out
+
+    def law(self, problem: Problem, batch: Batch, network: Network) -> FloatArray:
+        """:meth:`action` of what a network says of :meth:`features`, bit for bit, in one compiled call."""
+        out = np.empty(batch.q.shape)
+        law_rows(self._ahead(problem), self._output, problem.velocity_limit, network.constants, tuple(batch[:5]), out)
+        return out
+
+    def _observe(self, problem: Problem, batch: Batch) -> tuple[Features, FloatArray]:
+        """Features, and units of velocities."""
+        out, unit = np.empty((len(batch.q), self.size(problem)), np.float32), np.empty(len(batch.q))
+        observe_rows(*self._ahead(problem), *batch[:5], out, unit)
+        return out, unit
+
+    @property
+    def _output(self) -> tuple[Any, ...]:
+        """What outputs mean, for the kernels."""
+        return self.bilinear, self.squash == "tanh", self.gain, self.largest
 
     def _ahead(self, problem: Problem) -> tuple[Any, ...]:
-        return problem.dt, np.array(self.offsets, dtype=np.int64), self.furthest
+        """What is seen, for the kernels."""
+        return problem.task.kind, problem.model.chain, problem.dt, self._steps, self.furthest
 
 
-def asked(output: FloatArray, features: Features, n: int) -> FloatArray:
-    """(G v̂ + h) / (0.2 + |v̂|) from network outputs and the features that begin with v̂ / (0.2 + |v̂|).
-
-    Args:
-        output: Row j of G and h_j, joint by joint. Shape (B, n (w + 1)).
-        features: Shape (B, f).
-        n: Joints.
-
-    Returns:
-        Shape (B, n).
-    """
-    rows = output.reshape(len(output), n, -1)
-    w = rows.shape[2] - 1
-    due = features[:, : w + 1].astype(np.float64)
-    due[:, w] /= LEAST
-    out: FloatArray = (rows * due[:, None]).sum(axis=2)
-    return out
+def _fields() -> list[str]:
+    """What files hold."""
+    return [field.name for field in dataclasses.fields(Relative) if field.init]
