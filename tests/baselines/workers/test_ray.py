@@ -103,10 +103,6 @@ class Unknown:
 @needs_proc
 def test_one_of_two_nodes_is_killed_half_way(cluster, monkeypatch, tmp_path, caplog):
     nodes, other, folder = cluster
-    # To start nodes takes long: here is also seen what they say of units that they cannot read.
-    expected = "cannot do its work: .*no_such_module.* Install ikgym, and whatever its policies are made of"
-    with Workers(cluster="ray").pool(1) as pool, pytest.raises(ClusterError, match=expected):
-        list(finished(pool, runner.do, [Unknown()]))
     check, done = runner.Checks.check, []
 
     def kill_half_way(self, unit, outcome):
@@ -126,6 +122,10 @@ def test_one_of_two_nodes_is_killed_half_way(cluster, monkeypatch, tmp_path, cap
     assert caplog.text.count("its unit is done again") == 1
     assert [untimed(row) for row in rows] == [untimed(row) for row in alone]
     assert [row.time_p50_us is None for row in rows] == [False] + [True] * EPISODES
+    # To start nodes takes long: so here is also seen what they say of units that they cannot read.
+    expected = "cannot do its work: .*no_such_module.* Install ikgym, and whatever its policies are made of"
+    with Workers(cluster="ray").pool(1) as pool, pytest.raises(ClusterError, match=expected):
+        list(finished(pool, runner.do, [Unknown()]))
 
 
 def untimed(row):
