@@ -8,6 +8,7 @@ import sys
 
 import pytest
 
+from baselines import workers
 from baselines.workers import LostError, Workers, finished
 from baselines.workers.processes import Processes
 from ikgym import parallel
@@ -80,6 +81,7 @@ def test_who_works():
 def test_without_ray_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "ray", None)
     monkeypatch.delitem(sys.modules, "baselines.workers.ray_cluster", raising=False)
+    monkeypatch.delattr(workers, "ray_cluster", raising=False)  # as the package has it once it was imported
     with pytest.raises(MissingDependencyError, match=r'pip install "ikgym\[cluster\]"'):
         Workers(cluster="ray").check()
 
