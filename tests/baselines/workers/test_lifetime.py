@@ -50,8 +50,9 @@ def alive(pid):
 
 
 def descendants(pid):
-    """Processes that were started by one, and by those, without Python's tracker of resources."""
-    children = pathlib.Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+    """Processes that were started by the threads of one, without Python's tracker of resources."""
+    threads = pathlib.Path(f"/proc/{pid}/task").glob("*/children")
+    children = [child for thread in threads for child in thread.read_text().split()]
     commands = {child: pathlib.Path(f"/proc/{child}/cmdline").read_text() for child in children}
     return [int(child) for child, command in commands.items() if "spawn_main" in command]
 
