@@ -19,6 +19,12 @@ STEPS_LEFT = 500.0
 LEAST = 0.2
 #: Joint velocities are seen up to so many units.
 FASTEST = 4.0
+#: What joints can do is seen up to so much.
+MOST = 10.0
+#: What 1 rad counts as, as a part of an arm's length: so that position and orientation are of a size.
+RADIAN = 0.25
+#: What is not due now is shown that much smaller: a network begins with what counts most in each step.
+CONTEXT = 0.3
 
 
 @kernel
@@ -108,8 +114,19 @@ def command_unit(kind, lead, furthest, pose, nominal, speed, error, due):
 
 
 @kernel
+def radian(chain):
+    """What 1 rad counts as in [m]: a quarter of the arm's length from joint to joint, 1 m without any."""
+    length = math.sqrt(np.sum(chain.tool**2))
+    for j in range(chain.offsets.shape[0]):
+        length += math.sqrt(np.sum(chain.offsets[j] ** 2))
+    return RADIAN * length if length > 0.0 else 1.0
+
+
+@kernel
 def along_joints(kind, chain, q, due, rotation, position, jacobians, out):
     """What each joint can do about the twist that is due: its column of the Jacobian times the twist.
+
+    Position is in units of :func:`radian`, so that what can be done about it is seen as well as orientation.
 
     Args:
         kind: Of task coordinates.
@@ -127,11 +144,13 @@ def along_joints(kind, chain, q, due, rotation, position, jacobians, out):
         rows = jacobians[1]
         task_kernels.jacobian(kind, rotation, jacobians[0], rows)
     for first in range(0, due.shape[0], 3):
+        unit = radian(chain) if first == 0 else 1.0
         for j in range(n):
             product = 0.0
             for a in range(first, first + 3):
                 product += rows[a, j] * due[a]
-            out[first // 3 * n + j] = min(max(product, -FASTEST), FASTEST)
+            product /= unit * unit
+            out[first // 3 * n + j] = min(max(product, -MOST), MOST)
 
 
 @kernel
@@ -168,7 +187,9 @@ def observe_rows(kind, chain, dt, offsets, furthest, q, qdot, pose, nominal, rem
         features[:w], features[w + 1 : moving] = due, along
         for j in range(n):
             features[moving + j] = min(max(qdot[row, j] / unit[row], -FASTEST), FASTEST)
-        feature_row(kind, chain.prismatic, axis, q[row], ahead, speed, remaining[row, 0], features[moving + n :])
+        context = features[moving + n :]
+        feature_row(kind, chain.prismatic, axis, q[row], ahead, speed, remaining[row, 0], context)
+        context *= CONTEXT
 
 
 @kernel
@@ -182,23 +203,14 @@ def unit_rows(kind, dt, offsets, furthest, pose, nominal, out):
 
 
 @kernel
-def log_rewards(rewards, tracking, terminated, scale, horizon, before, out):
+def log_rewards(rewards, scale, worst, out):
     """Rewards of agents, in one loop for one arm and for many, see :class:`ikgym.rl.LogReward`.
 
     Args:
         rewards: −cost. Shape (N,).
-        tracking: Tracking costs. Shape (N,).
-        terminated: Where a track is lost. Shape (N,).
         scale: See there.
-        horizon: See there.
-        before: log(1 + tracking cost) of the last step, 0 where an episode begins; that of this one takes its place.
-            Shape (N,).
+        worst: See there.
         out: Receives the rewards. Shape (N,).
     """
     for row in range(rewards.shape[0]):
-        level, total = math.log1p(tracking[row]), math.log1p(-rewards[row])
-        if terminated[row]:
-            out[row] = scale * horizon * (before[row] - total)
-        else:
-            out[row] = scale * (horizon * before[row] - (horizon - 1.0) * level - total)
-        before[row] = level
+        out[row] = scale * max(1.0 - math.log1p(-rewards[row]) / worst, 0.0)

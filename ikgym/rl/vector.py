@@ -118,31 +118,31 @@ class LogReward(ArmsWrapper):
     Args:
         env: The vector environment.
         scale: Above 0.
-        horizon: At least 1.
+        worst: Above 0.
 
     Raises:
         InvalidInputError: A parameter is out of its range.
     """
 
-    def __init__(self, env: Any, scale: float = 0.1, horizon: float = 100.0) -> None:
+    def __init__(self, env: Any, scale: float = 0.05, worst: float = 12.0) -> None:
         super().__init__(env)
-        self._scale, self._horizon = number("scale", scale, above=0.0), number("horizon", horizon, at_least=1.0)
-        self._before = np.zeros(self.num_envs)
+        self._scale, self._worst = number("scale", scale, above=0.0), number("worst", worst, above=0.0)
+        self._ended = np.zeros(self.num_envs, dtype=np.bool_)
 
     def reset(self, *, seed: Any = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Begins episodes, in all rows or in those of a mask."""
         found = self.env.reset(seed=seed, options=options)
-        self._before[beginning(options, self.num_envs)] = 0.0
+        self._ended &= ~beginning(options, self.num_envs)
         return found
 
     def step(self, actions: Any) -> StepReturn:
         """One step of all arms."""
         observation, rewards, terminated, truncated, infos = self.env.step(actions)
-        out, tracking = np.empty(self.num_envs), np.zeros(self.num_envs)
-        for seen in (infos, infos.get("final_info", {})):  # rows that have ended are in the latter alone
-            tracking += seen.get("tracking_cost", 0.0)
-        log_rewards(rewards, tracking, terminated, self._scale, self._horizon, self._before, out)
-        self._before[terminated | truncated] = 0.0
+        out = np.empty(self.num_envs)
+        log_rewards(rewards, self._scale, self._worst, out)
+        if self.metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP:
+            out[self._ended] = 0.0  # these rows have begun an episode, and taken no step
+        self._ended = terminated | truncated
         return observation, out, terminated, truncated, infos
 
 

@@ -11,7 +11,7 @@ from gymnasium import spaces
 
 from ikgym.exceptions import InvalidInputError
 from ikgym.outcome import Observation
-from ikgym.rl.feature_kernels import FASTEST, observe_rows, unit_rows
+from ikgym.rl.feature_kernels import CONTEXT, FASTEST, MOST, observe_rows, unit_rows
 from ikgym.rl.twists import is_turned, shown_joints, twist_size
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray, number
@@ -109,8 +109,10 @@ def bound(scenario: Scenario, shown: int) -> tuple[FloatArray, FloatArray]:
         at += 1 if prismatic[j] else 2
     # Each part of the mean twists is at most the root of their number times their root mean square, which is below s.
     ahead = np.full((shown - 1) * w, math.sqrt((shown - 1) * w))
-    moving = np.full((w // 3 + 1) * scenario.joints, FASTEST)
-    upper = np.concatenate([np.ones(w + 1), moving, joints, ahead, [LARGEST_LOG, 1.0]])
+    n = scenario.joints
+    moving = np.concatenate([np.full(w // 3 * n, MOST), np.full(n, FASTEST)])
+    context = CONTEXT * np.concatenate([joints, ahead, [LARGEST_LOG, 1.0]])
+    upper = np.concatenate([np.ones(w + 1), moving, context])
     lower = -upper
     lower[w] = lower[-1] = 0.0
     return lower, upper

@@ -29,14 +29,14 @@ class AgentObservation(gym.ObservationWrapper[Features, Any, Observation], Recor
     |---|---|
     | w | v̂ / (0.2 + |v̂|), with |v̂| cut at `furthest` |
     | 1 | 0.2 / (0.2 + |v̂|) |
-    | n or 2 n | what each joint can do about it: v̂ / (0.2 + |v̂|) times its column of the Jacobian, position and \
-orientation apart, cut at ±4 |
+    | n or 2 n | what each joint can do about it: v̂ / (0.2 + |v̂|) times its column of the Jacobian, position in \
+units of a quarter of the arm's length and orientation apart, cut at ±10 |
     | n | joint velocities in units of s (0.2 + |v̂|), cut at ±4 |
     | 2 each | sin q_j and cos q_j of revolute joints, but for joint 1 where twists are seen from its frame |
     | 1 each | q_j of prismatic joints |
     | w each | v_i / s |
     | 1 | ln s |
-    | 1 | steps left, as a share of 500, at most 1 |
+    | 1 | steps left, as a share of 500, at most 1; from the sines on all are multiplied by 0.3 up to here |
     | 1 each | ages of `q` and `pose` as a share of 100 steps, where sensors are slow or late |
     | h n | the last h commands, like the joint velocities, where the environment shows them |
 
@@ -105,44 +105,32 @@ class RelativeAction(gym.Wrapper[Any, Any, Observation, Any], RecordConstructorA
 
 
 class LogReward(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
-    """The logarithm of the stage cost in place of the cost, and how much nearer each step has come.
+    """What is left of a step's worth after the logarithm of its cost.
 
-    Stage costs span ten decades, and a critic that has to tell 1 from 2 must not see 1e9. With L = log(1 + stage cost)
-    and T = log(1 + tracking cost) of a step k, and H = `horizon`:
+        reward = scale · max(0, 1 − log(1 + stage cost) / worst)
 
-        reward(k) = scale · (H T(k - 1) - (H - 1) T(k) - L(k))
-
-    This is −scale · L(k), shaped by the potential −scale · H T, which changes no policy's rank where 1 / (1 − γ) = H
-    (Ng, Harada & Russell 1999): an agent need not learn first that an arm that is off its path stays off. Where a track
-    is lost, the reward is scale · H (T(k - 1) - L(k)), as if the arm had stayed there: to end early saves nothing.
-    T is 0 before an episode begins.
+    Stage costs span ten decades, and a critic that has to tell 1 from 2 must not see 1e9. No reward is negative, so
+    that an agent gains nothing by ending an episode: where a track is lost, it loses what later steps would be worth.
 
     Args:
-        env: The environment, or one around it whose `info` has its tracking cost.
-        scale: Above 0.
-        horizon: Steps that a critic looks ahead, 1 / (1 − γ); at least 1.
+        env: The environment, or one around it.
+        scale: Reward of a step without cost, above 0.
+        worst: Logarithm of a cost from which on a step is worth nothing, above 0.
 
     Raises:
         InvalidInputError: A parameter is out of its range.
     """
 
-    def __init__(self, env: gym.Env[Any, Any], scale: float = 0.1, horizon: float = 100.0) -> None:
-        RecordConstructorArgs.__init__(self, scale=scale, horizon=horizon)
+    def __init__(self, env: gym.Env[Any, Any], scale: float = 0.05, worst: float = 12.0) -> None:
+        RecordConstructorArgs.__init__(self, scale=scale, worst=worst)
         super().__init__(env)
-        self._scale, self._horizon = number("scale", scale, above=0.0), number("horizon", horizon, at_least=1.0)
-        self._before = np.zeros(1)
-
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
-        """Begins an episode."""
-        found = self.env.reset(seed=seed, options=options)
-        self._before[0] = 0.0
-        return found
+        self._scale, self._worst = number("scale", scale, above=0.0), number("worst", worst, above=0.0)
 
     def step(self, action: Any) -> StepReturn:
         """One step of the environment."""
         observation, reward, terminated, truncated, info = self.env.step(action)
-        rewards, tracking, out = np.array([float(reward)]), np.array([float(info["tracking_cost"])]), np.empty(1)
-        log_rewards(rewards, tracking, np.array([terminated]), self._scale, self._horizon, self._before, out)
+        out = np.empty(1)
+        log_rewards(np.array([float(reward)]), self._scale, self._worst, out)
         return observation, out[0].item(), terminated, truncated, info
 
 

@@ -15,6 +15,7 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 import ikgym
 from ikgym import rl
 from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.rl.feature_kernels import MOST, radian
 
 N = 3
 PREVIEW = (10, 40, 100)
@@ -123,30 +124,23 @@ def test_what_joints_can_do_is_their_column_of_the_jacobian_times_what_is_due(na
     due, n = features[:6].reshape(2, 3), scenario.joints
     if turned:
         due = due @ ikgym.rotations.rodrigues(scenario.model.chain.axes[0], seen["q"][0]).T
-    products = np.concatenate([jacobian[:3].T @ due[0], jacobian[3:].T @ due[1]])
+    unit = radian(scenario.model.chain)
+    products = np.concatenate([jacobian[:3].T @ due[0] / unit**2, jacobian[3:].T @ due[1]]).clip(-MOST, MOST)
     assert np.allclose(features[7 : 7 + 2 * n], products, atol=1e-6)
     assert np.ptp(products) > 0.1
 
 
-def test_rewards_are_logarithms_and_what_a_step_has_come_nearer():
-    kept, h = {"scenario": short(), "preview": PREVIEW, "lost_distance": 0.05}, 50.0
+def test_rewards_are_what_the_logarithm_of_the_cost_leaves():
+    kept = {"scenario": short(), "preview": PREVIEW, "lost_distance": 0.05}
     action = np.full(7, 0.02, dtype=np.float32)
-    plain, env = gym.make("RedundantIK-v0", **kept), rl.LogReward(gym.make("RedundantIK-v0", **kept), 0.1, h)
-    for seed in (0, None):  # the second time from where the track was lost
-        plain.reset(seed=seed), env.reset(seed=seed)
-        lost, before, shaped, logarithms, k = False, 0.0, 0.0, 0.0, 0
-        while not lost:
-            _, cost, lost, _, info = plain.step(action)
-            _, reward, *_ = env.step(action)
-            total, level = math.log1p(-cost), math.log1p(info["tracking_cost"])
-            wanted = h * (before - total) if lost else h * before - (h - 1.0) * level - total
-            assert math.isclose(reward, 0.1 * wanted, rel_tol=1e-12)
-            # With a discount of 1 - 1 / H, the shaped return is that of the logarithms, with H of the last.
-            shaped += (1.0 - 1.0 / h) ** k * reward
-            logarithms -= (1.0 - 1.0 / h) ** k * 0.1 * total * (h if lost else 1.0)
-            before, k = level, k + 1
-        assert k > 3
-        assert math.isclose(shaped, logarithms, rel_tol=1e-9)
+    plain, env = gym.make("RedundantIK-v0", **kept), rl.LogReward(gym.make("RedundantIK-v0", **kept), 0.1, 14.0)
+    plain.reset(seed=0), env.reset(seed=0)
+    lost, rewards = False, []
+    while not lost:
+        _, cost, lost, *_ = plain.step(action)
+        rewards.append(env.step(action)[1])
+        assert math.isclose(rewards[-1], 0.1 * max(0.0, 1.0 - math.log1p(-cost) / 14.0), rel_tol=1e-12)
+    assert 0.0 <= rewards[-1] < rewards[0] < 0.1
 
 
 def test_wrong_use_is_refused():
@@ -170,6 +164,6 @@ def test_wrong_use_is_refused():
         rl.RelativeAction(env)
     with pytest.raises(InvalidInputError, match="its own observation"):
         rl.vector.RelativeAction(envs)
-    for wrong in ({"lost_distance": 0.0}, {"share": 0.0}, {"scale": -1.0}, {"horizon": 0.5}, {"history": 0}):
+    for wrong in ({"lost_distance": 0.0}, {"share": 0.0}, {"scale": -1.0}, {"worst": 0.0}, {"history": 0}):
         with pytest.raises(InvalidInputError):
             rl.make(short(), **wrong)

@@ -39,9 +39,9 @@ class SolverEntrant(Entrant):
         return self.kind.for_scenario(scenario, **given)
 
     def parameters(self, scenario: Scenario, player: Player) -> dict[str, Any]:
-        """All parameters, but for the seed that a reference was given for its episode."""
+        """All parameters, but for the seeds that a reference was given for its episode."""
         assert isinstance(player, SolverPolicy)
-        hidden = self._seeded(scenario, Draw(0)).keys() - self.given.keys()
+        hidden = self._seeded(scenario, Draw(0, player.parameters.get("arm_seed"))).keys() - self.given.keys()
         return {name: jsonable(value) for name, value in player.parameters.items() if name not in hidden}
 
     def unsuited(self, scenario: Scenario, draw: Draw, preview: Preview | None) -> str | None:

@@ -104,6 +104,13 @@ def test_a_reference_is_told_its_arm():
     assert second.make().drawn.arm.offsets[0, 0] == SAME_ARM.drawn_plant(arm_seed=400_000).arm.offsets[0, 0]
 
 
+def test_a_reference_is_the_same_one_for_every_arm():
+    first, *_, last = make_plan((), "told:policy=dls", test_sets="panda-same-arm").jobs
+    assert first.arm_seed != last.arm_seed
+    assert "arm_seed" not in last.parameters
+    assert last.make().arm_seed == last.arm_seed
+
+
 def test_other_noise_on_the_same_path_with_the_same_arm():
     scenario = SAME_ARM.replace(name="noisy", plant=Plant(zero=5e-4, q_noise=1e-4))
     rows = evaluate(scenario, "rhc:horizon=3", episodes=2, noise_seeds=3)

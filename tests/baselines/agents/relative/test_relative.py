@@ -38,7 +38,7 @@ def test_one_call_is_the_three_parts(arm, task, bilinear, squash):
         said = (rows * due[:, None]).sum(axis=2)
     said = np.clip(0.5 * said, -2.0, 2.0) if squash == "clip" else 2.0 * np.tanh(0.5 * said / 2.0)
     unit = parts * problem.velocity_limit / said
-    assert np.allclose(unit, unit[:, :1], rtol=1e-6)
+    assert np.allclose(unit, unit[:, :1], rtol=1e-5)  # in float32
     assert (unit > 0.0).all()
 
 
