@@ -8,8 +8,9 @@ after the first 0.2 s, and of these the median. Time in which the machine did so
 from __future__ import annotations
 
 import argparse
+import ast
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -27,9 +28,11 @@ from ikgym.validation import FloatArray
 SETTLED = 0.2
 
 
-def largest_errors(model: Any, scenario: str, split: str, episodes: int) -> FloatArray:
+def largest_errors(
+    model: Any, scenario: str, split: str, episodes: int, changes: Mapping[str, Any] | None = None
+) -> FloatArray:
     """The largest position error of each episode after the first 0.2 s, in [m]. Shape (episodes,)."""
-    envs = rl.make_vec(scenario, episodes, autoreset_mode="Disabled", lost_distance=None)
+    envs = rl.make_vec(scenario, episodes, autoreset_mode="Disabled", **{**(changes or {}), "lost_distance": None})
     observation, _ = envs.reset(seed=scenarios.SPLITS[split].start)
     worst, found = np.zeros(episodes), scenarios.get(scenario)
     for step in range(found.steps):
@@ -66,9 +69,15 @@ class Watch(BaseCallback):
 
 def said(model: Any, arguments: argparse.Namespace, split: str, spent: float, steps: int) -> str:
     """One line of what has been reached."""
-    worst = 1e3 * largest_errors(model, arguments.scenario, split, arguments.episodes)
+    worst = 1e3 * largest_errors(model, arguments.scenario, split, arguments.episodes, dict(arguments.change))
     median, p90 = np.median(worst), np.percentile(worst, 90.0)
     return f"{spent / 60.0:6.2f} min {steps:9d} steps  {split}: median {median:8.2f} mm, 9 of 10 {p90:8.2f} mm"
+
+
+def change(given: str) -> tuple[str, Any]:
+    """A field and its value from NAME=VALUE."""
+    name, _, value = given.partition("=")
+    return name, ast.literal_eval(value)
 
 
 def main(given: Sequence[str] | None = None) -> None:
@@ -84,10 +93,14 @@ def main(given: Sequence[str] | None = None) -> None:
     parser.add_argument("--episodes", type=int, default=64, help="that are followed")
     parser.add_argument("--every", type=int, default=8, help="rollouts between two validations")
     parser.add_argument("--threads", type=int, default=1, help="of PyTorch")
+    parser.add_argument(
+        "--change", type=change, nargs="+", default=[], metavar="NAME=VALUE", help="fields of ikgym.rl.Learning"
+    )
     parser.add_argument("--test", action="store_true", help="measure on the test episodes in the end: once")
     arguments = parser.parse_args(given)
     torch.set_num_threads(arguments.threads)
-    model = PPO("MlpPolicy", ikgym.sb3.make_vec(arguments.scenario, 8), seed=arguments.seed, device="cpu")
+    envs = ikgym.sb3.make_vec(arguments.scenario, 8, **dict(arguments.change))
+    model = PPO("MlpPolicy", envs, seed=arguments.seed, device="cpu")
     watch = Watch(arguments)
     model.learn(10**9, callback=watch)
     split = "test" if arguments.test else "validation"
