@@ -132,7 +132,8 @@ def cells(
     }
     rows = measure.play(plans, folder / slug(name), **options)
     how = {"progress": bool(options.get("progress")), "workers": options.get("workers", ALONE)}
-    bounds = _bounds(everywhere, scenarios.seeds("test", episodes), **how)
+    seeds = {place: tuple(dict.fromkeys(job.seed for job in jobs)) for (_, place), jobs in plans.items()}
+    bounds = _bounds(everywhere, seeds, **how)
     return tuple(Cell.of(policy, place, found, bounds[place]) for (policy, place), found in rows.items())
 
 
@@ -191,12 +192,16 @@ def _of_policy(label: str, policy: str, sets: Sequence[str], rows: Sequence[Row]
 
 
 def _bounds(
-    everywhere: Mapping[tuple[float, float], Scenario], seeds: Sequence[int], *, progress: bool, workers: Workers
+    everywhere: Mapping[tuple[float, float], Scenario],
+    seeds: Mapping[tuple[float, float], Sequence[int]],
+    *,
+    progress: bool,
+    workers: Workers,
 ) -> dict[tuple[float, float], dict[int, float]]:
     """The best known cost of each episode; what is not recorded is searched, and kept on disk."""
     out: dict[tuple[float, float], dict[int, float]] = {place: {} for place in everywhere}
     missing: dict[Wanted, tuple[float, float]] = {}
-    for (place, scenario), seed in itertools.product(everywhere.items(), seeds):
+    for place, scenario, seed in ((*one, seed) for one in everywhere.items() for seed in seeds[one[0]]):
         if (cost := best_known.cost(scenario, seed)) is not None:
             out[place][seed] = cost
         else:

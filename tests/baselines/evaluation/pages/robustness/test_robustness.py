@@ -101,6 +101,14 @@ def test_a_cluster_changes_nothing(short, tmp_path, monkeypatch):
     assert len(pool.units) == 1 + 2 + 2  # a block of two seeds, two best known costs, and what was lost
 
 
+def test_a_path_that_is_always_the_same_has_one_episode_a_cell(short, tmp_path):
+    plant = ikgym.Plant(command_delay=2)
+    scenarios.get("panda-circle").replace(name="late", steps=STEPS, plant=plant).save(tmp_path / "late.toml")
+    (cell,) = measure.cells(str(tmp_path / "late.toml"), {"dls": "dls"}, tmp_path / "out", severities=[1.0], episodes=2)
+    assert cell.cost_ratio > 1.0
+    assert {row.seed for (file,) in [[*tmp_path.glob("out/*/results.json")]] for row in read_rows(file)} == {0}
+
+
 def test_ratios_are_to_the_best_known_cost_of_the_arm_that_moves(short, tmp_path):
     cells = measure.cells("panda-field", {"low gain": "dls:gain=0.1"}, tmp_path, severities=[0.5], episodes=2)
     scenario = measure.at("panda-field", (0.5, 0.5))
