@@ -50,19 +50,15 @@ EXTRAS = {
 }
 
 
-class Plays(Protocol):
-    """The options of a command that plays episodes into a folder, and goes on there with ``--resume``."""
+class Fills(Protocol):
+    """The options of a command that fills a folder, and goes on there with ``--resume``."""
 
     @property
     def out(self) -> pathlib.Path | None: ...  # noqa: D102
-    @property
-    def episodes(self) -> int | None: ...  # noqa: D102
-    @property
-    def workers(self) -> int: ...  # noqa: D102
 
 
 T = TypeVar("T")
-P = TypeVar("P", bound=Plays)
+P = TypeVar("P", bound=Fills)
 
 
 def program(name: str, otherwise: str) -> str:
@@ -138,10 +134,10 @@ def run_resumable(
     manual: Callable[[str], str],
     work: Callable[[P, str], None],
 ) -> int:
-    """Reads the options of a command that plays into the folder of ``--out``, and does its work.
+    """Reads the options of a command that fills the folder of ``--out``, and does its work.
 
     Args:
-        kind: Of the options.
+        kind: Of the options; `workers` and `episodes`, where there are such, must be at least 1.
         arguments: What stands behind the command; taken from the process if left out.
         prog: The name of the command.
         manual: Gives the text of ``--help`` above the options for that name.
@@ -157,13 +153,13 @@ def run_resumable(
         nonlocal out
         options = parse(kind, given, prog=prog, description=manual(prog))
         out = str(options.out)
-        whole_number("workers", options.workers, at_least=1)
-        if options.episodes is not None:
-            whole_number("episodes", options.episodes, at_least=1)
+        for name in ("workers", "episodes"):
+            if (value := getattr(options, name, None)) is not None:
+                whole_number(name, value, at_least=1)
         work(options, shlex.join([*prog.split(), *given]))
         return 0
 
-    return run(both, lambda: f"Stopped. What was finished is in {out}; continue with --resume.")
+    return run(both, lambda: f"Stopped. What was finished is in {out}; go on with --resume.")
 
 
 def started(module: str) -> int:

@@ -8,6 +8,7 @@ from typing import Any, Self
 import numpy as np
 import numpy.typing as npt
 
+from baselines.agents.alone import Alone
 from baselines.agents.features import Features
 from baselines.policy import Batch, Problem
 from ikgym.exceptions import InvalidInputError
@@ -20,7 +21,7 @@ ORDER = ("nominal", "pose", "q", "qdot", "remaining")
 
 
 @dataclasses.dataclass(frozen=True)
-class RawObservation(Frozen):
+class RawObservation(Alone, Frozen):
     """All numbers of the observation as float32, part by part as in :data:`ORDER`; the network output is the action.
 
     Args:
@@ -58,16 +59,6 @@ class RawObservation(Frozen):
         if len(shown) != ahead:
             raise InvalidInputError(f"offsets: expected {ahead}, as many as the model sees, got {shown}.")
         return cls(shown)
-
-    @property
-    def base_policy(self) -> None:
-        """There is none."""
-        return
-
-    @property
-    def null_space(self) -> None:
-        """Outputs go through no projector."""
-        return
 
     def size(self, problem: Problem) -> int:
         """The number of features."""

@@ -37,14 +37,14 @@ class Options:
     """Replace the data set in the folder."""
 
 
-def manual() -> str:
+def manual(prog: str) -> str:
     """The text of ``--help`` above the options."""
     return f"""\
 Plays episodes and writes them as a data set of Minari: observations, actions, rewards and infos, each episode with its
 seed and its cost, and all of them with the scenario, the policy and the versions that they come from.
 
 Example:
-  {_program()} --scenario varga7-random --policy dls:damping=1e-2 --episodes 100 --out datasets/dls-v0
+  {prog} --scenario varga7-random --policy dls:damping=1e-2 --episodes 100 --out datasets/dls-v0
 
 In Python, with MINARI_DATASETS_PATH=datasets:
   minari.load_dataset("dls-v0")
@@ -61,32 +61,25 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         The exit code: 0, 2 where something expected went wrong, 130 after Ctrl-C.
     """
-    given = sys.argv[1:] if arguments is None else list(arguments)
-    out = "the folder of --out"
+    return command.run_resumable(Options, arguments, _program(), manual, _work)
 
-    def work() -> int:
-        nonlocal out
-        options = command.parse(Options, given, prog=_program(), description=manual())
-        out = str(options.out)
-        # Only who writes one needs Minari, and nobody who asks for help.
-        from baselines.datasets.dataset import planned, write
 
-        if (here := str(pathlib.Path.cwd())) not in sys.path:
-            sys.path.append(here)  # for modules of the user, where a console command does not look
-        wanted = planned(
-            options.scenario,
-            options.policy,
-            episodes=options.episodes,
-            split=options.split,
-            preview=options.preview,
-            trust=options.trust,
-        )
-        write(wanted, options.out, resume=options.resume, overwrite=options.overwrite, progress=True)
-        folder = options.out.resolve()
-        print(f'{options.out}: MINARI_DATASETS_PATH={options.out.parent}, minari.load_dataset("{folder.name}")')
-        return 0
+def _work(options: Options, _: str) -> None:
+    # Only who writes one needs Minari, and nobody who asks for help.
+    from baselines.datasets.dataset import planned, write
 
-    return command.run(work, lambda: f"Stopped. What was finished is in {out}; go on with --resume.")
+    command.find_own_modules()
+    wanted = planned(
+        options.scenario,
+        options.policy,
+        episodes=options.episodes,
+        split=options.split,
+        preview=options.preview,
+        trust=options.trust,
+    )
+    write(wanted, options.out, resume=options.resume, overwrite=options.overwrite, progress=True)
+    folder = options.out.resolve()
+    print(f'{options.out}: MINARI_DATASETS_PATH={options.out.parent}, minari.load_dataset("{folder.name}")')
 
 
 def _program() -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import pathlib
-import shlex
 import sys
 from collections.abc import Sequence
 from typing import Annotated
@@ -46,15 +45,15 @@ class Options:
     """Replace the trials in the folder."""
 
 
-def manual() -> str:
+def manual(prog: str) -> str:
     """The text of ``--help`` above the options."""
     return f"""\
 Searches the settings of solvers with the lowest geometric mean of the total cost, by Optuna, on the first episodes of
 the split "{SPLIT}". Settings that are worse than the median of those before are given up after a part of the episodes.
 
 Examples:
-  {_program()} --scenario varga7-random --policies dls rhc:horizon=3 --out results/tune
-  {_program()} --scenario varga7-random --out results/tune --workers 4 --resume
+  {prog} --scenario varga7-random --policies dls rhc:horizon=3 --out results/tune
+  {prog} --scenario varga7-random --out results/tune --workers 4 --resume
 
 Files:
   DIR/study.journal   all trials, for Optuna (JournalStorage), and for --resume
@@ -70,18 +69,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         The exit code: 0, 2 where something expected went wrong, 130 after Ctrl-C.
     """
-    given = sys.argv[1:] if arguments is None else list(arguments)
-    out = "the folder of --out"
+    return command.run_resumable(Options, arguments, _program(), manual, _work)
 
-    def work() -> int:
-        nonlocal out
-        options = command.parse(Options, given, prog=_program(), description=manual())
-        out = str(options.out)
-        print(searched(options, shlex.join([*_program().split(), *given])))
-        print(f"\nwritten to {options.out}")
-        return 0
 
-    return command.run(work, lambda: f"Stopped. What was finished is in {out}; go on with --resume.")
+def _work(options: Options, text: str) -> None:
+    print(searched(options, text))
+    print(f"\nwritten to {options.out}")
 
 
 def searched(options: Options, text: str) -> str:
@@ -98,8 +91,6 @@ def searched(options: Options, text: str) -> str:
     from baselines.tuning.solvers import planned, result, stated
     from baselines.tuning.study import prepare, search
 
-    for name in ("episodes", "workers"):
-        whole_number(name, getattr(options, name), at_least=1)
     whole_number("seed", options.seed, at_least=0)
     scenario = scenarios.find(options.scenario)
     studies = planned(

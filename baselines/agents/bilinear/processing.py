@@ -10,6 +10,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 import numpy.typing as npt
 
+from baselines.agents.alone import Alone
 from baselines.agents.bilinear.kernels import action_rows, law_rows, new_features
 from baselines.agents.features import Features
 from baselines.agents.network import Network
@@ -20,7 +21,7 @@ from ikgym.validation import FloatArray, Frozen, known_names, whole_number
 
 
 @dataclasses.dataclass(frozen=True)
-class Bilinear(Frozen):
+class Bilinear(Alone, Frozen):
     """q̇ = G v + h s: joint velocities linear in the twist that is due, with G and h from the network.
 
     v is the twist that removes the error from the next reference pose within Δt: feedback and feed-forward in one. The
@@ -66,16 +67,6 @@ class Bilinear(Frozen):
         ahead.flags.writeable = False
         for field, value in {"offsets": offsets, "_ahead": ahead}.items():
             object.__setattr__(self, field, value)
-
-    @property
-    def base_policy(self) -> None:
-        """There is none."""
-        return
-
-    @property
-    def null_space(self) -> None:
-        """Outputs go through no projector."""
-        return
 
     def to_json(self) -> dict[str, Any]:
         """The fields, as JSON has them."""

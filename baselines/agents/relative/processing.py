@@ -9,6 +9,7 @@ from typing import Any, ClassVar, Literal, Self, get_args
 import numpy as np
 import numpy.typing as npt
 
+from baselines.agents.alone import Alone
 from baselines.agents.features import Features
 from baselines.agents.network import Network
 from baselines.agents.relative.kernels import law_rows, velocity_rows
@@ -23,7 +24,7 @@ Squash = Literal["clip", "tanh"]
 
 
 @dataclasses.dataclass(frozen=True)
-class Relative(Frozen):
+class Relative(Alone, Frozen):
     """Joint velocities in units of what is asked for, from the features of :class:`ikgym.rl.AgentObservation`.
 
     The velocity of a joint is a · s (0.2 + |v̂|), with a = gain · x, kept within ±largest. x is the network output; of a
@@ -65,16 +66,6 @@ class Relative(Frozen):
         steps.flags.writeable = False
         for field, value in {"offsets": offsets, "_steps": steps, **values}.items():
             object.__setattr__(self, field, value)
-
-    @property
-    def base_policy(self) -> None:
-        """There is none."""
-        return
-
-    @property
-    def null_space(self) -> None:
-        """Outputs go through no projector."""
-        return
 
     def to_json(self) -> dict[str, Any]:
         """The fields, as JSON has them."""
