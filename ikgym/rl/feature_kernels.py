@@ -123,7 +123,7 @@ def radian(chain):
 
 
 @kernel
-def along_joints(kind, chain, q, due, rotation, position, jacobians, out):
+def along_joints(kind, chain, metres, q, due, rotation, position, jacobians, out):
     """What each joint can do about the twist that is due: its column of the Jacobian times the twist.
 
     Position is in units of :func:`radian`, so that what can be done about it is seen as well as orientation.
@@ -131,6 +131,7 @@ def along_joints(kind, chain, q, due, rotation, position, jacobians, out):
     Args:
         kind: Of task coordinates.
         chain: The arm's model, see :class:`ikgym.kinematics.Chain`.
+        metres: What 1 rad counts as, see :func:`radian`.
         q: Joint coordinates in [rad] or [m]. Shape (n,).
         due: As :func:`command_unit` gives it. Shape (w,).
         rotation: Scratch. Shape (3, 3).
@@ -144,7 +145,7 @@ def along_joints(kind, chain, q, due, rotation, position, jacobians, out):
         rows = jacobians[1]
         task_kernels.jacobian(kind, rotation, jacobians[0], rows)
     for first in range(0, due.shape[0], 3):
-        unit = radian(chain) if first == 0 else 1.0
+        unit = metres if first == 0 else 1.0
         for j in range(n):
             product = 0.0
             for a in range(first, first + 3):
@@ -174,14 +175,14 @@ def observe_rows(kind, chain, dt, offsets, furthest, q, qdot, pose, nominal, rem
     w, n = twist_size(kind), q.shape[1]
     error, due, ahead = np.empty(6), np.empty(w), np.empty((offsets.shape[0] - 1, w))
     rotation, position, jacobians, along = np.empty((3, 3)), np.empty(3), np.empty((2, 6, n)), np.empty(w // 3 * n)
-    axis = chain.axes[0]
+    axis, metres = chain.axes[0], radian(chain)
     moving = w + 1 + along.shape[0]
     for row in range(q.shape[0]):
         speed, features = mean_twists(kind, dt, offsets, nominal[row], error, ahead), out[row]
         features[w], unit[row] = command_unit(
             kind, offsets[0] * dt, furthest, pose[row], nominal[row, 0], speed, error, due
         )
-        along_joints(kind, chain, q[row], due, rotation, position, jacobians, along)
+        along_joints(kind, chain, metres, q[row], due, rotation, position, jacobians, along)
         if is_turned(kind, chain.prismatic):
             turn(axis, -q[row, 0], due)
         features[:w], features[w + 1 : moving] = due, along
