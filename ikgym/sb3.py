@@ -18,8 +18,8 @@ from ikgym.options import checked_options
 from ikgym.rows import ArmRow
 from ikgym.scenarios import Preview, Scenario
 from ikgym.simulator import Observation
-from ikgym.validation import FloatArray, float_array
-from ikgym.vector_env import Flags, RedundantIKVectorEnv
+from ikgym.validation import BoolArray, FloatArray, float_array
+from ikgym.vector_env import RedundantIKVectorEnv
 
 try:
     from stable_baselines3.common.monitor import Monitor
@@ -28,7 +28,7 @@ try:
 except ImportError as error:
     raise MissingDependencyError('ikgym.sb3 needs Stable-Baselines3: pip install "ikgym[train]"') from error
 
-StepReturn = tuple[Observation, npt.NDArray[np.float32], Flags, list[dict[str, Any]]]
+StepReturn = tuple[Observation, npt.NDArray[np.float32], BoolArray, list[dict[str, Any]]]
 
 
 class RedundantIKVecEnv(VecEnv):

@@ -24,9 +24,8 @@ from ikgym.scenarios import Preview, Scenario
 from ikgym.scenarios.entering import has_joint_path
 from ikgym.simulator import Simulator
 from ikgym.spaces import action_space, observation_space
-from ikgym.validation import FloatArray, whole_number
+from ikgym.validation import BoolArray, FloatArray, whole_number
 
-Flags = npt.NDArray[np.bool_]
 Infos = dict[str, Any]
 
 
@@ -176,7 +175,7 @@ class RedundantIKVectorEnv(
         self._begin(mask, starts, arm_seeds, steps)
         return observation(self._simulator.observe()), {}
 
-    def step(self, actions: npt.NDArray[np.float32]) -> tuple[Observation, FloatArray, Flags, Flags, Infos]:
+    def step(self, actions: npt.NDArray[np.float32]) -> tuple[Observation, FloatArray, BoolArray, BoolArray, Infos]:
         """One step of all arms; the class of the single environment says what comes back.
 
         Raises:
@@ -258,7 +257,7 @@ class RedundantIKVectorEnv(
 
     def _begin(
         self,
-        mask: Flags,
+        mask: BoolArray,
         starts: FloatArray | None = None,
         arm_seeds: Sequence[int | None] | None = None,
         steps: npt.NDArray[np.int64] | None = None,
@@ -269,7 +268,7 @@ class RedundantIKVectorEnv(
         self._begun |= mask
         self._ended = self._ended & ~mask
 
-    def _infos(self, out: Outcome, rows: Flags) -> Infos:
+    def _infos(self, out: Outcome, rows: BoolArray) -> Infos:
         """The infos of some rows, as Gymnasium's vector environments lay them out; zero in the others."""
         if not rows.any():
             return {}
@@ -293,7 +292,7 @@ class RedundantIKVectorEnv(
         return infos
 
 
-def _rows_of(observation: Observation, rows: Flags) -> npt.NDArray[np.object_]:
+def _rows_of(observation: Observation, rows: BoolArray) -> npt.NDArray[np.object_]:
     """One observation a row, as `final_obs` has them; None in the rows that are not asked for."""
     out = np.full(len(rows), None, dtype=object)
     for row in np.flatnonzero(rows):

@@ -16,11 +16,10 @@ from ikgym.rl.checks import action_box, checked_action, history_box
 from ikgym.rl.feature_kernels import log_rewards
 from ikgym.rl.view import FURTHEST, AgentView, Features
 from ikgym.scenarios import Scenario
-from ikgym.validation import FloatArray, number, whole_number
+from ikgym.validation import BoolArray, FloatArray, number, whole_number
 
-Flags = npt.NDArray[np.bool_]
 Seeds = int | Sequence[int | None] | None
-StepReturn = tuple[Any, FloatArray, Flags, Flags, dict[str, Any]]
+StepReturn = tuple[Any, FloatArray, BoolArray, BoolArray, dict[str, Any]]
 
 
 class ArmsWrapper(VectorWrapper[Any, Any, Any, Any, Any]):
@@ -42,9 +41,9 @@ class ArmsWrapper(VectorWrapper[Any, Any, Any, Any, Any]):
         self.single_observation_space, self.observation_space = space, batch_space(space, self.num_envs)
 
 
-def beginning(options: dict[str, Any] | None, rows: int) -> Flags:
+def beginning(options: dict[str, Any] | None, rows: int) -> BoolArray:
     """Which rows a reset with such options begins. Shape (N,)."""
-    mask: Flags | None = (options or {}).get("reset_mask")
+    mask: BoolArray | None = (options or {}).get("reset_mask")
     return np.ones(rows, dtype=np.bool_) if mask is None else mask
 
 
@@ -192,6 +191,6 @@ class History(ArmsWrapper):
     def _shown(self) -> Features:
         return self._kept.reshape(self.num_envs, -1).copy()
 
-    def _begin(self, observation: Features, rows: Flags) -> None:
+    def _begin(self, observation: Features, rows: BoolArray) -> None:
         """Fills the history of rows with their first observation."""
         self._kept[rows] = observation[rows, None]

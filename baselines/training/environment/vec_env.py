@@ -14,10 +14,9 @@ from baselines.training.environment.view import View
 from ikgym.sb3 import RedundantIKVecEnv
 from ikgym.scenarios import Scenario
 from ikgym.simulator import Observation
-from ikgym.validation import known_names, number, whole_number
-from ikgym.vector_env import Flags
+from ikgym.validation import BoolArray, known_names, number, whole_number
 
-StepReturn = tuple[Features, npt.NDArray[np.float32], Flags, list[dict[str, Any]]]
+StepReturn = tuple[Features, npt.NDArray[np.float32], BoolArray, list[dict[str, Any]]]
 
 
 def minus_cost(rewards: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:

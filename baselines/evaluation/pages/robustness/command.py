@@ -21,9 +21,9 @@ from baselines.files import write
 from baselines.files.locks import locked
 from baselines.spec import parse_policy
 from baselines.workers import Workers
-from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import imperfect
-from ikgym.validation import number, whole_number
+from ikgym.validation import known_name, known_names, number, whole_number
 
 #: What the command is called where Python has run its module.
 PROGRAM = "python -m baselines.robustness"
@@ -140,9 +140,7 @@ def some_of(policies: Mapping[str, str], labels: Sequence[str]) -> dict[str, str
     Raises:
         UnknownNameError: There is no such label.
     """
-    for label in labels:
-        if label not in policies:
-            raise UnknownNameError("label", label, policies)
+    known_names("label", labels, policies)
     return {label: policies[label] for label in labels or policies}
 
 
@@ -160,10 +158,8 @@ def whole(given: Sequence[str], policies: Iterable[str], sets: Sequence[str]) ->
     out = []
     for one in given:
         label, _, name = one.rpartition("@")
-        if label not in policies:
-            raise UnknownNameError("label", label, policies)
-        if name not in sets:
-            raise UnknownNameError("set among --sets", name, sets)
+        known_name("label", label, policies)
+        known_name("set among --sets", name, sets)
         out.append((label, name))
     return frozenset(out)
 
