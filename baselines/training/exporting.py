@@ -15,7 +15,8 @@ from baselines.agents.network import Network
 from baselines.agents.relative.processing import Relative, Squash
 from baselines.agents.sb3_zip import network_of_model
 from baselines.policy import Problem
-from baselines.training.policies import ACTIVATION, BilinearActor
+from baselines.training.policies import ACTIVATION
+from baselines.training.trainers.models import bilinear_actor
 from ikgym.exceptions import InvalidInputError
 from ikgym.preview import offsets
 from ikgym.sb3 import LearningVecEnv
@@ -41,7 +42,7 @@ def export(
         ResultsError: The file cannot be written.
     """
     learning, scenario = envs.learning, envs.scenario
-    actor = next((module for module in model.policy.modules() if isinstance(module, BilinearActor)), None)
+    actor = bilinear_actor(model)
     if actor is None:
         network, tanh = _unsquashed(network_of_model(model.policy, model.policy_kwargs))
         gain = learning.largest if tanh else learning.share

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from baselines.agents.bilinear.damped_kernels import held_rows
 from baselines.agents.network import forward_rows
 from ikgym.jit import kernel
 from ikgym.rl.feature_kernels import feature_row, mean_twists
@@ -107,10 +108,10 @@ def action_rows(kind, prismatic, axis, dt, offsets, velocity_limit, q, pose, nom
 @kernel
 def law_rows(
     kind,
-    prismatic,
-    axis,
+    chain,
     dt,
     offsets,
+    damping,
     velocity_limit,
     weights,
     biases,
@@ -127,10 +128,10 @@ def law_rows(
 
     Args:
         kind: Of task coordinates.
-        prismatic: Shape (n,).
-        axis: Shape (3,).
+        chain: The arm.
         dt: Δt in [s].
         offsets: Shape (p,).
+        damping: Of :func:`baselines.agents.bilinear.damped_kernels.held_rows`, which is left out where it is 0.
         velocity_limit: Shape (n,).
         weights: See :func:`baselines.agents.network.forward_rows`.
         biases: See there.
@@ -143,7 +144,13 @@ def law_rows(
         remaining: Shape (B, 1).
         out: Receives fractions of the velocity limit. Shape (B, n).
     """
+    prismatic, axis, n = chain.prismatic, chain.axes[0], q.shape[1]
     features = new_features(kind, prismatic, axis, dt, offsets, q, nominal, remaining)
     output = np.empty((q.shape[0], sizes[sizes.shape[0] - 1]), np.float32)
     forward_rows(weights, biases, sizes, activation, squash, features, output)
-    action_rows(kind, prismatic, axis, dt, offsets, velocity_limit, q, pose, nominal, output, out)
+    if damping > 0.0:
+        held = np.empty((q.shape[0], n * (twist_size(kind) + 1)))
+        held_rows(kind, chain, damping, q, output, held)
+        action_rows(kind, prismatic, axis, dt, offsets, velocity_limit, q, pose, nominal, held, out)
+    else:
+        action_rows(kind, prismatic, axis, dt, offsets, velocity_limit, q, pose, nominal, output, out)

@@ -11,13 +11,15 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.agents.alone import Alone
+from baselines.agents.bilinear.damped_kernels import held_rows
 from baselines.agents.bilinear.kernels import action_rows, law_rows, new_features
 from baselines.agents.features import Features
 from baselines.agents.network import Network
 from baselines.policy import Batch, Problem
+from ikgym import task_kernels
 from ikgym.exceptions import InvalidInputError
 from ikgym.rl.twists import shown_joints, twist_size
-from ikgym.validation import FloatArray, Frozen, known_names, whole_number
+from ikgym.validation import FloatArray, Frozen, known_names, number, whole_number
 
 
 @dataclasses.dataclass(frozen=True)
@@ -43,14 +45,23 @@ class Bilinear(Alone, Frozen):
     | 1 | ln s |
     | 1 | steps left, as a share of 500, at most 1 |
 
+    With a damping, G is what the network adds to a weighted damped inverse of the Jacobian J,
+
+        U Jᵀ (J U Jᵀ + λ I)⁻¹,
+
+    whose λ and diagonal metric U the network gives, too: its last outputs are ln λ against `damping`, and ln U. It then
+    begins as damped least squares, and need not learn the kinematics of the arm.
+
     Args:
         offsets: o, steps ahead at which the reference is seen, rising from 1, at least two.
+        damping: λ where the network says 0, above 0; None for no inverse.
 
     Raises:
-        InvalidInputError: Offsets do not rise from 1.
+        InvalidInputError: Offsets do not rise from 1, or the damping is not above 0.
     """
 
     offsets: tuple[int, ...] = (1, 10, 40, 80, 130, 200, 300, 450, 650, 900)
+    damping: float | None = None
 
     #: The offsets as kernels take them.
     _ahead: npt.NDArray[np.int64] = dataclasses.field(init=False, repr=False, compare=False)
@@ -65,12 +76,14 @@ class Bilinear(Alone, Frozen):
             raise InvalidInputError(f"offsets: expected at least two, rising from 1, got {self.offsets}.")
         ahead = np.array(offsets, dtype=np.int64)
         ahead.flags.writeable = False
-        for field, value in {"offsets": offsets, "_ahead": ahead}.items():
+        damping = None if self.damping is None else number("damping", self.damping, above=0.0)
+        for field, value in {"offsets": offsets, "damping": damping, "_ahead": ahead}.items():
             object.__setattr__(self, field, value)
 
     def to_json(self) -> dict[str, Any]:
         """The fields, as JSON has them."""
-        return {"kind": self.kind, "offsets": list(self.offsets)}
+        inverse = {} if self.damping is None else {"damping": self.damping}
+        return {"kind": self.kind, "offsets": list(self.offsets), **inverse}
 
     @classmethod
     def from_json(cls, values: Mapping[str, Any]) -> Self:
@@ -80,8 +93,8 @@ class Bilinear(Alone, Frozen):
             UnknownNameError: There is a key that is none of the fields.
             InvalidInputError: A value is refused.
         """
-        known_names("field of the processing", values, ["kind", "offsets"])
-        return cls(tuple(values.get("offsets", cls.offsets)))
+        known_names("field of the processing", values, ["kind", "offsets", "damping"])
+        return cls(tuple(values.get("offsets", cls.offsets)), values.get("damping"))
 
     def size(self, problem: Problem) -> int:
         """The number of features."""
@@ -90,8 +103,18 @@ class Bilinear(Alone, Frozen):
         return shown + (len(self.offsets) - 1) * int(twist_size(kind)) + 2
 
     def outputs(self, problem: Problem) -> int:
-        """The number of network outputs: row j of G and h_j, joint by joint."""
-        return problem.model.joints * (int(twist_size(problem.task.kind)) + 1)
+        """The number of network outputs: row j of G and h_j, joint by joint; ln λ and ln U where there is an inverse.
+
+        Raises:
+            InvalidInputError: There is an inverse, and the task shows skew coordinates, whose errors are no twists.
+        """
+        kind, n = problem.task.kind, problem.model.joints
+        if self.damping is not None and kind == task_kernels.SKEW:
+            raise InvalidInputError(
+                f"damping: expected None for skew coordinates, whose errors are no twists, got {self.damping}; "
+                "agents for them are trained on whole poses (task pose)."
+            )
+        return n * (int(twist_size(kind)) + 1) + (0 if self.damping is None else 1 + n)
 
     def features(self, problem: Problem, batch: Batch, base: FloatArray | None = None) -> Features:
         """The features of a batch; see :meth:`baselines.agents.features.Processing.features`."""
@@ -115,6 +138,10 @@ class Bilinear(Alone, Frozen):
         """Actions, as fractions of the velocity limit; see :meth:`baselines.agents.features.Processing.action`."""
         del base
         out, chain = np.empty(batch.q.shape), problem.model.chain
+        if self.damping is not None:
+            held = np.empty((len(output), chain.prismatic.shape[0] * (int(twist_size(problem.task.kind)) + 1)))
+            held_rows(problem.task.kind, chain, self.damping, batch.q, output, held)
+            output = held
         action_rows(
             problem.task.kind,
             chain.prismatic,
@@ -135,10 +162,10 @@ class Bilinear(Alone, Frozen):
         out, chain = np.empty(batch.q.shape), problem.model.chain
         law_rows(
             problem.task.kind,
-            chain.prismatic,
-            chain.axes[0],
+            chain,
             problem.dt,
             self._ahead,
+            0.0 if self.damping is None else self.damping,
             problem.velocity_limit,
             *network.constants,
             batch.q,

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Annotated, ClassVar, get_args
+from typing import Annotated, Any, ClassVar, get_args
 
 import tyro
 
 from baselines.agents.bilinear.processing import Bilinear
-from baselines.training.config.base import Algorithm, Annealed, JointVelocities
+from baselines.training.config.base import Algorithm, Annealed, JointVelocities, Stored
 from baselines.training.config.limits import MOST_BATCH, MOST_TRANSITIONS, between, count
 from ikgym.exceptions import InvalidInputError
 from ikgym.validation import known_names, number, whole_number
@@ -84,6 +84,9 @@ class APG(ActorOnly):
 
     offsets: Annotated[tuple[int, ...], tyro.conf.arg(metavar="N …")] = Bilinear.offsets
     """Steps ahead at which the agent sees the reference trajectory, rising from 1."""
+    damping: Annotated[float | None, tyro.conf.arg(metavar="λ")] = None
+    """The agent begins as the damped inverse of the Jacobian with this λ, which the network changes, weighs and adds
+    to. The network gives the whole matrix if left out. Not for skew coordinates."""
     hidden: Annotated[tuple[int, ...], tyro.conf.arg(metavar="N …")] = (256, 256)
     """Neurons of the hidden layers: at most 10 layers of at most 2048 neurons."""
     n_envs: Annotated[int, tyro.conf.arg(metavar="N")] = 256
@@ -115,6 +118,7 @@ class APG(ActorOnly):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        self._set("damping", self.processing.damping)
         if not isinstance(self.window, tuple) or not self.window:
             raise InvalidInputError(f"window: expected whole numbers, got {self.window!r}.")
         self._set("hold", whole_number("hold", self.hold, at_least=1))
@@ -133,7 +137,12 @@ class APG(ActorOnly):
     @property
     def processing(self) -> Bilinear:
         """What the agent sees, and what the outputs of its network mean."""
-        return Bilinear(self.offsets)
+        return Bilinear(self.offsets, self.damping)
+
+    @classmethod
+    def shape_of(cls, processing: Stored, sizes: tuple[int, ...], activation: str) -> dict[str, Any]:
+        """See :meth:`Config.shape_of`."""
+        return super().shape_of(processing, sizes, activation) | {"damping": getattr(processing, "damping", None)}
 
     def window_of(self, segment: int) -> int:
         """The window of a segment, counted from 0."""

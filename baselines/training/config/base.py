@@ -11,6 +11,7 @@ import tyro
 
 from baselines.agents.bilinear.processing import Bilinear
 from baselines.agents.features import Processing
+from baselines.agents.relative.processing import Relative
 from baselines.training.config.limits import (
     MOST_ARMS,
     MOST_LAYERS,
@@ -30,9 +31,11 @@ Activation = Literal["silu", "relu", "tanh", "elu"]
 Algorithm = Literal["ppo", "sac", "td3"]
 
 #: Options that may come with the file of ``init``.
-SHAPE = ("base_policy", "offsets", "action_scale", "null_space", "hidden", "activation")
+SHAPE = (
+    "base_policy", "offsets", "action_scale", "null_space", "damping", "largest", "furthest", "hidden", "activation",
+)  # fmt: skip
 #: Transforms that files can describe.
-Stored = Processing | Bilinear
+Stored = Processing | Bilinear | Relative
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -168,13 +171,17 @@ class JointVelocities(Config):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        processing = self.processing
-        self._set("action_scale", processing.action_scale)
-        self._set("null_space", processing.null_space)
+        self._set("action_scale", self.velocities.action_scale)
+        self._set("null_space", self.velocities.null_space)
 
     @property
-    def processing(self) -> Processing:
+    def processing(self) -> Stored:
         """What the agent sees, and what the outputs of its network mean."""
+        return self.velocities
+
+    @property
+    def velocities(self) -> Processing:
+        """The same, where these outputs are joint velocities."""
         return Processing(self.offsets, self.action_scale, self.base_policy, self.null_space)
 
     @classmethod

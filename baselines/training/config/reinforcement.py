@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import dataclasses
 import re
-from typing import Annotated, ClassVar, Literal, get_args
+from typing import Annotated, Any, ClassVar, Literal, get_args
 
 import tyro
 
-from baselines.training.config.base import Annealed, JointVelocities
+from baselines.agents.relative.processing import Relative, Squash
+from baselines.training.config.base import Annealed, Config, JointVelocities, Stored
 from baselines.training.config.limits import MOST_BATCH, MOST_TRANSITIONS, between, count, share
 from ikgym.exceptions import InvalidInputError
+from ikgym.rl import Learning
 from ikgym.validation import known_names, number, whole_number
 
 Reward = Literal["cost", "log"]
+Output = Literal["velocities", "bilinear"]
 
 #: Limits of the logarithm of a standard deviation: those that SAC has for it.
 LOG_STD = (-20.0, 2.0)
@@ -23,6 +26,19 @@ LOG_STD = (-20.0, 2.0)
 class Reinforcement(Annealed, JointVelocities):
     """What the methods that learn from rewards have in common."""
 
+    #: What keeps actions within their bounds.
+    squash: ClassVar[Squash]
+
+    output: Output = "velocities"
+    """What the network gives. velocities: those of the joints, as multiples of action_scale. bilinear: G and h, see
+    baselines.training.policies, with the environment of ikgym.rl: lost tracks end an episode there, rewards are never
+    negative, and offsets are what is seen of the reference, to the first of which the arm is led."""
+    lost_distance: Annotated[float, tyro.conf.arg(metavar="M")] = 0.01
+    """Position error in [m] at which the episode of a bilinear agent ends, in training."""
+    largest: Annotated[float, tyro.conf.arg(metavar="X")] = Learning.largest
+    """Largest velocity of a joint of bilinear agents, in units of what is asked for."""
+    furthest: Annotated[float, tyro.conf.arg(metavar="X")] = Learning.furthest
+    """Where the twist that is due is cut that bilinear agents see, in units of the speed of what is ahead."""
     reward: Reward = "log"
     """cost: −stage cost, as in the environment. log: −log(1 + stage cost), which keeps an arm that has lost its path,
     whose costs are millions of times larger, from dominating; costs are then compared by their ratios."""
@@ -40,6 +56,15 @@ class Reinforcement(Annealed, JointVelocities):
     """First segments in which only the critics learn: for an actor from --init whose critics do not know it yet."""
 
     def __post_init__(self) -> None:
+        known_names("output", [self.output], get_args(Output))
+        for name in ("lost_distance", "largest", "furthest"):
+            self._set(name, number(name, getattr(self, name), above=0.0))
+        if self.output == "bilinear":
+            for name in ("base_policy", "null_space", "initial_episode_steps"):
+                if getattr(self, name) is not None:
+                    raise InvalidInputError(
+                        f"{name}: expected none for an output that is bilinear, got {getattr(self, name)!r}."
+                    )
         super().__post_init__()
         known_names("reward", [self.reward], get_args(Reward))
         self._set("episodes", whole_number("episodes", self.episodes, at_least=1))
@@ -51,6 +76,28 @@ class Reinforcement(Annealed, JointVelocities):
             )
         self._set("gamma", share("gamma", self.gamma))
         self._set("critic_warmup", whole_number("critic_warmup", self.critic_warmup, at_least=0))
+
+    @property
+    def processing(self) -> Stored:
+        """What the agent sees, and what the outputs of its network mean."""
+        if self.output == "velocities":
+            return self.velocities
+        return Relative(self.offsets, self.furthest, self.largest, self.largest, self.squash, bilinear=True)
+
+    @property
+    def learning(self) -> Learning:
+        """How the environment of bilinear agents is wrapped."""
+        return Learning(
+            preview=self.offsets, largest=self.largest, furthest=self.furthest, lost_distance=self.lost_distance
+        )
+
+    @classmethod
+    def shape_of(cls, processing: Stored, sizes: tuple[int, ...], activation: str) -> dict[str, Any]:
+        """See :meth:`Config.shape_of`."""
+        if not isinstance(processing, Relative):
+            return super().shape_of(processing, sizes, activation)
+        bounds = {name: getattr(processing, name) for name in ("largest", "furthest")}
+        return Config.shape_of(processing, sizes, activation) | bounds
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -83,6 +130,7 @@ class PPO(_StateDependentExploration):
     """Proximal policy optimisation (Schulman et al. 2017), by Stable-Baselines3."""
 
     method: ClassVar[str] = "ppo"
+    squash: ClassVar[Squash] = "clip"
 
     n_steps: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
     """Steps of each arm between two updates: a divisor of the steps of a segment. A whole segment if left out."""
@@ -115,6 +163,7 @@ class PPO(_StateDependentExploration):
 class OffPolicy(Reinforcement):
     """What SAC and TD3 have in common."""
 
+    squash: ClassVar[Squash] = "tanh"
     buffer_size: Annotated[int, tyro.conf.arg(metavar="N")] = 200_000
     """Transitions in the replay buffer, those of all arms together; at most 10000000."""
     learning_starts: Annotated[int | None, tyro.conf.arg(metavar="N")] = None

@@ -66,7 +66,7 @@ class View:
         """
         self._seen = self._view.see(_batch(observation), self._recall(starting))
         self._memory = () if self._seen.step is None else self._seen.step.memory
-        return _aligned(self._seen.features)
+        return aligned(self._seen.features)
 
     def glance(self, observation: Observation, rows: npt.NDArray[np.int64]) -> Features:
         """The features of what some arms show at the end of their episode, where no action follows.
@@ -79,7 +79,7 @@ class View:
             Shape (R, f).
         """
         memory = tuple(array[rows] for array in self._memory or ())
-        return _aligned(self._view.see(_batch(observation), memory).features)
+        return aligned(self._view.see(_batch(observation), memory).features)
 
     def act(self, output: npt.NDArray[Any]) -> FloatArray:
         """What network outputs for the features last seen mean, as fractions of the velocity limit.
@@ -108,9 +108,11 @@ def _batch(observation: Observation) -> Batch:
     return Batch(*[np.ascontiguousarray(observation[key], dtype=np.float64) for key in OBSERVED])
 
 
-def _aligned(features: Features) -> Features:
-    # In memory of PyTorch, which is aligned: what a matrix product rounds to may depend on where its operands lie,
-    # and a run must give the same each time.
+def aligned(features: Features) -> Features:
+    """The same numbers in memory of PyTorch, which is aligned.
+
+    What a matrix product rounds to may depend on where its operands lie, and a run must give the same each time.
+    """
     out: Features = torch.empty(features.shape).numpy()
     out[:] = features
     return out

@@ -9,6 +9,7 @@ import torch
 from torch import Tensor
 from torch.autograd.function import once_differentiable
 
+from baselines.agents.bilinear.damped_kernels import held_gradient_rows, held_rows
 from baselines.agents.bilinear.kernels import feature_gradient_rows, feature_rows
 from baselines.agents.bilinear.processing import Bilinear
 from baselines.policy import Problem
@@ -45,6 +46,7 @@ class Law:
         self.inputs, self.outputs = processing.size(problem), processing.outputs(problem)
         self.task = Task.of(scenario)
         self._chain, self._offsets = scenario.model.chain, np.array(processing.offsets)
+        self._damping = processing.damping
 
     def features(self, q: Tensor, nominal: FloatArray, remaining: FloatArray) -> tuple[Tensor, FloatArray]:
         """See :class:`Bilinear`.
@@ -60,6 +62,21 @@ class Law:
         speed = np.empty(len(nominal))
         out: Tensor = _Features.apply(q, self, nominal, remaining, speed)  # type: ignore[no-untyped-call]
         return out, speed
+
+    def held(self, q: Tensor, output: Tensor) -> Tensor:
+        """(G, h) from the output of the network; G with the damped inverse where there is one.
+
+        Args:
+            q: Joint coordinates in [rad] or [m]. Shape (N, n), float64.
+            output: Shape (N, outputs), float64.
+
+        Returns:
+            Shape (N, n (w + 1)), float64.
+        """
+        if self._damping is None:
+            return output
+        out: Tensor = _Held.apply(q, output, self)  # type: ignore[no-untyped-call]
+        return out
 
     def move(
         self, q: Tensor, qdot: Tensor, output: Tensor, rows: Rows, prior: float
@@ -105,6 +122,25 @@ class _Features(torch.autograd.Function):
         given = np.ascontiguousarray(gradient.numpy())
         feature_gradient_rows(law.task.kind, chain.prismatic, chain.axes[0], ctx.features, given, out)
         return torch.from_numpy(out), None, None, None, None
+
+
+class _Held(torch.autograd.Function):
+    @staticmethod
+    def forward(ctx: Any, q: Tensor, output: Tensor, law: Law) -> Tensor:
+        joints, given = q.detach().numpy(), np.ascontiguousarray(output.detach().numpy())
+        out = np.empty((len(joints), given.shape[1] - 1 - joints.shape[1]))
+        held_rows(law.task.kind, law._chain, law._damping, joints, given, out)
+        ctx.law, ctx.given = law, (joints, given)
+        return torch.from_numpy(out)
+
+    @staticmethod
+    @once_differentiable
+    def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor, Tensor, None]:
+        law, (joints, given) = ctx.law, ctx.given
+        by_output, by_q = np.empty(given.shape), np.empty(joints.shape)
+        by = np.ascontiguousarray(gradient.numpy())
+        held_gradient_rows(law.task.kind, law._chain, law._damping, joints, given, by, by_output, by_q)
+        return torch.from_numpy(by_q), torch.from_numpy(by_output), None
 
 
 class _Segment(torch.autograd.Function):

@@ -52,7 +52,7 @@ class ImitateTrainer(ActorTrainer):
     _config: Imitate
 
     def __init__(self, config: Imitate, scenario: Scenario, seed: int) -> None:
-        env = ProcessedVecEnv(1, scenario, config.processing)
+        env = ProcessedVecEnv(1, scenario, config.velocities)
         model = new_model(config.algorithm, env, config.hidden, config.activation)
         if config.init is not None:
             begin_from(model, config)
@@ -60,7 +60,7 @@ class ImitateTrainer(ActorTrainer):
         self._squashed = squash_of(config.algorithm)
         name, parameters = parse_policy(config.expert)
         self._expert = registry.make(name, scenario, **parameters)
-        view = View(config.processing, scenario)
+        view = View(config.velocities, scenario)
         self._ahead = max(furthest(view.preview), furthest(self._expert.preview))
         self._examples: Examples | None = None
 
@@ -143,7 +143,7 @@ class _Mixture:
         self._config, self._model, self._expert = trainer._config, trainer.model, trainer._expert
         scenario, rows = trainer._scenario, len(by_expert)
         self._problem = Problem.of(scenario)
-        self._view = View(self._config.processing, scenario)
+        self._view = View(self._config.velocities, scenario)
         self._by_expert = by_expert
         size = self._config.expert_noise * generator.random(rows)
         self._noise = _Noise(size, generator, scenario.joints)
@@ -178,7 +178,7 @@ class _Mixture:
         self, right: npt.NDArray[np.float32], q: FloatArray, nominal: FloatArray, base: FloatArray | None
     ) -> npt.NDArray[np.float32]:
         """Network outputs for the expert's actions, or for their projection into the null space."""
-        processing, problem = self._config.processing, self._problem
+        processing, problem = self._config.velocities, self._problem
         scratch = np.empty((*nominal.shape[:2], problem.task.error_size))
         speed = speed_rows(problem.task.kind, problem.dt, np.array(processing.offsets), nominal, scratch)
         missing = (right if base is None else right - base) * problem.velocity_limit

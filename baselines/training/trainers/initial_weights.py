@@ -55,7 +55,7 @@ def begin_from(model: BaseAlgorithm, config: Config) -> None:
     assert config.init is not None
     file, algorithm = load_weights(config.init), algorithm_of(model)
     _check_processing(file, config)
-    if file.network.squash != squash_of(algorithm):
+    if file.network.squash != "linear" and file.network.squash != squash_of(algorithm):
         fitting = "ppo" if file.network.squash == "clip" else "sac or td3"
         raise TrainingError(
             f"{algorithm} keeps network outputs within ±1 by {squash_of(algorithm)}, the agent of {file.source} by "

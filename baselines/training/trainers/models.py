@@ -11,14 +11,26 @@ import torch
 from stable_baselines3 import PPO, SAC, TD3
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.logger import Logger
+from stable_baselines3.common.policies import BasePolicy
+from stable_baselines3.common.vec_env import VecEnv
 from torch import Tensor, nn
 
 from baselines.agents.features import Features
 from baselines.training.config.base import Activation, Algorithm
-from baselines.training.environment.vec_env import ProcessedVecEnv
 from baselines.training.networks import ACTIVATIONS, QUIET, ActorModel
+from baselines.training.policies import (
+    BilinearActor,
+    BilinearPPOPolicy,
+    BilinearSACPolicy,
+    BilinearTD3Policy,
+)
 
 ALGORITHMS: dict[Algorithm, type[BaseAlgorithm]] = {"ppo": PPO, "sac": SAC, "td3": TD3}
+BILINEAR: dict[Algorithm, type[BasePolicy]] = {
+    "ppo": BilinearPPOPolicy,
+    "sac": BilinearSACPolicy,
+    "td3": BilinearTD3Policy,
+}
 
 #: How network outputs are kept within ±1.
 Squash = Literal["clip", "tanh", "linear"]
@@ -28,11 +40,12 @@ Model = BaseAlgorithm | ActorModel
 
 def new_model(
     algorithm: Algorithm,
-    env: ProcessedVecEnv,
+    env: VecEnv,
     hidden: Sequence[int],
     activation: Activation,
     log_std_init: float = -2.0,
     use_sde: bool = False,
+    bilinear: bool = False,
     **parameters: Any,
 ) -> BaseAlgorithm:
     """An untrained model, whose first outputs are almost 0.
@@ -46,6 +59,7 @@ def new_model(
         activation: Of the hidden layers.
         log_std_init: Logarithm of the standard deviation of its outputs, before tanh where there is one; TD3 has none.
         use_sde: Whether noise is a function of what is seen (gSDE). Not for TD3.
+        bilinear: Whether the actor is bilinear, in the environment of :func:`ikgym.sb3.make_vec`.
         **parameters: Of the class of Stable-Baselines3.
     """
     critic = "vf" if algorithm == "ppo" else "qf"
@@ -60,16 +74,19 @@ def new_model(
         if algorithm == "sac":
             policy["clip_mean"] = 0.0  # or there would be more to the actor than layers
     kind = ALGORITHMS[algorithm]
-    model: Any = kind("MlpPolicy", env, policy_kwargs=policy, device="cpu", **parameters)
+    model: Any = kind(
+        BILINEAR[algorithm] if bilinear else "MlpPolicy", env, policy_kwargs=policy, device="cpu", **parameters
+    )
     model.set_logger(Logger(None, []))
     with torch.no_grad():
         last: Any = mean_network(model)[-1]
-        if algorithm != "ppo":  # whose policy sees to it by itself
+        if algorithm != "ppo" and not bilinear:  # whose policies see to it by themselves
             last.weight.mul_(QUIET)
             last.bias.zero_()
         if algorithm == "sac" and not use_sde:
-            model.policy.actor.log_std.weight.mul_(QUIET)
-            model.policy.actor.log_std.bias.fill_(log_std_init)
+            spread: Any = model.policy.actor.log_std[-1] if bilinear else model.policy.actor.log_std
+            spread.weight.mul_(QUIET)
+            spread.bias.fill_(log_std_init)
         if algorithm == "td3":
             model.policy.actor_target.load_state_dict(model.policy.actor.state_dict())
     made: BaseAlgorithm = model
@@ -95,7 +112,14 @@ def squash_of(algorithm: Algorithm) -> Squash:
 
 def squash_of_model(model: Model) -> Squash:
     """How a model keeps its outputs within ±1; `linear` where it does not."""
-    return "linear" if isinstance(model, ActorModel) else squash_of(algorithm_of(model))
+    if isinstance(model, ActorModel) or bilinear_actor(model) is not None:
+        return "linear"
+    return squash_of(algorithm_of(model))
+
+
+def bilinear_actor(model: BaseAlgorithm) -> BilinearActor | None:
+    """The bilinear actor of a model; None where its actor is another."""
+    return next((module for module in model.policy.modules() if isinstance(module, BilinearActor)), None)
 
 
 def mean_network(model: Model) -> nn.Sequential:
@@ -106,6 +130,9 @@ def mean_network(model: Model) -> nn.Sequential:
     """
     if isinstance(model, ActorModel):
         return model.policy
+    bilinear = bilinear_actor(model)
+    if bilinear is not None:
+        return bilinear.network
     algorithm = algorithm_of(model)
     policy: Any = model.policy
     if algorithm == "ppo":

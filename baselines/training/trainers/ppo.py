@@ -34,6 +34,7 @@ class PPOTrainer(ReinforcementTrainer):
             config.activation,
             config.log_std_init,
             config.use_sde,
+            config.output == "bilinear",
             sde_sample_freq=config.sde_sample_freq,
             learning_rate=config.learning_rate,
             n_steps=n_steps,

@@ -12,9 +12,11 @@ import numpy as np
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.utils import FloatSchedule
+from stable_baselines3.common.vec_env import VecEnv
 from torch import nn
 
 from baselines.training.config.reinforcement import Reinforcement
+from baselines.training.environment.learning_env import SpreadVecEnv
 from baselines.training.environment.vec_env import ProcessedVecEnv
 from baselines.training.randomness import episode_seed
 from baselines.training.trainer import SegmentMetrics
@@ -29,7 +31,7 @@ COUNTERS = ("num_timesteps", "_n_updates", "_episode_num")
 class ReinforcementTrainer(abc.ABC):
     """A model of Stable-Baselines3 that learns segment by segment, see :class:`baselines.training.trainer.Trainer`.
 
-    A segment begins with new episodes and plays all of them to their end, so that no state of an arm outlives it.
+    A segment begins with new episodes, so that no state of an arm outlives it, and has the steps of whole ones.
 
     Args:
         config: Of the method.
@@ -80,6 +82,8 @@ class ReinforcementTrainer(abc.ABC):
             self._learn()
         metrics = {name: float(value) for name, value in model.logger.name_to_value.items()}
         metrics["rollout/ep_rew_mean"] = float(np.mean([episode["r"] for episode in model.ep_info_buffer]))
+        if self._config.output == "bilinear":  # whose returns are no costs
+            return metrics
         # Of the shorter ones of the curriculum, what a whole one would cost.
         costs = [-episode["r"] * self._scenario.steps / episode["l"] for episode in model.ep_info_buffer]
         metrics["train/cost"] = float(np.exp(np.mean(np.log(np.maximum(costs, np.finfo(np.float64).tiny)))))
@@ -102,12 +106,14 @@ class ReinforcementTrainer(abc.ABC):
         for name, count in state["counters"].items():
             setattr(self.model, name, count)
 
-    def _new_env(self, episode_steps: int) -> ProcessedVecEnv:
+    def _new_env(self, episode_steps: int) -> VecEnv:
         config = self._config
+        if config.output == "bilinear":
+            return SpreadVecEnv(config.n_envs, self._scenario, config.learning)
         # Values are then of the size of rewards: of sums a hundred times as large, the critics would take most of the
         # gradient that is left after it has been clipped.
         scale = max(1.0 - config.gamma, 1e-3)
-        return ProcessedVecEnv(config.n_envs, self._scenario, config.processing, config.reward, scale, episode_steps)
+        return ProcessedVecEnv(config.n_envs, self._scenario, config.velocities, config.reward, scale, episode_steps)
 
     def _learn(self) -> None:
         self.model.learn(self._segment_steps, self._callback(), log_interval=None, reset_num_timesteps=False)

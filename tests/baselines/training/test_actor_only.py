@@ -29,6 +29,7 @@ BILINEAR = APG(
 )
 CONFIGS = {
     "apg": BILINEAR,
+    "apg, damped": BILINEAR.replace(damping=4e-4),
     "apg, skew, end within a segment": BILINEAR.replace(task="skew", steps=20),
     "imitate": Imitate(**SMALL, expert="dls", gradient_steps=5, batch_size=16, example_every=2, buffer_size=70),
     "imitate over dls": Imitate(**OVER, expert="rhc:horizon=5", gradient_steps=5, batch_size=16, algorithm="sac"),
@@ -76,11 +77,14 @@ def test_ordinary_models_come_out(config):
     assert trainer.steps == config.n_envs * played
 
 
-def test_gradient_of_a_window_is_that_of_its_loss():
+@pytest.mark.parametrize("damping", [None, 4e-2])
+def test_gradient_of_a_window_is_that_of_its_loss(damping):
     """Along a direction in the space of weights, against central differences: through arm, features and network."""
     # So long a prior makes the weights of the costs constant; they are not differentiated.
     many = {"max_gradient_share": 1e9, "cost_prior_steps": 1e12, "reset_distance": 1e9}
-    config = BILINEAR.replace(hidden=(16,), n_envs=6, activation="tanh", segment_steps=24, window=(24,), **many)
+    config = BILINEAR.replace(
+        hidden=(16,), n_envs=6, activation="tanh", segment_steps=24, window=(24,), damping=damping, **many
+    )
     losses, slope = {}, 0.0
     for along in (0.0, 1e-6, -1e-6):
         trainer = made(config)
@@ -123,6 +127,7 @@ def test_a_run_of_apg_repeats_and_goes_on(tmp_path):
     begun = made(config, seed=5)
     for layer, weights in zip(begun.model.policy[::2], agent.network.weights, strict=True):
         np.testing.assert_array_equal(layer.weight.detach(), weights)
+    assert inherit(BILINEAR.replace(init=agent.source, damping=1e-3), ()).damping is None
     with pytest.raises(TrainingError, match="another structure than imitate trains"):
         inherit(Imitate(**SMALL, init=agent.source), ())
     with pytest.raises(TrainingError, match=r"offsets: .* has \(1, 2, 10\), got \(1, 5\)"):

@@ -154,8 +154,13 @@ def test_files_hold_the_kept_agent(finished):
     assert weights_hash(loaded) == about(folder)["kept"]["weights_sha256"]
 
 
-def test_agents_with_state_dependent_exploration_are_exported(tmp_path):
-    config = tiny("sac", use_sde=True, segments=1, evaluate_every=1)
+@pytest.mark.parametrize(
+    ("method", "changes"),
+    [("sac", {"use_sde": True}), *((method, {"output": "bilinear"}) for method in ("ppo", "sac", "td3"))],
+    ids=str,
+)
+def test_what_is_exported_plays_as_in_validation(method, changes, tmp_path):
+    config = tiny(method, **changes, segments=1, evaluate_every=1)
     cost = train(config, 3, tmp_path).score.cost
     scenario = config.make_scenario()
     policy = baselines.make("agent", scenario, path=str(tmp_path / "agent.safetensors"))
