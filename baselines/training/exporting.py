@@ -50,7 +50,8 @@ def export(
         network, tanh, gain = _layers(actor.network), hasattr(model.policy, "critic"), learning.largest
     squash: Squash = "tanh" if tanh else "clip"
     ahead = offsets(learning.preview)
-    processing = Relative(ahead, learning.furthest, learning.largest, gain, squash, actor is not None)
+    damping = None if actor is None else actor.damping
+    processing = Relative(ahead, learning.furthest, learning.largest, gain, squash, actor is not None, damping)
     problem = Problem.of(scenario)
     sizes, needed = (network.inputs, network.outputs), (processing.size(problem), processing.outputs(problem))
     if sizes != needed:

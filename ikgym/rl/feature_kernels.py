@@ -155,6 +155,36 @@ def along_joints(kind, chain, metres, q, due, rotation, position, jacobians, out
 
 
 @kernel
+def seen_jacobian(kind, chain, q, joints, rotation, position, out):
+    """The geometric Jacobian from the frame in which twists are seen: that of joint 1, as if it stood at 0.
+
+    Args:
+        kind: Of task coordinates, but for skew ones, which are no twists.
+        chain: The arm's model, see :class:`ikgym.kinematics.Chain`.
+        q: Joint coordinates in [rad] or [m]. Shape (n,).
+        joints: Scratch. Shape (n,).
+        rotation: Scratch. Shape (3, 3).
+        position: Scratch. Shape (3,).
+        out: Receives the Jacobian; tasks of position have its first three rows. Shape (6, n).
+    """
+    joints[:] = q
+    if is_turned(kind, chain.prismatic):
+        joints[0] = 0.0
+    forward_and_jacobian(chain, joints, rotation, position, out)
+
+
+@kernel
+def jacobian_rows(kind, chain, q, out):
+    """The first rows of :func:`seen_jacobian` one after the other, arm by arm: shapes (N, n) and (N, w n)."""
+    n, w = q.shape[1], twist_size(kind)
+    joints, rotation, position, jacobian = np.empty(n), np.empty((3, 3)), np.empty(3), np.empty((6, n))
+    for row in range(q.shape[0]):
+        seen_jacobian(kind, chain, q[row], joints, rotation, position, jacobian)
+        for a in range(w):
+            out[row, a * n : (a + 1) * n] = jacobian[a]
+
+
+@kernel
 def observe_rows(kind, chain, dt, offsets, furthest, q, qdot, pose, nominal, remaining, out, unit):
     """What agents see, row by row, see :class:`ikgym.rl.AgentObservation`.
 

@@ -36,6 +36,7 @@ class Learning(Frozen):
         worst: See there.
         history: How many observations are seen side by side, see :class:`ikgym.rl.History`.
         commands: How many of the last commands are seen.
+        jacobian: Whether the Jacobian is seen, as the damped inverse of :mod:`baselines.training.policies` needs it.
     """
 
     preview: Preview = (10, 40, 100)
@@ -47,6 +48,7 @@ class Learning(Frozen):
     worst: float = 12.0
     history: int = 1
     commands: int = 0
+    jacobian: bool = False
 
     def arm(self, scenario: str | Scenario) -> gym.Env[Any, Any]:
         """One arm of a scenario, wrapped."""
@@ -67,7 +69,7 @@ class Learning(Frozen):
         """An environment in the wrappers of a module."""
         env = kinds.RelativeAction(env, self.share, self.largest, self.furthest)
         env = kinds.LogReward(env, self.scale, self.worst)
-        env = kinds.AgentObservation(env, self.furthest)
+        env = kinds.AgentObservation(env, self.furthest, self.jacobian)
         return env if self.history == 1 else kinds.History(env, self.history)
 
 

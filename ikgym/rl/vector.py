@@ -53,14 +53,16 @@ class AgentObservation(ArmsWrapper):
     Args:
         env: The vector environment, whose observation nothing else has changed.
         furthest: Where |v̂| is cut, above 0.
+        jacobian: Whether the Jacobian is seen; not of skew coordinates.
 
     Raises:
-        InvalidInputError: The environment shows less than two reference poses, or `furthest` is out of its range.
+        InvalidInputError: The environment shows less than two reference poses, `furthest` is out of its range, or the
+            task has no such Jacobian.
     """
 
-    def __init__(self, env: Any, furthest: float = FURTHEST) -> None:
+    def __init__(self, env: Any, furthest: float = FURTHEST, jacobian: bool = False) -> None:
         super().__init__(env)
-        self._view = AgentView(env, furthest)
+        self._view = AgentView(env, furthest, jacobian)
         self._see(self._view.space)
 
     def reset(self, *, seed: Any = None, options: dict[str, Any] | None = None) -> tuple[Features, dict[str, Any]]:

@@ -39,6 +39,7 @@ units of a quarter of the arm's length and orientation apart, cut at ±10 |
     | 1 | steps left, as a share of 500, at most 1; from the sines on all are multiplied by 0.3 up to here |
     | 1 each | ages of `q` and `pose` as a share of 100 steps, where sensors are slow or late |
     | h n | the last h commands, like the joint velocities, where the environment shows them |
+    | w n | the Jacobian of the twist row by row, in [m] and without a unit, where it is asked for |
 
     Twists have w components: 3 for tasks of position alone, else 6. They are seen from the frame of joint 1, which a
     turn of joint 1 does not change, so that nothing has to be learned twice; where joint 1 is prismatic and for skew
@@ -47,15 +48,17 @@ units of a quarter of the arm's length and orientation apart, cut at ±10 |
     Args:
         env: The environment, whose observation nothing else has changed.
         furthest: Where |v̂| is cut, above 0.
+        jacobian: Whether the Jacobian is seen; not of skew coordinates.
 
     Raises:
-        InvalidInputError: The environment shows less than two reference poses, or `furthest` is out of its range.
+        InvalidInputError: The environment shows less than two reference poses, `furthest` is out of its range, or the
+            task has no such Jacobian.
     """
 
-    def __init__(self, env: gym.Env[Any, Any], furthest: float = FURTHEST) -> None:
-        RecordConstructorArgs.__init__(self, furthest=furthest)
+    def __init__(self, env: gym.Env[Any, Any], furthest: float = FURTHEST, jacobian: bool = False) -> None:
+        RecordConstructorArgs.__init__(self, furthest=furthest, jacobian=jacobian)
         super().__init__(env)
-        self._view = AgentView(env, furthest)
+        self._view = AgentView(env, furthest, jacobian)
         self.observation_space = self._view.space
 
     def observation(self, observation: Observation) -> Features:

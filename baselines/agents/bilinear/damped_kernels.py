@@ -17,7 +17,7 @@ import numpy as np
 
 from baselines.solvers.linear_algebra import damped_gram, ldl, ldl_scaled_inverse
 from ikgym.jit import inlined, kernel
-from ikgym.kinematics import forward_and_jacobian
+from ikgym.rl.feature_kernels import seen_jacobian
 from ikgym.rl.twists import is_turned, twist_size
 
 #: Of the logarithms that a network gives.
@@ -39,9 +39,10 @@ def held_rows(kind, chain, damping, q, output, out):
     n, w = q.shape[1], twist_size(kind)
     geometric, scaled, inverse = np.empty((6, n)), np.empty((w, n)), np.empty((w, w))
     joints, metric, products = np.empty(n), np.empty(n), np.empty((w, n))
+    rotation, position = np.empty((3, 3)), np.empty(3)
     for row in range(q.shape[0]):
         given, held = output[row], out[row]
-        see(kind, chain, q[row], joints, geometric)
+        seen_jacobian(kind, chain, q[row], joints, rotation, position, geometric)
         lambda_ = damping * logarithm(given[n * (w + 1)])
         invert(geometric[:w], given[n * (w + 1) + 1 :], lambda_, metric, scaled, inverse, products)
         for j in range(n):
@@ -67,11 +68,12 @@ def held_gradient_rows(kind, chain, damping, q, output, by_held, by_output, by_q
     n, w = q.shape[1], twist_size(kind)
     geometric, scaled, inverse = np.empty((6, n)), np.empty((w, n)), np.empty((w, w))
     joints, metric, products = np.empty(n), np.empty(n), np.empty((w, n))
+    rotation, position = np.empty((3, 3)), np.empty(3)
     back, both, by_jacobian = np.empty((w, n)), np.empty((w, w)), np.zeros((6, n))
     for row in range(q.shape[0]):
         given, by, into = output[row], by_held[row], by_output[row]
         into[: n * (w + 1)] = by
-        see(kind, chain, q[row], joints, geometric)
+        seen_jacobian(kind, chain, q[row], joints, rotation, position, geometric)
         lambda_ = damping * logarithm(given[n * (w + 1)])
         invert(geometric[:w], given[n * (w + 1) + 1 :], lambda_, metric, scaled, inverse, products)
         # M⁻¹ Bᵀ, with B the gradient by U Jᵀ M⁻¹.
@@ -110,15 +112,6 @@ def held_gradient_rows(kind, chain, damping, q, output, by_held, by_output, by_q
 def logarithm(number):
     """What a network says by a logarithm."""
     return math.exp(min(max(number, -LARGEST), LARGEST))
-
-
-@inlined
-def see(kind, chain, q, joints, geometric):
-    """The geometric Jacobian in the frame in which twists are seen: that of joint 1, as if it stood at 0."""
-    joints[:] = q
-    if is_turned(kind, chain.prismatic):
-        joints[0] = 0.0
-    forward_and_jacobian(chain, joints, np.empty((3, 3)), np.empty(3), geometric)
 
 
 @kernel

@@ -106,15 +106,9 @@ class Bilinear(Alone, Frozen):
         """The number of network outputs: row j of G and h_j, joint by joint; ln λ and ln U where there is an inverse.
 
         Raises:
-            InvalidInputError: There is an inverse, and the task shows skew coordinates, whose errors are no twists.
+            InvalidInputError: As :func:`bilinear_outputs`.
         """
-        kind, n = problem.task.kind, problem.model.joints
-        if self.damping is not None and kind == task_kernels.SKEW:
-            raise InvalidInputError(
-                f"damping: expected None for skew coordinates, whose errors are no twists, got {self.damping}; "
-                "agents for them are trained on whole poses (task pose)."
-            )
-        return n * (int(twist_size(kind)) + 1) + (0 if self.damping is None else 1 + n)
+        return bilinear_outputs(problem, self.damping)
 
     def features(self, problem: Problem, batch: Batch, base: FloatArray | None = None) -> Features:
         """The features of a batch; see :meth:`baselines.agents.features.Processing.features`."""
@@ -139,9 +133,7 @@ class Bilinear(Alone, Frozen):
         del base
         out, chain = np.empty(batch.q.shape), problem.model.chain
         if self.damping is not None:
-            held = np.empty((len(output), chain.prismatic.shape[0] * (int(twist_size(problem.task.kind)) + 1)))
-            held_rows(problem.task.kind, chain, self.damping, batch.q, output, held)
-            output = held
+            output = held(problem, self.damping, batch.q, output)
         action_rows(
             problem.task.kind,
             chain.prismatic,
@@ -175,3 +167,33 @@ class Bilinear(Alone, Frozen):
             out,
         )
         return out
+
+
+def bilinear_outputs(problem: Problem, damping: float | None) -> int:
+    """The number of outputs of a network that gives G and h, and λ and U where there is a damped inverse.
+
+    Raises:
+        InvalidInputError: There is an inverse, and the task shows skew coordinates, whose errors are no twists.
+    """
+    kind, n = problem.task.kind, problem.model.joints
+    if damping is not None and kind == task_kernels.SKEW:
+        raise InvalidInputError(
+            f"damping: expected None for skew coordinates, whose errors are no twists, got {damping}; agents for them "
+            "are trained on whole poses (task pose)."
+        )
+    return n * (int(twist_size(kind)) + 1) + (0 if damping is None else 1 + n)
+
+
+def held(problem: Problem, damping: float, q: FloatArray, output: npt.NDArray[Any]) -> FloatArray:
+    """(G, h) with the damped inverse in it. Shape (B, n (w + 1)).
+
+    Args:
+        problem: What is tracked.
+        damping: The usual λ.
+        q: Joint coordinates in [rad] or [m]. Shape (B, n).
+        output: Of the network. Shape (B, n (w + 1) + 1 + n).
+    """
+    kind, chain = problem.task.kind, problem.model.chain
+    out = np.empty((len(q), q.shape[1] * (int(twist_size(kind)) + 1)))
+    held_rows(kind, chain, damping, q, output, out)
+    return out

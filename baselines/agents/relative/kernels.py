@@ -6,9 +6,11 @@ import math
 
 import numpy as np
 
+from baselines.agents.bilinear.damped_kernels import held_rows
 from baselines.agents.network import forward_rows
 from ikgym.jit import kernel
 from ikgym.rl.feature_kernels import LEAST, observe_rows
+from ikgym.rl.twists import twist_size
 
 
 @kernel
@@ -41,12 +43,13 @@ def velocity_rows(bilinear, squashed, gain, largest, velocity_limit, features, u
 
 
 @kernel
-def law_rows(ahead, meaning, velocity_limit, network, batch, out):
+def law_rows(ahead, meaning, damping, velocity_limit, network, batch, out):
     """The whole law, row by row: :func:`ikgym.rl.feature_kernels.observe_rows`, the network, :func:`velocity_rows`.
 
     Args:
         ahead: The first five arguments of `observe_rows`.
         meaning: The first four of :func:`velocity_rows`.
+        damping: Of :func:`baselines.agents.bilinear.damped_kernels.held_rows`, which is left out where it is 0.
         velocity_limit: In [rad/s] or [m/s]. Shape (n,).
         network: The first five of :func:`baselines.agents.network.forward_rows`.
         batch: q, q̇, pose, reference and steps left, as of `observe_rows`.
@@ -60,4 +63,9 @@ def law_rows(ahead, meaning, velocity_limit, network, batch, out):
     observe_rows(kind, chain, dt, offsets, furthest, q, qdot, pose, nominal, remaining, features, unit)
     output = np.empty((q.shape[0], sizes[sizes.shape[0] - 1]), np.float32)
     forward_rows(weights, biases, sizes, activation, squash, features, output)
-    velocity_rows(bilinear, squashed, gain, largest, velocity_limit, features, unit, output, out)
+    if damping > 0.0:
+        held = np.empty((q.shape[0], q.shape[1] * (twist_size(kind) + 1)))
+        held_rows(kind, chain, damping, q, output, held)
+        velocity_rows(bilinear, squashed, gain, largest, velocity_limit, features, unit, held, out)
+    else:
+        velocity_rows(bilinear, squashed, gain, largest, velocity_limit, features, unit, output, out)

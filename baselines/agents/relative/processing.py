@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.agents.alone import Alone
+from baselines.agents.bilinear.processing import bilinear_outputs, held
 from baselines.agents.features import Features
 from baselines.agents.network import Network
 from baselines.agents.relative.kernels import law_rows, velocity_rows
@@ -37,6 +38,8 @@ class Relative(Alone, Frozen):
         gain: Above 0.
         squash: What keeps a within its bounds: `clip` cuts it, `tanh` is largest · tanh(a / largest).
         bilinear: Whether the network gives G and h.
+        damping: Of the inverse that G is added to, see :class:`baselines.agents.bilinear.processing.Bilinear`; None for
+            no inverse.
 
     Raises:
         InvalidInputError: A value is out of its range.
@@ -49,6 +52,7 @@ class Relative(Alone, Frozen):
     gain: float = 1.0
     squash: Squash = "clip"
     bilinear: bool = False
+    damping: float | None = None
     _steps: npt.NDArray[np.int64] = dataclasses.field(init=False, repr=False, compare=False)
 
     #: What files call it.
@@ -61,7 +65,10 @@ class Relative(Alone, Frozen):
         known_name("squash", self.squash, get_args(Squash))
         if not isinstance(self.bilinear, bool):
             raise InvalidInputError(f"bilinear: expected true or false, got {self.bilinear!r}.")
-        values = {name: number(name, getattr(self, name), above=0.0) for name in ("furthest", "largest", "gain")}
+        if self.damping is not None and not self.bilinear:
+            raise InvalidInputError(f"damping: expected None unless bilinear, got {self.damping!r}.")
+        numbers = ["furthest", "largest", "gain"] + ["damping"] * (self.damping is not None)
+        values = {name: number(name, getattr(self, name), above=0.0) for name in numbers}
         steps = np.array(offsets, dtype=np.int64)
         steps.flags.writeable = False
         for field, value in {"offsets": offsets, "_steps": steps, **values}.items():
@@ -69,7 +76,7 @@ class Relative(Alone, Frozen):
 
     def to_json(self) -> dict[str, Any]:
         """The fields, as JSON has them."""
-        fields = {name: getattr(self, name) for name in _fields()}
+        fields = {name: getattr(self, name) for name in _fields() if name != "damping" or self.damping is not None}
         return {"kind": self.kind, **fields, "offsets": list(self.offsets)}
 
     @classmethod
@@ -81,7 +88,7 @@ class Relative(Alone, Frozen):
             InvalidInputError: A value is refused.
         """
         known_names("field of the processing", values, ["kind", *_fields()])
-        fields = {name: values[name] for name in _fields()}
+        fields = {name: values[name] for name in _fields() if name != "damping" or name in values}
         return cls(**{**fields, "offsets": tuple(fields["offsets"])})
 
     def size(self, problem: Problem) -> int:
@@ -91,9 +98,12 @@ class Relative(Alone, Frozen):
         return shown + len(self.offsets) * w + 3 + (w // 3 + 1) * problem.model.joints
 
     def outputs(self, problem: Problem) -> int:
-        """The number of network outputs."""
-        n = problem.model.joints
-        return n * (int(twist_size(problem.task.kind)) + 1) if self.bilinear else n
+        """The number of network outputs.
+
+        Raises:
+            InvalidInputError: As :func:`baselines.agents.bilinear.processing.bilinear_outputs`.
+        """
+        return bilinear_outputs(problem, self.damping) if self.bilinear else problem.model.joints
 
     def features(self, problem: Problem, batch: Batch, base: FloatArray | None = None) -> Features:
         """The features of a batch; see :meth:`baselines.agents.features.Processing.features`."""
@@ -106,13 +116,17 @@ class Relative(Alone, Frozen):
         """Actions, as fractions of the velocity limit; see :meth:`baselines.agents.features.Processing.action`."""
         del base
         out = np.empty(batch.q.shape)
+        if self.damping is not None:
+            output = held(problem, self.damping, batch.q, output)
         velocity_rows(*self._output, problem.velocity_limit, *self._observe(problem, batch), output, out)
         return out
 
     def law(self, problem: Problem, batch: Batch, network: Network) -> FloatArray:
         """:meth:`action` of what a network says of :meth:`features`, bit for bit, in one compiled call."""
         out = np.empty(batch.q.shape)
-        law_rows(self._ahead(problem), self._output, problem.velocity_limit, network.constants, tuple(batch[:5]), out)
+        damping = 0.0 if self.damping is None else self.damping
+        arguments = self._ahead(problem), self._output, damping, problem.velocity_limit
+        law_rows(*arguments, network.constants, tuple(batch[:5]), out)
         return out
 
     def _observe(self, problem: Problem, batch: Batch) -> tuple[Features, FloatArray]:

@@ -39,6 +39,9 @@ class Reinforcement(Annealed, JointVelocities):
     """Largest velocity of a joint of bilinear agents, in units of what is asked for."""
     furthest: Annotated[float, tyro.conf.arg(metavar="X")] = Learning.furthest
     """Where the twist that is due is cut that bilinear agents see, in units of the speed of what is ahead."""
+    damping: Annotated[float | None, tyro.conf.arg(metavar="λ")] = None
+    """A bilinear agent begins as the damped inverse of the Jacobian with this λ, which the network changes, weighs and
+    adds to. The network gives the whole matrix if left out. Not for skew coordinates."""
     reward: Reward = "log"
     """cost: −stage cost, as in the environment. log: −log(1 + stage cost), which keeps an arm that has lost its path,
     whose costs are millions of times larger, from dominating; costs are then compared by their ratios."""
@@ -65,6 +68,8 @@ class Reinforcement(Annealed, JointVelocities):
                     raise InvalidInputError(
                         f"{name}: expected none for an output that is bilinear, got {getattr(self, name)!r}."
                     )
+        elif self.damping is not None:
+            raise InvalidInputError(f"damping: expected none unless the output is bilinear, got {self.damping!r}.")
         super().__post_init__()
         known_names("reward", [self.reward], get_args(Reward))
         self._set("episodes", whole_number("episodes", self.episodes, at_least=1))
@@ -82,13 +87,25 @@ class Reinforcement(Annealed, JointVelocities):
         """What the agent sees, and what the outputs of its network mean."""
         if self.output == "velocities":
             return self.velocities
-        return Relative(self.offsets, self.furthest, self.largest, self.largest, self.squash, bilinear=True)
+        return Relative(
+            self.offsets,
+            self.furthest,
+            self.largest,
+            gain=self.largest,
+            squash=self.squash,
+            bilinear=True,
+            damping=self.damping,
+        )
 
     @property
     def learning(self) -> Learning:
         """How the environment of bilinear agents is wrapped."""
         return Learning(
-            preview=self.offsets, largest=self.largest, furthest=self.furthest, lost_distance=self.lost_distance
+            preview=self.offsets,
+            largest=self.largest,
+            furthest=self.furthest,
+            lost_distance=self.lost_distance,
+            jacobian=self.damping is not None,
         )
 
     @classmethod
@@ -96,7 +113,7 @@ class Reinforcement(Annealed, JointVelocities):
         """See :meth:`Config.shape_of`."""
         if not isinstance(processing, Relative):
             return super().shape_of(processing, sizes, activation)
-        bounds = {name: getattr(processing, name) for name in ("largest", "furthest")}
+        bounds = {name: getattr(processing, name) for name in ("largest", "furthest", "damping")}
         return Config.shape_of(processing, sizes, activation) | bounds
 
 
@@ -144,6 +161,9 @@ class PPO(_StateDependentExploration):
     """An update ends early where the policy has gone further than this, in [nat]."""
     ent_coef: Annotated[float, tyro.conf.arg(metavar="C")] = 0.0
     """Weight of the entropy in the loss."""
+    log_std_end: Annotated[float | None, tyro.conf.arg(metavar="X")] = None
+    """The logarithm of the standard deviation goes from log_std_init to this one, from segment to segment by equal
+    parts. It is learned if left out."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -157,6 +177,14 @@ class PPO(_StateDependentExploration):
         if self.target_kl is not None:
             self._set("target_kl", number("target_kl", self.target_kl, above=0.0))
         self._set("ent_coef", number("ent_coef", self.ent_coef, at_least=0.0))
+        if self.log_std_end is not None:
+            self._set("log_std_end", between("log_std_end", self.log_std_end, *LOG_STD))
+
+    def log_std_of(self, segment: int) -> float | None:
+        """The logarithm of the standard deviation in a segment, counted from 0; None where it is learned."""
+        if self.log_std_end is None:
+            return None
+        return self.log_std_init + (self.log_std_end - self.log_std_init) * segment / max(self.segments - 1, 1)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

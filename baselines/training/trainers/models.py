@@ -17,6 +17,7 @@ from torch import Tensor, nn
 
 from baselines.agents.features import Features
 from baselines.training.config.base import Activation, Algorithm
+from baselines.training.config.reinforcement import Output
 from baselines.training.networks import ACTIVATIONS, QUIET, ActorModel
 from baselines.training.policies import (
     BilinearActor,
@@ -45,7 +46,7 @@ def new_model(
     activation: Activation,
     log_std_init: float = -2.0,
     use_sde: bool = False,
-    bilinear: bool = False,
+    output: tuple[Output, float | None] = ("velocities", None),
     **parameters: Any,
 ) -> BaseAlgorithm:
     """An untrained model, whose first outputs are almost 0.
@@ -59,14 +60,18 @@ def new_model(
         activation: Of the hidden layers.
         log_std_init: Logarithm of the standard deviation of its outputs, before tanh where there is one; TD3 has none.
         use_sde: Whether noise is a function of what is seen (gSDE). Not for TD3.
-        bilinear: Whether the actor is bilinear, in the environment of :func:`ikgym.sb3.make_vec`.
+        output: What the actor's network gives, and the damping of a bilinear one, whose environment is that of
+            :func:`ikgym.sb3.make_vec`.
         **parameters: Of the class of Stable-Baselines3.
     """
+    bilinear, damping = output[0] == "bilinear", output[1]
     critic = "vf" if algorithm == "ppo" else "qf"
     policy: dict[str, Any] = {
         "net_arch": {"pi": list(hidden), critic: list(hidden)},
         "activation_fn": ACTIVATIONS[activation],
     }
+    if bilinear:
+        policy["damping"] = damping
     if algorithm != "td3":
         policy["log_std_init"] = log_std_init
     if use_sde:

@@ -9,6 +9,7 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from torch import nn
 
 from baselines.training.config.reinforcement import PPO
+from baselines.training.trainer import SegmentMetrics
 from baselines.training.trainers.models import new_model
 from baselines.training.trainers.reinforcement import ReinforcementTrainer
 from ikgym.exceptions import InvalidInputError
@@ -34,7 +35,7 @@ class PPOTrainer(ReinforcementTrainer):
             config.activation,
             config.log_std_init,
             config.use_sde,
-            config.output == "bilinear",
+            (config.output, config.damping),
             sde_sample_freq=config.sde_sample_freq,
             learning_rate=config.learning_rate,
             n_steps=n_steps,
@@ -47,6 +48,13 @@ class PPOTrainer(ReinforcementTrainer):
             ent_coef=config.ent_coef,
             stats_window_size=self._ends,
         )
+
+    def segment(self, number: int) -> SegmentMetrics:
+        """See :meth:`baselines.training.trainer.Trainer.segment`."""
+        given = self._config.log_std_of(number)
+        if given is not None:
+            self.model.policy.log_std.requires_grad_(False).fill_(given)
+        return super().segment(number)
 
     def _begun(self) -> None:
         with torch.no_grad():
