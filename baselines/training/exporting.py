@@ -47,7 +47,7 @@ def export(
         network, tanh = _unsquashed(network_of_model(model.policy, model.policy_kwargs))
         gain = learning.largest if tanh else learning.share
     else:
-        network, tanh, gain = _layers(actor.network), hasattr(model.policy, "critic"), learning.largest
+        network, tanh, gain = _layers(actor.network), hasattr(model.policy, "critic"), learning.share
     squash: Squash = "tanh" if tanh else "clip"
     ahead = offsets(learning.preview)
     damping = None if actor is None else actor.damping

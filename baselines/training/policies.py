@@ -75,8 +75,8 @@ class BilinearActor(nn.Module):
         return out + inverse
 
 
-class _Scaled(nn.Module):
-    """Velocities in units as actions of a box whose bound is the largest velocity."""
+class _Shares(nn.Module):
+    """Velocities in units as shares of the bound of the box, which Stable-Baselines3 multiplies tanh of them by."""
 
     def __init__(self, actor: BilinearActor, space: Any) -> None:
         super().__init__()
@@ -84,16 +84,16 @@ class _Scaled(nn.Module):
 
     def forward(self, features: Tensor) -> Tensor:
         """Shape (B, n)."""
-        out: Tensor = self.bound * self.actor(features)
+        out: Tensor = self.actor(features) / self.bound
         return out
 
 
 class _Extractor(MlpExtractor):
     """The critic's layers of Stable-Baselines3, and a bilinear actor in place of its own."""
 
-    def __init__(self, actor: _Scaled, *args: Any) -> None:
+    def __init__(self, actor: BilinearActor, *args: Any) -> None:
         super().__init__(*args)
-        self.policy_net, self.latent_dim_pi = nn.Sequential(actor), actor.actor.joints
+        self.policy_net, self.latent_dim_pi = nn.Sequential(actor), actor.joints
 
 
 class _Policy:
@@ -114,14 +114,13 @@ class BilinearPPOPolicy(_Policy, ActorCriticPolicy):
     def _build_mlp_extractor(self) -> None:
         hidden = self.net_arch["pi"] if isinstance(self.net_arch, dict) else self.net_arch
         actor = BilinearActor(self.observation_space, _joints(self.action_space), hidden, self._damping)
-        scaled = _Scaled(actor, self.action_space)
-        self.mlp_extractor = _Extractor(scaled, self.features_dim, self.net_arch, self.activation_fn, self.device)
+        self.mlp_extractor = _Extractor(actor, self.features_dim, self.net_arch, self.activation_fn, self.device)
 
     def _build(self, lr_schedule: Any) -> None:
         super()._build(lr_schedule)
         self.action_net: nn.Module = nn.Identity()  # what the actor says are the actions
-        scaled, optimizer = cast(_Scaled, self.mlp_extractor.policy_net[0]), cast(Any, self.optimizer_class)
-        cast(nn.Linear, scaled.actor.network[-1]).weight.data.mul_(QUIET)  # after the orthogonal initialisation
+        actor, optimizer = cast(BilinearActor, self.mlp_extractor.policy_net[0]), cast(Any, self.optimizer_class)
+        cast(nn.Linear, actor.network[-1]).weight.data.mul_(QUIET)  # after the orthogonal initialisation
         self.optimizer = optimizer(self.parameters(), lr=lr_schedule(1), **self.optimizer_kwargs)
 
 
@@ -130,7 +129,8 @@ class _BilinearSACActor(SACActor):
         super().__init__(*args, **kwargs)
         if self.use_sde:
             raise InvalidInputError("use_sde: expected False for a bilinear actor, got True.")
-        self.mu = BilinearActor(self.observation_space, _joints(self.action_space), self.net_arch, damping)
+        actor = BilinearActor(self.observation_space, _joints(self.action_space), self.net_arch, damping)
+        self.mu: nn.Module = _Shares(actor, self.action_space)
         head: Any = self.log_std
         self.log_std = nn.Sequential(self.latent_pi, head)  # type: ignore[assignment]  # declared for use_sde
         self.latent_pi = nn.Sequential()
@@ -152,7 +152,7 @@ class _BilinearTD3Actor(TD3Actor):
     def __init__(self, *args: Any, damping: float | None, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
         actor = BilinearActor(self.observation_space, _joints(self.action_space), self.net_arch, damping)
-        self.mu = nn.Sequential(actor, nn.Tanh())
+        self.mu = nn.Sequential(_Shares(actor, self.action_space), nn.Tanh())
 
 
 class BilinearTD3Policy(_Policy, TD3Policy):

@@ -91,7 +91,6 @@ class Reinforcement(Annealed, JointVelocities):
             self.offsets,
             self.furthest,
             self.largest,
-            gain=self.largest,
             squash=self.squash,
             bilinear=True,
             damping=self.damping,

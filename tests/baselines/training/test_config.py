@@ -51,6 +51,11 @@ def test_json_holds_all_of_it(kind):
             "buffer_size: expected at least one .* of each arm, got 3",
         ),
         (TD3, {"action_noise": -0.1}, InvalidInputError, "action_noise"),
+        (PPO, {"output": "bilinar"}, UnknownNameError, "Did you mean 'bilinear'"),
+        (PPO, {"output": "bilinear", "base_policy": "dls"}, InvalidInputError, "base_policy: expected none"),
+        (PPO, {"damping": 1e-3}, InvalidInputError, "damping: expected none unless the output is bilinear"),
+        (PPO, {"output": "bilinear", "lost_distance": 0.0}, InvalidInputError, "lost_distance"),
+        (PPO, {"log_std_end": 3.0}, InvalidInputError, "log_std_end"),
     ],
 )
 def test_refused(kind, values, error, message):

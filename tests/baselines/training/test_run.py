@@ -156,7 +156,11 @@ def test_files_hold_the_kept_agent(finished):
 
 @pytest.mark.parametrize(
     ("method", "changes"),
-    [("sac", {"use_sde": True}), *((method, {"output": "bilinear"}) for method in ("ppo", "sac", "td3"))],
+    [
+        ("sac", {"use_sde": True}),
+        *((method, {"output": "bilinear"}) for method in ("ppo", "sac", "td3")),
+        ("ppo", {"output": "bilinear", "scenario": "panda-random", "damping": 4e-4, "log_std_end": -3.0}),
+    ],
     ids=str,
 )
 def test_what_is_exported_plays_as_in_validation(method, changes, tmp_path):

@@ -8,6 +8,7 @@ import itertools
 import numpy as np
 import pytest
 
+from baselines.agents.bilinear.processing import held
 from baselines.agents.network import Network
 from baselines.agents.relative.processing import Relative
 from ikgym.exceptions import InvalidInputError, UnknownNameError
@@ -21,17 +22,19 @@ def random_network(processing, problem):
 
 
 @pytest.mark.parametrize(("arm", "task"), [("varga7", "pose"), ("tiago", "axis"), ("varga7", "position")])
-@pytest.mark.parametrize("bilinear", [False, True])
+@pytest.mark.parametrize(("bilinear", "damping"), [(False, None), (True, None), (True, 1e-2)])
 @pytest.mark.parametrize("squash", ["clip", "tanh"])
-def test_one_call_is_the_three_parts(arm, task, bilinear, squash):
+def test_one_call_is_the_three_parts(arm, task, bilinear, damping, squash):
     problem = problem_of(arm, task)
-    processing = Relative(OFFSETS, 5.0, largest=2.0, gain=0.5, squash=squash, bilinear=bilinear)
+    processing = Relative(OFFSETS, 5.0, 2.0, gain=0.5, squash=squash, bilinear=bilinear, damping=damping)
     network, batch = random_network(processing, problem), batch_of(problem)
     features = processing.features(problem, batch)
     parts = processing.action(problem, batch, network.forward(features))
     assert np.array_equal(processing.law(problem, batch, network), parts)
     n, w = problem.model.joints, 3 if task == "position" else 6
     said = network.forward(features).astype(np.float64)
+    if damping is not None:
+        said = held(problem, damping, batch.q, network.forward(features))
     if bilinear:
         rows = said.reshape(-1, n, w + 1)
         due = np.column_stack([features[:, :w], features[:, w] / 0.2])
@@ -44,6 +47,9 @@ def test_one_call_is_the_three_parts(arm, task, bilinear, squash):
 
 def test_files_hold_all_of_it():
     processing = Relative(OFFSETS, 5.0, squash="tanh", bilinear=True)
+    assert "damping" not in processing.to_json()  # as files of before
+    damped = dataclasses.replace(processing, damping=1e-3)
+    assert Relative.from_json(damped.to_json()) == damped != processing
     assert Relative.from_json(processing.to_json()) == processing
     assert Relative.from_json(processing.to_json() | {"gain": 0.5}) != processing
     with pytest.raises(UnknownNameError, match="gains"):
@@ -60,6 +66,8 @@ def test_files_hold_all_of_it():
         ({"gain": -1.0}, "gain"),
         ({"squash": "sigmoid"}, "squash"),
         ({"bilinear": 1}, "true or false"),
+        ({"damping": 0.1}, "damping: expected None unless bilinear"),
+        ({"bilinear": True, "damping": 0.0}, "damping"),
     ],
 )
 def test_wrong_values_are_refused(wrong, said):
