@@ -197,7 +197,7 @@ def _shipped(name: str, kind: type[ShippedAgent]) -> Entry:
     about = files.parse_agent(name, untrusted.read(kind.folder / f"{name}{untrusted.SUFFIX}")).about
     trained, cost = about["training"], about["training"]["training"]
     training = Training(
-        trained["method"], about["processing"]["base_policy"], (cost["steps"],), (cost["core_minutes"],)
+        trained["method"], about["processing"].get("base_policy"), (cost["steps"],), (cost["core_minutes"],)
     )
     return Entry(name, ((name, {}),), (trained["seed"],), training=training)
 
