@@ -180,6 +180,12 @@ class Observe(ActorOnly):
     """That of gated recurrent units; there is no other."""
     n_envs: Annotated[int, tyro.conf.arg(metavar="N")] = 128
     """Episodes of a segment, a multiple of the plants."""
+    segments: Annotated[int, tyro.conf.arg(metavar="N")] = 40
+    """Parts of the training, of some five core-seconds each."""
+    evaluate_every: Annotated[int, tyro.conf.arg(metavar="N")] = 40
+    """Segments from one validation to the next; there is one at the start and one at the end, too."""
+    validation_episodes: Annotated[int, tyro.conf.arg(metavar="N")] = 16
+    """Episodes of each: the first seeds of the split "validation"."""
     plants: Annotated[int, tyro.conf.arg(metavar="N")] = 16
     """Plants that are drawn in a segment; each episode draws an arm and noise from its own."""
     measurements: Annotated[int, tyro.conf.arg(metavar="N")] = 96
@@ -196,12 +202,12 @@ class Observe(ActorOnly):
     """In the last segment; in between it falls by equal factors."""
 
     def __post_init__(self) -> None:
-        super().__post_init__()
         if self.offsets != Recurrent.offsets or self.activation != "tanh" or self.init is not None:
             raise InvalidInputError(
                 "observe: expected no offsets, no activation and no init: its agents have none of the first two, and "
                 f"begin anew; got {self.offsets}, {self.activation!r} and {self.init}."
             )
+        super().__post_init__()
         for name in ("plants", "gradient_steps"):
             self._set(name, whole_number(name, getattr(self, name), at_least=1))
         self._set("measurements", whole_number("measurements", self.measurements, at_least=2))

@@ -20,17 +20,32 @@ from baselines.training.score import Score
 from baselines.training.trainer import SegmentMetrics
 from baselines.training.trainers.actor_only import ActorTrainer
 from baselines.training.validation import played, score_of, validation_seeds
+from ikgym import task_kernels
+from ikgym.exceptions import InvalidInputError
 from ikgym.outcome import observation
 from ikgym.scenarios import Scenario
 from ikgym.simulation import Outcome
 
 
 class ObserveTrainer(ActorTrainer):
-    """See :class:`Observe`."""
+    """See :class:`Observe`.
+
+    Args:
+        config: Of the method.
+        scenario: Whose arm and paths plants are drawn for.
+        seed: Of the run.
+
+    Raises:
+        InvalidInputError: The task shows no whole poses.
+    """
 
     _config: Observe
 
     def __init__(self, config: Observe, scenario: Scenario, seed: int) -> None:
+        if scenario.task.kind != task_kernels.POSE:
+            raise InvalidInputError(
+                f"task: expected pose, whose errors are those of position and rotation, got {scenario.task.name!r}."
+            )
         network = Gated(config.processing.sizes(config.hidden))
         super().__init__(config, scenario, seed, MemoryModel(network), network)
 

@@ -10,6 +10,7 @@ import ikgym
 from baselines.agents.recurrent.files import load_recurrent, save_recurrent
 from baselines.agents.recurrent.network import GatedNetwork, shapes
 from baselines.agents.recurrent.policy import RecurrentPolicy
+from baselines.agents.shipped import FOLDER
 from baselines.episode import Draw
 from baselines.evaluation.rollout import rollout, rollouts, sequence
 from baselines.files import ResultsError
@@ -88,11 +89,8 @@ def test_a_file_does_not_make_another_one_be_read(tmp_path):
 
 
 def test_an_agent_without_memory_is_refused():
-    shipped = (
-        baselines.make("agent_alone", ikgym.scenarios.get("varga7-pose-random")).folder / "agent_alone.safetensors"
-    )
     with pytest.raises(ResultsError, match="has no memory, and is played as agent:FILE"):
-        RecurrentPolicy.for_scenario(SHORT, path=str(shipped))
+        RecurrentPolicy.for_scenario(SHORT, path=str(FOLDER / "agent_alone.safetensors"))
 
 
 def test_networks_are_checked():
