@@ -64,11 +64,12 @@ class RecurrentPolicy(Corrected):
         problem: What the policy is told of the scenario.
         path: The file of the agent; the one that comes with the package if left out.
         other_arm: Whether it may play on an arm that it was not trained for.
+        hash: The first twelve digits of the agent's hash, to insist on; in results those of the agent that played.
         given: An agent that is in no file yet.
 
     Raises:
         ResultsError: There is no such file, or it cannot be used.
-        InvalidInputError: The arm or the task is another than the one it was trained for.
+        InvalidInputError: The arm or the task is another than the one it was trained for, or the hash is another.
     """
 
     policy: str = dataclasses.field(default="rhc", init=False)
@@ -77,6 +78,7 @@ class RecurrentPolicy(Corrected):
     blend: float = dataclasses.field(default=0.01, init=False)
     path: str = ""
     other_arm: bool = False
+    hash: str | None = None
 
     #: What was read, or given in place of a file.
     file: RecurrentFile = dataclasses.field(init=False, repr=False)
@@ -96,8 +98,11 @@ class RecurrentPolicy(Corrected):
             raise InvalidInputError(f"other_arm: expected True or False, got {self.other_arm!r}.")
         file = self.load() if given is None else given
         check_trained_for(file, self)
+        if self.hash is not None and self.hash != file.digits:
+            raise InvalidInputError(f"hash: expected {file.digits}, which {file.source} has, got {self.hash!r}.")
         name, options = parse_policy(file.processing.base_policy)
-        for field, value in {"path": os.fspath(self.path), "file": file, "policy": name, "options": options}.items():
+        known = {"path": os.fspath(self.path), "hash": file.digits}
+        for field, value in {**known, "file": file, "policy": name, "options": options}.items():
             object.__setattr__(self, field, value)
         super().__post_init__()
 

@@ -64,7 +64,9 @@ def test_a_file_gives_the_same_agent_again(tmp_path):
     file, scenario = tmp_path / "agent.safetensors", ikgym.scenarios.get("panda-field")
     digits = save_recurrent(file, drawn(), PROCESSING, scenario, {"seed": 1})
     policy = baselines.make("recurrent", SHORT, path=str(file))
-    assert policy.file.hash == digits
+    assert (policy.file.hash, policy.parameters["hash"]) == (digits, digits[:12])
+    with pytest.raises(InvalidInputError, match=f"hash: expected {digits[:12]}"):
+        baselines.make("recurrent", SHORT, path=str(file), hash="0" * 12)
     assert policy.file.processing == PROCESSING
     np.testing.assert_array_equal(rollout(SHORT, policy, SEEDS[0]).q, rollout(SHORT, made(scenario=SHORT), SEEDS[0]).q)
     with pytest.raises(ResultsError, match="this version"):
