@@ -34,6 +34,11 @@ def fingerprint(scenario: Scenario) -> str:
     return _digest(cost_kernels.COST_VERSION, _canonical(parts))
 
 
+def arm_fingerprint(arm: Arm) -> str:
+    """Twelve digits that differ where two arms move differently; limits, name and home do not count."""
+    return _digest("arm", _canonical(list(arm.chain)))
+
+
 def _of_plant(plant: Plant) -> dict[str, Any]:
     """What is switched on, but for bias and noise, whose digest is the one of when there was nothing else."""
     given = plant.switched_on()

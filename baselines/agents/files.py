@@ -23,7 +23,7 @@ from baselines.agents.relative.processing import Relative
 from baselines.agents.untrusted import parse_json, read, refuse
 from baselines.canonical import canonical
 from baselines.files import write
-from baselines.fingerprints import fingerprint
+from baselines.fingerprints import arm_fingerprint, fingerprint
 from ikgym import cost_kernels
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 from ikgym.scenarios import Scenario
@@ -85,6 +85,7 @@ def description(processing: Described, scenario: Scenario, training: Mapping[str
         "format": FORMAT,
         "processing": processing.to_json(),
         "scenario": {"name": scenario.name, "fingerprint": fingerprint(scenario)},
+        "arm": {"name": scenario.model.name, "fingerprint": arm_fingerprint(scenario.model)},
         "joints": scenario.joints,
         "task": {"name": scenario.task.name, "size": scenario.task.size, "error_size": scenario.task.error_size},
         "training": dict(training or {}),
@@ -228,6 +229,9 @@ def check_types(about: Mapping[str, Any], processing: Described) -> None:
         all(isinstance(text, str) for text in texts) and all(type(value) is int for value in numbers) and base_policy
     ):
         raise InvalidInputError(f"expected names as texts and sizes as whole numbers, got {texts} and {numbers}")
+    arm = about.get("arm", {"name": "", "fingerprint": ""})  # files of before have none
+    if not (isinstance(arm, dict) and all(isinstance(arm.get(key), str) for key in ("name", "fingerprint"))):
+        raise InvalidInputError(f"arm: expected a name and a fingerprint as texts, got {arm!r}")
     if not isinstance(about["training"], dict):
         raise InvalidInputError(f"training: expected an object, got {about['training']!r}")
 

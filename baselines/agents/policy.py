@@ -6,6 +6,7 @@ import abc
 import dataclasses
 import os
 import pathlib
+from collections.abc import Mapping
 from typing import ClassVar
 
 import numpy as np
@@ -15,10 +16,12 @@ from baselines.agents import files, untrusted
 from baselines.agents.protocols import AgentFile
 from baselines.agents.view import AgentView
 from baselines.files import ResultsError
+from baselines.fingerprints import arm_fingerprint
 from baselines.policy import Batch, Memory, Operations, Problem, Solution, statuses
 from baselines.solvers.wrappers import orientation
 from baselines.status import Status
 from baselines.wrapper import Wrapper
+from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 from ikgym.preview import offsets as checked_offsets
 from ikgym.scenarios import Preview
@@ -28,7 +31,7 @@ from ikgym.scenarios import Preview
 class LearnedPolicy(Wrapper, abc.ABC):
     """A network between the features of an observation and an action, perhaps on top of a base policy.
 
-    It plays every scenario whose features have the shape of those that it was trained on, be it another one. The
+    It plays every scenario of its arm whose features have the shape of those that it was trained on. The
     base policy sees what it would see alone, and has its memory in that of the agent: a network output of 0 is the
     base policy, bit for bit. The status is that of the base policy, at best ``applied``.
 
@@ -56,6 +59,8 @@ class LearnedPolicy(Wrapper, abc.ABC):
         file = self.load()
         problem = _problem_for(file, self.problem)
         _check_size(file, problem)
+        if not self._takes_any_arm:
+            _check_arm(file, problem)
         try:
             view = AgentView.of(file.processing, problem)
         except UnknownNameError as e:
@@ -72,6 +77,11 @@ class LearnedPolicy(Wrapper, abc.ABC):
         Raises:
             ResultsError: There is no such file, or it cannot be used.
         """
+
+    @property
+    def _takes_any_arm(self) -> bool:
+        """Whether it may play on an arm that it was not trained for."""
+        return False
 
     @property
     def preview(self) -> Preview:
@@ -130,6 +140,7 @@ class Agent(LearnedPolicy):
         offsets: Steps ahead at which a model sees the nominal coordinates that was trained on the observation itself;
             1, 2, … if left out, as its file does not tell. Files that do tell are not to be contradicted.
         hash: The first twelve digits of the agent's hash, to insist on; in results those of the agent that played.
+        any_arm: Whether it may play on an arm that it was not trained for, which is refused otherwise.
 
     Raises:
         ResultsError: There is no such file, it is damaged, or needs to be trusted.
@@ -140,6 +151,7 @@ class Agent(LearnedPolicy):
     trust: bool = False
     offsets: tuple[int, ...] | None = None
     hash: str | None = None
+    any_arm: bool = False
 
     name: ClassVar[str] = "agent"
     nameless: ClassVar[str] = "path"
@@ -148,8 +160,9 @@ class Agent(LearnedPolicy):
     def __post_init__(self) -> None:
         if not isinstance(self.path, (str, os.PathLike)) or not os.fspath(self.path):
             raise ResultsError(f"agent: expected the path of its file, as in agent:PATH, got {self.path!r}.")
-        if not isinstance(self.trust, bool):
-            raise InvalidInputError(f"trust: expected True or False, got {self.trust!r}.")
+        for option in ("trust", "any_arm"):
+            if not isinstance(getattr(self, option), bool):
+                raise InvalidInputError(f"{option}: expected True or False, got {getattr(self, option)!r}.")
         if self.offsets is not None:
             object.__setattr__(self, "offsets", checked_offsets(self.offsets))
         object.__setattr__(self, "path", os.fspath(self.path))
@@ -158,6 +171,10 @@ class Agent(LearnedPolicy):
         if self.hash is not None and (not isinstance(self.hash, str) or self.hash != digits):
             raise InvalidInputError(f"hash: expected {digits}, which {self.path} has, got {self.hash!r}.")
         object.__setattr__(self, "hash", digits)
+
+    @property
+    def _takes_any_arm(self) -> bool:
+        return self.any_arm
 
     def load(self) -> AgentFile:
         """See :meth:`LearnedPolicy.load`."""
@@ -202,3 +219,26 @@ def _check_size(file: AgentFile, problem: Problem) -> None:
             f"Agent {file.source}: expected a network from {needed[0]} features to {needed[1]} outputs, got "
             f"{shape[0]} and {shape[1]}."
         )
+
+
+def _check_arm(file: AgentFile, problem: Problem) -> None:
+    """Refuses an arm that moves differently from the one that the agent was trained for, where its file says which."""
+    trained, here = _trained_arm(file), arm_fingerprint(problem.model)
+    if trained is not None and trained["fingerprint"] != here:
+        raise InvalidInputError(
+            f"Agent {file.source} was trained for the arm {trained['name']}, which moves differently from "
+            f"{problem.model.name}: expected that arm, or any_arm=True, as in agent:FILE,any_arm=True."
+        )
+
+
+def _trained_arm(file: AgentFile) -> Mapping[str, str] | None:
+    """Name and fingerprint of the arm; of older files that of the scenario of that name, None where there is none."""
+    about = file.about
+    if "arm" in about:
+        arm: Mapping[str, str] = about["arm"]
+        return arm
+    name = about.get("scenario", {}).get("name")
+    if name not in scenarios.names():
+        return None
+    model = scenarios.get(name).model
+    return {"name": model.name, "fingerprint": arm_fingerprint(model)}

@@ -12,16 +12,36 @@ then ln λ against the usual λ, then ln U; both logarithms are cut at ±:data:`
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from baselines.solvers.linear_algebra import damped_gram, ldl, ldl_scaled_inverse
 from ikgym.jit import inlined, kernel
 from ikgym.rl.feature_kernels import seen_jacobian
 from ikgym.rl.twists import is_turned, twist_size
 
+Floats = npt.NDArray[np.float64]
+
 #: Of the logarithms that a network gives.
 LARGEST = 6.0
+
+
+class Inverse(NamedTuple):
+    """The damped inverse of one arm, and what it is made of.
+
+    Attributes:
+        jacobian: J, as :func:`ikgym.rl.feature_kernels.seen_jacobian` gives it. Shape (6, n).
+        metric: The diagonal of U. Shape (n,).
+        inverse: M⁻¹, with M = J U Jᵀ + λ I. Shape (w, w).
+        products: M⁻¹ J. Shape (w, n).
+    """
+
+    jacobian: Floats
+    metric: Floats
+    inverse: Floats
+    products: Floats
 
 
 @kernel
@@ -37,18 +57,15 @@ def held_rows(kind, chain, damping, q, output, out):
         out: Receives (G, h), float64. Shape (B, n (w + 1)).
     """
     n, w = q.shape[1], twist_size(kind)
-    geometric, scaled, inverse = np.empty((6, n)), np.empty((w, n)), np.empty((w, w))
-    joints, metric, products = np.empty(n), np.empty(n), np.empty((w, n))
-    rotation, position = np.empty((3, 3)), np.empty(3)
+    found = Inverse(np.empty((6, n)), np.empty(n), np.empty((w, w)), np.empty((w, n)))
     for row in range(q.shape[0]):
         given, held = output[row], out[row]
-        seen_jacobian(kind, chain, q[row], joints, rotation, position, geometric)
-        lambda_ = damping * logarithm(given[n * (w + 1)])
-        invert(geometric[:w], given[n * (w + 1) + 1 :], lambda_, metric, scaled, inverse, products)
+        invert(kind, chain, damping, q[row], given[n * (w + 1) :], found)
         for j in range(n):
+            own = j * (w + 1)
             for a in range(w):
-                held[j * (w + 1) + a] = given[j * (w + 1) + a] + metric[j] * products[a, j]
-            held[j * (w + 1) + w] = given[j * (w + 1) + w]
+                held[own + a] = given[own + a] + found.metric[j] * found.products[a, j]
+            held[own + w] = given[own + w]
 
 
 @kernel
@@ -66,85 +83,101 @@ def held_gradient_rows(kind, chain, damping, q, output, by_held, by_output, by_q
         by_q: Receives that by the joint coordinates. Shape (B, n).
     """
     n, w = q.shape[1], twist_size(kind)
-    geometric, scaled, inverse = np.empty((6, n)), np.empty((w, n)), np.empty((w, w))
-    joints, metric, products = np.empty(n), np.empty(n), np.empty((w, n))
-    rotation, position = np.empty((3, 3)), np.empty(3)
-    back, both, by_jacobian = np.empty((w, n)), np.empty((w, w)), np.zeros((6, n))
+    rows = n * (w + 1)
+    found = Inverse(np.empty((6, n)), np.empty(n), np.empty((w, w)), np.empty((w, n)))
+    by_jacobian = np.zeros((6, n))
     for row in range(q.shape[0]):
-        given, by, into = output[row], by_held[row], by_output[row]
-        into[: n * (w + 1)] = by
-        seen_jacobian(kind, chain, q[row], joints, rotation, position, geometric)
-        lambda_ = damping * logarithm(given[n * (w + 1)])
-        invert(geometric[:w], given[n * (w + 1) + 1 :], lambda_, metric, scaled, inverse, products)
-        # M⁻¹ Bᵀ, with B the gradient by U Jᵀ M⁻¹.
-        for a in range(w):
-            for j in range(n):
-                total = 0.0
-                for b in range(w):
-                    total += inverse[a, b] * by[j * (w + 1) + b]
-                back[a, j] = total
-        # C + Cᵀ, where −C is the gradient by M: C = M⁻¹ J U B M⁻¹.
-        for a in range(w):
-            for b in range(w):
-                both[a, b] = 0.0
-                for j in range(n):
-                    both[a, b] += metric[j] * (products[a, j] * back[b, j] + products[b, j] * back[a, j])
-        trace = 0.0
-        for a in range(w):
-            trace += 0.5 * both[a, a]
-        into[n * (w + 1)] = -lambda_ * trace if abs(given[n * (w + 1)]) < LARGEST else 0.0
-        for j in range(n):
-            by_metric = 0.0
-            for a in range(w):
-                through = 0.0
-                for b in range(w):
-                    through += both[a, b] * geometric[b, j]
-                by_metric += by[j * (w + 1) + a] * products[a, j] - 0.5 * geometric[a, j] * through
-                by_jacobian[a, j] = metric[j] * (back[a, j] - through)
-            own = n * (w + 1) + 1 + j
-            into[own] = metric[j] * by_metric if abs(given[own]) < LARGEST else 0.0
-        jacobian_gradient(geometric, by_jacobian, by_q[row])
+        given, into = output[row, rows:], by_output[row]
+        into[:rows] = by_held[row]
+        lambda_ = invert(kind, chain, damping, q[row], given, found)
+        through_inverse(found, lambda_, by_held[row], into[rows:], by_jacobian)
+        for i in range(1 + n):
+            if abs(given[i]) >= LARGEST:
+                into[rows + i] = 0.0
+        jacobian_gradient(found.jacobian, by_jacobian, by_q[row])
         if is_turned(kind, chain.prismatic):
             by_q[row, 0] = 0.0
 
 
+@kernel
+def invert(kind, chain, damping, q, given, found):
+    """Fills an :class:`Inverse`; NaN where a network gave NaN.
+
+    Args:
+        kind: Of task coordinates.
+        chain: The arm.
+        damping: The usual λ.
+        q: Shape (n,).
+        given: ln λ against the usual one, and ln U. Shape (1 + n,).
+        found: Is filled.
+
+    Returns:
+        λ.
+    """
+    w, n = found.products.shape
+    scaled, factor = np.empty((w, n)), np.empty((w, w))
+    seen_jacobian(kind, chain, q, np.empty(n), np.empty((3, 3)), np.empty(3), found.jacobian)
+    lambda_ = damping * from_logarithm(given[0])
+    for j in range(n):
+        found.metric[j] = from_logarithm(given[1 + j])
+        root = math.sqrt(found.metric[j])
+        for a in range(w):
+            scaled[a, j] = found.jacobian[a, j] * root
+    damped_gram(scaled, lambda_, factor)
+    if ldl(factor):
+        ldl_scaled_inverse(factor, 1.0, found.inverse)
+    else:
+        found.inverse[:] = np.nan
+    for a in range(w):
+        for j in range(n):
+            total = 0.0
+            for b in range(w):
+                total += found.inverse[a, b] * found.jacobian[b, j]
+            found.products[a, j] = total
+    return lambda_
+
+
 @inlined
-def logarithm(number):
+def from_logarithm(number):
     """What a network says by a logarithm."""
     return math.exp(min(max(number, -LARGEST), LARGEST))
 
 
 @kernel
-def invert(jacobian, logarithms, damping, metric, scaled, inverse, products):
-    """U, J √U, M⁻¹ and M⁻¹ J, with M = J U Jᵀ + λ I; NaN where it cannot be inverted, because a network gave NaN.
+def through_inverse(found, damping, by, by_logarithms, by_jacobian):
+    """From the gradient B by U Jᵀ M⁻¹ to those by λ, U and J.
+
+    With P = M⁻¹ J and C = P U B M⁻¹, that by M is −C; what comes of M = J U Jᵀ + λ I is in C + Cᵀ.
 
     Args:
-        jacobian: J. Shape (w, n).
-        logarithms: ln U. Shape (n,).
+        found: An :class:`Inverse`.
         damping: λ.
-        metric: Receives U. Shape (n,).
-        scaled: Receives J √U. Shape (w, n).
-        inverse: Receives M⁻¹. Shape (w, w).
-        products: Receives M⁻¹ J. Shape (w, n).
+        by: That by (G, h), in whose rows B is. Shape (n (w + 1),).
+        by_logarithms: Receives those by ln λ and ln U. Shape (1 + n,).
+        by_jacobian: Receives that by J, in its first rows. Shape (6, n).
     """
-    w, n = jacobian.shape
+    jacobian, metric, inverse, products = found
+    w, n = products.shape
+    back, both, trace = np.zeros((w, n)), np.zeros((w, w)), 0.0
     for j in range(n):
-        metric[j] = logarithm(logarithms[j])
-        root = math.sqrt(metric[j])
         for a in range(w):
-            scaled[a, j] = jacobian[a, j] * root
-    factor = np.empty((w, w))
-    damped_gram(scaled, damping, factor)
-    if ldl(factor):
-        ldl_scaled_inverse(factor, 1.0, inverse)
-    else:
-        inverse[:] = np.nan
-    for a in range(w):
-        for j in range(n):
-            total = 0.0
             for b in range(w):
-                total += inverse[a, b] * jacobian[b, j]
-            products[a, j] = total
+                back[a, j] += inverse[a, b] * by[j * (w + 1) + b]  # M⁻¹ Bᵀ
+        for a in range(w):
+            for b in range(w):
+                both[a, b] += metric[j] * (products[a, j] * back[b, j] + products[b, j] * back[a, j])
+    for a in range(w):
+        trace += 0.5 * both[a, a]
+    by_logarithms[0] = -damping * trace
+    for j in range(n):
+        by_metric = 0.0
+        for a in range(w):
+            through = 0.0
+            for b in range(w):
+                through += both[a, b] * jacobian[b, j]
+            by_metric += by[j * (w + 1) + a] * products[a, j] - 0.5 * jacobian[a, j] * through
+            by_jacobian[a, j] = metric[j] * (back[a, j] - through)
+        by_logarithms[1 + j] = metric[j] * by_metric
 
 
 @kernel

@@ -66,8 +66,18 @@ def sentences(section: Section) -> list[str]:
     far = [line for line in ranked if line.kind == FAR]
     if not learned:
         return ["- No agent has been entered: the lines are those of solvers.", *_solvers(near, far, means)]
-    best = learned[0]
+    beside = {line.label: _beside_base(line, ranked, cost_ratios) for line in learned}
     out = [*_solvers(near, far, means)]
+    out += [
+        f"- {_name(line, means)} corrects `{line.training.base_policy}` and costs {beside[line.label]} times as much "
+        "as that solver alone: it is in the table, and not compared with others here."
+        for line in learned
+        if line.training and _fails(beside[line.label])
+    ]
+    learned = [line for line in learned if not _fails(beside[line.label])]
+    if not learned:
+        return [*out, "- No agent is better than the solver that it corrects, and none stands alone."]
+    best = learned[0]
     out += [f"- The best agent is {_name(best, means)}{_few(best)}; it loses track in {best.lost} of {best.runs} runs."]
     if best.training and best.training.base_policy:
         out.append(
@@ -86,6 +96,18 @@ def sentences(section: Section) -> list[str]:
         f"- Its cost is {r} times that of {_name(line, means)}, which looks {line.preview:,} steps ahead."
         for r, line in zip(ratios, far, strict=True)
     ]
+
+
+def _beside_base(line: Line, ranked: list[Line], cost_ratios: dict[str, FloatArray]) -> Comparison | None:
+    """A residual agent beside its base policy alone; None for others, and where that was not played."""
+    base = line.training.base_policy if line.training else None
+    alone = next((other for other in ranked if other.name == base and not other.settings), None)
+    return None if alone is None else Comparison.of(cost_ratios[line.label], cost_ratios[alone.label])
+
+
+def _fails(beside: Comparison | None) -> bool:
+    """Whether the costs of a residual agent are not below those of its base policy with their whole interval."""
+    return beside is not None and beside.high >= 1.0
 
 
 def _beside_near(best: Line, near: list[Line], cost_ratios: dict[str, FloatArray], means: dict[str, Mean]) -> str:

@@ -197,7 +197,7 @@ def _shipped(name: str, kind: type[ShippedAgent]) -> Entry:
     about = files.parse_agent(name, untrusted.read(kind.folder / f"{name}{untrusted.SUFFIX}")).about
     trained, cost = about["training"], about["training"]["training"]
     training = Training(
-        trained["method"], about["processing"]["base_policy"], (cost["steps"],), (cost["core_minutes"],)
+        trained["method"], about["processing"].get("base_policy"), (cost["steps"],), (cost["core_minutes"],)
     )
     return Entry(name, ((name, {}),), (trained["seed"],), training=training)
 
@@ -266,9 +266,9 @@ def _run(file: pathlib.Path) -> tuple[str, str | None, int, float]:
     """Method, base policy, steps and core-minutes of a training."""
     try:
         content = json_files.read(file)
-        training, base_policy = content["training"], content["processing"]["base_policy"]
+        training, base_policy = content["training"], content["processing"].get("base_policy")
         if not (base_policy is None or isinstance(base_policy, str)):
             raise TypeError(f"base_policy: expected the spec of a policy or null, got {base_policy!r}")
         return str(content["method"]), base_policy, int(training["steps"]), float(training["core_minutes"])
-    except (OSError, ValueError, TypeError, KeyError) as e:
+    except (OSError, ValueError, TypeError, KeyError, AttributeError) as e:
         raise ResultsError(f"Cannot read what a training has cost from {file}: {e!r}.") from None

@@ -17,7 +17,7 @@ from stable_baselines3.common.vec_env import DummyVecEnv
 import baselines
 import ikgym
 from baselines import registry
-from baselines.agents import shipped
+from baselines.agents import files, shipped
 from baselines.agents.base_policy import make_base_policy
 from baselines.agents.features import Processing
 from baselines.agents.files import load_agent, save_agent
@@ -47,6 +47,10 @@ contract = pytest.mark.parametrize(("base_policy", "null_space"), KINDS)
 @pytest.fixture
 def file(tmp_path):
     return write_agent(tmp_path / "mine.safetensors", FAST, "dls:damping=1e-2")
+
+
+def without(about, key):
+    return {name: value for name, value in about.items() if name != key}
 
 
 def agent_for(tmp_path, scenario, base_policy=None, **options):
@@ -153,7 +157,8 @@ class TestContract:
 
     def test_frozen_and_says_its_parameters(self, file):
         policy = baselines.make("agent", FAST, path=file)
-        assert policy.parameters == {"path": file, "trust": False, "offsets": None, "hash": policy.file.digits}
+        others = {"trust": False, "offsets": None, "hash": policy.file.digits, "any_arm": False}
+        assert policy.parameters == {"path": file, **others}
         assert set(policy.parameters) == set(policy.parameter_names())
         with pytest.raises(dataclasses.FrozenInstanceError):
             policy.path = "x"
@@ -302,6 +307,24 @@ class TestScenarios:
                 InvalidInputError, match=rf"Agent .* was trained for 7 joints and 6 .*; here there are {words}"
             ):
                 baselines.make("agent", name, path=file)
+
+    def test_another_arm_only_if_told_so(self, tmp_path, monkeypatch):
+        """One with as many joints, too; a file that does not say its arm says its scenario."""
+        here, describe = ikgym.scenarios.get("panda-random").replace(steps=STEPS), files.description
+        whole = ikgym.scenarios.get("varga7-pose-random")
+        said = r"was trained for the arm varga7, which moves differently from panda: expected that arm, or any_arm=True"
+        file = write_agent(tmp_path / "new.safetensors", whole, None)
+        monkeypatch.setattr(files, "description", lambda *given: without(describe(*given), "arm"))
+        for of_varga7 in (file, write_agent(tmp_path / "old.safetensors", whole, None)):
+            with pytest.raises(InvalidInputError, match=said):
+                baselines.make("agent", here, path=of_varga7)
+            assert rollout(here, baselines.make("agent", here, path=of_varga7, any_arm=True), 0)
+        unknown = write_agent(tmp_path / "unknown.safetensors", whole.replace(name="mine"), None)
+        assert rollout(here, baselines.make("agent", here, path=unknown), 0)
+
+    def test_shipped_agents_play_on_their_arm(self):
+        with pytest.raises(InvalidInputError, match="was trained for the arm varga7"):
+            baselines.make("agent_residual", "panda-random")
 
     def test_a_network_of_another_size(self, tmp_path):
         save_agent(tmp_path / "a.safetensors", network((5, 7)), Processing(offsets=OFFSETS), FAST)

@@ -70,7 +70,7 @@ def write_runs(folder, seeds, *, first=0, method="ppo", base_policy=None):
         run = {
             "method": method,
             "training": {"steps": 100 + seed, "core_minutes": 0.5},
-            "processing": {"base_policy": base_policy},
+            "processing": {} if base_policy is None else {"base_policy": base_policy},
         }
         (folder / f"seed-{seed}").mkdir(parents=True)
         (folder / f"seed-{seed}" / "run.json").write_text(json.dumps(run))

@@ -48,6 +48,17 @@ class TestClaims:
         assert "1 of 2 are as low or lower, namely `dls`, tuned (2.000, 2.000 to 2.000)" in text
         assert "1.500 (1.500 to 1.500)" in text
 
+    def test_a_residual_agent_that_is_no_better_than_its_base_policy_makes_no_headline(self):
+        """It has to be below it with its whole interval."""
+        solvers = line("dls", ((4.0, 4.0),)), line("mfac", ((9.0, 4.0),))
+        residual = learned("residual", ((4.4, 2.0),) * 5, base_policy="dls")
+        text = "\n".join(sentences(a_section(*solvers, residual, learned("PPO", ((5.0, 5.0),) * 5))))
+        assert "- residual (2.966, 2.000 to 4.400) corrects `dls` and costs 0.7416 (0.5000 to 1.100) times" in text
+        assert "The best agent is PPO" in text
+        assert "The best without a solver under it" not in text
+        text = "\n".join(sentences(a_section(*solvers, residual)))
+        assert "No agent is better than the solver that it corrects, and none stands alone." in text
+
     def test_no_agent(self):
         text = "\n".join(sentences(a_section(line("dls"), line("mfac", ((1.0, 1.0),)))))
         assert "No agent has been entered" in text

@@ -38,7 +38,8 @@ def test_plays_writes_and_writes_anew(tmp_path, capsys, monkeypatch):
     printed = capsys.readouterr().out
     assert all(str(file) in printed for file in files)
     texts = [file.read_text(encoding="utf-8") for file in files]
-    assert "The best agent is PPO from scratch" in texts[0]
+    assert "- PPO from scratch (" in texts[0]
+    assert ") corrects `dls` and costs " in texts[0]
     assert "| residual agent |" in texts[0]
     assert "relative to `rhc_foresight`." in texts[0]
     assert "- command: `python -m baselines.leaderboard --agents" in texts[1]

@@ -1,0 +1,49 @@
+"""Agents beside solvers: the table is that of what was played."""
+
+from __future__ import annotations
+
+import json
+import pathlib
+
+import numpy as np
+import pytest
+
+import baselines
+from baselines.evaluation.rollout import rollouts
+from benchmarks import paired
+from ikgym import scenarios
+from ikgym.exceptions import UnknownNameError
+from tests.baselines.evaluation.pages.builders import write_runs
+from tests.baselines.random_agents import write_agent
+
+DOCS = pathlib.Path(__file__).parents[2] / "docs"
+
+
+def test_plays_and_prints(tmp_path, capsys, monkeypatch):
+    scenario = scenarios.get("varga7-pose-random").replace(steps=30)
+    monkeypatch.setattr(paired.scenarios, "get", lambda name: {"varga7-pose-random": scenario}[name])
+    write_runs(tmp_path / "runs", 2)
+    for seed in (0, 1):
+        write_agent(tmp_path / "runs" / f"seed-{seed}" / "agent.safetensors", scenario, "dls", seed=seed)
+    file = tmp_path / "paired.json"
+    paired.main(["--agents", str(tmp_path / "runs"), "--out", str(file), "--episodes", "3"])
+    printed = capsys.readouterr().out.splitlines()
+    content = json.loads(file.read_text())
+    assert printed == paired.lines(content)
+    assert np.shape(content["played"]["agents"]["costs"]) == (2, 3)
+    costs = [
+        float(np.sum(e.tracking_cost + e.velocity_cost))
+        for e in rollouts(scenario, baselines.make("dls", scenario), scenarios.seeds("test", 3))
+    ]
+    np.testing.assert_allclose(content["played"]["dls"]["costs"][0], costs, rtol=1e-5)
+    ratio = np.exp(np.mean(np.log(content["played"]["agents"]["costs"]) - np.log(costs)))
+    assert float(printed[2].split("|")[2].split()[0]) == pytest.approx(ratio, rel=1e-3)
+    paired.main(["--out", str(file)])
+    assert capsys.readouterr().out.splitlines() == printed
+
+
+def test_unknown_names_are_told(tmp_path):
+    write_runs(tmp_path, 1)
+    (tmp_path / "seed-0" / "agent.safetensors").write_bytes(b"")
+    with pytest.raises(UnknownNameError, match="Did you mean 'dls'"):
+        paired.main(["--agents", str(tmp_path), "--out", str(tmp_path / "x.json"), "--beside", "dlss"])
