@@ -47,11 +47,6 @@ def _of_plant(plant: Plant) -> dict[str, Any]:
     return {"disturbance": disturbance, **({"plant": others} if others else {})}
 
 
-def arm_digest(arm: Arm) -> str:
-    """Twelve digits that differ where two arms differ in more than home and the names of their joints."""
-    return _digest(_canonical(arm))
-
-
 def same(one: object, other: object) -> bool:
     """Whether two frozen objects, such as problems, have the same content, numbers in arrays up to rounding."""
     return canonical(_canonical(one)) == canonical(_canonical(other))

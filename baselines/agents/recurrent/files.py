@@ -18,7 +18,6 @@ from baselines.agents.recurrent.network import GatedNetwork, shapes
 from baselines.agents.recurrent.processing import Recurrent
 from baselines.agents.untrusted import read, refuse
 from baselines.files import write
-from baselines.fingerprints import arm_digest
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 from ikgym.scenarios import Scenario
 
@@ -90,9 +89,6 @@ def load_recurrent(file: pathlib.Path) -> RecurrentFile:
         processing = Recurrent.from_json(_of_kind(about["processing"]))
         check_types(about, processing)
         check_base_policy(processing.base_policy)
-        arm = about["arm"]
-        if not isinstance(arm["name"], str) or not isinstance(arm["digest"], str):
-            raise InvalidInputError(f"arm: expected texts, got {arm!r}")
         sizes = tuple(int(size) for size in about["network"]["sizes"])
         network = GatedNetwork(sizes, load(content))
         if sizes != Recurrent.sizes(sizes[1:-1]):
@@ -119,7 +115,6 @@ def _about(
     """What the file of an agent says of it."""
     return {
         **description(processing, scenario, training),
-        "arm": {"name": scenario.model.name, "digest": arm_digest(scenario.model)},
         "network": {"sizes": list(network.sizes)},
     }
 

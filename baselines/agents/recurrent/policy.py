@@ -12,11 +12,11 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.agents.network import Singles
+from baselines.agents.policy import check_arm
 from baselines.agents.recurrent.files import RecurrentFile, load_recurrent
 from baselines.agents.recurrent.kernels import remember_rows
 from baselines.agents.shipped import FOLDER
 from baselines.files import ResultsError
-from baselines.fingerprints import arm_digest
 from baselines.policy import Batch
 from baselines.solvers.adaptive.corrected import Corrected
 from baselines.solvers.adaptive.measurements import Measurement
@@ -63,7 +63,7 @@ class RecurrentPolicy(Corrected):
     Args:
         problem: What the policy is told of the scenario.
         path: The file of the agent; the one that comes with the package if left out.
-        other_arm: Whether it may play on an arm that it was not trained for.
+        any_arm: Whether it may play on an arm that it was not trained for.
         hash: The first twelve digits of the agent's hash, to insist on; in results those of the agent that played.
         given: An agent that is in no file yet.
 
@@ -77,7 +77,7 @@ class RecurrentPolicy(Corrected):
     history: int = dataclasses.field(default=64, init=False)
     blend: float = dataclasses.field(default=0.01, init=False)
     path: str = ""
-    other_arm: bool = False
+    any_arm: bool = False
     hash: str | None = None
 
     #: What was read, or given in place of a file.
@@ -87,17 +87,19 @@ class RecurrentPolicy(Corrected):
     name: ClassVar[str] = "recurrent"
     from_file: ClassVar[bool] = True
     nameless: ClassVar[str] = "path"
-    decisive: ClassVar[tuple[str, ...]] = ("path", "other_arm")
+    decisive: ClassVar[tuple[str, ...]] = ("path", "any_arm")
     #: As :class:`Calibrated`.
     evaluated: ClassVar[int] = 5
 
     def __post_init__(self, given: RecurrentFile | None) -> None:
         if not isinstance(self.path, (str, os.PathLike)):
             raise ResultsError(f"recurrent: expected the path of a file, as in recurrent:PATH, got {self.path!r}.")
-        if not isinstance(self.other_arm, bool):
-            raise InvalidInputError(f"other_arm: expected True or False, got {self.other_arm!r}.")
+        if not isinstance(self.any_arm, bool):
+            raise InvalidInputError(f"any_arm: expected True or False, got {self.any_arm!r}.")
         file = self.load() if given is None else given
-        check_trained_for(file, self)
+        _check_task(file, self.problem.task.name)
+        if not self.any_arm:
+            check_arm(file.source, file.about, self.problem)
         if self.hash is not None and self.hash != file.digits:
             raise InvalidInputError(f"hash: expected {file.digits}, which {file.source} has, got {self.hash!r}.")
         name, options = parse_policy(file.processing.base_policy)
@@ -146,19 +148,8 @@ class RecurrentPolicy(Corrected):
         return kept
 
 
-def check_trained_for(file: RecurrentFile, policy: RecurrentPolicy) -> None:
-    """Refuses another task than the agent was trained for, and another arm unless it was asked for.
-
-    Raises:
-        InvalidInputError: It is another one.
-    """
-    model, task = policy.problem.model, policy.problem.task
+def _check_task(file: RecurrentFile, task: str) -> None:
+    """Refuses another task than the agent was trained for."""
     trained = file.about["task"]["name"]
-    if task.name != trained:
-        raise InvalidInputError(f"Agent {file.source} was trained for the task {trained!r}; here it is {task.name!r}.")
-    arm = file.about["arm"]
-    if arm["digest"] != arm_digest(model) and not policy.other_arm:
-        raise InvalidInputError(
-            f"Agent {file.source} was trained for the arm {arm['name']!r}; here it is {model.name!r}, or has other "
-            "measures. With other_arm=True it plays all the same."
-        )
+    if task != trained:
+        raise InvalidInputError(f"Agent {file.source} was trained for the task {trained!r}; here it is {task!r}.")

@@ -47,17 +47,17 @@ def test_what_it_remembers_ends_with_the_episode():
     np.testing.assert_array_equal(second.q, alone.q)
 
 
-def test_another_arm_is_refused_unless_it_was_asked_for():
-    with pytest.raises(InvalidInputError, match=r"trained for the arm 'panda'; here it is 'varga7'.*other_arm=True"):
+def test_anany_arm_is_refused_unless_it_was_asked_for():
+    with pytest.raises(InvalidInputError, match=r"trained for the arm panda, which moves differently.*any_arm=True"):
         made(scenario=ikgym.scenarios.get("varga7-pose-random"))
     other = SHORT.replace(model=SHORT.model.replace(tool=SHORT.model.tool + 1e-3))
-    with pytest.raises(InvalidInputError, match="other measures"):
+    with pytest.raises(InvalidInputError, match="moves differently"):
         made(scenario=other)
-    assert made(scenario=other, other_arm=True).other_arm
+    assert made(scenario=other, any_arm=True).any_arm
     with pytest.raises(InvalidInputError, match="trained for the task 'pose'; here it is 'skew'"):
-        made(scenario=SHORT.replace(task=ikgym.tasks.get("skew")), other_arm=True)
-    with pytest.raises(InvalidInputError, match="other_arm: expected True or False"):
-        made(scenario=SHORT, other_arm="yes")
+        made(scenario=SHORT.replace(task=ikgym.tasks.get("skew")), any_arm=True)
+    with pytest.raises(InvalidInputError, match="any_arm: expected True or False"):
+        made(scenario=SHORT, any_arm="yes")
 
 
 def test_a_file_gives_the_same_agent_again(tmp_path):
