@@ -14,6 +14,7 @@ from baselines.agents.shipped import FOLDER
 from baselines.episode import Draw
 from baselines.evaluation.rollout import rollout, rollouts, sequence
 from baselines.files import ResultsError
+from baselines.training.config.actor_only import Observe
 from ikgym.exceptions import InvalidInputError
 from tests.baselines.agents.recurrent.recurrent_agents import PROCESSING, SIZES, constant, drawn, made
 
@@ -93,6 +94,14 @@ def test_a_file_does_not_make_another_one_be_read(tmp_path):
 def test_an_agent_without_memory_is_refused():
     with pytest.raises(ResultsError, match="has no memory, and is played as agent:FILE"):
         RecurrentPolicy.for_scenario(SHORT, path=str(FOLDER / "agent_alone.safetensors"))
+
+
+def test_the_one_that_comes_along_was_trained_as_the_page_says():
+    policy = baselines.make("recurrent", SHORT)
+    training = policy.file.about["training"]
+    assert (training["method"], training["training"]["segments"]) == ("observe", Observe().segments)
+    assert policy.file.processing == Observe().processing
+    assert rollout(SHORT, policy, SEEDS[0]).position_error.max() < 2e-3
 
 
 def test_networks_are_checked():
