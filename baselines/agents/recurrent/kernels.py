@@ -100,14 +100,13 @@ def linearise(arm, q, pose, error, sensitivity):
 
 
 @kernel
-def remember_rows(chain, network, gap, exact, observed, first, known, deviation, old):
+def remember_rows(chain, network, rule, observed, first, known, deviation, old):
     """Takes the measurements in, and tells the deviations, row by row.
 
     Args:
         chain: The model of the arm.
         network: Of :attr:`GatedNetwork.constants`.
-        gap: Steps from one pose that is taken in to the next, at least.
-        exact: Variance of the start.
+        rule: Steps from one pose that is taken in to the next, at least, and the variance of the start.
         observed: Present joint coordinates of shape (B, n), measured poses (B, m), the joint coordinates where they
             were measured (B, n), and whether they are new (B,).
         first: Whether an episode begins, of shape (B,), and the poses that it begins with, (B, m).
@@ -116,6 +115,7 @@ def remember_rows(chain, network, gap, exact, observed, first, known, deviation,
         old: Receives what they would be without the measurements. Shape (B, 6).
     """
     q, pose, then, new = observed
+    gap, exact = rule
     starts, begun = first
     n, p = q.shape[1], known.parameters.shape[1]
     parts = np.empty((n, 3)), np.empty((n, 3)), np.empty(3)

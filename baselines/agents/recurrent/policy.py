@@ -137,8 +137,7 @@ class RecurrentPolicy(Corrected):
         remember_rows(
             self.problem.model.chain,
             self.file.network.constants,
-            processing.gap,
-            processing.start**2,
+            (processing.gap, processing.start**2),
             (batch.q, batch.pose, measured.q, measured.new),
             (measured.first, np.ascontiguousarray(batch.nominal[:, 0])),
             kept,

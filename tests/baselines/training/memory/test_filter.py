@@ -91,7 +91,7 @@ def _played(policy, scenario, seed):
 
 
 def test_gradients_are_those_of_differences():
-    one, shown = network().double(), measured()
+    one, shown = network().double(), measure(FIELD.replace(plant=PLANT), SEEDS, 6)
     value = loss(one, PROCESSING, shown, 1e-3, 0.1)
     value.backward()
     for parameter in one.parameters():
