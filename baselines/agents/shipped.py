@@ -42,9 +42,9 @@ class ShippedAgent(LearnedPolicy):
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class AgentAlone(ShippedAgent):
-    """Learned agent that stands alone, trained on `varga7-random` by ppo."""
+    """Learned agent that stands alone, trained on `varga7-random` by apg."""
 
-    hash: str = "3066b5c5b727"
+    hash: str = "7c2ee6f8bfed"
 
     name: ClassVar[str] = "agent_alone"
 

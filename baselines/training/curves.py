@@ -8,6 +8,7 @@ import sys
 from collections.abc import Sequence
 from typing import Annotated
 
+import numpy as np
 import tyro
 from matplotlib.figure import Figure
 
@@ -15,6 +16,9 @@ from baselines.evaluation.plots import style
 from baselines.files import write
 from baselines.training.folder import read_run
 from ikgym.exceptions import IkgymError, InvalidInputError
+
+#: Ratios that span less than this have ticks with plain numbers.
+FEW = 10.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -50,6 +54,9 @@ def curves(trainings: dict[str, pathlib.Path]) -> Figure:
             (line,) = axes.plot(minutes, cost_ratios, lw=1.0, marker="o", ms=2.5, **style.looks(number))
         handles.append(line)
     axes.set_yscale("log")
+    if np.divide(*axes.get_ylim()[::-1]) < FEW:  # powers of ten would all be the same
+        for axis in (axes.yaxis.set_major_formatter, axes.yaxis.set_minor_formatter):
+            axis("{x:.3g}")
     style.dress(axes, ylabel="validation cost ratio", xlabel="core-minutes of training")
     style.legend(drawn, "Training: a line a seed", handles, list(trainings))
     return drawn

@@ -47,3 +47,11 @@ def test_unknown_names_are_told(tmp_path):
     (tmp_path / "seed-0" / "agent.safetensors").write_bytes(b"")
     with pytest.raises(UnknownNameError, match="Did you mean 'dls'"):
         paired.main(["--agents", str(tmp_path), "--out", str(tmp_path / "x.json"), "--beside", "dlss"])
+
+
+def test_the_page_has_the_table_of_what_was_played():
+    page = (DOCS / "agents.md").read_text(encoding="utf-8")
+    table = page.split("<!-- beside -->\n")[1].split("\n<!-- end -->")[0]
+    content = json.loads((DOCS / "agents.json").read_text())
+    assert table.splitlines() == paired.lines(content)
+    assert (content["episodes"], content["split"], len(content["played"]["agents"]["costs"])) == (256, "test", 5)

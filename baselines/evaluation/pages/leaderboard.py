@@ -60,8 +60,9 @@ below is worked out from what was measured, which lies in [{file}]({file}).
 ABOUT = {
     sets.MAIN: """\
 The arm tracks the whole pose. [leaderboard_skew.md](leaderboard_skew.md) has the same motions in the papers' own skew
-coordinates, in which a wrong orientation can be cheaper than the right one. The agents are those that come with the
-package, which were trained on whole poses; of each one training seed was kept.
+coordinates, in which a wrong orientation can be cheaper than the right one. The agents were trained on whole poses.
+Of those that come with the package, `agent_…`, one training seed was kept; others stand with all of theirs, trained as
+[agents.md](agents.md) says.
 """,
     sets.SKEW: """\
 **The papers' own coordinates, as they were measured for the test sets of version 0.2.0**, and not since: an arm counted

@@ -448,7 +448,7 @@ class TestShipped:
             assert pickle.loads(pickle.dumps(kind)) is kind
             assert kind.name == name
             about = baselines.make(name, "varga7-random").file.about
-            base_policy = about["processing"]["base_policy"]
+            base_policy = about["processing"].get("base_policy")
             role = "that stands alone" if base_policy is None else f"of `{base_policy}`"
             assert f"{role}, trained on `{about['scenario']['name']}` by {about['training']['method']}." in kind.__doc__
 

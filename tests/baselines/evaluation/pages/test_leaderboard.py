@@ -150,8 +150,10 @@ class TestTree:
         suited = plan(sets.MAIN, entered, 1)
         assert found == {e.label: json.loads(json.dumps(e.settings)) for e in entered if e.label in suited}
 
-    def test_agents_are_those_of_the_package(self, written):
-        assert {one.name for one in written.sections[0].lines if one.learned} == {one.name for one in shipped()}
+    def test_agents_are_those_of_the_package_and_whole_trainings(self, written):
+        learned = {one.name: one for one in written.sections[0].lines if one.learned}
+        assert learned.keys() >= {one.name for one in shipped()}
+        assert all(learned[name].benchmark for name in learned.keys() - {one.name for one in shipped()})
 
     def test_it_names_no_folder_of_a_machine(self, written):
         assert not re.search(r"(^|[\s=])/", written.command)
