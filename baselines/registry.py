@@ -72,6 +72,7 @@ _places: dict[str, str] = {
 #: Those that are nothing by their name alone, or but for some scenarios, and so are no part of "all policies".
 _incomplete: dict[str, str] = {
     "agent": "baselines.agents.policy:Agent",
+    "recurrent": "baselines.agents.recurrent.policy:RecurrentPolicy",
     "published": f"{_SOLVERS}.references.published:Published",
     "told": f"{_SOLVERS}.references.told:Told",
 }

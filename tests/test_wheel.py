@@ -36,6 +36,7 @@ def test_it_holds_every_module_and_all_data(content):
         "best_known.json",
         "tuned/varga7-random.json",
         "agents/agent_alone.safetensors",
+        "agents/agent_memory.safetensors",
         "agents/agent_residual.safetensors",
     ):
         assert f"baselines/data/{file}" in content

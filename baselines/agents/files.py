@@ -18,7 +18,7 @@ from baselines.agents.base_policy import check_base_policy
 from baselines.agents.bilinear.processing import Bilinear
 from baselines.agents.features import Processing
 from baselines.agents.network import Network, Singles
-from baselines.agents.protocols import AgentFile, StoredTransform
+from baselines.agents.protocols import AgentFile, Described, StoredTransform
 from baselines.agents.relative.processing import Relative
 from baselines.agents.untrusted import parse_json, read, refuse
 from baselines.canonical import canonical
@@ -75,7 +75,7 @@ def save_agent(
     return found
 
 
-def description(processing: StoredTransform, scenario: Scenario, training: Mapping[str, Any] | None) -> dict[str, Any]:
+def description(processing: Described, scenario: Scenario, training: Mapping[str, Any] | None) -> dict[str, Any]:
     """What files say of an agent besides its network, as JSON has it.
 
     Raises:
@@ -170,7 +170,7 @@ def check_described(source: str, about: Mapping[str, Any]) -> Processing | Bilin
         values = dict(about["processing"])
         kinds: dict[Any, type[Bilinear | Relative]] = {Bilinear.kind: Bilinear, Relative.kind: Relative}
         processing = kinds.get(values.get("kind"), Processing).from_json(values)
-        _check_types(about, processing)
+        check_types(about, processing)
     except _UNREADABLE as e:
         refuse(source, f"is no agent that this version can read: {_said(e)}")
     try:
@@ -216,8 +216,12 @@ def _network(about: Mapping[str, Any], tensors: Mapping[str, Any]) -> Network:
     )
 
 
-def _check_types(about: Mapping[str, Any], processing: StoredTransform) -> None:
-    """Insists on the types of what others rely on."""
+def check_types(about: Mapping[str, Any], processing: Described) -> None:
+    """Insists on the types of what others rely on.
+
+    Raises:
+        InvalidInputError: One is another.
+    """
     texts = about["scenario"]["name"], about["scenario"]["fingerprint"], about["task"]["name"], about["ikgym"]
     numbers = about["joints"], about["task"]["size"], about["task"]["error_size"], about["cost_version"]
     base_policy = processing.base_policy is None or isinstance(processing.base_policy, str)

@@ -7,7 +7,7 @@ import dataclasses
 import os
 import pathlib
 from collections.abc import Mapping
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -60,7 +60,7 @@ class LearnedPolicy(Wrapper, abc.ABC):
         problem = _problem_for(file, self.problem)
         _check_size(file, problem)
         if not self._takes_any_arm:
-            _check_arm(file, problem)
+            check_arm(file.source, file.about, problem)
         try:
             view = AgentView.of(file.processing, problem)
         except UnknownNameError as e:
@@ -221,19 +221,27 @@ def _check_size(file: AgentFile, problem: Problem) -> None:
         )
 
 
-def _check_arm(file: AgentFile, problem: Problem) -> None:
-    """Refuses an arm that moves differently from the one that the agent was trained for, where its file says which."""
-    trained, here = _trained_arm(file), arm_fingerprint(problem.model)
+def check_arm(source: str, about: Mapping[str, Any], problem: Problem) -> None:
+    """Refuses an arm that moves differently from the one that the agent was trained for, where its file says which.
+
+    Args:
+        source: The file, as messages name it.
+        about: What it says of the agent.
+        problem: What the agent is told of the scenario.
+
+    Raises:
+        InvalidInputError: The arm is another one.
+    """
+    trained, here = _trained_arm(about), arm_fingerprint(problem.model)
     if trained is not None and trained["fingerprint"] != here:
         raise InvalidInputError(
-            f"Agent {file.source} was trained for the arm {trained['name']}, which moves differently from "
-            f"{problem.model.name}: expected that arm, or any_arm=True, as in agent:FILE,any_arm=True."
+            f"Agent {source} was trained for the arm {trained['name']}, which moves differently from "
+            f"{problem.model.name}: expected that arm, or any_arm=True, as in agent:path=FILE,any_arm=True."
         )
 
 
-def _trained_arm(file: AgentFile) -> Mapping[str, str] | None:
+def _trained_arm(about: Mapping[str, Any]) -> Mapping[str, str] | None:
     """Name and fingerprint of the arm; of older files that of the scenario of that name, None where there is none."""
-    about = file.about
     if "arm" in about:
         arm: Mapping[str, str] = about["arm"]
         return arm

@@ -48,11 +48,19 @@ class Transform(Protocol):
         """What network outputs mean, as fractions of the velocity limit. Shape (B, n)."""
 
 
-class StoredTransform(Transform, Protocol):
-    """A transform that files can describe."""
+class Described(Protocol):
+    """What files say of how an agent comes from observations to actions."""
+
+    @property
+    def base_policy(self) -> str | None:
+        """See :attr:`Transform.base_policy`."""
 
     def to_json(self) -> dict[str, Any]:
         """The fields, as JSON has them."""
+
+
+class StoredTransform(Transform, Described, Protocol):
+    """A transform that files can describe."""
 
 
 class Actor(Protocol):

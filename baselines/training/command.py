@@ -119,9 +119,10 @@ Files in the folder of a run, each replaced in one go, so that it may be stopped
   history.json       a row a segment
   tensorboard/       the same, for: tensorboard --logdir DIR
   checkpoint.pt      where it stands, for --resume
-  model.safetensors  at the end, the kept model with its critics, for --init; not of apg
-  model.zip          at the end, the same model, for Stable-Baselines3; not of apg
-  agent.safetensors  at the end, its actor, for --init and for: {evaluate} --policies agent:FILE
+  model.safetensors  at the end, the kept model with its critics, for --init; not of apg and observe
+  model.zip          at the end, the same model, for Stable-Baselines3; not of apg and observe
+  agent.safetensors  at the end, its actor, for --init and for: {evaluate} --policies agent:FILE;
+                     of observe for: {evaluate} --policies recurrent:FILE
 
 Agents are trained on the seeds of the split "train" and validated on those of "validation"; those of "test" are not
 used. Where there is a reference, the cost ratio is the geometric mean of the costs over those of rhc_foresight."""

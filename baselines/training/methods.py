@@ -6,7 +6,7 @@ import importlib
 from collections.abc import Callable
 from typing import NamedTuple
 
-from baselines.training.config.actor_only import APG, Imitate
+from baselines.training.config.actor_only import APG, Imitate, Observe
 from baselines.training.config.base import Config
 from baselines.training.config.reinforcement import PPO, SAC, TD3
 from baselines.training.trainer import Trainer
@@ -41,6 +41,7 @@ METHODS: dict[str, Method] = {
     "td3": Method(TD3, ("baselines.training.trainers.off_policy", "TD3Trainer")),
     "imitate": Method(Imitate, ("baselines.training.trainers.imitate", "ImitateTrainer")),
     "apg": Method(APG, ("baselines.training.trainers.apg", "APGTrainer")),
+    "observe": Method(Observe, ("baselines.training.trainers.observe", "ObserveTrainer")),
 }
 
 

@@ -10,6 +10,7 @@ import torch
 from torch import nn
 
 from baselines.training.config.base import Activation
+from baselines.training.memory.filter import Gated
 
 ACTIVATIONS: dict[Activation, type[nn.Module]] = {
     "silu": nn.SiLU,
@@ -52,3 +53,16 @@ class ActorModel:
             layers[-1].bias.zero_()
         hidden = [module for layer in layers[:-1] for module in (layer, ACTIVATIONS[activation]())]
         return cls(nn.Sequential(*hidden, layers[-1]))
+
+
+@dataclasses.dataclass(eq=False)
+class MemoryModel:
+    """An actor with memory, which tunes a filter.
+
+    Args:
+        policy: Its network.
+        num_timesteps: Steps of the environment that it was trained in.
+    """
+
+    policy: Gated
+    num_timesteps: int = 0

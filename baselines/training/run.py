@@ -39,12 +39,12 @@ from baselines.training.checkpoint import Checkpoint
 from baselines.training.config.base import Config
 from baselines.training.errors import TrainingError
 from baselines.training.folder import FORMAT, Folder
+from baselines.training.networks import MemoryModel
 from baselines.training.randomness import deterministic_torch, reseed
 from baselines.training.score import Score
 from baselines.training.trainer import SegmentMetrics, Trainer
 from baselines.training.trainers.export import export
-from baselines.training.trainers.models import Model, network_outputs, weights_hash
-from baselines.training.validation import validate
+from baselines.training.trainers.models import Model, weights_hash
 from ikgym.scenarios import Scenario
 
 #: No weight of a network that has learned anything is this large.
@@ -177,12 +177,7 @@ class _Run:
         score = None
         if done % config.evaluate_every == 0 or done == trainer.segments:
             model = trainer.model
-            score = validate(
-                lambda features: network_outputs(model, features),
-                trainer.processing,
-                self._scenario,
-                config.validation_episodes,
-            )
+            score = trainer.score(config.validation_episodes)
             row["validation"] = score.to_json()
             if self._at.best is None or score.cost < self._at.best["score"]["cost"]:
                 weights = {name: tensor.clone() for name, tensor in model.policy.state_dict().items()}
@@ -290,6 +285,6 @@ def versions() -> dict[str, str]:
     }
 
 
-def _finite(model: Model) -> bool:
+def _finite(model: Model | MemoryModel) -> bool:
     """Whether all weights are numbers that can still be added up."""
     return all(bool((parameter.detach().abs() < LARGEST).all()) for parameter in model.policy.parameters())

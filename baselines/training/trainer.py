@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Protocol
 
+from baselines.agents.recurrent.processing import Recurrent
 from baselines.training.config.base import Stored
 
 if TYPE_CHECKING:  # the command line is read without it
     from stable_baselines3.common.base_class import BaseAlgorithm
 
-    from baselines.training.networks import ActorModel
+    from baselines.training.networks import ActorModel, MemoryModel
+    from baselines.training.score import Score
 
 #: What a trainer says of a segment, by name.
 SegmentMetrics = dict[str, float]
@@ -31,8 +33,8 @@ class Trainer(Protocol):
         steps: Steps of the environment so far, those of all arms together.
     """
 
-    model: BaseAlgorithm | ActorModel
-    processing: Stored
+    model: BaseAlgorithm | ActorModel | MemoryModel
+    processing: Stored | Recurrent
     segments: int
 
     @property
@@ -45,6 +47,9 @@ class Trainer(Protocol):
         Args:
             number: Counted from 0.
         """
+
+    def score(self, episodes: int) -> Score:
+        """How good the model is on the first so many episodes of the validation split."""
 
     def state(self) -> dict[str, Any]:
         """All that the segments to come depend on: tensors, numbers, texts, and lists and dicts of them."""

@@ -21,7 +21,7 @@ import tyro
 from baselines import registry
 from baselines.agents.features import Features
 from baselines.agents.protocols import Transform
-from baselines.episode import added_up
+from baselines.episode import Act, added_up
 from baselines.episode import play as play_episodes
 from baselines.evaluation.metrics import lost
 from baselines.evaluation.rollout import rollouts
@@ -34,7 +34,7 @@ from baselines.training.environment.view import View
 from baselines.training.score import Score
 from ikgym import scenarios, tasks
 from ikgym.outcome import observation
-from ikgym.scenarios import Scenario
+from ikgym.scenarios import Preview, Scenario
 from ikgym.simulation import Outcome
 from ikgym.validation import FloatArray
 
@@ -72,7 +72,21 @@ def validate(actor: Actor, processing: Transform, scenario: Scenario, episodes: 
         episodes: How many; a deterministic scenario has one.
     """
     seeds = validation_seeds(scenario, episodes)
-    costs, errors, angles = play(actor, processing, scenario, seeds)
+    return score_of(scenario, seeds, *play(actor, processing, scenario, seeds))
+
+
+def score_of(
+    scenario: Scenario, seeds: Sequence[int], costs: FloatArray, errors: FloatArray, angles: FloatArray
+) -> Score:
+    """The score of episodes that were played.
+
+    Args:
+        scenario: What was tracked.
+        seeds: The reset seeds.
+        costs: Of the episodes. Shape (N,).
+        errors: The largest position errors in [m]. Shape (N,).
+        angles: The largest orientation errors in [rad], 0 where the scenario has no orientation. Shape (N,).
+    """
     reference = reference_costs(fingerprint(scenario), seeds)
     ratios = costs if reference is None else costs / reference
     return Score(
@@ -86,9 +100,7 @@ def validate(actor: Actor, processing: Transform, scenario: Scenario, episodes: 
     )
 
 
-def play(
-    actor: Actor, processing: Transform, scenario: Scenario, seeds: Sequence[int]
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+def play(actor: Actor, processing: Transform, scenario: Scenario, seeds: Sequence[int]) -> tuple[FloatArray, ...]:
     """Plays episodes in step, as :func:`baselines.evaluation.rollout.rollouts` does.
 
     Args:
@@ -109,8 +121,21 @@ def play(
         starting[:] = False
         return view.act(actor(features))
 
+    return played(scenario, seeds, act, view.preview)
+
+
+def played(scenario: Scenario, seeds: Sequence[int], act: Act, preview: Preview) -> tuple[FloatArray, ...]:
+    """What :func:`play` returns, of anybody's actions.
+
+    Args:
+        scenario: What is to be tracked.
+        seeds: The reset seeds.
+        act: Called before each step with what all arms show.
+        preview: Steps ahead that they show.
+    """
+    rows = len(seeds)
     costs, errors, angles = np.empty((rows, scenario.steps)), np.zeros(rows), np.zeros(rows)
-    for k, out in enumerate(play_episodes(scenario, seeds, act, preview=view.preview)):
+    for k, out in enumerate(play_episodes(scenario, seeds, act, preview=preview)):
         costs[:, k] = out.tracking_cost + out.velocity_cost
         errors = np.maximum(errors, out.position_error)
         if scenario.task.has_orientation:

@@ -11,6 +11,7 @@ import tyro
 
 from baselines.agents.bilinear.processing import Bilinear
 from baselines.agents.features import Processing
+from baselines.agents.recurrent.processing import Recurrent
 from baselines.agents.relative.processing import Relative
 from baselines.training.config.limits import (
     MOST_ARMS,
@@ -102,7 +103,7 @@ class Config(Frozen):
         count("offsets", self.offsets[-1], at_most=MOST_STEPS_AHEAD)
 
     @property
-    def processing(self) -> Stored:
+    def processing(self) -> Stored | Recurrent:
         """What the agent sees, and what the outputs of its network mean."""
         raise NotImplementedError
 

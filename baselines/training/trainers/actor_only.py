@@ -10,7 +10,9 @@ import torch
 from torch import Tensor, nn
 
 from baselines.training.config.actor_only import ActorOnly
+from baselines.training.score import Score
 from baselines.training.trainer import SegmentMetrics
+from baselines.training.trainers.models import score_of_model
 from ikgym.scenarios import Scenario
 
 
@@ -35,6 +37,11 @@ class ActorTrainer(abc.ABC):
     def steps(self) -> int:
         """Steps of the environment so far, those of all arms together."""
         return int(self.model.num_timesteps)
+
+    def score(self, episodes: int) -> Score:
+        """See :meth:`baselines.training.trainer.Trainer.score`."""
+        processing: Any = self.processing
+        return score_of_model(self.model, processing, self._scenario, episodes)
 
     @abc.abstractmethod
     def segment(self, number: int) -> SegmentMetrics:

@@ -8,9 +8,12 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 
 from baselines.agents.features import Processing
 from baselines.agents.files import save_agent
+from baselines.agents.recurrent.files import save_recurrent
+from baselines.agents.recurrent.processing import Recurrent
 from baselines.agents.sb3_zip import save_zip
 from baselines.training.config.base import Activation
 from baselines.training.folder import Folder
+from baselines.training.networks import MemoryModel
 from baselines.training.trainer import Trainer
 from baselines.training.trainers.model_file import actor_network, save_model
 from ikgym.scenarios import Scenario
@@ -31,6 +34,11 @@ def export(trainer: Trainer, activation: Activation, folder: Folder, scenario: S
     """
     model, processing = trainer.model, trainer.processing
     training = {name: about[name] for name in ("method", "seed", "training", "kept", "versions")}
+    if isinstance(model, MemoryModel):
+        assert isinstance(processing, Recurrent)
+        save_recurrent(folder.agent, model.policy.to_runtime(), processing, scenario, training)
+        return
+    assert not isinstance(processing, Recurrent)
     if isinstance(model, BaseAlgorithm) and isinstance(processing, Processing):
         save_zip(model, folder.zip, processing, scenario)
         save_model(model, folder.model, activation, processing, scenario)

@@ -16,15 +16,19 @@ from stable_baselines3.common.vec_env import VecEnv
 from torch import Tensor, nn
 
 from baselines.agents.features import Features
+from baselines.agents.protocols import Transform
 from baselines.training.config.base import Activation, Algorithm
 from baselines.training.config.reinforcement import Output
-from baselines.training.networks import ACTIVATIONS, QUIET, ActorModel
+from baselines.training.networks import ACTIVATIONS, QUIET, ActorModel, MemoryModel
 from baselines.training.policies import (
     BilinearActor,
     BilinearPPOPolicy,
     BilinearSACPolicy,
     BilinearTD3Policy,
 )
+from baselines.training.score import Score
+from baselines.training.validation import validate
+from ikgym.scenarios import Scenario
 
 ALGORITHMS: dict[Algorithm, type[BaseAlgorithm]] = {"ppo": PPO, "sac": SAC, "td3": TD3}
 BILINEAR: dict[Algorithm, type[BasePolicy]] = {
@@ -171,7 +175,12 @@ def network_outputs(model: Model, features: Features) -> Features:
     return out
 
 
-def weights_hash(model: Model) -> str:
+def score_of_model(model: Model, processing: Transform, scenario: Scenario, episodes: int) -> Score:
+    """How good a model is on the first so many episodes of the validation split."""
+    return validate(lambda features: network_outputs(model, features), processing, scenario, episodes)
+
+
+def weights_hash(model: Model | MemoryModel) -> str:
     """SHA-256 of all weights of a model's policy, critics included."""
     digest = hashlib.sha256()
     for name, tensor in sorted(model.policy.state_dict().items()):

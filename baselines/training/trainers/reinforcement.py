@@ -19,8 +19,10 @@ from baselines.training.config.reinforcement import Reinforcement
 from baselines.training.environment.learning_env import SpreadVecEnv
 from baselines.training.environment.vec_env import ProcessedVecEnv
 from baselines.training.randomness import episode_seed
+from baselines.training.score import Score
 from baselines.training.trainer import SegmentMetrics
 from baselines.training.trainers.initial_weights import begin_from
+from baselines.training.trainers.models import score_of_model
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
 
@@ -56,6 +58,10 @@ class ReinforcementTrainer(abc.ABC):
         if config.init is not None:
             begin_from(self.model, config)
             self._begun()
+
+    def score(self, episodes: int) -> Score:
+        """See :meth:`baselines.training.trainer.Trainer.score`."""
+        return score_of_model(self.model, self.processing, self._scenario, episodes)
 
     @property
     def steps(self) -> int:

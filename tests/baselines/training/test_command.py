@@ -160,9 +160,9 @@ def test_no_method(capsys):
     """The help, and one line that says what is missing."""
     assert main([]) == 2
     printed = capsys.readouterr()
-    assert "Methods: ppo, sac, td3, imitate, apg." in printed.out
+    assert "Methods: ppo, sac, td3, imitate, apg, observe." in printed.out
     assert printed.err.splitlines() == [
-        "error: expected a method, one of ppo, sac, td3, imitate, apg, or repeat; got none."
+        "error: expected a method, one of ppo, sac, td3, imitate, apg, observe, or repeat; got none."
     ]
 
 

@@ -7,6 +7,7 @@ import json
 import pytest
 
 from baselines.training import presets
+from baselines.training.config.actor_only import Observe
 from baselines.training.config.base import Config, JointVelocities, differences
 from baselines.training.config.reinforcement import PPO, SAC, TD3
 from baselines.training.methods import METHODS, get
@@ -18,7 +19,8 @@ KINDS = [method.config for method in METHODS.values()]
 @pytest.mark.parametrize("kind", KINDS, ids=METHODS)
 def test_json_holds_all_of_it(kind):
     over = {"base_policy": "dls"} if issubclass(kind, JointVelocities) else {}
-    config = kind(hidden=(3, 4), offsets=(1, 5), **over)
+    shown = {} if kind is Observe else {"offsets": (1, 5)}
+    config = kind(hidden=(3, 4), **shown, **over)
     values = json.loads(json.dumps(config.to_json()))
     assert kind.from_json(values) == config
     assert differences(values, config.to_json()) == []

@@ -1,0 +1,1 @@
+"""Agents with memory: a gated recurrent network that says how far a Kalman filter trusts each measurement."""

@@ -1,0 +1,111 @@
+"""A gated recurrent network in float32, one kernel a step (Cho et al. 2014, in the form of PyTorch's GRUCell)."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import math
+from collections.abc import Mapping
+from typing import Self
+
+import numpy as np
+
+from baselines.agents.network import Singles, multiply_add
+from ikgym.exceptions import InvalidInputError
+from ikgym.jit import inlined, kernel
+from ikgym.validation import Frozen
+
+#: The parts of a layer: from its inputs and from its own state to reset gate, update gate and candidate.
+PARTS = ("weight_ih", "weight_hh", "bias_ih", "bias_hh")
+_ONE = np.float32(1.0)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class GatedNetwork(Frozen):
+    """Layers of gated recurrent units, and a linear layer behind them.
+
+    Args:
+        sizes: Inputs, units of each layer, outputs.
+        tensors: By name, as PyTorch has them: ``layers.K.weight_ih`` and the others of :data:`PARTS`, then
+            ``head.weight`` and ``head.bias``; float32.
+
+    Raises:
+        InvalidInputError: A tensor is missing, too many, of another shape or type, or not finite.
+    """
+
+    sizes: tuple[int, ...]
+    tensors: Mapping[str, Singles]
+
+    #: All tensors in one row, matrices transposed, and the sizes, as the kernel takes them.
+    constants: tuple[object, ...] = dataclasses.field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        expected = shapes(self.sizes)
+        got = {name: tensor.shape for name, tensor in self.tensors.items()}
+        if got != expected or any(tensor.dtype != np.float32 for tensor in self.tensors.values()):
+            raise InvalidInputError(f"expected float32 tensors of the shapes {expected}, got {got}")
+        if not all(np.isfinite(tensor).all() for tensor in self.tensors.values()):
+            raise InvalidInputError("expected finite weights, got NaN or infinity")
+        packed = np.concatenate([self.tensors[name].T.ravel() for name in expected])
+        packed.flags.writeable = False
+        object.__setattr__(self, "constants", (packed, np.array(self.sizes)))
+
+    @property
+    def units(self) -> int:
+        """Numbers that are remembered."""
+        return sum(self.sizes[1:-1])
+
+    @classmethod
+    def quiet(cls, sizes: tuple[int, ...]) -> Self:
+        """One whose outputs are all 0."""
+        return cls(sizes, {name: np.zeros(shape, np.float32) for name, shape in shapes(sizes).items()})
+
+
+def shapes(sizes: tuple[int, ...]) -> dict[str, tuple[int, ...]]:
+    """The tensors of a network by name, in their order.
+
+    Raises:
+        InvalidInputError: There is no layer, or one without units.
+    """
+    if len(sizes) < 3 or min(sizes) < 1:
+        raise InvalidInputError(f"sizes: expected inputs, units of at least one layer, and outputs, got {sizes}")
+    out: dict[str, tuple[int, ...]] = {}
+    for number, (inputs, units) in enumerate(itertools.pairwise(sizes[:-1])):
+        of_layer = ((3 * units, inputs), (3 * units, units), (3 * units,), (3 * units,))
+        out |= {f"layers.{number}.{part}": shape for part, shape in zip(PARTS, of_layer, strict=True)}
+    return {**out, "head.weight": (sizes[-1], sizes[-2]), "head.bias": (sizes[-1],)}
+
+
+@inlined
+def _sigmoid(x):
+    return _ONE / (_ONE + np.float32(math.exp(-x)))
+
+
+@kernel
+def step_network(packed, sizes, x, hidden, out):
+    """One step: h ← (1 - z) n + z h with the gates r, z = σ(W x + U h + b) and n = tanh(W x + b + r (U h + b)).
+
+    Args:
+        packed: Of :attr:`GatedNetwork.constants`.
+        sizes: Likewise.
+        x: Inputs. Shape (f,).
+        hidden: The states of all layers, one after the other, changed in place. Shape (units,).
+        out: Receives the outputs. Shape (o,).
+    """
+    at, first = 0, 0
+    for layer in range(sizes.shape[0] - 2):
+        inputs, units = sizes[layer], sizes[layer + 1]
+        rows, state = 3 * units, hidden[first : first + units]
+        biases = at + rows * (inputs + units)
+        fresh, kept = packed[biases : biases + rows].copy(), packed[biases + rows : biases + 2 * rows].copy()
+        multiply_add(packed[at : at + rows * inputs], x[:inputs], fresh)
+        multiply_add(packed[at + rows * inputs : biases], state, kept)
+        for j in range(units):
+            reset = _sigmoid(fresh[j] + kept[j])
+            update = _sigmoid(fresh[units + j] + kept[units + j])
+            candidate = np.float32(math.tanh(fresh[2 * units + j] + reset * kept[2 * units + j]))
+            state[j] = (_ONE - update) * candidate + update * state[j]
+        x, at, first = state, biases + 2 * rows, first + units
+    last = sizes[-2] * sizes[-1]
+    out[:] = packed[at + last : at + last + sizes[-1]]
+    multiply_add(packed[at : at + last], x, out)

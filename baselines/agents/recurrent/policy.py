@@ -1,0 +1,154 @@
+"""Agents with memory as policies."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import pathlib
+from collections.abc import Mapping
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from baselines.agents.network import Singles
+from baselines.agents.policy import check_arm
+from baselines.agents.recurrent.files import RecurrentFile, load_recurrent
+from baselines.agents.recurrent.kernels import remember_rows
+from baselines.agents.shipped import FOLDER
+from baselines.files import ResultsError
+from baselines.policy import Batch
+from baselines.solvers.adaptive.corrected import Corrected
+from baselines.solvers.adaptive.measurements import Measurement
+from baselines.spec import parse_policy
+from ikgym.exceptions import InvalidInputError
+from ikgym.validation import FloatArray
+
+#: The agent that comes with the package.
+SHIPPED = "agent_memory"
+
+
+class RecurrentMemory(NamedTuple):
+    """What is known of the arm and of its sensors.
+
+    Attributes:
+        before: See :class:`Measurement`. Shape (B, h, n).
+        age: See :class:`Measurement`. Shape (B, 1).
+        rest: What is not blended in yet of how estimates have changed. Shape (B, 6).
+        parameters: See :mod:`baselines.solvers.adaptive.chain_parameters`. Shape (B, p).
+        covariance: Of their errors. Shape (B, p, p).
+        hidden: What the network remembers. Shape (B, units).
+        since: Steps since the last pose that was taken in. Shape (B,).
+    """
+
+    before: FloatArray
+    age: FloatArray
+    rest: FloatArray
+    parameters: FloatArray
+    covariance: FloatArray
+    hidden: Singles
+    since: npt.NDArray[np.int64]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class RecurrentPolicy(Corrected):
+    """Corrects a base policy by what a recurrent network and a Kalman filter remember of the arm and its sensors.
+
+    The filter is that of :class:`baselines.solvers.adaptive.calibrated.Calibrated`, without its settings: at each
+    measurement a gated recurrent network sees how far it is from what was expected, and says how noisy position and
+    orientation are taken to be, and by how much joint zeros may have changed since (after KalmanNet, Revach et al.
+    2022, whose network gives the gain). It was trained over plants that were drawn, and recognises from measurements
+    alone on which one it is.
+
+    Args:
+        problem: What the policy is told of the scenario.
+        path: The file of the agent; the one that comes with the package if left out.
+        any_arm: Whether it may play on an arm that it was not trained for.
+        hash: The first twelve digits of the agent's hash, to insist on; in results those of the agent that played.
+        given: An agent that is in no file yet.
+
+    Raises:
+        ResultsError: There is no such file, or it cannot be used.
+        InvalidInputError: The arm or the task is another than the one it was trained for, or the hash is another.
+    """
+
+    policy: str = dataclasses.field(default="rhc", init=False)
+    options: Mapping[str, Any] = dataclasses.field(default_factory=dict, init=False)
+    history: int = dataclasses.field(default=64, init=False)
+    blend: float = dataclasses.field(default=0.01, init=False)
+    path: str = ""
+    any_arm: bool = False
+    hash: str | None = None
+
+    #: What was read, or given in place of a file.
+    file: RecurrentFile = dataclasses.field(init=False, repr=False)
+    given: dataclasses.InitVar[RecurrentFile | None] = dataclasses.field(default=None, kw_only=True)
+
+    name: ClassVar[str] = "recurrent"
+    from_file: ClassVar[bool] = True
+    nameless: ClassVar[str] = "path"
+    decisive: ClassVar[tuple[str, ...]] = ("path", "any_arm")
+    #: As :class:`Calibrated`.
+    evaluated: ClassVar[int] = 5
+
+    def __post_init__(self, given: RecurrentFile | None) -> None:
+        if not isinstance(self.path, (str, os.PathLike)):
+            raise ResultsError(f"recurrent: expected the path of a file, as in recurrent:PATH, got {self.path!r}.")
+        if not isinstance(self.any_arm, bool):
+            raise InvalidInputError(f"any_arm: expected True or False, got {self.any_arm!r}.")
+        file = self.load() if given is None else given
+        _check_task(file, self.problem.task.name)
+        if not self.any_arm:
+            check_arm(file.source, file.about, self.problem)
+        if self.hash is not None and self.hash != file.digits:
+            raise InvalidInputError(f"hash: expected {file.digits}, which {file.source} has, got {self.hash!r}.")
+        name, options = parse_policy(file.processing.base_policy)
+        known = {"path": os.fspath(self.path), "hash": file.digits}
+        for field, value in {**known, "file": file, "policy": name, "options": options}.items():
+            object.__setattr__(self, field, value)
+        super().__post_init__()
+
+    def load(self) -> RecurrentFile:
+        """Reads the file.
+
+        Raises:
+            ResultsError: There is no such file, or it cannot be used.
+        """
+        try:
+            file = pathlib.Path(self.path).expanduser() if self.path else FOLDER / f"{SHIPPED}.safetensors"
+        except RuntimeError:
+            raise ResultsError(f"Agent {self.path}: expected a path, got one with an unknown user's home.") from None
+        return load_recurrent(file)
+
+    def own_memory(self, rows: int) -> RecurrentMemory:
+        """See :meth:`Wrapper.own_memory`."""
+        prior = self.file.processing.prior(self.problem.model.joints)
+        covariance = np.repeat(np.diag(prior**2)[None], rows, axis=0)
+        hidden = np.zeros((rows, self.file.network.units), np.float32)
+        since = np.zeros(rows, np.int64)
+        return RecurrentMemory(*self.sensors(rows), np.zeros((rows, len(prior))), covariance, hidden, since)
+
+    def learn(
+        self, batch: Batch, measured: Measurement, own: RecurrentMemory, out: FloatArray, old: FloatArray
+    ) -> RecurrentMemory:
+        """See :meth:`Corrected.learn`."""
+        kept = own._replace(**{name: getattr(own, name).copy() for name in own._fields[3:]})
+        processing = self.file.processing
+        remember_rows(
+            self.problem.model.chain,
+            self.file.network.constants,
+            (processing.gap, processing.start**2),
+            (batch.q, batch.pose, measured.q, measured.new),
+            (measured.first, np.ascontiguousarray(batch.nominal[:, 0])),
+            kept,
+            out,
+            old,
+        )
+        return kept
+
+
+def _check_task(file: RecurrentFile, task: str) -> None:
+    """Refuses another task than the agent was trained for."""
+    trained = file.about["task"]["name"]
+    if task != trained:
+        raise InvalidInputError(f"Agent {file.source} was trained for the task {trained!r}; here it is {task!r}.")

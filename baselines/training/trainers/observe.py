@@ -1,0 +1,90 @@
+"""Agents with memory: gradients from a filter's estimates, through an episode, to the network that tunes it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import torch
+
+from baselines.agents.recurrent.files import in_memory
+from baselines.agents.recurrent.policy import RecurrentPolicy
+from baselines.policy import Memory, Problem
+from baselines.training.config.actor_only import Observe
+from baselines.training.memory.episodes import Measurements, draw_plant, joined, measure, taken
+from baselines.training.memory.filter import Gated, loss
+from baselines.training.networks import MemoryModel
+from baselines.training.randomness import episode_seed, sequence
+from baselines.training.score import Score
+from baselines.training.trainer import SegmentMetrics
+from baselines.training.trainers.actor_only import ActorTrainer
+from baselines.training.validation import played, score_of, validation_seeds
+from ikgym import task_kernels
+from ikgym.exceptions import InvalidInputError
+from ikgym.outcome import observation
+from ikgym.scenarios import Scenario
+from ikgym.simulation import Outcome
+
+
+class ObserveTrainer(ActorTrainer):
+    """See :class:`Observe`.
+
+    Args:
+        config: Of the method.
+        scenario: Whose arm and paths plants are drawn for.
+        seed: Of the run.
+
+    Raises:
+        InvalidInputError: The task shows no whole poses.
+    """
+
+    _config: Observe
+
+    def __init__(self, config: Observe, scenario: Scenario, seed: int) -> None:
+        if scenario.task.kind != task_kernels.POSE:
+            raise InvalidInputError(
+                f"task: expected pose, whose errors are those of position and rotation, got {scenario.task.name!r}."
+            )
+        network = Gated(config.processing.sizes(config.hidden))
+        super().__init__(config, scenario, seed, MemoryModel(network), network)
+
+    def segment(self, number: int) -> SegmentMetrics:
+        """See :meth:`baselines.training.trainer.Trainer.segment`."""
+        config, processing = self._config, self._config.processing
+        self._set_learning_rate(number)
+        measured, losses = self._measure(number), []
+        for _ in range(config.gradient_steps):
+            some = taken(measured, torch.randperm(config.n_envs)[: config.batch_size])
+            value = loss(self.model.policy, processing, some, self._scenario.cost.delta_x, config.step_cost)
+            self._descend(value)
+            losses.append(value.item())
+        return {"train/loss": float(np.mean(losses))}
+
+    def score(self, episodes: int) -> Score:
+        """Of the agent on the scenario's own plant."""
+        scenario = self._scenario
+        file = in_memory(self.model.policy.to_runtime(), self._config.processing, scenario)
+        policy = RecurrentPolicy(Problem.of(scenario), given=file)
+        seeds = validation_seeds(scenario, episodes)
+        state: Memory | None = None
+
+        def act(out: Outcome) -> npt.NDArray[Any]:
+            nonlocal state
+            action, state = policy.predict(observation(out), state)
+            return action
+
+        return score_of(scenario, seeds, *played(scenario, seeds, act, policy.preview))
+
+    def _measure(self, number: int) -> Measurements:
+        """Draws plants and episodes, and measures them."""
+        config, scenario = self._config, self._scenario
+        generator = np.random.default_rng(sequence(self._seed, number))
+        first, each = episode_seed(self._seed, number, config.n_envs), config.n_envs // config.plants
+        parts = []
+        for k in range(config.plants):
+            plant = draw_plant(generator, config.processing, config.measurements, scenario.steps)
+            seeds = range(first + k * each, first + (k + 1) * each)
+            parts.append(measure(scenario.replace(plant=plant), seeds, config.measurements))
+            self.model.num_timesteps += each * min(config.measurements * plant.pose_every, scenario.steps)
+        return joined(parts, max(part.error.shape[1] for part in parts))

@@ -1,0 +1,39 @@
+"""Agents with memory whose weights are drawn or chosen."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import ikgym
+from baselines.agents.recurrent.files import in_memory
+from baselines.agents.recurrent.kernels import MOST
+from baselines.agents.recurrent.network import GatedNetwork, shapes
+from baselines.agents.recurrent.policy import RecurrentPolicy
+from baselines.agents.recurrent.processing import Recurrent
+from baselines.policy import Problem
+
+#: A base policy whose step takes no time.
+PROCESSING = Recurrent("dls:damping=1e-2", gap=1)
+SIZES = Recurrent.sizes((4, 3))
+
+
+def drawn(seed=0, sizes=SIZES):
+    """A network with any weights."""
+    rng = np.random.default_rng(seed)
+    return GatedNetwork(
+        sizes, {k: rng.normal(0.0, 0.5, shape).astype(np.float32) for k, shape in shapes(sizes).items()}
+    )
+
+
+def constant(outputs):
+    """A network that always says the same: multiples of the standard deviations that an output of 0 means."""
+    network = GatedNetwork.quiet(SIZES)
+    bias = MOST * np.arctanh(np.log(outputs) / MOST)
+    return GatedNetwork(SIZES, {**network.tensors, "head.bias": bias.astype(np.float32)})
+
+
+def made(network=None, scenario="panda-camera-slow", processing=PROCESSING, **options):
+    """A policy with such a network."""
+    on = ikgym.scenarios.get(scenario) if isinstance(scenario, str) else scenario
+    file = in_memory(drawn() if network is None else network, processing, ikgym.scenarios.get("panda-field"))
+    return RecurrentPolicy(Problem.of(on), given=file, **options)

@@ -1,0 +1,114 @@
+"""Agents with memory: their network, their filter, and the arms that they refuse."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import baselines
+import ikgym
+from baselines.agents.recurrent.files import load_recurrent, save_recurrent
+from baselines.agents.recurrent.network import GatedNetwork, shapes
+from baselines.agents.recurrent.policy import RecurrentPolicy
+from baselines.agents.shipped import FOLDER
+from baselines.episode import Draw
+from baselines.evaluation.rollout import rollout, rollouts, sequence
+from baselines.files import ResultsError
+from baselines.training.config.actor_only import Observe
+from ikgym.exceptions import InvalidInputError
+from tests.baselines.agents.recurrent.recurrent_agents import PROCESSING, SIZES, constant, drawn, made
+
+SHORT = ikgym.scenarios.get("panda-camera-slow").replace(steps=120)
+SEEDS = ikgym.scenarios.seeds("validation", 3)
+
+
+def test_rows_of_a_batch_are_single_episodes_bit_for_bit():
+    policy = made(scenario=SHORT)
+    together = rollouts(SHORT, policy, SEEDS)
+    for seed, episode in zip(SEEDS, together, strict=True):
+        np.testing.assert_array_equal(rollout(SHORT, policy, seed).q, episode.q)
+
+
+def test_with_outputs_that_never_change_it_is_the_calibration_with_those_settings():
+    """In units of what an output of 0 means: twice the noise of the position, half that of the orientation."""
+    scale = np.array([2.0, 0.5, 0.05, 0.05])
+    options = {"policy": "dls", "options": {"damping": 1e-2}, "start": PROCESSING.start, "jump": 0.0}
+    noise = {"pose_noise": 6e-4, "pose_rotation_noise": 2.5e-4}
+    other = baselines.make("calibrated", SHORT, **options, **noise)
+    ours, theirs = (rollout(SHORT, policy, SEEDS[0]) for policy in (made(constant(scale), SHORT), other))
+    np.testing.assert_allclose(ours.pose, theirs.pose, atol=1e-8)
+    plain = rollout(SHORT, baselines.make("dls", SHORT, damping=1e-2), SEEDS[0])
+    assert np.abs(ours.pose - plain.pose).max() > 1e-4  # it does correct
+
+
+def test_what_it_remembers_ends_with_the_episode():
+    policy = made(scenario=SHORT)
+    alone = rollout(SHORT, policy, SEEDS[1])
+    _, (second,) = sequence(SHORT, policy, [[Draw(SEEDS[0])], [Draw(SEEDS[1])]], alone=True)
+    np.testing.assert_array_equal(second.q, alone.q)
+
+
+def test_anany_arm_is_refused_unless_it_was_asked_for():
+    with pytest.raises(InvalidInputError, match=r"trained for the arm panda, which moves differently.*any_arm=True"):
+        made(scenario=ikgym.scenarios.get("varga7-pose-random"))
+    other = SHORT.replace(model=SHORT.model.replace(tool=SHORT.model.tool + 1e-3))
+    with pytest.raises(InvalidInputError, match="moves differently"):
+        made(scenario=other)
+    assert made(scenario=other, any_arm=True).any_arm
+    with pytest.raises(InvalidInputError, match="trained for the task 'pose'; here it is 'skew'"):
+        made(scenario=SHORT.replace(task=ikgym.tasks.get("skew")), any_arm=True)
+    with pytest.raises(InvalidInputError, match="any_arm: expected True or False"):
+        made(scenario=SHORT, any_arm="yes")
+
+
+def test_a_file_gives_the_same_agent_again(tmp_path):
+    file, scenario = tmp_path / "agent.safetensors", ikgym.scenarios.get("panda-field")
+    digits = save_recurrent(file, drawn(), PROCESSING, scenario, {"seed": 1})
+    policy = baselines.make("recurrent", SHORT, path=str(file))
+    assert (policy.file.hash, policy.parameters["hash"]) == (digits, digits[:12])
+    with pytest.raises(InvalidInputError, match=f"hash: expected {digits[:12]}"):
+        baselines.make("recurrent", SHORT, path=str(file), hash="0" * 12)
+    assert policy.file.processing == PROCESSING
+    np.testing.assert_array_equal(rollout(SHORT, policy, SEEDS[0]).q, rollout(SHORT, made(scenario=SHORT), SEEDS[0]).q)
+    with pytest.raises(ResultsError, match="this version"):
+        baselines.make("agent", SHORT, path=str(file))
+    content = file.read_bytes()
+    file.write_bytes(content[:-1] + bytes([content[-1] ^ 1]))
+    with pytest.raises(ResultsError, match="changed after it was written"):
+        load_recurrent(file)
+    file.write_bytes(content[:-8])
+    with pytest.raises(ResultsError, match="no agent with memory"):
+        load_recurrent(file)
+    with pytest.raises(ResultsError, match="does not exist"):
+        load_recurrent(tmp_path / "other.safetensors")
+
+
+def test_a_file_does_not_make_another_one_be_read(tmp_path):
+    file = tmp_path / "agent.safetensors"
+    scenario = ikgym.scenarios.get("panda-field")
+    save_recurrent(file, drawn(), PROCESSING.replace(base_policy="agent:other.safetensors"), scenario)
+    with pytest.raises(ResultsError, match="no agent and is not made from one"):
+        load_recurrent(file)
+
+
+def test_an_agent_without_memory_is_refused():
+    with pytest.raises(ResultsError, match="has no memory, and is played as agent:FILE"):
+        RecurrentPolicy.for_scenario(SHORT, path=str(FOLDER / "agent_alone.safetensors"))
+
+
+def test_the_one_that_comes_along_was_trained_as_the_page_says():
+    policy = baselines.make("recurrent", SHORT)
+    training = policy.file.about["training"]
+    assert (training["method"], training["training"]["segments"]) == ("observe", Observe().segments)
+    assert policy.file.processing == Observe().processing
+    assert rollout(SHORT, policy, SEEDS[0]).position_error.max() < 2e-3
+
+
+def test_networks_are_checked():
+    whole = dict(drawn().tensors)
+    with pytest.raises(InvalidInputError, match="expected float32 tensors of the shapes"):
+        GatedNetwork(SIZES, {name: tensor for name, tensor in whole.items() if name != "head.bias"})
+    with pytest.raises(InvalidInputError, match="NaN or infinity"):
+        GatedNetwork(SIZES, {**whole, "head.bias": np.full(4, np.nan, np.float32)})
+    with pytest.raises(InvalidInputError, match="at least one layer"):
+        shapes((13, 4))
