@@ -117,12 +117,12 @@ class LearnedPolicy(Wrapper, abc.ABC):
         return self.counted(Operations(*map(np.asarray, (0, 0, 0, 1))))
 
     def counted(self, inside: Operations) -> Operations:
-        """With a Jacobian and a factorisation for the null space, and a pose where the orientation is resolved."""
-        projected = int(self.file.processing.null_space is not None)
+        """With what the processing takes, and a pose where the orientation is resolved."""
+        jacobians, factorisations = self.file.processing.operations
         return inside._replace(
             forward_kinematics=inside.forward_kinematics + int(self._resolves),
-            jacobians=inside.jacobians + projected,
-            factorisations=inside.factorisations + projected,
+            jacobians=inside.jacobians + jacobians,
+            factorisations=inside.factorisations + factorisations,
         )
 
 

@@ -96,6 +96,12 @@ class Bilinear(Alone, Frozen):
         known_names("field of the processing", values, ["kind", "offsets", "damping"])
         return cls(tuple(values.get("offsets", cls.offsets)), values.get("damping"))
 
+    @property
+    def operations(self) -> tuple[int, int]:
+        """A Jacobian and a factorisation for the damped inverse."""
+        inverse = int(self.damping is not None)
+        return inverse, inverse
+
     def size(self, problem: Problem) -> int:
         """The number of features."""
         kind = problem.task.kind

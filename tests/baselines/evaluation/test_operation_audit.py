@@ -5,10 +5,16 @@ from __future__ import annotations
 import pytest
 
 import baselines
+from baselines.agents.bilinear.processing import Bilinear
+from baselines.agents.files import save_agent
+from baselines.agents.relative.processing import Relative
 from baselines.evaluation.operation_audit import audit
+from baselines.policy import Problem
 from baselines.registry import get
 from baselines.solvers.resolved_rate.dls import DampedLeastSquares
+from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError
+from tests.baselines.random_agents import network
 
 #: Few iterations, since nothing is compiled here.
 FEW = {
@@ -45,6 +51,19 @@ def test_every_policy_that_counts_counts_right():
         assert len(audited.counted) == 2, name
         assert audited.counted == audited.stated, (name, parameters)
         assert get(name).reference or any(map(sum, audited.counted)), name
+
+
+@pytest.mark.parametrize("processing", [
+    Bilinear((1, 5)), Bilinear((1, 5), 1e-3), Relative((1, 5), 5.0), Relative((1, 5), 5.0, bilinear=True, damping=1e-3),
+])  # fmt: skip
+def test_agents_count_what_their_processing_takes(tmp_path, processing):
+    file, scenario = tmp_path / "agent.safetensors", scenarios.get("varga7-pose-random")
+    problem = Problem.of(scenario)
+    save_agent(
+        file, network((processing.size(problem), processing.outputs(problem)), squash="linear"), processing, scenario
+    )
+    (audited,) = audit("varga7-pose-random", [("agent", {"path": str(file)})], steps=2)
+    assert audited.counted == audited.stated
 
 
 def test_those_that_estimate_say_so():
