@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from baselines.agents.base_policy import SharedPreview, make_base_policy
 from baselines.agents.bilinear.processing import Bilinear
+from baselines.agents.bounds import Bounds
 from baselines.agents.features import Features
 from baselines.agents.network import Network
 from baselines.agents.protocols import Actor, Transform
@@ -44,12 +45,14 @@ class AgentView:
         problem: What the agent and the base policy are told of the scenario.
         base: The base policy; None for an agent that stands alone.
         preview: What both are shown.
+        bounds: Of the velocities of a bilinear agent; None where there are none.
     """
 
     processing: Transform
     problem: Problem
     base: SolverPolicy | None
     preview: SharedPreview
+    bounds: Bounds | None
 
     @classmethod
     def of(cls, processing: Transform, problem: Problem) -> Self:
@@ -60,7 +63,8 @@ class AgentView:
             InvalidInputError: The base policy is refused, see :func:`make_base_policy`.
         """
         base = make_base_policy(processing, problem)
-        return cls(processing, problem, base, SharedPreview.of(processing, base))
+        bounds = Bounds.of(problem) if isinstance(processing, (Bilinear, Relative)) else None
+        return cls(processing, problem, base, SharedPreview.of(processing, base), bounds)
 
     def see(self, batch: Batch, memory: Memory) -> Seen:
         """What the agent sees; the base policy acts once.
@@ -91,7 +95,8 @@ class AgentView:
         """
         if isinstance(self.processing, (Bilinear, Relative)) and isinstance(network, Network):
             own = batch._replace(nominal=self.preview.for_agent(batch.nominal))
-            return self.processing.law(self.problem, own, network), None
+            action = self.processing.law(self.problem, own, network)
+            return (action if self.bounds is None else self.bounds.keep(own, action)), None
         seen = self.see(batch, memory)
         return self.action(seen, network.forward(seen.features)), seen.step
 

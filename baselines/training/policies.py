@@ -37,7 +37,7 @@ class BilinearActor(nn.Module):
     G and h come from a network that sees all features; what is due is the first of them, see
     :class:`ikgym.rl.AgentObservation`. The critics are those of Stable-Baselines3, which see it as well.
 
-    With a damping, G is what the network adds to U Jᵀ (J U Jᵀ + λ I)⁻¹, see
+    With a damping, G is what the network adds to U Jᵀ (J U Jᵀ + λ I)⁻¹, and h moves in the null space, see
     :class:`baselines.agents.bilinear.processing.Bilinear`; J are the last of the features, which the network itself
     does not see.
 
@@ -62,17 +62,20 @@ class BilinearActor(nn.Module):
         due = torch.cat([features[:, :w], features[:, w : w + 1] / LEAST], dim=1)
         output = self.network(features[:, : self.seen])
         rows = output[:, : n * (w + 1)].reshape(-1, n, w + 1)
-        out: Tensor = (rows * due[:, None]).sum(dim=2)
+        out: Tensor
         if self.damping is None:
+            out = (rows * due[:, None]).sum(dim=2)
             return out
         jacobian = features[:, self.seen :].reshape(-1, w, n).double()
+        matrices, null_motion = rows[:, :, :w].double(), (rows[:, :, w] * due[:, w:]).double()
         logarithms = output[:, n * (w + 1) :].double().clamp(-LARGEST, LARGEST)
         weighted = jacobian * logarithms[:, None, 1:].exp()
         damped = self.damping * logarithms[:, :1, None].exp() * torch.eye(w, dtype=torch.float64)
-        matrix = weighted @ jacobian.transpose(1, 2) + damped
-        shares = torch.linalg.solve(matrix, due[:, :w, None].double())
-        inverse: Tensor = (weighted.transpose(1, 2) @ shares)[:, :, 0].float()
-        return out + inverse
+        # What h alone would do to the tool is taken back.
+        left = due[:, :w, None].double() - jacobian @ null_motion[:, :, None]
+        shares = torch.linalg.solve(weighted @ jacobian.transpose(1, 2) + damped, left)
+        out = null_motion + (matrices @ left + weighted.transpose(1, 2) @ shares)[:, :, 0]
+        return out.float()
 
 
 class _Shares(nn.Module):

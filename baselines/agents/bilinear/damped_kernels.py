@@ -3,10 +3,11 @@
 With J the Jacobian of the twist, in the frame in which twists are seen, U a diagonal metric of the joints and λ a
 damping, which the network gives beside G and h,
 
-    G + U Jᵀ (J U Jᵀ + λ I)⁻¹
+    G' = G + U Jᵀ (J U Jᵀ + λ I)⁻¹
 
-takes the place of G (weighted damped least squares, as in Nakamura and Hanafusa 1986). An output is that of G and h,
-then ln λ against the usual λ, then ln U; both logarithms are cut at ±:data:`LARGEST`.
+takes the place of G (weighted damped least squares, as in Nakamura and Hanafusa 1986), and the null motion
+h' = (I - G' J) h that of h: what h would do to the tool is taken back. An output is that of G and h, then ln λ against
+the usual λ, then ln U; both logarithms are cut at ±:data:`LARGEST`.
 """
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ class Inverse(NamedTuple):
 
 @kernel
 def held_rows(kind, chain, damping, q, output, out):
-    """(G, h) with the damped inverse in it, row by row.
+    """(G', h'), row by row.
 
     Args:
         kind: Of task coordinates.
@@ -54,18 +55,20 @@ def held_rows(kind, chain, damping, q, output, out):
         damping: The usual λ, above 0.
         q: Shape (B, n).
         output: Of the network. Shape (B, n (w + 1) + 1 + n).
-        out: Receives (G, h), float64. Shape (B, n (w + 1)).
+        out: Receives (G', h'), float64. Shape (B, n (w + 1)).
     """
     n, w = q.shape[1], twist_size(kind)
-    found = Inverse(np.empty((6, n)), np.empty(n), np.empty((w, w)), np.empty((w, n)))
+    found, moved = Inverse(np.empty((6, n)), np.empty(n), np.empty((w, w)), np.empty((w, n))), np.empty(w)
     for row in range(q.shape[0]):
         given, held = output[row], out[row]
         invert(kind, chain, damping, q[row], given[n * (w + 1) :], found)
+        tool_motion(found.jacobian, given, moved)
         for j in range(n):
             own = j * (w + 1)
+            held[own + w] = given[own + w]
             for a in range(w):
                 held[own + a] = given[own + a] + found.metric[j] * found.products[a, j]
-            held[own + w] = given[own + w]
+                held[own + w] -= held[own + a] * moved[a]
 
 
 @kernel
@@ -78,21 +81,25 @@ def held_gradient_rows(kind, chain, damping, q, output, by_held, by_output, by_q
         damping: The usual λ.
         q: Shape (B, n).
         output: Of the network. Shape (B, n (w + 1) + 1 + n).
-        by_held: The gradient by (G, h). Shape (B, n (w + 1)).
+        by_held: The gradient by (G', h'). Shape (B, n (w + 1)).
         by_output: Receives that by the output. Shape (B, n (w + 1) + 1 + n).
         by_q: Receives that by the joint coordinates. Shape (B, n).
     """
     n, w = q.shape[1], twist_size(kind)
     rows = n * (w + 1)
     found = Inverse(np.empty((6, n)), np.empty(n), np.empty((w, w)), np.empty((w, n)))
-    by_jacobian = np.zeros((6, n))
+    by_jacobian, moved, by_moved = np.zeros((6, n)), np.empty(w), np.empty(w)
     for row in range(q.shape[0]):
-        given, into = output[row, rows:], by_output[row]
+        given, logarithms, into = output[row], output[row, rows:], by_output[row]
         into[:rows] = by_held[row]
-        lambda_ = invert(kind, chain, damping, q[row], given, found)
-        through_inverse(found, lambda_, by_held[row], into[rows:], by_jacobian)
+        lambda_ = invert(kind, chain, damping, q[row], logarithms, found)
+        through_null_motion(found, given, moved, by_moved, into)
+        through_inverse(found, lambda_, into, into[rows:], by_jacobian)
+        for a in range(w):
+            for j in range(n):
+                by_jacobian[a, j] += by_moved[a] * given[j * (w + 1) + w]
         for i in range(1 + n):
-            if abs(given[i]) >= LARGEST:
+            if abs(logarithms[i]) >= LARGEST:
                 into[rows + i] = 0.0
         jacobian_gradient(found.jacobian, by_jacobian, by_q[row])
         if is_turned(kind, chain.prismatic):
@@ -138,6 +145,41 @@ def invert(kind, chain, damping, q, given, found):
 
 
 @inlined
+def tool_motion(jacobian, given, moved):
+    """J h, what h alone would do to the tool."""
+    w, n = moved.shape[0], jacobian.shape[1]
+    for a in range(w):
+        moved[a] = 0.0
+        for j in range(n):
+            moved[a] += jacobian[a, j] * given[j * (w + 1) + w]
+
+
+@kernel
+def through_null_motion(found, given, moved, by_moved, by):
+    """From the gradient by G' and h' = h - G' (J h) to those by G', h and J h.
+
+    Args:
+        found: An :class:`Inverse`.
+        given: Of the network. Shape (n (w + 1) + 1 + n,).
+        moved: Receives J h. Shape (w,).
+        by_moved: Receives the gradient by it. Shape (w,).
+        by: The gradient by (G', h'), and receives that by (G', h). Shape (n (w + 1) or more,).
+    """
+    w, n = found.products.shape
+    tool_motion(found.jacobian, given, moved)
+    by_moved[:] = 0.0
+    for j in range(n):
+        own = j * (w + 1)
+        by_null = by[own + w]
+        for a in range(w):
+            by_moved[a] -= (given[own + a] + found.metric[j] * found.products[a, j]) * by_null
+            by[own + a] -= by_null * moved[a]
+    for j in range(n):
+        for a in range(w):
+            by[j * (w + 1) + w] += by_moved[a] * found.jacobian[a, j]
+
+
+@inlined
 def from_logarithm(number):
     """What a network says by a logarithm."""
     return math.exp(min(max(number, -LARGEST), LARGEST))
@@ -145,14 +187,14 @@ def from_logarithm(number):
 
 @kernel
 def through_inverse(found, damping, by, by_logarithms, by_jacobian):
-    """From the gradient B by U Jᵀ M⁻¹ to those by λ, U and J.
+    """From the gradient B by G' to those by λ, U and J.
 
     With P = M⁻¹ J and C = P U B M⁻¹, that by M is −C; what comes of M = J U Jᵀ + λ I is in C + Cᵀ.
 
     Args:
         found: An :class:`Inverse`.
         damping: λ.
-        by: That by (G, h), in whose rows B is. Shape (n (w + 1),).
+        by: That by (G', h), in whose rows B is. Shape (n (w + 1) or more,).
         by_logarithms: Receives those by ln λ and ln U. Shape (1 + n,).
         by_jacobian: Receives that by J, in its first rows. Shape (6, n).
     """

@@ -49,8 +49,9 @@ class Bilinear(Alone, Frozen):
 
         U Jᵀ (J U Jᵀ + λ I)⁻¹,
 
-    whose λ and diagonal metric U the network gives, too: its last outputs are ln λ against `damping`, and ln U. It then
-    begins as damped least squares, and need not learn the kinematics of the arm.
+    whose λ and diagonal metric U the network gives, too: its last outputs are ln λ against `damping`, and ln U. What h
+    would do to the tool is then taken back: (I - G J) h stands for h, with the whole G. The agent begins as damped
+    least squares, and need not learn the kinematics of the arm.
 
     Args:
         offsets: o, steps ahead at which the reference is seen, rising from 1, at least two.
@@ -191,7 +192,7 @@ def bilinear_outputs(problem: Problem, damping: float | None) -> int:
 
 
 def held(problem: Problem, damping: float, q: FloatArray, output: npt.NDArray[Any]) -> FloatArray:
-    """(G, h) with the damped inverse in it. Shape (B, n (w + 1)).
+    """(G, h) with the damped inverse in G, and h in the null space. Shape (B, n (w + 1)).
 
     Args:
         problem: What is tracked.

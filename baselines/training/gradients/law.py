@@ -64,7 +64,7 @@ class Law:
         return out, speed
 
     def held(self, q: Tensor, output: Tensor) -> Tensor:
-        """(G, h) from the output of the network; G with the damped inverse where there is one.
+        """(G, h) from the output of the network; with the damped inverse, and h in the null space, where there is one.
 
         Args:
             q: Joint coordinates in [rad] or [m]. Shape (N, n), float64.

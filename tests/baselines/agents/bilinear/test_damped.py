@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from baselines.agents.bilinear.damped_kernels import held_gradient_rows, held_rows
+from baselines.agents.bilinear.damped_kernels import LARGEST, held_gradient_rows, held_rows
 from baselines.agents.bilinear.processing import Bilinear
 from ikgym.exceptions import InvalidInputError
 from tests.baselines.agents.bilinear.test_bilinear import OFFSETS, ROWS, batch_of, outputs, problem_of, qdot
@@ -42,6 +42,7 @@ def test_it_is_the_weighted_damped_inverse(arm, task):
         lambda_ = DAMPING * np.exp(output[row, n * (w + 1)])
         wanted = output[row, : n * (w + 1)].reshape(n, w + 1).copy()
         wanted[:, :w] += metric @ j.T @ np.linalg.inv(j @ metric @ j.T + lambda_ * np.eye(w))
+        wanted[:, w] = (np.eye(n) - wanted[:, :w] @ j) @ wanted[:, w]
         np.testing.assert_allclose(given[row], wanted, rtol=1e-8, atol=1e-9)
 
 
@@ -60,6 +61,21 @@ def test_gradients(arm, task):
             ways = [(q + s * step, output) if name == "q" else (q, output + s * step) for s in (1.0, -1.0)]
             wanted = (by * (held(problem, *ways[0]) - held(problem, *ways[1]))).sum(1) / 2e-6
             np.testing.assert_allclose(given[:, j], wanted, rtol=2e-5, atol=2e-5 * np.abs(given).max())
+
+
+def test_null_motion_leaves_the_tool_where_it_is():
+    """But for the damping: what an untrained matrix lets h do to the tool is a small part of what h would do."""
+    problem = problem_of()
+    q, n = batch_of(problem).q, problem.model.joints
+    output = np.zeros((ROWS, DAMPED.outputs(problem)))
+    null_motion = np.random.default_rng(4).normal(size=(ROWS, n))
+    output[:, 6 : 7 * n : 7] = null_motion
+    output[:, 7 * n] = -LARGEST
+    kept = held(problem, q, output).reshape(ROWS, n, 7)[:, :, 6]
+    jacobian = problem.model.jacobian(q * np.array([0.0] + [1.0] * (n - 1)))
+    moved, alone = (np.linalg.norm(jacobian @ h[:, :, None], axis=1) for h in (kept, null_motion))
+    assert np.median(moved / alone) < 1e-2
+    assert (np.linalg.norm(kept, axis=1) > 0.0).all()
 
 
 def test_logarithms_are_cut():

@@ -1,0 +1,72 @@
+"""Actions of agents that stand alone, kept within the limits of the arm."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Self
+
+import numpy as np
+
+from baselines.policy import Batch, Problem
+from baselines.solvers.quadratic_program.limits import limits_with_braking
+from baselines.solvers.quadratic_program.velocity_box import velocity_box
+from ikgym.jit import kernel
+from ikgym.validation import FloatArray
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Bounds:
+    """The bounds of the joint velocities that :class:`QP` solves within: a joint brakes ahead of its stop.
+
+    Args:
+        limits: What :func:`limits_with_braking` gives. Shape (5, n).
+        dt: Δt in [s].
+        velocity_limit: What an action of 1 means, in [rad/s] or [m/s]. Shape (n,).
+    """
+
+    limits: FloatArray
+    dt: float
+    velocity_limit: FloatArray
+
+    @classmethod
+    def of(cls, problem: Problem) -> Self | None:
+        """Those of a problem; None where the arm knows no limits, and the environment bounds the actions themselves."""
+        model = problem.model
+        known = np.concatenate([model.lower, model.upper, model.velocity_limit, model.acceleration_limit])
+        if not np.isfinite(known).any():
+            return None
+        return cls(limits_with_braking(problem), problem.dt, problem.velocity_limit)
+
+    def keep(self, batch: Batch, action: FloatArray) -> FloatArray:
+        """Actions within the bounds; NaN stays NaN.
+
+        Args:
+            batch: What was observed.
+            action: Fractions of the velocity limit; written. Shape (B, n).
+        """
+        keep_rows(self.limits, self.dt, self.velocity_limit, batch.q, batch.qdot, action)
+        return action
+
+
+@kernel
+def keep_rows(limits, dt, velocity_limit, q, last, action):
+    """Bounds actions, row by row.
+
+    Args:
+        limits: See :func:`velocity_box`. Shape (5, n).
+        dt: Δt in [s].
+        velocity_limit: Shape (n,).
+        q: Shape (B, n).
+        last: Joint velocities last applied. Shape (B, n).
+        action: Fractions of the velocity limit; written. Shape (B, n).
+    """
+    n = q.shape[1]
+    lower, upper = np.empty(n), np.empty(n)
+    for row in range(q.shape[0]):
+        velocity_box(limits, dt, q[row], last[row], lower, upper)
+        for j in range(n):
+            share = action[row, j]
+            if share * velocity_limit[j] > upper[j]:
+                action[row, j] = upper[j] / velocity_limit[j]
+            elif share * velocity_limit[j] < lower[j]:
+                action[row, j] = lower[j] / velocity_limit[j]

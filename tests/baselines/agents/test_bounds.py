@@ -1,0 +1,63 @@
+"""Bilinear agents keep to the limits of their arm, as `qp` does."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+
+import baselines
+from baselines.agents.bilinear.processing import Bilinear
+from baselines.agents.bounds import Bounds
+from baselines.agents.files import save_agent
+from baselines.agents.network import Network
+from baselines.evaluation.rollout import rollouts
+from baselines.policy import Batch, Problem
+from baselines.solvers.quadratic_program.limits import limits_with_braking
+from baselines.solvers.quadratic_program.velocity_box import velocity_box
+from ikgym import scenarios, tasks
+
+PANDA = scenarios.get("panda-random").replace(task=tasks.get("pose"), steps=300)
+
+
+def test_actions_are_kept_within_the_velocity_box():
+    """Those outside come to its edge, those inside stay as they are, and what is no number stays none."""
+    problem, rng = Problem.of(PANDA), np.random.default_rng(0)
+    arm, bounds = problem.model, Bounds.of(problem)
+    q = rng.uniform(arm.lower, arm.upper, (200, 7))
+    last = rng.uniform(-0.3, 0.3, (200, 7))
+    asked = rng.uniform(-1.2, 1.2, (200, 7))
+    asked[0, 3] = np.nan
+    kept = bounds.keep(Batch(q, last, *[np.empty(0)] * 3), asked.copy())
+    lower, upper = np.empty(7), np.empty(7)
+    for row in range(200):
+        velocity_box(limits_with_braking(problem), problem.dt, q[row], last[row], lower, upper)
+        wanted = np.clip(asked[row] * problem.velocity_limit, lower, upper)
+        np.testing.assert_allclose(kept[row] * problem.velocity_limit, wanted, rtol=1e-14)
+        inside = wanted == asked[row] * problem.velocity_limit
+        assert np.array_equal(kept[row, inside], asked[row, inside])
+    assert np.isnan(kept[0, 3])
+
+
+def test_an_arm_without_limits_has_no_bounds():
+    assert Bounds.of(Problem.of(scenarios.get("varga7-pose-random"))) is None
+
+
+def test_no_limit_holds_an_agent_back(tmp_path):
+    """Even one that pushes joints against their stops as fast as it can."""
+    processing, problem = Bilinear((1, 10, 40), 1e-3), Problem.of(PANDA)
+    sizes = processing.size(problem), 8, processing.outputs(problem)
+    rng = np.random.default_rng(1)
+    weights = tuple(rng.normal(size=(b, a)) for a, b in itertools.pairwise(sizes))
+    save_agent(
+        tmp_path / "a.safetensors",
+        Network(weights, (np.zeros(8), rng.normal(scale=9.0, size=sizes[2])), "silu", "linear"),
+        processing,
+        PANDA,
+    )
+    policy = baselines.make("agent", PANDA, path=str(tmp_path / "a.safetensors"))
+    episodes = rollouts(PANDA, policy, [1, 2])
+    assert not any(episode.at_limit.any() for episode in episodes)
+    object.__setattr__(policy.view, "bounds", None)
+    held_back = sum(episode.at_limit for episode in rollouts(PANDA, policy, [1, 2])).sum(axis=0)
+    assert held_back[0] > 0  # by stops
