@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from baselines.agents.bilinear.damped_kernels import held_rows
+from baselines.agents.bilinear.rate_kernels import metric_rows, rate_rows
 from baselines.agents.network import forward_rows
 from ikgym.jit import kernel
 from ikgym.rl.feature_kernels import feature_row, mean_twists
@@ -36,17 +37,35 @@ def feature_rows(kind, prismatic, axis, dt, offsets, q, nominal, remaining, out,
 
 
 @kernel
-def new_features(kind, prismatic, axis, dt, offsets, q, nominal, remaining):
-    """:func:`feature_rows` in an array of their own, as float32: made here, it takes a fifth of the time."""
-    size = shown_joints(kind, prismatic) + (offsets.shape[0] - 1) * twist_size(kind) + 2
-    out, speed = np.empty((q.shape[0], size), np.float32), np.empty(q.shape[0])
-    feature_rows(kind, prismatic, axis, dt, offsets, q, nominal, remaining, out, speed)
+def new_features(kind, chain, dt, offsets, rates, q, nominal, remaining):
+    """:func:`feature_rows` in an array of their own, as float32: made here, it takes a fifth of the time.
+
+    Args:
+        kind: Of task coordinates.
+        chain: The arm.
+        dt: Δt in [s].
+        offsets: Shape (p,).
+        rates: Whether joint rates are shown, see :func:`baselines.agents.bilinear.rate_kernels.rate_rows`.
+        q: Shape (B, n).
+        nominal: At the offsets. Shape (B, p, m).
+        remaining: Shape (B, 1).
+
+    Returns:
+        Shape (B, f), float32.
+    """
+    prismatic, twists = chain.prismatic, offsets.shape[0] - 1
+    size = shown_joints(kind, prismatic) + twists * twist_size(kind) + 2
+    shown = size + (twists * q.shape[1] if rates else 0)
+    out, speed = np.empty((q.shape[0], shown), np.float32), np.empty(q.shape[0])
+    feature_rows(kind, prismatic, chain.axes[0], dt, offsets, q, nominal, remaining, out, speed)
+    if rates:
+        rate_rows(kind, chain, twists, q, out)
     return out
 
 
 @kernel
-def feature_gradient_rows(kind, prismatic, axis, features, gradient, out):
-    """From the gradient by the features to that by the joint coordinates, row by row.
+def feature_gradient_rows(kind, prismatic, axis, twists, features, gradient, out):
+    """From the gradient by the features of :func:`feature_rows` to that by the joint coordinates, row by row.
 
     The speed of what is ahead does not depend on where the arm is.
 
@@ -54,7 +73,8 @@ def feature_gradient_rows(kind, prismatic, axis, features, gradient, out):
         kind: Of task coordinates.
         prismatic: Shape (n,).
         axis: Shape (3,).
-        features: What :func:`feature_rows` gave. Shape (B, f).
+        twists: How many are seen ahead.
+        features: What :func:`feature_rows` gave, perhaps more. Shape (B, f).
         gradient: By the features. Shape (B, f).
         out: Receives the gradient. Shape (B, n).
     """
@@ -70,7 +90,8 @@ def feature_gradient_rows(kind, prismatic, axis, features, gradient, out):
                 out[row, j] = g[at] * x[at + 1] - g[at + 1] * x[at]
                 at += 2
         if turned:
-            out[row, 0] = turn_gradient(axis, x[at:-2], g[at:-2])
+            end = at + twists * twist_size(kind)
+            out[row, 0] = turn_gradient(axis, x[at:end], g[at:end])
 
 
 @kernel
@@ -145,11 +166,12 @@ def law_rows(
         out: Receives fractions of the velocity limit. Shape (B, n).
     """
     prismatic, axis, n = chain.prismatic, chain.axes[0], q.shape[1]
-    features = new_features(kind, prismatic, axis, dt, offsets, q, nominal, remaining)
+    features = new_features(kind, chain, dt, offsets, damping > 0.0, q, nominal, remaining)
     output = np.empty((q.shape[0], sizes[sizes.shape[0] - 1]), np.float32)
     forward_rows(weights, biases, sizes, activation, squash, features, output)
     if damping > 0.0:
         held = np.empty((q.shape[0], n * (twist_size(kind) + 1)))
+        metric_rows(kind, prismatic, offsets.shape[0] - 1, features, output)
         held_rows(kind, chain, damping, q, output, held)
         action_rows(kind, prismatic, axis, dt, offsets, velocity_limit, q, pose, nominal, held, out)
     else:

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from baselines.agents.alone import Alone
 from baselines.agents.bilinear.damped_kernels import held_rows
 from baselines.agents.bilinear.kernels import action_rows, law_rows, new_features
+from baselines.agents.bilinear.rate_kernels import metric_rows
 from baselines.agents.features import Features
 from baselines.agents.network import Network
 from baselines.policy import Batch, Problem
@@ -44,14 +45,16 @@ class Bilinear(Alone, Frozen):
     | w each | v_i / s |
     | 1 | ln s |
     | 1 | steps left, as a share of 500, at most 1 |
+    | n each | with a damping: 0.3 Jᵀ (J Jᵀ + 0.01 I)⁻¹ v_i / s, what v_i would ask of the joints here |
 
     With a damping, G is what the network adds to a weighted damped inverse of the Jacobian J,
 
         U Jᵀ (J U Jᵀ + λ I)⁻¹,
 
-    whose λ and diagonal metric U the network gives, too: its last outputs are ln λ against `damping`, and ln U. What h
-    would do to the tool is then taken back: (I - G J) h stands for h, with the whole G. The agent begins as damped
-    least squares, and need not learn the kinematics of the arm.
+    whose λ and diagonal metric U the network gives, too: its last outputs are ln λ against `damping`, and ln U against
+    the metric of :mod:`baselines.agents.bilinear.rate_kernels`, in which a joint that would be fast counts less. What h
+    would do to the tool is then taken back: (I - G J) h stands for h, with the whole G. The agent begins as weighted
+    damped least squares, and need not learn the kinematics of the arm.
 
     Args:
         offsets: o, steps ahead at which the reference is seen, rising from 1, at least two.
@@ -99,15 +102,16 @@ class Bilinear(Alone, Frozen):
 
     @property
     def operations(self) -> tuple[int, int]:
-        """A Jacobian and a factorisation for the damped inverse."""
-        inverse = int(self.damping is not None)
-        return inverse, inverse
+        """A Jacobian and a factorisation for the damped inverse, and as much for the joint rates that are seen."""
+        inverses = 0 if self.damping is None else 2
+        return inverses, inverses
 
     def size(self, problem: Problem) -> int:
         """The number of features."""
         kind = problem.task.kind
         shown: int = shown_joints(kind, problem.model.chain.prismatic)
-        return shown + (len(self.offsets) - 1) * int(twist_size(kind)) + 2
+        rates = 0 if self.damping is None else problem.model.joints
+        return shown + (len(self.offsets) - 1) * (int(twist_size(kind)) + rates) + 2
 
     def outputs(self, problem: Problem) -> int:
         """The number of network outputs: row j of G and h_j, joint by joint; ln λ and ln U where there is an inverse.
@@ -123,10 +127,10 @@ class Bilinear(Alone, Frozen):
         chain = problem.model.chain
         out: Features = new_features(
             problem.task.kind,
-            chain.prismatic,
-            chain.axes[0],
+            chain,
             problem.dt,
             self._ahead,
+            self.damping is not None,
             batch.q,
             batch.nominal,
             batch.remaining,
@@ -140,6 +144,8 @@ class Bilinear(Alone, Frozen):
         del base
         out, chain = np.empty(batch.q.shape), problem.model.chain
         if self.damping is not None:
+            kind, output = problem.task.kind, np.array(output)
+            metric_rows(kind, chain.prismatic, len(self.offsets) - 1, self.features(problem, batch), output)
             output = held(problem, self.damping, batch.q, output)
         action_rows(
             problem.task.kind,

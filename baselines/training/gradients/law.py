@@ -12,6 +12,7 @@ from torch.autograd.function import once_differentiable
 from baselines.agents.bilinear.damped_kernels import held_gradient_rows, held_rows
 from baselines.agents.bilinear.kernels import feature_gradient_rows, feature_rows
 from baselines.agents.bilinear.processing import Bilinear
+from baselines.agents.bilinear.rate_kernels import AT_REST, EXPONENT, LITTLE, rate_gradient_rows, rate_rows
 from baselines.policy import Problem
 from baselines.training.gradients.adjoint import Gradient, adjoint
 from baselines.training.gradients.segment import Path, Rows, Task, segment
@@ -46,7 +47,7 @@ class Law:
         self.inputs, self.outputs = processing.size(problem), processing.outputs(problem)
         self.task = Task.of(scenario)
         self._chain, self._offsets = scenario.model.chain, np.array(processing.offsets)
-        self._damping = processing.damping
+        self._damping, self._twists = processing.damping, len(processing.offsets) - 1
 
     def features(self, q: Tensor, nominal: FloatArray, remaining: FloatArray) -> tuple[Tensor, FloatArray]:
         """See :class:`Bilinear`.
@@ -63,11 +64,12 @@ class Law:
         out: Tensor = _Features.apply(q, self, nominal, remaining, speed)  # type: ignore[no-untyped-call]
         return out, speed
 
-    def held(self, q: Tensor, output: Tensor) -> Tensor:
+    def held(self, q: Tensor, features: Tensor, output: Tensor) -> Tensor:
         """(G, h) from the output of the network; with the damped inverse, and h in the null space, where there is one.
 
         Args:
             q: Joint coordinates in [rad] or [m]. Shape (N, n), float64.
+            features: What :meth:`features` gave. Shape (N, f), float64.
             output: Shape (N, outputs), float64.
 
         Returns:
@@ -75,6 +77,11 @@ class Law:
         """
         if self._damping is None:
             return output
+        n = q.shape[1]
+        first = self.inputs - n * self._twists
+        squares = features[:, first : first + n].square()
+        metric = -EXPONENT * (squares / (squares.mean(1, keepdim=True) + LITTLE) + AT_REST).log()
+        output = torch.cat([output[:, :-n], output[:, -n:] + metric], dim=1)
         out: Tensor = _Held.apply(q, output, self)  # type: ignore[no-untyped-call]
         return out
 
@@ -109,19 +116,24 @@ class _Features(torch.autograd.Function):
             some = slice(start, stop)
             arrays = joints[some], nominal[some], remaining[some], out[some], speed[some]
             feature_rows(task.kind, chain.prismatic, chain.axes[0], task.dt, law._offsets, *arrays)
+            if law._damping is not None:
+                rate_rows(task.kind, chain, law._twists, joints[some], out[some])
 
         in_chunks(work, len(out), GRAIN)
-        ctx.law, ctx.features = law, out
+        ctx.law, ctx.seen = law, (joints, out)
         return torch.from_numpy(out)
 
     @staticmethod
     @once_differentiable
     def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor, None, None, None, None]:
-        law, chain = ctx.law, ctx.law._chain
-        out = np.empty((len(gradient), len(chain.prismatic)))
-        given = np.ascontiguousarray(gradient.numpy())
-        feature_gradient_rows(law.task.kind, chain.prismatic, chain.axes[0], ctx.features, given, out)
-        return torch.from_numpy(out), None, None, None, None
+        law, (joints, features) = ctx.law, ctx.seen
+        kind, chain = law.task.kind, law._chain
+        out, by_rates = np.empty(joints.shape), np.zeros(joints.shape)
+        given = gradient.numpy().copy()
+        if law._damping is not None:
+            rate_gradient_rows(kind, chain, law._twists, joints, features, given, by_rates)
+        feature_gradient_rows(kind, chain.prismatic, chain.axes[0], law._twists, features, given, out)
+        return torch.from_numpy(out + by_rates), None, None, None, None
 
 
 class _Held(torch.autograd.Function):

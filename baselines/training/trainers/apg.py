@@ -85,7 +85,7 @@ class APGTrainer(ActorTrainer):
             given_up += self._renew(generator)
             q, qdot = _limited(arms.q, OVERFLOW), _limited(arms.qdot, OVERFLOW)
             features, speed = self._law.features(q, arms.ahead, arms.remaining)
-            held = _limited(self._law.held(q, self._actor(features.to(precision)).double()), most)
+            held = _limited(self._law.held(q, features, self._actor(features.to(precision)).double()), most)
             rows = arms.rows(config.hold, speed)
             arms.q, arms.qdot, loss, self._far = self._law.move(q, qdot, held, rows, config.cost_prior_steps)
             arms.made += rows.steps

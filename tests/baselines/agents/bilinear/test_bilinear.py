@@ -142,7 +142,8 @@ def test_gradients_of_features(arm, task):
         return out
 
     given = np.empty(batch.q.shape)
-    feature_gradient_rows(problem.task.kind, chain.prismatic, chain.axes[0], seen(batch.q), weights, given)
+    shown = seen(batch.q)
+    feature_gradient_rows(problem.task.kind, chain.prismatic, chain.axes[0], len(OFFSETS) - 1, shown, weights, given)
     for j in range(batch.q.shape[1]):
         step = np.zeros(batch.q.shape)
         step[:, j] = 1e-6
