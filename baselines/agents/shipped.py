@@ -44,7 +44,7 @@ class ShippedAgent(LearnedPolicy):
 class AgentAlone(ShippedAgent):
     """Learned agent that stands alone, trained on `varga7-random` by apg."""
 
-    hash: str = "7c2ee6f8bfed"
+    hash: str = "11a3d096b4d5"
 
     name: ClassVar[str] = "agent_alone"
 
