@@ -56,7 +56,7 @@ def curves(trainings: dict[str, pathlib.Path]) -> Figure:
     axes.set_yscale("log")
     if np.divide(*axes.get_ylim()[::-1]) < FEW:  # powers of ten would all be the same
         for axis in (axes.yaxis.set_major_formatter, axes.yaxis.set_minor_formatter):
-            axis("{x:.3g}")
+            axis("{x:.4g}")
     style.dress(axes, ylabel="validation cost ratio", xlabel="core-minutes of training")
     style.legend(drawn, "Training: a line a seed", handles, list(trainings))
     return drawn
