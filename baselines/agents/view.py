@@ -95,8 +95,7 @@ class AgentView:
         """
         if isinstance(self.processing, (Bilinear, Relative)) and isinstance(network, Network):
             own = batch._replace(nominal=self.preview.for_agent(batch.nominal))
-            action = self.processing.law(self.problem, own, network)
-            return (action if self.bounds is None else self.bounds.keep(own, action)), None
+            return self._bounded(own, self.processing.law(self.problem, own, network)), None
         seen = self.see(batch, memory)
         return self.action(seen, network.forward(seen.features)), seen.step
 
@@ -107,4 +106,7 @@ class AgentView:
             seen: What the outputs are for.
             output: Shape (B, n).
         """
-        return self.processing.action(self.problem, seen.batch, output, seen.base)
+        return self._bounded(seen.batch, self.processing.action(self.problem, seen.batch, output, seen.base))
+
+    def _bounded(self, batch: Batch, action: FloatArray) -> FloatArray:
+        return action if self.bounds is None else self.bounds.keep(batch, action)
