@@ -37,8 +37,8 @@ KEY: Final = "ikgym"
 #: Most bytes of a header.
 MOST_HEADER = 2**20
 
-# What is raised by descriptions that are JSON, and no more.
-_UNREADABLE = (InvalidInputError, UnknownNameError, KeyError, TypeError, ValueError, OverflowError)
+#: What is raised by descriptions that are JSON, and no more.
+UNREADABLE = (InvalidInputError, UnknownNameError, KeyError, TypeError, ValueError, OverflowError)
 
 
 def save_agent(
@@ -69,6 +69,18 @@ def save_agent(
         **description(processing, scenario, training),
         "network": {"sizes": list(network.sizes), "activation": network.activation, "squash": network.squash},
     }
+    return write_file(file, tensors, about)
+
+
+def write_file(file: pathlib.Path, tensors: list[tuple[str, Singles]], about: Mapping[str, Any]) -> str:
+    """Writes tensors and what they mean, in one go.
+
+    Returns:
+        Their hash.
+
+    Raises:
+        ResultsError: The file cannot be written.
+    """
     found = digest(tensors, about)
     metadata = {KEY: json.dumps({**about, "hash": found}, ensure_ascii=False, allow_nan=False)}
     write(file, save(dict(tensors), metadata))
@@ -127,12 +139,17 @@ def parse_agent(source: str, content: bytes) -> AgentFile:
     processing = check_described(source, about)
     try:
         network = _network(about["network"], tensors)
-    except _UNREADABLE as e:
-        refuse(source, f"is no agent that this version can read: {_said(e)}")
-    found = digest(_tensors(network), about)
+    except UNREADABLE as e:
+        refuse(source, f"is no agent that this version can read: {said(e)}")
+    check_hash(source, _tensors(network), about, claimed)
+    return AgentFile(source, network, processing, about, claimed)
+
+
+def check_hash(source: str, tensors: list[tuple[str, Singles]], about: Mapping[str, Any], claimed: str) -> None:
+    """Refuses a file that is not what its hash was made of."""
+    found = digest(tensors, about)
     if found != claimed:
         refuse(source, f"was changed after it was written: expected the hash {claimed}, got {found}")
-    return AgentFile(source, network, processing, about, found)
 
 
 def parse_header(source: str, content: bytes) -> dict[str, Any]:
@@ -171,8 +188,8 @@ def check_described(source: str, about: Mapping[str, Any]) -> Processing | Bilin
         kinds: dict[Any, type[Bilinear | Relative]] = {Bilinear.kind: Bilinear, Relative.kind: Relative}
         processing = kinds.get(values.get("kind"), Processing).from_json(values)
         check_types(about, processing)
-    except _UNREADABLE as e:
-        refuse(source, f"is no agent that this version can read: {_said(e)}")
+    except UNREADABLE as e:
+        refuse(source, f"is no agent that this version can read: {said(e)}")
     try:
         check_base_policy(processing.base_policy)
     except (InvalidInputError, UnknownNameError) as e:
@@ -249,5 +266,6 @@ def _names(value: object) -> str:
     return f"the keys {sorted(value)}" if isinstance(value, dict) else repr(value)
 
 
-def _said(error: Exception) -> str:
+def said(error: Exception) -> str:
+    """What is wrong, without the quotes of a missing key alone."""
     return f"the key {error} is missing" if isinstance(error, KeyError) else str(error)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from typing import Any, Protocol
+from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -12,6 +12,9 @@ import numpy.typing as npt
 from baselines.agents.features import Features
 from baselines.policy import Batch, Problem
 from ikgym.validation import FloatArray
+
+NetworkT = TypeVar("NetworkT")
+ProcessingT = TypeVar("ProcessingT")
 
 
 class Transform(Protocol):
@@ -83,20 +86,20 @@ class Actor(Protocol):
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class AgentFile:
-    """An agent that was read from a file.
+class FileOf(Generic[NetworkT, ProcessingT]):
+    """What was read from the file of an agent.
 
     Args:
         source: The file, as messages name it.
-        network: The actor.
-        processing: What it sees, and what its outputs mean.
+        network: Its network.
+        processing: How the network comes from observations to actions.
         about: What the file says of the agent: where it was trained, and how.
         hash: SHA-256 of what it is made of, in 64 hexadecimal digits.
     """
 
     source: str
-    network: Actor
-    processing: Transform
+    network: NetworkT
+    processing: ProcessingT
     about: Mapping[str, Any]
     hash: str
 
@@ -104,6 +107,10 @@ class AgentFile:
     def digits(self) -> str:
         """The first digits of the hash, which stand in results."""
         return self.hash[:DIGITS]
+
+
+class AgentFile(FileOf[Actor, Transform]):
+    """An agent without memory that was read from a file."""
 
 
 #: Digits of a hash that tell agents apart.

@@ -45,6 +45,12 @@ class Inverse(NamedTuple):
     products: Floats
 
 
+@inlined
+def empty_inverse(w, n):
+    """Room for one."""
+    return Inverse(np.empty((6, n)), np.empty(n), np.empty((w, w)), np.empty((w, n)))
+
+
 @kernel
 def held_rows(kind, chain, damping, q, output, out):
     """(G', h'), row by row.
@@ -58,7 +64,7 @@ def held_rows(kind, chain, damping, q, output, out):
         out: Receives (G', h'), float64. Shape (B, n (w + 1)).
     """
     n, w = q.shape[1], twist_size(kind)
-    found, moved = Inverse(np.empty((6, n)), np.empty(n), np.empty((w, w)), np.empty((w, n))), np.empty(w)
+    found, moved = empty_inverse(w, n), np.empty(w)
     for row in range(q.shape[0]):
         given, held = output[row], out[row]
         invert(kind, chain, damping, q[row], given[n * (w + 1) :], found)
@@ -87,7 +93,7 @@ def held_gradient_rows(kind, chain, damping, q, output, by_held, by_output, by_q
     """
     n, w = q.shape[1], twist_size(kind)
     rows = n * (w + 1)
-    found = Inverse(np.empty((6, n)), np.empty(n), np.empty((w, w)), np.empty((w, n)))
+    found = empty_inverse(w, n)
     by_jacobian, moved, by_moved = np.zeros((6, n)), np.empty(w), np.empty(w)
     for row in range(q.shape[0]):
         given, logarithms, into = output[row], output[row, rows:], by_output[row]

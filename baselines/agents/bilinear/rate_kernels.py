@@ -14,7 +14,7 @@ import math
 
 import numpy as np
 
-from baselines.agents.bilinear.damped_kernels import Inverse, invert, jacobian_gradient, through_inverse
+from baselines.agents.bilinear.damped_kernels import empty_inverse, invert, jacobian_gradient, through_inverse
 from ikgym.jit import kernel
 from ikgym.rl.feature_kernels import CONTEXT
 from ikgym.rl.twists import is_turned, shown_joints, twist_size
@@ -42,7 +42,7 @@ def rate_rows(kind, chain, twists, q, features):
     n, w = q.shape[1], twist_size(kind)
     begin = shown_joints(kind, chain.prismatic)
     first = begin + twists * w + 2
-    found, plain = Inverse(np.empty((6, n)), np.empty(n), np.empty((w, w)), np.empty((w, n))), np.zeros(1 + n)
+    found, plain = empty_inverse(w, n), np.zeros(1 + n)
     for row in range(q.shape[0]):
         invert(kind, chain, DAMPING, q[row], plain, found)
         for i in range(twists):
@@ -69,7 +69,7 @@ def rate_gradient_rows(kind, chain, twists, q, features, gradient, out):
     n, w = q.shape[1], twist_size(kind)
     begin = shown_joints(kind, chain.prismatic)
     first = begin + twists * w + 2
-    found, plain = Inverse(np.empty((6, n)), np.empty(n), np.empty((w, w)), np.empty((w, n))), np.zeros(1 + n)
+    found, plain = empty_inverse(w, n), np.zeros(1 + n)
     by, by_jacobian, by_logarithms = np.empty(n * (w + 1)), np.zeros((6, n)), np.empty(1 + n)
     for row in range(q.shape[0]):
         lambda_ = invert(kind, chain, DAMPING, q[row], plain, found)

@@ -2,48 +2,34 @@
 
 from __future__ import annotations
 
-import dataclasses
-import json
 import pathlib
 from collections.abc import Mapping
 from typing import Any
 
 from safetensors import SafetensorError
-from safetensors.numpy import load, save
+from safetensors.numpy import load
 
 from baselines.agents.base_policy import check_base_policy
-from baselines.agents.files import KEY, check_types, description, digest, parse_header
-from baselines.agents.protocols import DIGITS
+from baselines.agents.files import (
+    UNREADABLE,
+    check_hash,
+    check_types,
+    description,
+    parse_header,
+    said,
+    write_file,
+)
+from baselines.agents.network import Singles
+from baselines.agents.protocols import FileOf
 from baselines.agents.recurrent.network import GatedNetwork, shapes
 from baselines.agents.recurrent.processing import Recurrent
 from baselines.agents.untrusted import read, refuse
-from baselines.files import write
-from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class RecurrentFile:
-    """An agent with memory that was read from a file.
-
-    Args:
-        source: The file, as messages name it.
-        network: Its network.
-        processing: What it corrects, and what its filter begins with.
-        about: What the file says of the agent: where it was trained, and how.
-        hash: SHA-256 of what it is made of, in 64 hexadecimal digits.
-    """
-
-    source: str
-    network: GatedNetwork
-    processing: Recurrent
-    about: Mapping[str, Any]
-    hash: str
-
-    @property
-    def digits(self) -> str:
-        """The first digits of the hash."""
-        return self.hash[:DIGITS]
+class RecurrentFile(FileOf[GatedNetwork, Recurrent]):
+    """An agent with memory that was read from a file."""
 
 
 def save_recurrent(
@@ -70,10 +56,7 @@ def save_recurrent(
         ResultsError: The file cannot be written.
     """
     about = _about(network, processing, scenario, training)
-    tensors = [(name, network.tensors[name]) for name in shapes(network.sizes)]
-    found = digest(tensors, about)
-    write(file, save(dict(tensors), {KEY: json.dumps({**about, "hash": found}, ensure_ascii=False, allow_nan=False)}))
-    return found
+    return write_file(file, _tensors(network), about)
 
 
 def load_recurrent(file: pathlib.Path) -> RecurrentFile:
@@ -93,15 +76,10 @@ def load_recurrent(file: pathlib.Path) -> RecurrentFile:
         network = GatedNetwork(sizes, load(content))
         if sizes != Recurrent.sizes(sizes[1:-1]):
             raise InvalidInputError(f"sizes: expected {Recurrent.sizes(sizes[1:-1])}, got {sizes}")
-    except (
-        SafetensorError, InvalidInputError, UnknownNameError, KeyError, TypeError, ValueError, OverflowError
-    ) as e:  # fmt: skip
-        reason = f"the key {e} is missing" if isinstance(e, KeyError) else str(e)
-        refuse(source, f"is no agent with memory that this version can read: {reason}")
-    found = digest([(name, network.tensors[name]) for name in shapes(sizes)], about)
-    if found != claimed:
-        refuse(source, f"was changed after it was written: expected the hash {claimed}, got {found}")
-    return RecurrentFile(source, network, processing, about, found)
+    except (SafetensorError, *UNREADABLE) as e:
+        refuse(source, f"is no agent with memory that this version can read: {said(e)}")
+    check_hash(source, _tensors(network), about, claimed)
+    return RecurrentFile(source, network, processing, about, claimed)
 
 
 def in_memory(network: GatedNetwork, processing: Recurrent, scenario: Scenario) -> RecurrentFile:
@@ -117,6 +95,11 @@ def _about(
         **description(processing, scenario, training),
         "network": {"sizes": list(network.sizes)},
     }
+
+
+def _tensors(network: GatedNetwork) -> list[tuple[str, Singles]]:
+    """Those of a network by name, in the order in which they are hashed."""
+    return [(name, network.tensors[name]) for name in shapes(network.sizes)]
 
 
 def _of_kind(values: Mapping[str, Any]) -> Mapping[str, Any]:
