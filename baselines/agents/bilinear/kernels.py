@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from baselines.agents.bilinear.damped_kernels import held_rows
+from baselines.agents.bilinear.damped_kernels import held_rows, with_matrix
 from baselines.agents.bilinear.rate_kernels import metric_rows, rate_rows
 from baselines.agents.network import forward_rows
 from ikgym.jit import kernel
@@ -171,6 +171,8 @@ def law_rows(
     forward_rows(weights, biases, sizes, activation, squash, features, output)
     if damping > 0.0:
         held = np.empty((q.shape[0], n * (twist_size(kind) + 1)))
+        if output.shape[1] == 2 * n + 1:
+            output = with_matrix(twist_size(kind), output)
         metric_rows(kind, prismatic, offsets.shape[0] - 1, features, output)
         held_rows(kind, chain, damping, q, output, held)
         action_rows(kind, prismatic, axis, dt, offsets, velocity_limit, q, pose, nominal, held, out)

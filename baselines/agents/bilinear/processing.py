@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.agents.alone import Alone
-from baselines.agents.bilinear.damped_kernels import held_rows
+from baselines.agents.bilinear.damped_kernels import held_rows, with_matrix
 from baselines.agents.bilinear.kernels import action_rows, law_rows, new_features
 from baselines.agents.bilinear.rate_kernels import metric_rows
 from baselines.agents.features import Features
@@ -54,18 +54,21 @@ class Bilinear(Alone, Frozen):
     whose λ and diagonal metric U the network gives, too: its last outputs are ln λ against `damping`, and ln U against
     the metric of :mod:`baselines.agents.bilinear.rate_kernels`, in which a joint that would be fast counts less. What h
     would do to the tool is then taken back: (I - G J) h stands for h, with the whole G. The agent begins as weighted
-    damped least squares, and need not learn the kinematics of the arm.
+    damped least squares, and need not learn the kinematics of the arm. Without `matrix` that is all: the network gives
+    h, λ and U alone.
 
     Args:
         offsets: o, steps ahead at which the reference is seen, rising from 1, at least two.
         damping: λ where the network says 0, above 0; None for no inverse.
+        matrix: Whether the network gives G. Without it there has to be a damping.
 
     Raises:
-        InvalidInputError: Offsets do not rise from 1, or the damping is not above 0.
+        InvalidInputError: Offsets do not rise from 1, the damping is not above 0, or neither G nor an inverse is left.
     """
 
     offsets: tuple[int, ...] = (1, 10, 40, 80, 130, 200, 300, 450, 650, 900)
     damping: float | None = None
+    matrix: bool = True
 
     #: The offsets as kernels take them.
     _ahead: npt.NDArray[np.int64] = dataclasses.field(init=False, repr=False, compare=False)
@@ -78,6 +81,10 @@ class Bilinear(Alone, Frozen):
         rising = all(a < b for a, b in itertools.pairwise(offsets))
         if len(offsets) < 2 or offsets[0] != 1 or not rising:
             raise InvalidInputError(f"offsets: expected at least two, rising from 1, got {self.offsets}.")
+        if not isinstance(self.matrix, bool):
+            raise InvalidInputError(f"matrix: expected true or false, got {self.matrix!r}.")
+        if not self.matrix and self.damping is None:
+            raise InvalidInputError("damping: expected a number where the network gives no matrix, got None.")
         ahead = np.array(offsets, dtype=np.int64)
         ahead.flags.writeable = False
         damping = None if self.damping is None else number("damping", self.damping, above=0.0)
@@ -87,7 +94,8 @@ class Bilinear(Alone, Frozen):
     def to_json(self) -> dict[str, Any]:
         """The fields, as JSON has them."""
         inverse = {} if self.damping is None else {"damping": self.damping}
-        return {"kind": self.kind, "offsets": list(self.offsets), **inverse}
+        alone = {} if self.matrix else {"matrix": False}
+        return {"kind": self.kind, "offsets": list(self.offsets), **inverse, **alone}
 
     @classmethod
     def from_json(cls, values: Mapping[str, Any]) -> Self:
@@ -97,8 +105,8 @@ class Bilinear(Alone, Frozen):
             UnknownNameError: There is a key that is none of the fields.
             InvalidInputError: A value is refused.
         """
-        known_names("field of the processing", values, ["kind", "offsets", "damping"])
-        return cls(tuple(values.get("offsets", cls.offsets)), values.get("damping"))
+        known_names("field of the processing", values, ["kind", "offsets", "damping", "matrix"])
+        return cls(tuple(values.get("offsets", cls.offsets)), values.get("damping"), values.get("matrix", True))
 
     @property
     def operations(self) -> tuple[int, int]:
@@ -116,10 +124,13 @@ class Bilinear(Alone, Frozen):
     def outputs(self, problem: Problem) -> int:
         """The number of network outputs: row j of G and h_j, joint by joint; ln λ and ln U where there is an inverse.
 
+        Without G they are h, ln λ and ln U.
+
         Raises:
             InvalidInputError: As :func:`bilinear_outputs`.
         """
-        return bilinear_outputs(problem, self.damping)
+        outputs = bilinear_outputs(problem, self.damping)
+        return outputs if self.matrix else 2 * problem.model.joints + 1
 
     def features(self, problem: Problem, batch: Batch, base: FloatArray | None = None) -> Features:
         """The features of a batch; see :meth:`baselines.agents.features.Processing.features`."""
@@ -145,6 +156,8 @@ class Bilinear(Alone, Frozen):
         out, chain = np.empty(batch.q.shape), problem.model.chain
         if self.damping is not None:
             kind, output = problem.task.kind, np.array(output)
+            if not self.matrix:
+                output = with_matrix(twist_size(kind), output)
             metric_rows(kind, chain.prismatic, len(self.offsets) - 1, self.features(problem, batch), output)
             output = held(problem, self.damping, batch.q, output)
         action_rows(

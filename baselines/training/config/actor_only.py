@@ -88,6 +88,9 @@ class APG(ActorOnly):
     damping: Annotated[float | None, tyro.conf.arg(metavar="λ")] = None
     """The agent begins as the damped inverse of the Jacobian with this λ, which the network changes, weighs and adds
     to. The network gives the whole matrix if left out. Not for skew coordinates."""
+    matrix: bool = True
+    """Whether the network adds a matrix to the damped inverse. Without it it gives the null motion, the damping and the
+    metric alone."""
     hidden: Annotated[tuple[int, ...], tyro.conf.arg(metavar="N …")] = (256, 256)
     """Neurons of the hidden layers: at most 10 layers of at most 2048 neurons."""
     n_envs: Annotated[int, tyro.conf.arg(metavar="N")] = 256
@@ -138,12 +141,13 @@ class APG(ActorOnly):
     @property
     def processing(self) -> Bilinear:
         """What the agent sees, and what the outputs of its network mean."""
-        return Bilinear(self.offsets, self.damping)
+        return Bilinear(self.offsets, self.damping, self.matrix)
 
     @classmethod
     def shape_of(cls, processing: Stored, sizes: tuple[int, ...], activation: str) -> dict[str, Any]:
         """See :meth:`Config.shape_of`."""
-        return super().shape_of(processing, sizes, activation) | {"damping": getattr(processing, "damping", None)}
+        own = {"damping": getattr(processing, "damping", None), "matrix": getattr(processing, "matrix", True)}
+        return super().shape_of(processing, sizes, activation) | own
 
     def window_of(self, segment: int) -> int:
         """The window of a segment, counted from 0."""

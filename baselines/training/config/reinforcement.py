@@ -8,6 +8,7 @@ from typing import Annotated, Any, ClassVar, Literal, get_args
 
 import tyro
 
+from baselines.agents.bilinear.processing import Bilinear
 from baselines.agents.relative.processing import Relative, Squash
 from baselines.training.config.base import Annealed, Config, JointVelocities, Stored
 from baselines.training.config.limits import MOST_BATCH, MOST_TRANSITIONS, between, count, share
@@ -16,7 +17,7 @@ from ikgym.rl import Learning
 from ikgym.validation import known_names, number, whole_number
 
 Reward = Literal["cost", "log"]
-Output = Literal["velocities", "bilinear"]
+Output = Literal["velocities", "bilinear", "inverse"]
 
 #: Limits of the logarithm of a standard deviation: those that SAC has for it.
 LOG_STD = (-20.0, 2.0)
@@ -32,9 +33,13 @@ class Reinforcement(Annealed, JointVelocities):
     output: Output = "velocities"
     """What the network gives. velocities: those of the joints, as multiples of action_scale. bilinear: G and h, see
     baselines.training.policies, with the environment of ikgym.rl: lost tracks end an episode there, rewards are never
-    negative, and offsets are what is seen of the reference, to the first of which the arm is led."""
+    negative, and offsets are what is seen of the reference, to the first of which the arm is led. inverse: null motion,
+    damping and metric of a damped inverse, held for some steps, see baselines.training.environment.inverse_env."""
     lost_distance: Annotated[float, tyro.conf.arg(metavar="M")] = 0.01
-    """Position error in [m] at which the episode of a bilinear agent ends, in training."""
+    """Position error in [m] at which an episode ends in training, unless the output is velocities."""
+    hold: Annotated[int, tyro.conf.arg(metavar="N")] = 10
+    """Steps for which an output that is inverse is held, with feedback at every step: a divisor of those of an episode.
+    Steps of n_steps, train_freq and gamma are then as many steps of the arm."""
     largest: Annotated[float, tyro.conf.arg(metavar="X")] = Learning.largest
     """Largest velocity of a joint of bilinear agents, in units of what is asked for."""
     furthest: Annotated[float, tyro.conf.arg(metavar="X")] = Learning.furthest
@@ -62,14 +67,17 @@ class Reinforcement(Annealed, JointVelocities):
         known_names("output", [self.output], get_args(Output))
         for name in ("lost_distance", "largest", "furthest"):
             self._set(name, number(name, getattr(self, name), above=0.0))
-        if self.output == "bilinear":
+        self._set("hold", whole_number("hold", self.hold, at_least=1))
+        if self.output == "inverse" and self.damping is None:
+            raise InvalidInputError("damping: expected a number for an output that is inverse, got None.")
+        if self.output != "velocities":
             for name in ("base_policy", "null_space", "initial_episode_steps"):
                 if getattr(self, name) is not None:
                     raise InvalidInputError(
-                        f"{name}: expected none for an output that is bilinear, got {getattr(self, name)!r}."
+                        f"{name}: expected none for an output that is {self.output}, got {getattr(self, name)!r}."
                     )
         elif self.damping is not None:
-            raise InvalidInputError(f"damping: expected none unless the output is bilinear, got {self.damping!r}.")
+            raise InvalidInputError(f"damping: expected none for an output of velocities, got {self.damping!r}.")
         super().__post_init__()
         known_names("reward", [self.reward], get_args(Reward))
         self._set("episodes", whole_number("episodes", self.episodes, at_least=1))
@@ -87,6 +95,8 @@ class Reinforcement(Annealed, JointVelocities):
         """What the agent sees, and what the outputs of its network mean."""
         if self.output == "velocities":
             return self.velocities
+        if self.output == "inverse":
+            return Bilinear(self.offsets, self.damping, matrix=False)
         return Relative(
             self.offsets,
             self.furthest,
@@ -110,6 +120,8 @@ class Reinforcement(Annealed, JointVelocities):
     @classmethod
     def shape_of(cls, processing: Stored, sizes: tuple[int, ...], activation: str) -> dict[str, Any]:
         """See :meth:`Config.shape_of`."""
+        if isinstance(processing, Bilinear):
+            return Config.shape_of(processing, sizes, activation) | {"damping": processing.damping}
         if not isinstance(processing, Relative):
             return super().shape_of(processing, sizes, activation)
         bounds = {name: getattr(processing, name) for name in ("largest", "furthest", "damping")}

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 from torch.autograd.function import once_differentiable
 
 from baselines.agents.bilinear.damped_kernels import held_gradient_rows, held_rows
@@ -18,6 +18,7 @@ from baselines.training.gradients.adjoint import Gradient, adjoint
 from baselines.training.gradients.segment import Path, Rows, Task, segment
 from ikgym.exceptions import InvalidInputError
 from ikgym.parallel import in_chunks
+from ikgym.rl.twists import twist_size
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray
 
@@ -48,6 +49,7 @@ class Law:
         self.task = Task.of(scenario)
         self._chain, self._offsets = scenario.model.chain, np.array(processing.offsets)
         self._damping, self._twists = processing.damping, len(processing.offsets) - 1
+        self._matrix = processing.matrix
 
     def features(self, q: Tensor, nominal: FloatArray, remaining: FloatArray) -> tuple[Tensor, FloatArray]:
         """See :class:`Bilinear`.
@@ -78,6 +80,9 @@ class Law:
         if self._damping is None:
             return output
         n = q.shape[1]
+        if not self._matrix:
+            rows = nn.functional.pad(output[:, :n, None], (int(twist_size(self.task.kind)), 0))
+            output = torch.cat([rows.flatten(1), output[:, n:]], dim=1)
         first = self.inputs - n * self._twists
         squares = features[:, first : first + n].square()
         metric = -EXPONENT * (squares / (squares.mean(1, keepdim=True) + LITTLE) + AT_REST).log()

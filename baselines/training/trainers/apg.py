@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
 from baselines.training.config.actor_only import APG
 from baselines.training.gradients.arms import Arms
@@ -37,13 +37,26 @@ class APGTrainer(ActorTrainer):
             begin_actor_from(model.policy, config)
         super().__init__(config, scenario, seed, model, copy.deepcopy(model.policy))
         self._updates = 0
-        rows, steps = config.n_envs, scenario.steps
-        self._arms = Arms(scenario, rows, config.offsets)
-        self._far, self._farthest = np.zeros(rows), config.reset_distance
-        # Spread over the episode, so that each step of Adam sees all parts of it.
-        follows = scenario.nominal_joint_path(scenarios.SPLITS["train"].start) is not None
+        self._arms = Arms(scenario, config.n_envs, config.offsets)
+        self._farthest = config.reset_distance
+        self.spread(np.random.default_rng(sequence(seed, None)))
+
+    @property
+    def actor(self) -> nn.Module:
+        """What gradients are taken by; the model is its average."""
+        return self._actor
+
+    def spread(self, generator: np.random.Generator) -> None:
+        """Begins new episodes, spread over their steps, so that each step of Adam sees all parts of them.
+
+        Args:
+            generator: Draws their seeds.
+        """
+        rows, steps = self._config.n_envs, self._scenario.steps
+        follows = self._scenario.nominal_joint_path(scenarios.SPLITS["train"].start) is not None
         first = np.arange(rows) * steps // rows if follows else np.zeros(rows, dtype=np.int64)
-        self._arms.begin(np.arange(rows), self._seeds(np.random.default_rng(sequence(seed, None)), rows), first)
+        self._arms.begin(np.arange(rows), self._seeds(generator, rows), first)
+        self._far = np.zeros(rows)
 
     def segment(self, number: int) -> SegmentMetrics:
         """See :meth:`baselines.training.trainer.Trainer.segment`."""
@@ -52,10 +65,9 @@ class APGTrainer(ActorTrainer):
         losses, refused, lost = [], 0, 0
         window, self._farthest = config.window_of(number), config.reset_distance_of(number)
         for _ in range(config.segment_steps // window):
-            loss, given_up = self._window(window, generator)
+            loss, given_up = self.window(window, generator)
             refused += not self._descend(loss)
             self._average()
-            self._arms.q, self._arms.qdot = self._arms.q.detach(), self._arms.qdot.detach()
             losses.append(loss.item())
             lost += given_up
         self.model.num_timesteps += config.n_envs * config.segment_steps
@@ -73,13 +85,18 @@ class APGTrainer(ActorTrainer):
         self._updates, self._far = state["updates"], state["far"].numpy().copy()
         self._arms.restore(state["arms"])
 
-    def _window(self, steps: int, generator: np.random.Generator) -> tuple[Tensor, int]:
-        """Moves all arms through a window.
+    def window(self, steps: int, generator: np.random.Generator) -> tuple[Tensor, int]:
+        """Moves all arms through a window, from where they are, of which no gradient is taken.
+
+        Args:
+            steps: A multiple of `hold`.
+            generator: Draws the seeds of new episodes.
 
         Returns:
             The loss, and how many arms were given up.
         """
         config, arms, total, given_up = self._config, self._arms, torch.zeros((), dtype=torch.float64), 0
+        arms.q, arms.qdot = arms.q.detach(), arms.qdot.detach()
         most, precision = config.max_gradient_share * config.hold / (config.n_envs * steps), self._precision
         for _ in range(steps // config.hold):
             given_up += self._renew(generator)

@@ -11,6 +11,7 @@ import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.noise import ActionNoise, NormalActionNoise, OrnsteinUhlenbeckActionNoise
+from stable_baselines3.common.vec_env import VecEnv
 from torch import nn
 
 from baselines.training.config.reinforcement import SAC, TD3, OffPolicy
@@ -19,7 +20,7 @@ from baselines.training.trainers.reinforcement import ReinforcementTrainer
 
 #: What a replay buffer holds, a row a step.
 REPLAYED = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
-#: Entropy a joint that SAC aims at, in [nat]: −1, the usual choice, is too much noise here.
+#: Entropy that SAC aims at, of each number of an action, in [nat]: −1, the usual choice, is too much noise here.
 TARGET_ENTROPY = -3.0
 
 
@@ -93,7 +94,7 @@ class SACTrainer(OffPolicyTrainer):
     _config: SAC
 
     def _make(self) -> BaseAlgorithm:
-        config = self._config
+        config, actions = self._config, _size(self._env)
         return new_model(
             "sac",
             self._env,
@@ -104,7 +105,7 @@ class SACTrainer(OffPolicyTrainer):
             (config.output, config.damping),
             sde_sample_freq=config.sde_sample_freq,
             ent_coef=config.ent_coef,
-            target_entropy=TARGET_ENTROPY * self._joints if config.target_entropy is None else config.target_entropy,
+            target_entropy=TARGET_ENTROPY * actions if config.target_entropy is None else config.target_entropy,
             **self._parameters(),
         )
 
@@ -132,14 +133,14 @@ class TD3Trainer(OffPolicyTrainer):
     _config: TD3
 
     def _make(self) -> BaseAlgorithm:
-        config, joints = self._config, self._joints
+        config, actions = self._config, _size(self._env)
         return new_model(
             "td3",
             self._env,
             config.hidden,
             config.activation,
             output=(config.output, config.damping),
-            action_noise=_noise(joints, config.action_noise, config.action_noise_correlation),
+            action_noise=_noise(actions, config.action_noise, config.action_noise_correlation),
             policy_delay=config.policy_delay,
             target_policy_noise=config.target_policy_noise,
             target_noise_clip=2.5 * config.target_policy_noise,
@@ -147,11 +148,18 @@ class TD3Trainer(OffPolicyTrainer):
         )
 
 
-def _noise(joints: int, deviation: float, steps: int) -> ActionNoise:
+def _size(env: VecEnv) -> int:
+    """Numbers of an action."""
+    shape = env.action_space.shape
+    assert shape is not None
+    return int(shape[0])
+
+
+def _noise(actions: int, deviation: float, steps: int) -> ActionNoise:
     """Noise of a standard deviation, with a correlation time in steps."""
-    mean = np.zeros(joints)
+    mean = np.zeros(actions)
     if steps == 1:
-        return NormalActionNoise(mean, np.full(joints, deviation))
+        return NormalActionNoise(mean, np.full(actions, deviation))
     return OrnsteinUhlenbeckActionNoise(
-        mean, np.full(joints, deviation * np.sqrt(2.0 / steps)), theta=1.0 / steps, dt=1.0
+        mean, np.full(actions, deviation * np.sqrt(2.0 / steps)), theta=1.0 / steps, dt=1.0
     )

@@ -15,7 +15,9 @@ from stable_baselines3.common.utils import FloatSchedule
 from stable_baselines3.common.vec_env import VecEnv
 from torch import nn
 
+from baselines.agents.bilinear.processing import Bilinear
 from baselines.training.config.reinforcement import Reinforcement
+from baselines.training.environment.inverse_env import InverseVecEnv
 from baselines.training.environment.learning_env import SpreadVecEnv
 from baselines.training.environment.vec_env import ProcessedVecEnv
 from baselines.training.randomness import episode_seed
@@ -49,11 +51,13 @@ class ReinforcementTrainer(abc.ABC):
     def __init__(self, config: Reinforcement, scenario: Scenario, seed: int) -> None:
         self.processing, self.segments = config.processing, config.segments
         self._config, self._seed = config, seed
-        self._length, self._joints = config.episodes * scenario.steps, scenario.joints
+        # Of an action, in steps of the arm.
+        self._hold = config.hold if config.output == "inverse" else 1
+        self._length = config.episodes * scenario.steps // self._hold
         self._scenario = scenario
         self._episode_lengths = _episode_lengths(scenario.steps, config.initial_episode_steps)
         self._env = self._new_env(self._episode_lengths[0])
-        self._ends = config.n_envs * self._length // self._episode_lengths[0]
+        self._ends = config.n_envs * config.episodes * scenario.steps // self._episode_lengths[0]
         self.model: Any = self._make()
         if config.init is not None:
             begin_from(self.model, config)
@@ -66,7 +70,7 @@ class ReinforcementTrainer(abc.ABC):
     @property
     def steps(self) -> int:
         """Steps that arms have been moved by so far."""
-        return int(self.model.num_timesteps)
+        return int(self.model.num_timesteps) * self._hold
 
     def segment(self, number: int) -> SegmentMetrics:
         """Trains for one segment.
@@ -88,7 +92,7 @@ class ReinforcementTrainer(abc.ABC):
             self._learn()
         metrics = {name: float(value) for name, value in model.logger.name_to_value.items()}
         metrics["rollout/ep_rew_mean"] = float(np.mean([episode["r"] for episode in model.ep_info_buffer]))
-        if self._config.output == "bilinear":  # whose returns are no costs
+        if self._config.output != "velocities":  # whose returns are no costs
             return metrics
         # Of the shorter ones of the curriculum, what a whole one would cost.
         costs = [-episode["r"] * self._scenario.steps / episode["l"] for episode in model.ep_info_buffer]
@@ -116,6 +120,9 @@ class ReinforcementTrainer(abc.ABC):
         config = self._config
         if config.output == "bilinear":
             return SpreadVecEnv(config.n_envs, self._scenario, config.learning)
+        if config.output == "inverse":
+            assert isinstance(self.processing, Bilinear)
+            return InverseVecEnv(config.n_envs, self._scenario, self.processing, config.hold, config.lost_distance)
         # Values are then of the size of rewards: of sums a hundred times as large, the critics would take most of the
         # gradient that is left after it has been clipped.
         scale = max(1.0 - config.gamma, 1e-3)
@@ -126,7 +133,7 @@ class ReinforcementTrainer(abc.ABC):
 
     @property
     def _segment_steps(self) -> int:
-        """Steps of a segment, those of all arms together."""
+        """Actions of a segment, those of all arms together."""
         return int(self._length * self._env.num_envs)
 
     def _callback(self) -> BaseCallback | None:

@@ -30,6 +30,7 @@ BILINEAR = APG(
 CONFIGS = {
     "apg": BILINEAR,
     "apg, damped": BILINEAR.replace(damping=4e-4),
+    "apg, no matrix": BILINEAR.replace(damping=4e-4, matrix=False),
     "apg, skew, end within a segment": BILINEAR.replace(task="skew", steps=20),
     "imitate": Imitate(**SMALL, expert="dls", gradient_steps=5, batch_size=16, example_every=2, buffer_size=70),
     "imitate over dls": Imitate(**OVER, expert="rhc:horizon=5", gradient_steps=5, batch_size=16, algorithm="sac"),

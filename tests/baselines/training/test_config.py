@@ -7,7 +7,7 @@ import json
 import pytest
 
 from baselines.training import presets
-from baselines.training.config.actor_only import Observe
+from baselines.training.config.actor_only import APG, Observe
 from baselines.training.config.base import Config, JointVelocities, differences
 from baselines.training.config.reinforcement import PPO, SAC, TD3
 from baselines.training.methods import METHODS, get
@@ -55,8 +55,12 @@ def test_json_holds_all_of_it(kind):
         (TD3, {"action_noise": -0.1}, InvalidInputError, "action_noise"),
         (PPO, {"output": "bilinar"}, UnknownNameError, "Did you mean 'bilinear'"),
         (PPO, {"output": "bilinear", "base_policy": "dls"}, InvalidInputError, "base_policy: expected none"),
-        (PPO, {"damping": 1e-3}, InvalidInputError, "damping: expected none unless the output is bilinear"),
+        (PPO, {"damping": 1e-3}, InvalidInputError, "damping: expected none for an output of velocities"),
         (PPO, {"output": "bilinear", "lost_distance": 0.0}, InvalidInputError, "lost_distance"),
+        (PPO, {"output": "inverse"}, InvalidInputError, "damping: expected a number"),
+        (TD3, {"output": "inverse", "damping": 1e-2, "hold": 0}, InvalidInputError, "hold"),
+        (APG, {"matrix": False}, InvalidInputError, "damping: expected a number where the network gives no matrix"),
+        (APG, {"matrix": "no"}, InvalidInputError, "matrix: expected true or false"),
         (PPO, {"log_std_end": 3.0}, InvalidInputError, "log_std_end"),
     ],
 )

@@ -160,6 +160,10 @@ def test_files_hold_the_kept_agent(finished):
         ("sac", {"use_sde": True}),
         *((method, {"output": "bilinear"}) for method in ("ppo", "sac", "td3")),
         ("ppo", {"output": "bilinear", "scenario": "panda-random", "damping": 4e-4, "log_std_end": -3.0}),
+        *(
+            (method, {"output": "inverse", "scenario": "panda-random", "damping": 1e-2, "hold": 4})
+            for method in ("ppo", "sac", "td3")
+        ),
     ],
     ids=str,
 )

@@ -28,6 +28,10 @@ NOISY = [
     ("td3", {"action_noise_correlation": 4, "policy_delay": 3}),
 ]
 BILINEAR = [(method, {"output": "bilinear", "scenario": "panda-random"}) for method in METHODS]
+#: Ten actions of two steps an episode.
+INVERSE = [
+    (method, {"output": "inverse", "damping": 1e-2, "hold": 2, "scenario": "panda-random"}) for method in METHODS
+]
 
 
 @pytest.fixture(autouse=True)
@@ -36,7 +40,7 @@ def one_thread():
         yield
 
 
-@pytest.mark.parametrize(("method", "changes"), [*NOISY, *BILINEAR], ids=str)
+@pytest.mark.parametrize(("method", "changes"), [*NOISY, *BILINEAR, *INVERSE], ids=str)
 def test_a_segment_follows_from_state_and_number(method, changes, tmp_path):
     """A trainer that was put where another one stood goes on like that one: same metrics, same weights, same state."""
     config = tiny(method, **changes)

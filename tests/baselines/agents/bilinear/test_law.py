@@ -12,10 +12,10 @@ from baselines.agents.network import Network
 from tests.baselines.agents.bilinear.test_bilinear import OFFSETS, batch_of, problem_of
 
 
-@pytest.mark.parametrize("damping", [None, 1e-3])
+@pytest.mark.parametrize("inverse", [{}, {"damping": 1e-3}, {"damping": 1e-3, "matrix": False}], ids=str)
 @pytest.mark.parametrize(("arm", "task"), [("varga7", "pose"), ("tiago", "axis"), ("varga7", "position")])
-def test_one_call_is_the_three_parts(arm, task, damping):
-    problem, processing = problem_of(arm, task), Bilinear(OFFSETS, damping)
+def test_one_call_is_the_three_parts(arm, task, inverse):
+    problem, processing = problem_of(arm, task), Bilinear(OFFSETS, **inverse)
     batch, rng = batch_of(problem), np.random.default_rng(3)
     sizes = processing.size(problem), 16, processing.outputs(problem)
     network = Network(

@@ -1,0 +1,165 @@
+"""N arms whose actions say how a damped inverse is weighed, for some steps at a time."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import torch
+from gymnasium import spaces
+from stable_baselines3.common.vec_env import VecEnv
+from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices
+
+from baselines.agents.bilinear.processing import Bilinear
+from baselines.agents.features import Features
+from baselines.training.environment.view import aligned
+from baselines.training.gradients.arms import Arms
+from baselines.training.gradients.law import Law
+from ikgym import scenarios
+from ikgym.exceptions import InvalidInputError
+from ikgym.scenarios import Scenario
+from ikgym.validation import FloatArray, number, whole_number
+
+#: Steps that the usual cost counts as much as, in the mean cost of an episode so far.
+PRIOR = 100.0
+
+
+class InverseVecEnv(VecEnv):
+    """N arms that follow their paths by a weighted damped inverse, of which an agent says what is free.
+
+    An action is what the network of a :class:`Bilinear` without `matrix` gives: the null motion h, ln λ and ln U, each
+    within ±1. It is held for `hold` steps, with feedback at each of them. Noise of exploration then moves the arm in its
+    null space, rather than off its path, and is the same for long enough to count. The steps between two actions are one
+    call of the kernel that gradients go through, see :mod:`baselines.training.gradients.segment`.
+
+    | | |
+    |---|---|
+    | observation | the features of the processing |
+    | reward | −ln(1 + c), with c the mean cost of these steps ÷ that of the episode so far |
+    | terminated | the episode is over, which the features show ahead |
+    | truncated | the arm is farther than `lost_distance` from its path, on which it then goes on; it gains nothing by that |
+
+    Args:
+        num_envs: N. A reset spreads them over their episodes.
+        scenario: What is to be tracked: on an ideal plant, along joint paths or not.
+        processing: What is seen; without `matrix`.
+        hold: Steps of an action, a divisor of those of the scenario.
+        lost_distance: In [m], above 0.
+
+    Raises:
+        InvalidInputError: A value is refused, or the scenario is none that gradients could go through.
+    """  # noqa: E501  # a table
+
+    def __init__(
+        self, num_envs: int, scenario: Scenario, processing: Bilinear, hold: int, lost_distance: float
+    ) -> None:
+        if processing.matrix:
+            raise InvalidInputError("processing: expected one without a matrix, got one with it.")
+        self._hold = whole_number("hold", hold, at_least=1)
+        if scenario.steps % self._hold:
+            raise InvalidInputError(
+                f"hold: expected a divisor of the {scenario.steps} steps of an episode, got {hold}."
+            )
+        self._lost_distance = number("lost_distance", lost_distance, above=0.0)
+        self._law, self._scenario = Law(scenario, processing), scenario
+        self._arms = Arms(scenario, num_envs, processing.offsets)
+        self._follows = scenario.nominal_joint_path(scenarios.SPLITS["train"].start) is not None
+        self._generator = np.random.default_rng()
+        self._returns, self._lengths = np.zeros(num_envs), np.zeros(num_envs, dtype=np.int64)
+        unbounded = spaces.Box(-np.inf, np.inf, (self._law.inputs,), np.float32)
+        self.render_mode = None
+        super().__init__(num_envs, unbounded, spaces.Box(-1.0, 1.0, (self._law.outputs,), np.float32))
+
+    def seed(self, seed: int | None = None) -> list[int | None]:
+        """The seed of all episodes from the next reset on."""
+        self._generator = np.random.default_rng(seed)
+        return [seed] * self.num_envs
+
+    def reset(self) -> Features:
+        """Begins new episodes, spread over their steps, of the split `train`. Returns shape (N, f)."""
+        rows, actions = np.arange(self.num_envs), self._scenario.steps // self._hold
+        self._begin(rows, rows * actions // self.num_envs * self._hold if self._follows else np.zeros_like(rows))
+        self._returns[:], self._lengths[:] = 0.0, 0
+        return self._see()
+
+    def step_async(self, actions: npt.NDArray[Any]) -> None:
+        """Takes actions. Shape (N, 2 n + 1)."""
+        given = np.asarray(actions, dtype=np.float64)
+        if given.shape != (self.num_envs, self._law.outputs) or not np.isfinite(given).all():
+            raise InvalidInputError(
+                f"actions: expected finite numbers of shape {(self.num_envs, self._law.outputs)}, got {actions!r}."
+            )
+        self._actions = np.clip(given, -1.0, 1.0)
+
+    def step_wait(self) -> tuple[Features, npt.NDArray[np.float32], npt.NDArray[np.bool_], list[dict[str, Any]]]:
+        """Moves all arms by `hold` steps, and begins new episodes where one has ended.
+
+        Returns:
+            Features of shape (N, f), rewards and ends of shape (N,), one info a row.
+        """
+        arms = self._arms
+        costs, distance = self._move()
+        rewards, over, lost = -np.log1p(costs), arms.ended, distance > self._lost_distance
+        self._returns += rewards
+        self._lengths += self._hold
+        ends = over | lost
+        infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        if ends.any():
+            last = self._see()
+            for row in np.flatnonzero(ends).tolist():
+                summary = {"r": float(self._returns[row]), "l": int(self._lengths[row]), "t": 0.0}
+                truncated = bool(not over[row])
+                infos[row] = {"terminal_observation": last[row], "episode": summary, "TimeLimit.truncated": truncated}
+            self._returns[ends], self._lengths[ends] = 0.0, 0
+            arms.give_up(np.flatnonzero(lost & ~over))
+            self._begin(np.flatnonzero(over), np.zeros(int(over.sum()), dtype=np.int64))
+        return self._see(), rewards.astype(np.float32), ends, infos
+
+    def close(self) -> None:
+        """Nothing is open; closing does nothing."""
+
+    def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
+        """An attribute that all rows share."""
+        return [getattr(self, attr_name) for _ in self._get_indices(indices)]
+
+    def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
+        """Rows have no attributes of their own.
+
+        Raises:
+            AttributeError: Always.
+        """
+        raise AttributeError(f"{attr_name}: the arms of {type(self).__name__} have no attributes of their own.")
+
+    def env_method(
+        self, method_name: str, *method_args: Any, indices: VecEnvIndices = None, **method_kwargs: Any
+    ) -> list[Any]:
+        """Rows have no methods of their own.
+
+        Raises:
+            AttributeError: Always.
+        """
+        raise AttributeError(f"{method_name}: the arms of {type(self).__name__} have no methods of their own.")
+
+    def env_is_wrapped(self, wrapper_class: Any, indices: VecEnvIndices = None) -> list[bool]:
+        """No row is wrapped."""
+        return [False for _ in self._get_indices(indices)]
+
+    def _begin(self, rows: npt.NDArray[np.int64], first: npt.NDArray[np.int64]) -> None:
+        train = scenarios.SPLITS["train"]
+        self._arms.begin(rows, self._generator.integers(train.start, train.stop, len(rows)), first)
+
+    def _see(self) -> Features:
+        with torch.no_grad():
+            self._features, self._speed = self._law.features(self._arms.q, self._arms.ahead, self._arms.remaining)
+        return aligned(self._features.numpy().astype(np.float32))
+
+    def _move(self) -> tuple[FloatArray, FloatArray]:
+        """The mean cost of each arm, ÷ that of its episode so far, and how far it is from its path in [m]."""
+        arms = self._arms
+        with torch.no_grad():
+            held = self._law.held(arms.q, self._features, torch.from_numpy(self._actions))
+            rows = arms.rows(self._hold, self._speed)
+            arms.q, arms.qdot, costs, distance = self._law.move(arms.q, arms.qdot, held, rows, PRIOR)
+        arms.made += self._hold
+        return costs.numpy() / self._hold, distance

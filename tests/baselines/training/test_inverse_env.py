@@ -1,0 +1,151 @@
+"""Arms whose actions weigh a damped inverse: they move as the agent does, and lose nothing by what is not a path."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from stable_baselines3 import PPO
+
+from baselines.agents.bilinear.processing import Bilinear
+from baselines.training.environment.inverse_env import InverseVecEnv
+from baselines.training.environment.view import View
+from baselines.training.randomness import deterministic_torch
+from baselines.training.trainers.models import network_outputs
+from baselines.training.validation import played
+from ikgym import scenarios
+from ikgym.exceptions import InvalidInputError
+from ikgym.simulator import observation
+from tests.comparison import identical
+
+SEEN = Bilinear((1, 10, 40), 1e-2, matrix=False)
+SCENARIO = scenarios.get("varga7-pose-random").replace(steps=40)
+
+
+@pytest.fixture(autouse=True)
+def one_thread():
+    with deterministic_torch():
+        yield
+
+
+def made(rows=3, scenario=SCENARIO, hold=4, lost_distance=0.05):
+    envs = InverseVecEnv(rows, scenario, SEEN, hold, lost_distance)
+    envs.seed(5)
+    return envs
+
+
+def actions_of(envs, seed=0):
+    return np.random.default_rng(seed).uniform(-1.0, 1.0, (envs.num_envs, *envs.action_space.shape))
+
+
+def test_an_action_of_each_step_is_that_of_the_agent():
+    """With hold = 1, from the start of an episode: the joint coordinates and the cost are those of the simulator."""
+    envs = made(rows=1, hold=1, scenario=scenarios.get("panda-random").replace(steps=12))
+    envs.reset()
+    outputs, seed, rewards, features = [], int(envs._arms.seed[0]), [], []
+    for step in range(12):
+        outputs.append(actions_of(envs, step))
+        features.append(envs._features.numpy().copy())
+        rewards.append(envs.step(outputs[-1])[1][0])
+    view, asked = View(SEEN, envs._scenario), iter(outputs)
+    seen = []
+
+    def act(out):
+        seen.append(view.see(observation(out), np.zeros(1, dtype=np.bool_)))
+        return view.act(next(asked))
+
+    costs, *_ = played(envs._scenario, [seed], act, view.preview)
+    np.testing.assert_allclose(np.array(features)[:, 0], np.array(seen)[:, 0], rtol=1e-6, atol=1e-7)
+    assert costs[0] == pytest.approx(envs_cost(envs, seed, outputs), rel=1e-6)
+    assert np.all(np.array(rewards) < 0.0)
+
+
+def envs_cost(envs, seed, outputs):
+    """What an episode costs by the law of gradients."""
+    envs._arms.begin(np.array([0]), np.array([seed]), np.array([0]))
+    envs._see()
+    for output in outputs:
+        envs.step_async(output)
+        envs._move()
+        envs._see()
+    return envs._arms.spent[0]
+
+
+def test_rewards_compare_with_the_episode_so_far():
+    """−ln(1 + c): an arm that always costs the same has c near 1."""
+    envs = made()
+    envs.reset()
+    envs.step_async(np.zeros((3, *envs.action_space.shape)))
+    before = envs._arms.spent.copy(), envs._arms.played.copy()
+    state = envs._arms.state()
+    costs, distance = envs._move()
+    assert (envs._arms.spent > before[0]).all()
+    assert (envs._arms.played == before[1] + 4).all()
+    envs._arms.restore(state)
+    envs._see()
+    _, rewards, ends, _ = envs.step(np.zeros((3, *envs.action_space.shape)))
+    np.testing.assert_allclose(rewards, -np.log1p(costs), rtol=1e-6)
+    assert not ends.any()
+    assert (distance < 0.05).all()
+
+
+def test_episodes_end_and_lost_arms_go_on_where_their_path_is():
+    envs = made(rows=4)
+    envs.reset()
+    assert envs._arms.made.tolist() == [0, 8, 20, 28]  # spread over ten actions
+    ended = []
+    for _ in range(10):
+        _, _, ends, infos = envs.step(np.zeros((4, *envs.action_space.shape)))
+        ended += [(row, infos[row]["episode"]["l"]) for row in np.flatnonzero(ends)]
+        assert all(not infos[row]["TimeLimit.truncated"] for row in np.flatnonzero(ends))
+        assert all(infos[row]["terminal_observation"].shape == (envs._law.inputs,) for row in np.flatnonzero(ends))
+    assert sorted(ended) == [(0, 40), (1, 32), (2, 20), (3, 12)]
+    strict = made(lost_distance=1e-12)
+    strict.reset()
+    made_so_far = strict._arms.made.copy()
+    _, _, ends, infos = strict.step(np.zeros((3, *strict.action_space.shape)))
+    assert ends.all()
+    assert all(info["TimeLimit.truncated"] for info in infos)
+    assert identical(strict._arms.made, made_so_far + 4)
+    on_path = strict._arms._path[np.arange(3), strict._arms.made]
+    assert identical(strict._arms.q.numpy(), on_path)
+
+
+def test_the_same_seed_is_the_same_run():
+    a, b = made(), made()
+    for envs in (a, b):
+        envs.reset()
+    for step in range(12):
+        first, second = (envs.step(actions_of(envs, step)) for envs in (a, b))
+        assert all(identical(x, y) for x, y in zip(first[:3], second[:3], strict=True))
+
+
+def test_ppo_of_stable_baselines3_learns_in_it():
+    envs = made()
+    model = PPO("MlpPolicy", envs, n_steps=10, batch_size=15, device="cpu", seed=0)
+    before = network_outputs(model, envs.reset())
+    model.learn(60)
+    assert not identical(network_outputs(model, envs.reset()), before)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"hold": 3}, "hold: expected a divisor of the 40 steps"),
+        ({"hold": 0}, "hold"),
+        ({"lost_distance": 0.0}, "lost_distance"),
+        ({"scenario": scenarios.get("panda-field")}, "ideal plant"),
+    ],
+)
+def test_bad_settings(changes, message):
+    with pytest.raises(InvalidInputError, match=message):
+        made(**changes)
+
+
+def test_bad_processing_and_actions():
+    with pytest.raises(InvalidInputError, match="without a matrix"):
+        InverseVecEnv(2, SCENARIO, Bilinear((1, 10), 1e-2), 4, 0.05)
+    envs = made()
+    envs.reset()
+    for bad in (np.zeros((2, 15)), np.full((3, 15), np.nan)):
+        with pytest.raises(InvalidInputError, match=r"actions: expected finite numbers of shape \(3, 15\)"):
+            envs.step(bad)
