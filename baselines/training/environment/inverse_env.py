@@ -23,6 +23,8 @@ from ikgym.validation import FloatArray, number, whole_number
 
 #: Steps that the usual cost counts as much as, in the mean cost of an episode so far.
 PRIOR = 100.0
+#: What agents see.
+SEEN = Bilinear(damping=1e-2, matrix=False)
 
 
 class InverseVecEnv(VecEnv):
@@ -40,20 +42,30 @@ class InverseVecEnv(VecEnv):
     | terminated | the episode is over, which the features show ahead |
     | truncated | the arm is farther than `lost_distance` from its path, on which it then goes on; it gains nothing by that |
 
+    >>> from stable_baselines3 import TD3
+    >>> model = TD3("MlpPolicy", InverseVecEnv(64, "panda-random"))
+
     Args:
         num_envs: N. A reset spreads them over their episodes.
-        scenario: What is to be tracked: on an ideal plant, along joint paths or not.
+        scenario: A scenario or what names one, see `ikgym.scenarios.find`; its plant is ideal.
         processing: What is seen; without `matrix`.
         hold: Steps of an action, a divisor of those of the scenario.
         lost_distance: In [m], above 0.
 
     Raises:
+        UnknownNameError: There is no such scenario.
         InvalidInputError: A value is refused, or the scenario is none that gradients could go through.
     """  # noqa: E501  # a table
 
     def __init__(
-        self, num_envs: int, scenario: Scenario, processing: Bilinear, hold: int, lost_distance: float
+        self,
+        num_envs: int,
+        scenario: str | Scenario,
+        processing: Bilinear = SEEN,
+        hold: int = 20,
+        lost_distance: float = 0.05,
     ) -> None:
+        scenario = scenarios.find(scenario)
         if processing.matrix:
             raise InvalidInputError("processing: expected one without a matrix, got one with it.")
         self._hold = whole_number("hold", hold, at_least=1)
@@ -62,7 +74,7 @@ class InverseVecEnv(VecEnv):
                 f"hold: expected a divisor of the {scenario.steps} steps of an episode, got {hold}."
             )
         self._lost_distance = number("lost_distance", lost_distance, above=0.0)
-        self._law, self._scenario = Law(scenario, processing), scenario
+        self._law, self.scenario, self.processing = Law(scenario, processing), scenario, processing
         self._arms = Arms(scenario, num_envs, processing.offsets)
         self._follows = scenario.nominal_joint_path(scenarios.SPLITS["train"].start) is not None
         self._generator = np.random.default_rng()
@@ -78,7 +90,7 @@ class InverseVecEnv(VecEnv):
 
     def reset(self) -> Features:
         """Begins new episodes, spread over their steps, of the split `train`. Returns shape (N, f)."""
-        rows, actions = np.arange(self.num_envs), self._scenario.steps // self._hold
+        rows, actions = np.arange(self.num_envs), self.scenario.steps // self._hold
         self._begin(rows, rows * actions // self.num_envs * self._hold if self._follows else np.zeros_like(rows))
         self._returns[:], self._lengths[:] = 0.0, 0
         return self._see()

@@ -46,14 +46,14 @@ def test_an_action_of_each_step_is_that_of_the_agent():
         outputs.append(actions_of(envs, step))
         features.append(envs._features.numpy().copy())
         rewards.append(envs.step(outputs[-1])[1][0])
-    view, asked = View(SEEN, envs._scenario), iter(outputs)
+    view, asked = View(SEEN, envs.scenario), iter(outputs)
     seen = []
 
     def act(out):
         seen.append(view.see(observation(out), np.zeros(1, dtype=np.bool_)))
         return view.act(next(asked))
 
-    costs, *_ = played(envs._scenario, [seed], act, view.preview)
+    costs, *_ = played(envs.scenario, [seed], act, view.preview)
     np.testing.assert_allclose(np.array(features)[:, 0], np.array(seen)[:, 0], rtol=1e-6, atol=1e-7)
     assert costs[0] == pytest.approx(envs_cost(envs, seed, outputs), rel=1e-6)
     assert np.all(np.array(rewards) < 0.0)

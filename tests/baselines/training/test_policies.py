@@ -14,6 +14,8 @@ from stable_baselines3 import PPO, SAC, TD3
 import baselines
 import ikgym
 import ikgym.sb3
+from baselines.training.environment.inverse_env import InverseVecEnv
+from baselines.training.environment.view import View
 from baselines.training.exporting import export
 from baselines.training.policies import BilinearPPOPolicy, BilinearSACPolicy, BilinearTD3Policy
 from ikgym import rl
@@ -62,6 +64,25 @@ def test_models_learn_and_act_the_same_from_their_file(tmp_path, kind, policy, p
         features, *_, info = env.step(said)
         seen, *_, same = plain.step(action)
         assert info["position_error"] == pytest.approx(same["position_error"], rel=1e-5)
+
+
+@pytest.mark.parametrize(("kind", "parameters"), [(PPO, SHORT), (SAC, LATE), (TD3, LATE)])
+def test_models_that_weigh_an_inverse_act_the_same_from_their_file(tmp_path, kind, parameters):
+    """What the model says of the features that the agent sees is what the agent does."""
+    envs = InverseVecEnv(2, scenario(), hold=4)
+    policy = {"policy_kwargs": {"net_arch": [8, 8]}}
+    model = kind("MlpPolicy", envs, device="cpu", seed=0, **parameters, **policy).learn(32)
+    export(model, envs, tmp_path / "agent.safetensors")
+    agent = baselines.make("agent", scenario(), path=str(tmp_path / "agent.safetensors"))
+    view = View(envs.processing, scenario())
+    env = ikgym.RedundantIKEnv(scenario(), preview=agent.preview)
+    seen, _ = env.reset(seed=1)
+    for _ in range(5):
+        batch = {key: value[None] for key, value in seen.items()}
+        said, _ = model.predict(view.see(batch, np.zeros(1, dtype=np.bool_)), deterministic=True)
+        action, _ = agent.predict(seen)
+        np.testing.assert_allclose(action, view.act(said)[0], rtol=1e-5, atol=1e-7)
+        seen, *_ = env.step(action)
 
 
 @pytest.mark.parametrize(
