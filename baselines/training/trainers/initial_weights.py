@@ -12,7 +12,10 @@ from torch import nn
 from baselines.training.config.base import Config
 from baselines.training.errors import TrainingError
 from baselines.training.trainers.model_file import InitialWeights, load_weights
-from baselines.training.trainers.models import algorithm_of, mean_network, squash_of
+from baselines.training.trainers.models import algorithm_of, mean_network, squash_of_model
+
+#: Methods that can go on with an agent, by how it keeps its outputs within ±1.
+FITTING: dict[str, str] = {"clip": "ppo", "tanh": "sac or td3", "linear": "the method that made it"}
 
 
 def inherit(config: Config, given: Collection[str]) -> Config:
@@ -55,13 +58,12 @@ def begin_from(model: BaseAlgorithm, config: Config) -> None:
     assert config.init is not None
     file, algorithm = load_weights(config.init), algorithm_of(model)
     _check_processing(file, config)
-    if file.network.squash != "linear" and file.network.squash != squash_of(algorithm):
-        fitting = "ppo" if file.network.squash == "clip" else "sac or td3"
+    if file.network.squash != squash_of_model(model):
         raise TrainingError(
-            f"{algorithm} keeps network outputs within ±1 by {squash_of(algorithm)}, the agent of {file.source} by "
-            f"{file.network.squash}: the same weights would be another agent. Go on with {fitting}, or imitate it by a "
-            f"model that {algorithm} can go on with: imitate --expert agent:FILE --algorithm {algorithm}, with FILE "
-            "its agent.safetensors."
+            f"{algorithm} keeps network outputs within ±1 by {squash_of_model(model)}, the agent of {file.source} by "
+            f"{file.network.squash}: the same weights would be another agent. Go on with "
+            f"{FITTING[file.network.squash]}, or imitate it by a model that {algorithm} can go on with: imitate "
+            f"--expert agent:FILE --algorithm {algorithm}, with FILE its agent.safetensors."
         )
     if file.algorithm == algorithm:
         _load_policy(model, file)
@@ -82,11 +84,17 @@ def begin_actor_from(actor: nn.Sequential, config: Config) -> None:
 
     Raises:
         ResultsError: The file cannot be read.
-        TrainingError: It has another shape.
+        TrainingError: It has another shape, or keeps its outputs within ±1, which this actor does not.
     """
     assert config.init is not None
     file = load_weights(config.init)
     _check_processing(file, config)
+    if file.network.squash != "linear":
+        raise TrainingError(
+            f"{config.method} does not keep network outputs within ±1, the agent of {file.source} does by "
+            f"{file.network.squash}: the same weights would be another agent. Go on with "
+            f"{FITTING[file.network.squash]}."
+        )
     _load_actor(actor, file)
 
 

@@ -45,7 +45,7 @@ def sources(tmp_path_factory):
 
 
 def begun(method, file, **changes):
-    config = inherit(tiny(method, init=file, scenario="varga7-random", **changes), ())
+    config = inherit(tiny(method, init=file, **{"scenario": "varga7-random", **changes}), ())
     reseed(0, None)
     return methods.get(method).make(config, config.make_scenario(), 0)
 
@@ -104,6 +104,23 @@ def test_what_is_seen_comes_with_the_file(sources):
 def test_another_squashing_is_another_agent(sources, source, method, fitting):
     with pytest.raises(TrainingError, match=rf"Go on with {fitting}, or imitate .* --algorithm {method}"):
         begun(method, sources[source] / "model.safetensors")
+
+
+def test_agents_that_weigh_an_inverse_are_gone_on_with(tmp_path):
+    """SAC goes on with TD3; a network of apg, whose outputs are not kept within ±1, is another agent."""
+    inverse = {"output": "inverse", "damping": 1e-2, "hold": 2, "scenario": "panda-random"}
+    apg = {"scenario": "panda-random", "task": "pose", "damping": 1e-2, "matrix": False, "offsets": (1, 2, 10)}
+    for method, changes in (("td3", inverse), ("apg", apg)):
+        train(tiny(method, **changes), 3, tmp_path / method)
+    files = {method: tmp_path / method / "agent.safetensors" for method in ("td3", "apg")}
+    trainer = begun("sac", files["td3"], **inverse)
+    features = np.random.default_rng(0).normal(size=(20, trainer.model.observation_space.shape[0])).astype(np.float32)
+    wanted = model_file.load_weights(files["td3"]).network.forward(features)
+    np.testing.assert_allclose(network_outputs(trainer.model, features), wanted, atol=1e-6)
+    with pytest.raises(TrainingError, match="td3 keeps network outputs within ±1 by tanh"):
+        begun("td3", files["apg"], **inverse)
+    with pytest.raises(TrainingError, match=r"apg does not keep network outputs within ±1.*Go on with sac or td3"):
+        begun("apg", files["td3"], **apg)
 
 
 def test_files_that_do_not_do(sources, tmp_path):
