@@ -39,7 +39,7 @@ class Reinforcement(Annealed, JointVelocities):
     """Position error in [m] at which an episode ends in training, unless the output is velocities."""
     hold: Annotated[int, tyro.conf.arg(metavar="N")] = 10
     """Steps for which an output that is inverse is held, with feedback at every step: a divisor of those of an episode.
-    Steps of n_steps, train_freq and gamma are then as many steps of the arm."""
+    A step of n_steps, train_freq and gamma is then as many of the arm."""
     largest: Annotated[float, tyro.conf.arg(metavar="X")] = Learning.largest
     """Largest velocity of a joint of bilinear agents, in units of what is asked for."""
     furthest: Annotated[float, tyro.conf.arg(metavar="X")] = Learning.furthest
