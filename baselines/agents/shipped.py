@@ -44,7 +44,7 @@ class ShippedAgent(LearnedPolicy):
 class AgentAlone(ShippedAgent):
     """Learned agent that stands alone, trained on `varga7-random` by apg."""
 
-    hash: str = "11a3d096b4d5"
+    hash: str = "60af3a9d70c8"
 
     name: ClassVar[str] = "agent_alone"
 
