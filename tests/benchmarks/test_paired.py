@@ -49,7 +49,10 @@ def test_unknown_names_are_told(tmp_path):
         paired.main(["--agents", str(tmp_path), "--out", str(tmp_path / "x.json"), "--beside", "dlss"])
 
 
-@pytest.mark.parametrize(("file", "seeds"), [("agents.json", 5), ("agents_long.json", 1), ("agents_td3.json", 3)])
+@pytest.mark.parametrize(
+    ("file", "seeds"),
+    [("agents.json", 5), ("agents_long.json", 1), ("agents_long_skew.json", 1), ("agents_td3.json", 3)],
+)
 def test_the_page_has_the_table_of_what_was_played(file, seeds):
     page = (DOCS / "agents.md").read_text(encoding="utf-8")
     table = page.split(f"<!-- beside {file} -->\n")[1].split("\n<!-- end -->")[0]
