@@ -238,8 +238,8 @@ class SAC(OffPolicy, _StateDependentExploration):
     ent_coef: Annotated[str, tyro.conf.arg(metavar="C")] = "auto_0.01"
     """Weight of the entropy: auto_X is tuned from X on, auto from 1 on; a number is fixed."""
     target_entropy: Annotated[float | None, tyro.conf.arg(metavar="NAT")] = None
-    """Entropy in [nat] of all joints together that ent_coef is tuned for. −3 a joint if left out; Stable-Baselines3
-    takes −1, which is too much noise here."""
+    """Entropy in [nat] of a whole action that ent_coef is tuned for. −3 for each of its numbers if left out;
+    Stable-Baselines3 takes −1, which is too much noise here."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
