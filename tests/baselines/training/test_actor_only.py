@@ -78,24 +78,24 @@ def test_ordinary_models_come_out(config):
     assert trainer.steps == config.n_envs * played
 
 
-@pytest.mark.parametrize("damping", [None, 4e-2])
-def test_gradient_of_a_window_is_that_of_its_loss(damping):
+@pytest.mark.parametrize("inverse", [{}, {"damping": 4e-2}, {"damping": 4e-2, "matrix": False}], ids=str)
+def test_gradient_of_a_window_is_that_of_its_loss(inverse):
     """Along a direction in the space of weights, against central differences: through arm, features and network."""
     # So long a prior makes the weights of the costs constant; they are not differentiated.
     many = {"max_gradient_share": 1e9, "cost_prior_steps": 1e12, "reset_distance": 1e9}
     config = BILINEAR.replace(
-        hidden=(16,), n_envs=6, activation="tanh", segment_steps=24, window=(24,), damping=damping, **many
+        hidden=(16,), n_envs=6, activation="tanh", segment_steps=24, window=(24,), **inverse, **many
     )
     losses, slope = {}, 0.0
     for along in (0.0, 1e-6, -1e-6):
         trainer = made(config)
-        trainer._actor.double()  # in single precision features are rounded by more than what is looked for
-        parameters, generator = list(trainer._actor.parameters()), torch.Generator().manual_seed(5)
+        trainer.actor.double()  # in single precision features are rounded by more than what is looked for
+        parameters, generator = list(trainer.actor.parameters()), torch.Generator().manual_seed(5)
         direction = [torch.randn(parameter.shape, generator=generator).double() for parameter in parameters]
         with torch.no_grad():
             for parameter, part in zip(parameters, direction, strict=True):
                 parameter.add_(part, alpha=0.02 + along)
-        loss, lost = trainer._window(24, np.random.default_rng(0))
+        loss, lost = trainer.window(24, np.random.default_rng(0))
         losses[along] = loss.item()
         assert lost == 0
         if along == 0.0:
@@ -138,7 +138,7 @@ def test_a_run_of_apg_repeats_and_goes_on(tmp_path):
 def test_lost_arms_are_put_back_on_their_path():
     """Where the reference joint path is then, and their costs so far forgotten; the others go on."""
     trainer = made(BILINEAR)
-    trainer._window(16, np.random.default_rng(0))
+    trainer.window(16, np.random.default_rng(0))
     arms, made_before, spent = trainer._arms, trainer._arms.made.copy(), trainer._arms.spent.copy()
     trainer._far[:] = [0.0, 0.31, 0.29, 5.0]
     q = arms.q.detach().numpy().copy()
