@@ -28,7 +28,7 @@ from baselines.training import presets
 from baselines.training.config.actor_only import APG
 from baselines.training.config.base import Config
 from baselines.training.config.reinforcement import PPO
-from baselines.training.randomness import sequence
+from baselines.training.randomness import deterministic_torch, reseed, sequence
 from baselines.training.trainers.apg import APGTrainer
 from baselines.training.trainers.models import mean_network
 from baselines.training.trainers.ppo import PPOTrainer
@@ -90,9 +90,7 @@ def noise_of(gradients: FloatArray) -> Noise:
     Raises:
         InvalidInputError: There are less than three.
     """
-    count = len(gradients)
-    if count < 3:
-        raise InvalidInputError(f"batches: expected at least 3, got {count}.")
+    count = _enough(len(gradients))
     products = gradients @ gradients.T
     size = float(np.trace(products)) / count
     # |G|² without each batch in turn, whose spread gives the standard error (jackknife).
@@ -113,8 +111,10 @@ def of_ppo(config: PPO, seed: int) -> Batches:
         config: In the first `critic_warmup` segments the critic is trained.
         seed: Of the actor and of the paths.
     """
+    reseed(seed, None)
     trainer = PPOTrainer(config, config.make_scenario(), seed)
     for segment in tqdm(range(config.critic_warmup), desc="critic", unit="segment"):
+        reseed(seed, segment)
         trainer.segment(segment)
     model, hold = trainer.model, config.hold if config.output == "inverse" else 1
     weights = list(mean_network(model).parameters())
@@ -139,6 +139,7 @@ def of_apg(config: APG, seed: int) -> Batches:
         config: Whose windows they are.
         seed: Of the actor and of the paths.
     """
+    reseed(seed, None)
     trainer, steps = APGTrainer(config, config.make_scenario(), seed), config.window[-1]
     generator = np.random.default_rng(sequence(seed, 0))
 
@@ -157,8 +158,7 @@ def lines(command: Command) -> list[str]:
         UnknownNameError: There is no such method or preset.
         InvalidInputError: There are less than three batches.
     """
-    if command.batches < 3:
-        raise InvalidInputError(f"batches: expected at least 3, got {command.batches}.")
+    _enough(command.batches)
     rows = []
     for given in command.gradients:
         method, _, preset = given.partition("=")
@@ -171,6 +171,13 @@ def lines(command: Command) -> list[str]:
         numbers = math.sqrt(scale), scale * batches.steps, scale * spent
         rows.append((given, f"{batches.steps:,}", *(f"{above}{number(x)}" for x in numbers)))
     return table(HEAD, rows, text=[0])
+
+
+def _enough(batches: int) -> int:
+    """Insists on as many batches as a standard error needs."""
+    if batches < 3:
+        raise InvalidInputError(f"batches: expected at least 3, got {batches}.")
+    return batches
 
 
 def _batches(method: str, preset: str, command: Command) -> Batches:
@@ -200,7 +207,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         arguments: Of the command line; those of this process if left out.
     """
     command = tyro.cli(Command, prog="python -m benchmarks.gradient_noise", description=__doc__, args=arguments)
-    print("\n".join(lines(command)))
+    with deterministic_torch():
+        print("\n".join(lines(command)))
 
 
 if __name__ == "__main__":

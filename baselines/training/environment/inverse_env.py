@@ -13,16 +13,15 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices
 
 from baselines.agents.bilinear.processing import Bilinear
 from baselines.agents.features import Features
+from baselines.training.config.actor_only import APG
 from baselines.training.environment.view import aligned
 from baselines.training.gradients.arms import Arms
 from baselines.training.gradients.law import Law
 from ikgym import scenarios
-from ikgym.exceptions import InvalidInputError
+from ikgym.exceptions import InvalidInputError, NoAttributeError, ResetNeededError
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray, number, whole_number
 
-#: Steps that the usual cost counts as much as, in the mean cost of an episode so far.
-PRIOR = 100.0
 #: What agents see.
 SEEN = Bilinear(damping=1e-2, matrix=False)
 
@@ -76,8 +75,7 @@ class InverseVecEnv(VecEnv):
         self._lost_distance = number("lost_distance", lost_distance, above=0.0)
         self._law, self.scenario, self.processing = Law(scenario, processing), scenario, processing
         self._arms = Arms(scenario, num_envs, processing.offsets)
-        self._follows = scenario.nominal_joint_path(scenarios.SPLITS["train"].start) is not None
-        self._generator = np.random.default_rng()
+        self._generator, self._reset = np.random.default_rng(), False
         self._returns, self._lengths = np.zeros(num_envs), np.zeros(num_envs, dtype=np.int64)
         unbounded = spaces.Box(-np.inf, np.inf, (self._law.inputs,), np.float32)
         self.render_mode = None
@@ -90,13 +88,20 @@ class InverseVecEnv(VecEnv):
 
     def reset(self) -> Features:
         """Begins new episodes, spread over their steps, of the split `train`. Returns shape (N, f)."""
-        rows, actions = np.arange(self.num_envs), self.scenario.steps // self._hold
-        self._begin(rows, rows * actions // self.num_envs * self._hold if self._follows else np.zeros_like(rows))
+        self._arms.spread(self._generator, self._hold)
         self._returns[:], self._lengths[:] = 0.0, 0
+        self._reset = True
         return self._see()
 
     def step_async(self, actions: npt.NDArray[Any]) -> None:
-        """Takes actions. Shape (N, 2 n + 1)."""
+        """Takes actions. Shape (N, 2 n + 1).
+
+        Raises:
+            InvalidInputError: They have another shape, or are not finite.
+            ResetNeededError: Nothing has been reset yet.
+        """
+        if not self._reset:
+            raise ResetNeededError("Actions need something that was seen: call reset() first.")
         given = np.asarray(actions, dtype=np.float64)
         if given.shape != (self.num_envs, self._law.outputs) or not np.isfinite(given).all():
             raise InvalidInputError(
@@ -120,28 +125,34 @@ class InverseVecEnv(VecEnv):
         if ends.any():
             last = self._see()
             for row in np.flatnonzero(ends).tolist():
-                summary = {"r": float(self._returns[row]), "l": int(self._lengths[row]), "t": 0.0}
+                summary = {"r": float(self._returns[row]), "l": int(self._lengths[row])}
                 truncated = bool(not over[row])
                 infos[row] = {"terminal_observation": last[row], "episode": summary, "TimeLimit.truncated": truncated}
             self._returns[ends], self._lengths[ends] = 0.0, 0
             arms.give_up(np.flatnonzero(lost & ~over))
-            self._begin(np.flatnonzero(over), np.zeros(int(over.sum()), dtype=np.int64))
+            arms.begin_new(np.flatnonzero(over), self._generator)
         return self._see(), rewards.astype(np.float32), ends, infos
 
     def close(self) -> None:
         """Nothing is open; closing does nothing."""
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
-        """An attribute that all rows share."""
+        """An attribute that all rows share.
+
+        Raises:
+            NoAttributeError: They have none of that name.
+        """
+        if not hasattr(self, attr_name):
+            raise NoAttributeError(f"{type(self).__name__} has no attribute {attr_name!r}.")
         return [getattr(self, attr_name) for _ in self._get_indices(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
         """Rows have no attributes of their own.
 
         Raises:
-            AttributeError: Always.
+            NoAttributeError: Always.
         """
-        raise AttributeError(f"{attr_name}: the arms of {type(self).__name__} have no attributes of their own.")
+        raise NoAttributeError(f"{attr_name}: the arms of {type(self).__name__} have no attributes of their own.")
 
     def env_method(
         self, method_name: str, *method_args: Any, indices: VecEnvIndices = None, **method_kwargs: Any
@@ -149,17 +160,13 @@ class InverseVecEnv(VecEnv):
         """Rows have no methods of their own.
 
         Raises:
-            AttributeError: Always.
+            NoAttributeError: Always.
         """
-        raise AttributeError(f"{method_name}: the arms of {type(self).__name__} have no methods of their own.")
+        raise NoAttributeError(f"{method_name}: the arms of {type(self).__name__} have no methods of their own.")
 
     def env_is_wrapped(self, wrapper_class: Any, indices: VecEnvIndices = None) -> list[bool]:
         """No row is wrapped."""
         return [False for _ in self._get_indices(indices)]
-
-    def _begin(self, rows: npt.NDArray[np.int64], first: npt.NDArray[np.int64]) -> None:
-        train = scenarios.SPLITS["train"]
-        self._arms.begin(rows, self._generator.integers(train.start, train.stop, len(rows)), first)
 
     def _see(self) -> Features:
         with torch.no_grad():
@@ -172,6 +179,6 @@ class InverseVecEnv(VecEnv):
         with torch.no_grad():
             held = self._law.held(arms.q, self._features, torch.from_numpy(self._actions))
             rows = arms.rows(self._hold, self._speed)
-            arms.q, arms.qdot, costs, distance = self._law.move(arms.q, arms.qdot, held, rows, PRIOR)
+            arms.q, arms.qdot, costs, distance = self._law.move(arms.q, arms.qdot, held, rows, APG.cost_prior_steps)
         arms.made += self._hold
         return costs.numpy() / self._hold, distance

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 from stable_baselines3.common.vec_env import VecEnvWrapper
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
 
 from baselines.agents.features import Features
 from baselines.training.environment.view import aligned
-from ikgym import scenarios
+from baselines.training.gradients.arms import spread_steps
 from ikgym.rl import Learning
 from ikgym.sb3 import LearningVecEnv
 from ikgym.scenarios import Scenario
@@ -33,9 +32,8 @@ class SpreadVecEnv(VecEnvWrapper):
 
     def __init__(self, num_envs: int, scenario: Scenario, learning: Learning) -> None:
         super().__init__(LearningVecEnv(num_envs, scenario, learning))
-        follows = scenario.nominal_joint_path(scenarios.SPLITS["train"].start) is not None
-        first = np.arange(num_envs) * scenario.steps // num_envs
-        self._first = [{"step": step} for step in first.tolist()] if follows else None
+        first = spread_steps(scenario, num_envs)
+        self._first = [{"step": step} for step in first.tolist()] if first.any() else None
 
     def reset(self) -> Features:
         """The first features. Shape (N, f)."""

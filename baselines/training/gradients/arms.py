@@ -9,6 +9,7 @@ import numpy.typing as npt
 import torch
 
 from baselines.training.gradients.segment import Rows
+from ikgym import scenarios
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray
 
@@ -18,6 +19,22 @@ Indices = npt.NDArray[np.int64]
 EVERY = 16
 #: Added to that mean, so that an arm at rest has something to be compared with.
 LEAST = 1e-3
+
+
+def spread_steps(scenario: Scenario, rows: int, every: int = 1) -> Indices:
+    """Where arms enter their episodes so that an update sees all parts of one, not one part in all arms.
+
+    Args:
+        scenario: What is to be tracked. Trajectories that are no joint path are begun at their beginning.
+        rows: N.
+        every: Steps that all entries are a multiple of.
+
+    Returns:
+        Steps that are left out. Shape (N,).
+    """
+    if scenario.nominal_joint_path(scenarios.SPLITS["train"].start) is None:
+        return np.zeros(rows, dtype=np.int64)
+    return np.arange(rows) * (scenario.steps // every) // rows * every
 
 
 class Arms:
@@ -79,6 +96,23 @@ class Arms:
         for row, seed in zip(rows.tolist(), seeds.tolist(), strict=True):
             self._know(row, seed)
         self._put(rows, at)
+
+    def begin_new(self, rows: Indices, generator: np.random.Generator, at: Indices | None = None) -> None:
+        """Begins new episodes of the split `train`, or enters them.
+
+        Args:
+            rows: Which arms. Shape (R,).
+            generator: Draws the reset seeds.
+            at: See :meth:`begin`; their beginnings if left out. Shape (R,).
+        """
+        train = scenarios.SPLITS["train"]
+        seeds = generator.integers(train.start, train.stop, len(rows))
+        self.begin(rows, seeds, np.zeros(len(rows), dtype=np.int64) if at is None else at)
+
+    def spread(self, generator: np.random.Generator, every: int = 1) -> None:
+        """Begins a new episode in each arm, see :meth:`begin_new` and :func:`spread_steps`."""
+        rows = np.arange(len(self.seed))
+        self.begin_new(rows, generator, spread_steps(self._scenario, len(rows), every))
 
     def give_up(self, rows: Indices) -> None:
         """Puts arms that are lost back on their reference joint paths, or to the starts where there are none."""

@@ -6,7 +6,6 @@ import copy
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import torch
 from torch import Tensor, nn
 
@@ -18,7 +17,6 @@ from baselines.training.randomness import sequence
 from baselines.training.trainer import SegmentMetrics
 from baselines.training.trainers.actor_only import ActorTrainer
 from baselines.training.trainers.initial_weights import begin_actor_from
-from ikgym import scenarios
 from ikgym.scenarios import Scenario
 
 #: No gradient by a joint coordinate that still says anything is this long.
@@ -52,11 +50,8 @@ class APGTrainer(ActorTrainer):
         Args:
             generator: Draws their seeds.
         """
-        rows, steps = self._config.n_envs, self._scenario.steps
-        follows = self._scenario.nominal_joint_path(scenarios.SPLITS["train"].start) is not None
-        first = np.arange(rows) * steps // rows if follows else np.zeros(rows, dtype=np.int64)
-        self._arms.begin(np.arange(rows), self._seeds(generator, rows), first)
-        self._far = np.zeros(rows)
+        self._arms.spread(generator)
+        self._far = np.zeros(self._config.n_envs)
 
     def segment(self, number: int) -> SegmentMetrics:
         """See :meth:`baselines.training.trainer.Trainer.segment`."""
@@ -116,7 +111,7 @@ class APGTrainer(ActorTrainer):
         if (lost & ~ended).any():
             self._arms.give_up(np.flatnonzero(lost & ~ended))
         if len(over):
-            self._arms.begin(over, self._seeds(generator, len(over)), np.zeros(len(over), dtype=np.int64))
+            self._arms.begin_new(over, generator)
         return int(lost.sum())
 
     @property
@@ -131,11 +126,6 @@ class APGTrainer(ActorTrainer):
         with torch.no_grad():
             for mean, weights in zip(self.model.policy.parameters(), self._actor.parameters(), strict=True):
                 mean.lerp_(weights, 1.0 - kept)
-
-    @staticmethod
-    def _seeds(generator: np.random.Generator, count: int) -> npt.NDArray[np.int64]:
-        train = scenarios.SPLITS["train"]
-        return generator.integers(train.start, train.stop, count)
 
 
 def _limited(tensor: Tensor, most: float) -> Tensor:

@@ -13,7 +13,7 @@ from baselines.training.randomness import deterministic_torch
 from baselines.training.trainers.models import network_outputs
 from baselines.training.validation import played
 from ikgym import scenarios
-from ikgym.exceptions import InvalidInputError
+from ikgym.exceptions import InvalidInputError, NoAttributeError, ResetNeededError
 from ikgym.simulator import observation
 from tests.comparison import identical
 
@@ -149,3 +149,14 @@ def test_bad_processing_and_actions():
     for bad in (np.zeros((2, 15)), np.full((3, 15), np.nan)):
         with pytest.raises(InvalidInputError, match=r"actions: expected finite numbers of shape \(3, 15\)"):
             envs.step(bad)
+
+
+def test_before_a_reset_and_unknown_attributes():
+    envs = made()
+    with pytest.raises(ResetNeededError, match="reset"):
+        envs.step(np.zeros((3, 15)))
+    with pytest.raises(NoAttributeError, match="no attribute 'q'"):
+        envs.get_attr("q")
+    with pytest.raises(NoAttributeError, match="set_steps"):
+        envs.env_method("set_steps")
+    assert envs.get_attr("scenario", [1]) == [SCENARIO]
