@@ -78,6 +78,7 @@ _HARMLESS: Final = {
     "normalize_images",
     "n_critics",
     "clip_mean",
+    "seen",
 }
 
 

@@ -37,9 +37,18 @@ class Reinforcement(Annealed, JointVelocities):
     damping and metric of a damped inverse, held for some steps, see baselines.training.environment.inverse_env."""
     lost_distance: Annotated[float, tyro.conf.arg(metavar="M")] = 0.01
     """Position error in [m] at which an episode ends in training, unless the output is velocities."""
-    hold: Annotated[int, tyro.conf.arg(metavar="N")] = 10
+    hold: Annotated[int, tyro.conf.arg(metavar="N")] = 20
     """Steps for which an output that is inverse is held, with feedback at every step: a divisor of those of an episode.
     A step of n_steps, train_freq and gamma is then as many of the arm."""
+    privileged: bool = False
+    """Whether critics see more than the features: the velocities of the joints, and what the reference joint path costs.
+    Rewards depend on both; the actor never sees them. Only for an output that is inverse."""
+    log_above: Annotated[float, tyro.conf.arg(metavar="X")] = 1.0
+    """Costs of more than about this many times the mean of the reference joint path count by their logarithm in the
+    rewards of an output that is inverse."""
+    null_noise: Annotated[float, tyro.conf.arg(metavar="X")] = 1.0
+    """Noise of exploration of the null motion at the start, against that of the damping and the metric: these change
+    less of what an arm does. Only for an output that is inverse."""
     largest: Annotated[float, tyro.conf.arg(metavar="X")] = Learning.largest
     """Largest velocity of a joint of bilinear agents, in units of what is asked for."""
     furthest: Annotated[float, tyro.conf.arg(metavar="X")] = Learning.furthest
@@ -65,11 +74,17 @@ class Reinforcement(Annealed, JointVelocities):
 
     def __post_init__(self) -> None:
         known_names("output", [self.output], get_args(Output))
-        for name in ("lost_distance", "largest", "furthest"):
+        for name in ("lost_distance", "log_above", "null_noise", "largest", "furthest"):
             self._set(name, number(name, getattr(self, name), above=0.0))
         self._set("hold", whole_number("hold", self.hold, at_least=1))
         if self.output == "inverse" and self.damping is None:
             raise InvalidInputError("damping: expected a number for an output that is inverse, got None.")
+        if not isinstance(self.privileged, bool):
+            raise InvalidInputError(f"privileged: expected true or false, got {self.privileged!r}.")
+        if self.privileged and self.output != "inverse":
+            raise InvalidInputError(f"privileged: expected false for an output that is {self.output}, got true.")
+        if self.null_noise != 1.0 and self.output != "inverse":
+            raise InvalidInputError(f"null_noise: expected 1 for an output that is {self.output}, got {self.null_noise!r}.")
         if self.output != "velocities":
             for name in ("base_policy", "null_space", "initial_episode_steps"):
                 if getattr(self, name) is not None:
@@ -172,6 +187,11 @@ class PPO(_StateDependentExploration):
     """An update ends early where the policy has gone further than this, in [nat]."""
     ent_coef: Annotated[float, tyro.conf.arg(metavar="C")] = 0.0
     """Weight of the entropy in the loss."""
+    critic_epochs: Annotated[int, tyro.conf.arg(metavar="N")] = 0
+    """Passes over the transitions of an update in which the critic learns by itself, before the actor does. With 0 it
+    learns with the actor, in n_epochs passes, at the same learning rate."""
+    critic_learning_rate: Annotated[float, tyro.conf.arg(metavar="RATE")] = 1e-3
+    """Of Adam, in these passes."""
     log_std_end: Annotated[float | None, tyro.conf.arg(metavar="X")] = None
     """The logarithm of the standard deviation goes from log_std_init to this one, from segment to segment by equal
     parts. It is learned if left out."""
@@ -183,6 +203,8 @@ class PPO(_StateDependentExploration):
         if self.n_steps is not None:
             self._set("n_steps", whole_number("n_steps", self.n_steps, at_least=1))
         self._set("n_epochs", whole_number("n_epochs", self.n_epochs, at_least=1))
+        self._set("critic_epochs", whole_number("critic_epochs", self.critic_epochs, at_least=0))
+        self._set("critic_learning_rate", number("critic_learning_rate", self.critic_learning_rate, above=0.0))
         self._set("gae_lambda", share("gae_lambda", self.gae_lambda))
         self._set("clip_range", number("clip_range", self.clip_range, above=0.0))
         if self.target_kl is not None:

@@ -13,7 +13,6 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices
 
 from baselines.agents.bilinear.processing import Bilinear
 from baselines.agents.features import Features
-from baselines.training.config.actor_only import APG
 from baselines.training.environment.view import aligned
 from baselines.training.gradients.arms import Arms
 from baselines.training.gradients.law import Law
@@ -22,6 +21,8 @@ from ikgym.exceptions import InvalidInputError, NoAttributeError, ResetNeededErr
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray, number, whole_number
 
+#: Steps for which an inverse is held: over those of an action it would cost more than what actions change.
+INVERSE_EVERY = 2
 #: What agents see.
 SEEN = Bilinear(damping=1e-2, matrix=False)
 
@@ -36,13 +37,17 @@ class InverseVecEnv(VecEnv):
 
     | | |
     |---|---|
-    | observation | the features of the processing |
-    | reward | −ln(1 + c), with c the mean cost of these steps ÷ that of the episode so far |
+    | observation | the features of the processing; for critics, what rewards depend on beside them |
+    | reward | −k ln(1 + c/k), with c the mean cost of these steps ÷ that of the reference joint path, and k = `log_above` |
     | terminated | the episode is over, which the features show ahead |
     | truncated | the arm is farther than `lost_distance` from its path, on which it then goes on; it gains nothing by that |
 
     >>> from stable_baselines3 import TD3
     >>> model = TD3("MlpPolicy", InverseVecEnv(64, "panda-random"))
+
+    Features say nothing of the velocities of the joints, which changes of velocity are counted from, nor of what the
+    reference joint path costs. A critic that sees features alone explains a small part of the rewards;
+    `privileged` shows it both, and a policy of :mod:`baselines.training.asymmetric` hides them from the actor.
 
     Args:
         num_envs: N. A reset spreads them over their episodes.
@@ -50,6 +55,12 @@ class InverseVecEnv(VecEnv):
         processing: What is seen; without `matrix`.
         hold: Steps of an action, a divisor of those of the scenario.
         lost_distance: In [m], above 0.
+        privileged: Whether n + 1 numbers are shown behind the features: the velocities of the joints ÷ the speed of
+            what is ahead, and the logarithm of the mean cost of the reference joint path, of 1 where there is none.
+        log_above: k, above 0: costs well below k times that mean count as they are, those above by their logarithm.
+
+    Attributes:
+        seen: How many numbers of an observation are features.
 
     Raises:
         UnknownNameError: There is no such scenario.
@@ -63,6 +74,8 @@ class InverseVecEnv(VecEnv):
         processing: Bilinear = SEEN,
         hold: int = 20,
         lost_distance: float = 0.05,
+        privileged: bool = False,
+        log_above: float = 1.0,
     ) -> None:
         scenario = scenarios.find(scenario)
         if processing.matrix:
@@ -73,11 +86,14 @@ class InverseVecEnv(VecEnv):
                 f"hold: expected a divisor of the {scenario.steps} steps of an episode, got {hold}."
             )
         self._lost_distance = number("lost_distance", lost_distance, above=0.0)
+        self._log_above = number("log_above", log_above, above=0.0)
         self._law, self.scenario, self.processing = Law(scenario, processing), scenario, processing
         self._arms = Arms(scenario, num_envs, processing.offsets)
         self._generator, self._reset = np.random.default_rng(), False
         self._returns, self._lengths = np.zeros(num_envs), np.zeros(num_envs, dtype=np.int64)
-        unbounded = spaces.Box(-np.inf, np.inf, (self._law.inputs,), np.float32)
+        self.seen, self._privileged = self._law.inputs, privileged
+        observed = self.seen + (scenario.joints + 1 if privileged else 0)
+        unbounded = spaces.Box(-np.inf, np.inf, (observed,), np.float32)
         self.render_mode = None
         super().__init__(num_envs, unbounded, spaces.Box(-1.0, 1.0, (self._law.outputs,), np.float32))
 
@@ -117,7 +133,8 @@ class InverseVecEnv(VecEnv):
         """
         arms = self._arms
         costs, distance = self._move()
-        rewards, over, lost = -np.log1p(costs), arms.ended, distance > self._lost_distance
+        rewards = -self._log_above * np.log1p(costs / self._log_above)
+        over, lost = arms.ended, distance > self._lost_distance
         self._returns += rewards
         self._lengths += self._hold
         ends = over | lost
@@ -169,16 +186,32 @@ class InverseVecEnv(VecEnv):
         return [False for _ in self._get_indices(indices)]
 
     def _see(self) -> Features:
+        self._look()
+        seen = self._features.numpy()
+        if self._privileged:
+            seen = np.concatenate([seen, self._behind_rewards()], axis=1)
+        return aligned(seen.astype(np.float32))
+
+    def _look(self) -> None:
+        """Features of where the arms are, and the speed of what is ahead."""
         with torch.no_grad():
             self._features, self._speed = self._law.features(self._arms.q, self._arms.ahead, self._arms.remaining)
-        return aligned(self._features.numpy().astype(np.float32))
+
+    def _behind_rewards(self) -> FloatArray:
+        """What rewards depend on beside the features. Shape (N, n + 1)."""
+        arms = self._arms
+        return np.column_stack([arms.qdot.numpy() / self._speed[:, None], np.log(arms.usual)])
 
     def _move(self) -> tuple[FloatArray, FloatArray]:
-        """The mean cost of each arm, ÷ that of its episode so far, and how far it is from its path in [m]."""
-        arms = self._arms
-        with torch.no_grad():
-            held = self._law.held(arms.q, self._features, torch.from_numpy(self._actions))
-            rows = arms.rows(self._hold, self._speed)
-            arms.q, arms.qdot, costs, distance = self._law.move(arms.q, arms.qdot, held, rows, APG.cost_prior_steps)
-        arms.made += self._hold
-        return costs.numpy() / self._hold, distance
+        """The mean cost of each arm, ÷ that of its reference joint path, and how far it is from its path in [m]."""
+        arms, spent, outputs = self._arms, self._arms.spent.copy(), torch.from_numpy(self._actions)
+        for begun in range(0, self._hold, INVERSE_EVERY):
+            steps = min(INVERSE_EVERY, self._hold - begun)
+            if begun:
+                self._look()
+            with torch.no_grad():
+                held = self._law.held(arms.q, self._features, outputs)
+                rows = arms.rows(steps, self._speed)
+                arms.q, arms.qdot, _, distance = self._law.move(arms.q, arms.qdot, held, rows, 0.0)
+            arms.made += steps
+        return (arms.spent - spent) / (self._hold * arms.usual), distance

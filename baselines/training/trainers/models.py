@@ -17,6 +17,7 @@ from torch import Tensor, nn
 
 from baselines.agents.features import Features
 from baselines.agents.protocols import Transform
+from baselines.training.asymmetric import AsymmetricPPOPolicy, AsymmetricSACPolicy, AsymmetricTD3Policy
 from baselines.training.config.base import Activation, Algorithm
 from baselines.training.config.reinforcement import Output
 from baselines.training.networks import ACTIVATIONS, QUIET, ActorModel, MemoryModel
@@ -37,6 +38,12 @@ BILINEAR: dict[Algorithm, type[BasePolicy]] = {
     "td3": BilinearTD3Policy,
 }
 
+ASYMMETRIC: dict[Algorithm, type[BasePolicy]] = {
+    "ppo": AsymmetricPPOPolicy,
+    "sac": AsymmetricSACPolicy,
+    "td3": AsymmetricTD3Policy,
+}
+
 #: How network outputs are kept within ±1.
 Squash = Literal["clip", "tanh", "linear"]
 #: What a run trains.
@@ -51,6 +58,7 @@ def new_model(
     log_std_init: float = -2.0,
     use_sde: bool = False,
     output: tuple[Output, float | None] = ("velocities", None),
+    seen: int | None = None,
     **parameters: Any,
 ) -> BaseAlgorithm:
     """An untrained model, whose first outputs are almost 0.
@@ -66,6 +74,7 @@ def new_model(
         use_sde: Whether noise is a function of what is seen (gSDE). Not for TD3.
         output: What the actor's network gives, and the damping of a bilinear one, whose environment is that of
             :func:`ikgym.sb3.make_vec`.
+        seen: How many of the numbers observed the actor sees, the first ones; all if left out.
         **parameters: Of the class of Stable-Baselines3.
     """
     bilinear, damping = output[0] == "bilinear", output[1]
@@ -82,10 +91,12 @@ def new_model(
         parameters |= {"use_sde": True}
         if algorithm == "sac":
             policy["clip_mean"] = 0.0  # or there would be more to the actor than layers
-    kind = ALGORITHMS[algorithm]
-    model: Any = kind(
-        BILINEAR[algorithm] if bilinear else "MlpPolicy", env, policy_kwargs=policy, device="cpu", **parameters
-    )
+    if seen is not None:
+        policy["seen"] = seen
+    kind: type[BasePolicy] | str = "MlpPolicy"
+    if bilinear or seen is not None:
+        kind = (BILINEAR if bilinear else ASYMMETRIC)[algorithm]
+    model: Any = ALGORITHMS[algorithm](kind, env, policy_kwargs=policy, device="cpu", **parameters)
     model.set_logger(Logger(None, []))
     with torch.no_grad():
         last: Any = mean_network(model)[-1]

@@ -11,12 +11,12 @@ import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.noise import ActionNoise, NormalActionNoise, OrnsteinUhlenbeckActionNoise
-from stable_baselines3.common.vec_env import VecEnv
 from torch import nn
 
 from baselines.training.config.reinforcement import SAC, TD3, OffPolicy
 from baselines.training.trainers.models import new_model
 from baselines.training.trainers.reinforcement import ReinforcementTrainer
+from ikgym.validation import FloatArray
 
 #: What a replay buffer holds, a row a step.
 REPLAYED = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
@@ -94,8 +94,8 @@ class SACTrainer(OffPolicyTrainer):
     _config: SAC
 
     def _make(self) -> BaseAlgorithm:
-        config, actions = self._config, _size(self._env)
-        return new_model(
+        config, scales = self._config, self._noise_scales
+        model: Any = new_model(
             "sac",
             self._env,
             config.hidden,
@@ -103,11 +103,18 @@ class SACTrainer(OffPolicyTrainer):
             config.log_std_init,
             config.use_sde,
             (config.output, config.damping),
+            self._seen,
             sde_sample_freq=config.sde_sample_freq,
             ent_coef=config.ent_coef,
-            target_entropy=TARGET_ENTROPY * actions if config.target_entropy is None else config.target_entropy,
+            target_entropy=TARGET_ENTROPY * len(scales) if config.target_entropy is None else config.target_entropy,
             **self._parameters(),
         )
+        if config.null_noise != 1.0:
+            log_std = model.policy.actor.log_std
+            with torch.no_grad():
+                (log_std if config.use_sde else log_std.bias).add_(torch.from_numpy(np.log(scales)))
+        made: BaseAlgorithm = model
+        return made
 
     @contextlib.contextmanager
     def _actor_frozen(self) -> Iterator[None]:
@@ -133,14 +140,15 @@ class TD3Trainer(OffPolicyTrainer):
     _config: TD3
 
     def _make(self) -> BaseAlgorithm:
-        config, actions = self._config, _size(self._env)
+        config = self._config
         return new_model(
             "td3",
             self._env,
             config.hidden,
             config.activation,
             output=(config.output, config.damping),
-            action_noise=_noise(actions, config.action_noise, config.action_noise_correlation),
+            seen=self._seen,
+            action_noise=_noise(config.action_noise * self._noise_scales, config.action_noise_correlation),
             policy_delay=config.policy_delay,
             target_policy_noise=config.target_policy_noise,
             target_noise_clip=2.5 * config.target_policy_noise,
@@ -148,18 +156,9 @@ class TD3Trainer(OffPolicyTrainer):
         )
 
 
-def _size(env: VecEnv) -> int:
-    """Numbers of an action."""
-    shape = env.action_space.shape
-    assert shape is not None
-    return int(shape[0])
-
-
-def _noise(actions: int, deviation: float, steps: int) -> ActionNoise:
-    """Noise of a standard deviation, with a correlation time in steps."""
-    mean = np.zeros(actions)
+def _noise(deviations: FloatArray, steps: int) -> ActionNoise:
+    """Noise of standard deviations, with a correlation time in steps."""
+    mean = np.zeros(len(deviations))
     if steps == 1:
-        return NormalActionNoise(mean, np.full(actions, deviation))
-    return OrnsteinUhlenbeckActionNoise(
-        mean, np.full(actions, deviation * np.sqrt(2.0 / steps)), theta=1.0 / steps, dt=1.0
-    )
+        return NormalActionNoise(mean, deviations)
+    return OrnsteinUhlenbeckActionNoise(mean, deviations * np.sqrt(2.0 / steps), theta=1.0 / steps, dt=1.0)

@@ -1,11 +1,14 @@
-"""PPO of Stable-Baselines3."""
+"""PPO of Stable-Baselines3, whose critic may learn by itself."""
 
 from __future__ import annotations
 
+import copy
 from typing import Any
 
+import numpy as np
 import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.callbacks import BaseCallback
 from torch import nn
 
 from baselines.training.config.reinforcement import PPO
@@ -13,12 +16,57 @@ from baselines.training.trainer import SegmentMetrics
 from baselines.training.trainers.models import new_model
 from baselines.training.trainers.reinforcement import ReinforcementTrainer
 from ikgym.exceptions import InvalidInputError
+from ikgym.scenarios import Scenario
+
+
+class _CriticEpochs(BaseCallback):
+    """Fits the critic to what the transitions of a rollout returned, before the actor learns from them.
+
+    Args:
+        optimizer: Of the critic's weights.
+        epochs: Passes over the transitions.
+        batch_size: Transitions of a gradient step.
+    """
+
+    def __init__(self, optimizer: torch.optim.Optimizer, epochs: int, batch_size: int) -> None:
+        super().__init__()
+        self._optimizer, self._epochs, self._batch_size = optimizer, epochs, batch_size
+
+    def _on_step(self) -> bool:
+        return True
+
+    def _on_rollout_end(self) -> None:
+        model: Any = self.model
+        for _ in range(self._epochs):
+            for batch in model.rollout_buffer.get(self._batch_size):
+                values = model.policy.predict_values(batch.observations).flatten()
+                self._optimizer.zero_grad()
+                nn.functional.mse_loss(values, batch.returns).backward()
+                self._optimizer.step()
 
 
 class PPOTrainer(ReinforcementTrainer):
     """See :class:`baselines.training.config.reinforcement.PPO`."""
 
     _config: PPO
+
+    def __init__(self, config: PPO, scenario: Scenario, seed: int) -> None:
+        super().__init__(config, scenario, seed)
+        policy = self.model.policy
+        critic = [*policy.mlp_extractor.value_net.parameters(), *policy.value_net.parameters()]
+        self._critic_optimizer = torch.optim.Adam(critic, config.critic_learning_rate)
+
+    def state(self) -> dict[str, Any]:
+        """See :meth:`baselines.training.trainer.Trainer.state`."""
+        if not self._config.critic_epochs:
+            return super().state()
+        return {**super().state(), "critic": {"optimizer": copy.deepcopy(self._critic_optimizer.state_dict())}}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """See :meth:`baselines.training.trainer.Trainer.restore`."""
+        super().restore(state)
+        if self._config.critic_epochs:
+            self._critic_optimizer.load_state_dict(copy.deepcopy(state["critic"]["optimizer"]))
 
     def _make(self) -> BaseAlgorithm:
         config = self._config
@@ -28,7 +76,7 @@ class PPOTrainer(ReinforcementTrainer):
                 f"batch_size: expected a divisor of the {n_steps * config.n_envs} transitions between two updates, got "
                 f"{config.batch_size}."
             )
-        return new_model(
+        model = new_model(
             "ppo",
             self._env,
             config.hidden,
@@ -36,6 +84,7 @@ class PPOTrainer(ReinforcementTrainer):
             config.log_std_init,
             config.use_sde,
             (config.output, config.damping),
+            self._seen,
             sde_sample_freq=config.sde_sample_freq,
             learning_rate=config.learning_rate,
             n_steps=n_steps,
@@ -46,19 +95,32 @@ class PPOTrainer(ReinforcementTrainer):
             clip_range=config.clip_range,
             target_kl=config.target_kl,
             ent_coef=config.ent_coef,
+            vf_coef=0.0 if config.critic_epochs else 0.5,
             stats_window_size=self._ends,
         )
+        self._set_log_std(model, config.log_std_init)
+        return model
 
     def segment(self, number: int) -> SegmentMetrics:
         """See :meth:`baselines.training.trainer.Trainer.segment`."""
         given = self._config.log_std_of(number)
         if given is not None:
-            self.model.policy.log_std.requires_grad_(False).fill_(given)
+            self.model.policy.log_std.requires_grad_(False)
+            self._set_log_std(self.model, given)
         return super().segment(number)
 
+    def _callback(self) -> BaseCallback | None:
+        config = self._config
+        if not config.critic_epochs:
+            return None
+        return _CriticEpochs(self._critic_optimizer, config.critic_epochs, config.batch_size)
+
     def _begun(self) -> None:
+        self._set_log_std(self.model, self._config.log_std_init)
+
+    def _set_log_std(self, model: Any, log_std: float) -> None:
         with torch.no_grad():
-            self.model.policy.log_std.fill_(self._config.log_std_init)
+            model.policy.log_std.copy_(torch.from_numpy(log_std + np.log(self._noise_scales)))
 
     def _actor(self) -> list[nn.Parameter]:
         policy: Any = self.model.policy

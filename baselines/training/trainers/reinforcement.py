@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
+from gymnasium import spaces
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.utils import FloatSchedule
@@ -27,6 +28,7 @@ from baselines.training.trainers.initial_weights import begin_from
 from baselines.training.trainers.models import score_of_model
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
+from ikgym.validation import FloatArray
 
 #: What a model counts.
 COUNTERS = ("num_timesteps", "_n_updates", "_episode_num")
@@ -122,11 +124,27 @@ class ReinforcementTrainer(abc.ABC):
             return SpreadVecEnv(config.n_envs, self._scenario, config.learning)
         if config.output == "inverse":
             assert isinstance(self.processing, Bilinear)
-            return InverseVecEnv(config.n_envs, self._scenario, self.processing, config.hold, config.lost_distance)
+            settings = config.hold, config.lost_distance, config.privileged, config.log_above
+            return InverseVecEnv(config.n_envs, self._scenario, self.processing, *settings)
         # Values are then of the size of rewards: of sums a hundred times as large, the critics would take most of the
         # gradient that is left after it has been clipped.
         scale = max(1.0 - config.gamma, 1e-3)
         return ProcessedVecEnv(config.n_envs, self._scenario, config.velocities, config.reward, scale, episode_steps)
+
+    @property
+    def _seen(self) -> int | None:
+        """How many of the numbers observed the actor sees; None for all."""
+        return self._env.seen if isinstance(self._env, InverseVecEnv) and self._config.privileged else None
+
+    @property
+    def _noise_scales(self) -> FloatArray:
+        """Noise of each output, against that of most. Shape (number of outputs,)."""
+        space = self._env.action_space
+        assert isinstance(space, spaces.Box)
+        scales = np.ones(space.shape)
+        if self._config.output == "inverse":
+            scales[: self._scenario.joints] = self._config.null_noise
+        return scales
 
     def _learn(self) -> None:
         self.model.learn(self._segment_steps, self._callback(), log_interval=None, reset_num_timesteps=False)

@@ -7,7 +7,7 @@ import pytest
 from stable_baselines3 import PPO
 
 from baselines.agents.bilinear.processing import Bilinear
-from baselines.training.environment.inverse_env import InverseVecEnv
+from baselines.training.environment.inverse_env import INVERSE_EVERY, InverseVecEnv
 from baselines.training.environment.view import View
 from baselines.training.randomness import deterministic_torch
 from baselines.training.trainers.models import network_outputs
@@ -27,8 +27,8 @@ def one_thread():
         yield
 
 
-def made(rows=3, scenario=SCENARIO, hold=4, lost_distance=0.05):
-    envs = InverseVecEnv(rows, scenario, SEEN, hold, lost_distance)
+def made(rows=3, scenario=SCENARIO, hold=4, **settings):
+    envs = InverseVecEnv(rows, scenario, SEEN, hold, **settings)
     envs.seed(5)
     return envs
 
@@ -70,22 +70,60 @@ def envs_cost(envs, seed, outputs):
     return envs._arms.spent[0]
 
 
-def test_rewards_compare_with_the_episode_so_far():
-    """−ln(1 + c): an arm that always costs the same has c near 1."""
-    envs = made()
+@pytest.mark.parametrize("k", [1.0, 5.0])
+def test_rewards_compare_with_the_reference_joint_path(k):
+    """−k ln(1 + c/k), with c what these steps cost ÷ what the reference joint path does in as many."""
+    envs = made(log_above=k)
     envs.reset()
-    envs.step_async(np.zeros((3, *envs.action_space.shape)))
-    before = envs._arms.spent.copy(), envs._arms.played.copy()
-    state = envs._arms.state()
-    costs, distance = envs._move()
-    assert (envs._arms.spent > before[0]).all()
-    assert (envs._arms.played == before[1] + 4).all()
-    envs._arms.restore(state)
-    envs._see()
+    before = envs._arms.spent.copy()
     _, rewards, ends, _ = envs.step(np.zeros((3, *envs.action_space.shape)))
-    np.testing.assert_allclose(rewards, -np.log1p(costs), rtol=1e-6)
+    spent = envs._arms.spent - before
+    assert (spent > 0.0).all()
+    costs = spent / (4 * envs._arms.usual)
+    np.testing.assert_allclose(rewards, -k * np.log(1.0 + costs / k), rtol=1e-6)
     assert not ends.any()
-    assert (distance < 0.05).all()
+
+
+def test_rewards_do_not_depend_on_what_was_spent_before():
+    """Otherwise having spent more would be rewarded later."""
+    first, second = made(), made()
+    for envs in (first, second):
+        envs.reset()
+    second._arms.spent += 100.0
+    second._arms.played += 100.0
+    for step in range(3):
+        assert identical(*(envs.step(actions_of(envs, step))[1] for envs in (first, second)))
+
+
+def test_the_inverse_is_renewed_while_an_action_is_held():
+    """Held for 8 steps it does what it does when it is said anew every other step."""
+    once, often = made(hold=8), made(hold=INVERSE_EVERY)
+    once.reset(), often.reset()
+    often._arms.restore(once._arms.state())
+    often._see()
+    said = actions_of(once)
+    once.step(said)
+    for _ in range(8 // INVERSE_EVERY):
+        often.step(said)
+    assert identical(*(envs._arms.q.numpy() for envs in (once, often)))
+    assert identical(*(envs._arms.spent for envs in (once, often)))
+
+
+def test_critics_see_what_rewards_depend_on():
+    """Behind the features, which stay as they are: velocities ÷ speed, and what the reference joint path costs."""
+    plain, envs = made(), made(privileged=True)
+    assert plain.seen == envs.seen == plain.observation_space.shape[0] == envs.observation_space.shape[0] - 8
+    seen, more = plain.reset(), envs.reset()
+    for step in range(12):
+        arms = envs._arms
+        assert identical(more[:, : envs.seen], seen)
+        wanted = [*(arms.qdot.numpy() / envs._speed[:, None]).T, np.log(arms.usual)]
+        np.testing.assert_allclose(more[:, envs.seen :], np.array(wanted).T, rtol=1e-5, atol=1e-6)
+        (seen, *ends, infos), (more, *others, longer) = (each.step(actions_of(envs, step)) for each in (plain, envs))
+        assert all(identical(x, y) for x, y in zip(ends, others, strict=True))
+        for info, other in zip(infos, longer, strict=True):
+            if "terminal_observation" in info:
+                assert identical(other["terminal_observation"][: envs.seen], info["terminal_observation"])
 
 
 def test_episodes_end_and_lost_arms_go_on_where_their_path_is():
@@ -133,6 +171,7 @@ def test_ppo_of_stable_baselines3_learns_in_it():
         ({"hold": 3}, "hold: expected a divisor of the 40 steps"),
         ({"hold": 0}, "hold"),
         ({"lost_distance": 0.0}, "lost_distance"),
+        ({"log_above": 0.0}, "log_above"),
         ({"scenario": scenarios.get("panda-field")}, "ideal plant"),
     ],
 )

@@ -14,6 +14,7 @@ from stable_baselines3 import PPO, SAC, TD3
 import baselines
 import ikgym
 import ikgym.sb3
+from baselines.training.asymmetric import AsymmetricPPOPolicy, AsymmetricSACPolicy, AsymmetricTD3Policy
 from baselines.training.environment.inverse_env import InverseVecEnv
 from baselines.training.environment.view import View
 from baselines.training.exporting import export
@@ -66,12 +67,22 @@ def test_models_learn_and_act_the_same_from_their_file(tmp_path, kind, policy, p
         assert info["position_error"] == pytest.approx(same["position_error"], rel=1e-5)
 
 
-@pytest.mark.parametrize(("kind", "parameters"), [(PPO, SHORT), (SAC, LATE), (TD3, LATE)])
-def test_models_that_weigh_an_inverse_act_the_same_from_their_file(tmp_path, kind, parameters):
+@pytest.mark.parametrize(("kind", "policy", "parameters"), [
+    (PPO, "MlpPolicy", SHORT),
+    (SAC, "MlpPolicy", LATE),
+    (TD3, "MlpPolicy", LATE),
+    (PPO, AsymmetricPPOPolicy, SHORT),
+    (SAC, AsymmetricSACPolicy, LATE),
+    (TD3, AsymmetricTD3Policy, LATE),
+])  # fmt: skip
+def test_models_that_weigh_an_inverse_act_the_same_from_their_file(tmp_path, kind, policy, parameters):
     """What the model says of the features that the agent sees is what the agent does."""
-    envs = InverseVecEnv(2, scenario(), hold=4)
-    policy = {"policy_kwargs": {"net_arch": [8, 8]}}
-    model = kind("MlpPolicy", envs, device="cpu", seed=0, **parameters, **policy).learn(32)
+    privileged = policy != "MlpPolicy"
+    envs = InverseVecEnv(2, scenario(), hold=4, privileged=privileged)
+    kwargs = {"net_arch": [8, 8]} | ({"seen": envs.seen} if privileged else {})
+    model = kind(policy, envs, device="cpu", seed=0, policy_kwargs=kwargs, **parameters).learn(32)
+    model.save(tmp_path / "model.zip")
+    model = kind.load(tmp_path / "model.zip", device="cpu")
     export(model, envs, tmp_path / "agent.safetensors")
     agent = baselines.make("agent", scenario(), path=str(tmp_path / "agent.safetensors"))
     view = View(envs.processing, scenario())
@@ -79,10 +90,34 @@ def test_models_that_weigh_an_inverse_act_the_same_from_their_file(tmp_path, kin
     seen, _ = env.reset(seed=1)
     for _ in range(5):
         batch = {key: value[None] for key, value in seen.items()}
-        said, _ = model.predict(view.see(batch, np.zeros(1, dtype=np.bool_)), deterministic=True)
+        shown = np.zeros((1, *envs.observation_space.shape), dtype=np.float32)
+        shown[:, : envs.seen] = view.see(batch, np.zeros(1, dtype=np.bool_))
+        said, _ = model.predict(shown, deterministic=True)
         action, _ = agent.predict(seen)
         np.testing.assert_allclose(action, view.act(said)[0], rtol=1e-5, atol=1e-7)
         seen, *_ = env.step(action)
+
+
+@pytest.mark.parametrize(
+    ("kind", "policy", "parameters"),
+    [(PPO, AsymmetricPPOPolicy, SHORT), (SAC, AsymmetricSACPolicy, LATE), (TD3, AsymmetricTD3Policy, LATE)],
+)
+def test_only_critics_see_what_is_behind_the_features(kind, policy, parameters):
+    envs = InverseVecEnv(2, scenario(), hold=4, privileged=True)
+    model = kind(policy, envs, device="cpu", seed=0, policy_kwargs={"seen": envs.seen}, **parameters)
+    seen = envs.reset()
+    more = seen.copy()
+    more[:, envs.seen :] += 1.0
+    first, second = (torch.from_numpy(observed) for observed in (seen, more))
+    with torch.no_grad():
+        actions = [model.predict(observed.numpy(), deterministic=True)[0] for observed in (first, second)]
+        assert np.array_equal(*actions)
+        given = torch.from_numpy(actions[0])
+        values = [
+            model.policy.predict_values(observed) if kind is PPO else model.critic(observed, given)[0]
+            for observed in (first, second)
+        ]
+    assert not torch.allclose(*values)
 
 
 @pytest.mark.parametrize(

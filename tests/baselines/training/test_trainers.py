@@ -30,7 +30,13 @@ NOISY = [
 BILINEAR = [(method, {"output": "bilinear", "scenario": "panda-random"}) for method in METHODS]
 #: Ten actions of two steps an episode.
 INVERSE = [
-    (method, {"output": "inverse", "damping": 1e-2, "hold": 2, "scenario": "panda-random"}) for method in METHODS
+    (method, {"output": "inverse", "damping": 1e-2, "hold": 2, "scenario": "panda-random", **more})
+    for method, more in [
+        *((method, {}) for method in METHODS),
+        ("ppo", {"privileged": True, "critic_epochs": 2, "null_noise": 0.2}),
+        ("sac", {"privileged": True, "null_noise": 0.2}),
+        ("td3", {"privileged": True, "null_noise": 0.2, "log_above": 5.0}),
+    ]
 ]
 
 
@@ -61,6 +67,49 @@ def test_a_segment_follows_from_state_and_number(method, changes, tmp_path):
     assert same(other.state(), undisturbed.state())
 
 
+def test_the_critic_learns_by_itself_in_passes_of_its_own():
+    """Its weights change, and those of the actor are the same whatever the passes are, until the critic judges."""
+    changes = {"output": "inverse", "damping": 1e-2, "hold": 2, "scenario": "panda-random", "critic_warmup": 1}
+    alone, with_actor = (made(tiny("ppo", **changes, critic_epochs=epochs, segments=1)) for epochs in (3, 0))
+    before = {name: tensor.clone() for name, tensor in alone.model.policy.named_parameters()}
+    for trainer in (alone, with_actor):
+        play_segments(trainer, [0])
+    for name, tensor in alone.model.policy.named_parameters():
+        assert torch.equal(tensor, before[name]) != ("value_net" in name), name
+    assert alone.model.vf_coef == 0.0
+    assert with_actor.model.vf_coef == 0.5
+    values = [trainer.model.policy.value_net.weight for trainer in (alone, with_actor)]
+    assert not torch.equal(*values)
+
+
+@pytest.mark.parametrize(
+    ("method", "changes"),
+    [
+        ("ppo", {"log_std_init": -1.0}),
+        ("ppo", {"log_std_init": -1.0, "use_sde": True}),
+        ("ppo", {"log_std_init": -4.0, "log_std_end": -1.0}),
+        ("sac", {"log_std_init": -1.0}),
+        ("sac", {"log_std_init": -1.0, "use_sde": True}),
+        ("td3", {"action_noise": np.exp(-1.0)}),
+        ("td3", {"action_noise": np.exp(-1.0) * np.sqrt(2.0), "action_noise_correlation": 4}),
+    ],
+)
+def test_null_motion_has_noise_of_its_own(method, changes):
+    output = {"output": "inverse", "damping": 1e-2, "hold": 2, "scenario": "panda-random", "null_noise": 0.1}
+    trainer = made(tiny(method, **output, **changes, segments=2))
+    if "log_std_end" in changes:
+        play_segments(trainer, [1])
+    if method == "td3":
+        log_std = np.log(trainer.model.action_noise._sigma)
+    elif method == "ppo":
+        log_std = trainer.model.policy.log_std.detach().numpy()
+    else:
+        log_std = trainer.model.policy.actor.log_std
+        log_std = (log_std if "use_sde" in changes else log_std.bias).detach().numpy()
+    wanted = np.repeat([np.log(0.1) - 1.0, -1.0], [7, 8])
+    np.testing.assert_allclose(log_std, np.broadcast_to(wanted, log_std.shape), atol=1e-6)
+
+
 def same(a, b):
     """Whether two states are the same bit for bit."""
     if isinstance(a, dict):
@@ -70,10 +119,10 @@ def same(a, b):
     return identical(a.numpy(), b.numpy()) if isinstance(a, torch.Tensor) else a == b
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_every_part_of_the_state_matters(method):
+@pytest.mark.parametrize(("method", "changes"), [*((method, {}) for method in METHODS), INVERSE[3]])
+def test_every_part_of_the_state_matters(method, changes):
     """Without it, whatever it is, the segment to come is another one; but for counters that only count."""
-    config = tiny(method)
+    config = tiny(method, **changes)
     trainer = made(config)
     play_segments(trainer, [0, 1])
     state = trainer.state()
