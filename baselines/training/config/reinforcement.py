@@ -41,8 +41,8 @@ class Reinforcement(Annealed, JointVelocities):
     """Steps for which an output that is inverse is held, with feedback at every step: a divisor of those of an episode.
     A step of n_steps, train_freq and gamma is then as many of the arm."""
     privileged: bool = False
-    """Whether critics see more than the features: the velocities of the joints, and what the reference joint path costs.
-    Rewards depend on both; the actor never sees them. Only for an output that is inverse."""
+    """Whether critics see more than the features: the velocities of the joints, and the cost of the reference joint
+    path. Rewards depend on both; the actor never sees them. Only for an output that is inverse."""
     log_above: Annotated[float, tyro.conf.arg(metavar="X")] = 1.0
     """Costs of more than about this many times the mean of the reference joint path count by their logarithm in the
     rewards of an output that is inverse."""
@@ -84,7 +84,9 @@ class Reinforcement(Annealed, JointVelocities):
         if self.privileged and self.output != "inverse":
             raise InvalidInputError(f"privileged: expected false for an output that is {self.output}, got true.")
         if self.null_noise != 1.0 and self.output != "inverse":
-            raise InvalidInputError(f"null_noise: expected 1 for an output that is {self.output}, got {self.null_noise!r}.")
+            raise InvalidInputError(
+                f"null_noise: expected 1 for an output that is {self.output}, got {self.null_noise!r}."
+            )
         if self.output != "velocities":
             for name in ("base_policy", "null_space", "initial_episode_steps"):
                 if getattr(self, name) is not None:

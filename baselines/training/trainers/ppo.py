@@ -41,7 +41,8 @@ class _CriticEpochs(BaseCallback):
             for batch in model.rollout_buffer.get(self._batch_size):
                 values = model.policy.predict_values(batch.observations).flatten()
                 self._optimizer.zero_grad()
-                nn.functional.mse_loss(values, batch.returns).backward()
+                loss: Any = nn.functional.mse_loss(values, batch.returns)
+                loss.backward()
                 self._optimizer.step()
 
 
