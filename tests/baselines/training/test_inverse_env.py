@@ -7,6 +7,7 @@ import pytest
 from stable_baselines3 import PPO
 
 from baselines.agents.bilinear.processing import Bilinear
+from baselines.training.environment import inverse_env
 from baselines.training.environment.inverse_env import INVERSE_EVERY, InverseVecEnv
 from baselines.training.environment.view import View
 from baselines.training.randomness import deterministic_torch
@@ -107,6 +108,27 @@ def test_the_inverse_is_renewed_while_an_action_is_held():
         often.step(said)
     assert identical(*(envs._arms.q.numpy() for envs in (once, often)))
     assert identical(*(envs._arms.spent for envs in (once, often)))
+
+
+def test_to_hold_the_inverse_for_an_action_would_cost_more_than_what_agents_can_gain(monkeypatch):
+    """Of the agent that says 0, beside an inverse that is new at each step; an inverse of two steps is as good."""
+
+    def spent(every):
+        monkeypatch.setattr(inverse_env, "INVERSE_EVERY", every)
+        envs = InverseVecEnv(32, "varga7-pose-random", hold=20)
+        envs.seed(5)
+        envs.reset()
+        costs = []
+        for _ in range(60):
+            envs.step_async(np.zeros((32, *envs.action_space.shape)))
+            costs.append(envs._move()[0])
+            envs._arms.begin_new(np.flatnonzero(envs._arms.ended), envs._generator)
+            envs._see()
+        return np.mean(costs, axis=0)
+
+    new, pair, held = (spent(every) for every in (1, INVERSE_EVERY, 20))
+    assert np.exp(np.mean(np.log(pair / new))) == pytest.approx(1.0, abs=0.01)
+    assert np.exp(np.mean(np.log(held / new))) > 1.1
 
 
 def test_critics_see_what_rewards_depend_on():
