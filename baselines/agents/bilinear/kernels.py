@@ -7,7 +7,7 @@ import numpy as np
 from baselines.agents.bilinear.damped_kernels import held_rows, with_matrix
 from baselines.agents.bilinear.rate_kernels import metric_rows, rate_rows
 from baselines.agents.network import forward_rows
-from ikgym.jit import kernel
+from ikgym.jit import inlined, kernel
 from ikgym.rl.feature_kernels import feature_row, mean_twists
 from ikgym.rl.twists import is_turned, shown_joints, turn, turn_gradient, twist, twist_size
 
@@ -94,6 +94,39 @@ def feature_gradient_rows(kind, prismatic, axis, twists, features, gradient, out
             out[row, 0] = turn_gradient(axis, x[at:end], g[at:end])
 
 
+@inlined
+def seen_twist(kind, turned, axis, angle, pose, nominal, error, due):
+    """The motion from a pose to the next one of the reference, seen from the frame of joint 1 where `turned`."""
+    twist(kind, nominal, pose, error, due)
+    if turned:
+        turn(axis, -angle, due)
+
+
+@kernel
+def due_rows(kind, prismatic, axis, dt, offsets, q, pose, nominal, due, speed):
+    """What G and h are multiplied by, row by row, in units of the speed: q̇ / s = G v / s + h.
+
+    Args:
+        kind: Of task coordinates.
+        prismatic: Shape (n,).
+        axis: Shape (3,).
+        dt: Δt in [s].
+        offsets: Shape (p,).
+        q: Shape (B, n).
+        pose: Measured task coordinates. Shape (B, m).
+        nominal: At the offsets. Shape (B, p, m).
+        due: Receives v / s. Shape (B, w).
+        speed: Receives s. Shape (B,).
+    """
+    turned, w = is_turned(kind, prismatic), due.shape[1]
+    error, ahead = np.empty(6), np.empty((offsets.shape[0] - 1, w))
+    for row in range(q.shape[0]):
+        speed[row], lead = mean_twists(kind, dt, offsets, nominal[row], error, ahead), offsets[0] * dt
+        seen_twist(kind, turned, axis, q[row, 0], pose[row], nominal[row, 0], error, due[row])
+        for a in range(w):
+            due[row, a] /= lead * speed[row]
+
+
 @kernel
 def action_rows(kind, prismatic, axis, dt, offsets, velocity_limit, q, pose, nominal, output, out):
     """The actions that network outputs mean, row by row: q̇ = G v + h s.
@@ -115,9 +148,7 @@ def action_rows(kind, prismatic, axis, dt, offsets, velocity_limit, q, pose, nom
     error, due, ahead = np.empty(6), np.empty(w), np.empty((offsets.shape[0] - 1, w))
     for row in range(q.shape[0]):
         speed, lead = mean_twists(kind, dt, offsets, nominal[row], error, ahead), offsets[0] * dt
-        twist(kind, nominal[row, 0], pose[row], error, due)
-        if turned:
-            turn(axis, -q[row, 0], due)
+        seen_twist(kind, turned, axis, q[row, 0], pose[row], nominal[row, 0], error, due)
         for j in range(n):
             own = output[row, j * (w + 1) : (j + 1) * (w + 1)]
             qdot = own[w] * speed

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from baselines.agents.alone import Alone
 from baselines.agents.bilinear.damped_kernels import held_rows, with_matrix
-from baselines.agents.bilinear.kernels import action_rows, law_rows, new_features
+from baselines.agents.bilinear.kernels import action_rows, due_rows, law_rows, new_features
 from baselines.agents.bilinear.rate_kernels import metric_rows
 from baselines.agents.features import Features
 from baselines.agents.network import Network
@@ -174,6 +174,14 @@ class Bilinear(Alone, Frozen):
             out,
         )
         return out
+
+    def due(self, problem: Problem, batch: Batch) -> tuple[FloatArray, FloatArray]:
+        """The twist that is due in units of the speed, v / s, of shape (B, w), and s, of shape (B,)."""
+        chain, kind = problem.model.chain, problem.task.kind
+        due, speed = np.empty((len(batch.q), int(twist_size(kind)))), np.empty(len(batch.q))
+        arrays = batch.q, batch.pose, batch.nominal, due, speed
+        due_rows(kind, chain.prismatic, chain.axes[0], problem.dt, self._ahead, *arrays)
+        return due, speed
 
     def law(self, problem: Problem, batch: Batch, network: Network) -> FloatArray:
         """:meth:`action` of what a network says of :meth:`features`, bit for bit, in one compiled call."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Annotated, Any, ClassVar, get_args
+from typing import Annotated, Any, ClassVar, Literal, get_args
 
 import tyro
 
@@ -39,8 +39,15 @@ class Imitate(ActorOnly, JointVelocities):
 
     method: ClassVar[str] = "imitate"
 
+    output: Literal["velocities", "bilinear"] = "velocities"
+    """What the network gives. velocities: those of the joints, as multiples of action_scale. bilinear: G and h, as that
+    of apg, which can go on with it."""
+    damping: Annotated[float | None, tyro.conf.arg(metavar="λ")] = None
+    """A bilinear agent begins as the damped inverse of the Jacobian with this λ, see apg."""
+    matrix: bool = True
+    """Whether the network of a bilinear agent adds a matrix to the damped inverse, see apg."""
     algorithm: Algorithm = "ppo"
-    """The kind of model that comes out, which the same algorithm can go on with."""
+    """The kind of model that comes out where the output is velocities, which the same algorithm can go on with."""
     expert: Annotated[str, tyro.conf.arg(metavar="POLICY")] = "rhc_foresight"
     """Who is imitated, as NAME or NAME:PARAMETER=VALUE,…"""
     beta: Annotated[float, tyro.conf.arg(metavar="β")] = 0.2
@@ -51,7 +58,8 @@ class Imitate(ActorOnly, JointVelocities):
     """Largest disturbance of the arms that the expert moves, as a multiple of their joint velocity, so that examples
     show how to come back. Projected into the null space where network outputs are."""
     tolerance: Annotated[float, tyro.conf.arg(metavar="X")] = 0.02
-    """Scale c of the Cauchy loss ln(1 + |error|²/c²) of network outputs, in which larger errors matter little."""
+    """Scale c of the Cauchy loss ln(1 + |error|²/c²) of network outputs, in which larger errors matter little. Of
+    bilinear agents the error is that of the joint velocities, in units of the speed of the reference ahead."""
     example_every: Annotated[int, tyro.conf.arg(metavar="N")] = 4
     """Steps from one example to the next: those in between are much like it."""
     buffer_size: Annotated[int, tyro.conf.arg(metavar="N")] = 400_000
@@ -62,6 +70,19 @@ class Imitate(ActorOnly, JointVelocities):
     """Examples of one gradient step."""
 
     def __post_init__(self) -> None:
+        known_names("output", [self.output], ["velocities", "bilinear"])
+        if self.output == "velocities":
+            for name, usual in (("damping", None), ("matrix", True)):
+                if getattr(self, name) != usual:
+                    raise InvalidInputError(
+                        f"{name}: expected {usual} for an output of velocities, got {getattr(self, name)!r}."
+                    )
+        else:
+            for name in ("base_policy", "null_space"):
+                if getattr(self, name) is not None:
+                    raise InvalidInputError(
+                        f"{name}: expected none for an output that is bilinear, got {getattr(self, name)!r}."
+                    )
         super().__post_init__()
         known_names("algorithm", [self.algorithm], get_args(Algorithm))
         self._set("beta", between("beta", self.beta, 0.0, 1.0))
@@ -72,6 +93,23 @@ class Imitate(ActorOnly, JointVelocities):
             self._set(name, whole_number(name, getattr(self, name), at_least=1))
         self._set("buffer_size", count("buffer_size", self.buffer_size, at_most=MOST_TRANSITIONS))
         self._set("batch_size", count("batch_size", self.batch_size, at_most=MOST_BATCH))
+
+    @property
+    def processing(self) -> Stored:
+        """What the agent sees, and what the outputs of its network mean."""
+        return self.velocities if self.output == "velocities" else self.bilinear
+
+    @property
+    def bilinear(self) -> Bilinear:
+        """The same, where these outputs are G and h."""
+        return Bilinear(self.offsets, self.damping, self.matrix)
+
+    @classmethod
+    def shape_of(cls, processing: Stored, sizes: tuple[int, ...], activation: str) -> dict[str, Any]:
+        """See :meth:`Config.shape_of`."""
+        if isinstance(processing, Bilinear):
+            return APG.shape_of(processing, sizes, activation)
+        return super().shape_of(processing, sizes, activation)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

@@ -54,6 +54,15 @@ class View:
         """Actions of the base policy for what was last seen, None where there is none. Shape (N, n)."""
         return None if self._seen is None else self._seen.base
 
+    @property
+    def batch(self) -> Batch:
+        """What was last seen, with the nominal coordinates at the offsets of the agent.
+
+        Raises:
+            ResetNeededError: Nothing has been seen yet.
+        """
+        return self._last().batch
+
     def see(self, observation: Observation, starting: npt.NDArray[np.bool_]) -> Features:
         """The features of what the arms show now.
 
@@ -90,9 +99,12 @@ class View:
         Raises:
             ResetNeededError: Nothing has been seen yet.
         """
+        return self._view.action(self._last(), output)
+
+    def _last(self) -> Seen:
         if self._seen is None:
             raise ResetNeededError("Actions need something that was seen: call reset() first.")
-        return self._view.action(self._seen, output)
+        return self._seen
 
     def _recall(self, starting: npt.NDArray[np.bool_]) -> Memory:
         """The memory of the base policy, cleared where an episode begins."""

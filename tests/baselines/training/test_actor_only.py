@@ -7,8 +7,11 @@ import pytest
 import torch
 
 from baselines.agents.bilinear.processing import Bilinear
-from baselines.agents.files import load_agent
+from baselines.agents.files import load_agent, save_agent
+from baselines.agents.network import Network
+from baselines.episode import play as play_episodes
 from baselines.training.config.actor_only import APG, Imitate
+from baselines.training.environment.view import View
 from baselines.training.errors import TrainingError
 from baselines.training.gradients.law import Law
 from baselines.training.networks import ActorModel
@@ -16,14 +19,17 @@ from baselines.training.randomness import deterministic_torch
 from baselines.training.run import train
 from baselines.training.trainers.initial_weights import inherit
 from baselines.training.trainers.models import ALGORITHMS, network_outputs, weights_hash
+from baselines.training.trainers.students import student
 from baselines.training.validation import play, validation_seeds
 from ikgym import Plant, scenarios
 from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.outcome import observation
 from tests.baselines.training.segments import made, play_segments
 from tests.baselines.training.small import TINY
 
 SMALL = {name: TINY[name] for name in ("scenario", "steps", "hidden", "offsets", "segments", "n_envs")}
 OVER = {**SMALL, "scenario": "varga7-random", "base_policy": "dls", "null_space": 1e-2}
+POSE = {**SMALL, "scenario": "varga7-random", "task": "pose"}
 BILINEAR = APG(
     **{**SMALL, "scenario": "varga7-random", "steps": 100}, task="pose", hold=8, segment_steps=48, window=(16, 48)
 )
@@ -33,6 +39,10 @@ CONFIGS = {
     "apg, no matrix": BILINEAR.replace(damping=4e-4, matrix=False),
     "apg, skew, end within a segment": BILINEAR.replace(task="skew", steps=20),
     "imitate": Imitate(**SMALL, expert="dls", gradient_steps=5, batch_size=16, example_every=2, buffer_size=70),
+    "imitate, bilinear": Imitate(**POSE, expert="dls", output="bilinear", gradient_steps=5, batch_size=16),
+    "imitate, no matrix": Imitate(
+        **POSE, expert="dls", output="bilinear", damping=1e-2, matrix=False, gradient_steps=5, batch_size=16
+    ),
     "imitate over dls": Imitate(**OVER, expert="rhc:horizon=5", gradient_steps=5, batch_size=16, algorithm="sac"),
 }
 
@@ -72,7 +82,8 @@ def test_ordinary_models_come_out(config):
     trainer = made(config)
     before = weights_hash(trainer.model)
     play_segments(trainer, [0])
-    assert type(trainer.model) is (ActorModel if isinstance(config, APG) else ALGORITHMS[config.algorithm])
+    alone = isinstance(config.processing, Bilinear)
+    assert type(trainer.model) is (ActorModel if alone else ALGORITHMS[config.algorithm])
     assert weights_hash(trainer.model) != before
     played = config.segment_steps if isinstance(config, APG) else config.steps
     assert trainer.steps == config.n_envs * played
@@ -208,10 +219,65 @@ def test_imitation_learns():
     )
     trainer = made(config)
     play_segments(trainer, range(3))
-    features, wanted = trainer._examples
+    features, wanted, _ = trainer._examples
     missed = network_outputs(trainer.model, features.numpy()) - wanted.numpy()
     # Outputs of 0 would miss as much as the targets are, and a wrong gradient more.
     assert np.median(np.abs(missed)) < 0.7 * np.median(np.abs(wanted.numpy()))
+
+
+@pytest.mark.parametrize("inverse", [{}, {"damping": 1e-2}, {"damping": 1e-2, "matrix": False}])
+def test_bilinear_students_say_what_their_agents_do(inverse):
+    """The velocities that the loss is made of, in units of the speed, are the actions of the agent."""
+    config = Imitate(**POSE, expert="dls", output="bilinear", **inverse)
+    scenario = config.make_scenario()
+    pupil = student(config, scenario)
+    with torch.no_grad():
+        pupil.actor[-1].bias.normal_(0.0, 0.1)
+    view, wrong = View(pupil.processing, scenario), np.random.default_rng(0)
+    seen = []
+
+    def act(out):
+        shown = np.ascontiguousarray(out.nominal[:, np.array(config.offsets) - 1])
+        features = view.see(observation(out) | {"nominal": shown}, np.zeros(len(out.q), dtype=np.bool_))
+        action = view.act(network_outputs(pupil.model, features))
+        target, given = pupil.example(view.batch, action.astype(np.float32), None)
+        seen.append((target, pupil.said(torch.from_numpy(features), torch.from_numpy(given)).detach().numpy()))
+        return action + 0.01 * wrong.normal(size=action.shape)  # errors are seen, too
+
+    for _ in play_episodes(scenario, range(3), act, preview=config.offsets[-1]):
+        pass
+    targets, said = (np.concatenate(part) for part in zip(*seen, strict=True))
+    assert len(said) == 3 * 20
+    assert np.abs(said).max() > 0.1
+    np.testing.assert_allclose(said, targets, rtol=1e-4, atol=1e-4)
+
+
+def test_bilinear_students_learn_and_apg_goes_on_with_them(tmp_path):
+    """One that begins as a damped inverse comes to do what damped least squares with another damping does."""
+    config = Imitate(
+        **POSE | {"steps": 60, "hidden": (32, 32), "n_envs": 32},
+        expert="dls:gain=1.0,damping=0.5",
+        output="bilinear",
+        damping=1e-2,
+        example_every=1,
+        gradient_steps=300,
+        batch_size=256,
+        learning_rate=3e-3,
+    )
+    untrained, trainer = made(config), made(config)
+    play_segments(trainer, range(3))
+    features, wanted, given = trainer._examples
+    students = untrained._student, trainer._student
+    missed = [(pupil.said(features, given).detach() - wanted).abs().median() for pupil in students]
+    assert missed[1] < 0.5 * missed[0]
+    scenario = config.make_scenario()
+    layers = [layer for layer in trainer.model.policy if isinstance(layer, torch.nn.Linear)]
+    weights, biases = ([getattr(layer, name).detach().numpy() for layer in layers] for name in ("weight", "bias"))
+    file = tmp_path / "agent.safetensors"
+    save_agent(file, Network(tuple(weights), tuple(biases), "silu", "linear"), config.processing, scenario)
+    goes_on = inherit(APG(**POSE, init=file, hold=8, segment_steps=48, window=(16, 48)), ())
+    assert goes_on.processing == config.processing
+    assert weights_hash(made(goes_on).model) == weights_hash(trainer.model)
 
 
 def test_episodes_are_of_the_split_for_training():
@@ -233,6 +299,13 @@ def test_episodes_are_of_the_split_for_training():
         (Imitate, {"beta": 1.5}, InvalidInputError, "beta: expected a number from 0 to 1, got 1.5"),
         (Imitate, {"tolerance": 0.0}, InvalidInputError, "tolerance"),
         (Imitate, {"gradient_steps": 0}, InvalidInputError, "gradient_steps"),
+        (Imitate, {"output": "bilinar"}, UnknownNameError, "Did you mean 'bilinear'"),
+        (Imitate, {"damping": 1e-2}, InvalidInputError, "damping: expected None for an output of velocities"),
+        (Imitate, {"matrix": False}, InvalidInputError, "matrix: expected True for an output of velocities"),
+        (Imitate, {"output": "bilinear", "matrix": False}, InvalidInputError, "damping: expected a number where"),
+        (Imitate, {"output": "bilinear", "base_policy": "dls"}, InvalidInputError, "base_policy: expected none"),
+        (Imitate, {"output": "bilinear", "null_space": 1e-2}, InvalidInputError, "null_space: expected none"),
+        (Imitate, {"output": "bilinear", "offsets": (2, 5)}, InvalidInputError, "offsets: .* rising from 1"),
     ],
 )
 def test_bad_configurations_are_refused(kind, changes, error, message):
