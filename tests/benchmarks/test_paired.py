@@ -51,7 +51,13 @@ def test_unknown_names_are_told(tmp_path):
 
 @pytest.mark.parametrize(
     ("file", "seeds"),
-    [("agents.json", 5), ("agents_long.json", 1), ("agents_long_skew.json", 1), ("agents_td3.json", 3)],
+    [
+        ("agents.json", 5),
+        ("agents_long.json", 1),
+        ("agents_long_skew.json", 1),
+        ("agents_td3.json", 3),
+        ("agents_ppo.json", 5),
+    ],
 )
 def test_the_page_has_the_table_of_what_was_played(file, seeds):
     page = (DOCS / "agents.md").read_text(encoding="utf-8")
