@@ -11,6 +11,7 @@ import pytest
 import baselines
 from baselines.agents.bilinear.processing import Bilinear
 from baselines.agents.files import save_agent
+from baselines.evaluation.pages.claims import Comparison
 from baselines.evaluation.rollout import rollouts
 from baselines.policy import Problem
 from benchmarks import outputs
@@ -82,3 +83,22 @@ def test_the_page_has_the_table_of_what_was_played():
     content = json.loads((DOCS / "agents_outputs.json").read_text())
     assert table.splitlines() == outputs.lines(content)
     assert (content["episodes"], content["split"]) == (256, "test")
+
+
+def test_the_page_says_how_much_is_learned():
+    """Agents beside the networks that they could begin with, λ = 1e-2 and 4e-2, and these beside tuned dls."""
+
+    def costs(file, label):
+        one = json.loads((DOCS / file).read_text())["played"][label]["costs"]
+        return np.atleast_2d(np.array(one))
+
+    first = costs("agents_outputs.json", "nothing")
+    second = costs("agents_ppo.json", "agent:runs/ppo-untrained/seed-0/agent.safetensors")
+    solver = costs("agents_long.json", "dls:gain=0.15,damping=0.01")
+    page = " ".join((DOCS / "agents.md").read_text(encoding="utf-8").split())
+    pairs = [(first, solver), (second, solver), (costs("agents_td3.json", "agents"), first)]
+    pairs += [
+        (costs(file, "agents"), other) for file in ("agents.json", "agents_long.json") for other in (first, second)
+    ]
+    for one, other in pairs:
+        assert str(Comparison.of(one, other)) in page
