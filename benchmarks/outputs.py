@@ -23,12 +23,9 @@ from baselines import registry
 from baselines.agents.bilinear.processing import Bilinear
 from baselines.agents.files import load_agent, save_agent
 from baselines.agents.network import Network
-from baselines.evaluation.metrics import lost
-from baselines.evaluation.pages.claims import Comparison
 from baselines.evaluation.pages.markdown import table
-from baselines.evaluation.report import number
-from baselines.evaluation.rollout import rollouts
 from baselines.files import json_files, write
+from benchmarks.paired import play, ratios
 from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError
 
@@ -113,28 +110,18 @@ def played(command: Command) -> dict[str, Any]:
         for label, names in tqdm(KEPT.items(), unit="agent"):
             kept = np.concatenate([np.zeros(0, dtype=np.int64), *(found[name] for name in names)])
             save_agent(file, keeping(network, kept), processing, scenario)
-            episodes = rollouts(scenario, registry.make("agent", scenario, path=str(file)), seeds)
-            costs = [float(f"{np.sum(e.tracking_cost + e.velocity_cost):.6g}") for e in episodes]
-            missed = sum(bool(lost(e.position_error.max(), e.orientation_error.max())) for e in episodes)
-            content["played"][label] = {"costs": costs, "lost": missed}
+            content["played"][label] = play(scenario, registry.make("agent", scenario, path=str(file)), seeds)._asdict()
     return content
 
 
 def lines(content: dict[str, Any]) -> list[str]:
     """The table."""
     everybody = content["played"]
+    costs = {label: np.array([one["costs"]]) for label, one in everybody.items()}
     first, *others = everybody
-    whole = np.array([everybody[first]["costs"]])
-    rows = [[first, "1", "1", _lost(everybody[first])]]
-    for label in others:
-        costs = np.array([everybody[label]["costs"]])
-        median = number(float(np.median(costs / whole)))
-        rows.append([label, str(Comparison.of(costs, whole)), median, _lost(everybody[label])])
+    told = {first: ["1", "1"]} | {label: ratios(costs[label], costs[first]) for label in others}
+    rows = [[label, *told[label], f"{one['lost']} of {len(one['costs'])}"] for label, one in everybody.items()]
     return table(HEAD, rows, text=(0, 1))
-
-
-def _lost(one: dict[str, Any]) -> str:
-    return f"{one['lost']} of {len(one['costs'])}"
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -11,7 +11,7 @@ import dataclasses
 import json
 import pathlib
 from collections.abc import Sequence
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 import tyro
@@ -25,10 +25,25 @@ from baselines.evaluation.pages.markdown import table
 from baselines.evaluation.report import number
 from baselines.evaluation.rollout import rollouts
 from baselines.files import json_files, write
+from baselines.policy import SolverPolicy
 from baselines.spec import parse_policy
 from ikgym import scenarios
+from ikgym.scenarios import Scenario
+from ikgym.validation import FloatArray
 
 HEAD = ("beside", "cost ratio to it", "median", "agents lost", "it lost")
+
+
+class Totals(NamedTuple):
+    """What a policy has cost.
+
+    Attributes:
+        costs: Of each episode.
+        lost: Episodes that lost track.
+    """
+
+    costs: list[float]
+    lost: int
 
 
 @dataclasses.dataclass(frozen=True)
@@ -65,14 +80,32 @@ def played(command: Command) -> dict[str, Any]:
     }
     bar = tqdm(total=len(agents) + len(solvers), unit="policy")
     for label, policies in {"agents": agents, **solvers}.items():
-        costs, missed = [], []
+        totals = []
         for name, parameters in policies:
-            episodes = rollouts(scenario, registry.make(name, scenario, **parameters), seeds)
-            costs.append([float(f"{np.sum(e.tracking_cost + e.velocity_cost):.6g}") for e in episodes])
-            missed.append(sum(map(_lost, episodes)))
+            totals.append(play(scenario, registry.make(name, scenario, **parameters), seeds))
             bar.update()
-        content.setdefault("played", {})[label] = {"costs": costs, "lost": missed}
+        content.setdefault("played", {})[label] = {
+            "costs": [total.costs for total in totals],
+            "lost": [total.lost for total in totals],
+        }
     return content
+
+
+def play(scenario: Scenario, policy: SolverPolicy, seeds: Sequence[int]) -> Totals:
+    """Plays a policy alone."""
+    episodes = rollouts(scenario, policy, seeds)
+    costs = [float(f"{np.sum(e.tracking_cost + e.velocity_cost):.6g}") for e in episodes]
+    return Totals(costs, sum(bool(lost(e.position_error.max(), e.orientation_error.max())) for e in episodes))
+
+
+def ratios(costs: FloatArray, others: FloatArray) -> list[str]:
+    """The geometric mean of a cost ratio with its interval, and the median.
+
+    Args:
+        costs: A row a training seed, a column an episode. Shape (S, E).
+        others: What they are divided by. Shape (S, E), or (1, E).
+    """
+    return [str(Comparison.of(costs, others)), number(float(np.median(costs / others)))]
 
 
 def lines(content: dict[str, Any]) -> list[str]:
@@ -85,11 +118,7 @@ def lines(content: dict[str, Any]) -> list[str]:
 def _line(label: str, own: dict[str, Any], one: dict[str, Any]) -> list[str]:
     costs, others = np.array(own["costs"]), np.array(one["costs"])
     share = [f"{sum(who['lost'])} of {array.size}" for who, array in ((own, costs), (one, others))]
-    return [f"`{label}`", str(Comparison.of(costs, others)), number(float(np.median(costs / others))), *share]
-
-
-def _lost(episode: Any) -> bool:
-    return bool(lost(episode.position_error.max(), episode.orientation_error.max()))
+    return [f"`{label}`", *ratios(costs, others), *share]
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
