@@ -137,6 +137,17 @@ def whole_number(name: str, value: int, *, at_least: int) -> int:
     return int(value)
 
 
+def flag(name: str, value: bool) -> bool:
+    """True or false, in the words of the files that hold it.
+
+    Raises:
+        InvalidInputError: The value is neither.
+    """
+    if not isinstance(value, bool):
+        raise InvalidInputError(f"{name}: expected true or false, got {value!r}.")
+    return value
+
+
 def rotation_matrix(name: str, value: npt.ArrayLike) -> FloatArray:
     """A rotation matrix, made exactly orthogonal if it is within 1e-6 of one, and read-only.
 

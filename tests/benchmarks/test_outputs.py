@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import baselines
+from baselines.agents.bilinear.damped_kernels import with_matrix
 from baselines.agents.bilinear.processing import Bilinear
 from baselines.agents.files import save_agent
 from baselines.evaluation.pages.claims import Comparison
@@ -32,11 +33,14 @@ def written(file, seed=0, **inverse):
 
 
 def test_every_output_is_one_of_the_parts(tmp_path):
-    """Those of G are where the law looks for them: without h, λ and U an agent of G = 0 is as one that says nothing."""
+    """Those of h, λ and U are where the law puts them for a network without G; those of G are the others."""
     found = outputs.parts(7, 57)
     assert sorted(np.concatenate(list(found.values()))) == list(range(57))
     assert [len(found[name]) for name in "GhλU"] == [42, 7, 1, 7]
     assert found["h"].tolist() == [6, 13, 20, 27, 34, 41, 48]  # behind each row of G
+    placed = with_matrix(6, np.arange(1.0, 16.0)[None])[0]
+    assert placed[np.concatenate([found[name] for name in "hλU"])].tolist() == list(range(1, 16))
+    assert not placed[found["G"]].any()
     made = written(tmp_path / "agent.safetensors", damping=1e-2)
     features = np.random.default_rng(0).normal(size=(3, made.inputs)).astype(np.float32)
     kept = outputs.keeping(made, found["h"]).forward(features)

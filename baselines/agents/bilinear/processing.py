@@ -20,7 +20,7 @@ from baselines.policy import Batch, Problem
 from ikgym import task_kernels
 from ikgym.exceptions import InvalidInputError
 from ikgym.rl.twists import shown_joints, twist_size
-from ikgym.validation import FloatArray, Frozen, known_names, number, whole_number
+from ikgym.validation import FloatArray, Frozen, flag, known_names, number, whole_number
 
 
 @dataclasses.dataclass(frozen=True)
@@ -81,8 +81,7 @@ class Bilinear(Alone, Frozen):
         rising = all(a < b for a, b in itertools.pairwise(offsets))
         if len(offsets) < 2 or offsets[0] != 1 or not rising:
             raise InvalidInputError(f"offsets: expected at least two, rising from 1, got {self.offsets}.")
-        if not isinstance(self.matrix, bool):
-            raise InvalidInputError(f"matrix: expected true or false, got {self.matrix!r}.")
+        flag("matrix", self.matrix)
         if not self.matrix and self.damping is None:
             raise InvalidInputError("damping: expected a number where the network gives no matrix, got None.")
         ahead = np.array(offsets, dtype=np.int64)

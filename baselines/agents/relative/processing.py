@@ -19,7 +19,7 @@ from ikgym.exceptions import InvalidInputError
 from ikgym.preview import offsets as checked_offsets
 from ikgym.rl.feature_kernels import observe_rows
 from ikgym.rl.twists import shown_joints, twist_size
-from ikgym.validation import FloatArray, Frozen, known_name, known_names, number
+from ikgym.validation import FloatArray, Frozen, flag, known_name, known_names, number
 
 Squash = Literal["clip", "tanh"]
 
@@ -63,8 +63,7 @@ class Relative(Alone, Frozen):
         if len(offsets) < 2:
             raise InvalidInputError(f"offsets: expected at least two steps ahead, got {self.offsets}.")
         known_name("squash", self.squash, get_args(Squash))
-        if not isinstance(self.bilinear, bool):
-            raise InvalidInputError(f"bilinear: expected true or false, got {self.bilinear!r}.")
+        flag("bilinear", self.bilinear)
         if self.damping is not None and not self.bilinear:
             raise InvalidInputError(f"damping: expected None unless bilinear, got {self.damping!r}.")
         numbers = ["furthest", "largest", "gain"] + ["damping"] * (self.damping is not None)

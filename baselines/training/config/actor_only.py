@@ -14,6 +14,9 @@ from baselines.training.config.limits import MOST_BATCH, MOST_TRANSITIONS, betwe
 from ikgym.exceptions import InvalidInputError
 from ikgym.validation import known_names, number, whole_number
 
+#: What the network of an agent gives that imitates an expert.
+StudentOutput = Literal["velocities", "bilinear"]
+
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class ActorOnly(Annealed):
@@ -39,7 +42,7 @@ class Imitate(ActorOnly, JointVelocities):
 
     method: ClassVar[str] = "imitate"
 
-    output: Literal["velocities", "bilinear"] = "velocities"
+    output: StudentOutput = "velocities"
     """What the network gives. velocities: those of the joints, as multiples of action_scale. bilinear: G and h, as that
     of apg, which can go on with it."""
     damping: Annotated[float | None, tyro.conf.arg(metavar="λ")] = None
@@ -70,7 +73,7 @@ class Imitate(ActorOnly, JointVelocities):
     """Examples of one gradient step."""
 
     def __post_init__(self) -> None:
-        known_names("output", [self.output], ["velocities", "bilinear"])
+        known_names("output", [self.output], get_args(StudentOutput))
         if self.output == "velocities":
             for name, usual in (("damping", None), ("matrix", True)):
                 if getattr(self, name) != usual:
@@ -78,11 +81,7 @@ class Imitate(ActorOnly, JointVelocities):
                         f"{name}: expected {usual} for an output of velocities, got {getattr(self, name)!r}."
                     )
         else:
-            for name in ("base_policy", "null_space"):
-                if getattr(self, name) is not None:
-                    raise InvalidInputError(
-                        f"{name}: expected none for an output that is bilinear, got {getattr(self, name)!r}."
-                    )
+            self._expect_none("base_policy", "null_space", output=self.output)
         super().__post_init__()
         known_names("algorithm", [self.algorithm], get_args(Algorithm))
         self._set("beta", between("beta", self.beta, 0.0, 1.0))

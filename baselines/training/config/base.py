@@ -25,7 +25,7 @@ from baselines.training.config.limits import (
 from ikgym import scenarios, tasks
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
-from ikgym.validation import Frozen, known_names, number, whole_number
+from ikgym.validation import Frozen, flag, known_names, number, whole_number
 
 Activation = Literal["silu", "relu", "tanh", "elu"]
 #: Kinds of models of Stable-Baselines3 that come out of a training.
@@ -96,8 +96,7 @@ class Config(Frozen):
             raise InvalidInputError(
                 f"hidden: expected at least one hidden layer, at most {MOST_LAYERS}, got {len(self.hidden)}."
             )
-        if not isinstance(self.keep_best, bool):
-            raise InvalidInputError(f"keep_best: expected true or false, got {self.keep_best!r}.")
+        flag("keep_best", self.keep_best)
         self._set("hidden", tuple(count("hidden", width, at_most=MOST_NEURONS) for width in self.hidden))
         self._check_init()
         self._set("offsets", self.processing.offsets)
@@ -185,6 +184,14 @@ class JointVelocities(Config):
     def velocities(self) -> Processing:
         """The same, where these outputs are joint velocities."""
         return Processing(self.offsets, self.action_scale, self.base_policy, self.null_space)
+
+    def _expect_none(self, *names: str, output: str) -> None:
+        """Insists that options are left out which mean nothing for another output than velocities."""
+        for name in names:
+            if getattr(self, name) is not None:
+                raise InvalidInputError(
+                    f"{name}: expected none for an output that is {output}, got {getattr(self, name)!r}."
+                )
 
     @classmethod
     def shape_of(cls, processing: Stored, sizes: tuple[int, ...], activation: str) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from baselines.training.config.base import Annealed, Config, JointVelocities, St
 from baselines.training.config.limits import MOST_BATCH, MOST_TRANSITIONS, between, count, share
 from ikgym.exceptions import InvalidInputError
 from ikgym.rl import Learning
-from ikgym.validation import known_names, number, whole_number
+from ikgym.validation import flag, known_names, number, whole_number
 
 Reward = Literal["cost", "log"]
 Output = Literal["velocities", "bilinear", "inverse"]
@@ -47,8 +47,8 @@ class Reinforcement(Annealed, JointVelocities):
     """Costs of more than about this many times the mean of the reference joint path count by their logarithm in the
     rewards of an output that is inverse."""
     null_noise: Annotated[float, tyro.conf.arg(metavar="X")] = 1.0
-    """Noise of exploration of the null motion at the start, against that of the damping and the metric: these change
-    less of what an arm does. Only for an output that is inverse."""
+    """Noise of exploration of the null motion at the start, as a multiple of that of the damping and the metric. Only
+    for an output that is inverse."""
     largest: Annotated[float, tyro.conf.arg(metavar="X")] = Learning.largest
     """Largest velocity of a joint of bilinear agents, in units of what is asked for."""
     furthest: Annotated[float, tyro.conf.arg(metavar="X")] = Learning.furthest
@@ -79,8 +79,7 @@ class Reinforcement(Annealed, JointVelocities):
         self._set("hold", whole_number("hold", self.hold, at_least=1))
         if self.output == "inverse" and self.damping is None:
             raise InvalidInputError("damping: expected a number for an output that is inverse, got None.")
-        if not isinstance(self.privileged, bool):
-            raise InvalidInputError(f"privileged: expected true or false, got {self.privileged!r}.")
+        flag("privileged", self.privileged)
         if self.privileged and self.output != "inverse":
             raise InvalidInputError(f"privileged: expected false for an output that is {self.output}, got true.")
         if self.null_noise != 1.0 and self.output != "inverse":
@@ -88,11 +87,7 @@ class Reinforcement(Annealed, JointVelocities):
                 f"null_noise: expected 1 for an output that is {self.output}, got {self.null_noise!r}."
             )
         if self.output != "velocities":
-            for name in ("base_policy", "null_space", "initial_episode_steps"):
-                if getattr(self, name) is not None:
-                    raise InvalidInputError(
-                        f"{name}: expected none for an output that is {self.output}, got {getattr(self, name)!r}."
-                    )
+            self._expect_none("base_policy", "null_space", "initial_episode_steps", output=self.output)
         elif self.damping is not None:
             raise InvalidInputError(f"damping: expected none for an output of velocities, got {self.damping!r}.")
         super().__post_init__()
@@ -162,8 +157,7 @@ class _StateDependentExploration(Reinforcement):
     def __post_init__(self) -> None:
         super().__post_init__()
         self._set("log_std_init", between("log_std_init", self.log_std_init, *LOG_STD))
-        if not isinstance(self.use_sde, bool):
-            raise InvalidInputError(f"use_sde: expected true or false, got {self.use_sde!r}.")
+        flag("use_sde", self.use_sde)
         if self.sde_sample_freq != -1:
             self._set("sde_sample_freq", whole_number("sde_sample_freq", self.sde_sample_freq, at_least=1))
             if not self.use_sde:

@@ -21,7 +21,7 @@ from ikgym.exceptions import InvalidInputError, NoAttributeError, ResetNeededErr
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray, number, whole_number
 
-#: Steps for which an inverse is held: over those of an action it would cost more than what actions change.
+#: Steps for which an inverse is held while an action is. Held as long as the action, it would cost more than it should.
 INVERSE_EVERY = 2
 #: What agents see.
 SEEN = Bilinear(damping=1e-2, matrix=False)
@@ -46,8 +46,8 @@ class InverseVecEnv(VecEnv):
     >>> model = TD3("MlpPolicy", InverseVecEnv(64, "panda-random"))
 
     Features say nothing of the velocities of the joints, which changes of velocity are counted from, nor of what the
-    reference joint path costs. A critic that sees features alone explains a small part of the rewards;
-    `privileged` shows it both, and a policy of :mod:`baselines.training.asymmetric` hides them from the actor.
+    reference joint path costs, and rewards depend on both. `privileged` shows them, and a policy of
+    :mod:`baselines.training.asymmetric` hides them from the actor: they are for the critics.
 
     Args:
         num_envs: N. A reset spreads them over their episodes.
@@ -189,7 +189,7 @@ class InverseVecEnv(VecEnv):
         self._look()
         seen = self._features.numpy()
         if self._privileged:
-            seen = np.concatenate([seen, self._behind_rewards()], axis=1)
+            seen = np.concatenate([seen, self._for_critics()], axis=1)
         return aligned(seen.astype(np.float32))
 
     def _look(self) -> None:
@@ -197,7 +197,7 @@ class InverseVecEnv(VecEnv):
         with torch.no_grad():
             self._features, self._speed = self._law.features(self._arms.q, self._arms.ahead, self._arms.remaining)
 
-    def _behind_rewards(self) -> FloatArray:
+    def _for_critics(self) -> FloatArray:
         """What rewards depend on beside the features. Shape (N, n + 1)."""
         arms = self._arms
         return np.column_stack([arms.qdot.numpy() / self._speed[:, None], np.log(arms.usual)])

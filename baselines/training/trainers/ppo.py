@@ -120,6 +120,7 @@ class PPOTrainer(ReinforcementTrainer):
         self._set_log_std(self.model, self._config.log_std_init)
 
     def _set_log_std(self, model: Any, log_std: float) -> None:
+        """Gives all outputs the same noise, but for the null motion, see :attr:`PPO.null_noise`."""
         with torch.no_grad():
             model.policy.log_std.copy_(torch.from_numpy(log_std + np.log(self._noise_scales)))
 
