@@ -118,7 +118,7 @@ def of_ppo(config: PPO, seed: int) -> Batches:
         trainer.segment(segment)
     model, hold = trainer.model, config.hold if config.output == "inverse" else 1
     weights = list(mean_network(model).parameters())
-    _, callback = model._setup_learn(model.num_timesteps, None)
+    _, callback = model._setup_learn(model.num_timesteps, trainer.callback())
 
     def take() -> Gradient:
         model._last_obs = model.env.reset()

@@ -79,6 +79,7 @@ _HARMLESS: Final = {
     "n_critics",
     "clip_mean",
     "seen",
+    "freedom",
 }
 
 

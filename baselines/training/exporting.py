@@ -17,7 +17,7 @@ from baselines.agents.relative.processing import Relative, Squash
 from baselines.agents.sb3_zip import network_of_model
 from baselines.policy import Problem
 from baselines.training.environment.inverse_env import InverseVecEnv
-from baselines.training.policies import ACTIVATION
+from baselines.training.policies.bilinear import ACTIVATION
 from baselines.training.trainers.models import bilinear_actor
 from ikgym.exceptions import InvalidInputError
 from ikgym.preview import offsets

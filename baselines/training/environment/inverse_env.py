@@ -13,13 +13,15 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices
 
 from baselines.agents.bilinear.processing import Bilinear
 from baselines.agents.features import Features
+from baselines.training.environment.null_space import null_maps
 from baselines.training.environment.view import aligned
 from baselines.training.gradients.arms import Arms
 from baselines.training.gradients.law import Law
 from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError, NoAttributeError, ResetNeededError
+from ikgym.rl.twists import twist_size
 from ikgym.scenarios import Scenario
-from ikgym.validation import FloatArray, number, whole_number
+from ikgym.validation import FloatArray, flag, number, whole_number
 
 #: Steps for which an inverse is held while an action is. Held as long as the action, it would cost more than it should.
 INVERSE_EVERY = 2
@@ -47,7 +49,11 @@ class InverseVecEnv(VecEnv):
 
     Features say nothing of the velocities of the joints, which changes of velocity are counted from, nor of what the
     reference joint path costs, and rewards depend on both. `privileged` shows them, and a policy of
-    :mod:`baselines.training.asymmetric` hides them from the actor: they are for the critics.
+    :mod:`baselines.training.policies.asymmetric` hides them from the actor: they are for the critics.
+
+    Episodes differ in cost by more than an action does. Of `group_size` arms all play the same episodes, each with its
+    own actions: how much better one does than the others is due to the actions alone (groups of rollouts from the same
+    state as in the vine of TRPO, Schulman et al. 2015, and in GRPO, Shao et al. 2024).
 
     Args:
         num_envs: N. A reset spreads them over their episodes.
@@ -58,9 +64,13 @@ class InverseVecEnv(VecEnv):
         privileged: Whether n + 1 numbers are shown behind the features: the velocities of the joints ÷ the speed of
             what is ahead, and the logarithm of the mean cost of the reference joint path, of 1 where there is none.
         log_above: k, above 0: costs well below k times that mean count as they are, those above by their logarithm.
+        group_size: Arms that play the same episodes, one after the other; N is a multiple.
+        null_map: Whether the last r n numbers shown are what :func:`null_maps` gives, row by row, for a policy of
+            :mod:`baselines.training.policies.null_space`. The task has to leave joints free then.
 
     Attributes:
         seen: How many numbers of an observation are features.
+        freedom: r, how many joints the task leaves free.
 
     Raises:
         UnknownNameError: There is no such scenario.
@@ -76,6 +86,8 @@ class InverseVecEnv(VecEnv):
         lost_distance: float = 0.05,
         privileged: bool = False,
         log_above: float = 1.0,
+        group_size: int = 1,
+        null_map: bool = False,
     ) -> None:
         scenario = scenarios.find(scenario)
         if processing.matrix:
@@ -87,12 +99,20 @@ class InverseVecEnv(VecEnv):
             )
         self._lost_distance = number("lost_distance", lost_distance, above=0.0)
         self._log_above = number("log_above", log_above, above=0.0)
+        self._group_size = whole_number("group_size", group_size, at_least=1)
+        if num_envs % self._group_size:
+            raise InvalidInputError(f"num_envs: expected a multiple of group_size, {group_size}, got {num_envs}.")
         self._law, self.scenario, self.processing = Law(scenario, processing), scenario, processing
+        self.freedom = scenario.joints - int(twist_size(self._law.task.kind))
+        self._null_map = flag("null_map", null_map)
+        if self._null_map and self.freedom < 1:
+            raise InvalidInputError(f"null_map: expected false where the task takes all joints, got {null_map}.")
         self._arms = Arms(scenario, num_envs, processing.offsets)
         self._generator, self._reset = np.random.default_rng(), False
         self._returns, self._lengths = np.zeros(num_envs), np.zeros(num_envs, dtype=np.int64)
         self.seen, self._privileged = self._law.inputs, privileged
         observed = self.seen + (scenario.joints + 1 if privileged else 0)
+        observed += self.freedom * scenario.joints if null_map else 0
         unbounded = spaces.Box(-np.inf, np.inf, (observed,), np.float32)
         self.render_mode = None
         super().__init__(num_envs, unbounded, spaces.Box(-1.0, 1.0, (self._law.outputs,), np.float32))
@@ -104,7 +124,7 @@ class InverseVecEnv(VecEnv):
 
     def reset(self) -> Features:
         """Begins new episodes, spread over their steps, of the split `train`. Returns shape (N, f)."""
-        self._arms.spread(self._generator, self._hold)
+        self._arms.spread(self._generator, self._hold, self._group_size)
         self._returns[:], self._lengths[:] = 0.0, 0
         self._reset = True
         return self._see()
@@ -147,7 +167,7 @@ class InverseVecEnv(VecEnv):
                 infos[row] = {"terminal_observation": last[row], "episode": summary, "TimeLimit.truncated": truncated}
             self._returns[ends], self._lengths[ends] = 0.0, 0
             arms.give_up(np.flatnonzero(lost & ~over))
-            arms.begin_new(np.flatnonzero(over), self._generator)
+            arms.begin_new(np.flatnonzero(over), self._generator, group_size=self._group_size)
         return self._see(), rewards.astype(np.float32), ends, infos
 
     def close(self) -> None:
@@ -187,10 +207,12 @@ class InverseVecEnv(VecEnv):
 
     def _see(self) -> Features:
         self._look()
-        seen = self._features.numpy()
+        seen = [self._features.numpy()]
         if self._privileged:
-            seen = np.concatenate([seen, self._for_critics()], axis=1)
-        return aligned(seen.astype(np.float32))
+            seen.append(self._for_critics())
+        if self._null_map:
+            seen.append(null_maps(self._law, self._arms.q, self._features).reshape(self.num_envs, -1))
+        return aligned(np.concatenate(seen, axis=1).astype(np.float32))
 
     def _look(self) -> None:
         """Features of where the arms are, and the speed of what is ahead."""

@@ -93,26 +93,29 @@ class Arms:
             seeds: Reset seeds. Shape (R,).
             at: Steps that are left out; 0 where there is no joint path. Shape (R,).
         """
-        for row, seed in zip(rows.tolist(), seeds.tolist(), strict=True):
-            self._know(row, seed)
+        self._know(rows, seeds)
         self._put(rows, at)
 
-    def begin_new(self, rows: Indices, generator: np.random.Generator, at: Indices | None = None) -> None:
+    def begin_new(
+        self, rows: Indices, generator: np.random.Generator, at: Indices | None = None, group_size: int = 1
+    ) -> None:
         """Begins new episodes of the split `train`, or enters them.
 
         Args:
             rows: Which arms. Shape (R,).
             generator: Draws the reset seeds.
             at: See :meth:`begin`; their beginnings if left out. Shape (R,).
+            group_size: Arms that get the same seed, one after the other; R is a multiple.
         """
         train = scenarios.SPLITS["train"]
-        seeds = generator.integers(train.start, train.stop, len(rows))
+        seeds = generator.integers(train.start, train.stop, len(rows) // group_size).repeat(group_size)
         self.begin(rows, seeds, np.zeros(len(rows), dtype=np.int64) if at is None else at)
 
-    def spread(self, generator: np.random.Generator, every: int = 1) -> None:
-        """Begins a new episode in each arm, see :meth:`begin_new` and :func:`spread_steps`."""
+    def spread(self, generator: np.random.Generator, every: int = 1, group_size: int = 1) -> None:
+        """Begins a new episode in each group of arms, see :meth:`begin_new` and :func:`spread_steps`."""
         rows = np.arange(len(self.seed))
-        self.begin_new(rows, generator, spread_steps(self._scenario, len(rows), every))
+        at = spread_steps(self._scenario, len(rows) // group_size, every).repeat(group_size)
+        self.begin_new(rows, generator, at, group_size)
 
     def give_up(self, rows: Indices) -> None:
         """Puts arms that are lost back on their reference joint paths, or to the starts where there are none."""
@@ -125,8 +128,7 @@ class Arms:
 
     def restore(self, state: dict[str, Any]) -> None:
         """Goes on from what :meth:`state` gave."""
-        for row, seed in enumerate(state["seed"].tolist()):
-            self._know(row, seed)
+        self._know(np.arange(len(self.seed)), state["seed"].numpy())
         self.q, self.qdot = state["q"].clone(), state["qdot"].clone()
         for name in ("made", "spent", "played"):
             setattr(self, name, state[name].numpy().copy())
@@ -153,10 +155,19 @@ class Arms:
         self.qdot = torch.where(chosen, torch.from_numpy(qdot), self.qdot)
         self.made[rows], self.spent[rows], self.played[rows] = at, 0.0, 0.0
 
-    def _know(self, row: int, seed: int) -> None:
+    def _know(self, rows: Indices, seeds: Indices) -> None:
+        """The references of the arms' episodes; those of equal seeds are worked out once."""
+        self.seed[rows] = seeds
+        _, first, which = np.unique(seeds, return_index=True, return_inverse=True)
+        for row in rows[first].tolist():
+            self._work_out(row, int(self.seed[row]))
+        if len(first) < len(rows):
+            for array in (self._nominal, self._path, self.usual):
+                array[rows] = array[rows[first[which]]]
+
+    def _work_out(self, row: int, seed: int) -> None:
         """The reference of an arm's episode."""
         scenario = self._scenario
-        self.seed[row] = seed
         self._nominal[row] = scenario.nominal(seed, int(self._offsets[-1]))
         path = scenario.nominal_joint_path(seed)
         if path is None:

@@ -47,7 +47,7 @@ class Law:
         problem = Problem.of(scenario)
         self.inputs, self.outputs = processing.size(problem), processing.outputs(problem)
         self.task = Task.of(scenario)
-        self._chain, self._offsets = scenario.model.chain, np.array(processing.offsets)
+        self.chain, self._offsets = scenario.model.chain, np.array(processing.offsets)
         self._damping, self._twists = processing.damping, len(processing.offsets) - 1
         self._matrix = processing.matrix
 
@@ -114,7 +114,7 @@ class Law:
 class _Features(torch.autograd.Function):
     @staticmethod
     def forward(ctx: Any, q: Tensor, law: Law, nominal: FloatArray, remaining: FloatArray, speed: FloatArray) -> Tensor:
-        task, chain, joints = law.task, law._chain, q.detach().numpy()
+        task, chain, joints = law.task, law.chain, q.detach().numpy()
         out = np.empty((len(joints), law.inputs))
 
         def work(start: int, stop: int) -> None:
@@ -132,7 +132,7 @@ class _Features(torch.autograd.Function):
     @once_differentiable
     def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor, None, None, None, None]:
         law, (joints, features) = ctx.law, ctx.seen
-        kind, chain = law.task.kind, law._chain
+        kind, chain = law.task.kind, law.chain
         out, by_rates = np.empty(joints.shape), np.zeros(joints.shape)
         given = gradient.numpy().copy()
         if law._damping is not None:
@@ -146,7 +146,7 @@ class _Held(torch.autograd.Function):
     def forward(ctx: Any, q: Tensor, output: Tensor, law: Law) -> Tensor:
         joints, given = q.detach().numpy(), np.ascontiguousarray(output.detach().numpy())
         out = np.empty((len(joints), given.shape[1] - 1 - joints.shape[1]))
-        held_rows(law.task.kind, law._chain, law._damping, joints, given, out)
+        held_rows(law.task.kind, law.chain, law._damping, joints, given, out)
         ctx.law, ctx.given = law, (joints, given)
         return torch.from_numpy(out)
 
@@ -156,7 +156,7 @@ class _Held(torch.autograd.Function):
         law, (joints, given) = ctx.law, ctx.given
         by_output, by_q = np.empty(given.shape), np.empty(joints.shape)
         by = np.ascontiguousarray(gradient.numpy())
-        held_gradient_rows(law.task.kind, law._chain, law._damping, joints, given, by, by_output, by_q)
+        held_gradient_rows(law.task.kind, law.chain, law._damping, joints, given, by, by_output, by_q)
         return torch.from_numpy(by_q), torch.from_numpy(by_output), None
 
 

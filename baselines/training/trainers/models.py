@@ -17,16 +17,17 @@ from torch import Tensor, nn
 
 from baselines.agents.features import Features
 from baselines.agents.protocols import Transform
-from baselines.training.asymmetric import AsymmetricPPOPolicy, AsymmetricSACPolicy, AsymmetricTD3Policy
 from baselines.training.config.base import Activation, Algorithm
 from baselines.training.config.reinforcement import Output
 from baselines.training.networks import ACTIVATIONS, QUIET, ActorModel, MemoryModel
-from baselines.training.policies import (
+from baselines.training.policies.asymmetric import AsymmetricPPOPolicy, AsymmetricSACPolicy, AsymmetricTD3Policy
+from baselines.training.policies.bilinear import (
     BilinearActor,
     BilinearPPOPolicy,
     BilinearSACPolicy,
     BilinearTD3Policy,
 )
+from baselines.training.policies.null_space import NullSpacePPOPolicy
 from baselines.training.score import Score
 from baselines.training.validation import validate
 from ikgym.scenarios import Scenario
@@ -59,6 +60,7 @@ def new_model(
     use_sde: bool = False,
     output: tuple[Output, float | None] = ("velocities", None),
     seen: int | None = None,
+    freedom: int | None = None,
     **parameters: Any,
 ) -> BaseAlgorithm:
     """An untrained model, whose first outputs are almost 0.
@@ -75,6 +77,7 @@ def new_model(
         output: What the actor's network gives, and the damping of a bilinear one, whose environment is that of
             :func:`ikgym.sb3.make_vec`.
         seen: How many of the numbers observed the actor sees, the first ones; all if left out.
+        freedom: How many joints the task leaves free, for PPO whose noise is in the null space.
         **parameters: Of the class of Stable-Baselines3.
     """
     bilinear, damping = output[0] == "bilinear", output[1]
@@ -96,6 +99,8 @@ def new_model(
     kind: type[BasePolicy] | str = "MlpPolicy"
     if bilinear or seen is not None:
         kind = (BILINEAR if bilinear else ASYMMETRIC)[algorithm]
+    if freedom is not None:
+        kind, policy["freedom"] = NullSpacePPOPolicy, freedom
     model: Any = ALGORITHMS[algorithm](kind, env, policy_kwargs=policy, device="cpu", **parameters)
     model.set_logger(Logger(None, []))
     with torch.no_grad():

@@ -66,7 +66,8 @@ class OffPolicyTrainer(ReinforcementTrainer):
             getattr(buffer, name)[: len(kept[name])] = kept[name].numpy()
         buffer.pos, buffer.full = kept["pos"], kept["full"]
 
-    def _callback(self) -> BaseCallback:
+    def callback(self) -> BaseCallback:
+        """See :meth:`ReinforcementTrainer.callback`."""
         given = self._config.learning_starts
         return _LearningStarts(self._segment_steps if given is None else given, self._config.gradient_steps)
 

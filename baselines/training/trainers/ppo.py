@@ -7,43 +7,78 @@ from typing import Any
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
-from torch import nn
+from torch import Tensor, nn
 
 from baselines.training.config.reinforcement import PPO
+from baselines.training.environment.inverse_env import InverseVecEnv
 from baselines.training.trainer import SegmentMetrics
 from baselines.training.trainers.models import new_model
 from baselines.training.trainers.reinforcement import ReinforcementTrainer
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
+from ikgym.validation import FloatArray
 
 
-class _CriticEpochs(BaseCallback):
-    """Fits the critic to what the transitions of a rollout returned, before the actor learns from them.
+class _RolloutEnd(BaseCallback):
+    """What is done with a rollout before the actor learns from it.
+
+    Advantages lose what they have in common with those of the same group, and the critic is fitted to what the
+    transitions returned, group by group.
 
     Args:
+        config: Of the run.
         optimizer: Of the critic's weights.
-        epochs: Passes over the transitions.
-        batch_size: Transitions of a gradient step.
     """
 
-    def __init__(self, optimizer: torch.optim.Optimizer, epochs: int, batch_size: int) -> None:
+    def __init__(self, config: PPO, optimizer: torch.optim.Optimizer) -> None:
         super().__init__()
-        self._optimizer, self._epochs, self._batch_size = optimizer, epochs, batch_size
+        self._config, self._optimizer = config, optimizer
 
     def _on_step(self) -> bool:
         return True
 
     def _on_rollout_end(self) -> None:
         model: Any = self.model
-        for _ in range(self._epochs):
-            for batch in model.rollout_buffer.get(self._batch_size):
-                values = model.policy.predict_values(batch.observations).flatten()
-                self._optimizer.zero_grad()
-                loss: Any = nn.functional.mse_loss(values, batch.returns)
-                loss.backward()
-                self._optimizer.step()
+        size, buffer = self._config.group_size, model.rollout_buffer
+        if size > 1:
+            buffer.advantages = beside_the_others(buffer.advantages, size)
+        for _ in range(self._config.critic_epochs):
+            self._fit(model.policy, buffer.observations, torch.from_numpy(buffer.returns))
+
+    def _fit(self, policy: Any, observations: NDArray[np.float32], returns: Tensor) -> None:
+        """One pass over the transitions of a rollout, whose groups stay together.
+
+        Args:
+            policy: Whose critic it is.
+            observations: Shape (T, N, …).
+            returns: Shape (T, N).
+        """
+        size, weight = self._config.group_size, self._config.critic_group_weight
+        groups = torch.arange(returns.numel()).reshape(-1, size)
+        seen, returned = torch.from_numpy(observations).flatten(0, 1), returns.flatten()
+        for batch in torch.tensor_split(torch.randperm(len(groups)), len(returned) // self._config.batch_size):
+            rows = groups[batch].flatten()
+            errors = (policy.predict_values(seen[rows]).flatten() - returned[rows]).reshape(-1, size)
+            loss: Any = errors.square().mean() + weight * (errors - errors.mean(1, keepdim=True)).square().mean()
+            self._optimizer.zero_grad()
+            loss.backward()
+            self._optimizer.step()
+
+
+def beside_the_others(advantages: NDArray[np.float32], group_size: int) -> NDArray[np.float32]:
+    """Advantages, each less the mean of those of the other arms of its group at the same time.
+
+    Args:
+        advantages: Shape (T, N), the arms of a group one after the other.
+        group_size: At least 2.
+    """
+    groups = advantages.reshape(len(advantages), -1, group_size)
+    beside = (groups - groups.mean(axis=2, keepdims=True)) * (group_size / (group_size - 1))
+    out: NDArray[np.float32] = beside.reshape(advantages.shape).astype(np.float32)
+    return out
 
 
 class PPOTrainer(ReinforcementTrainer):
@@ -86,6 +121,7 @@ class PPOTrainer(ReinforcementTrainer):
             config.use_sde,
             (config.output, config.damping),
             self._seen,
+            self._env.freedom if config.null_space_noise and isinstance(self._env, InverseVecEnv) else None,
             sde_sample_freq=config.sde_sample_freq,
             learning_rate=config.learning_rate,
             n_steps=n_steps,
@@ -110,11 +146,23 @@ class PPOTrainer(ReinforcementTrainer):
             self._set_log_std(self.model, given)
         return super().segment(number)
 
-    def _callback(self) -> BaseCallback | None:
+    def callback(self) -> BaseCallback | None:
+        """See :meth:`ReinforcementTrainer.callback`."""
         config = self._config
-        if not config.critic_epochs:
+        if not config.critic_epochs and config.group_size == 1:
             return None
-        return _CriticEpochs(self._critic_optimizer, config.critic_epochs, config.batch_size)
+        return _RolloutEnd(config, self._critic_optimizer)
+
+    @property
+    def _exploration(self) -> dict[str, Any]:
+        return {"group_size": self._config.group_size, "null_map": self._config.null_space_noise}
+
+    @property
+    def _noise_scales(self) -> FloatArray:
+        if not self._config.null_space_noise:
+            return super()._noise_scales
+        assert isinstance(self._env, InverseVecEnv)
+        return np.append(np.full(self._env.freedom, self._config.null_noise), 1.0)
 
     def _begun(self) -> None:
         self._set_log_std(self.model, self._config.log_std_init)

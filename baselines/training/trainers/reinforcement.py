@@ -125,11 +125,16 @@ class ReinforcementTrainer(abc.ABC):
         if config.output == "inverse":
             assert isinstance(self.processing, Bilinear)
             settings = config.hold, config.lost_distance, config.privileged, config.log_above
-            return InverseVecEnv(config.n_envs, self._scenario, self.processing, *settings)
+            return InverseVecEnv(config.n_envs, self._scenario, self.processing, *settings, **self._exploration)
         # Values are then of the size of rewards: of sums a hundred times as large, the critics would take most of the
         # gradient that is left after it has been clipped.
         scale = max(1.0 - config.gamma, 1e-3)
         return ProcessedVecEnv(config.n_envs, self._scenario, config.velocities, config.reward, scale, episode_steps)
+
+    @property
+    def _exploration(self) -> dict[str, Any]:
+        """What else the environment is told whose actions weigh a damped inverse."""
+        return {}
 
     @property
     def _seen(self) -> int | None:
@@ -147,14 +152,14 @@ class ReinforcementTrainer(abc.ABC):
         return scales
 
     def _learn(self) -> None:
-        self.model.learn(self._segment_steps, self._callback(), log_interval=None, reset_num_timesteps=False)
+        self.model.learn(self._segment_steps, self.callback(), log_interval=None, reset_num_timesteps=False)
 
     @property
     def _segment_steps(self) -> int:
         """Actions of a segment, those of all arms together."""
         return int(self._length * self._env.num_envs)
 
-    def _callback(self) -> BaseCallback | None:
+    def callback(self) -> BaseCallback | None:
         """What Stable-Baselines3 calls while it learns."""
         return None
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import torch
 from stable_baselines3 import PPO
 
 from baselines.agents.bilinear.processing import Bilinear
@@ -13,7 +14,7 @@ from baselines.training.environment.view import View
 from baselines.training.randomness import deterministic_torch
 from baselines.training.trainers.models import network_outputs
 from baselines.training.validation import played
-from ikgym import scenarios
+from ikgym import scenarios, tasks
 from ikgym.exceptions import InvalidInputError, NoAttributeError, ResetNeededError
 from ikgym.simulator import observation
 from tests.comparison import identical
@@ -187,9 +188,54 @@ def test_ppo_of_stable_baselines3_learns_in_it():
     assert not identical(network_outputs(model, envs.reset()), before)
 
 
+def test_arms_of_a_group_play_the_same_episodes():
+    """From the same place on, and where one has ended, too; those of another group others."""
+    envs = made(rows=6, group_size=3)
+    seen = envs.reset()
+    for step in range(12):
+        arms = envs._arms
+        for array in (seen, arms.seed, arms.made, arms.usual, arms._nominal, arms._path):
+            groups = np.asarray(array).reshape(2, 3, -1)
+            assert identical(groups[:, :1].repeat(3, axis=1), groups)
+            assert not identical(groups[0], groups[1])
+        seen, *_ = envs.step(actions_of(made(rows=2), step).repeat(3, axis=0))
+    parted, *_ = envs.step(actions_of(envs))
+    assert not identical(parted[0], parted[1])
+
+
+def test_references_of_groups_are_those_of_their_seeds():
+    envs = made(rows=6, group_size=3)
+    envs.reset()
+    for row, seed in enumerate(envs._arms.seed.tolist()):
+        assert identical(envs._arms._nominal[row], SCENARIO.nominal(seed, 40))
+        assert identical(envs._arms._path[row], SCENARIO.nominal_joint_path(seed))
+
+
+@pytest.mark.parametrize(("task", "freedom"), [("pose", 1), ("position", 4)])
+def test_null_maps(task, freedom):
+    """M h are the coordinates of what is left of h in an orthonormal basis of the null space, but for the damping."""
+    scenario = SCENARIO.replace(task=tasks.get(task))
+    envs = InverseVecEnv(5, scenario, Bilinear((1, 10, 40), 1e-9, matrix=False), 4, privileged=True, null_map=True)
+    envs.seed(0)
+    seen, n = envs.reset(), scenario.joints
+    assert envs.freedom == freedom
+    maps = seen[:, envs.seen + n + 1 :].reshape(5, freedom, n).astype(np.float64)
+    h, law = np.random.default_rng(0).normal(size=(5, n)), envs._law
+    output = torch.from_numpy(np.concatenate([h, np.zeros((5, n + 1))], axis=1))
+    left = law.held(envs._arms.q, envs._features, output).numpy().reshape(5, n, n - freedom + 1)[:, :, -1]
+    for row in range(5):
+        moved = maps[row] @ h[row]
+        assert np.linalg.norm(moved) == pytest.approx(np.linalg.norm(left[row]), rel=1e-4)
+        # The map takes what is left for what it is, and h may be as large as it likes across the null space.
+        np.testing.assert_allclose(maps[row] @ left[row], moved, rtol=1e-3, atol=1e-5)
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
+        ({"group_size": 2}, "num_envs: expected a multiple of group_size, 2, got 3"),
+        ({"group_size": 0}, "group_size"),
+        ({"null_map": 1}, "null_map"),
         ({"hold": 3}, "hold: expected a divisor of the 40 steps"),
         ({"hold": 0}, "hold"),
         ({"lost_distance": 0.0}, "lost_distance"),

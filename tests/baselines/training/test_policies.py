@@ -14,13 +14,23 @@ from stable_baselines3 import PPO, SAC, TD3
 import baselines
 import ikgym
 import ikgym.sb3
-from baselines.training.asymmetric import AsymmetricPPOPolicy, AsymmetricSACPolicy, AsymmetricTD3Policy
+from baselines.agents.bilinear.processing import Bilinear
 from baselines.training.environment.inverse_env import InverseVecEnv
 from baselines.training.environment.view import View
 from baselines.training.exporting import export
-from baselines.training.policies import BilinearPPOPolicy, BilinearSACPolicy, BilinearTD3Policy
+from baselines.training.policies import (
+    AsymmetricPPOPolicy,
+    AsymmetricSACPolicy,
+    AsymmetricTD3Policy,
+    BilinearPPOPolicy,
+    BilinearSACPolicy,
+    BilinearTD3Policy,
+    NullSpacePPOPolicy,
+)
+from baselines.training.policies.null_space import NullSpaceGaussian
 from ikgym import rl
 from ikgym.exceptions import InvalidInputError
+from ikgym.rl.feature_kernels import jacobian_rows
 
 pytestmark = pytest.mark.usefixtures("one_thread")
 
@@ -74,12 +84,15 @@ def test_models_learn_and_act_the_same_from_their_file(tmp_path, kind, policy, p
     (PPO, AsymmetricPPOPolicy, SHORT),
     (SAC, AsymmetricSACPolicy, LATE),
     (TD3, AsymmetricTD3Policy, LATE),
+    (PPO, NullSpacePPOPolicy, SHORT),
 ])  # fmt: skip
 def test_models_that_weigh_an_inverse_act_the_same_from_their_file(tmp_path, kind, policy, parameters):
     """What the model says of the features that the agent sees is what the agent does."""
     privileged = policy != "MlpPolicy"
-    envs = InverseVecEnv(2, scenario(), hold=4, privileged=privileged)
+    null_map = policy is NullSpacePPOPolicy
+    envs = InverseVecEnv(2, scenario(), hold=4, privileged=privileged, null_map=null_map)
     kwargs = {"net_arch": [8, 8]} | ({"seen": envs.seen} if privileged else {})
+    kwargs |= {"freedom": envs.freedom} if null_map else {}
     model = kind(policy, envs, device="cpu", seed=0, policy_kwargs=kwargs, **parameters).learn(32)
     model.save(tmp_path / "model.zip")
     model = kind.load(tmp_path / "model.zip", device="cpu")
@@ -200,3 +213,49 @@ def test_the_snippet_of_the_page_runs(tmp_path, monkeypatch):
     exec(compile(snippet, "agents.md", "exec", dont_inherit=True), {})
     agent = baselines.make("agent", "panda-random", path="mine.safetensors")
     assert agent.preview == (10, 40, 100)
+
+
+def test_noise_in_the_null_space():
+    """Density and samples are those of a normal distribution of (M h, ln λ); ln U has none."""
+    rng, batch, r, n = np.random.default_rng(0), 4000, 2, 5
+    maps = torch.from_numpy(rng.normal(size=(1, r, n))).float().expand(batch, r, n)
+    mean, log_std = (
+        torch.from_numpy(rng.normal(size=(1, 2 * n + 1))).float().expand(batch, -1),
+        torch.tensor([0.1, -1.0, 0.5]),
+    )
+    noise = NullSpaceGaussian().proba_distribution(mean, maps, log_std)
+    torch.manual_seed(0)
+    actions = noise.sample()
+
+    def done(said):
+        return torch.cat([torch.einsum("brn,bn->br", maps, said[:, :n]), said[:, n : n + 1]], dim=1)
+
+    wanted = torch.distributions.MultivariateNormal(done(mean), torch.diag((2.0 * log_std).exp()))
+    torch.testing.assert_close(noise.log_prob(actions), wanted.log_prob(done(actions)))
+    torch.testing.assert_close(noise.entropy(), wanted.entropy())
+    moved = done(actions) - done(mean)
+    np.testing.assert_allclose(np.cov(moved.numpy().T), np.diag(np.exp(2.0 * log_std.numpy())), atol=0.15)
+    assert torch.equal(actions[:, n + 1 :], mean[:, n + 1 :])
+    assert torch.equal(noise.get_actions(deterministic=True), mean)
+    # What changes nothing has no density of its own, and no gradient.
+    basis = torch.linalg.svd(maps[0])[2][r:]
+    across = torch.nn.functional.pad(basis[:1].expand(batch, -1), (0, n + 1))
+    torch.testing.assert_close(noise.log_prob(actions + across), noise.log_prob(actions))
+
+
+def test_noise_in_the_null_space_leaves_the_tool_where_it_is():
+    """Where the inverse is hardly damped: samples of h move the joints, and the tool as the mean does."""
+    envs = InverseVecEnv(16, scenario(), Bilinear(damping=1e-9, matrix=False), 4, null_map=True)
+    seen = torch.from_numpy(envs.reset())
+    policy_kwargs = {"seen": envs.seen, "freedom": envs.freedom, "log_std_init": -1.0}
+    model = PPO(NullSpacePPOPolicy, envs, device="cpu", seed=0, policy_kwargs=policy_kwargs, **SHORT)
+    assert model.policy.log_std.shape == (2,)
+    with torch.no_grad():
+        moved = (model.policy(seen)[0] - model.policy.get_distribution(seen).mode())[:, :7].double()
+    jacobians = np.empty((16, 42))
+    jacobian_rows(envs._law.task.kind, envs._law.chain, envs._arms.q.numpy(), jacobians)
+    tool = np.einsum("bwn,bn->bw", jacobians.reshape(16, 6, 7), moved.numpy())
+    weighted = envs._law.held(envs._arms.q, envs._features, torch.nn.functional.pad(moved, (0, 8)))
+    left = np.einsum("bwn,bn->bw", jacobians.reshape(16, 6, 7), weighted.reshape(16, 7, 7)[:, :, -1].numpy())
+    assert np.linalg.norm(moved.numpy(), axis=1).min() > 1e-3
+    assert np.abs(left).max() < 1e-5 < np.abs(tool).max()

@@ -11,6 +11,7 @@ import torch
 from baselines.training import methods
 from baselines.training.randomness import deterministic_torch, episode_seed, reseed
 from baselines.training.trainers.models import algorithm_of, mean_network, network_outputs, weights_hash
+from baselines.training.trainers.ppo import beside_the_others
 from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError
 from tests.baselines.training.segments import made, play_segments
@@ -34,6 +35,8 @@ INVERSE = [
     for method, more in [
         *((method, {}) for method in METHODS),
         ("ppo", {"privileged": True, "critic_epochs": 2, "null_noise": 0.2}),
+        ("ppo", {"privileged": True, "null_space_noise": True, "group_size": 2}),
+        ("ppo", {"privileged": True, "group_size": 2, "critic_epochs": 2, "critic_group_weight": 3.0}),
         ("sac", {"privileged": True, "null_noise": 0.2}),
         ("td3", {"privileged": True, "null_noise": 0.2, "log_above": 5.0}),
     ]
@@ -80,6 +83,41 @@ def test_the_critic_learns_by_itself_in_passes_of_its_own():
     assert with_actor.model.vf_coef == 0.5
     values = [trainer.model.policy.value_net.weight for trainer in (alone, with_actor)]
     assert not torch.equal(*values)
+
+
+def test_advantages_are_those_beside_the_others_of_a_group():
+    advantages = np.random.default_rng(0).normal(size=(3, 8)).astype(np.float32)
+    beside = beside_the_others(advantages, 4)
+    for t, row in np.ndindex(3, 8):
+        group = range(row // 4 * 4, row // 4 * 4 + 4)
+        others = [advantages[t, other] for other in group if other != row]
+        assert beside[t, row] == pytest.approx(advantages[t, row] - np.mean(others), abs=1e-6)
+    # What differs from group to group alone says nothing of actions.
+    np.testing.assert_allclose(beside_the_others(np.arange(2.0).repeat(4)[None] * 100.0, 4), 0.0, atol=1e-5)
+
+
+def test_a_critic_that_weighs_groups_tells_better_what_differs_in_them(monkeypatch):
+    """Of returns that differ by much from group to group and by little in them."""
+    output = {"output": "inverse", "damping": 1e-2, "hold": 2, "scenario": "panda-random", "privileged": True}
+    rng = np.random.default_rng(0)
+    seen = rng.normal(size=(64, 4, 1)).repeat(2, axis=1) + 0.3 * rng.normal(size=(64, 8, 1))
+    returns = (100.0 * np.sin(40.0 * seen.mean(1, keepdims=True)) + seen)[:, :, 0].astype(np.float32)
+
+    def explained(weight):
+        more = {"n_envs": 8, "group_size": 8, "critic_epochs": 1, "critic_group_weight": weight}
+        trainer = made(tiny("ppo", **output, **more, n_steps=10, batch_size=40))
+        observations = np.zeros((64, 8, *trainer._env.observation_space.shape), np.float32)
+        observations[:, :, :1] = seen
+        callback, policy = trainer.callback(), trainer.model.policy
+        torch.manual_seed(0)
+        for _ in range(100):
+            callback._fit(policy, observations, torch.from_numpy(returns))
+        with torch.no_grad():
+            values = policy.predict_values(torch.from_numpy(observations).flatten(0, 1)).reshape(64, 8).numpy()
+        inside = [array - array.mean(axis=1, keepdims=True) for array in (values, returns)]
+        return 1.0 - np.var(inside[0] - inside[1]) / np.var(inside[1])
+
+    assert explained(1000.0) > max(explained(0.0), 0.0)
 
 
 @pytest.mark.parametrize(
