@@ -32,6 +32,7 @@ from baselines.training.randomness import deterministic_torch, reseed, sequence
 from baselines.training.trainers.apg import APGTrainer
 from baselines.training.trainers.models import mean_network
 from baselines.training.trainers.ppo import PPOTrainer
+from benchmarks.learning import change
 from ikgym.exceptions import InvalidInputError
 from ikgym.validation import FloatArray, known_names
 
@@ -58,7 +59,7 @@ class Command:
     """Measures the noise of policy gradients."""
 
     gradients: Annotated[tuple[str, ...], tyro.conf.Positional] = ("ppo=quick", "apg=quick")
-    """METHOD=PRESET, of ppo and apg."""
+    """METHOD=PRESET, of ppo and apg; METHOD=PRESET,OPTION=VALUE,… with other options than the preset's."""
     batches: int = 64
     """Gradients that are taken, at least 3."""
     critic_segments: int = 3
@@ -183,13 +184,16 @@ def _enough(batches: int) -> int:
 def _batches(method: str, preset: str, command: Command) -> Batches:
     known_names("method", [method], METHODS)
     kind, take = METHODS[method]
+    preset, *changed = preset.split(",")
     config: Any = presets.configure(kind, preset)[0]
-    changes: dict[str, Any] = {} if command.n_envs is None else {"n_envs": command.n_envs}
+    changes = dict(change(given) for given in changed)
+    if command.n_envs is not None:
+        changes["n_envs"] = command.n_envs
     if kind is PPO:
         changes["critic_warmup"] = command.critic_segments
         if command.n_envs is not None:
             changes["batch_size"] = command.n_envs
-    return take(dataclasses.replace(config, **changes), command.seed)
+    return take(kind.from_json({**config.to_json(), **changes}), command.seed)
 
 
 def _gradient(loss: Tensor, weights: Sequence[nn.Parameter]) -> Gradient:

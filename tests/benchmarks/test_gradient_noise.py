@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import numpy as np
 import pytest
 
+from baselines.training import presets
+from baselines.training.config.reinforcement import PPO
 from baselines.training.randomness import deterministic_torch
+from baselines.training.trainers import ppo
 from benchmarks import gradient_noise
 from benchmarks.gradient_noise import noise_of
 from ikgym.exceptions import InvalidInputError, UnknownNameError
@@ -60,13 +64,25 @@ def test_gradients_that_say_nothing():
     assert 3.0 < noise.least < math.inf
 
 
+def test_gradients_are_those_beside_the_others_of_a_group(tmp_path, monkeypatch):
+    """As in training: where all of a group do equally well there is none."""
+    file = tmp_path / "tiny.toml"
+    file.write_text(PRESET)
+    config = dataclasses.replace(presets.configure(PPO, str(file))[0], group_size=4)
+    assert np.linalg.norm(gradient_noise.of_ppo(config, 0).take()) > 0.0
+    monkeypatch.setattr(ppo, "beside_the_others", lambda advantages, group_size: 0.0 * advantages)
+    assert np.linalg.norm(gradient_noise.of_ppo(config, 0).take()) == 0.0
+
+
 def test_gradients_of_actors(tmp_path, capsys):
     file = tmp_path / "tiny.toml"
     file.write_text(PRESET)
-    command = [f"ppo={file}", f"apg={file}", "--batches", "3", "--critic-segments", "1"]
+    changed = f"ppo={file},n_steps=1,batch_size=4,group_size=2"
+    command = [f"ppo={file}", changed, f"apg={file}", "--batches", "3", "--critic-segments", "1"]
     gradient_noise.main(command)
     printed = capsys.readouterr().out.splitlines()
-    assert [line.split("|")[1:3] for line in printed[2:]] == [[f" ppo={file} ", " 80 "], [f" apg={file} ", " 32 "]]
+    wanted = [[f" ppo={file} ", " 80 "], [f" {changed} ", " 16 "], [f" apg={file} ", " 32 "]]
+    assert [line.split("|")[1:3] for line in printed[2:]] == wanted
     cells = [cell.strip().removeprefix("> ") for line in printed[2:] for cell in line.split("|")[3:6]]
     assert all(float(cell) >= 0.0 for cell in cells)
 
@@ -77,6 +93,7 @@ def test_gradients_of_actors(tmp_path, capsys):
         (["ppo=quick", "--batches", "2"], InvalidInputError, "batches: expected at least 3, got 2"),
         (["td3=quick"], UnknownNameError, "method"),
         (["ppo=quik"], UnknownNameError, "quick"),
+        (["ppo=quick,group_sise=1"], UnknownNameError, "Did you mean 'group_size'"),
     ],
 )
 def test_bad_commands(command, error, message):
