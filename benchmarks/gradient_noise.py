@@ -27,7 +27,7 @@ from baselines.evaluation.report import number
 from baselines.training import presets
 from baselines.training.config.actor_only import APG
 from baselines.training.config.base import Config
-from baselines.training.config.reinforcement import PPO
+from baselines.training.config.ppo import PPO
 from baselines.training.randomness import deterministic_torch, reseed, sequence
 from baselines.training.trainers.apg import APGTrainer
 from baselines.training.trainers.models import mean_network

@@ -8,7 +8,8 @@ from typing import NamedTuple
 
 from baselines.training.config.actor_only import APG, Imitate, Observe
 from baselines.training.config.base import Config
-from baselines.training.config.reinforcement import PPO, SAC, TD3
+from baselines.training.config.off_policy import SAC, TD3
+from baselines.training.config.ppo import PPO
 from baselines.training.trainer import Trainer
 from ikgym.exceptions import UnknownNameError
 from ikgym.scenarios import Scenario

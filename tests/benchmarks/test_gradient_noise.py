@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from baselines.training import presets
-from baselines.training.config.reinforcement import PPO
+from baselines.training.config.ppo import PPO
 from baselines.training.randomness import deterministic_torch
-from baselines.training.trainers import ppo
+from baselines.training.trainers import rollout_end
 from benchmarks import gradient_noise
 from benchmarks.gradient_noise import noise_of
 from ikgym.exceptions import InvalidInputError, UnknownNameError
@@ -70,7 +70,7 @@ def test_gradients_are_those_beside_the_others_of_a_group(tmp_path, monkeypatch)
     file.write_text(PRESET)
     config = dataclasses.replace(presets.configure(PPO, str(file))[0], group_size=4)
     assert np.linalg.norm(gradient_noise.of_ppo(config, 0).take()) > 0.0
-    monkeypatch.setattr(ppo, "beside_the_others", lambda advantages, group_size: 0.0 * advantages)
+    monkeypatch.setattr(rollout_end, "beside_the_others", lambda advantages, group_size: 0.0 * advantages)
     assert np.linalg.norm(gradient_noise.of_ppo(config, 0).take()) == 0.0
 
 

@@ -13,7 +13,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.noise import ActionNoise, NormalActionNoise, OrnsteinUhlenbeckActionNoise
 from torch import nn
 
-from baselines.training.config.reinforcement import SAC, TD3, OffPolicy
+from baselines.training.config.off_policy import SAC, TD3, OffPolicy
 from baselines.training.trainers.models import new_model
 from baselines.training.trainers.reinforcement import ReinforcementTrainer
 from ikgym.validation import FloatArray

@@ -16,7 +16,7 @@ import pytest
 
 from baselines.training import command, methods, run, seeds
 from baselines.training.command import main, parse
-from baselines.training.config.reinforcement import PPO
+from baselines.training.config.ppo import PPO
 from baselines.training.errors import TrainingError
 from baselines.training.folder import FORMAT
 from baselines.training.seeds import SeedRuns
