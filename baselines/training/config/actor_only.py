@@ -75,13 +75,9 @@ class Imitate(ActorOnly, JointVelocities):
     def __post_init__(self) -> None:
         known_names("output", [self.output], get_args(StudentOutput))
         if self.output == "velocities":
-            for name, usual in (("damping", None), ("matrix", True)):
-                if getattr(self, name) != usual:
-                    raise InvalidInputError(
-                        f"{name}: expected {usual} for an output of velocities, got {getattr(self, name)!r}."
-                    )
+            self._expect_defaults("damping", "matrix", output=self.output)
         else:
-            self._expect_none("base_policy", "null_space", output=self.output)
+            self._expect_defaults("base_policy", "null_space", output=self.output)
         super().__post_init__()
         known_names("algorithm", [self.algorithm], get_args(Algorithm))
         self._set("beta", between("beta", self.beta, 0.0, 1.0))

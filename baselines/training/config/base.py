@@ -185,12 +185,13 @@ class JointVelocities(Config):
         """The same, where these outputs are joint velocities."""
         return Processing(self.offsets, self.action_scale, self.base_policy, self.null_space)
 
-    def _expect_none(self, *names: str, output: str) -> None:
-        """Insists that options are left out which mean nothing for another output than velocities."""
+    def _expect_defaults(self, *names: str, output: str) -> None:
+        """Insists that options are left out which mean nothing for an output."""
+        usual = {field.name: field.default for field in dataclasses.fields(self)}
         for name in names:
-            if getattr(self, name) is not None:
+            if getattr(self, name) != usual[name]:
                 raise InvalidInputError(
-                    f"{name}: expected none for an output that is {output}, got {getattr(self, name)!r}."
+                    f"{name}: expected {usual[name]} for an output that is {output}, got {getattr(self, name)!r}."
                 )
 
     @classmethod

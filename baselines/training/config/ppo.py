@@ -72,13 +72,9 @@ class PPO(StateDependentExploration):
                 f"critic_group_weight: expected 0 without a group_size above 1 and critic_epochs, got {weight}."
             )
         if self.output != "inverse":
-            for name, usual in (("group_size", 1), ("null_space_noise", False)):
-                if getattr(self, name) != usual:
-                    raise InvalidInputError(
-                        f"{name}: expected {usual} for an output that is {self.output}, got {getattr(self, name)!r}."
-                    )
-        if self.null_space_noise and (self.use_sde or not self.privileged):
-            raise InvalidInputError("null_space_noise: expected false with use_sde and without privileged, got true.")
+            self._expect_defaults("group_size", "null_space_noise", output=self.output)
+        if self.null_space_noise and self.use_sde:
+            raise InvalidInputError("null_space_noise: expected false with use_sde, got true.")
         self._set("critic_learning_rate", number("critic_learning_rate", self.critic_learning_rate, above=0.0))
         self._set("gae_lambda", share("gae_lambda", self.gae_lambda))
         self._set("clip_range", number("clip_range", self.clip_range, above=0.0))

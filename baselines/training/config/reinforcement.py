@@ -79,16 +79,12 @@ class Reinforcement(Annealed, JointVelocities):
         if self.output == "inverse" and self.damping is None:
             raise InvalidInputError("damping: expected a number for an output that is inverse, got None.")
         flag("privileged", self.privileged)
-        if self.privileged and self.output != "inverse":
-            raise InvalidInputError(f"privileged: expected false for an output that is {self.output}, got true.")
-        if self.null_noise != 1.0 and self.output != "inverse":
-            raise InvalidInputError(
-                f"null_noise: expected 1 for an output that is {self.output}, got {self.null_noise!r}."
-            )
+        if self.output != "inverse":
+            self._expect_defaults("privileged", "null_noise", output=self.output)
         if self.output != "velocities":
-            self._expect_none("base_policy", "null_space", "initial_episode_steps", output=self.output)
-        elif self.damping is not None:
-            raise InvalidInputError(f"damping: expected none for an output of velocities, got {self.damping!r}.")
+            self._expect_defaults("base_policy", "null_space", "initial_episode_steps", output=self.output)
+        else:
+            self._expect_defaults("damping", output=self.output)
         super().__post_init__()
         known_names("reward", [self.reward], get_args(Reward))
         self._set("episodes", whole_number("episodes", self.episodes, at_least=1))

@@ -139,7 +139,9 @@ class ReinforcementTrainer(abc.ABC):
     @property
     def _seen(self) -> int | None:
         """How many of the numbers observed the actor sees; None for all."""
-        return self._env.seen if isinstance(self._env, InverseVecEnv) and self._config.privileged else None
+        if not isinstance(self._env, InverseVecEnv) or self._env.observation_space.shape == (self._env.seen,):
+            return None
+        return self._env.seen
 
     @property
     def _noise_scales(self) -> FloatArray:

@@ -35,7 +35,7 @@ INVERSE = [
     for method, more in [
         *((method, {}) for method in METHODS),
         ("ppo", {"privileged": True, "critic_epochs": 2, "null_noise": 0.2}),
-        ("ppo", {"privileged": True, "null_space_noise": True, "group_size": 2}),
+        ("ppo", {"null_space_noise": True, "group_size": 2}),
         ("ppo", {"privileged": True, "group_size": 2, "critic_epochs": 2, "critic_group_weight": 3.0}),
         ("sac", {"privileged": True, "null_noise": 0.2}),
         ("td3", {"privileged": True, "null_noise": 0.2, "log_above": 5.0}),
