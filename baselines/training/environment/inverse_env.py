@@ -64,7 +64,8 @@ class InverseVecEnv(VecEnv):
         privileged: Whether n + 1 numbers are shown behind the features: the velocities of the joints ÷ the speed of
             what is ahead, and the logarithm of the mean cost of the reference joint path, of 1 where there is none.
         log_above: k, above 0: costs well below k times that mean count as they are, those above by their logarithm.
-        group_size: Arms that play the same episodes, one after the other; N is a multiple.
+        group_size: Arms that play the same episodes, one after the other; N is a multiple. Where there is no reference
+            joint path it is 1.
         null_map: Whether the last r n numbers shown are what :func:`null_maps` gives, row by row, for a policy of
             :mod:`baselines.training.policies.null_space`. The task has to leave joints free then.
 
@@ -102,6 +103,11 @@ class InverseVecEnv(VecEnv):
         self._group_size = whole_number("group_size", group_size, at_least=1)
         if num_envs % self._group_size:
             raise InvalidInputError(f"num_envs: expected a multiple of group_size, {group_size}, got {num_envs}.")
+        if self._group_size > 1 and scenario.nominal_joint_path(scenarios.SPLITS["train"].start) is None:
+            # Where an arm that is lost begins anew, and its group does not.
+            raise InvalidInputError(
+                f"group_size: expected 1 without a reference joint path, as in {scenario.name!r}, got {group_size}."
+            )
         self._law, self.scenario, self.processing = Law(scenario, processing), scenario, processing
         self.freedom = scenario.joints - int(twist_size(self._law.task.kind))
         self._null_map = flag("null_map", null_map)
@@ -110,7 +116,7 @@ class InverseVecEnv(VecEnv):
         self._arms = Arms(scenario, num_envs, processing.offsets)
         self._generator, self._reset = np.random.default_rng(), False
         self._returns, self._lengths = np.zeros(num_envs), np.zeros(num_envs, dtype=np.int64)
-        self.seen, self._privileged = self._law.inputs, privileged
+        self.seen, self._privileged = self._law.inputs, flag("privileged", privileged)
         observed = self.seen + (scenario.joints + 1 if privileged else 0)
         observed += self.freedom * scenario.joints if null_map else 0
         unbounded = spaces.Box(-np.inf, np.inf, (observed,), np.float32)

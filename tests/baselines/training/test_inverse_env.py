@@ -235,6 +235,7 @@ def test_null_maps(task, freedom):
     [
         ({"group_size": 2}, "num_envs: expected a multiple of group_size, 2, got 3"),
         ({"group_size": 0}, "group_size"),
+        ({"group_size": 3, "scenario": scenarios.get("panda-line").replace(steps=40)}, "reference joint path"),
         ({"null_map": 1}, "null_map"),
         ({"hold": 3}, "hold: expected a divisor of the 40 steps"),
         ({"hold": 0}, "hold"),
