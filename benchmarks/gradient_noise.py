@@ -32,6 +32,7 @@ from baselines.training.randomness import deterministic_torch, reseed, sequence
 from baselines.training.trainers.apg import APGTrainer
 from baselines.training.trainers.models import mean_network
 from baselines.training.trainers.ppo import PPOTrainer
+from baselines.training.trainers.rollout_end import GroupBaseline
 from benchmarks.learning import change
 from ikgym.exceptions import InvalidInputError
 from ikgym.validation import FloatArray, known_names
@@ -119,7 +120,8 @@ def of_ppo(config: PPO, seed: int) -> Batches:
         trainer.segment(segment)
     model, hold = trainer.model, config.hold if config.output == "inverse" else 1
     weights = list(mean_network(model).parameters())
-    _, callback = model._setup_learn(model.num_timesteps, trainer.callback())
+    baseline = GroupBaseline(config.group_size) if config.group_size > 1 else None
+    _, callback = model._setup_learn(model.num_timesteps, baseline)
 
     def take() -> Gradient:
         model._last_obs = model.env.reset()

@@ -66,8 +66,7 @@ class OffPolicyTrainer(ReinforcementTrainer):
             getattr(buffer, name)[: len(kept[name])] = kept[name].numpy()
         buffer.pos, buffer.full = kept["pos"], kept["full"]
 
-    def callback(self) -> BaseCallback:
-        """See :meth:`ReinforcementTrainer.callback`."""
+    def _callback(self) -> BaseCallback:
         given = self._config.learning_starts
         return _LearningStarts(self._segment_steps if given is None else given, self._config.gradient_steps)
 

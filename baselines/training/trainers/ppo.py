@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
-from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.callbacks import BaseCallback, CallbackList
 from torch import nn
 
 from baselines.training.config.ppo import PPO
@@ -16,7 +16,7 @@ from baselines.training.environment.inverse_env import InverseVecEnv
 from baselines.training.trainer import SegmentMetrics
 from baselines.training.trainers.models import new_model
 from baselines.training.trainers.reinforcement import ReinforcementTrainer
-from baselines.training.trainers.rollout_end import RolloutEnd
+from baselines.training.trainers.rollout_end import CriticEpochs, GroupBaseline
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray
@@ -87,12 +87,14 @@ class PPOTrainer(ReinforcementTrainer):
             self._set_log_std(self.model, given)
         return super().segment(number)
 
-    def callback(self) -> BaseCallback | None:
-        """See :meth:`ReinforcementTrainer.callback`."""
-        config = self._config
-        if not config.critic_epochs and config.group_size == 1:
-            return None
-        return RolloutEnd(config, self._critic_optimizer)
+    def _callback(self) -> BaseCallback:
+        config, callbacks = self._config, list[BaseCallback]()
+        if config.group_size > 1:
+            callbacks.append(GroupBaseline(config.group_size))
+        if config.critic_epochs:
+            settings = config.critic_epochs, config.batch_size, config.group_size, config.critic_group_weight
+            callbacks.append(CriticEpochs(self._critic_optimizer, *settings))
+        return CallbackList(callbacks)
 
     @property
     def _exploration(self) -> dict[str, Any]:

@@ -154,14 +154,14 @@ class ReinforcementTrainer(abc.ABC):
         return scales
 
     def _learn(self) -> None:
-        self.model.learn(self._segment_steps, self.callback(), log_interval=None, reset_num_timesteps=False)
+        self.model.learn(self._segment_steps, self._callback(), log_interval=None, reset_num_timesteps=False)
 
     @property
     def _segment_steps(self) -> int:
         """Actions of a segment, those of all arms together."""
         return int(self._length * self._env.num_envs)
 
-    def callback(self) -> BaseCallback | None:
+    def _callback(self) -> BaseCallback | None:
         """What Stable-Baselines3 calls while it learns."""
         return None
 

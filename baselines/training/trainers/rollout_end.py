@@ -10,49 +10,75 @@ from numpy.typing import NDArray
 from stable_baselines3.common.callbacks import BaseCallback
 from torch import Tensor
 
-from baselines.training.config.ppo import PPO
+from ikgym.validation import whole_number
 
 
-class RolloutEnd(BaseCallback):
-    """Compares arms that play the same episodes, and fits the critic.
+class GroupBaseline(BaseCallback):
+    """Compares arms that play the same episodes.
 
-    Advantages lose what they have in common with those of the same group, and the critic is fitted to what the
-    transitions returned, group by group.
+    From the advantage of each arm of a rollout the mean of those of the other arms of its group is taken, so that the
+    actor learns from what is due to its actions (leave-one-out baseline, Kool et al. 2019).
+
+    >>> envs = InverseVecEnv(64, "panda-random", group_size=8)
+    >>> model = PPO("MlpPolicy", envs).learn(100_000, callback=GroupBaseline(8))
 
     Args:
-        config: Of the run.
-        optimizer: Of the critic's weights.
+        group_size: Arms of a group, one after the other; those of the environment are a multiple.
     """
 
-    def __init__(self, config: PPO, optimizer: torch.optim.Optimizer) -> None:
+    def __init__(self, group_size: int) -> None:
         super().__init__()
-        self._config, self._optimizer = config, optimizer
+        self._group_size = whole_number("group_size", group_size, at_least=2)
 
     def _on_step(self) -> bool:
         return True
 
     def _on_rollout_end(self) -> None:
         model: Any = self.model
-        size, buffer = self._config.group_size, model.rollout_buffer
-        if size > 1:
-            buffer.advantages = beside_the_others(buffer.advantages, size)
-        for _ in range(self._config.critic_epochs):
-            self._fit(model.policy, buffer.observations, torch.from_numpy(buffer.returns))
+        model.rollout_buffer.advantages = beside_the_others(model.rollout_buffer.advantages, self._group_size)
 
-    def _fit(self, policy: Any, observations: NDArray[np.float32], returns: Tensor) -> None:
+
+class CriticEpochs(BaseCallback):
+    """Fits the critic of PPO to what the transitions of a rollout returned, before the actor learns from them.
+
+    Args:
+        optimizer: Of the critic's weights.
+        epochs: Passes over the transitions.
+        batch_size: Transitions of a gradient step.
+        group_size: Arms that play the same episodes.
+        group_weight: Weight of the differences within groups in the loss.
+    """
+
+    model: Any
+
+    def __init__(
+        self, optimizer: torch.optim.Optimizer, epochs: int, batch_size: int, group_size: int, group_weight: float
+    ) -> None:
+        super().__init__()
+        self._optimizer, self._epochs, self._batch_size = optimizer, epochs, batch_size
+        self._group_size, self._group_weight = group_size, group_weight
+
+    def _on_step(self) -> bool:
+        return True
+
+    def _on_rollout_end(self) -> None:
+        buffer = self.model.rollout_buffer
+        for _ in range(self._epochs):
+            self.fit(buffer.observations, torch.from_numpy(buffer.returns))
+
+    def fit(self, observations: NDArray[np.float32], returns: Tensor) -> None:
         """One pass over the transitions of a rollout, whose groups stay together.
 
         Args:
-            policy: Whose critic it is.
             observations: Shape (T, N, …).
             returns: Shape (T, N).
         """
-        size, weight = self._config.group_size, self._config.critic_group_weight
+        size, weight = self._group_size, self._group_weight
         groups = torch.arange(returns.numel()).reshape(-1, size)
         seen, returned = torch.from_numpy(observations).flatten(0, 1), returns.flatten()
-        for batch in torch.tensor_split(torch.randperm(len(groups)), len(returned) // self._config.batch_size):
+        for batch in torch.tensor_split(torch.randperm(len(groups)), len(returned) // self._batch_size):
             rows = groups[batch].flatten()
-            errors = (policy.predict_values(seen[rows]).flatten() - returned[rows]).reshape(-1, size)
+            errors = (self.model.policy.predict_values(seen[rows]).flatten() - returned[rows]).reshape(-1, size)
             loss: Any = errors.square().mean() + weight * (errors - errors.mean(1, keepdim=True)).square().mean()
             self._optimizer.zero_grad()
             loss.backward()

@@ -108,10 +108,11 @@ def test_a_critic_that_weighs_groups_tells_better_what_differs_in_them(monkeypat
         trainer = made(tiny("ppo", **output, **more, n_steps=10, batch_size=40))
         observations = np.zeros((64, 8, *trainer._env.observation_space.shape), np.float32)
         observations[:, :, :1] = seen
-        callback, policy = trainer.callback(), trainer.model.policy
+        callback, policy = trainer._callback().callbacks[-1], trainer.model.policy
+        callback.init_callback(trainer.model)
         torch.manual_seed(0)
         for _ in range(100):
-            callback._fit(policy, observations, torch.from_numpy(returns))
+            callback.fit(observations, torch.from_numpy(returns))
         with torch.no_grad():
             values = policy.predict_values(torch.from_numpy(observations).flatten(0, 1)).reshape(64, 8).numpy()
         inside = [array - array.mean(axis=1, keepdims=True) for array in (values, returns)]
