@@ -59,6 +59,7 @@ _places: dict[str, str] = {
     "fixed_point": f"{_SOLVERS}.fixed_point.fixed_point:FixedPoint",
     "abstract_rotation": f"{_SOLVERS}.fixed_point.abstract_rotation:AbstractRotation",
     "agent_alone": "baselines.agents.shipped:AgentAlone",
+    "agent_ppo": "baselines.agents.shipped:AgentPPO",
     "agent_residual": "baselines.agents.shipped:AgentResidual",
     "fixed_point_extended": f"{_SOLVERS}.fixed_point.extended:FixedPointExtended",
     "pink": f"{_SOLVERS}.rivals.pink:Pink",

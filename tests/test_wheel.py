@@ -37,6 +37,7 @@ def test_it_holds_every_module_and_all_data(content):
         "tuned/varga7-random.json",
         "agents/agent_alone.safetensors",
         "agents/agent_memory.safetensors",
+        "agents/agent_ppo.safetensors",
         "agents/agent_residual.safetensors",
     ):
         assert f"baselines/data/{file}" in content

@@ -50,6 +50,15 @@ class AgentAlone(ShippedAgent):
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
+class AgentPPO(ShippedAgent):
+    """Learned agent that stands alone, trained on `varga7-random` by ppo."""
+
+    hash: str = "bd450ee47520"
+
+    name: ClassVar[str] = "agent_ppo"
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
 class AgentResidual(ShippedAgent):
     """Learned correction of `rhc:horizon=400,iterations=1,move_blocks=30`, trained on `varga7-random` by imitate."""
 

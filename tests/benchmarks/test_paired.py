@@ -50,19 +50,20 @@ def test_unknown_names_are_told(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("file", "seeds"),
+    ("file", "seeds", "episodes"),
     [
-        ("agents.json", 5),
-        ("agents_long.json", 1),
-        ("agents_long_skew.json", 1),
-        ("agents_td3.json", 3),
-        ("agents_ppo.json", 5),
+        ("agents.json", 5, 256),
+        ("agents_long.json", 1, 256),
+        ("agents_long_skew.json", 1, 256),
+        ("agents_td3.json", 3, 256),
+        ("agents_ppo.json", 5, 256),
+        ("agents_ppo_more.json", 5, 1280),
     ],
 )
-def test_the_page_has_the_table_of_what_was_played(file, seeds):
+def test_the_page_has_the_table_of_what_was_played(file, seeds, episodes):
     page = (DOCS / "agents.md").read_text(encoding="utf-8")
     table = page.split(f"<!-- beside {file} -->\n")[1].split("\n<!-- end -->")[0]
     content = json.loads((DOCS / file).read_text())
     assert table.splitlines() == paired.lines(content)
-    assert (content["episodes"], content["split"]) == (256, "test")
+    assert (content["episodes"], content["split"]) == (episodes, "test")
     assert len(content["played"]["agents"]["costs"]) == seeds

@@ -54,6 +54,7 @@ class TestEntries:
         found = {entry.name: entry for entry in entries.shipped()}
         assert set(found) == {name for name in registry.names() if issubclass(registry.get(name), ShippedAgent)}
         alone, residual = found["agent_alone"], found["agent_residual"]
+        assert (found["agent_ppo"].training.method, found["agent_ppo"].training.base_policy) == ("ppo", None)
         assert (alone.training.method, alone.training.base_policy, alone.seeds) == ("apg", None, (0,))
         assert residual.training.base_policy == "rhc:horizon=400,iterations=1,move_blocks=30"
         assert residual.training.steps == (256_000,)

@@ -34,7 +34,7 @@ class TestSets:
         main_set = plan(sets.MAIN, [*everyone, *shipped()], 1)
         # On whole poses there is no orientation to be resolved.
         suited = [entry.label for entry in everyone if not entry.name.startswith("full_orientation")]
-        assert list(main_set) == [*suited, "agent_alone", "agent_residual"]
+        assert list(main_set) == [*suited, "agent_alone", "agent_ppo", "agent_residual"]
         jobs = plan("varga7-random-amplitude", playing("varga7-random-amplitude", everyone, sets.SKEW))
         assert set(jobs) == {"fake", *entries.GENERAL}
         assert [len(jobs[name]) for name in ("fake", "dls", entries.FORESIGHT)] == [64, 32, 96]
