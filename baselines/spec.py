@@ -32,7 +32,7 @@ def parse_policy(spec: PolicySpec) -> tuple[str, dict[str, Any]]:
         if alone is not None and text.strip() and text.partition("=")[0].strip() not in known:
             parameters: dict[str, Any] = {alone: text.strip()}
         else:
-            parameters = _parse_parameters(spec, text) if ":" in spec else {}
+            parameters = parse_parameters(text, f"policy {spec!r}") if ":" in spec else {}
     elif isinstance(spec, tuple) and len(spec) == 2 and isinstance(spec[0], str) and isinstance(spec[1], Mapping):
         name, parameters = spec[0], dict(spec[1])
     else:
@@ -62,7 +62,31 @@ def parse_place(spec: object) -> tuple[str, dict[str, Any]] | None:
     place = f"{module}:{attribute}"
     if registry.known(module) or not registry.PLACE.fullmatch(place) or (more and given is not None):
         return None
-    return place, (_parse_parameters(text, parameters) if more else dict(given or {}))
+    return place, (parse_parameters(parameters, f"policy {text!r}") if more else dict(given or {}))
+
+
+def parse_parameters(text: str, source: str) -> dict[str, Any]:
+    """Names and values.
+
+    Args:
+        text: ``"name=value,name=value"``; values are Python's literals, anything else is taken for plain text.
+        source: What it is part of, for the message.
+
+    Raises:
+        InvalidInputError: The text has another form, or names one twice.
+    """
+    out: dict[str, Any] = {}
+    for part in _split(text):
+        name, equals, value = (piece.strip() for piece in part.partition("="))
+        if not (name and equals and value):
+            raise InvalidInputError(f"{source}: expected name=value,…, got {part.strip()!r}.")
+        if name in out:
+            raise InvalidInputError(f"{source}: {name!r} is given twice.")
+        try:
+            out[name] = ast.literal_eval(value)
+        except (ValueError, SyntaxError, TypeError, RecursionError, MemoryError):
+            out[name] = value
+    return out
 
 
 def refuse_trust(spec: PolicySpec, source: str) -> None:
@@ -87,21 +111,6 @@ def _trusts(value: object) -> bool:
     if isinstance(value, Mapping):
         return any((name == "trust" and item is not False) or _trusts(item) for name, item in value.items())
     return isinstance(value, (list, tuple)) and any(map(_trusts, value))
-
-
-def _parse_parameters(spec: str, text: str) -> dict[str, Any]:
-    out: dict[str, Any] = {}
-    for part in _split(text):
-        name, equals, value = (piece.strip() for piece in part.partition("="))
-        if not (name and equals and value):
-            raise InvalidInputError(f"policy {spec!r}: expected name:parameter=value,…, got {part.strip()!r}.")
-        if name in out:
-            raise InvalidInputError(f"policy {spec!r}: parameter {name!r} is given twice.")
-        try:
-            out[name] = ast.literal_eval(value)
-        except (ValueError, SyntaxError, TypeError, RecursionError, MemoryError):
-            out[name] = value
-    return out
 
 
 def _split(text: str) -> list[str]:

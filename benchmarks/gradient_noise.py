@@ -24,6 +24,7 @@ from tqdm import tqdm
 
 from baselines.evaluation.pages.markdown import table
 from baselines.evaluation.report import number
+from baselines.spec import parse_parameters
 from baselines.training import presets
 from baselines.training.config.actor_only import APG
 from baselines.training.config.base import Config
@@ -33,7 +34,6 @@ from baselines.training.trainers.apg import APGTrainer
 from baselines.training.trainers.models import mean_network
 from baselines.training.trainers.ppo import PPOTrainer
 from baselines.training.trainers.rollout_end import GroupBaseline
-from benchmarks.learning import change
 from ikgym.exceptions import InvalidInputError
 from ikgym.validation import FloatArray, known_names
 
@@ -120,7 +120,7 @@ def of_ppo(config: PPO, seed: int) -> Batches:
         trainer.segment(segment)
     model, hold = trainer.model, config.hold if config.output == "inverse" else 1
     weights = list(mean_network(model).parameters())
-    baseline = GroupBaseline(config.group_size) if config.group_size > 1 else None
+    baseline = GroupBaseline() if config.group_size > 1 else None
     _, callback = model._setup_learn(model.num_timesteps, baseline)
 
     def take() -> Gradient:
@@ -158,14 +158,13 @@ def lines(command: Command) -> list[str]:
     """The table.
 
     Raises:
-        UnknownNameError: There is no such method or preset.
-        InvalidInputError: There are less than three batches.
+        UnknownNameError: There is no such method, preset or option.
+        InvalidInputError: There are less than three batches, or an option has another form or is refused.
     """
     _enough(command.batches)
     rows = []
     for given in command.gradients:
-        method, _, preset = given.partition("=")
-        batches = _batches(method, preset, command)
+        batches = _batches(given, command)
         batches.take()  # compiles
         begun = time.process_time()
         taken = [batches.take() for _ in tqdm(range(command.batches), desc=given, unit="batch")]
@@ -183,12 +182,13 @@ def _enough(batches: int) -> int:
     return batches
 
 
-def _batches(method: str, preset: str, command: Command) -> Batches:
+def _batches(given: str, command: Command) -> Batches:
+    chosen, _, options = given.partition(",")
+    method, _, preset = chosen.partition("=")
     known_names("method", [method], METHODS)
     kind, take = METHODS[method]
-    preset, *changed = preset.split(",")
     config: Any = presets.configure(kind, preset)[0]
-    changes = dict(change(given) for given in changed)
+    changes = parse_parameters(options, repr(given)) if options else {}
     if command.n_envs is not None:
         changes["n_envs"] = command.n_envs
     if kind is PPO:

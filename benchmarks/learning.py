@@ -8,7 +8,6 @@ after the first 0.2 s, and of these the median. Time in which the machine did so
 from __future__ import annotations
 
 import argparse
-import ast
 import time
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -21,6 +20,7 @@ from tqdm import tqdm
 
 import ikgym
 import ikgym.sb3
+from baselines.spec import parse_parameters
 from ikgym import rl, scenarios
 from ikgym.validation import FloatArray
 
@@ -76,8 +76,8 @@ def said(model: Any, arguments: argparse.Namespace, split: str, spent: float, st
 
 def change(given: str) -> tuple[str, Any]:
     """A field and its value from NAME=VALUE."""
-    name, _, value = given.partition("=")
-    return name, ast.literal_eval(value)
+    (found,) = parse_parameters(given, "--change").items()
+    return found
 
 
 def main(given: Sequence[str] | None = None) -> None:

@@ -94,6 +94,8 @@ def test_gradients_of_actors(tmp_path, capsys):
         (["td3=quick"], UnknownNameError, "method"),
         (["ppo=quik"], UnknownNameError, "quick"),
         (["ppo=quick,group_sise=1"], UnknownNameError, "Did you mean 'group_size'"),
+        (["ppo=quick,group_size"], InvalidInputError, "expected name=value,…, got 'group_size'"),
+        (["ppo=quick,group_size=one"], InvalidInputError, "group_size: expected a whole number"),
     ],
 )
 def test_bad_commands(command, error, message):

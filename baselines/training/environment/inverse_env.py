@@ -15,7 +15,7 @@ from baselines.agents.bilinear.processing import Bilinear
 from baselines.agents.features import Features
 from baselines.training.environment.null_space import null_maps
 from baselines.training.environment.view import aligned
-from baselines.training.gradients.arms import Arms
+from baselines.training.gradients.arms import Arms, Indices
 from baselines.training.gradients.law import Law
 from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError, NoAttributeError, ResetNeededError
@@ -25,6 +25,8 @@ from ikgym.validation import FloatArray, flag, number, whole_number
 
 #: Steps for which an inverse is held while an action is. Held as long as the action, it would cost more than it should.
 INVERSE_EVERY = 2
+#: Of all arms.
+ALL = slice(None)
 #: What agents see.
 SEEN = Bilinear(damping=1e-2, matrix=False)
 
@@ -72,6 +74,7 @@ class InverseVecEnv(VecEnv):
     Attributes:
         seen: How many numbers of an observation are features.
         freedom: r, how many joints the task leaves free.
+        group_size: Arms that play the same episodes.
 
     Raises:
         UnknownNameError: There is no such scenario.
@@ -100,10 +103,10 @@ class InverseVecEnv(VecEnv):
             )
         self._lost_distance = number("lost_distance", lost_distance, above=0.0)
         self._log_above = number("log_above", log_above, above=0.0)
-        self._group_size = whole_number("group_size", group_size, at_least=1)
-        if num_envs % self._group_size:
+        self.group_size = whole_number("group_size", group_size, at_least=1)
+        if num_envs % self.group_size:
             raise InvalidInputError(f"num_envs: expected a multiple of group_size, {group_size}, got {num_envs}.")
-        if self._group_size > 1 and scenario.nominal_joint_path(scenarios.SPLITS["train"].start) is None:
+        if self.group_size > 1 and scenario.nominal_joint_path(scenarios.SPLITS["train"].start) is None:
             # Where an arm that is lost begins anew, and its group does not.
             raise InvalidInputError(
                 f"group_size: expected 1 without a reference joint path, as in {scenario.name!r}, got {group_size}."
@@ -114,6 +117,8 @@ class InverseVecEnv(VecEnv):
         if self._null_map and self.freedom < 1:
             raise InvalidInputError(f"null_map: expected false where the task takes all joints, got {null_map}.")
         self._arms = Arms(scenario, num_envs, processing.offsets)
+        self._features = torch.zeros(num_envs, self._law.inputs, dtype=torch.float64)
+        self._speed = np.ones(num_envs)
         self._generator, self._reset = np.random.default_rng(), False
         self._returns, self._lengths = np.zeros(num_envs), np.zeros(num_envs, dtype=np.int64)
         self.seen, self._privileged = self._law.inputs, flag("privileged", privileged)
@@ -130,10 +135,10 @@ class InverseVecEnv(VecEnv):
 
     def reset(self) -> Features:
         """Begins new episodes, spread over their steps, of the split `train`. Returns shape (N, f)."""
-        self._arms.spread(self._generator, self._hold, self._group_size)
+        self._arms.spread(self._generator, self._hold, self.group_size)
         self._returns[:], self._lengths[:] = 0.0, 0
         self._reset = True
-        return self._see()
+        return self._see(ALL)
 
     def step_async(self, actions: npt.NDArray[Any]) -> None:
         """Takes actions. Shape (N, 2 n + 1).
@@ -165,16 +170,18 @@ class InverseVecEnv(VecEnv):
         self._lengths += self._hold
         ends = over | lost
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        seen = self._see(ALL)
         if ends.any():
-            last = self._see()
-            for row in np.flatnonzero(ends).tolist():
+            rows = np.flatnonzero(ends)
+            for row, last in zip(rows.tolist(), seen[rows], strict=True):
                 summary = {"r": float(self._returns[row]), "l": int(self._lengths[row])}
                 truncated = bool(not over[row])
-                infos[row] = {"terminal_observation": last[row], "episode": summary, "TimeLimit.truncated": truncated}
+                infos[row] = {"terminal_observation": last, "episode": summary, "TimeLimit.truncated": truncated}
             self._returns[ends], self._lengths[ends] = 0.0, 0
             arms.give_up(np.flatnonzero(lost & ~over))
-            arms.begin_new(np.flatnonzero(over), self._generator, group_size=self._group_size)
-        return self._see(), rewards.astype(np.float32), ends, infos
+            arms.begin_new(np.flatnonzero(over), self._generator, group_size=self.group_size)
+            seen[rows] = self._see(rows)
+        return seen, rewards.astype(np.float32), ends, infos
 
     def close(self) -> None:
         """Nothing is open; closing does nothing."""
@@ -211,24 +218,24 @@ class InverseVecEnv(VecEnv):
         """No row is wrapped."""
         return [False for _ in self._get_indices(indices)]
 
-    def _see(self) -> Features:
-        self._look()
-        seen = [self._features.numpy()]
+    def _see(self, rows: Indices | slice) -> Features:
+        """What some arms show where they are. Shape (R, observed)."""
+        self._look(rows)
+        arms, features = self._arms, self._features[rows]
+        seen = [features.numpy()]
         if self._privileged:
-            seen.append(self._for_critics())
+            seen.append(arms.qdot[rows].numpy() / self._speed[rows, None])
+            seen.append(np.log(arms.usual[rows, None]))
         if self._null_map:
-            seen.append(null_maps(self._law, self._arms.q, self._features).reshape(self.num_envs, -1))
+            seen.append(null_maps(self._law, arms.q[rows], features).reshape(len(features), -1))
         return aligned(np.concatenate(seen, axis=1).astype(np.float32))
 
-    def _look(self) -> None:
-        """Features of where the arms are, and the speed of what is ahead."""
-        with torch.no_grad():
-            self._features, self._speed = self._law.features(self._arms.q, self._arms.ahead, self._arms.remaining)
-
-    def _for_critics(self) -> FloatArray:
-        """What rewards depend on beside the features. Shape (N, n + 1)."""
+    def _look(self, rows: Indices | slice = ALL) -> None:
+        """Features of where some arms are, and the speed of what is ahead."""
         arms = self._arms
-        return np.column_stack([arms.qdot.numpy() / self._speed[:, None], np.log(arms.usual)])
+        with torch.no_grad():
+            features, speed = self._law.features(arms.q[rows], arms.ahead[rows], arms.remaining[rows])
+        self._features[rows], self._speed[rows] = features, speed
 
     def _move(self) -> tuple[FloatArray, FloatArray]:
         """The mean cost of each arm, ÷ that of its reference joint path, and how far it is from its path in [m]."""

@@ -11,13 +11,14 @@ from typing import Any
 
 import torch
 from stable_baselines3.common.distributions import Distribution
-from stable_baselines3.common.preprocessing import get_action_dim
+from stable_baselines3.common.preprocessing import get_action_dim, get_flattened_obs_dim
 from stable_baselines3.common.torch_layers import MlpExtractor
 from stable_baselines3.common.type_aliases import Schedule
 from torch import Tensor, nn
 from torch.distributions import Normal
 
 from baselines.training.policies.asymmetric import AsymmetricPPOPolicy
+from ikgym.exceptions import InvalidInputError
 
 
 class NullSpaceGaussian(Distribution):
@@ -99,6 +100,10 @@ class NullSpacePPOPolicy(AsymmetricPPOPolicy):
     """For PPO in an :class:`baselines.training.environment.inverse_env.InverseVecEnv` with `null_map`.
 
     Arguments as of Stable-Baselines3's `MlpPolicy`, `seen`, and `freedom`, how many joints the task leaves free.
+
+    Raises:
+        InvalidInputError: The environment shows no maps of the null space, or `use_sde` is given, which is noise of
+            another kind.
     """
 
     def __init__(self, *args: Any, freedom: int, **kwargs: Any) -> None:
@@ -119,11 +124,25 @@ class NullSpacePPOPolicy(AsymmetricPPOPolicy):
         self._narrow(extractor.policy_net)
 
     def _build(self, lr_schedule: Schedule) -> None:
+        self._check()
         super()._build(lr_schedule)
         self.action_dist = NullSpaceGaussian()  # type: ignore[no-untyped-call]
         self.log_std = nn.Parameter(torch.full((self._freedom + 1,), self.log_std_init))
         make: Any = self.optimizer_class
         self.optimizer = make(self.parameters(), lr=lr_schedule(1), **self.optimizer_kwargs)
+
+    def _check(self) -> None:
+        """Insists on what :class:`InverseVecEnv` shows behind the features: for critics, or nothing, and the maps."""
+        if self.use_sde:
+            raise InvalidInputError("use_sde: expected false, noise is drawn in coordinates of the null space.")
+        n, shown = self._joints, self.observation_space.shape
+        behind = get_flattened_obs_dim(self.observation_space) - self._seen
+        maps = self._freedom * n
+        if behind not in (maps, maps + n + 1):
+            raise InvalidInputError(
+                f"env: expected {maps} or {maps + n + 1} numbers behind the {self._seen} features, as InverseVecEnv "
+                f"shows with null_map=True, got observations of shape {shown}."
+            )
 
     def _get_action_dist_from_latent(self, latent_pi: Tensor) -> Distribution:
         n, r = self._joints, self._freedom

@@ -90,7 +90,7 @@ class PPOTrainer(ReinforcementTrainer):
     def _callback(self) -> BaseCallback:
         config, callbacks = self._config, list[BaseCallback]()
         if config.group_size > 1:
-            callbacks.append(GroupBaseline(config.group_size))
+            callbacks.append(GroupBaseline())
         if config.critic_epochs:
             settings = config.critic_epochs, config.batch_size, config.group_size, config.critic_group_weight
             callbacks.append(CriticEpochs(self._critic_optimizer, *settings))

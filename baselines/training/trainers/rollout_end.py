@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from stable_baselines3.common.callbacks import BaseCallback
 from torch import Tensor
 
-from ikgym.validation import whole_number
+from ikgym.exceptions import InvalidInputError
 
 
 class GroupBaseline(BaseCallback):
@@ -20,15 +20,23 @@ class GroupBaseline(BaseCallback):
     actor learns from what is due to its actions (leave-one-out baseline, Kool et al. 2019).
 
     >>> envs = InverseVecEnv(64, "panda-random", group_size=8)
-    >>> model = PPO("MlpPolicy", envs).learn(100_000, callback=GroupBaseline(8))
+    >>> model = PPO("MlpPolicy", envs).learn(100_000, callback=GroupBaseline())
 
-    Args:
-        group_size: Arms of a group, one after the other; those of the environment are a multiple.
+    Raises:
+        InvalidInputError: When the training begins: the environment has no attribute `group_size`, or one below 2.
     """
 
-    def __init__(self, group_size: int) -> None:
-        super().__init__()
-        self._group_size = whole_number("group_size", group_size, at_least=2)
+    def _init_callback(self) -> None:
+        try:
+            sizes = self.training_env.get_attr("group_size")
+        except AttributeError:
+            sizes = []
+        self._group_size = min(sizes, default=1)
+        if self._group_size < 2:
+            raise InvalidInputError(
+                "GroupBaseline: expected an environment in which arms play the same episodes, as InverseVecEnv with a "
+                f"group_size of at least 2, got {type(self.training_env.unwrapped).__name__} without."
+            )
 
     def _on_step(self) -> bool:
         return True

@@ -362,7 +362,7 @@ class TestNames:
         assert parse_policy(text) == ("agent", parameters)
 
     def test_texts_of_others_are_as_before(self):
-        with pytest.raises(InvalidInputError, match="expected name:parameter=value"):
+        with pytest.raises(InvalidInputError, match="expected name=value"):
             parse_policy("dls:some/path")
         assert parse_policy("dls:damping=" + "-" * 100_000 + "1")[1]["damping"].startswith("--")
 

@@ -300,7 +300,7 @@ def test_actions_of_solvers_that_are_not_finite_are_named_too():
         (here("Problem"), "cannot be made: TypeError"),
         (here("Borrowed:dampin=1"), "There is no parameter of dls 'dampin'"),
         (here("refuse"), "Nothing to evaluate: .*refuse in zhang3-helix: only for seven joints"),
-        (here("Borrowed:damping"), "expected name:parameter=value"),
+        (here("Borrowed:damping"), "expected name=value"),
     ],
 )
 def test_what_is_no_policy_is_refused(policy, message):
@@ -511,7 +511,7 @@ def test_modules_are_found_in_the_current_folder(tmp_path, monkeypatch, capsys):
     for policy, message in [
         (f"{name}:Proportionl", "has no attribute 'Proportionl'"),
         ("broken_module:Policy", "ZeroDivisionError"),
-        ("dls:Policy", "expected name:parameter=value"),
+        ("dls:Policy", "expected name=value"),
     ]:
         assert main(["--policies", policy, "--steps", "3"]) == 2
         printed = capsys.readouterr()

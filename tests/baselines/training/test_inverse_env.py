@@ -64,11 +64,11 @@ def test_an_action_of_each_step_is_that_of_the_agent():
 def envs_cost(envs, seed, outputs):
     """What an episode costs by the law of gradients."""
     envs._arms.begin(np.array([0]), np.array([seed]), np.array([0]))
-    envs._see()
+    envs._look()
     for output in outputs:
         envs.step_async(output)
         envs._move()
-        envs._see()
+        envs._look()
     return envs._arms.spent[0]
 
 
@@ -102,7 +102,7 @@ def test_the_inverse_is_renewed_while_an_action_is_held():
     once, often = made(hold=8), made(hold=INVERSE_EVERY)
     once.reset(), often.reset()
     often._arms.restore(once._arms.state())
-    often._see()
+    often._look()
     said = actions_of(once)
     once.step(said)
     for _ in range(8 // INVERSE_EVERY):
@@ -124,7 +124,7 @@ def test_to_hold_the_inverse_for_an_action_would_cost_more_than_what_agents_can_
             envs.step_async(np.zeros((32, *envs.action_space.shape)))
             costs.append(envs._move()[0])
             envs._arms.begin_new(np.flatnonzero(envs._arms.ended), envs._generator)
-            envs._see()
+            envs._look()
         return np.mean(costs, axis=0)
 
     new, pair, held = (spent(every) for every in (1, INVERSE_EVERY, 20))
@@ -147,6 +147,22 @@ def test_critics_see_what_rewards_depend_on():
         for info, other in zip(infos, longer, strict=True):
             if "terminal_observation" in info:
                 assert identical(other["terminal_observation"][: envs.seen], info["terminal_observation"])
+
+
+def test_what_is_seen_after_an_end_is_that_of_the_new_episode():
+    """Of the arms that begin anew, all that is shown; of the others, and of what has ended, what was there."""
+    envs = made(rows=4, privileged=True, null_map=True)
+    envs.reset()
+    ended = 0
+    for step in range(20):
+        seen, _, ends, infos = envs.step(actions_of(envs, step))
+        ended += int(ends.sum())
+        assert identical(envs._see(slice(None)), seen)
+        for row in np.flatnonzero(ends).tolist():
+            last = infos[row]["terminal_observation"]
+            assert last.shape == seen[row].shape
+            assert not np.array_equal(last, seen[row])
+    assert 8 <= ended < 80
 
 
 def test_episodes_end_and_lost_arms_go_on_where_their_path_is():

@@ -15,7 +15,7 @@ import baselines
 import ikgym
 import ikgym.sb3
 from baselines.agents.bilinear.processing import Bilinear
-from baselines.training.environment.inverse_env import InverseVecEnv
+from baselines.training.environment.inverse_env import SEEN, InverseVecEnv
 from baselines.training.environment.view import View
 from baselines.training.exporting import export
 from baselines.training.policies import (
@@ -28,6 +28,7 @@ from baselines.training.policies import (
     NullSpacePPOPolicy,
 )
 from baselines.training.policies.null_space import NullSpaceGaussian
+from baselines.training.trainers.rollout_end import GroupBaseline
 from ikgym import rl
 from ikgym.exceptions import InvalidInputError
 from ikgym.rl.feature_kernels import jacobian_rows
@@ -206,13 +207,42 @@ def test_a_lost_track_is_no_truncation():
     assert info["terminal_observation"].shape == envs.observation_space.shape
 
 
-def test_the_snippet_of_the_page_runs(tmp_path, monkeypatch):
+@pytest.mark.parametrize(
+    ("word", "preview"),
+    [("make_vec", (10, 40, 100)), ("TD3(", SEEN.offsets), ("GroupBaseline", SEEN.offsets)],
+)
+def test_the_snippets_of_the_page_run(word, preview, tmp_path, monkeypatch):
     page = (pathlib.Path(__file__).parents[3] / "docs" / "agents.md").read_text(encoding="utf-8")
-    (snippet,) = (text for text in re.findall(r"```python\n(.*?)```", page, re.DOTALL) if "make_vec" in text)
+    (snippet,) = (text for text in re.findall(r"```python\n(.*?)```", page, re.DOTALL) if word in text)
     monkeypatch.chdir(tmp_path)
     exec(compile(snippet, "agents.md", "exec", dont_inherit=True), {})
     agent = baselines.make("agent", "panda-random", path="mine.safetensors")
-    assert agent.preview == (10, 40, 100)
+    assert agent.preview == preview
+
+
+@pytest.mark.parametrize(
+    ("changes", "more", "message"),
+    [
+        ({}, {}, r"expected 7 or 15 numbers behind the \d+ features, as InverseVecEnv shows with null_map=True"),
+        ({"privileged": True}, {}, "expected 7 or 15 numbers behind"),
+        ({"null_map": True}, {"use_sde": True}, "use_sde: expected false"),
+    ],
+)
+def test_noise_in_the_null_space_needs_its_maps(changes, more, message):
+    envs = InverseVecEnv(2, scenario(), hold=4, **changes)
+    policy_kwargs = {"seen": envs.seen, "freedom": envs.freedom}
+    with pytest.raises(InvalidInputError, match=message):
+        PPO(NullSpacePPOPolicy, envs, device="cpu", policy_kwargs=policy_kwargs, **more, **SHORT)
+
+
+@pytest.mark.parametrize(
+    "make", [lambda: InverseVecEnv(2, scenario(), hold=4), lambda: ikgym.sb3.make_vec(scenario(), 2)]
+)
+def test_a_baseline_of_groups_needs_groups(make):
+    envs = make()
+    model = PPO("MlpPolicy", envs, device="cpu", **SHORT)
+    with pytest.raises(InvalidInputError, match="expected an environment in which arms play the same episodes"):
+        model.learn(8, callback=GroupBaseline())
 
 
 def test_noise_in_the_null_space():

@@ -96,7 +96,7 @@ def test_advantages_are_those_beside_the_others_of_a_group():
     np.testing.assert_allclose(beside_the_others(np.arange(2.0).repeat(4)[None] * 100.0, 4), 0.0, atol=1e-5)
 
 
-def test_a_critic_that_weighs_groups_tells_better_what_differs_in_them(monkeypatch):
+def test_a_critic_that_weighs_groups_tells_better_what_differs_in_them():
     """Of returns that differ by much from group to group and by little in them."""
     output = {"output": "inverse", "damping": 1e-2, "hold": 2, "scenario": "panda-random", "privileged": True}
     rng = np.random.default_rng(0)
