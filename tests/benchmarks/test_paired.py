@@ -53,6 +53,8 @@ def test_unknown_names_are_told(tmp_path):
     ("file", "seeds", "episodes"),
     [
         ("agents.json", 5, 256),
+        ("agents_skew.json", 5, 256),
+        ("agents_more.json", 5, 1280),
         ("agents_long.json", 1, 256),
         ("agents_long_skew.json", 1, 256),
         ("agents_td3.json", 3, 256),
