@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import baselines
+from baselines.evaluation.pages.claims import Comparison
 from baselines.evaluation.rollout import rollouts
 from benchmarks import paired
 from ikgym import scenarios
@@ -69,3 +70,14 @@ def test_the_page_has_the_table_of_what_was_played(file, seeds, episodes):
     assert table.splitlines() == paired.lines(content)
     assert (content["episodes"], content["split"]) == (episodes, "test")
     assert len(content["played"]["agents"]["costs"]) == seeds
+
+
+def test_the_page_says_how_far_a_second_training_is_from_the_first():
+    """The same seeds at a later commit, on the first 256 of the episodes that they played."""
+    first, more = (json.loads((DOCS / file).read_text())["played"] for file in ("agents.json", "agents_more.json"))
+    again = np.array(more["agents"]["costs"])[:, :256]
+    page = " ".join((DOCS / "agents.md").read_text(encoding="utf-8").split())
+    for label in first.keys() - {"agents"}:
+        assert str(Comparison.of(again, np.array(first[label]["costs"]))) in page
+    apart = 100.0 * np.median(np.abs(np.log(again / np.array(first["agents"]["costs"]))), axis=1)
+    assert f"costs differ by {apart.min():.1f} to {apart.max():.1f} % in the median" in page

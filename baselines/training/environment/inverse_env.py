@@ -138,7 +138,7 @@ class InverseVecEnv(VecEnv):
         self._arms.spread(self._generator, self._hold, self.group_size)
         self._returns[:], self._lengths[:] = 0.0, 0
         self._reset = True
-        return self._see(ALL)
+        return self._see()
 
     def step_async(self, actions: npt.NDArray[Any]) -> None:
         """Takes actions. Shape (N, 2 n + 1).
@@ -170,7 +170,7 @@ class InverseVecEnv(VecEnv):
         self._lengths += self._hold
         ends = over | lost
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
-        seen = self._see(ALL)
+        seen = self._see()
         if ends.any():
             rows = np.flatnonzero(ends)
             for row, last in zip(rows.tolist(), seen[rows], strict=True):
@@ -218,7 +218,7 @@ class InverseVecEnv(VecEnv):
         """No row is wrapped."""
         return [False for _ in self._get_indices(indices)]
 
-    def _see(self, rows: Indices | slice) -> Features:
+    def _see(self, rows: Indices | slice = ALL) -> Features:
         """What some arms show where they are. Shape (R, observed)."""
         self._look(rows)
         arms, features = self._arms, self._features[rows]

@@ -135,13 +135,12 @@ class NullSpacePPOPolicy(AsymmetricPPOPolicy):
         """Insists on what :class:`InverseVecEnv` shows behind the features: for critics, or nothing, and the maps."""
         if self.use_sde:
             raise InvalidInputError("use_sde: expected false, noise is drawn in coordinates of the null space.")
-        n, shown = self._joints, self.observation_space.shape
+        n, maps = self._joints, self._freedom * self._joints
         behind = get_flattened_obs_dim(self.observation_space) - self._seen
-        maps = self._freedom * n
         if behind not in (maps, maps + n + 1):
             raise InvalidInputError(
                 f"env: expected {maps} or {maps + n + 1} numbers behind the {self._seen} features, as InverseVecEnv "
-                f"shows with null_map=True, got observations of shape {shown}."
+                f"shows with null_map=True, got {behind}."
             )
 
     def _get_action_dist_from_latent(self, latent_pi: Tensor) -> Distribution:

@@ -28,10 +28,9 @@ class GroupBaseline(BaseCallback):
 
     def _init_callback(self) -> None:
         try:
-            sizes = self.training_env.get_attr("group_size")
+            self._group_size = self.training_env.get_attr("group_size")[0]
         except AttributeError:
-            sizes = []
-        self._group_size = min(sizes, default=1)
+            self._group_size = 1
         if self._group_size < 2:
             raise InvalidInputError(
                 "GroupBaseline: expected an environment in which arms play the same episodes, as InverseVecEnv with a "
