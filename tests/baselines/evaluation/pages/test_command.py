@@ -23,6 +23,7 @@ def assert_picture(file):
     assert PIL.Image.open(io.BytesIO(file.read_bytes())).size[0] > 1000
 
 
+@pytest.mark.slow
 def test_plays_writes_and_writes_anew(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(command, "solvers", lambda *_: FEW)
     monkeypatch.setattr(families, "entries", lambda *_: (solver("dls"), solver("rhc:horizon=3,iterations=1")))
@@ -72,9 +73,16 @@ def test_one_page_alone(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(families, "entries", lambda *_: (solver("dls", timed=1),))
     arguments = ["--pages", "cost-time", "--sets", "varga7-fast", "--out", str(tmp_path)]
     assert main(arguments) == 0
-    text = (tmp_path / "cost_time.md").read_text(encoding="utf-8")
+    page = tmp_path / "cost_time.md"
+    text = page.read_text(encoding="utf-8")
     assert f"`python -m baselines.leaderboard {' '.join(arguments)}`" in text
     assert not (tmp_path / "leaderboard.md").exists()
+    page.unlink()
+    assert main(["--pages", "cost-time", "--write", str(tmp_path)]) == 0
+    assert page.read_text(encoding="utf-8") == text
+    capsys.readouterr()
+    assert main(arguments) == 2
+    assert "--resume" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
