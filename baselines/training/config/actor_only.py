@@ -144,8 +144,9 @@ class APG(ActorOnly):
     """The gradient by what the network gives one arm is cut at this many times an equal share of a loss of 1: near
     singularities it would otherwise exceed that of all others together."""
     cost_prior_steps: Annotated[float, tyro.conf.arg(metavar="N")] = 100.0
-    """Stage costs are divided by the mean of their episode so far, in which the mean cost of the reference joint path
-    counts as much as this many steps: what is minimised is the logarithm of the costs of whole episodes."""
+    """Costs are divided by the mean stage cost of their episode up to the end of the window, in which the mean cost of
+    the reference joint path counts as much as this many steps: what is minimised is the logarithm of the costs of
+    whole episodes."""
     reset_distance: Annotated[float, tyro.conf.arg(metavar="M")] = 0.3
     """Arms that are farther from their reference position than this, in [m], are put back on the reference path."""
     reset_distance_end: Annotated[float, tyro.conf.arg(metavar="M")] = 1.0

@@ -247,6 +247,6 @@ class InverseVecEnv(VecEnv):
             with torch.no_grad():
                 held = self._law.held(arms.q, self._features, outputs)
                 rows = arms.rows(steps, self._speed)
-                arms.q, arms.qdot, _, distance = self._law.move(arms.q, arms.qdot, held, rows, 0.0)
-            arms.made += steps
+                arms.q, arms.qdot, cost, distance = self._law.move(arms.q, arms.qdot, held, rows)
+            arms.went(rows.steps, cost)
         return (arms.spent - spent) / (self._hold * arms.usual), distance

@@ -67,22 +67,22 @@ class Place(NamedTuple):
 
 
 @kernel
-def adjoint(task, rows, output, path, by_loss, gradient, start, stop):
+def adjoint(task, rows, output, path, by_cost, gradient, start, stop):
     """Leads gradients back through a segment.
 
     Args:
         task: A :class:`baselines.training.gradients.segment.Task`.
-        rows: What the segment was given; `spent`, `played` and `usual` are not looked at.
+        rows: What the segment was given.
         output: As in the segment.
         path: What the segment made of it.
-        by_loss: The gradient by the loss of each arm; weights count as constants. Shape (N,).
+        by_cost: The gradient by the cost of each arm. Shape (N,).
         gradient: A :class:`Gradient`; changed in place.
         start: The first row that is meant.
         stop: The row after the last.
     """
     chain, kind, e, dt, velocity_limit, limits, cost = task
-    nominal, _, steps, speed = rows[:4]
-    q_path, qdot_path, weights = path[:3]
+    nominal, counted, steps, speed = rows
+    q_path, qdot_path = path[:2]
     by_q, by_qdot, by_output = gradient
     prismatic, axis, m, n = chain.prismatic, chain.axes[0], nominal.shape[2], q_path.shape[2]
     turned, w, of_twist = is_turned(kind, prismatic), twist_size(kind), error_kind(kind)
@@ -95,7 +95,7 @@ def adjoint(task, rows, output, path, by_loss, gradient, start, stop):
         into[:] = 0.0
         look(chain, kind, q_path[row, steps[row]], place)
         for t in range(steps[row] - 1, -1, -1):
-            target, weight = nominal[row, t], weights[row, t] * by_loss[row]
+            target, weight = nominal[row, t], by_cost[row] if counted[row, t] else 0.0
             q, last, reached, applied = q_path[row, t], qdot_path[row, t], q_path[row, t + 1], qdot_path[row, t + 1]
             if weight != 0.0:
                 task_kernels.error(kind, target, pose, error[:e])

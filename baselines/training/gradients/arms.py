@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import torch
+from torch import Tensor
 
 from baselines.training.gradients.segment import Rows
 from ikgym import scenarios
@@ -83,7 +84,30 @@ class Arms:
         """
         at = self.made[:, None] + np.arange(1, steps + 1)
         left = np.minimum(self._scenario.steps - self.made, steps)
-        return Rows(self._nominal[self._every, at], self._counted[at], left, speed, self.usual, self.spent, self.played)
+        return Rows(self._nominal[self._every, at], self._counted[at], left, speed)
+
+    def went(self, steps: Indices, cost: Tensor) -> None:
+        """Counts what was done in a segment.
+
+        Args:
+            steps: That each arm made. Shape (N,).
+            cost: That each arm spent. Shape (N,).
+        """
+        self.made += steps
+        self.played += steps
+        self.spent += cost.detach().numpy()
+
+    def relative(self, cost: Tensor, prior: float) -> Tensor:
+        """Costs of these episodes ÷ their mean stage cost so far: their gradient is that of its logarithm.
+
+        Args:
+            cost: A part of what each arm has spent in its episode. Shape (N,).
+            prior: Steps that the mean cost of the reference joint path counts as much as.
+
+        Returns:
+            In mean stage costs. Shape (N,).
+        """
+        return cost * torch.from_numpy((self.played + prior) / (self.spent + prior * self.usual))
 
     def begin(self, rows: Indices, seeds: Indices, at: Indices) -> None:
         """Begins episodes, or enters them after some steps, where their reference joint path is then.

@@ -90,24 +90,21 @@ class Law:
         out: Tensor = _Held.apply(q, output, self)  # type: ignore[no-untyped-call]
         return out
 
-    def move(
-        self, q: Tensor, qdot: Tensor, output: Tensor, rows: Rows, prior: float
-    ) -> tuple[Tensor, Tensor, Tensor, FloatArray]:
+    def move(self, q: Tensor, qdot: Tensor, output: Tensor, rows: Rows) -> tuple[Tensor, Tensor, Tensor, FloatArray]:
         """A segment of steps, see :func:`baselines.training.gradients.segment.segment`.
 
         Args:
             q: Joint coordinates in [rad] or [m]. Shape (N, n), float64.
             qdot: Joint velocities last applied, in [rad/s] or [m/s]. Shape (N, n), float64.
             output: (G, h). Shape (N, n (w + 1)), float64.
-            rows: What to do; must not be changed before the gradient is known, but for `spent` and `played`.
-            prior: Steps that the usual cost counts as much as.
+            rows: What to do; must not be changed before the gradient is known.
 
         Returns:
-            Joint coordinates and velocities after it, the weighed costs of shape (N,), and the position errors at its
-            end in [m], of shape (N,).
+            Joint coordinates and velocities after it, the costs of shape (N,), and the position errors at its end in
+            [m], of shape (N,).
         """
         path = Path.empty(len(rows.steps), rows.nominal.shape[1], q.shape[1])
-        ends: Any = _Segment.apply(q, qdot, output, self, rows, prior, path)  # type: ignore[no-untyped-call]
+        ends: Any = _Segment.apply(q, qdot, output, self, rows, path)  # type: ignore[no-untyped-call]
         return *ends, path.distance
 
 
@@ -163,26 +160,26 @@ class _Held(torch.autograd.Function):
 class _Segment(torch.autograd.Function):
     @staticmethod
     def forward(
-        ctx: Any, q: Tensor, qdot: Tensor, output: Tensor, law: Law, rows: Rows, prior: float, path: Path
+        ctx: Any, q: Tensor, qdot: Tensor, output: Tensor, law: Law, rows: Rows, path: Path
     ) -> tuple[Tensor, Tensor, Tensor]:
         count, held = len(q), np.ascontiguousarray(output.detach().numpy())
         path.q[:, 0], path.qdot[:, 0] = q.detach().numpy(), qdot.detach().numpy()
-        in_chunks(lambda start, stop: segment(law.task, rows, prior, held, path, start, stop), count, GRAIN)
+        in_chunks(lambda start, stop: segment(law.task, rows, held, path, start, stop), count, GRAIN)
         ctx.law, ctx.rows, ctx.path, ctx.held = law, rows, path, held
         last = np.arange(count), rows.steps
-        return torch.from_numpy(path.q[last]), torch.from_numpy(path.qdot[last]), torch.from_numpy(path.loss)
+        return torch.from_numpy(path.q[last]), torch.from_numpy(path.qdot[last]), torch.from_numpy(path.cost)
 
     @staticmethod
     @once_differentiable
     def backward(
-        ctx: Any, by_q: Tensor, by_qdot: Tensor, by_loss: Tensor
-    ) -> tuple[Tensor, Tensor, Tensor, None, None, None, None]:
+        ctx: Any, by_q: Tensor, by_qdot: Tensor, by_cost: Tensor
+    ) -> tuple[Tensor, Tensor, Tensor, None, None, None]:
         gradient = Gradient(by_q.numpy().copy(), by_qdot.numpy().copy(), np.empty(ctx.held.shape))
-        weights = np.ascontiguousarray(by_loss.numpy())
+        by_costs = np.ascontiguousarray(by_cost.numpy())
         in_chunks(
-            lambda start, stop: adjoint(ctx.law.task, ctx.rows, ctx.held, ctx.path, weights, gradient, start, stop),
-            len(weights),
+            lambda start, stop: adjoint(ctx.law.task, ctx.rows, ctx.held, ctx.path, by_costs, gradient, start, stop),
+            len(by_costs),
             GRAIN,
         )
         by = [torch.from_numpy(array) for array in gradient]
-        return by[0], by[1], by[2], None, None, None, None
+        return by[0], by[1], by[2], None, None, None

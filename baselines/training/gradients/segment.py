@@ -59,18 +59,12 @@ class Rows(NamedTuple):
         counted: Whether the cost of each step counts. Shape (N, K).
         steps: Steps to make, at most K. Shape (N,).
         speed: s, see :mod:`baselines.agents.bilinear`. Shape (N,).
-        usual: A stage cost that each episode's costs are compared with until they are known. Shape (N,).
-        spent: The cost of the episode so far; written. Shape (N,).
-        played: Steps that it was spent in; written. Shape (N,).
     """
 
     nominal: Floats
     counted: npt.NDArray[np.bool_]
     steps: npt.NDArray[np.int64]
     speed: Floats
-    usual: Floats
-    spent: Floats
-    played: Floats
 
 
 class Path(NamedTuple):
@@ -79,46 +73,43 @@ class Path(NamedTuple):
     Attributes:
         q: Joint coordinates in [rad] or [m]. Shape (N, K + 1, n).
         qdot: Joint velocities applied before them, in [rad/s] or [m/s]. Shape (N, K + 1, n).
-        weight: What each stage cost is multiplied by; 0 where it does not count. Shape (N, K).
-        loss: The weighed costs, added up. Shape (N,).
+        cost: The stage costs that count, added up. Shape (N,).
         distance: The position error at the end in [m]. Shape (N,).
     """
 
     q: Floats
     qdot: Floats
-    weight: Floats
-    loss: Floats
+    cost: Floats
     distance: Floats
 
     @classmethod
     def empty(cls, rows: int, steps: int, n: int) -> Path:
         """Room for N arms and K steps."""
         q, qdot = np.empty((2, rows, steps + 1, n))
-        return cls(q, qdot, np.empty((rows, steps)), np.empty(rows), np.empty(rows))
+        return cls(q, qdot, np.empty(rows), np.empty(rows))
 
 
 @kernel
-def segment(task, rows, prior, output, path, start, stop):
+def segment(task, rows, output, path, start, stop):
     """Moves arms.
 
     Args:
         task: A :class:`Task`.
-        rows: A :class:`Rows`; `spent` and `played` go on.
-        prior: Steps that `usual` counts as much as.
+        rows: A :class:`Rows`.
         output: (G, h) of each arm, see :func:`baselines.agents.bilinear.kernels.action_rows`. Shape (N, n (w + 1)).
         path: A :class:`Path` with the first `q` and `qdot`; receives all else.
         start: The first row that is meant.
         stop: The row after the last.
     """
     chain, kind, e, dt, velocity_limit, limits, cost = task
-    nominal, counted, steps, speed, usual, spent, played = rows
-    q_path, qdot_path, weights, loss, distance = path
+    nominal, counted, steps, speed = rows
+    q_path, qdot_path, total, distance = path
     prismatic, axis, m, n = chain.prismatic, chain.axes[0], nominal.shape[2], q_path.shape[2]
     turned, w, limited = is_turned(kind, prismatic), twist_size(kind), limits.shape[0] > 0
     rotation, position, pose = np.empty((3, 3)), np.empty(3), np.empty(m)
     error, due, held = np.empty(max(e, 6)), np.empty(w), np.zeros((1, 3))
     for row in range(start, stop):
-        loss[row] = distance[row] = 0.0
+        total[row] = distance[row] = 0.0
         forward(chain, q_path[row, 0], rotation, position)
         task_kernels.coordinates(kind, rotation, position, pose)
         for t in range(steps[row]):
@@ -138,13 +129,8 @@ def segment(task, rows, prior, output, path, start, stop):
             forward(chain, reached, rotation, position)
             task_kernels.coordinates(kind, rotation, position, pose)
             task_kernels.error(kind, target, pose, error[:e])
-            played[row] += 1.0
-            weights[row, t] = 0.0
             if counted[row, t]:
-                stage = cost_kernels.tracking(cost, error[:e]) + cost_kernels.velocity(cost, applied)
-                spent[row] += stage
-                weights[row, t] = (played[row] + prior) / (spent[row] + prior * usual[row])
-                loss[row] += weights[row, t] * stage
+                total[row] += cost_kernels.tracking(cost, error[:e]) + cost_kernels.velocity(cost, applied)
         if steps[row] > 0:
             distance[row] = missing(target, position)
 

@@ -6,6 +6,7 @@ import copy
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import torch
 from torch import Tensor, nn
 
@@ -83,6 +84,9 @@ class APGTrainer(ActorTrainer):
     def window(self, steps: int, generator: np.random.Generator) -> tuple[Tensor, int]:
         """Moves all arms through a window, from where they are, of which no gradient is taken.
 
+        All steps of an episode in it are weighed alike, by what the episode has cost by its end: weighed by what it
+        had cost before each step, the way into a costly passage would count far more than the passage.
+
         Args:
             steps: A multiple of `hold`.
             generator: Draws the seeds of new episodes.
@@ -91,28 +95,40 @@ class APGTrainer(ActorTrainer):
             The loss, and how many arms were given up.
         """
         config, arms, total, given_up = self._config, self._arms, torch.zeros((), dtype=torch.float64), 0
+        spent = torch.zeros(config.n_envs, dtype=torch.float64)  # in this window, each arm in its episode
         arms.q, arms.qdot = arms.q.detach(), arms.qdot.detach()
         most, precision = config.max_gradient_share * config.hold / (config.n_envs * steps), self._precision
         for _ in range(steps // config.hold):
-            given_up += self._renew(generator)
+            over = torch.from_numpy(self._lost | arms.ended)
+            if over.any():
+                total = total + arms.relative(spent, config.cost_prior_steps)[over].sum()
+                spent = torch.where(over, 0.0, spent)
+                given_up += self._renew(generator)
             q, qdot = _limited(arms.q, OVERFLOW), _limited(arms.qdot, OVERFLOW)
             features, speed = self._law.features(q, arms.ahead, arms.remaining)
             held = _limited(self._law.held(q, features, self._actor(features.to(precision)).double()), most)
             rows = arms.rows(config.hold, speed)
-            arms.q, arms.qdot, loss, self._far = self._law.move(q, qdot, held, rows, config.cost_prior_steps)
-            arms.made += rows.steps
-            total = total + loss.sum()
+            arms.q, arms.qdot, cost, self._far = self._law.move(q, qdot, held, rows)
+            arms.went(rows.steps, cost)
+            spent = spent + cost
+        total = total + arms.relative(spent, config.cost_prior_steps).sum()
         return total / (config.n_envs * steps), given_up
 
     def _renew(self, generator: np.random.Generator) -> int:
         """Puts lost arms back, and begins new episodes where they are over; how many arms were lost."""
-        lost, ended = self._far > self._farthest, self._arms.ended
+        lost, ended = self._lost, self._arms.ended
         over = np.flatnonzero(ended)
         if (lost & ~ended).any():
             self._arms.give_up(np.flatnonzero(lost & ~ended))
         if len(over):
             self._arms.begin_new(over, generator)
         return int(lost.sum())
+
+    @property
+    def _lost(self) -> npt.NDArray[np.bool_]:
+        """Which arms are too far from their paths. Shape (N,)."""
+        lost: npt.NDArray[np.bool_] = self._far > self._farthest
+        return lost
 
     @property
     def _precision(self) -> torch.dtype:

@@ -18,8 +18,6 @@ from tests.comparison import identical
 
 ARMS = ["varga7", "planar2", "khan8", "tiago"]  # a prismatic joint, the fewest joints, eight, a prismatic joint 1
 ROWS, STEPS, DT = 4, 5, 0.01
-#: So many steps count as known that weights are constants.
-FOREVER = 1e15
 #: Of G: such that some of the commands exceed the velocity limit of 1.
 GAIN = 0.02
 
@@ -46,8 +44,7 @@ class Case:
         way = home + np.cumsum(rng.normal(scale=0.02, size=(ROWS, STEPS, n)), 1)
         nominal = kind.coordinates(*arm.forward(way))
         count = np.array([STEPS, STEPS, STEPS - 2, 0])
-        speed, usual = rng.uniform(0.1, 1.0, ROWS), rng.uniform(0.5, 2.0, ROWS)
-        rows = Rows(nominal, rng.random((ROWS, STEPS)) < 0.7, count, speed, usual, np.zeros(ROWS), np.zeros(ROWS))
+        rows = Rows(nominal, rng.random((ROWS, STEPS)) < 0.7, count, rng.uniform(0.1, 1.0, ROWS))
         scale = np.tile([GAIN] * twist_size(kind.kind) + [0.5], n)
         output = scale * rng.normal(size=(ROWS, len(scale)))
         by_end = [rng.normal(size=ROWS), rng.normal(size=q.shape), rng.normal(size=q.shape)]
@@ -56,16 +53,15 @@ class Case:
     def play(self, start):
         path = Path.empty(ROWS, STEPS, start[0].shape[1])
         path.q[:, 0], path.qdot[:, 0] = start[:2]
-        self.rows.spent[:] = self.rows.played[:] = 0.0
-        segment(self.task, self.rows, FOREVER, start[2], path, 0, ROWS)
+        segment(self.task, self.rows, start[2], path, 0, ROWS)
         return path
 
     def numbers(self, start):
         """One of each arm."""
         path = self.play(start)
         last = np.arange(ROWS), self.rows.steps
-        by_loss, by_q, by_qdot = self.by_end
-        return by_loss * path.loss + (by_q * path.q[last]).sum(1) + (by_qdot * path.qdot[last]).sum(1)
+        by_cost, by_q, by_qdot = self.by_end
+        return by_cost * path.cost + (by_q * path.q[last]).sum(1) + (by_qdot * path.qdot[last]).sum(1)
 
     def gradient(self):
         path = self.play(self.start)
@@ -142,8 +138,6 @@ def test_a_segment_is_the_environment(name):
     out, task, n = simulator.observe(), Task.of(scenario), scenario.joints
     chain, w, counted = task.chain, twist_size(task.kind), scenario.counted()
     output = np.random.default_rng(1).normal(scale=2.0, size=(1, n * (w + 1)))
-    prior, usual, spent, played = 10.0, np.array([2.0]), np.zeros(1), np.zeros(1)
-    weighed = 0.0
     for k in range(scenario.steps):
         action, path, ahead = np.empty((1, n)), Path.empty(1, 1, n), np.empty((1, w))
         action_rows(
@@ -152,20 +146,13 @@ def test_a_segment_is_the_environment(name):
         )  # fmt: skip
         path.q[:, 0], path.qdot[:, 0] = out.q, out.qdot
         speed = np.array([mean_twists(task.kind, task.dt, offsets, out.nominal[0], np.empty(6), ahead)])
-        rows = Rows(
-            out.nominal[:, :1].copy(), counted[None, k + 1 : k + 2], np.ones(1, int), speed, usual, spent, played
-        )
-        segment(task, rows, prior, output, path, 0, 1)
+        rows = Rows(out.nominal[:, :1].copy(), counted[None, k + 1 : k + 2], np.ones(1, int), speed)
+        segment(task, rows, output, path, 0, 1)
         out = simulator.step(action)
         np.testing.assert_allclose(path.q[:, 1], out.q, rtol=0, atol=1e-13)
         np.testing.assert_allclose(path.qdot[:, 1], out.qdot, rtol=1e-12, atol=1e-10)
-        cost = out.tracking_cost[0] + out.velocity_cost[0]
-        weighed += cost
-        weight = (k + 1 + prior) / (weighed + prior * usual[0])
-        assert path.weight[0, 0] == pytest.approx(weight * counted[k + 1], rel=1e-8)
-        assert path.loss[0] == pytest.approx(weight * cost, rel=1e-8)
+        assert path.cost[0] == pytest.approx(out.tracking_cost[0] + out.velocity_cost[0], rel=1e-8)
         assert path.distance[0] == pytest.approx(out.position_error[0], rel=1e-9)
-    assert (spent[0], played[0]) == (pytest.approx(weighed, rel=1e-8), scenario.steps)
 
 
 def test_rows_are_independent():
@@ -175,11 +162,10 @@ def test_rows_are_independent():
     parts = Path.empty(ROWS, STEPS, 7)
     parts.q[:, 0], parts.qdot[:, 0] = case.start[:2]
     gradient = Gradient(case.by_end[1].copy(), case.by_end[2].copy(), np.empty(case.start[2].shape))
-    case.rows.spent[:] = case.rows.played[:] = 0.0
     for start, stop in ((2, 4), (0, 1), (1, 2)):
-        segment(case.task, case.rows, FOREVER, case.start[2], parts, start, stop)
+        segment(case.task, case.rows, case.start[2], parts, start, stop)
         adjoint(case.task, case.rows, case.start[2], parts, case.by_end[0], gradient, start, stop)
     last = np.arange(ROWS), case.rows.steps
     assert identical(parts.q[last], whole.q[last])
-    assert identical(parts.loss, whole.loss)
+    assert identical(parts.cost, whole.cost)
     assert all(identical(given, right) for given, right in zip(gradient, wanted, strict=True))
