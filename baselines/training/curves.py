@@ -32,7 +32,7 @@ class Options:
 
 
 def curves(trainings: dict[str, pathlib.Path]) -> Figure:
-    """Validation cost ratio over core-minutes, a line a seed.
+    """Validation costs ÷ those of what a run began with, over core-minutes, a line a seed.
 
     Args:
         trainings: The folders of seeds by name.
@@ -49,15 +49,15 @@ def curves(trainings: dict[str, pathlib.Path]) -> Figure:
         if not files:
             raise InvalidInputError(f"{folder}: expected runs, seed-*/run.json; there is none.")
         for file in files:
-            scores = [score for score in read_run(file)["validation"] if score["cost_ratio"] is not None]
-            minutes, cost_ratios = [s["core_minutes"] for s in scores], [s["cost_ratio"] for s in scores]
-            (line,) = axes.plot(minutes, cost_ratios, lw=1.0, marker="o", ms=2.5, **style.looks(number))
+            scores = read_run(file)["validation"]
+            minutes, costs = [s["core_minutes"] for s in scores], np.array([s["cost"] for s in scores])
+            (line,) = axes.plot(minutes, costs / costs[:1], lw=1.0, marker="o", ms=2.5, **style.looks(number))
         handles.append(line)
     axes.set_yscale("log")
     if np.divide(*axes.get_ylim()[::-1]) < FEW:  # powers of ten would all be the same
         for axis in (axes.yaxis.set_major_formatter, axes.yaxis.set_minor_formatter):
             axis("{x:.4g}")
-    style.dress(axes, ylabel="validation cost ratio", xlabel="core-minutes of training")
+    style.dress(axes, ylabel="validation cost ÷ that at first", xlabel="core-minutes of training")
     style.legend(drawn, "Training: a line a seed", handles, list(trainings))
     return drawn
 
@@ -74,8 +74,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = tyro.cli(
         Options,
         prog="python -m baselines.training.curves",
-        description="Draws how agents got better: the geometric mean of their costs on validation episodes over those "
-        "of rhc_foresight.",
+        description="Draws how agents got better: the geometric mean of their costs on validation episodes over that "
+        "of what they began with.",
         args=arguments,
     )
     try:

@@ -13,6 +13,7 @@ from baselines.episode import play as play_episodes
 from baselines.training.config.actor_only import APG, Imitate
 from baselines.training.environment.view import View
 from baselines.training.errors import TrainingError
+from baselines.training.gradients.arms import Arms
 from baselines.training.gradients.law import Law
 from baselines.training.networks import ActorModel
 from baselines.training.randomness import deterministic_torch
@@ -113,6 +114,43 @@ def test_gradient_of_a_window_is_that_of_its_loss(inverse):
             gradients = torch.autograd.grad(loss, parameters)
             slope = sum((g * part).sum().item() for g, part in zip(gradients, direction, strict=True))
     assert slope == pytest.approx((losses[1e-6] - losses[-1e-6]) / 2e-6, rel=1e-3)
+
+
+def test_costs_are_weighed_by_what_their_episode_has_cost_in_the_end():
+    """Their gradient is that of the logarithm of all that the episode has cost, the prior included."""
+    arms = Arms(BILINEAR.make_scenario(), 3, (1, 2, 10))
+    arms.usual, arms.spent[:], arms.played[:] = np.array([1.0, 2.0, 3.0]), [5.0, 0.0, 90.0], [10.0, 0.0, 30.0]
+    costs = torch.tensor([[4.0, 1.0, 0.5], [0.1, 7.0, 40.0]], dtype=torch.float64, requires_grad=True)
+    for cost in costs:
+        arms.went(np.array([8, 8, 8]), cost)
+    arms.relative(costs.sum(0), prior=20.0).sum().backward()
+    before = torch.tensor([5.0, 0.0, 90.0]) + 20.0 * torch.from_numpy(arms.usual)
+    steps = torch.tensor([46.0, 36.0, 66.0], dtype=torch.float64)
+    again = costs.detach().requires_grad_()
+    (steps * (before + again.sum(0)).log()).sum().backward()
+    torch.testing.assert_close(costs.grad, again.grad)
+
+
+def test_episodes_that_end_in_a_window_are_weighed_each_by_its_own_costs(monkeypatch):
+    config = BILINEAR.replace(reset_distance=1e9, reset_distance_end=1e9)
+    trainer, went, seen = made(config), Arms.went, []
+
+    def recorded(arms, steps, cost):
+        went(arms, steps, cost)
+        mean = (arms.spent + config.cost_prior_steps * arms.usual) / (arms.played + config.cost_prior_steps)
+        seen.append((arms.seed.copy(), cost.detach().numpy(), mean))
+
+    monkeypatch.setattr(Arms, "went", recorded)
+    loss, _ = trainer.window(48, np.random.default_rng(0))
+    wanted, episodes = 0.0, 0
+    for row in range(config.n_envs):
+        spent = {}  # by episode: what it has cost in the window, and its mean stage cost then
+        for seeds, costs, mean in seen:
+            spent[seeds[row]] = spent.get(seeds[row], (0.0,))[0] + costs[row], mean[row]
+        wanted += sum(cost / mean for cost, mean in spent.values())
+        episodes += len(spent)
+    assert episodes > config.n_envs
+    assert loss.item() == pytest.approx(wanted / (config.n_envs * 48), rel=1e-12)
 
 
 def test_analytic_policy_gradient_learns():

@@ -8,8 +8,8 @@ from baselines.training.curves import curves, main
 from baselines.training.folder import FORMAT
 
 
-def run(folder, seed, cost_ratios):
-    scores = [{"core_minutes": 0.5 * i, "cost_ratio": cost_ratio} for i, cost_ratio in enumerate(cost_ratios)]
+def run(folder, seed, costs):
+    scores = [{"core_minutes": 0.5 * i, "cost": cost} for i, cost in enumerate(costs)]
     about = {"format": FORMAT, "method": "ppo", "seed": seed, "config": {}, "validation": scores}
     (folder / f"seed-{seed}").mkdir(parents=True)
     (folder / f"seed-{seed}" / "run.json").write_text(json.dumps(about), encoding="utf-8")
@@ -17,11 +17,11 @@ def run(folder, seed, cost_ratios):
 
 def test_a_line_a_seed(tmp_path):
     run(tmp_path / "a", 0, [8.0, 4.0, 2.0])
-    run(tmp_path / "a", 1, [9.0, None, 3.0])
+    run(tmp_path / "a", 1, [9.0, 3.0])
     run(tmp_path / "b", 0, [7.0])
     (axes,) = curves({"one": tmp_path / "a", "other": tmp_path / "b"}).axes
-    assert [line.get_ydata().tolist() for line in axes.lines] == [[8.0, 4.0, 2.0], [9.0, 3.0], [7.0]]
-    assert axes.lines[1].get_xdata().tolist() == [0.0, 1.0]
+    assert [line.get_ydata().tolist() for line in axes.lines] == [[1.0, 0.5, 0.25], [1.0, 1.0 / 3.0], [1.0]]
+    assert axes.lines[1].get_xdata().tolist() == [0.0, 0.5]
 
 
 def test_command_line(tmp_path, capsys):
