@@ -17,7 +17,7 @@ from baselines.files import write
 from baselines.training.folder import read_run
 from ikgym.exceptions import IkgymError, InvalidInputError
 
-#: Ratios that span less than this have ticks with plain numbers.
+#: Ratios that span more than this are drawn on a logarithmic axis.
 FEW = 10.0
 
 
@@ -53,10 +53,9 @@ def curves(trainings: dict[str, pathlib.Path]) -> Figure:
             minutes, costs = [s["core_minutes"] for s in scores], np.array([s["cost"] for s in scores])
             (line,) = axes.plot(minutes, costs / costs[:1], lw=1.0, marker="o", ms=2.5, **style.looks(number))
         handles.append(line)
-    axes.set_yscale("log")
-    if np.divide(*axes.get_ylim()[::-1]) < FEW:  # powers of ten would all be the same
-        for axis in (axes.yaxis.set_major_formatter, axes.yaxis.set_minor_formatter):
-            axis("{x:.4g}")
+    shown = np.concatenate([line.get_ydata() for line in axes.lines])
+    if shown.size and shown.max() > FEW * shown.min():
+        axes.set_yscale("log")
     style.dress(axes, ylabel="validation cost ÷ that at first", xlabel="core-minutes of training")
     style.legend(drawn, "Training: a line a seed", handles, list(trainings))
     return drawn

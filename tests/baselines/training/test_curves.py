@@ -19,9 +19,16 @@ def test_a_line_a_seed(tmp_path):
     run(tmp_path / "a", 0, [8.0, 4.0, 2.0])
     run(tmp_path / "a", 1, [9.0, 3.0])
     run(tmp_path / "b", 0, [7.0])
+    run(tmp_path / "b", 1, [])  # ended before it was judged
     (axes,) = curves({"one": tmp_path / "a", "other": tmp_path / "b"}).axes
-    assert [line.get_ydata().tolist() for line in axes.lines] == [[1.0, 0.5, 0.25], [1.0, 1.0 / 3.0], [1.0]]
+    assert [line.get_ydata().tolist() for line in axes.lines] == [[1.0, 0.5, 0.25], [1.0, 1.0 / 3.0], [1.0], []]
     assert axes.lines[1].get_xdata().tolist() == [0.0, 0.5]
+
+
+def test_costs_of_many_decades_are_drawn_by_their_logarithms(tmp_path):
+    run(tmp_path / "a", 0, [1e8, 1.0])
+    run(tmp_path / "b", 0, [9.0, 1.0])
+    assert [curves({"one": tmp_path / name}).axes[0].get_yscale() for name in "ab"] == ["log", "linear"]
 
 
 def test_command_line(tmp_path, capsys):
