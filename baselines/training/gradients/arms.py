@@ -98,14 +98,16 @@ class Arms:
         self.spent += cost.detach().numpy()
 
     def relative(self, cost: Tensor, prior: float) -> Tensor:
-        """Costs of these episodes ÷ their mean stage cost so far: their gradient is that of its logarithm.
+        """Parts of what the arms have spent ÷ the mean stage cost of their episodes so far.
+
+        The mean counts as a constant: the gradient is that of its logarithm, times the steps.
 
         Args:
-            cost: A part of what each arm has spent in its episode. Shape (N,).
+            cost: The part of each arm. Shape (N,).
             prior: Steps that the mean cost of the reference joint path counts as much as.
 
         Returns:
-            In mean stage costs. Shape (N,).
+            Shape (N,).
         """
         return cost * torch.from_numpy((self.played + prior) / (self.spent + prior * self.usual))
 
