@@ -248,5 +248,5 @@ class InverseVecEnv(VecEnv):
                 held = self._law.held(arms.q, self._features, outputs)
                 rows = arms.rows(steps, self._speed)
                 arms.q, arms.qdot, cost, distance = self._law.move(arms.q, arms.qdot, held, rows)
-            arms.went(rows.steps, cost)
+            arms.advance(rows.steps, cost)
         return (arms.spent - spent) / (self._hold * arms.usual), distance

@@ -86,7 +86,7 @@ class Arms:
         left = np.minimum(self._scenario.steps - self.made, steps)
         return Rows(self._nominal[self._every, at], self._counted[at], left, speed)
 
-    def went(self, steps: Indices, cost: Tensor) -> None:
+    def advance(self, steps: Indices, cost: Tensor) -> None:
         """Counts what was done in a segment.
 
         Args:

@@ -84,8 +84,8 @@ class APGTrainer(ActorTrainer):
     def window(self, steps: int, generator: np.random.Generator) -> tuple[Tensor, int]:
         """Moves all arms through a window, from where they are, of which no gradient is taken.
 
-        All steps of an episode in it are weighed alike, by what the episode has cost by its end: weighed by what it
-        had cost before each step, the way into a costly passage would count far more than the passage.
+        All steps of an episode in it have the same weight, by what the episode has cost at its end. With weights by
+        what it had cost before each step, the way into a costly passage would count far more than the passage.
 
         Args:
             steps: A multiple of `hold`.
@@ -109,7 +109,7 @@ class APGTrainer(ActorTrainer):
             held = _limited(self._law.held(q, features, self._actor(features.to(precision)).double()), most)
             rows = arms.rows(config.hold, speed)
             arms.q, arms.qdot, cost, self._far = self._law.move(q, qdot, held, rows)
-            arms.went(rows.steps, cost)
+            arms.advance(rows.steps, cost)
             spent = spent + cost
         total = total + arms.relative(spent, config.cost_prior_steps).sum()
         return total / (config.n_envs * steps), given_up

@@ -116,13 +116,13 @@ def test_gradient_of_a_window_is_that_of_its_loss(inverse):
     assert slope == pytest.approx((losses[1e-6] - losses[-1e-6]) / 2e-6, rel=1e-3)
 
 
-def test_costs_are_weighed_by_what_their_episode_has_cost_in_the_end():
+def test_costs_are_weighted_by_what_their_episode_has_cost_in_the_end():
     """Their gradient is that of the logarithm of all that the episode has cost, the prior included."""
     arms = Arms(BILINEAR.make_scenario(), 3, (1, 2, 10))
     arms.usual, arms.spent[:], arms.played[:] = np.array([1.0, 2.0, 3.0]), [5.0, 0.0, 90.0], [10.0, 0.0, 30.0]
     costs = torch.tensor([[4.0, 1.0, 0.5], [0.1, 7.0, 40.0]], dtype=torch.float64, requires_grad=True)
     for cost in costs:
-        arms.went(np.array([8, 8, 8]), cost)
+        arms.advance(np.array([8, 8, 8]), cost)
     arms.relative(costs.sum(0), prior=20.0).sum().backward()
     before = torch.tensor([5.0, 0.0, 90.0]) + 20.0 * torch.from_numpy(arms.usual)
     steps = torch.tensor([46.0, 36.0, 66.0], dtype=torch.float64)
@@ -131,16 +131,16 @@ def test_costs_are_weighed_by_what_their_episode_has_cost_in_the_end():
     torch.testing.assert_close(costs.grad, again.grad)
 
 
-def test_episodes_that_end_in_a_window_are_weighed_each_by_its_own_costs(monkeypatch):
+def test_episodes_that_end_in_a_window_are_weighted_each_by_its_own_costs(monkeypatch):
     config = BILINEAR.replace(reset_distance=1e9, reset_distance_end=1e9)
-    trainer, went, seen = made(config), Arms.went, []
+    trainer, advance, seen = made(config), Arms.advance, []
 
     def recorded(arms, steps, cost):
-        went(arms, steps, cost)
+        advance(arms, steps, cost)
         mean = (arms.spent + config.cost_prior_steps * arms.usual) / (arms.played + config.cost_prior_steps)
         seen.append((arms.seed.copy(), cost.detach().numpy(), mean))
 
-    monkeypatch.setattr(Arms, "went", recorded)
+    monkeypatch.setattr(Arms, "advance", recorded)
     loss, _ = trainer.window(48, np.random.default_rng(0))
     wanted, episodes = 0.0, 0
     for row in range(config.n_envs):
