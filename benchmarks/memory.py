@@ -1,7 +1,7 @@
 """Agents with memory beside adaptive policies: ``python -m benchmarks.memory --agents FILE … --out docs/memory.json``.
 
 Plays the first episodes of imperfect plants, all policies with the same noise: as many noise seeds as the test set
-says, of which an episode counts once, with their mean. Prints the table of docs/agents.md.
+says, of which an episode counts once, with their mean. Prints the table of docs/agents_memory.md.
 """
 
 from __future__ import annotations

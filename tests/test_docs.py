@@ -122,7 +122,7 @@ def test_snippets_on_papers_run(paper, capsys):
 
 
 def test_no_page_has_snippets_that_nobody_runs():
-    here = {"README.md", "evaluation.md", "policies.md", "scenarios.md", "agents.md"}
+    here = {"README.md", "evaluation.md", "policies.md", "scenarios.md", "agents.md", "agents_rewards.md"}
     run = {ROOT / "README.md", *TUTORIALS, *(PAGES / name for name in here), *(PAGES / "papers").glob("*.md")}
     with_snippets = {page for page in PROSE if "```python" in page.read_text(encoding="utf-8")}
     assert with_snippets <= run

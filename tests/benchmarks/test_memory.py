@@ -17,7 +17,7 @@ DOCS = pathlib.Path(__file__).parents[2] / "docs"
 def test_the_page_shows_what_was_measured():
     measured = json.loads((DOCS / "memory.json").read_text())
     assert (measured["split"], measured["episodes"]) == ("test", 16)
-    assert memory.table(measured) in (DOCS / "agents.md").read_text()
+    assert memory.table(measured) in (DOCS / "agents_memory.md").read_text()
 
 
 def test_noise_seeds_of_an_episode_count_once():

@@ -82,7 +82,7 @@ def test_other_agents_are_refused(tmp_path, inverse):
 
 
 def test_the_page_has_the_table_of_what_was_played():
-    page = (DOCS / "agents.md").read_text(encoding="utf-8")
+    page = (DOCS / "agents_gradients.md").read_text(encoding="utf-8")
     table = page.split("<!-- outputs -->\n")[1].split("\n<!-- end -->")[0]
     content = json.loads((DOCS / "agents_outputs.json").read_text())
     assert table.splitlines() == outputs.lines(content)
@@ -99,7 +99,7 @@ def test_the_page_says_how_much_is_learned():
     first = costs("agents_outputs.json", "nothing")
     second = costs("agents_ppo.json", "agent:runs/ppo-untrained/seed-0/agent.safetensors")
     solver = costs("agents_long.json", "dls:gain=0.15,damping=0.01")
-    page = " ".join((DOCS / "agents.md").read_text(encoding="utf-8").split())
+    page = " ".join((DOCS / "agents_gradients.md").read_text(encoding="utf-8").split())
     pairs = [(first, solver), (second, solver), (costs("agents_td3.json", "agents"), first)]
     pairs += [
         (costs(file, "agents"), other) for file in ("agents.json", "agents_long.json") for other in (first, second)

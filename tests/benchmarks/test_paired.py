@@ -18,6 +18,7 @@ from tests.baselines.evaluation.pages.builders import write_runs
 from tests.baselines.random_agents import write_agent
 
 DOCS = pathlib.Path(__file__).parents[2] / "docs"
+PAGES = ("agents_gradients.md", "agents_rewards.md")
 
 
 def test_plays_and_prints(tmp_path, capsys, monkeypatch):
@@ -64,7 +65,7 @@ def test_unknown_names_are_told(tmp_path):
     ],
 )
 def test_the_page_has_the_table_of_what_was_played(file, seeds, episodes):
-    page = (DOCS / "agents.md").read_text(encoding="utf-8")
+    (page,) = (text for name in PAGES if f"<!-- beside {file} -->" in (text := (DOCS / name).read_text("utf-8")))
     table = page.split(f"<!-- beside {file} -->\n")[1].split("\n<!-- end -->")[0]
     content = json.loads((DOCS / file).read_text())
     assert table.splitlines() == paired.lines(content)
@@ -76,7 +77,7 @@ def test_the_page_says_how_far_a_second_training_is_from_the_first():
     """The same seeds at a later commit, on the first 256 of the episodes that they played."""
     first, more = (json.loads((DOCS / file).read_text())["played"] for file in ("agents.json", "agents_more.json"))
     again = np.array(more["agents"]["costs"])[:, :256]
-    page = " ".join((DOCS / "agents.md").read_text(encoding="utf-8").split())
+    page = " ".join((DOCS / "agents_gradients.md").read_text(encoding="utf-8").split())
     for label in first.keys() - {"agents"}:
         assert str(Comparison.of(again, np.array(first[label]["costs"]))) in page
     apart = 100.0 * np.median(np.abs(np.log(again / np.array(first["agents"]["costs"]))), axis=1)

@@ -208,14 +208,18 @@ def test_a_lost_track_is_no_truncation():
 
 
 @pytest.mark.parametrize(
-    ("word", "preview"),
-    [("make_vec", (10, 40, 100)), ("TD3(", SEEN.offsets), ("GroupBaseline", SEEN.offsets)],
+    ("name", "word", "preview"),
+    [
+        ("agents.md", "make_vec", (10, 40, 100)),
+        ("agents_rewards.md", "TD3(", SEEN.offsets),
+        ("agents_rewards.md", "GroupBaseline", SEEN.offsets),
+    ],
 )
-def test_the_snippets_of_the_page_run(word, preview, tmp_path, monkeypatch):
-    page = (pathlib.Path(__file__).parents[3] / "docs" / "agents.md").read_text(encoding="utf-8")
+def test_the_snippets_of_the_pages_run(name, word, preview, tmp_path, monkeypatch):
+    page = (pathlib.Path(__file__).parents[3] / "docs" / name).read_text(encoding="utf-8")
     (snippet,) = (text for text in re.findall(r"```python\n(.*?)```", page, re.DOTALL) if word in text)
     monkeypatch.chdir(tmp_path)
-    exec(compile(snippet, "agents.md", "exec", dont_inherit=True), {})
+    exec(compile(snippet, name, "exec", dont_inherit=True), {})
     agent = baselines.make("agent", "panda-random", path="mine.safetensors")
     assert agent.preview == preview
 
