@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from baselines.agents.bilinear.damped_kernels import held_rows, with_matrix
-from baselines.agents.bilinear.rate_kernels import metric_rows, rate_rows
+from baselines.agents.bilinear.prediction_kernels import predicted_rate_rows
+from baselines.agents.bilinear.rate_kernels import HERE, NONE, PREDICTED, metric_rows, rate_rows
 from baselines.agents.network import forward_rows
 from ikgym.jit import inlined, kernel
 from ikgym.rl.feature_kernels import feature_row, mean_twists
@@ -37,15 +38,39 @@ def feature_rows(kind, prismatic, axis, dt, offsets, q, nominal, remaining, out,
 
 
 @kernel
-def new_features(kind, chain, dt, offsets, rates, q, nominal, remaining):
-    """:func:`feature_rows` in an array of their own, as float32: made here, it takes a fifth of the time.
+def seen_rows(kind, chain, dt, offsets, rates, q, nominal, remaining, out, speed):
+    """All that a network sees, row by row: :func:`feature_rows` and the joint rates.
 
     Args:
         kind: Of task coordinates.
         chain: The arm.
         dt: Δt in [s].
         offsets: Shape (p,).
-        rates: Whether joint rates are shown, see :func:`baselines.agents.bilinear.rate_kernels.rate_rows`.
+        rates: Which joint rates are shown: NONE, HERE (:func:`baselines.agents.bilinear.rate_kernels.rate_rows`) or
+            PREDICTED (:func:`baselines.agents.bilinear.prediction_kernels.predicted_rate_rows`).
+        q: Shape (B, n).
+        nominal: At the offsets. Shape (B, p, m).
+        remaining: Shape (B, 1).
+        out: Receives the features. Shape (B, f).
+        speed: Receives the speeds. Shape (B,).
+    """
+    feature_rows(kind, chain.prismatic, chain.axes[0], dt, offsets, q, nominal, remaining, out, speed)
+    if rates == HERE:
+        rate_rows(kind, chain, offsets.shape[0] - 1, q, out)
+    elif rates == PREDICTED:
+        predicted_rate_rows(kind, chain, dt, offsets, q, nominal, speed, out)
+
+
+@kernel
+def new_features(kind, chain, dt, offsets, rates, q, nominal, remaining):
+    """:func:`seen_rows` in an array of their own, as float32: made here, it takes a fifth of the time.
+
+    Args:
+        kind: Of task coordinates.
+        chain: The arm.
+        dt: Δt in [s].
+        offsets: Shape (p,).
+        rates: See :func:`seen_rows`.
         q: Shape (B, n).
         nominal: At the offsets. Shape (B, p, m).
         remaining: Shape (B, 1).
@@ -55,11 +80,9 @@ def new_features(kind, chain, dt, offsets, rates, q, nominal, remaining):
     """
     prismatic, twists = chain.prismatic, offsets.shape[0] - 1
     size = shown_joints(kind, prismatic) + twists * twist_size(kind) + 2
-    shown = size + (twists * q.shape[1] if rates else 0)
+    shown = size + (twists * q.shape[1] if rates != NONE else 0)
     out, speed = np.empty((q.shape[0], shown), np.float32), np.empty(q.shape[0])
-    feature_rows(kind, prismatic, chain.axes[0], dt, offsets, q, nominal, remaining, out, speed)
-    if rates:
-        rate_rows(kind, chain, twists, q, out)
+    seen_rows(kind, chain, dt, offsets, rates, q, nominal, remaining, out, speed)
     return out
 
 
@@ -163,6 +186,7 @@ def law_rows(
     chain,
     dt,
     offsets,
+    rates,
     damping,
     velocity_limit,
     weights,
@@ -183,6 +207,7 @@ def law_rows(
         chain: The arm.
         dt: Δt in [s].
         offsets: Shape (p,).
+        rates: See :func:`seen_rows`.
         damping: Of :func:`baselines.agents.bilinear.damped_kernels.held_rows`, which is left out where it is 0.
         velocity_limit: Shape (n,).
         weights: See :func:`baselines.agents.network.forward_rows`.
@@ -197,7 +222,7 @@ def law_rows(
         out: Receives fractions of the velocity limit. Shape (B, n).
     """
     prismatic, axis, n = chain.prismatic, chain.axes[0], q.shape[1]
-    features = new_features(kind, chain, dt, offsets, damping > 0.0, q, nominal, remaining)
+    features = new_features(kind, chain, dt, offsets, rates, q, nominal, remaining)
     output = np.empty((q.shape[0], sizes[sizes.shape[0] - 1]), np.float32)
     forward_rows(weights, biases, sizes, activation, squash, features, output)
     if damping > 0.0:

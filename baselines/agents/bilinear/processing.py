@@ -13,7 +13,7 @@ import numpy.typing as npt
 from baselines.agents.alone import Alone
 from baselines.agents.bilinear.damped_kernels import held_rows, with_matrix
 from baselines.agents.bilinear.kernels import action_rows, due_rows, law_rows, new_features
-from baselines.agents.bilinear.rate_kernels import metric_rows
+from baselines.agents.bilinear.rate_kernels import HERE, NONE, PREDICTED, metric_rows
 from baselines.agents.features import Features
 from baselines.agents.network import Network
 from baselines.policy import Batch, Problem
@@ -61,14 +61,18 @@ class Bilinear(Alone, Frozen):
         offsets: o, steps ahead at which the reference is seen, rising from 1, at least two.
         damping: λ where the network says 0, above 0; None for no inverse.
         matrix: Whether the network gives G. Without it there has to be a damping.
+        predicted_rates: Whether what v_i would ask of the joints is seen at the posture where the arm would be then,
+            see :mod:`baselines.agents.bilinear.prediction_kernels`. There has to be a damping.
 
     Raises:
-        InvalidInputError: Offsets do not rise from 1, the damping is not above 0, or neither G nor an inverse is left.
+        InvalidInputError: Offsets do not rise from 1, the damping is not above 0, neither G nor an inverse is left, or
+            there are no joint rates to predict.
     """
 
     offsets: tuple[int, ...] = (1, 10, 40, 80, 130, 200, 300, 450, 650, 900)
     damping: float | None = None
     matrix: bool = True
+    predicted_rates: bool = False
 
     #: The offsets as kernels take them.
     _ahead: npt.NDArray[np.int64] = dataclasses.field(init=False, repr=False, compare=False)
@@ -84,6 +88,9 @@ class Bilinear(Alone, Frozen):
         flag("matrix", self.matrix)
         if not self.matrix and self.damping is None:
             raise InvalidInputError("damping: expected a number where the network gives no matrix, got None.")
+        flag("predicted_rates", self.predicted_rates)
+        if self.predicted_rates and self.damping is None:
+            raise InvalidInputError("damping: expected a number where joint rates are predicted, got None.")
         ahead = np.array(offsets, dtype=np.int64)
         ahead.flags.writeable = False
         damping = None if self.damping is None else number("damping", self.damping, above=0.0)
@@ -94,7 +101,8 @@ class Bilinear(Alone, Frozen):
         """The fields, as JSON has them."""
         inverse = {} if self.damping is None else {"damping": self.damping}
         alone = {} if self.matrix else {"matrix": False}
-        return {"kind": self.kind, "offsets": list(self.offsets), **inverse, **alone}
+        rates = {"predicted_rates": True} if self.predicted_rates else {}
+        return {"kind": self.kind, "offsets": list(self.offsets), **inverse, **alone, **rates}
 
     @classmethod
     def from_json(cls, values: Mapping[str, Any]) -> Self:
@@ -104,13 +112,21 @@ class Bilinear(Alone, Frozen):
             UnknownNameError: There is a key that is none of the fields.
             InvalidInputError: A value is refused.
         """
-        known_names("field of the processing", values, ["kind", "offsets", "damping", "matrix"])
-        return cls(tuple(values.get("offsets", cls.offsets)), values.get("damping"), values.get("matrix", True))
+        known_names("field of the processing", values, ["kind", "offsets", "damping", "matrix", "predicted_rates"])
+        own = {name: value for name, value in values.items() if name not in ("kind", "offsets")}
+        return cls(tuple(values.get("offsets", cls.offsets)), **own)
+
+    @property
+    def rates(self) -> int:
+        """Which joint rates are seen: NONE, HERE or PREDICTED of :mod:`baselines.agents.bilinear.rate_kernels`."""
+        if self.damping is None:
+            return NONE
+        return PREDICTED if self.predicted_rates else HERE
 
     @property
     def operations(self) -> tuple[int, int]:
-        """A Jacobian and a factorisation for the damped inverse, and as much for the joint rates that are seen."""
-        inverses = 0 if self.damping is None else 2
+        """A Jacobian and a factorisation for the damped inverse, and as much for each posture where rates are seen."""
+        inverses = {NONE: 0, HERE: 2, PREDICTED: 1 + len(self.offsets)}[self.rates]
         return inverses, inverses
 
     def size(self, problem: Problem) -> int:
@@ -140,7 +156,7 @@ class Bilinear(Alone, Frozen):
             chain,
             problem.dt,
             self._ahead,
-            self.damping is not None,
+            self.rates,
             batch.q,
             batch.nominal,
             batch.remaining,
@@ -190,6 +206,7 @@ class Bilinear(Alone, Frozen):
             chain,
             problem.dt,
             self._ahead,
+            self.rates,
             0.0 if self.damping is None else self.damping,
             problem.velocity_limit,
             *network.constants,

@@ -49,6 +49,8 @@ class Imitate(ActorOnly, JointVelocities):
     """A bilinear agent begins as the damped inverse of the Jacobian with this λ, see apg."""
     matrix: bool = True
     """Whether the network of a bilinear agent adds a matrix to the damped inverse, see apg."""
+    predicted_rates: bool = False
+    """Whether a bilinear agent is shown joint rates at predicted postures, see apg."""
     algorithm: Algorithm = "ppo"
     """The kind of model that comes out where the output is velocities, which the same algorithm can go on with."""
     expert: Annotated[str, tyro.conf.arg(metavar="POLICY")] = "rhc_foresight"
@@ -75,7 +77,7 @@ class Imitate(ActorOnly, JointVelocities):
     def __post_init__(self) -> None:
         known_names("output", [self.output], get_args(StudentOutput))
         if self.output == "velocities":
-            self._expect_defaults("damping", "matrix", output=self.output)
+            self._expect_defaults("damping", "matrix", "predicted_rates", output=self.output)
         else:
             self._expect_defaults("base_policy", "null_space", output=self.output)
         super().__post_init__()
@@ -97,7 +99,7 @@ class Imitate(ActorOnly, JointVelocities):
     @property
     def bilinear(self) -> Bilinear:
         """The same, where these outputs are G and h."""
-        return Bilinear(self.offsets, self.damping, self.matrix)
+        return Bilinear(self.offsets, self.damping, self.matrix, self.predicted_rates)
 
     @classmethod
     def shape_of(cls, processing: Stored, sizes: tuple[int, ...], activation: str) -> dict[str, Any]:
@@ -124,6 +126,9 @@ class APG(ActorOnly):
     matrix: bool = True
     """Whether the network adds a matrix to the damped inverse. Without it it gives the null motion, the damping and the
     metric alone."""
+    predicted_rates: bool = False
+    """Whether the agent is shown what the reference ahead will ask of the joints at the postures that a damped inverse
+    would lead to by then, rather than at the posture of now. Of what is shown no gradient is taken then."""
     hidden: Annotated[tuple[int, ...], tyro.conf.arg(metavar="N …")] = (256, 256)
     """Neurons of the hidden layers: at most 10 layers of at most 2048 neurons."""
     n_envs: Annotated[int, tyro.conf.arg(metavar="N")] = 256
@@ -175,12 +180,13 @@ class APG(ActorOnly):
     @property
     def processing(self) -> Bilinear:
         """What the agent sees, and what the outputs of its network mean."""
-        return Bilinear(self.offsets, self.damping, self.matrix)
+        return Bilinear(self.offsets, self.damping, self.matrix, self.predicted_rates)
 
     @classmethod
     def shape_of(cls, processing: Stored, sizes: tuple[int, ...], activation: str) -> dict[str, Any]:
         """See :meth:`Config.shape_of`."""
-        own = {"damping": getattr(processing, "damping", None), "matrix": getattr(processing, "matrix", True)}
+        first = {"damping": None, "matrix": True, "predicted_rates": False}
+        own = {name: getattr(processing, name, value) for name, value in first.items()}
         return super().shape_of(processing, sizes, activation) | own
 
     def window_of(self, segment: int) -> int:

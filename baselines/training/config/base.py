@@ -33,8 +33,8 @@ Algorithm = Literal["ppo", "sac", "td3"]
 
 #: Options that may come with the file of ``init``.
 SHAPE = (
-    "base_policy", "offsets", "action_scale", "null_space", "damping", "matrix", "largest", "furthest", "hidden",
-    "activation",
+    "base_policy", "offsets", "action_scale", "null_space", "damping", "matrix", "predicted_rates", "largest",
+    "furthest", "hidden", "activation",
 )  # fmt: skip
 #: Transforms that files can describe.
 Stored = Processing | Bilinear | Relative

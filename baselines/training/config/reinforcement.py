@@ -55,6 +55,8 @@ class Reinforcement(Annealed, JointVelocities):
     damping: Annotated[float | None, tyro.conf.arg(metavar="λ")] = None
     """A bilinear agent begins as the damped inverse of the Jacobian with this λ, which the network changes, weighs and
     adds to. The network gives the whole matrix if left out. Not for skew coordinates."""
+    predicted_rates: bool = False
+    """Whether agents with an output that is inverse are shown joint rates at predicted postures, see apg."""
     reward: Reward = "log"
     """cost: −stage cost, as in the environment. log: −log(1 + stage cost), which keeps an arm that has lost its path,
     whose costs are millions of times larger, from dominating; costs are then compared by their ratios."""
@@ -80,7 +82,7 @@ class Reinforcement(Annealed, JointVelocities):
             raise InvalidInputError("damping: expected a number for an output that is inverse, got None.")
         flag("privileged", self.privileged)
         if self.output != "inverse":
-            self._expect_defaults("privileged", "null_noise", output=self.output)
+            self._expect_defaults("privileged", "null_noise", "predicted_rates", output=self.output)
         if self.output != "velocities":
             self._expect_defaults("base_policy", "null_space", "initial_episode_steps", output=self.output)
         else:
@@ -103,7 +105,7 @@ class Reinforcement(Annealed, JointVelocities):
         if self.output == "velocities":
             return self.velocities
         if self.output == "inverse":
-            return Bilinear(self.offsets, self.damping, matrix=False)
+            return Bilinear(self.offsets, self.damping, matrix=False, predicted_rates=self.predicted_rates)
         return Relative(
             self.offsets,
             self.furthest,
@@ -128,7 +130,8 @@ class Reinforcement(Annealed, JointVelocities):
     def shape_of(cls, processing: Stored, sizes: tuple[int, ...], activation: str) -> dict[str, Any]:
         """See :meth:`Config.shape_of`."""
         if isinstance(processing, Bilinear):
-            return Config.shape_of(processing, sizes, activation) | {"damping": processing.damping}
+            own = {name: getattr(processing, name) for name in ("damping", "predicted_rates")}
+            return Config.shape_of(processing, sizes, activation) | own
         if not isinstance(processing, Relative):
             return super().shape_of(processing, sizes, activation)
         bounds = {name: getattr(processing, name) for name in ("largest", "furthest", "damping")}

@@ -10,9 +10,9 @@ from torch import Tensor, nn
 from torch.autograd.function import once_differentiable
 
 from baselines.agents.bilinear.damped_kernels import held_gradient_rows, held_rows
-from baselines.agents.bilinear.kernels import feature_gradient_rows, feature_rows
+from baselines.agents.bilinear.kernels import feature_gradient_rows, seen_rows
 from baselines.agents.bilinear.processing import Bilinear
-from baselines.agents.bilinear.rate_kernels import AT_REST, EXPONENT, LITTLE, rate_gradient_rows, rate_rows
+from baselines.agents.bilinear.rate_kernels import AT_REST, EXPONENT, HERE, LITTLE, PREDICTED, rate_gradient_rows
 from baselines.policy import Problem
 from baselines.training.gradients.adjoint import Gradient, adjoint
 from baselines.training.gradients.segment import Path, Rows, Task, segment
@@ -49,10 +49,13 @@ class Law:
         self.task = Task.of(scenario)
         self.chain, self._offsets = scenario.model.chain, np.array(processing.offsets)
         self._damping, self._twists = processing.damping, len(processing.offsets) - 1
-        self._matrix = processing.matrix
+        self._matrix, self._rates = processing.matrix, processing.rates
 
     def features(self, q: Tensor, nominal: FloatArray, remaining: FloatArray) -> tuple[Tensor, FloatArray]:
         """See :class:`Bilinear`.
+
+        Where joint rates are predicted, features have no gradient: that of costs goes through the arm and its law, not
+        through what is seen of the arm.
 
         Args:
             q: Joint coordinates in [rad] or [m]. Shape (N, n), float64.
@@ -63,8 +66,22 @@ class Law:
             Features of shape (N, f), float64, and speeds of shape (N,).
         """
         speed = np.empty(len(nominal))
+        if self._rates == PREDICTED:
+            return torch.from_numpy(self.seen(q.detach().numpy(), nominal, remaining, speed)), speed
         out: Tensor = _Features.apply(q, self, nominal, remaining, speed)  # type: ignore[no-untyped-call]
         return out, speed
+
+    def seen(self, q: FloatArray, nominal: FloatArray, remaining: FloatArray, speed: FloatArray) -> FloatArray:
+        """:meth:`features` without a gradient; fills the speeds of shape (N,)."""
+        task, chain, out = self.task, self.chain, np.empty((len(q), self.inputs))
+
+        def work(start: int, stop: int) -> None:
+            some = slice(start, stop)
+            arrays = q[some], nominal[some], remaining[some], out[some], speed[some]
+            seen_rows(task.kind, chain, task.dt, self._offsets, self._rates, *arrays)
+
+        in_chunks(work, len(out), GRAIN)
+        return out
 
     def held(self, q: Tensor, features: Tensor, output: Tensor) -> Tensor:
         """(G, h) from the output of the network; with the damped inverse, and h in the null space, where there is one.
@@ -111,17 +128,8 @@ class Law:
 class _Features(torch.autograd.Function):
     @staticmethod
     def forward(ctx: Any, q: Tensor, law: Law, nominal: FloatArray, remaining: FloatArray, speed: FloatArray) -> Tensor:
-        task, chain, joints = law.task, law.chain, q.detach().numpy()
-        out = np.empty((len(joints), law.inputs))
-
-        def work(start: int, stop: int) -> None:
-            some = slice(start, stop)
-            arrays = joints[some], nominal[some], remaining[some], out[some], speed[some]
-            feature_rows(task.kind, chain.prismatic, chain.axes[0], task.dt, law._offsets, *arrays)
-            if law._damping is not None:
-                rate_rows(task.kind, chain, law._twists, joints[some], out[some])
-
-        in_chunks(work, len(out), GRAIN)
+        joints = q.detach().numpy()
+        out = law.seen(joints, nominal, remaining, speed)
         ctx.law, ctx.seen = law, (joints, out)
         return torch.from_numpy(out)
 
@@ -132,7 +140,7 @@ class _Features(torch.autograd.Function):
         kind, chain = law.task.kind, law.chain
         out, by_rates = np.empty(joints.shape), np.zeros(joints.shape)
         given = gradient.numpy().copy()
-        if law._damping is not None:
+        if law._rates == HERE:
             rate_gradient_rows(kind, chain, law._twists, joints, features, given, by_rates)
         feature_gradient_rows(kind, chain.prismatic, chain.axes[0], law._twists, features, given, out)
         return torch.from_numpy(out + by_rates), None, None, None, None

@@ -54,7 +54,8 @@ def test_every_policy_that_counts_counts_right():
 
 
 @pytest.mark.parametrize("processing", [
-    Bilinear((1, 5)), Bilinear((1, 5), 1e-3), Relative((1, 5), 5.0), Relative((1, 5), 5.0, bilinear=True, damping=1e-3),
+    Bilinear((1, 5)), Bilinear((1, 5), 1e-3), Bilinear((1, 5, 9), 1e-3, predicted_rates=True), Relative((1, 5), 5.0),
+    Relative((1, 5), 5.0, bilinear=True, damping=1e-3),
 ])  # fmt: skip
 def test_agents_count_what_their_processing_takes(tmp_path, processing):
     file, scenario = tmp_path / "agent.safetensors", scenarios.get("varga7-pose-random")

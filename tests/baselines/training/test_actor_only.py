@@ -38,6 +38,7 @@ CONFIGS = {
     "apg": BILINEAR,
     "apg, damped": BILINEAR.replace(damping=4e-4),
     "apg, no matrix": BILINEAR.replace(damping=4e-4, matrix=False),
+    "apg, predicted": BILINEAR.replace(damping=4e-4, predicted_rates=True),
     "apg, skew, end within a segment": BILINEAR.replace(task="skew", steps=20),
     "imitate": Imitate(**SMALL, expert="dls", gradient_steps=5, batch_size=16, example_every=2, buffer_size=70),
     "imitate, bilinear": Imitate(**POSE, expert="dls", output="bilinear", gradient_steps=5, batch_size=16),
@@ -90,13 +91,22 @@ def test_ordinary_models_come_out(config):
     assert trainer.steps == config.n_envs * played
 
 
-@pytest.mark.parametrize("inverse", [{}, {"damping": 4e-2}, {"damping": 4e-2, "matrix": False}], ids=str)
-def test_gradient_of_a_window_is_that_of_its_loss(inverse):
+@pytest.mark.parametrize(
+    ("inverse", "hold"),
+    [
+        ({}, 8),
+        ({"damping": 4e-2}, 8),
+        ({"damping": 4e-2, "matrix": False}, 8),
+        ({"damping": 4e-2, "predicted_rates": True}, 24),  # seen once, where it has no gradient to miss
+    ],
+    ids=str,
+)
+def test_gradient_of_a_window_is_that_of_its_loss(inverse, hold):
     """Along a direction in the space of weights, against central differences: through arm, features and network."""
     # So long a prior makes the weights of the costs constant; they are not differentiated.
     many = {"max_gradient_share": 1e9, "cost_prior_steps": 1e12, "reset_distance": 1e9}
     config = BILINEAR.replace(
-        hidden=(16,), n_envs=6, activation="tanh", segment_steps=24, window=(24,), **inverse, **many
+        hidden=(16,), n_envs=6, activation="tanh", segment_steps=24, window=(24,), hold=hold, **inverse, **many
     )
     losses, slope = {}, 0.0
     for along in (0.0, 1e-6, -1e-6):
@@ -178,6 +188,7 @@ def test_a_run_of_apg_repeats_and_goes_on(tmp_path):
     for layer, weights in zip(begun.model.policy[::2], agent.network.weights, strict=True):
         np.testing.assert_array_equal(layer.weight.detach(), weights)
     assert inherit(BILINEAR.replace(init=agent.source, damping=1e-3), ()).damping is None
+    assert not inherit(BILINEAR.replace(init=agent.source, damping=1e-3, predicted_rates=True), ()).predicted_rates
     with pytest.raises(TrainingError, match="another structure than imitate trains"):
         inherit(Imitate(**SMALL, init=agent.source), ())
     with pytest.raises(TrainingError, match=r"offsets: .* has \(1, 2, 10\), got \(1, 5\)"):

@@ -12,7 +12,11 @@ from baselines.agents.network import Network
 from tests.baselines.agents.bilinear.test_bilinear import OFFSETS, batch_of, problem_of
 
 
-@pytest.mark.parametrize("inverse", [{}, {"damping": 1e-3}, {"damping": 1e-3, "matrix": False}], ids=str)
+@pytest.mark.parametrize(
+    "inverse",
+    [{}, {"damping": 1e-3}, {"damping": 1e-3, "matrix": False}, {"damping": 1e-3, "predicted_rates": True}],
+    ids=str,
+)
 @pytest.mark.parametrize(("arm", "task"), [("varga7", "pose"), ("tiago", "axis"), ("varga7", "position")])
 def test_one_call_is_the_three_parts(arm, task, inverse):
     problem, processing = problem_of(arm, task), Bilinear(OFFSETS, **inverse)
