@@ -54,6 +54,7 @@ def test_unknown_names_are_told(tmp_path):
 @pytest.mark.parametrize(
     ("file", "seeds", "episodes"),
     [
+        ("agents_quick.json", 3, 256),
         ("agents.json", 5, 256),
         ("agents_skew.json", 5, 256),
         ("agents_more.json", 5, 1280),
@@ -71,6 +72,24 @@ def test_the_page_has_the_table_of_what_was_played(file, seeds, episodes):
     assert table.splitlines() == paired.lines(content)
     assert (content["episodes"], content["split"]) == (episodes, "test")
     assert len(content["played"]["agents"]["costs"]) == seeds
+
+
+def test_the_page_says_what_seeing_ahead_is_worth():
+    files = "agents_quick.json", "agents.json", "agents_long.json"
+    now, *before = (json.loads((DOCS / file).read_text())["played"]["agents"]["costs"] for file in files)
+    page = " ".join((DOCS / "agents_gradients.md").read_text(encoding="utf-8").split())
+    for costs in before:
+        assert f"{Comparison.of(np.array(now), np.array(costs))} times" in page
+
+
+@pytest.mark.parametrize("file", ["README.md", "docs/agents_gradients.md"])
+def test_pages_say_how_much_less_quick_agents_cost(file):
+    played = json.loads((DOCS / "agents_quick.json").read_text())["played"]
+    mean = {label: np.mean(np.log(one["costs"])) for label, one in played.items()}
+    text = " ".join((DOCS.parent / file).read_text(encoding="utf-8").split())
+    less = {label.split(":")[0]: 100.0 * -np.expm1(mean["agents"] - own) for label, own in mean.items()}
+    assert f"cost {less['dls']:.0f} % less than tuned damped least squares" in text
+    assert file == "README.md" or f"and {less['rhc']:.0f} % less than a receding horizon of 3" in text
 
 
 def test_the_page_says_how_far_a_second_training_is_from_the_first():
