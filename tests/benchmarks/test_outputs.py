@@ -89,7 +89,7 @@ def test_the_page_has_the_table_of_what_was_played():
     assert (content["episodes"], content["split"]) == (256, "test")
 
 
-def test_the_page_says_how_much_is_learned():
+def test_the_pages_say_how_much_is_learned():
     """Agents beside the networks that they could begin with, λ = 1e-2 and 4e-2, and these beside tuned dls."""
 
     def costs(file, label):
@@ -99,10 +99,14 @@ def test_the_page_says_how_much_is_learned():
     first = costs("agents_outputs.json", "nothing")
     second = costs("agents_ppo.json", "agent:runs/ppo-untrained/seed-0/agent.safetensors")
     solver = costs("agents_long.json", "dls:gain=0.15,damping=0.01")
-    page = " ".join((DOCS / "agents_gradients.md").read_text(encoding="utf-8").split())
-    pairs = [(first, solver), (second, solver), (costs("agents_td3.json", "agents"), first)]
+    by_gradients, by_rewards = (
+        " ".join((DOCS / name).read_text(encoding="utf-8").split())
+        for name in ("agents_gradients.md", "agents_rewards.md")
+    )
+    pairs = [(first, solver), (second, solver)]
     pairs += [
         (costs(file, "agents"), other) for file in ("agents.json", "agents_long.json") for other in (first, second)
     ]
     for one, other in pairs:
-        assert str(Comparison.of(one, other)) in page
+        assert str(Comparison.of(one, other)) in by_gradients
+    assert str(Comparison.of(costs("agents_td3.json", "agents"), first)) in by_rewards
