@@ -6,7 +6,7 @@ import numpy as np
 
 from baselines.agents.bilinear.damped_kernels import held_rows, with_matrix
 from baselines.agents.bilinear.prediction_kernels import predicted_rate_rows
-from baselines.agents.bilinear.rate_kernels import HERE, NONE, PREDICTED, metric_rows, rate_rows
+from baselines.agents.bilinear.rate_kernels import FIRST, HERE, NONE, PREDICTED, metric_rows, rate_rows
 from baselines.agents.network import forward_rows
 from ikgym.jit import inlined, kernel
 from ikgym.rl.feature_kernels import feature_row, mean_twists
@@ -46,8 +46,9 @@ def seen_rows(kind, chain, dt, offsets, rates, q, nominal, remaining, out, speed
         chain: The arm.
         dt: Δt in [s].
         offsets: Shape (p,).
-        rates: Which joint rates are shown: NONE, HERE (:func:`baselines.agents.bilinear.rate_kernels.rate_rows`) or
-            PREDICTED (:func:`baselines.agents.bilinear.prediction_kernels.predicted_rate_rows`).
+        rates: Which joint rates are shown: NONE, HERE (:func:`baselines.agents.bilinear.rate_kernels.rate_rows`),
+            PREDICTED (:func:`baselines.agents.bilinear.prediction_kernels.predicted_rate_rows`), or FIRST, which leaves
+            all but the first of these as they were.
         q: Shape (B, n).
         nominal: At the offsets. Shape (B, p, m).
         remaining: Shape (B, 1).
@@ -58,7 +59,9 @@ def seen_rows(kind, chain, dt, offsets, rates, q, nominal, remaining, out, speed
     if rates == HERE:
         rate_rows(kind, chain, offsets.shape[0] - 1, q, out)
     elif rates == PREDICTED:
-        predicted_rate_rows(kind, chain, dt, offsets, q, nominal, speed, out)
+        predicted_rate_rows(kind, chain, dt, offsets, q, nominal, speed, out, offsets.shape[0] - 1)
+    elif rates == FIRST:
+        predicted_rate_rows(kind, chain, dt, offsets, q, nominal, speed, out, 1)
 
 
 @kernel

@@ -27,7 +27,7 @@ FARTHEST = 0.5
 
 
 @kernel
-def predicted_rate_rows(kind, chain, dt, offsets, q, nominal, speed, features):
+def predicted_rate_rows(kind, chain, dt, offsets, q, nominal, speed, features, twists):
     """Appends the joint rates between the offsets to features, in units of the speed of what is ahead.
 
     Args:
@@ -39,6 +39,7 @@ def predicted_rate_rows(kind, chain, dt, offsets, q, nominal, speed, features):
         nominal: Reference task coordinates at the offsets. Shape (B, p, m).
         speed: Shape (B,).
         features: Receives the rates in its last columns. Shape (B, f + (p - 1) n).
+        twists: Of how many twists, at most p - 1; the columns of the others stay as they were.
     """
     n, w, first = q.shape[1], twist_size(kind), features.shape[1] - (offsets.shape[0] - 1) * q.shape[1]
     rotation, position, jacobian, pose = np.empty((3, 3)), np.empty(3), np.empty((6, n)), np.empty(nominal.shape[2])
@@ -46,7 +47,7 @@ def predicted_rate_rows(kind, chain, dt, offsets, q, nominal, speed, features):
     posture, step = np.empty(n), np.empty(n)
     for row in range(q.shape[0]):
         posture[:] = q[row]
-        for i in range(offsets.shape[0]):
+        for i in range(1 + twists):
             forward_and_jacobian(chain, posture, rotation, position, jacobian)
             task_kernels.coordinates(kind, rotation, position, pose)
             twist(kind, nominal[row, i], pose, error, due)

@@ -19,8 +19,9 @@ from ikgym.jit import kernel
 from ikgym.rl.feature_kernels import CONTEXT
 from ikgym.rl.twists import is_turned, shown_joints, twist_size
 
-#: Which joint rates are seen, if any: where the arm is now, or where it will be.
-NONE, HERE, PREDICTED = range(3)
+#: Which joint rates are seen, if any: where the arm is now, where it will be, or of the latter the first alone, which
+#: the metric depends on.
+NONE, HERE, PREDICTED, FIRST = range(4)
 #: λ of the joint rates: near a singularity they grow, but not without bounds.
 DAMPING = 1e-2
 #: θ of the metric U_j = (q̇_j² / mean q̇² + ε)^-θ, and ε, from which a joint at rest has it.

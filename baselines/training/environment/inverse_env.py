@@ -243,7 +243,8 @@ class InverseVecEnv(VecEnv):
         for begun in range(0, self._hold, INVERSE_EVERY):
             steps = min(INVERSE_EVERY, self._hold - begun)
             if begun:
-                self._look()
+                at = arms.q.numpy(), arms.ahead, arms.remaining
+                self._law.see(*at, self._features.numpy(), self._speed, for_network=False)
             with torch.no_grad():
                 held = self._law.held(arms.q, self._features, outputs)
                 rows = arms.rows(steps, self._speed)

@@ -12,7 +12,15 @@ from torch.autograd.function import once_differentiable
 from baselines.agents.bilinear.damped_kernels import held_gradient_rows, held_rows
 from baselines.agents.bilinear.kernels import feature_gradient_rows, seen_rows
 from baselines.agents.bilinear.processing import Bilinear
-from baselines.agents.bilinear.rate_kernels import AT_REST, EXPONENT, HERE, LITTLE, PREDICTED, rate_gradient_rows
+from baselines.agents.bilinear.rate_kernels import (
+    AT_REST,
+    EXPONENT,
+    FIRST,
+    HERE,
+    LITTLE,
+    PREDICTED,
+    rate_gradient_rows,
+)
 from baselines.policy import Problem
 from baselines.training.gradients.adjoint import Gradient, adjoint
 from baselines.training.gradients.segment import Path, Rows, Task, segment
@@ -67,21 +75,41 @@ class Law:
         """
         speed = np.empty(len(nominal))
         if self._rates == PREDICTED:
-            return torch.from_numpy(self.seen(q.detach().numpy(), nominal, remaining, speed)), speed
+            seen = np.empty((len(nominal), self.inputs))
+            self.see(q.detach().numpy(), nominal, remaining, seen, speed)
+            return torch.from_numpy(seen), speed
         out: Tensor = _Features.apply(q, self, nominal, remaining, speed)  # type: ignore[no-untyped-call]
         return out, speed
 
-    def seen(self, q: FloatArray, nominal: FloatArray, remaining: FloatArray, speed: FloatArray) -> FloatArray:
-        """:meth:`features` without a gradient; fills the speeds of shape (N,)."""
-        task, chain, out = self.task, self.chain, np.empty((len(q), self.inputs))
+    def see(
+        self,
+        q: FloatArray,
+        nominal: FloatArray,
+        remaining: FloatArray,
+        out: FloatArray,
+        speed: FloatArray,
+        for_network: bool = True,
+    ) -> None:
+        """:meth:`features` without a gradient.
+
+        Args:
+            q: Shape (N, n).
+            nominal: Shape (N, p, m).
+            remaining: Shape (N, 1).
+            out: Receives the features. Shape (N, f).
+            speed: Receives the speeds. Shape (N,).
+            for_network: Whether a network looks at them. What :meth:`held` does is a small part, which takes less time
+                where joint rates are predicted; the rest then stays as it was.
+        """
+        task, chain = self.task, self.chain
+        rates = FIRST if self._rates == PREDICTED and not for_network else self._rates
 
         def work(start: int, stop: int) -> None:
             some = slice(start, stop)
             arrays = q[some], nominal[some], remaining[some], out[some], speed[some]
-            seen_rows(task.kind, chain, task.dt, self._offsets, self._rates, *arrays)
+            seen_rows(task.kind, chain, task.dt, self._offsets, rates, *arrays)
 
         in_chunks(work, len(out), GRAIN)
-        return out
 
     def held(self, q: Tensor, features: Tensor, output: Tensor) -> Tensor:
         """(G, h) from the output of the network; with the damped inverse, and h in the null space, where there is one.
@@ -128,8 +156,8 @@ class Law:
 class _Features(torch.autograd.Function):
     @staticmethod
     def forward(ctx: Any, q: Tensor, law: Law, nominal: FloatArray, remaining: FloatArray, speed: FloatArray) -> Tensor:
-        joints = q.detach().numpy()
-        out = law.seen(joints, nominal, remaining, speed)
+        joints, out = q.detach().numpy(), np.empty((len(q), law.inputs))
+        law.see(joints, nominal, remaining, out, speed)
         ctx.law, ctx.seen = law, (joints, out)
         return torch.from_numpy(out)
 

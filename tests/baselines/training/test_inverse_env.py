@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 import torch
@@ -29,8 +31,8 @@ def one_thread():
         yield
 
 
-def made(rows=3, scenario=SCENARIO, hold=4, **settings):
-    envs = InverseVecEnv(rows, scenario, SEEN, hold, **settings)
+def made(rows=3, scenario=SCENARIO, hold=4, processing=SEEN, **settings):
+    envs = InverseVecEnv(rows, scenario, processing, hold, **settings)
     envs.seed(5)
     return envs
 
@@ -97,9 +99,11 @@ def test_rewards_do_not_depend_on_what_was_spent_before():
         assert identical(*(envs.step(actions_of(envs, step))[1] for envs in (first, second)))
 
 
-def test_the_inverse_is_renewed_while_an_action_is_held():
+@pytest.mark.parametrize("predicted", [False, True])
+def test_the_inverse_is_renewed_while_an_action_is_held(predicted):
     """Held for 8 steps it does what it does when it is said anew every other step."""
-    once, often = made(hold=8), made(hold=INVERSE_EVERY)
+    seen = dataclasses.replace(SEEN, predicted_rates=predicted)
+    once, often = made(hold=8, processing=seen), made(hold=INVERSE_EVERY, processing=seen)
     once.reset(), often.reset()
     often._arms.restore(once._arms.state())
     often._look()
@@ -109,6 +113,7 @@ def test_the_inverse_is_renewed_while_an_action_is_held():
         often.step(said)
     assert identical(*(envs._arms.q.numpy() for envs in (once, often)))
     assert identical(*(envs._arms.spent for envs in (once, often)))
+    assert identical(*(envs._features.numpy() for envs in (once, often)))
 
 
 def test_to_hold_the_inverse_for_an_action_would_cost_more_than_what_agents_can_gain(monkeypatch):

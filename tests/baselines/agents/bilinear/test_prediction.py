@@ -87,7 +87,7 @@ def test_nan_is_not_taken_for_a_step():
     batch, chain, n = batch_of(problem), problem.model.chain, problem.model.joints
     batch.nominal[1, 1, 0] = np.nan
     out = np.zeros((ROWS, TWISTS * n))
-    arrays = batch.q, batch.nominal, np.ones(ROWS), out
+    arrays = batch.q, batch.nominal, np.ones(ROWS), out, TWISTS
     predicted_rate_rows(problem.task.kind, chain, problem.dt, np.array(OFFSETS), *arrays)
     assert np.isnan(out[1]).all()
     assert np.isfinite(np.delete(out, 1, axis=0)).all()
@@ -103,6 +103,20 @@ def test_what_is_seen_has_no_gradient_and_what_is_done_has():
     np.testing.assert_array_equal(features.numpy().astype(np.float32), PREDICTED.features(problem, batch))
     np.testing.assert_array_equal(speed, PREDICTED.due(problem, batch)[1])
     assert law.held(q, features, torch.zeros(ROWS, law.outputs, dtype=torch.float64)).requires_grad
+
+
+def test_where_no_network_looks_what_an_inverse_needs_is_seen_alone():
+    scenario, batch = scenarios.get("varga7-pose-random"), batch_of(problem_of())
+    law, n = Law(scenario, PREDICTED), scenario.joints
+    (features, speed), zeros = law.features(torch.from_numpy(batch.q), batch.nominal, batch.remaining), np.zeros(ROWS)
+    some = np.full(features.shape, 7.0)
+    law.see(batch.q, batch.nominal, batch.remaining, some, zeros, for_network=False)
+    rest = law.inputs - (TWISTS - 1) * n
+    np.testing.assert_array_equal(some[:, :rest], features[:, :rest])
+    assert (some[:, rest:] == 7.0).all()
+    np.testing.assert_array_equal(zeros, speed)
+    q, output = torch.from_numpy(batch.q), torch.zeros(ROWS, law.outputs, dtype=torch.float64)
+    assert torch.equal(law.held(q, torch.from_numpy(some), output), law.held(q, features, output))
 
 
 def test_files():
