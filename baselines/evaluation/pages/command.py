@@ -18,6 +18,7 @@ from baselines.evaluation.pages.choosing import page as choosing
 from baselines.evaluation.pages.entries import FORESIGHT, HORIZONS, Entry, agents, playing, shipped, solvers
 from baselines.evaluation.pages.measure import measure
 from baselines.evaluation.pages.measurement import Measurement, Section
+from baselines.evaluation.pages.renewal import renewed
 from baselines.evaluation.pages.submissions.add import add
 from baselines.evaluation.plots.style import small_png
 from baselines.files import write
@@ -61,6 +62,9 @@ class Options:
     add: Annotated[tuple[pathlib.Path, ...], tyro.conf.arg(metavar="FOLDER …")] = ()
     """Submissions, see docs/rules.md: each is checked, scored on the sets of the leaderboard, and added to the page in
     --write; its rows go into --out."""
+    renew: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME …")] = ()
+    """Lines of the leaderboard, by their names: these alone are played, those of --agents among them, and stand in the
+    page in --write, whose other lines stay as they are; their rows go into --out."""
     trust: bool = False
     """Run the code in submissions: only in folders whose maker you know."""
     episodes: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
@@ -92,6 +96,7 @@ Examples:
   {prog} --pages cost-time --out results/quick --quick
   {prog} --pages rivals choosing --out results/arms --write docs
   {prog} --add examples/submission --out results/added --write docs
+  {prog} --renew PPO --agents "PPO=results/ppo" --out results/renewed --write docs
   {prog} --write docs
 
 Files:
@@ -142,23 +147,33 @@ def measured(options: Options, command: str) -> dict[str, Measurement]:
 
 
 def extended(options: Options, command: str) -> dict[str, Measurement]:
-    """The leaderboards with the submissions of ``--add``.
+    """The leaderboards with the submissions of ``--add`` and the lines of ``--renew``.
 
     Raises:
-        IkgymError: Something expected went wrong, see :func:`baselines.evaluation.pages.submissions.add.add`.
+        IkgymError: Something expected went wrong, see :func:`baselines.evaluation.pages.submissions.add.add` and
+            :func:`baselines.evaluation.pages.renewal.renewed`.
     """
-    del command  # what was measured before keeps the one that measured it
+    option = "--add" if options.add else "--renew"
     if options.out is None or options.write is None:
-        raise InvalidInputError("--add: expected --out, where the rows go, and --write, the folder of the leaderboard.")
+        raise InvalidInputError(
+            f"{option}: expected --out, where the rows go, and --write, the folder of the leaderboard."
+        )
     pages = [page for page in options.pages if page in LEADERBOARDS]
     if not pages:
-        raise InvalidInputError(f"--add: expected some of {', '.join(LEADERBOARDS)} in --pages.")
-    how: dict[str, Any] = {"resume": options.resume, "overwrite": options.overwrite, "workers": _workers(options)}
+        raise InvalidInputError(f"{option}: expected some of {', '.join(LEADERBOARDS)} in --pages.")
+    how: dict[str, Any] = {
+        "resume": options.resume, "overwrite": options.overwrite, "workers": _workers(options), "progress": True,
+    }  # fmt: skip
     found = {page: _read(_file(options.write, page).with_suffix(".json")) for page in pages}
-    return {
-        page: add(one, options.add, options.out / page, date=_today(), trust=options.trust, progress=True, **how)
-        for page, one in found.items()
-    }
+    for page, one in found.items():
+        if options.add:
+            # What was measured before keeps the command that measured it.
+            one = add(one, options.add, options.out / page, date=_today(), trust=options.trust, **how)
+        if options.renew:
+            everyone = _everyone(options, page)
+            one = renewed(one, everyone, options.renew, options.out / page, command=command, date=_today(), **how)
+        found[page] = one
+    return found
 
 
 def draw_up(measurement: Measurement, page: str, folder: pathlib.Path) -> None:
@@ -209,9 +224,7 @@ def _entered(options: Options) -> dict[str, dict[str, list[Entry]]]:
     out: dict[str, dict[str, list[Entry]]] = {}
     for page, main in LEADERBOARDS.items():
         if page in options.pages:
-            tuned = tuning.of(main).settings
-            everyone = [*agents(options.agents), *shipped(), *_quick(options, solvers(tuned))]
-            out[page] = {name: playing(name, everyone, main) for name in sets.leaderboard(main)}
+            out[page] = {name: playing(name, _everyone(options, page), main) for name in sets.leaderboard(main)}
     if COST_TIME in options.pages:
         names = options.sets or (QUICK_SETS if options.quick else sets.cost_time())
         compared = families.entries(SHORT if options.quick else families.HORIZONS)
@@ -226,6 +239,12 @@ def _entered(options: Options) -> dict[str, dict[str, list[Entry]]]:
         names = options.sets or (rivals.QUICK_SETS if options.quick else choosing.played())
         out[CHOOSING] = {name: list(choosing.entries(name)) for name in names}
     return out
+
+
+def _everyone(options: Options, page: str) -> list[Entry]:
+    """Who plays for a leaderboard."""
+    tuned = tuning.of(LEADERBOARDS[page]).settings
+    return [*agents(options.agents), *shipped(), *_quick(options, solvers(tuned))]
 
 
 def _machine(page: str) -> dict[str, object]:
@@ -266,6 +285,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _work(options: Options, command: str) -> None:
     folder = options.write or options.out or pathlib.Path()
-    for page, measurement in (extended if options.add else measured)(options, command).items():
+    make = extended if options.add or options.renew else measured
+    for page, measurement in make(options, command).items():
         draw_up(measurement, page, folder)
         print(f"written to {_file(folder, page)}")

@@ -94,4 +94,7 @@ def conditions(measurement: Measurement) -> list[str]:
     out = ["## Conditions", "", f"- command: `{measurement.command}`", f"- date: {measurement.date}"]
     out += [f"- machine: {machine}"]
     out += [f"- `{one.name}`: fingerprint {one.fingerprint}, {episodes(one)}" for one in measurement.sections]
+    for one in measurement.renewals:
+        names = ", ".join(f"`{label}`" for label in one.labels)
+        out.append(f"- played later, on {one.date}: {names}, by `{one.command}`")
     return [*out, f"- {_TIMES}"]

@@ -233,6 +233,21 @@ class Submitted:
 
 
 @dataclasses.dataclass(frozen=True)
+class Renewal:
+    """Lines that were played after the others, see :mod:`baselines.evaluation.pages.renewal`.
+
+    Args:
+        labels: Of the lines.
+        command: What played them.
+        date: When, as YYYY-MM-DD.
+    """
+
+    labels: tuple[str, ...]
+    command: str
+    date: str
+
+
+@dataclasses.dataclass(frozen=True)
 class Measurement:
     """What a page is made from.
 
@@ -242,6 +257,7 @@ class Measurement:
         machine: On what, see :func:`baselines.evaluation.machine.describe`.
         sections: What came out, by sets of episodes.
         submissions: Those of the lines that others have handed in.
+        renewals: Those that were played after the others.
     """
 
     command: str
@@ -249,6 +265,7 @@ class Measurement:
     machine: Mapping[str, Any]
     sections: tuple[Section, ...]
     submissions: tuple[Submitted, ...] = ()
+    renewals: tuple[Renewal, ...] = ()
 
     def save(self, file: pathlib.Path) -> None:
         """Writes it as JSON, a line of the table a line.
@@ -257,8 +274,9 @@ class Measurement:
             ResultsError: The file cannot be written.
         """
         head = {"format": FORMAT, "command": self.command, "date": self.date, "machine": dict(self.machine)}
-        if self.submissions:
-            head["submissions"] = [dataclasses.asdict(one) for one in self.submissions]
+        for name in ("submissions", "renewals"):
+            if records := getattr(self, name):
+                head[name] = [dataclasses.asdict(one) for one in records]
         sections = []
         for one in self.sections:
             about = {name: value for name, value in vars(one).items() if name != "lines"}

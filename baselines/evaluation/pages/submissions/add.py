@@ -7,10 +7,9 @@ import pathlib
 from collections.abc import Sequence
 from typing import Any
 
-from baselines.evaluation.machine import describe
-from baselines.evaluation.pages.entries import Entry, playing
-from baselines.evaluation.pages.measure import measure
-from baselines.evaluation.pages.measurement import Measurement, Section, Submitted
+from baselines.evaluation.pages.entries import Entry
+from baselines.evaluation.pages.measurement import Measurement, Submitted
+from baselines.evaluation.pages.renewal import comparable, with_lines
 from baselines.evaluation.pages.submissions.check import Submission, check_foresight, submission, taken
 from baselines.files import ResultsError
 
@@ -49,8 +48,7 @@ def add(
     for one in found:
         _check_name(one, there, mine, overwrite=overwrite)
         there, mine = [*there, one.manifest.name], [name for name in mine if name != one.manifest.name]
-    # Times of another machine would stand beside those of the page as if they could be compared.
-    timed = dict(measurement.machine) == describe()
+    timed = comparable(measurement)
     entries = [one.copied(out / one.digest / FILES).entry(timed=timed) for one in found]
     for one, entry in zip(found, entries, strict=True):
         for section in measurement.sections:
@@ -71,19 +69,8 @@ def _check_name(one: Submission, there: Sequence[str], mine: Sequence[str], *, o
 def _added(
     measurement: Measurement, one: Submission, entry: Entry, out: pathlib.Path, *, date: str, **options: Any
 ) -> Measurement:
-    main = measurement.sections[0].name
-    sections = tuple(_with(section, entry, main, out / one.digest, options) for section in measurement.sections)
+    sections = with_lines(measurement, [entry], out / one.digest, everywhere=True, **options)
     said = one.manifest
     line = Submitted(said.name, said.authors, said.commands, said.foresight, said.tuned_on, one.digest, date)
     others = tuple(other for other in measurement.submissions if other.name != said.name)
     return dataclasses.replace(measurement, sections=sections, submissions=(*others, line))
-
-
-def _with(section: Section, entry: Entry, main: str, out: pathlib.Path, options: dict[str, Any]) -> Section:
-    """A section with one line more, played on its very episodes."""
-    (own,) = playing(section.name, [entry], main) or [dataclasses.replace(entry, timed=0)]
-    played = measure(section.name, {"": [own]}, out, episodes=len(section.seeds), **options)[""]
-    if (played.seeds, played.fingerprint) != (section.seeds, section.fingerprint):
-        raise ResultsError(f"{section.name}: expected the episodes of the page, {section.seeds}, got {played.seeds}.")
-    others = tuple(line for line in section.lines if line.label != entry.label)
-    return dataclasses.replace(section, lines=(*others, *played.lines))
