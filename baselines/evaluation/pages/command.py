@@ -164,7 +164,7 @@ def extended(options: Options, command: str) -> dict[str, Measurement]:
     how: dict[str, Any] = {
         "resume": options.resume, "overwrite": options.overwrite, "workers": _workers(options), "progress": True,
     }  # fmt: skip
-    found = {page: _read(_file(options.write, page).with_suffix(".json")) for page in pages}
+    found: dict[str, Measurement] = {page: _read(_file(options.write, page).with_suffix(".json")) for page in pages}
     for page, one in found.items():
         if options.add:
             # What was measured before keeps the command that measured it.
