@@ -156,6 +156,13 @@ class APG(ActorOnly):
     """Arms that are farther from their reference position than this, in [m], are put back on the reference path."""
     reset_distance_end: Annotated[float, tyro.conf.arg(metavar="M")] = 1.0
     """The same in the segments of the last window, in which the agent learns to come back from farther away."""
+    replay_share: Annotated[float, tyro.conf.arg(metavar="SHARE")] = 0.0
+    """Share of the episodes that are drawn from those that were lost or cost most so far, rather than anew."""
+    singular_share: Annotated[float, tyro.conf.arg(metavar="SHARE")] = 0.0
+    """Share of the episodes that are entered just before their reference joint path is closest to a singularity, rather
+    than begun at their beginning."""
+    start_noise: Annotated[float, tyro.conf.arg(metavar="X")] = 0.0
+    """Standard deviation of the joint coordinates, off the path, where an episode begins, in [rad] or [m]."""
     averaging: Annotated[float, tyro.conf.arg(metavar="β")] = 0.99
     """The agent is the exponential moving average of the weights, of which each step of Adam keeps this share."""
 
@@ -175,7 +182,9 @@ class APG(ActorOnly):
                 )
         for name in ("max_gradient_share", "cost_prior_steps", "reset_distance", "reset_distance_end"):
             self._set(name, number(name, getattr(self, name), above=0.0))
-        self._set("averaging", between("averaging", self.averaging, 0.0, 1.0))
+        self._set("start_noise", number("start_noise", self.start_noise, at_least=0.0))
+        for name in ("averaging", "replay_share", "singular_share"):
+            self._set(name, between(name, getattr(self, name), 0.0, 1.0))
 
     @property
     def processing(self) -> Bilinear:

@@ -111,6 +111,12 @@ class Arms:
         """
         return cost * torch.from_numpy((self.played + prior) / (self.spent + prior * self.usual))
 
+    @property
+    def cost_ratio(self) -> FloatArray:
+        """What their episodes have cost so far ÷ what the reference joint paths do in as many steps. Shape (N,)."""
+        ratio: FloatArray = self.spent / (np.maximum(self.played, 1.0) * self.usual)
+        return ratio
+
     def begin(self, rows: Indices, seeds: Indices, at: Indices) -> None:
         """Begins episodes, or enters them after some steps, where their reference joint path is then.
 
@@ -143,6 +149,17 @@ class Arms:
         at = spread_steps(self._scenario, len(rows) // group_size, every).repeat(group_size)
         self.begin_new(rows, generator, at, group_size)
 
+    def displace(self, rows: Indices, by: FloatArray) -> None:
+        """Moves arms off their paths, within their stops.
+
+        Args:
+            rows: Which arms. Shape (R,).
+            by: In [rad] or [m]. Shape (R, n).
+        """
+        q, arm = self.q.detach().numpy().copy(), self._scenario.arm
+        q[rows] = np.clip(q[rows] + by, arm.lower, arm.upper)
+        self._replace(rows, q, self.qdot.detach().numpy())
+
     def give_up(self, rows: Indices) -> None:
         """Puts arms that are lost back on their reference joint paths, or to the starts where there are none."""
         self._put(rows, np.where(self._follows[rows], self.made[rows], 0))
@@ -174,12 +191,15 @@ class Arms:
         if first:
             episodes = [self._scenario.episode(int(self.seed[row])) for row in first]
             q[first], qdot[first] = self._scenario.first_q_of(episodes), 0.0
+        self._replace(rows, q, qdot)
+        self.made[rows], self.spent[rows], self.played[rows] = at, 0.0, 0.0
+
+    def _replace(self, rows: Indices, q: FloatArray, qdot: FloatArray) -> None:
+        """Gives some arms what arrays of all arms say; the others keep their gradients."""
         chosen = torch.zeros(len(q), 1, dtype=torch.bool)
         chosen[torch.from_numpy(rows)] = True
-        # The others keep their gradients.
         self.q = torch.where(chosen, torch.from_numpy(q), self.q)
         self.qdot = torch.where(chosen, torch.from_numpy(qdot), self.qdot)
-        self.made[rows], self.spent[rows], self.played[rows] = at, 0.0, 0.0
 
     def _know(self, rows: Indices, seeds: Indices) -> None:
         """The references of the arms' episodes; those of equal seeds are worked out once."""

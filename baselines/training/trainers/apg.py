@@ -13,6 +13,7 @@ from torch import Tensor, nn
 from baselines.training.config.actor_only import APG
 from baselines.training.gradients.arms import Arms
 from baselines.training.gradients.law import Law
+from baselines.training.gradients.starts import Starts
 from baselines.training.networks import ActorModel
 from baselines.training.randomness import sequence
 from baselines.training.trainer import SegmentMetrics
@@ -37,6 +38,7 @@ class APGTrainer(ActorTrainer):
         super().__init__(config, scenario, seed, model, copy.deepcopy(model.policy))
         self._updates = 0
         self._arms = Arms(scenario, config.n_envs, config.offsets)
+        self._starts = Starts(scenario, config.replay_share, config.singular_share, config.start_noise)
         self._farthest = config.reset_distance
         self.spread(np.random.default_rng(sequence(seed, None)))
 
@@ -72,7 +74,8 @@ class APGTrainer(ActorTrainer):
     def state(self) -> dict[str, Any]:
         """See :meth:`baselines.training.trainer.Trainer.state`."""
         actor, far = copy.deepcopy(self._actor.state_dict()), torch.from_numpy(self._far.copy())
-        return {**super().state(), "actor": actor, "updates": self._updates, "arms": self._arms.state(), "far": far}
+        own = {"actor": actor, "updates": self._updates, "far": far}
+        return {**super().state(), **own, "arms": self._arms.state(), "starts": self._starts.state()}
 
     def restore(self, state: dict[str, Any]) -> None:
         """See :meth:`baselines.training.trainer.Trainer.restore`."""
@@ -80,6 +83,7 @@ class APGTrainer(ActorTrainer):
         self._actor.load_state_dict(state["actor"])
         self._updates, self._far = state["updates"], state["far"].numpy().copy()
         self._arms.restore(state["arms"])
+        self._starts.restore(state["starts"])
 
     def window(self, steps: int, generator: np.random.Generator) -> tuple[Tensor, int]:
         """Moves all arms through a window, from where they are, of which no gradient is taken.
@@ -118,10 +122,11 @@ class APGTrainer(ActorTrainer):
         """Puts lost arms back, and begins new episodes where they are over; how many arms were lost."""
         lost, ended = self._lost, self._arms.ended
         over = np.flatnonzero(ended)
+        self._starts.note(self._arms, np.flatnonzero(lost | ended))
         if (lost & ~ended).any():
             self._arms.give_up(np.flatnonzero(lost & ~ended))
         if len(over):
-            self._arms.begin_new(over, generator)
+            self._starts.renew(self._arms, over, generator)
         return int(lost.sum())
 
     @property

@@ -39,6 +39,7 @@ CONFIGS = {
     "apg, damped": BILINEAR.replace(damping=4e-4),
     "apg, no matrix": BILINEAR.replace(damping=4e-4, matrix=False),
     "apg, predicted": BILINEAR.replace(damping=4e-4, predicted_rates=True),
+    "apg, tail": BILINEAR.replace(steps=20, replay_share=0.5, singular_share=0.5, start_noise=0.01),
     "apg, skew, end within a segment": BILINEAR.replace(task="skew", steps=20),
     "imitate": Imitate(**SMALL, expert="dls", gradient_steps=5, batch_size=16, example_every=2, buffer_size=70),
     "imitate, bilinear": Imitate(**POSE, expert="dls", output="bilinear", gradient_steps=5, batch_size=16),
