@@ -6,8 +6,9 @@ import importlib
 from collections.abc import Callable
 from typing import NamedTuple
 
-from baselines.training.config.actor_only import APG, Imitate, Observe
+from baselines.training.config.actor_only import APG, Imitate
 from baselines.training.config.base import Config
+from baselines.training.config.observe import Observe
 from baselines.training.config.off_policy import SAC, TD3
 from baselines.training.config.ppo import PPO
 from baselines.training.trainer import Trainer

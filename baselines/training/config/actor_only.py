@@ -8,8 +8,7 @@ from typing import Annotated, Any, ClassVar, Literal, get_args
 import tyro
 
 from baselines.agents.bilinear.processing import Bilinear
-from baselines.agents.recurrent.processing import Recurrent
-from baselines.training.config.base import Activation, Algorithm, Annealed, JointVelocities, Stored
+from baselines.training.config.base import Algorithm, Annealed, JointVelocities, Stored
 from baselines.training.config.limits import MOST_BATCH, MOST_TRANSITIONS, between, count
 from ikgym.exceptions import InvalidInputError
 from ikgym.validation import known_names, number, whole_number
@@ -209,67 +208,3 @@ class APG(ActorOnly):
 
     def _stage(self, segment: int) -> int:
         return segment * len(self.window) // self.segments
-
-
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class Observe(ActorOnly):
-    """An agent with memory for plants that differ from the model: a recurrent network tunes a Kalman filter.
-
-    Plants are drawn anew in each segment: calibration, payload, and the noise, the pace and the gaps of the camera.
-    The gradient of what the filter's estimates cost is back-propagated through all measurements of an episode.
-    """
-
-    method: ClassVar[str] = "observe"
-
-    scenario: Annotated[str, tyro.conf.arg(metavar="NAME")] = "panda-field"
-    """Whose arm and paths the plants are drawn for, and on whose own plant agents are validated."""
-    base_policy: Annotated[str, tyro.conf.arg(metavar="POLICY")] = Recurrent.base_policy
-    """The policy that is corrected. It changes nothing in the training, but for the validation."""
-    offsets: Annotated[tuple[int, ...], tyro.conf.arg(metavar="N …")] = Recurrent.offsets
-    """These agents see the next step alone; the base policy sees what it asks for."""
-    hidden: Annotated[tuple[int, ...], tyro.conf.arg(metavar="N …")] = (32,)
-    """Units of the recurrent layers."""
-    activation: Activation = "tanh"
-    """That of gated recurrent units; there is no other."""
-    n_envs: Annotated[int, tyro.conf.arg(metavar="N")] = 128
-    """Episodes of a segment, a multiple of the plants."""
-    segments: Annotated[int, tyro.conf.arg(metavar="N")] = 40
-    """Parts of the training, of some five core-seconds each."""
-    evaluate_every: Annotated[int, tyro.conf.arg(metavar="N")] = 40
-    """Segments from one validation to the next; there is one at the start and one at the end, too."""
-    validation_episodes: Annotated[int, tyro.conf.arg(metavar="N")] = 16
-    """Episodes of each: the first seeds of the split "validation"."""
-    plants: Annotated[int, tyro.conf.arg(metavar="N")] = 16
-    """Plants that are drawn in a segment; each episode draws an arm and noise from its own."""
-    measurements: Annotated[int, tyro.conf.arg(metavar="N")] = 96
-    """Measurements of an episode, through all of which gradients are back-propagated."""
-    gradient_steps: Annotated[int, tyro.conf.arg(metavar="N")] = 10
-    """Gradient steps of a segment."""
-    batch_size: Annotated[int, tyro.conf.arg(metavar="N")] = 32
-    """Episodes of one gradient step."""
-    step_cost: Annotated[float, tyro.conf.arg(metavar="X")] = 0.13
-    """What a step costs where nothing is off: the logarithm of the cost of an episode is minimised."""
-    learning_rate: Annotated[float, tyro.conf.arg(metavar="RATE")] = 5e-3
-    """Of Adam, in the first segment."""
-    learning_rate_end: Annotated[float, tyro.conf.arg(metavar="RATE")] = 3e-4
-    """In the last segment; in between it falls by equal factors."""
-
-    def __post_init__(self) -> None:
-        if self.offsets != Recurrent.offsets or self.activation != "tanh" or self.init is not None:
-            raise InvalidInputError(
-                "observe: expected no offsets, no activation and no init: its agents have none of the first two, and "
-                f"begin anew; got {self.offsets}, {self.activation!r} and {self.init}."
-            )
-        super().__post_init__()
-        for name in ("plants", "gradient_steps"):
-            self._set(name, whole_number(name, getattr(self, name), at_least=1))
-        self._set("measurements", whole_number("measurements", self.measurements, at_least=2))
-        self._set("batch_size", count("batch_size", self.batch_size, at_most=self.n_envs))
-        self._set("step_cost", number("step_cost", self.step_cost, above=0.0))
-        if self.n_envs % self.plants:
-            raise InvalidInputError(f"n_envs: expected a multiple of {self.plants} plants, got {self.n_envs}.")
-
-    @property
-    def processing(self) -> Recurrent:
-        """What the agent corrects, and what its filter begins with."""
-        return Recurrent(self.base_policy)

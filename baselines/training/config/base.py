@@ -152,6 +152,16 @@ class Config(Frozen):
             raise InvalidInputError(f"init: expected the path of a file, got {self.init!r}.")
         self._set("init", pathlib.Path(self.init))
 
+    def _expect_defaults(self, *names: str, **where: str) -> None:
+        """Insists that options are left out which mean nothing where another one has a value."""
+        ((option, value),) = where.items()
+        usual = {field.name: field.default for field in dataclasses.fields(self)}
+        for name in names:
+            if getattr(self, name) != usual[name]:
+                raise InvalidInputError(
+                    f"{name}: expected {usual[name]} for an {option} that is {value}, got {getattr(self, name)!r}."
+                )
+
     def _set(self, field: str, value: object) -> None:
         """Writes a field of this frozen object, while it is made."""
         object.__setattr__(self, field, value)
@@ -184,15 +194,6 @@ class JointVelocities(Config):
     def velocities(self) -> Processing:
         """The same, where these outputs are joint velocities."""
         return Processing(self.offsets, self.action_scale, self.base_policy, self.null_space)
-
-    def _expect_defaults(self, *names: str, output: str) -> None:
-        """Insists that options are left out which mean nothing for an output."""
-        usual = {field.name: field.default for field in dataclasses.fields(self)}
-        for name in names:
-            if getattr(self, name) != usual[name]:
-                raise InvalidInputError(
-                    f"{name}: expected {usual[name]} for an output that is {output}, got {getattr(self, name)!r}."
-                )
 
     @classmethod
     def shape_of(cls, processing: Stored, sizes: tuple[int, ...], activation: str) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from typing import Protocol
 
 import torch
 from torch import Tensor, nn
@@ -33,9 +34,14 @@ class Gated(nn.Module):
             self.head.weight.mul_(QUIET)
             self.head.bias.zero_()
 
+    @property
+    def dtype(self) -> torch.dtype:
+        """Of its weights."""
+        return self.head.weight.dtype
+
     def start(self, rows: int) -> list[Tensor]:
         """The states of the layers when nothing has been seen."""
-        return [torch.zeros(rows, units, dtype=self.head.weight.dtype) for units in self.sizes[1:-1]]
+        return [torch.zeros(rows, units, dtype=self.dtype) for units in self.sizes[1:-1]]
 
     def forward(self, x: Tensor, hidden: list[Tensor]) -> tuple[Tensor, list[Tensor]]:
         """Outputs of shape (B, o), and the states after a step."""
@@ -71,7 +77,21 @@ def believe(output: Tensor) -> tuple[Tensor, Tensor]:
     return noise.square().repeat_interleave(3, 1), changes.square()
 
 
-def errors(network: Gated, processing: Recurrent, measured: Measurements) -> tuple[Tensor, Tensor]:
+class Speaker(Protocol):
+    """What is asked what measurements are worth: a :class:`Gated`, or what stands around one."""
+
+    @property
+    def dtype(self) -> torch.dtype:
+        """Of what it is shown."""
+
+    def start(self, rows: int) -> list[Tensor]:
+        """See :class:`Gated`."""
+
+    def __call__(self, x: Tensor, hidden: list[Tensor], /) -> tuple[Tensor, list[Tensor]]:
+        """See :class:`Gated`."""
+
+
+def errors(network: Speaker, processing: Recurrent, measured: Measurements) -> tuple[Tensor, Tensor]:
     """How far estimates are off at each measurement, before and after it was taken in. Shapes (B, T, 6).
 
     Args:
@@ -94,7 +114,7 @@ def errors(network: Gated, processing: Recurrent, measured: Measurements) -> tup
         surprise = measured.error[:, k] - _product(rate, parameters)
         spread = ((rate @ covariance) * rate).sum(2)
         loaded = rate[:, :, : (p - 3) // 6].sum(2)
-        features = describe(surprise, loaded, spread, waited).to(network.head.weight.dtype)
+        features = describe(surprise, loaded, spread, waited).to(network.dtype)
         output, fresh = network(features, hidden)
         hidden = [torch.where(arrived[:, None], new, old) for new, old in zip(fresh, hidden, strict=True)]
         before.append(measured.true[:, k] - _product(rate, parameters))
@@ -116,11 +136,22 @@ def loss(network: Gated, processing: Recurrent, measured: Measurements, delta_x:
         delta_x: The error that costs 1 a step.
         floor: What a step costs where nothing is off.
     """
-    before, after = errors(network, processing, measured)
-    # From one measurement to the next, estimates are off by something between the two.
-    costs = 0.5 * (after[:, :-1].square() + before[:, 1:].square()).sum(2) / delta_x**2
-    out: Tensor = (costs.mean(1) + floor).log().mean()
+    out: Tensor = (costs(network, processing, measured, delta_x).mean(1) + floor).log().mean()
     return out
+
+
+def costs(network: Speaker, processing: Recurrent, measured: Measurements, delta_x: float) -> Tensor:
+    """What estimates are off costs, from each measurement to the next. Shape (B, T - 1).
+
+    Args:
+        network: Says what measurements are worth.
+        processing: What the filter begins with.
+        measured: The episodes.
+        delta_x: The error that costs 1 a step.
+    """
+    before, after = errors(network, processing, measured)
+    # In between, estimates are off by something between the two.
+    return 0.5 * (after[:, :-1].square() + before[:, 1:].square()).sum(2) / delta_x**2
 
 
 def _product(rate: Tensor, parameters: Tensor) -> Tensor:

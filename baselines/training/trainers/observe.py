@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -11,9 +12,10 @@ import torch
 from baselines.agents.recurrent.files import in_memory
 from baselines.agents.recurrent.policy import RecurrentPolicy
 from baselines.policy import Memory, Problem
-from baselines.training.config.actor_only import Observe
+from baselines.training.config.observe import Observe
 from baselines.training.memory.episodes import Measurements, draw_plant, joined, measure, taken
 from baselines.training.memory.filter import Gated, loss
+from baselines.training.memory.rewards import explored, surrogate
 from baselines.training.networks import MemoryModel
 from baselines.training.randomness import episode_seed, sequence
 from baselines.training.score import Score
@@ -56,10 +58,28 @@ class ObserveTrainer(ActorTrainer):
         measured, losses = self._measure(number), []
         for _ in range(config.gradient_steps):
             some = taken(measured, torch.randperm(config.n_envs)[: config.batch_size])
-            value = loss(self.model.policy, processing, some, self._scenario.cost.delta_x, config.step_cost)
-            self._descend(value)
+            about = self.model.policy, processing, some, self._scenario.cost.delta_x, config.step_cost
+            if config.estimator == "ppo":
+                self._learn_from_costs(about, math.exp(config.log_std_of(number)))
+                with torch.no_grad():
+                    value = loss(*about)
+            else:
+                value = loss(*about)
+                self._descend(value)
             losses.append(value.item())
         return {"train/loss": float(np.mean(losses))}
+
+    def _learn_from_costs(self, about: Any, std: float) -> None:
+        """Gradient steps of PPO on some episodes.
+
+        Args:
+            about: Network, processing, episodes and costs, as :func:`explored` takes them.
+            std: Standard deviation of what the network says.
+        """
+        config = self._config
+        rollout = explored(*about, std=std, group_size=config.group_size, gamma=config.gamma)
+        for _ in range(config.n_epochs):
+            self._descend(surrogate(self.model.policy, rollout, std, config.clip_range))
 
     def score(self, episodes: int) -> Score:
         """Of the agent on the scenario's own plant."""

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from stable_baselines3.common.callbacks import BaseCallback
 from torch import Tensor
 
+from baselines.training.groups import beside_the_others
 from ikgym.exceptions import InvalidInputError
 
 
@@ -90,16 +91,3 @@ class CriticEpochs(BaseCallback):
             self._optimizer.zero_grad()
             loss.backward()
             self._optimizer.step()
-
-
-def beside_the_others(advantages: NDArray[np.float32], group_size: int) -> NDArray[np.float32]:
-    """Advantages, each less the mean of those of the other arms of its group at the same time.
-
-    Args:
-        advantages: Shape (T, N), the arms of a group one after the other.
-        group_size: At least 2.
-    """
-    groups = advantages.reshape(len(advantages), -1, group_size)
-    beside = (groups - groups.mean(axis=2, keepdims=True)) * (group_size / (group_size - 1))
-    out: NDArray[np.float32] = beside.reshape(advantages.shape).astype(np.float32)
-    return out

@@ -7,8 +7,9 @@ import json
 import pytest
 
 from baselines.training import presets
-from baselines.training.config.actor_only import APG, Observe
+from baselines.training.config.actor_only import APG
 from baselines.training.config.base import Config, JointVelocities, differences
+from baselines.training.config.observe import Observe
 from baselines.training.config.off_policy import SAC, TD3
 from baselines.training.config.ppo import PPO
 from baselines.training.methods import METHODS, get

@@ -8,7 +8,7 @@ import torch
 
 import baselines
 from baselines.agents.recurrent.files import load_recurrent
-from baselines.training.config.actor_only import Observe
+from baselines.training.config.observe import Observe
 from baselines.training.randomness import deterministic_torch
 from baselines.training.run import train
 from baselines.training.trainers.models import weights_hash
@@ -28,12 +28,14 @@ def one_thread():
         yield
 
 
-def test_a_segment_follows_from_state_and_number(tmp_path):
-    undisturbed = made(TINY)
+@pytest.mark.parametrize("estimator", ["analytic", "ppo"])
+def test_a_segment_follows_from_state_and_number(tmp_path, estimator):
+    config = TINY.replace(estimator=estimator)
+    undisturbed = made(config)
     play_segments(undisturbed, [0])
     torch.save(undisturbed.state(), tmp_path / "state.pt")
     wanted = play_segments(undisturbed, [1, 2])
-    other = made(TINY)
+    other = made(config)
     other.restore(torch.load(tmp_path / "state.pt", weights_only=True))
     assert play_segments(other, [1, 2]) == wanted
     assert weights_hash(other.model) == weights_hash(undisturbed.model)
@@ -53,10 +55,11 @@ def test_a_run_repeats_and_its_agent_plays(tmp_path):
 
 
 @pytest.mark.slow
-def test_it_learns():
+@pytest.mark.parametrize("estimator", ["analytic", "ppo"])
+def test_it_learns(estimator):
     """Exact sensors and a payload: the network finds out that they are to be believed, and arms change."""
     config = TINY.replace(hidden=(12,), n_envs=16, plants=8, measurements=8, gradient_steps=10, batch_size=16)
-    trainer = made(config)
+    trainer = made(config.replace(estimator=estimator))
     before, *_, after = play_segments(trainer, range(4))
     assert after["train/loss"] < before["train/loss"] - 0.1
     assert np.isfinite(after["train/loss"])
@@ -72,6 +75,10 @@ def test_it_learns():
         ({"measurements": 1}, "measurements: expected a whole number of at least 2"),
         ({"batch_size": 7}, "batch_size: expected a whole number from 1 to 6"),
         ({"step_cost": 0.0}, "step_cost"),
+        ({"gamma": 0.9}, "gamma: expected 0.95 for an estimator that is analytic, got 0.9"),
+        ({"estimator": "ppo", "group_size": 1}, "group_size: expected a whole number of at least 2, got 1"),
+        ({"estimator": "ppo", "gamma": 0.0}, "gamma"),
+        ({"estimator": "ppo", "log_std_end": 3.0}, "log_std_end: expected a number from -20 to 2, got 3"),
     ],
 )
 def test_refused(values, message):
@@ -82,6 +89,11 @@ def test_refused(values, message):
 def test_a_base_policy_has_to_be_one():
     with pytest.raises(UnknownNameError, match="dls"):
         made(TINY.replace(base_policy="dlss")).score(1)
+
+
+def test_an_estimator_has_to_be_one():
+    with pytest.raises(UnknownNameError, match="estimator 'pppo'. Did you mean 'ppo'"):
+        TINY.replace(estimator="pppo")
 
 
 def test_poses_have_to_be_whole():

@@ -14,7 +14,7 @@ from baselines.agents.shipped import FOLDER
 from baselines.episode import Draw
 from baselines.evaluation.rollout import rollout, rollouts, sequence
 from baselines.files import ResultsError
-from baselines.training.config.actor_only import Observe
+from baselines.training.config.observe import Observe
 from ikgym.exceptions import InvalidInputError
 from tests.baselines.agents.recurrent.recurrent_agents import PROCESSING, SIZES, constant, drawn, made
 

@@ -1,0 +1,143 @@
+"""PPO of agents with memory: they learn from what estimates cost, and no gradient goes through the filter.
+
+The network says something at each measurement, with noise. Each episode is gone through several times, a group, in
+which the noise alone differs: beside the others of its group an advantage is due to what was said (leave-one-out
+baseline, Kool et al. 2019), so that no critic is needed.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import torch
+from torch import Tensor
+from torch.distributions import Normal
+
+from baselines.agents.recurrent.processing import Recurrent
+from baselines.training.groups import beside_the_others
+from baselines.training.memory.episodes import Measurements, taken
+from baselines.training.memory.filter import Gated, costs
+
+#: Added to the variance of advantages, by whose root they are divided.
+LITTLE = 1e-8
+
+
+class Rollout(NamedTuple):
+    """What was seen and said in B episodes, and what came of it. T is one less than the measurements of an episode.
+
+    Attributes:
+        features: Shape (B, T, f).
+        outputs: What was said. Shape (B, T, o).
+        arrived: Whether there was a measurement that it was said of. Shape (B, T).
+        log_prob: Of what was said, when it was said. Shape (B, T).
+        advantages: Shape (B, T).
+    """
+
+    features: Tensor
+    outputs: Tensor
+    arrived: Tensor
+    log_prob: Tensor
+    advantages: Tensor
+
+
+class Exploring:
+    """A network that says what it would say with noise, and keeps what it has seen and said.
+
+    Args:
+        network: Stays as it is.
+        std: Standard deviation of the noise.
+    """
+
+    def __init__(self, network: Gated, std: float) -> None:
+        self._network, self._std = network, std
+        self.seen: list[Tensor] = []
+        self.means: list[Tensor] = []
+        self.said: list[Tensor] = []
+
+    @property
+    def dtype(self) -> torch.dtype:
+        """Of what it is shown."""
+        return self._network.dtype
+
+    def start(self, rows: int) -> list[Tensor]:
+        """See :class:`Gated`."""
+        return self._network.start(rows)
+
+    def __call__(self, x: Tensor, hidden: list[Tensor], /) -> tuple[Tensor, list[Tensor]]:
+        """See :class:`Gated`."""
+        mean, after = self._network(x, hidden)
+        said = mean + self._std * torch.randn_like(mean)
+        for kept, part in ((self.seen, x), (self.means, mean), (self.said, said)):
+            kept.append(part)
+        return said, after
+
+
+def explored(
+    network: Gated,
+    processing: Recurrent,
+    measured: Measurements,
+    delta_x: float,
+    floor: float,
+    *,
+    std: float,
+    group_size: int,
+    gamma: float,
+) -> Rollout:
+    """Goes through episodes, each as often as a group has members.
+
+    Rewards are what estimates cost, ÷ what the episode costs in the mean of its group, so that in the sum the logarithm
+    of the costs of episodes is minimised, as by :func:`baselines.training.memory.filter.loss`.
+
+    Args:
+        network: Says what measurements are worth.
+        processing: What the filter begins with.
+        measured: The episodes.
+        delta_x: The error that costs 1 a step.
+        floor: What a step costs where nothing is off.
+        std: Standard deviation of what is said.
+        group_size: At least 2.
+        gamma: Discount factor, from one measurement to the next.
+    """
+    again = taken(measured, torch.arange(len(measured.arrived)).repeat_interleave(group_size))
+    exploring = Exploring(network, std)
+    with torch.no_grad():
+        spent = costs(exploring, processing, again, delta_x)
+        usual = spent.mean(1).reshape(-1, group_size).mean(1).repeat_interleave(group_size) + floor
+        features, means, outputs = (torch.stack(x[:-1], 1) for x in (exploring.seen, exploring.means, exploring.said))
+        log_prob = _log_prob(outputs, means, std)
+        returns = -(spent / usual[:, None])
+        for k in range(returns.shape[1] - 2, -1, -1):
+            returns[:, k] += gamma * returns[:, k + 1]
+    beside = beside_the_others(returns.T.numpy().astype(np.float32), group_size)
+    advantages = torch.from_numpy(np.ascontiguousarray(beside.T))
+    return Rollout(features, outputs, again.arrived[:, :-1], log_prob, advantages)
+
+
+def surrogate(network: Gated, rollout: Rollout, std: float, clip_range: float) -> Tensor:
+    """The clipped objective of PPO, which is minimised (Schulman et al. 2017, eq. 7, with its sign turned).
+
+    Args:
+        network: Is trained.
+        rollout: What :func:`explored` gave.
+        std: Standard deviation of what is said.
+        clip_range: How far the ratio of probabilities may go from 1.
+    """
+    features, outputs, arrived, log_prob, advantages = rollout
+    hidden, means = network.start(len(features)), []
+    for k in range(features.shape[1]):
+        mean, fresh = network(features[:, k], hidden)
+        means.append(mean)
+        hidden = [torch.where(arrived[:, k, None], new, old) for new, old in zip(fresh, hidden, strict=True)]
+    ratio = (_log_prob(outputs, torch.stack(means, 1), std) - log_prob).exp()
+    scaled = advantages / (advantages[arrived].square().mean() + LITTLE).sqrt()
+    least = torch.minimum(ratio * scaled, ratio.clamp(1.0 - clip_range, 1.0 + clip_range) * scaled)
+    out: Tensor = -least[arrived].mean()
+    return out
+
+
+def _log_prob(outputs: Tensor, means: Tensor, std: float) -> Tensor:
+    """Of what is said at each measurement. Shape (B, T)."""
+    noise: Any = Normal(means, std)
+    out: Tensor = noise.log_prob(outputs).sum(2)
+    return out
