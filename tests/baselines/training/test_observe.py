@@ -92,7 +92,7 @@ def test_a_base_policy_has_to_be_one():
 
 
 def test_an_estimator_has_to_be_one():
-    with pytest.raises(UnknownNameError, match="estimator 'pppo'. Did you mean 'ppo'"):
+    with pytest.raises(UnknownNameError, match=r"estimator 'pppo'\. Did you mean 'ppo'\?"):
         TINY.replace(estimator="pppo")
 
 

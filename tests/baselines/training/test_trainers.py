@@ -9,9 +9,9 @@ import pytest
 import torch
 
 from baselines.training import methods
+from baselines.training.groups import beside_the_others
 from baselines.training.randomness import deterministic_torch, episode_seed, reseed
 from baselines.training.trainers.models import algorithm_of, mean_network, network_outputs, weights_hash
-from baselines.training.groups import beside_the_others
 from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError
 from tests.baselines.training.segments import made, play_segments
