@@ -47,13 +47,13 @@ def renewed(
     chosen = [known[label] for label in dict.fromkeys(labels)]
     if not comparable(measurement):
         chosen = [dataclasses.replace(entry, timed=0) for entry in chosen]
-    renewals = [dataclasses.replace(one, labels=tuple(set(one.labels) - set(labels))) for one in measurement.renewals]
+    sections = with_lines(measurement, chosen, out, **options)
+    renewals = []
+    for one in measurement.renewals:
+        if left := tuple(label for label in one.labels if label not in labels):
+            renewals.append(dataclasses.replace(one, labels=left))
     own = Renewal(tuple(entry.label for entry in chosen), command, date)
-    return dataclasses.replace(
-        measurement,
-        sections=with_lines(measurement, chosen, out, **options),
-        renewals=(*(one for one in renewals if one.labels), own),
-    )
+    return dataclasses.replace(measurement, sections=sections, renewals=(*renewals, own))
 
 
 def comparable(measurement: Measurement) -> bool:
