@@ -44,7 +44,7 @@ class ShippedAgent(LearnedPolicy):
 class AgentAlone(ShippedAgent):
     """Learned agent that stands alone, trained on `varga7-random` by apg."""
 
-    hash: str = "60af3a9d70c8"
+    hash: str = "25357e60147d"
 
     name: ClassVar[str] = "agent_alone"
 
