@@ -48,12 +48,13 @@ def renewed(
     if not comparable(measurement):
         chosen = [dataclasses.replace(entry, timed=0) for entry in chosen]
     sections = with_lines(measurement, chosen, out, **options)
-    renewals = []
-    for one in measurement.renewals:
-        if left := tuple(label for label in one.labels if label not in labels):
-            renewals.append(dataclasses.replace(one, labels=left))
+    before = (
+        dataclasses.replace(one, labels=tuple(label for label in one.labels if label not in labels))
+        for one in measurement.renewals
+    )
     own = Renewal(tuple(entry.label for entry in chosen), command, date)
-    return dataclasses.replace(measurement, sections=sections, renewals=(*renewals, own))
+    renewals = *(one for one in before if one.labels), own
+    return dataclasses.replace(measurement, sections=sections, renewals=renewals)
 
 
 def comparable(measurement: Measurement) -> bool:
