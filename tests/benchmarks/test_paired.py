@@ -91,4 +91,7 @@ def test_pages_say_how_much_less_quick_agents_cost(file):
     text = " ".join((DOCS.parent / file).read_text(encoding="utf-8").split())
     less = {label.split(":")[0]: 100.0 * -np.expm1(mean["agents"] - own) for label, own in mean.items()}
     assert f"cost {less['dls']:.0f} % less than tuned damped least squares" in text
+    long = json.loads((DOCS / "agents_long.json").read_text())["played"]
+    hour = np.mean(np.log(long["agents"]["costs"])) - np.mean(np.log(long["dls:gain=0.15,damping=0.01"]["costs"]))
+    assert file != "README.md" or f"one of an hour {-100.0 * np.expm1(hour):.0f} % less" in text
     assert file == "README.md" or f"and {less['rhc']:.0f} % less than a receding horizon of 3" in text

@@ -38,6 +38,12 @@ def spread_steps(scenario: Scenario, rows: int, every: int = 1) -> Indices:
     return np.arange(rows) * (scenario.steps // every) // rows * every
 
 
+def drawn_seeds(generator: np.random.Generator, count: int) -> Indices:
+    """Reset seeds of new episodes of the split `train`. Shape (count,)."""
+    train = scenarios.SPLITS["train"]
+    return generator.integers(train.start, train.stop, count)
+
+
 class Arms:
     """N arms, each in an episode of its own, and the reference trajectories of these.
 
@@ -139,8 +145,7 @@ class Arms:
             at: See :meth:`begin`; their beginnings if left out. Shape (R,).
             group_size: Arms that get the same seed, one after the other; R is a multiple.
         """
-        train = scenarios.SPLITS["train"]
-        seeds = generator.integers(train.start, train.stop, len(rows) // group_size).repeat(group_size)
+        seeds = drawn_seeds(generator, len(rows) // group_size).repeat(group_size)
         self.begin(rows, seeds, np.zeros(len(rows), dtype=np.int64) if at is None else at)
 
     def spread(self, generator: np.random.Generator, every: int = 1, group_size: int = 1) -> None:

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 import torch
 
-from baselines.training.gradients.arms import Arms, Indices
-from ikgym import scenarios
+from baselines.training.gradients.arms import Arms, Indices, drawn_seeds
 from ikgym.rl.twists import twist_size
 from ikgym.scenarios import Scenario
 
@@ -64,8 +63,7 @@ class Starts:
             rows: Those that begin one. Shape (R,).
             generator: Draws episodes and starts; what is off draws nothing.
         """
-        train = scenarios.SPLITS["train"]
-        seeds, at = generator.integers(train.start, train.stop, len(rows)), np.zeros(len(rows), dtype=np.int64)
+        seeds, at = drawn_seeds(generator, len(rows)), np.zeros(len(rows), dtype=np.int64)
         if self._replay_share > 0.0 and self._costs:
             again = generator.random(len(rows)) < self._replay_share
             seeds = np.where(again, self._costly(len(rows), generator), seeds)
