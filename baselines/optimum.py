@@ -13,7 +13,7 @@ import tyro
 from tqdm import tqdm
 
 from baselines import command
-from baselines.episode import Draw
+from baselines.episodes import Draw
 from baselines.evaluation import test_sets as known_sets
 from baselines.oracle import best_known
 from baselines.oracle.best_known import MARGIN, MEANINGLESS

@@ -16,10 +16,9 @@ import numpy as np
 from tqdm import tqdm
 
 from baselines import registry
-from baselines.episode import Draw
+from baselines.episodes import Draw, rollouts
 from baselines.evaluation import test_sets
 from baselines.evaluation.pages.statistics import geometric_interval
-from baselines.evaluation.rollout import rollouts
 from baselines.files import write
 from baselines.oracle import best_known
 from baselines.policy import SolverPolicy

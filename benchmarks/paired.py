@@ -18,12 +18,12 @@ import tyro
 from tqdm import tqdm
 
 from baselines import registry
+from baselines.episodes import rollouts
 from baselines.evaluation.metrics import lost
 from baselines.evaluation.pages import entries
 from baselines.evaluation.pages.claims import Comparison
 from baselines.evaluation.pages.markdown import table
 from baselines.evaluation.report import number
-from baselines.evaluation.rollout import rollouts
 from baselines.files import json_files, write
 from baselines.policy import SolverPolicy
 from baselines.spec import parse_policy

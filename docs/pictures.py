@@ -11,8 +11,8 @@ from matplotlib.ticker import MaxNLocator
 
 import baselines
 import ikgym
+from baselines.episodes import rollout
 from baselines.evaluation.plots import style
-from baselines.evaluation.rollout import rollout
 from baselines.files import write
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray

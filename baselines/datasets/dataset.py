@@ -22,7 +22,7 @@ from tqdm import tqdm
 
 from baselines.datasets.folder import Folder
 from baselines.datasets.record import Block, blocks, record
-from baselines.episode import added_up
+from baselines.episodes import added_up
 from baselines.evaluation.entrants import AnyPolicy
 from baselines.evaluation.machine import describe
 from baselines.evaluation.plan import Job, make_plan

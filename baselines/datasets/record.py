@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from baselines.episode import play
+from baselines.episodes import TICK, Player, Tick, finite, play
 from baselines.evaluation.entrants import ForeignPolicy
 from baselines.evaluation.plan import Job
-from baselines.evaluation.rollout import TICK, Player, Tick, finite
 from ikgym.outcome import Outcome, observation
 from ikgym.preview import offsets
 
@@ -39,7 +38,7 @@ def record(jobs: Sequence[Job], tick: Tick | None = None) -> Block:
 
     Args:
         jobs: One an episode.
-        tick: See :data:`baselines.evaluation.rollout.Tick`.
+        tick: See :data:`baselines.episodes.Tick`.
 
     Returns:
         `observations/KEY` of shape (N, steps + 1, …), the first one that of the reset; `actions` (N, steps, n) as

@@ -12,8 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from baselines.episode import Draw
-from baselines.evaluation.rollout import Episode
+from baselines.episodes import Draw, Episode
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray, known_names
 

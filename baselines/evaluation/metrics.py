@@ -11,8 +11,7 @@ from typing import Any, Self
 import numpy as np
 
 from baselines.canonical import canonical
-from baselines.episode import Draw, added_up
-from baselines.evaluation.rollout import Episode
+from baselines.episodes import Draw, Episode, added_up
 from baselines.files.json_files import JsonError, made, shown
 from baselines.status import Status
 from ikgym.arms import Arm

@@ -7,11 +7,10 @@ import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Literal, Self
 
-from baselines.episode import Draw
+from baselines.episodes import Draw, Player
 from baselines.evaluation import metrics
 from baselines.evaluation import test_sets as known_sets
 from baselines.evaluation.entrants import ALL, AnyPolicy, Entrant, Wrap, entrants
-from baselines.evaluation.rollout import Player
 from baselines.files import ResultsError
 from baselines.fingerprints import fingerprint
 from baselines.oracle.stripped import ideal
@@ -40,7 +39,7 @@ class Job:
         test_set: The digest of the test set that it belongs to, None where to none.
         exported: Whether its joint motion is kept.
         arm_seed: Which arm moves; the seed's own if it is None.
-        noise_seed: Which noise there is in sensors and drives, see :class:`baselines.episode.Draw`.
+        noise_seed: Which noise there is in sensors and drives, see :class:`baselines.episodes.Draw`.
         before: Reset seeds of the episodes that the arm plays before, and whose last state the policy is handed.
         ideal: The fingerprint of the scenario with an ideal plant.
     """

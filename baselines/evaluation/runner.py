@@ -11,13 +11,12 @@ from typing import Any
 from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
-from baselines.episode import Draw
+from baselines.episodes import Draw, Episode, Player, Tick, rollout, rollouts, sequence
 from baselines.evaluation.entrants import ForeignPolicy, check_sendable, play_wrapped
 from baselines.evaluation.export import Motion
 from baselines.evaluation.machine import describe
 from baselines.evaluation.metrics import Row, measure
 from baselines.evaluation.plan import Job
-from baselines.evaluation.rollout import Episode, Player, Tick, rollout, rollouts, sequence
 from baselines.evaluation.trajectory_log import trajectory_log
 from baselines.evaluation.units import BLOCK, Checks, Done, Played, Unit, processor, units
 from baselines.oracle import best_known
@@ -161,7 +160,7 @@ def play(batch: Sequence[Job], tick: Tick | None = None) -> list[Played]:
 
     Args:
         batch: The jobs.
-        tick: See :data:`baselines.evaluation.rollout.Tick`.
+        tick: See :data:`baselines.episodes.Tick`.
     """
     first, draws = batch[0], [job.draw for job in batch]
     # The matrices of one arm are too small to share out, and threads would blur the times. Environment variables
@@ -220,7 +219,7 @@ def play_episodes(
         draws: The reset seeds, or what is drawn how; of what is timed, one.
         preview: What the policy is shown.
         timed: Whether to keep the times of single calls.
-        tick: See :data:`baselines.evaluation.rollout.Tick`.
+        tick: See :data:`baselines.episodes.Tick`.
 
     Raises:
         InvalidInputError: The policy refuses what it is shown, or chooses no action.

@@ -12,11 +12,10 @@ import numpy.typing as npt
 from matplotlib.figure import Figure
 from threadpoolctl import threadpool_limits
 
-from baselines.episode import Draw, added_up
+from baselines.episodes import Draw, Episode, added_up
 from baselines.evaluation.entrants import AnyPolicy, Wrap, entrant
 from baselines.evaluation.export import Motion, message, table
 from baselines.evaluation.plots import tracking as picture
-from baselines.evaluation.rollout import Episode
 from baselines.evaluation.runner import play_episodes
 from baselines.evaluation.trajectory_log import trajectory_log
 from baselines.files import write

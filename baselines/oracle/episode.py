@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium.utils import seeding
 
-from baselines.episode import added_up, play
+from baselines.episodes import added_up, play
 from baselines.policy import Memory, SolverPolicy
 from baselines.solvers.receding_horizon.newton.grid import Grid
 from baselines.solvers.receding_horizon.newton.workspace import PathProblem

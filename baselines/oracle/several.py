@@ -8,7 +8,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 
 from baselines import registry
-from baselines.episode import Draw
+from baselines.episodes import Draw
 from baselines.oracle.best_known import MEANINGLESS
 from baselines.oracle.cache import keep, kept, solve
 from baselines.oracle.episode import EpisodeProblem, path_of

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from stable_baselines3.common.callbacks import BaseCallback
 
-from baselines.episode import Draw, added_up
+from baselines.episodes import Draw, added_up
 from baselines.evaluation.entrants import Wrap, entrant
 from baselines.evaluation.runner import play_episodes
 from baselines.evaluation.summary import geometric_mean

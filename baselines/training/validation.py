@@ -21,10 +21,9 @@ import tyro
 from baselines import registry
 from baselines.agents.features import Features
 from baselines.agents.protocols import Transform
-from baselines.episode import Act, added_up
-from baselines.episode import play as play_episodes
+from baselines.episodes import Act, added_up, rollouts
+from baselines.episodes import play as play_episodes
 from baselines.evaluation.metrics import lost
-from baselines.evaluation.rollout import rollouts
 from baselines.evaluation.summary import geometric_mean
 from baselines.files import write
 from baselines.fingerprints import fingerprint
@@ -101,7 +100,7 @@ def score_of(
 
 
 def play(actor: Actor, processing: Transform, scenario: Scenario, seeds: Sequence[int]) -> tuple[FloatArray, ...]:
-    """Plays episodes in step, as :func:`baselines.evaluation.rollout.rollouts` does.
+    """Plays episodes in step, as :func:`baselines.episodes.rollouts` does.
 
     Args:
         actor: The agent's.

@@ -15,9 +15,8 @@ from optuna.trial import FrozenTrial, Trial
 
 from baselines import registry
 from baselines.canonical import DIGITS, canonical, jsonable, rounded
-from baselines.episode import added_up
+from baselines.episodes import added_up, rollouts
 from baselines.evaluation.pages.tuning import EPISODES, SPLIT, Tuned, Tuning
-from baselines.evaluation.rollout import rollouts
 from baselines.evaluation.summary import geometric_mean
 from baselines.fingerprints import fingerprint
 from baselines.spec import parse_policy

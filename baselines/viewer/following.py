@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from baselines.controller import Controller
-from baselines.episode import Draw
+from baselines.episodes import Draw
 from baselines.evaluation.entrants import entrant
 from baselines.policy import SolverPolicy
 from baselines.status import Status

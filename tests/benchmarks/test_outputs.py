@@ -12,8 +12,8 @@ import baselines
 from baselines.agents.bilinear.damped_kernels import with_matrix
 from baselines.agents.bilinear.processing import Bilinear
 from baselines.agents.files import save_agent
+from baselines.episodes import rollouts
 from baselines.evaluation.pages.claims import Comparison
-from baselines.evaluation.rollout import rollouts
 from baselines.policy import Problem
 from benchmarks import outputs
 from ikgym import scenarios

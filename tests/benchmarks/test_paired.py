@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import baselines
+from baselines.episodes import rollouts
 from baselines.evaluation.pages.claims import Comparison
-from baselines.evaluation.rollout import rollouts
 from benchmarks import paired
 from ikgym import scenarios
 from ikgym.exceptions import UnknownNameError

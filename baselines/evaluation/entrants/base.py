@@ -7,8 +7,7 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Any
 
-from baselines.episode import Draw
-from baselines.evaluation.rollout import Player
+from baselines.episodes import Draw, Player
 from ikgym.exceptions import InvalidInputError
 from ikgym.preview import offsets
 from ikgym.scenarios import Preview, Scenario

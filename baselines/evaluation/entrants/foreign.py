@@ -12,8 +12,7 @@ import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
 
-from baselines.episode import Draw
-from baselines.evaluation.rollout import Episode, Tick, finite
+from baselines.episodes import Draw, Episode, Tick, finite
 from baselines.policy import Memory, Operations, Report
 from baselines.status import Status
 from ikgym.env import RedundantIKEnv
@@ -211,7 +210,7 @@ def play_wrapped(
         policy: Who tracks it, with a `wrap`.
         seed: The reset seed, or what is drawn how, as far as a reset without options can say it.
         timed: Whether to keep the times of the calls.
-        tick: See :data:`baselines.evaluation.rollout.Tick`.
+        tick: See :data:`baselines.episodes.Tick`.
 
     Raises:
         InvalidInputError: The environment cannot be wrapped, the episode ends early, or an action is refused.

@@ -9,11 +9,10 @@ from typing import Any, cast
 
 from baselines import registry
 from baselines.canonical import jsonable
-from baselines.episode import Draw
+from baselines.episodes import Draw, Player
 from baselines.evaluation.entrants.base import Entrant, covering
 from baselines.evaluation.entrants.foreign import ForeignPolicy, Predictor, Wrap
 from baselines.evaluation.entrants.solvers import InstanceEntrant
-from baselines.evaluation.rollout import Player
 from baselines.policy import SolverPolicy
 from ikgym.exceptions import InvalidInputError
 from ikgym.preview import offsets

@@ -7,9 +7,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from baselines.canonical import jsonable
-from baselines.episode import Draw
+from baselines.episodes import Draw, Player
 from baselines.evaluation.entrants.base import Entrant, covering
-from baselines.evaluation.rollout import Player
 from baselines.fingerprints import same
 from baselines.policy import Problem, SolverPolicy
 from ikgym.exceptions import InvalidInputError, MissingDependencyError

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from baselines.evaluation.rollout import Episode
+from baselines.episodes import Episode
 from baselines.papers.runs import Runs
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario

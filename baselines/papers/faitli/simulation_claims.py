@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from baselines.evaluation.rollout import Episode
+from baselines.episodes import Episode
 from baselines.papers.faitli.episodes import (
     REGULAR,
     SHOULDER,

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from baselines.evaluation.rollout import Episode
+from baselines.episodes import Episode
 from baselines.papers.paper import rms
 from baselines.papers.runs import Runs
 from ikgym.rotations import rotation_vector

@@ -6,7 +6,7 @@ import time
 
 import numpy as np
 
-from baselines.evaluation.rollout import Episode
+from baselines.episodes import Episode
 from baselines.papers.paper import Finding, verdict, verdict_by_condition
 from baselines.papers.runs import Runs
 from baselines.papers.varga.episodes import (

@@ -6,7 +6,7 @@ import itertools
 
 import numpy as np
 
-from baselines.evaluation.rollout import Episode
+from baselines.episodes import Episode
 from baselines.papers.paper import roughness
 from baselines.papers.runs import Runs
 from baselines.status import Status

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from baselines.evaluation.rollout import Episode
+from baselines.episodes import Episode
 from baselines.papers.drawing import Curve, Panel, picture
 from baselines.papers.paper import Drawn, PaperFigure, rms, roughness
 from baselines.papers.runs import Runs

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from baselines.evaluation.rollout import rollout
+from baselines.episodes import rollout
 from baselines.papers.paper import Claim, Finding, verdict
 from baselines.papers.runs import Runs
 from baselines.papers.zhang.episodes import HELIX, constant, jacobians_used, listed, predictive, settled_from

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from baselines.evaluation.rollout import Episode
+from baselines.episodes import Episode
 from baselines.papers.runs import Runs
 from baselines.solvers.levenberg_marquardt.presets import HelixPredictiveControl
 from ikgym.scenarios import Scenario

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from baselines.evaluation.rollout import Episode
+from baselines.episodes import Episode
 from baselines.papers.paper import Claim, Finding, roughness
 from baselines.papers.runs import Runs
 from baselines.papers.zhang.comparing import falls, in_words

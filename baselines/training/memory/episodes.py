@@ -13,7 +13,7 @@ from torch import Tensor
 
 from baselines.agents.recurrent.kernels import linearise
 from baselines.agents.recurrent.processing import Recurrent
-from baselines.episode import play
+from baselines.episodes import play
 from ikgym.exceptions import InvalidInputError
 from ikgym.jit import kernel
 from ikgym.plant import Plant

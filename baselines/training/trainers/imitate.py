@@ -10,8 +10,8 @@ import torch
 from torch import Tensor
 
 from baselines import registry
-from baselines.episode import added_up
-from baselines.episode import play as play_episodes
+from baselines.episodes import added_up
+from baselines.episodes import play as play_episodes
 from baselines.policy import Memory
 from baselines.spec import parse_policy
 from baselines.training.config.actor_only import Imitate

@@ -11,7 +11,7 @@ from baselines.agents.bilinear.processing import Bilinear
 from baselines.agents.bounds import Bounds
 from baselines.agents.files import save_agent
 from baselines.agents.network import Network
-from baselines.evaluation.rollout import rollouts
+from baselines.episodes import rollouts
 from baselines.policy import Batch, Problem
 from baselines.solvers.quadratic_program.limits import limits_with_braking
 from baselines.solvers.quadratic_program.velocity_box import velocity_box

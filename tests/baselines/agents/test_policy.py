@@ -23,8 +23,8 @@ from baselines.agents.features import Processing
 from baselines.agents.files import load_agent, save_agent
 from baselines.agents.policy import Agent
 from baselines.agents.recurrent.policy import SHIPPED
+from baselines.episodes import rollout, rollouts
 from baselines.evaluation.plan import make_plan
-from baselines.evaluation.rollout import rollout, rollouts
 from baselines.files import ResultsError
 from baselines.policy import Problem
 from baselines.spec import parse_policy

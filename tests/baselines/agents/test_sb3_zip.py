@@ -27,8 +27,8 @@ from baselines.agents.features import Processing
 from baselines.agents.files import load_agent
 from baselines.agents.sb3_network import network_of
 from baselines.agents.sb3_zip import export_model, save_zip
+from baselines.episodes import rollout
 from baselines.evaluate import evaluate
-from baselines.evaluation.rollout import rollout
 from baselines.files import ResultsError
 from baselines.policy import Problem
 from ikgym.exceptions import InvalidInputError

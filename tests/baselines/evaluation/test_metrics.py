@@ -10,9 +10,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 import baselines
 import ikgym
 from baselines.canonical import jsonable
+from baselines.episodes import Episode, rollout
 from baselines.evaluate import evaluate
 from baselines.evaluation.metrics import TIME_COLUMNS, Row, lost, measure
-from baselines.evaluation.rollout import Episode, rollout
 from baselines.evaluation.summary import Spread, geometric_mean, summarise
 from baselines.policy import Operations
 from baselines.status import Status

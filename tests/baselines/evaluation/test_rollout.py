@@ -6,7 +6,7 @@ import pytest
 
 import baselines
 import ikgym
-from baselines.evaluation.rollout import rollout, rollouts
+from baselines.episodes import rollout, rollouts
 from baselines.registry import get
 from baselines.status import Status
 from baselines.wrapper import Wrapper

@@ -10,11 +10,10 @@ import pytest
 
 import baselines
 import ikgym
-from baselines.episode import Draw
+from baselines.episodes import Draw, rollout, sequence
 from baselines.evaluate import evaluate
 from baselines.evaluation import test_sets
 from baselines.evaluation.plan import make_plan
-from baselines.evaluation.rollout import rollout, sequence
 from baselines.evaluation.runner import play
 from baselines.evaluation.units import units
 from baselines.policy import Solution, SolverPolicy, statuses

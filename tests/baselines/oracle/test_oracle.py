@@ -9,9 +9,9 @@ from numpy.testing import assert_allclose
 import baselines
 import ikgym
 from baselines import optimum as optimum_command
+from baselines.episodes import rollout
 from baselines.evaluate import evaluate
 from baselines.evaluation import test_sets
-from baselines.evaluation.rollout import rollout
 from baselines.fingerprints import episode_hash
 from baselines.oracle import Optimum, Search, Start, best_known, cache, local_search, solve
 from baselines.oracle.episode import EpisodeProblem

@@ -6,7 +6,7 @@ import dataclasses
 
 import pytest
 
-from baselines.episode import Draw
+from baselines.episodes import Draw
 from baselines.oracle import Search, several
 from baselines.oracle.cache import kept
 from baselines.oracle.several import Wanted, find_all

@@ -9,7 +9,7 @@ import torch
 from baselines.agents.bilinear.processing import Bilinear
 from baselines.agents.files import load_agent, save_agent
 from baselines.agents.network import Network
-from baselines.episode import play as play_episodes
+from baselines.episodes import play as play_episodes
 from baselines.training.config.actor_only import APG, Imitate
 from baselines.training.environment.view import View
 from baselines.training.errors import TrainingError

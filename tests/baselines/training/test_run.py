@@ -13,7 +13,7 @@ from stable_baselines3 import PPO, SAC, TD3
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 import baselines
-from baselines.evaluation.rollout import rollouts
+from baselines.episodes import rollouts
 from baselines.files import ResultsError
 from baselines.training import checkpoint
 from baselines.training import run as run_module

@@ -9,7 +9,7 @@ import pytest
 
 import baselines
 from baselines.agents.features import Processing
-from baselines.evaluation.rollout import rollouts
+from baselines.episodes import rollouts
 from baselines.evaluation.summary import geometric_mean
 from baselines.fingerprints import fingerprint
 from baselines.spec import parse_policy

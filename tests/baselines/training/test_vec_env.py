@@ -10,7 +10,7 @@ from stable_baselines3.common.vec_env import VecCheckNan
 import baselines
 import ikgym
 from baselines.agents.features import Processing
-from baselines.evaluation.rollout import rollouts
+from baselines.episodes import rollouts
 from baselines.policy import Batch, Problem
 from baselines.spec import parse_policy
 from baselines.training.environment.vec_env import ProcessedVecEnv

@@ -12,8 +12,8 @@ from threadpoolctl import threadpool_limits
 
 from baselines import registry
 from baselines.canonical import one_line, with_list
+from baselines.episodes import rollout
 from baselines.evaluation.pages.elsewhere.followed import Followed, followed
-from baselines.evaluation.rollout import rollout
 from baselines.files import json_files, write
 from baselines.fingerprints import fingerprint
 from baselines.status import Status

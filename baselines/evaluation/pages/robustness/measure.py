@@ -10,7 +10,7 @@ from typing import Any
 
 from tqdm import tqdm
 
-from baselines.episode import Draw
+from baselines.episodes import Draw
 from baselines.evaluation.metrics import Row
 from baselines.evaluation.pages import measure
 from baselines.evaluation.pages.robustness.measured import Cell, Effect, Entry

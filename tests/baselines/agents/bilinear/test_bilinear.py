@@ -11,7 +11,7 @@ from baselines.agents.bilinear.kernels import feature_gradient_rows, feature_row
 from baselines.agents.bilinear.processing import Bilinear
 from baselines.agents.files import load_agent, save_agent
 from baselines.agents.network import Network
-from baselines.evaluation.rollout import rollouts
+from baselines.episodes import rollouts
 from baselines.policy import Batch, Problem
 from ikgym import arms, scenarios, tasks
 from ikgym.exceptions import InvalidInputError, UnknownNameError

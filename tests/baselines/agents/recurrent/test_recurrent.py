@@ -11,8 +11,7 @@ from baselines.agents.recurrent.files import load_recurrent, save_recurrent
 from baselines.agents.recurrent.network import GatedNetwork, shapes
 from baselines.agents.recurrent.policy import RecurrentPolicy
 from baselines.agents.shipped import FOLDER
-from baselines.episode import Draw
-from baselines.evaluation.rollout import rollout, rollouts, sequence
+from baselines.episodes import Draw, rollout, rollouts, sequence
 from baselines.files import ResultsError
 from baselines.training.config.observe import Observe
 from ikgym.exceptions import InvalidInputError

@@ -7,7 +7,7 @@ import pytest
 
 import baselines
 import ikgym
-from baselines.evaluation.rollout import rollout
+from baselines.episodes import rollout
 from baselines.status import Status
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 from tests.every_scenario import ONE_OF_EACH

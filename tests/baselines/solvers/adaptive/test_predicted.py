@@ -10,7 +10,7 @@ import pytest
 
 import baselines
 import ikgym
-from baselines.evaluation.rollout import rollouts
+from baselines.episodes import rollouts
 from baselines.solvers.adaptive.drives import Hypotheses, identify_rows, start_memory
 from ikgym.exceptions import InvalidInputError
 

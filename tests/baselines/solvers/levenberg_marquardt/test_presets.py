@@ -7,7 +7,7 @@ import pytest
 
 import baselines
 import ikgym
-from baselines.evaluation.rollout import rollout
+from baselines.episodes import rollout
 
 #: (44) of example 1, (59) of example 2.
 RULE_44 = {"rule": "threshold", "damping": 2.0, "growth": 1.1, "decay": 1.02, "threshold": 10.0, "carry": True}

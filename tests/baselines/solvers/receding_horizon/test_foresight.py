@@ -8,7 +8,7 @@ import pytest
 
 import baselines
 import ikgym
-from baselines.evaluation.rollout import rollouts
+from baselines.episodes import rollouts
 from ikgym.exceptions import InvalidInputError
 
 SCENARIO = "varga7-pose-random"

@@ -8,7 +8,7 @@ import pytest
 
 import baselines
 import ikgym
-from baselines.evaluation.rollout import rollout
+from baselines.episodes import rollout
 from baselines.solvers.receding_horizon import horizon as horizon_module
 from baselines.solvers.receding_horizon.horizon import (
     analytic_gradient,

@@ -7,7 +7,7 @@ import pytest
 
 import baselines
 import ikgym
-from baselines.evaluation.rollout import rollouts
+from baselines.episodes import rollouts
 from benchmarks.rivals.numpy_horizon import Horizon, beyond_limits, plan_cost
 from tests.baselines.solvers.receding_horizon.newton.interior_point.states import DT, KNOTS, horizon_of, problem_of
 from tests.baselines.solvers.receding_horizon.newton.interior_point.test_minimise import GOLDEN

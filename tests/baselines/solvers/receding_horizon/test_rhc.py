@@ -11,7 +11,7 @@ import pytest
 
 import baselines
 import ikgym
-from baselines.evaluation.rollout import rollout
+from baselines.episodes import rollout
 from baselines.policy import Problem
 from baselines.status import Status
 from benchmarks.rivals.casadi_horizon import OPTIONS, CasadiHorizon

@@ -7,9 +7,8 @@ import pytest
 
 import baselines
 import ikgym
-from baselines.episode import Draw
+from baselines.episodes import Draw, rollout
 from baselines.evaluation.report import is_reference
-from baselines.evaluation.rollout import rollout
 from ikgym import Plant
 from ikgym.exceptions import InvalidInputError
 

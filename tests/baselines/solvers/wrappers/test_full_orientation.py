@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import baselines
-from baselines.evaluation.rollout import rollout, rollouts
+from baselines.episodes import rollout, rollouts
 from baselines.policy import Batch, Problem
 from baselines.solvers.wrappers import orientation
 from baselines.solvers.wrappers.orientation import resolve_one

@@ -10,7 +10,7 @@ import pytest
 
 import baselines
 import ikgym
-from baselines.evaluation.rollout import rollouts
+from baselines.episodes import rollouts
 from baselines.solvers.receding_horizon.newton.cost import true_cost
 from baselines.solvers.receding_horizon.newton.pentadiagonal import pentadiagonal_step
 from baselines.solvers.receding_horizon.newton.rate import rate_cost
