@@ -1,4 +1,4 @@
-"""Environments as agents learn in them: all wrappers, in the order in which they belong."""
+"""Environments for learning: all wrappers in their order."""
 
 from __future__ import annotations
 
@@ -19,24 +19,23 @@ from ikgym.vector_env import RedundantIKVectorEnv
 class Learning(Frozen):
     """How an environment is wrapped for learning.
 
-    The defaults are for PPO of Stable-Baselines3 with its own defaults. With a lead of ten steps a joint within an
-    acceleration limit can follow what it is told, and with |v̂| cut at 5 an arm that is far off is not told to be there
-    at once. Noise of one standard deviation of 1 is as large as the velocity that is asked for: with less of it, what
-    one action has done is lost among the others. A track counts as lost soon, and the next episode begins on it: with
-    0.1 m most steps were far from the path, where nothing is learned of how to stay on it.
+    The defaults suit PPO of Stable-Baselines3 with its own defaults. With a lead of ten steps, a joint within its
+    acceleration limit can follow; with |v̂| clipped at 5, an arm that is far off returns gradually. Exploration noise
+    with a standard deviation of 1 is as large as the required velocity: with less, the effect of one action is lost
+    among those of the others. Episodes end at 0.01 m: at 0.1 m most steps were far from the path, where nothing is
+    learned about staying on it.
 
     Args:
-        preview: Steps ahead at which the reference is shown, at least two; the arm is to be at the first of them by
-            then.
+        preview: Steps ahead at which the reference is shown, at least two; the first one is the lead.
         lost_distance: Position error in [m] at which an episode ends; None for never.
         share: See :class:`ikgym.rl.RelativeAction`.
         largest: See there.
         furthest: See there.
         scale: See :class:`ikgym.rl.LogReward`.
         worst: See there.
-        history: How many observations are seen side by side, see :class:`ikgym.rl.History`.
-        commands: How many of the last commands are seen.
-        jacobian: Whether the Jacobian is seen, as the damped inverse of :mod:`baselines.training.policies` needs it.
+        history: Number of observations shown side by side, see :class:`ikgym.rl.History`.
+        commands: Number of past commands shown.
+        jacobian: Whether the Jacobian is shown.
     """
 
     preview: Preview = (10, 40, 100)
@@ -52,21 +51,21 @@ class Learning(Frozen):
 
     def arm(self, scenario: str | Scenario) -> gym.Env[Any, Any]:
         """One arm of a scenario, wrapped."""
-        env: gym.Env[Any, Any] = self._wrap(RedundantIKEnv(scenario, **self._shown()), wrappers)
+        env: gym.Env[Any, Any] = self._wrap(RedundantIKEnv(scenario, **self._arguments()), wrappers)
         return env
 
     def arms(self, scenario: str | Scenario, num_envs: int, autoreset_mode: str | AutoresetMode) -> Any:
         """N arms of a scenario, wrapped."""
         return self._wrap(
-            RedundantIKVectorEnv(num_envs, scenario, autoreset_mode=autoreset_mode, **self._shown()), vector
+            RedundantIKVectorEnv(num_envs, scenario, autoreset_mode=autoreset_mode, **self._arguments()), vector
         )
 
-    def _shown(self) -> dict[str, Any]:
-        """What the environment itself is made with."""
+    def _arguments(self) -> dict[str, Any]:
+        """Arguments of the environment."""
         return {"preview": self.preview, "commands": self.commands, "lost_distance": self.lost_distance}
 
     def _wrap(self, env: Any, kinds: Any) -> Any:
-        """An environment in the wrappers of a module."""
+        """The environment in the wrappers of a module, in their order."""
         env = kinds.RelativeAction(env, self.share, self.largest, self.furthest)
         env = kinds.LogReward(env, self.scale, self.worst)
         env = kinds.AgentObservation(env, self.furthest, self.jacobian)
@@ -77,8 +76,8 @@ def make(scenario: str | Scenario, **changes: Any) -> gym.Env[Any, Any]:
     """One arm, wrapped for learning.
 
     Args:
-        scenario: A scenario or what names one, see `ikgym.scenarios.find`.
-        changes: Fields of :class:`Learning` that are not as usual.
+        scenario: A scenario or its name, see `ikgym.scenarios.find`.
+        changes: Fields of :class:`Learning` that differ from their defaults.
 
     Raises:
         UnknownNameError: There is no such scenario or field.
@@ -97,10 +96,10 @@ def make_vec(
     """N arms, wrapped for learning and stepped by one kernel; bit for bit a `SyncVectorEnv` of :func:`make`.
 
     Args:
-        scenario: A scenario or what names one, see `ikgym.scenarios.find`.
+        scenario: A scenario or its name, see `ikgym.scenarios.find`.
         num_envs: N.
         autoreset_mode: A mode of Gymnasium, or its value such as ``"SameStep"``.
-        changes: Fields of :class:`Learning` that are not as usual.
+        changes: Fields of :class:`Learning` that differ from their defaults.
 
     Raises:
         UnknownNameError: There is no such scenario, mode or field.

@@ -145,8 +145,3 @@ def _jacobian_bound(scenario: Scenario) -> FloatArray:
 def due_size(space: spaces.Box) -> int:
     """w, of the twist that such features begin with; the share after it is the first of them that is not negative."""
     return int(np.argmax(space.low == 0.0))
-
-
-def batched(observation: Observation) -> Observation:
-    """An observation of one arm as that of one row."""
-    return {key: value[None] for key, value in observation.items()}

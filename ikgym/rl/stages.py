@@ -1,0 +1,159 @@
+"""The work of each wrapper on N rows; a single environment is one row."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from gymnasium import spaces
+
+from ikgym.exceptions import InvalidInputError
+from ikgym.rl.feature_kernels import log_rewards
+from ikgym.rl.view import FURTHEST, AgentView
+from ikgym.validation import BoolArray, FloatArray, number, shortened, whole_number
+
+
+class Stage:
+    """What one wrapper changes. This base changes nothing; each hook is overridden where needed.
+
+    Attributes:
+        observation_space: Space of one row's observation, None where it is that of the environment.
+        action_space: Space of one row's action, None where it is that of the environment.
+    """
+
+    observation_space: spaces.Box | None = None
+    action_space: spaces.Box | None = None
+
+    def observation(self, observation: Any, begun: BoolArray) -> Any:
+        """The observation of N rows.
+
+        Args:
+            observation: From the environment, with a leading axis of N.
+            begun: Rows whose observation is the first of an episode. Shape (N,).
+        """
+        del begun
+        return observation
+
+    def reset(self, observation: Any, begun: BoolArray) -> Any:
+        """The observation of N rows after a reset; where no episode has begun, it is the one of the last step."""
+        return self.observation(observation, begun)
+
+    def last_observation(self, row: int, observation: Any) -> Any:
+        """The last observation of a row whose next episode has begun in the same step.
+
+        Args:
+            row: Which one.
+            observation: From the environment, without a row axis.
+        """
+        del row
+        return observation
+
+    def action(self, actions: FloatArray) -> FloatArray:
+        """The environment's actions. Shapes (N, n)."""
+        return actions
+
+    def reward(self, rewards: FloatArray) -> FloatArray:
+        """The rewards of N rows. Shapes (N,)."""
+        return rewards
+
+
+class FeatureStage(Stage):
+    """See :class:`ikgym.rl.AgentObservation`."""
+
+    def __init__(self, env: Any, furthest: float = FURTHEST, jacobian: bool = False) -> None:
+        self._view = AgentView(env, furthest, jacobian)
+        self.observation_space = self._view.space
+
+    def observation(self, observation: Any, begun: BoolArray) -> Any:
+        """The features. Shape (N, f)."""
+        del begun
+        return self._view.see(observation)
+
+    def last_observation(self, row: int, observation: Any) -> Any:
+        """The features of one row. Shape (f,)."""
+        del row
+        return self._view.see(one_row(observation))[0]
+
+
+class UnitStage(Stage):
+    """See :class:`ikgym.rl.RelativeAction`."""
+
+    def __init__(self, env: Any, share: float = 1.0, largest: float = 1.0, furthest: float = FURTHEST) -> None:
+        self._view, self._limit = AgentView(env, furthest), env.unwrapped.scenario.velocity_limit
+        self._share, largest = number("share", share, above=0.0), number("largest", largest, above=0.0)
+        bound = largest / self._share
+        self.action_space = spaces.Box(-bound, bound, self._limit.shape, np.float32)
+        self._unit = np.zeros(1)
+
+    def observation(self, observation: Any, begun: BoolArray) -> Any:
+        """The observation as it is, from which the unit of the next action follows."""
+        del begun
+        self._unit = self._view.unit(observation)
+        return observation
+
+    def action(self, actions: FloatArray) -> FloatArray:
+        """Fractions of the velocity limit."""
+        fractions: FloatArray = actions * (self._share * self._unit)[:, None] / self._limit
+        return fractions
+
+
+class LogStage(Stage):
+    """See :class:`ikgym.rl.LogReward`."""
+
+    def __init__(self, env: Any, scale: float = 0.05, worst: float = 12.0) -> None:
+        del env
+        self._scale, self._worst = number("scale", scale, above=0.0), number("worst", worst, above=0.0)
+
+    def reward(self, rewards: FloatArray) -> FloatArray:
+        """Rewards scale · max(0, 1 − log(1 + stage cost) / worst)."""
+        out = np.empty(len(rewards))
+        log_rewards(rewards, self._scale, self._worst, out)
+        return out
+
+
+class HistoryStage(Stage):
+    """See :class:`ikgym.rl.History`."""
+
+    def __init__(self, env: Any, length: int = 4) -> None:
+        space = getattr(env, "single_observation_space", env.observation_space)
+        self._length = whole_number("length", length, at_least=1)
+        if not isinstance(space, spaces.Box) or len(space.shape) != 1:
+            raise InvalidInputError(f"History: expected an environment whose observation is a vector, got {space}.")
+        low, high = np.tile(space.low, self._length), np.tile(space.high, self._length)
+        self.observation_space = spaces.Box(low, high, dtype=np.float32)
+        self._kept: npt.NDArray[np.float32] = np.zeros((getattr(env, "num_envs", 1), self._length, *space.shape), "f4")
+
+    def observation(self, observation: Any, begun: BoolArray) -> Any:
+        """The last observations, newest first. Shape (N, length · f)."""
+        self._kept = np.concatenate([observation[:, None], self._kept[:, :-1]], axis=1)
+        return self.reset(observation, begun)
+
+    def reset(self, observation: Any, begun: BoolArray) -> Any:
+        """The first observation of an episode, repeated. Shape (N, length · f)."""
+        self._kept[begun] = observation[begun, None]
+        return self._kept.reshape(len(observation), -1).copy()
+
+    def last_observation(self, row: int, observation: Any) -> Any:
+        """The last observation of an episode and those before it. Shape (length · f,)."""
+        return np.concatenate([observation, self._kept[row, :-1].ravel()])
+
+
+def one_row(observation: Any) -> Any:
+    """An observation without a row axis as that of one row."""
+    if isinstance(observation, dict):
+        return {key: value[None] for key, value in observation.items()}
+    return np.asarray(observation)[None]
+
+
+def checked_actions(actions: npt.ArrayLike, space: Any) -> FloatArray:
+    """Actions clipped to their box, as float64.
+
+    Raises:
+        InvalidInputError: They have a wrong shape or type.
+    """
+    raw = np.asarray(actions)
+    if raw.dtype.kind not in "fiub" or raw.shape != space.shape:
+        raise InvalidInputError(f"action: expected numbers of shape {space.shape}, got {shortened(actions)}.")
+    out: FloatArray = np.clip(raw.astype(np.float64), space.low, space.high)
+    return out
