@@ -9,6 +9,7 @@ import dataclasses
 import functools
 import inspect
 import re
+import shlex
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
@@ -19,6 +20,8 @@ import ikgym
 from baselines.console.listing import kinds_of_limits, summary
 from baselines.evaluation import test_sets as sets
 from baselines.evaluation.report import NOTHING
+from baselines.evaluation.table import from_csv
+from baselines.evaluation.table import markdown as results_table
 from baselines.oracle import best_known
 from baselines.oracle.best_known import MARGIN
 from baselines.papers import PAPERS
@@ -193,11 +196,33 @@ def markdown(rows: Iterable[tuple[str, ...]]) -> str:
     return "\n".join([lines[0], "|---" * len(head) + "|", *lines[1:]])
 
 
+def measured(file: str, *words: str) -> str:
+    """The table of a CSV file.
+
+    Args:
+        file: The file, relative to this folder.
+        words: `columns=NAME,NAME,…` chooses columns, `NAME=VALUE` lines with that value in that column.
+    """
+    wanted = dict(word.split("=", 1) for word in words)
+    columns = wanted.pop("columns", "").split(",")
+    lines = from_csv((PAGES / file).read_text(encoding="utf-8"))
+    lines = [line for line in lines if all(line[name] == value for name, value in wanted.items())]
+    return results_table(lines, [name for name in columns if name])
+
+
+def table(words: str) -> str:
+    """The table, or the text, of what stands behind `<!-- table:`."""
+    name, *rest = shlex.split(words)
+    if name.endswith(".csv"):
+        return measured(name, *rest)
+    return TEXTS[name]() if name in TEXTS else markdown(TABLES[name]())
+
+
 def filled(text: str) -> str:
     """A page with its tables and texts written anew."""
     return re.sub(
-        r"(<!-- table: (\w+) -->\n).*?(<!-- end -->)",
-        lambda m: f"{m[1]}{TEXTS[m[2]]() if m[2] in TEXTS else markdown(TABLES[m[2]]())}\n{m[3]}",
+        r"(<!-- table: (.+?) -->\n).*?(<!-- end -->)",
+        lambda m: f"{m[1]}{table(m[2])}\n{m[3]}",
         text,
         flags=re.DOTALL,
     )
