@@ -9,20 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from ikgym.arms import (
-    faitli,
-    fetch,
-    flexiv,
-    franka,
-    khan,
-    kinova,
-    kuka,
-    pal,
-    panda_calibrated,
-    ufactory,
-    varga,
-    zhang,
-)
+from ikgym.arms import catalogue
 from ikgym.arms.arm import Arm
 from ikgym.arms.denavit_hartenberg import from_dh
 from ikgym.arms.urdf import from_urdf
@@ -31,23 +18,9 @@ from ikgym.registry import Registry
 __all__ = ["SHIPPED", "Arm", "from_dh", "from_urdf", "get", "names", "register"]
 
 _registry: Registry[Arm] = Registry("arm", Arm)
-for _family in (
-    varga,
-    faitli,
-    khan,
-    zhang,
-    franka,
-    panda_calibrated,
-    kuka,
-    kinova,
-    ufactory,
-    flexiv,
-    pal,
-    fetch,
-):
-    for _name, _make in _family.ARMS.items():
-        _registry.register(_name, _make)
-#: The arms of this package: what names one of them can be read by everyone.
+for _name, _make in catalogue.read().items():
+    _registry.register(_name, _make)
+#: The arms of this package, which files may refer to by name.
 SHIPPED = frozenset(_registry.names())
 
 
@@ -56,7 +29,7 @@ def get(name: str) -> Arm:
 
     Raises:
         UnknownNameError: There is no such arm; the message has the nearest name.
-        InvalidInputError: What makes it fails, or makes something else.
+        InvalidInputError: The registered function fails, or does not return an arm.
     """
     return _registry.get(name)
 
@@ -71,9 +44,9 @@ def register(name: str, make: Callable[[], Arm]) -> None:
 
     Args:
         name: Its new name.
-        make: Called without arguments when the arm is first asked for.
+        make: Returns the arm; called without arguments when the arm is first needed.
 
     Raises:
-        InvalidInputError: The name is taken or no text, or there is nothing that makes the arm.
+        InvalidInputError: The name is taken or no text, or `make` cannot be called.
     """
     _registry.register(name, make)

@@ -34,7 +34,7 @@ def from_dh(
     A joint coordinate is added to ``theta`` of a revolute and to ``d`` of a prismatic joint.
 
     Args:
-        name: What the arm is called.
+        name: Name of the arm.
         a: Link lengths in [m]. Shape (n,).
         d: Link offsets in [m]. Shape (n,).
         alpha: Link twists in [rad]. Shape (n,).

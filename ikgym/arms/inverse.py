@@ -1,52 +1,36 @@
-"""Inverse kinematics of poses: what is checked, and what the compiled search is given."""
+"""Inverse kinematics of poses: checks of the input, and the call of the compiled search.
+
+Arms are typed `Any` here, since :mod:`ikgym.arms.arm` imports this module.
+"""
 
 from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Hashable, Iterable
+from collections.abc import Iterable
 from contextlib import nullcontext
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from ikgym import parallel
-from ikgym.arms.posture import Limited, within_limits
 from ikgym.compilation import announced
 from ikgym.exceptions import InvalidInputError
 from ikgym.inverse_kinematics import Ranges, Settings, inverse_rows
 from ikgym.kinematics import Chain
 from ikgym.validation import BoolArray, FloatArray, float_array, number, rotation_matrices, whole_number
 
-# What an angle of 1 rad counts as, in lengths of the whole arm. From 0.1 to 0.8 differ by less than a fifth.
+# 1 rad weighs as much as this share of the arm's length; shares from 0.1 to 0.8 differ by less than a fifth.
 LENGTH_OF_RADIAN = 0.25
 # Poses that are worth a thread.
 GRAIN = 64
-# How another arm's posture is looked for, next to one that is known, and the decimals of it that count.
+# Settings for a posture of a similar arm next to a known one, and the decimals that are kept.
 NEARBY, DECIMALS = Settings(1e-12, 1.0, 0, np.uint64(0)), 10
 
 
-class Solvable(Limited, Hashable, Protocol):
-    """What is asked of an arm here."""
-
-    @property
-    def home(self) -> FloatArray | None:
-        """A posture to start from in [rad] or [m]. Shape (n,)."""
-
-    @property
-    def chain(self) -> Chain:
-        """The arm as its kernels see it."""
-
-    def reach(self, travel: npt.ArrayLike) -> float:
-        """A radius around the base that the tool point never leaves, in [m]."""
-
-    def forward(self, q: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """The pose of the tool. Shapes (..., 3, 3) and (..., 3)."""
-
-
 def inverse(
-    arm: Solvable,
+    arm: Any,
     rotation: npt.ArrayLike | None,
     position: npt.ArrayLike,
     start: npt.ArrayLike | None,
@@ -67,7 +51,7 @@ def inverse(
     rotations = np.empty((0, 0)) if rotation is None else rotation_matrices("rotation", rotation)
     if start is not None:
         starts = _with_last("start", start, arm.joints)
-        within_limits("start", starts, arm)
+        arm.check_posture("start", starts)
     lead = _lead(rotations.shape, positions.shape, starts.shape)
     targets = _rows(rotations, lead, 2), _rows(positions, lead, 1), _rows(starts, lead, 1)
     constants = *arm.chain, *ranges, *settings
@@ -82,13 +66,13 @@ def inverse(
     return q.reshape(*lead, arm.joints), converged.reshape(lead)[()]
 
 
-def alike(arm: Solvable, chains: Iterable[Chain], q: FloatArray, *, oriented: bool) -> FloatArray:
-    """Joint coordinates at which other arms have the poses that an arm has, the nearest within its limits to its own.
+def alike(arm: Any, chains: Iterable[Chain], q: FloatArray, *, oriented: bool) -> FloatArray:
+    """Joint coordinates that give other arms the poses of an arm, the nearest within its limits.
 
     Args:
-        arm: Whose poses they are.
+        arm: The arm with the known postures.
         chains: The k other arms, nearly the same.
-        q: Where the arm has its poses, within its limits, in [rad] or [m]. Shape (k, n).
+        q: The arm's joint coordinates within its limits, in [rad] or [m]. Shape (k, n).
         oriented: Whether orientations matter.
 
     Returns:
@@ -117,8 +101,8 @@ def _locked(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
 
 
 @functools.lru_cache(maxsize=64)
-def _search(arm: Solvable) -> tuple[Ranges, float, FloatArray]:
-    """Where restarts are drawn from, a full turn without limits; what 1 rad counts as, in [m]; and the usual start."""
+def _search(arm: Any) -> tuple[Ranges, float, FloatArray]:
+    """Ranges of the restarts, a full turn without limits; the length that weighs as 1 rad does, in [m]; the start."""
     size = arm.reach(np.zeros(arm.joints)) or 1.0  # an arm of slides alone may have no length at q = 0
     span = np.where(arm.prismatic, 2.0 * size, 2.0 * np.pi)
     finite_lower, finite_upper = np.isfinite(arm.lower), np.isfinite(arm.upper)

@@ -1,4 +1,4 @@
-"""What follows from the limits of an arm."""
+"""Quantities derived from the limits of an arm."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ikgym.validation import LARGEST, SMALLEST, FloatArray, per_joint
 
 
 def velocity_scale(arm: Arm, given: npt.ArrayLike | None) -> FloatArray:
-    """What an action of 1 means: the velocity that is given, or else the limits of all joints.
+    """The joint velocities of an action of 1: those given, else the arm's limits.
 
     Args:
         arm: The arm.

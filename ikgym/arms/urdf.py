@@ -5,25 +5,23 @@ from __future__ import annotations
 from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from ikgym.arms.arm import Arm, UrdfReference
 from ikgym.arms.home import from_home
+from ikgym.arms.urdf_check import MOVING, UrdfJoint, read_chain
 from ikgym.exceptions import InvalidInputError, MissingDependencyError
 from ikgym.validation import FloatArray, frozen_array, rotation_matrix
-
-if TYPE_CHECKING:
-    from ikgym.arms.urdf_check import UrdfJoint
 
 # Descriptions of whole humanoids take a few hundred kilobytes.
 MAX_BYTES = 16 * 2**20
 
 
 class _Home(NamedTuple):
-    """What is seen of the arm at q = 0, in the frame of the base link."""
+    """Joints and tool of the arm at q = 0, in the frame of the base link."""
 
     axes: FloatArray
     points: FloatArray
@@ -56,13 +54,13 @@ def from_urdf(
         base: The link to begin at, whose frame becomes the base frame. The root link if it is left out.
         tip: The link to end at, whose frame becomes the tool's if there is no tool offset. The only leaf below the
             base if it is left out.
-        name: What the arm is called, the name of the robot in the file if it is left out.
+        name: Name of the arm, by default that of the robot in the file.
         tool: Tool point in the frame of the tip, in [m]; the frame's origin if it is left out. Shape (3,).
         tool_rotation: Orientation of the tool in the frame of the tip, a rotation matrix; that of the frame if it
             is left out. Shape (3, 3).
 
     Returns:
-        The arm. Lengths in [m], angles in [rad], as in the file. Its :attr:`Arm.urdf` remembers where it came from.
+        The arm. Lengths in [m], angles in [rad], as in the file. Its :attr:`Arm.urdf` names the file.
 
     Raises:
         InvalidInputError: The file cannot be read, is no URDF, or has no such chain from base to tip; or the tool
@@ -70,9 +68,6 @@ def from_urdf(
         UnknownNameError: There is no link of that name; the message has the nearest one.
         MissingDependencyError: Pinocchio is not installed.
     """
-    # XML parsers are slow to import, and seldom needed.
-    from ikgym.arms.urdf_check import MOVING, read_chain
-
     try:
         robot, joints = read_chain(_content(path), base, tip)
         moving = [joint for joint in joints if joint.kind in MOVING]

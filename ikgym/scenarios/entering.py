@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ikgym.arms.posture import within_limits
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios.scenario import Scenario
 from ikgym.trajectories import Trajectory
@@ -42,7 +41,7 @@ def checked_starts(q: npt.ArrayLike | None, rows: int, scenario: Scenario) -> Fl
     starts = float_array("options['q']", q)
     if starts.shape not in {(joints,), (rows, joints)}:
         raise InvalidInputError(f"options['q']: expected shape ({joints},), got {starts.shape}.")
-    within_limits("options['q']", starts, scenario.arm)
+    scenario.arm.check_posture("options['q']", starts)
     if (np.abs(starts) > bound).any():
         raise InvalidInputError(
             f"options['q']: expected absolute values of at most {np.round(bound, 4).tolist()} in [rad] or [m], "
@@ -102,6 +101,6 @@ def on_path(scenario: Scenario, episodes: Sequence[Trajectory], steps: Steps) ->
     at = np.stack([points[steps - 1], points[steps]], axis=1) * scenario.dt
     paths = np.stack([one.joint_path(times) for one, times in zip(episodes, at, strict=True)])  # type: ignore[misc]
     q: FloatArray = paths[:, 1]
-    within_limits(f"Reference joint path of scenario {scenario.name!r}", q, scenario.arm)
+    scenario.arm.check_posture(f"Reference joint path of scenario {scenario.name!r}", q)
     limit = scenario.largest_qdot
     return q, np.clip((q - paths[:, 0]) / scenario.dt, -limit, limit)

@@ -14,7 +14,6 @@ from gymnasium.utils import seeding
 
 from ikgym.arms import Arm
 from ikgym.arms.limits import farthest, velocity_scale
-from ikgym.arms.posture import within_limits
 from ikgym.cost import TrackingCost
 from ikgym.exceptions import InvalidInputError
 from ikgym.kinematics import Chain
@@ -349,7 +348,7 @@ class Scenario(Frozen):
         if first is None:
             first = np.tile(self._start, (len(episodes), 1))
         if self.arm.limited:
-            within_limits(f"Start of scenario {self.name!r}", first, self.arm)
+            self.arm.check_posture(f"Start of scenario {self.name!r}", first)
         return first
 
     def joint_bound(self) -> FloatArray:

@@ -12,7 +12,7 @@ import numpy as np
 
 from ikgym import arms, files, tasks
 from ikgym.arms import Arm
-from ikgym.arms.arm import numbered_joints
+from ikgym.arms.checks import numbered_joints
 from ikgym.cost import TrackingCost
 from ikgym.exceptions import IkgymError, InvalidInputError
 from ikgym.plant import Plant

@@ -1,0 +1,52 @@
+"""The arms of ``arms.toml``: those of papers and of makers, with their sources."""
+
+from __future__ import annotations
+
+import functools
+import os
+import pathlib
+import tomllib
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from ikgym.arms.arm import Arm
+from ikgym.exceptions import InvalidInputError
+from ikgym.validation import FloatArray
+
+FILE = pathlib.Path(__file__).with_name("arms.toml")
+#: Keys of a table that are no fields of an arm.
+ABOUT = ("source", "licence", "like")
+
+
+def read(file: str | os.PathLike[str] = FILE) -> dict[str, Callable[[], Arm]]:
+    """The arms of a file, each made when its function is called.
+
+    Args:
+        file: A TOML file with one table an arm, whose keys are the fields of :class:`ikgym.Arm`. Axes may be words such
+            as ``"z -y x"``. The key `like` names another arm of the file, which supplies the missing fields.
+
+    Raises:
+        InvalidInputError: The file is no TOML. The functions raise where a table is no arm.
+    """
+    try:
+        tables = tomllib.loads(pathlib.Path(file).read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise InvalidInputError(f"{file}: expected a TOML file with a table an arm: {error}.") from None
+    return {name: functools.partial(_arm, name, tables) for name in tables}
+
+
+def _arm(name: str, tables: dict[str, Any]) -> Arm:
+    table = tables[name]
+    if "like" in table:
+        table = tables[table["like"]] | table
+    fields = {key: value for key, value in table.items() if key not in ABOUT}
+    if isinstance(fields["axes"], str):
+        fields["axes"] = directions(fields["axes"])
+    return Arm(name, **fields)
+
+
+def directions(words: str) -> FloatArray:
+    """Unit vectors along the axes of the base, from one word a joint, such as ``"z y -z"``. Shape (n, 3)."""
+    return np.array([(-1.0 if word[0] == "-" else 1.0) * np.eye(3)["xyz".index(word[-1])] for word in words.split()])
