@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium.utils import seeding
 
-from baselines.policy import Memory, Operations, Report
+from baselines.policy import Report
 from ikgym.exceptions import InvalidInputError
 from ikgym.outcome import Observation, observation
 from ikgym.scenarios import Preview, Scenario
@@ -123,12 +123,6 @@ class Player(Protocol):
     def diagnostics(self, state: Any) -> dict[str, FloatArray]:
         """What it shows of how it came to its action."""
 
-    def counters(self, state: Any) -> Memory:
-        """What the call that returned a state has counted besides its iterations."""
-
-    def operations_of(self, iterations: npt.NDArray[np.int64], counters: Memory) -> Operations:
-        """What calls have cost; arrays of length 0 where nobody counts."""
-
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Episode:
@@ -146,8 +140,6 @@ class Episode:
         status: Values of :class:`baselines.Status`. Shape (steps,).
         iterations: Iterations of the policy. Shape (steps,).
         time_ns: Wall time of the call of `predict`, in [ns]. Shape (steps,), or (0,) where the calls were not timed.
-        operations: What the steps have cost, see :class:`baselines.policy.Operations`, its arrays of shape (steps,),
-            or (0,) where nobody counts.
         diagnostics: What the policy showed of how it came to its action, by name, see
             :meth:`SolverPolicy.diagnostics`; each of shape (steps, …).
     """
@@ -163,7 +155,6 @@ class Episode:
     status: npt.NDArray[np.int64]
     iterations: npt.NDArray[np.int64]
     time_ns: npt.NDArray[np.int64]
-    operations: Operations
     diagnostics: dict[str, FloatArray]
 
 
@@ -307,7 +298,6 @@ def _play(
     status, iterations = np.empty((2, rows, steps), dtype=np.int64)
     time_ns = np.empty(steps if timed else 0, dtype=np.int64)
     diagnostics: dict[str, FloatArray] = {}
-    counters: list[Memory] = []
 
     clock = time.perf_counter_ns
     # A policy without a state knows that an episode begins.
@@ -339,7 +329,6 @@ def _play(
             position[:, k], orientation[:, k] = out.position_error, out.orientation_error
             at_limit[:, k] = out.at_limit
             status[:, k], iterations[:, k] = report.status, report.iterations
-            counters.append(policy.counters(state))
             for name, value in policy.diagnostics(state).items():
                 diagnostics.setdefault(name, np.empty((rows, steps, *value.shape[1:])))[:, k] = value
             if tick is not None and (k + 1) % TICK == 0:
@@ -350,7 +339,6 @@ def _play(
             gc.enable()
     if tick is not None:
         tick(steps % TICK * rows)
-    counted = [np.array(steps) for steps in zip(*counters, strict=True)]
     episodes = [
         Episode(
             q[row],
@@ -364,7 +352,6 @@ def _play(
             status[row],
             iterations[row],
             time_ns,
-            policy.operations_of(iterations[row], tuple(counter[:, row] for counter in counted)),
             {name: values[row] for name, values in diagnostics.items()},
         )
         for row in range(rows)

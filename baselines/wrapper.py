@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines import registry
-from baselines.policy import Batch, Memory, Operations, Problem, Solution, SolverPolicy
+from baselines.policy import Batch, Memory, Problem, Solution, SolverPolicy
 from baselines.policy.state import pack, remembered, replace_rows
 from baselines.spec import PolicySpec, parse_policy
 from ikgym.exceptions import InvalidInputError
@@ -71,10 +71,6 @@ class Wrapper(SolverPolicy, abc.ABC):
         del rows
         return ()
 
-    def counted(self, inside: Operations) -> Operations:
-        """The operations of a step, from those of the inner policy; the same, unless a wrapper says otherwise."""
-        return inside
-
     def memory(self, rows: int) -> Memory:
         """The wrapper's own memory, then that of the inner policy."""
         return *self.own_memory(rows), *(() if self.inner is None else self.inner.memory(rows))
@@ -126,29 +122,9 @@ class Wrapper(SolverPolicy, abc.ABC):
         size, _ = self._own
         return pack(*self.report(state), remembered(state)[size:])
 
-    @property
-    def stated(self) -> bool:
-        """As the inner policy's."""
-        return self.inner is not None and self.inner.stated
-
-    def counters(self, state: Memory) -> Memory:
-        """Those of the inner policy."""
-        return () if self.inner is None else self.inner.counters(self.inner_state(state))
-
-    def operations_of(self, iterations: npt.NDArray[np.int64], counters: Memory) -> Operations:
-        """Those of the inner policy, and the wrapper's own."""
-        if self.inner is None:
-            return super().operations_of(iterations, counters)
-        return self.counted(self.inner.operations_of(iterations, counters))
-
     def diagnostics(self, state: Memory) -> dict[str, FloatArray]:
         """What the inner policy shows of itself."""
         return {} if self.inner is None else self.inner.diagnostics(self.inner_state(state))
-
-    def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
-        """Those of the inner policy, and the wrapper's own."""
-        assert self.inner is not None
-        return self.counted(Operations(*map(np.asarray, self.inner.count(iterations))))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

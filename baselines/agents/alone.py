@@ -15,8 +15,3 @@ class Alone:
     def null_space(self) -> None:
         """Outputs go through no projector."""
         return
-
-    @property
-    def operations(self) -> tuple[int, int]:
-        """No Jacobian and no factorisation."""
-        return 0, 0

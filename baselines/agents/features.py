@@ -88,12 +88,6 @@ class Processing(Frozen):
         known_names("field of the processing", values, [field.name for field in dataclasses.fields(cls)])
         return cls(**{**values, "offsets": tuple(values.get("offsets", cls.offsets))})
 
-    @property
-    def operations(self) -> tuple[int, int]:
-        """A Jacobian and a factorisation for the projector into the null space."""
-        projected = int(self.null_space is not None)
-        return projected, projected
-
     def size(self, problem: Problem) -> int:
         """The number of features."""
         n, e = problem.model.joints, problem.task.error_size

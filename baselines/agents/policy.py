@@ -10,14 +10,13 @@ from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import numpy as np
-import numpy.typing as npt
 
 from baselines.agents import files, untrusted
 from baselines.agents.protocols import AgentFile
 from baselines.agents.view import AgentView
 from baselines.files import ResultsError
 from baselines.fingerprints import arm_fingerprint
-from baselines.policy import Batch, Memory, Operations, Problem, Solution, statuses
+from baselines.policy import Batch, Memory, Problem, Solution, statuses
 from baselines.solvers.wrappers import orientation
 from baselines.status import Status
 from baselines.wrapper import Wrapper
@@ -109,21 +108,6 @@ class LearnedPolicy(Wrapper, abc.ABC):
         # Where the base policy has converged, its action with a correction has not.
         status = np.maximum(step.status, int(Status.APPLIED))
         return self.solution(qdot, own, step._replace(status=status))
-
-    def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
-        """Those of the base policy, or a measurement; what a projector into the null space takes."""
-        if self.inner is not None:
-            return super().count(iterations)
-        return self.counted(Operations(*map(np.asarray, (0, 0, 0, 1))))
-
-    def counted(self, inside: Operations) -> Operations:
-        """With what the processing takes, and a pose where the orientation is resolved."""
-        jacobians, factorisations = self.file.processing.operations
-        return inside._replace(
-            forward_kinematics=inside.forward_kinematics + int(self._resolves),
-            jacobians=inside.jacobians + jacobians,
-            factorisations=inside.factorisations + factorisations,
-        )
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -36,10 +36,6 @@ class Transform(Protocol):
     def null_space(self) -> float | None:
         """λ of the projector that network outputs go through; None where there is none."""
 
-    @property
-    def operations(self) -> tuple[int, int]:
-        """How many Jacobians of the arm a step takes, and how many matrices it factorises, but for the base policy."""
-
     def size(self, problem: Problem) -> int:
         """The number of features."""
 

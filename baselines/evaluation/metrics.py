@@ -69,7 +69,7 @@ class Row:
         status_counts: How many steps ended with which status.
         preview: Steps ahead that the policy was shown; the furthest where it was shown some of them.
         fingerprint: Tells scenarios apart that share a name, see :func:`baselines.fingerprints.fingerprint`.
-        operations: Mean numbers of operations in one step, see :class:`baselines.policy.Operations`; empty where they
+        operations: Mean numbers of operations in one step, empty where they
             are not known.
         time_first_us: Wall time of the first call of the policy, in [µs].
         test_set: The digest of the test set that the episode belongs to, see :mod:`baselines.evaluation.test_sets`.
@@ -190,7 +190,7 @@ def measure(
     angles = episode.orientation_error[counted] if scenario.task.has_orientation else None
     held = (episode.at_limit > 0.0).sum(axis=0).tolist()
     statuses = collections.Counter(episode.status.tolist())
-    worst, operations = Status(max(statuses)), episode.operations._asdict()
+    worst = Status(max(statuses))
     return Row(
         scenario=scenario.name,
         policy=policy,
@@ -222,7 +222,7 @@ def measure(
         status_counts={Status(status).label: count for status, count in sorted(statuses.items())},
         preview=preview,
         fingerprint=fingerprint,
-        operations={name: float(count.mean()) for name, count in operations.items() if len(count)},
+        operations={},
         time_first_us=float(episode.time_ns[0]) / 1e3 if timed else None,
         test_set=test_set,
         arm_seed=draw.arm_seed,

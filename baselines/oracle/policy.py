@@ -7,7 +7,6 @@ import functools
 from typing import Any, ClassVar, Self
 
 import numpy as np
-import numpy.typing as npt
 
 from baselines.oracle.cache import solve
 from baselines.oracle.optimum import Search
@@ -78,7 +77,3 @@ class Oracle(PrivilegedPath):
         qdot = (self.path[self.next_rows(batch)] - batch.q) / self.problem.dt
         rows = len(qdot)
         return Solution(qdot, memory, statuses(rows), np.zeros(rows, dtype=np.int64))
-
-    def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
-        """Nothing: all was known before."""
-        return 0, 0, 0, 0

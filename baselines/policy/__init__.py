@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from baselines.policy.problem import Batch, Memory, Operations, Problem, Solution
+from baselines.policy.problem import Batch, Memory, Problem, Solution
 from baselines.policy.solver import SolverPolicy
 from baselines.policy.state import Report
 from baselines.status import Status, statuses
@@ -12,7 +12,6 @@ __all__ = (
     "Batch",
     "Memory",
     "Observation",
-    "Operations",
     "Problem",
     "Report",
     "Solution",

@@ -90,19 +90,3 @@ class Solution(NamedTuple):
     memory: Memory
     status: npt.NDArray[np.int64]
     iterations: npt.NDArray[np.int64]
-
-
-class Operations(NamedTuple):
-    """What one step has cost, counted in what is costly on a real arm.
-
-    Attributes:
-        forward_kinematics: Evaluations of the model's forward kinematics alone. Shape (B,).
-        jacobians: Evaluations of the model's Jacobian, with the forward kinematics that come with it. Shape (B,).
-        factorisations: Matrices factorised, decomposed or inverted. Shape (B,).
-        measurements: Poses measured. Shape (B,).
-    """
-
-    forward_kinematics: npt.NDArray[np.int64]
-    jacobians: npt.NDArray[np.int64]
-    factorisations: npt.NDArray[np.int64]
-    measurements: npt.NDArray[np.int64]

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from baselines.policy import state as states
 from baselines.policy.observations import ObservationReader, Parts, as_batch, not_finite, taken
-from baselines.policy.problem import Batch, Memory, Operations, Problem, Solution
+from baselines.policy.problem import Batch, Memory, Problem, Solution
 from baselines.policy.state import REPORTED, Report, joined, pack, remembered, replace_rows
 from baselines.policy_kernels import all_finite, cut_rows
 from ikgym.compilation import announced
@@ -194,48 +194,6 @@ class SolverPolicy(Frozen, abc.ABC):
         """
         del state
         return {}
-
-    def operations(self, state: Memory) -> Operations:
-        """What the call that returned a state has cost; worked out when asked for, at no cost otherwise."""
-        return self.operations_of(self.report(state).iterations, self.counters(state))
-
-    def counters(self, state: Memory) -> Memory:
-        """What the call that returned a state has counted besides its iterations, each of shape (B,).
-
-        Nothing for most solvers, whose iterations tell what they have cost.
-        """
-        del state
-        return ()
-
-    def operations_of(self, iterations: npt.NDArray[np.int64], counters: Memory) -> Operations:
-        """What calls have cost, from what is kept of each of them.
-
-        Args:
-            iterations: Those that the calls reported. Shape (B,).
-            counters: What :meth:`counters` told of them, each of shape (B,).
-        """
-        del counters
-        counts = self.count(iterations)
-        return Operations(*(np.broadcast_to(np.asarray(c, dtype=np.int64), iterations.shape).copy() for c in counts))
-
-    @property
-    def stated(self) -> bool:
-        """Whether :meth:`operations` are an estimate from the iterations, not what was done in them, call by call.
-
-        Others are held against counts by :mod:`baselines.evaluation.operation_audit`.
-        """
-        return False
-
-    @abc.abstractmethod
-    def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
-        """What a solve of so many iterations costs.
-
-        Args:
-            iterations: Iterations made. Shape (B,).
-
-        Returns:
-            The numbers of :class:`Operations`, in its order; each one number, or of shape (B,).
-        """
 
     @functools.cached_property
     def _read(self) -> ObservationReader:

@@ -193,16 +193,13 @@ def test_any_policy_inside_smoothed(name, feedback):
     own, inside = policy.split(policy.memory(3))
     assert own._fields == ("known", "q", "qdot", "smooth")
     assert identical(tuple(inside), tuple(alone.memory(3)))
-    state, forwards = None, int(feedback == "calculated")
+    state = None
     for k, observation in enumerate(observations(usual(name), policy.preview, 3)):
         action, state = policy.predict(observation, state)
         assert [array.shape for array in state[2:]] == [array.shape for array in (*own, *inside)]
         inner_state = policy.inner_state(state)
         assert identical(policy.report(state), alone.report(inner_state))
         assert identical(policy.diagnostics(state), alone.diagnostics(inner_state))
-        ours, theirs = policy.operations(state), alone.operations(inner_state)
-        assert identical(ours.jacobians, theirs.jacobians)
-        assert identical(ours.forward_kinematics, theirs.forward_kinematics + forwards)
         if k == 0:
             np.testing.assert_array_equal(action, 0.0)
             if feedback == "measured":
@@ -221,7 +218,7 @@ TESTED = {
     "rhc_gradient",
     "rhc_lagrange",
     "smoothed",  # around `rhc_gradient`
-    *("offset_free", "kalman_jacobian", "calibrated"),  # around `rhc`
+    *("offset_free", "calibrated"),  # around `rhc`
 }
 
 
@@ -256,9 +253,6 @@ def test_actions_are_in_the_box_and_deterministic_changes_nothing(name, on):
         report = policy.report(next_state)
         assert report.status[0] in set(Status)
         assert report.iterations[0] >= 0
-        operations = policy.operations(next_state)
-        assert all(count.shape == (1,) and count[0] >= 0 for count in operations)
-        assert policy.reference or sum(count[0] for count in operations) > 0
         state = next_state
 
 
@@ -503,9 +497,6 @@ class Broken(SolverPolicy):
         qdot = np.zeros_like(batch.q)
         qdot[1] = np.nan
         return Solution(qdot, (memory[0] + 1.0,), statuses(len(qdot)), np.ones(len(qdot), dtype=np.int64))
-
-    def count(self, iterations):
-        return 0, 0, 0, 0
 
 
 def test_no_nan_leaves_a_policy():

@@ -30,9 +30,6 @@ class Still(SolverPolicy):
         rows = len(batch.q)
         return Solution(np.zeros_like(batch.q), memory, statuses(rows), np.zeros(rows, dtype=np.int64))
 
-    def count(self, iterations):
-        return 0, 0, 0, 0
-
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Misnamed(Still):
@@ -180,8 +177,6 @@ def test_names_that_are_taken_are_refused(name):
 
 def test_classes_that_are_no_policies_are_refused_and_leave_nothing_behind():
     class Unfinished(SolverPolicy):
-        def count(self, iterations):
-            return 0, 0, 0, 0
 
     with pytest.raises(InvalidInputError, match="expected a class derived from SolverPolicy"):
         baselines.register("mine", dict)

@@ -123,12 +123,6 @@ class Bilinear(Alone, Frozen):
             return NONE
         return PREDICTED if self.predicted_rates else HERE
 
-    @property
-    def operations(self) -> tuple[int, int]:
-        """A Jacobian and a factorisation for the damped inverse, and as much for each posture where rates are seen."""
-        inverses = {NONE: 0, HERE: 2, PREDICTED: 1 + len(self.offsets)}[self.rates]
-        return inverses, inverses
-
     def size(self, problem: Problem) -> int:
         """The number of features."""
         kind = problem.task.kind

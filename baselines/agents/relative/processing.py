@@ -90,12 +90,6 @@ class Relative(Alone, Frozen):
         fields = {name: values[name] for name in _fields() if name != "damping" or name in values}
         return cls(**{**fields, "offsets": tuple(fields["offsets"])})
 
-    @property
-    def operations(self) -> tuple[int, int]:
-        """A Jacobian for what joints can do, and another one with a factorisation for the damped inverse."""
-        inverse = int(self.damping is not None)
-        return 1 + inverse, inverse
-
     def size(self, problem: Problem) -> int:
         """The number of features."""
         kind = problem.task.kind

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.episodes import Draw, Episode, Tick, finite
-from baselines.policy import Memory, Operations, Report
+from baselines.policy import Report
 from baselines.status import Status
 from ikgym.env import RedundantIKEnv
 from ikgym.exceptions import InvalidInputError
@@ -88,16 +88,6 @@ class ForeignPolicy:
         del state
         return {}
 
-    def counters(self, state: Any) -> Memory:
-        """Nothing is counted."""
-        del state
-        return ()
-
-    def operations_of(self, iterations: npt.NDArray[np.int64], counters: Memory) -> Operations:
-        """Nothing is known. Shapes (0,)."""
-        del iterations, counters
-        return NOTHING_COUNTED
-
     def misfit(self, scenario: Scenario) -> str | None:
         """Why the model does not fit a scenario, as far as it has spaces that tell; None where it does, or may.
 
@@ -135,10 +125,6 @@ class ForeignPolicy:
         if not isinstance(env, gym.Env) or env.unwrapped is not made.unwrapped:
             raise InvalidInputError(f"wrap: expected the environment that it was given in wrappers, got {env!r}.")
         return env, recorder
-
-
-#: The operations of who counts none.
-NOTHING_COUNTED = Operations(*np.empty((4, 0), dtype=np.int64))
 
 
 class Recorder(gym.Wrapper[Any, Any, Any, Any]):
@@ -248,7 +234,6 @@ def play_wrapped(
         status=np.full(scenario.steps, int(Status.UNKNOWN)),
         iterations=np.zeros(scenario.steps, dtype=np.int64),
         time_ns=np.array(times if timed else [], dtype=np.int64),
-        operations=NOTHING_COUNTED,
         diagnostics={},
     )
 

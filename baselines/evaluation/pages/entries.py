@@ -44,7 +44,7 @@ GENERAL = (
 #: Solvers made for arms with limits, and for arms that are not their model. The arms of these pages are neither.
 FOR_OTHER_ARMS = (
     *("qp", "sns"),
-    *("adaptive_jacobian", "offset_free", "kalman_jacobian", "calibrated", "predicted", "iterative_learning"),
+    *("offset_free", "calibrated", "predicted"),
 )
 #: Training seeds below which a mean over them is no benchmark.
 ENOUGH = 5

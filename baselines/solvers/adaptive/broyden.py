@@ -97,10 +97,6 @@ class Broyden(DampedLeastSquares):
         """See :meth:`ResolvedRate.numbers`."""
         return self.damping, self.motion, self.learns == "correction"
 
-    def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
-        """One factorisation and one measurement; one Jacobian, where it is learnt at the start only."""
-        return 0, 1 if self.learns == "correction" else 1 - iterations, 1, 1
-
 
 @kernel
 def broyden_rows(

@@ -95,8 +95,6 @@ class Calibrated(Corrected):
     keep: bool = False
 
     name: ClassVar[str] = "calibrated"
-    #: Of the calibrated arm where the pose was measured, at present before and after that, and twice of the model.
-    evaluated: ClassVar[int] = 5
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -5,11 +5,11 @@ from __future__ import annotations
 import abc
 import dataclasses
 import math
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
-from baselines.policy import Batch, Memory, Operations, Solution
+from baselines.policy import Batch, Memory, Solution
 from baselines.solvers.adaptive.deviation import SIZE, add_deviation
 from baselines.solvers.adaptive.measurements import Measurement, nothing_measured, recall
 from baselines.wrapper import NamedWrapper
@@ -47,9 +47,6 @@ class Corrected(NamedWrapper, abc.ABC):
     policy: str = "rhc_foresight"
     history: int = 64
     blend: float = 0.01
-
-    #: Forward kinematics of a step with a new pose: those of the model where it was measured and at present.
-    evaluated: ClassVar[int] = 2
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -93,18 +90,6 @@ class Corrected(NamedWrapper, abc.ABC):
         show_rows(self.problem.model.chain, task.kind, batch.q, shown, nominal, pose, shifted)
         step = self.ask(batch._replace(pose=pose, nominal=shifted, pose_age=batch.q_age), inside)
         return self.solution(step.action * self.problem.velocity_limit, own, step)
-
-    @property
-    def stated(self) -> bool:
-        """Operations are those of steps with a new pose."""
-        return True
-
-    def counted(self, inside: Operations) -> Operations:
-        """The forward kinematics of the wrapper come on top, and it is the one that measures."""
-        return inside._replace(
-            forward_kinematics=inside.forward_kinematics + self.evaluated,
-            measurements=np.ones_like(inside.measurements),
-        )
 
 
 @kernel

@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from baselines.policy import Batch, Memory, Operations, Solution
+from baselines.policy import Batch, Memory, Solution
 from baselines.solvers.adaptive.drives import Hypotheses, PredictedMemory, identify_rows, past_rows, start_memory
 from baselines.solvers.adaptive.following import Servo, follow_rows, move_rows
 from baselines.wrapper import NamedWrapper
@@ -122,11 +122,6 @@ class Predicted(NamedWrapper):
         with np.errstate(divide="ignore"):  # no lag at T = 1
             constants = -self.problem.dt / np.log1p(-1.0 / own.lag)
         return {**super().diagnostics(state), "delay": own.delay.astype(np.float64), "time_constant": constants}
-
-    def counted(self, inside: Operations) -> Operations:
-        """Two forward kinematics, for the offset of the pose and for the arm that is shown, and a measurement."""
-        kinematics = inside.forward_kinematics + 2
-        return inside._replace(forward_kinematics=kinematics, measurements=np.maximum(inside.measurements, 1))
 
     @functools.cached_property
     def _hypotheses(self) -> Hypotheses:

@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from baselines.policy import Batch, Memory, Problem, Solution, SolverPolicy
 from baselines.solvers.arm_size import jacobian_bound
@@ -201,10 +200,6 @@ class AbstractRotation(SolverPolicy):
         """A plain :class:`RotationRule`."""
         kinds = COUNTER_ROTATIONS[self.counter_rotation], DEFORMATIONS[self.deformation]
         return *self._weights, *kinds, (self.r_a, self.lambda_a, self.epsa, self.q_pp_max), self.tolerance
-
-    def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
-        """One Jacobian of the model, one measurement, nothing inverted."""
-        return 0, 1, 0, 1
 
 
 @kernel

@@ -5,9 +5,6 @@ from __future__ import annotations
 import dataclasses
 from typing import ClassVar
 
-import numpy as np
-import numpy.typing as npt
-
 from baselines.policy import Batch
 from baselines.solvers.arm_size import jacobian_bound
 from baselines.solvers.fixed_point.fixed_point import FixedPoint
@@ -79,10 +76,6 @@ class FixedPointExtended(PrivilegedPath, FixedPoint):
         object.__setattr__(self, "_branch", branch)
         object.__setattr__(self, "_points", read_only(branch.forward(path[:, :link])[1]))
         super().__post_init__()
-
-    def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
-        """Everything twice: for the tool, and for the link."""
-        return 2, 2 * iterations, 0, 0
 
     def _extension(self, batch: Batch) -> tuple[Chain, FloatArray]:
         return self._branch.chain, self._points[self.next_rows(batch)]

@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from baselines.policy import Batch, Memory, Solution, SolverPolicy
 from baselines.solvers.arm_size import error_weights, jacobian_bound, length, radian
@@ -138,12 +137,6 @@ class FixedPoint(SolverPolicy):
         return Solution(
             (q - batch.q) / problem.dt, (previous,) if memory else (), status, np.full(rows, self.iterations)
         )
-
-    def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
-        """A Jacobian an iteration, or forward kinematics where none is used, and the last error for the status."""
-        if self.transformation == "transpose":
-            return 1, iterations, 0, 0
-        return iterations + 1, 0, 0, 0
 
     @functools.cached_property
     def _method(self) -> tuple[Any, ...]:

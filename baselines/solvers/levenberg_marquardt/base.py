@@ -7,10 +7,8 @@ import dataclasses
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from baselines.policy import Batch, Memory, Operations, Solution, SolverPolicy
-from baselines.policy.state import remembered
+from baselines.policy import Batch, Memory, Solution, SolverPolicy
 from baselines.solvers.levenberg_marquardt.damping_parameters import checked_parameters, damping_law, truth
 from baselines.solvers.levenberg_marquardt.damping_rules import DampingLaw
 from baselines.solvers.levenberg_marquardt.iteration import DampingMemory, Iterates, IterationLimits
@@ -105,27 +103,18 @@ class DampedIteration(SolverPolicy, abc.ABC):
 
     def memory(self, rows: int) -> Memory:
         """A :class:`DampingMemory` without a step before."""
-        return DampingMemory(np.full(rows, self.law.damping), np.full(rows, np.inf), np.zeros(rows, dtype=np.int64))
+        return DampingMemory(np.full(rows, self.law.damping), np.full(rows, np.inf))
 
     def diagnostics(self, state: Memory) -> dict[str, FloatArray]:
         """The remembered λ as ``lambda``, of shape (B,): of the last iteration, or what a stepped law made of it."""
         _status, _iterations, *memory = state
         return {"lambda": DampingMemory(*memory).damping}
 
-    def counters(self, state: Memory) -> Memory:
-        """The factorisations, which depend on the rule and on the ranks met."""
-        return (DampingMemory(*remembered(state)).factorised,)
-
-    def operations_of(self, iterations: npt.NDArray[np.int64], counters: Memory) -> Operations:
-        """See :meth:`SolverPolicy.operations_of`; the factorisations are those counted while solving."""
-        (factorised,) = counters
-        return super().operations_of(iterations, counters)._replace(factorisations=factorised.copy())
-
     def solve(self, batch: Batch, memory: Memory) -> Solution:
         """See :meth:`SolverPolicy.solve`."""
         rows = len(batch.q)
         before = DampingMemory(*(memory if self.carry else self.memory(rows)))
-        kept = DampingMemory(before.damping.copy(), before.error.copy(), np.zeros(rows, dtype=np.int64))
+        kept = DampingMemory(before.damping.copy(), before.error.copy())
         found = Iterates(batch.q.copy(), np.empty(rows, dtype=np.int64), np.empty(rows, dtype=np.int64))
         # Plain tuples, see :mod:`baselines.solvers.arm_task`.
         self.iterate(batch, tuple(kept), tuple(found))

@@ -44,12 +44,10 @@ class DampingMemory(NamedTuple):
     Attributes:
         damping: λ. Shape (B,).
         error: Norm of the error before; infinite where there is none. Shape (B,).
-        factorised: Matrices factorised in the last step. Shape (B,).
     """
 
     damping: FloatArray
     error: FloatArray
-    factorised: npt.NDArray[np.int64]
 
 
 class Iterates(NamedTuple):

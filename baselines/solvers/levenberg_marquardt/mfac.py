@@ -6,7 +6,6 @@ import dataclasses
 from typing import ClassVar
 
 import numpy as np
-import numpy.typing as npt
 
 from baselines.policy import Batch, Memory
 from baselines.solvers.arm_task import arm_task_of, plain_arm_task, pose_arrays
@@ -72,10 +71,6 @@ class ModelFreeAdaptiveControl(DampedIteration):
         observed = batch.q, batch.pose, batch.nominal
         iterate_rows(plain_arm_task(self.problem), tuple(self.law), tuple(self.limits), observed, memory, found)
 
-    def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
-        """A Jacobian before each step and one for the last test; the controller (5) has one, and measures."""
-        return 0, 1 if self.one_step else iterations + 1, iterations, int(self.one_step)
-
 
 @kernel
 def iterate_rows(arm_task, law, limits, observed, memory, found):
@@ -92,7 +87,7 @@ def iterate_rows(arm_task, law, limits, observed, memory, found):
     (chain, kind), rule = arm_task_of(arm_task), DampingLaw(*law)
     size, rank, longest, tolerance, most, one_step = limits
     start, poses, nominal = observed
-    damping, error_before, factorised = memory
+    damping, error_before = memory
     q, status, iterations = found
     rotation, position, geometric, coordinates = pose_arrays(q.shape[1], poses.shape[1])
     # With the leading axis that the pseudoinverse wants; without it, as views made once.
@@ -121,12 +116,9 @@ def iterate_rows(arm_task, law, limits, observed, memory, found):
             condition = 1.0
             if rule.condition_bounds.shape[0] > 0:
                 condition = condition_number(jacobian, rank, scratch)
-                factorised[row] += 1
             damping[row] = damping_now(rule, norm, condition, damping[row])
-            factorised[row] += 1
             if not damped_step(jacobian, error, damping[row], gram, x, step):  # (13)
                 pseudoinverse_rows(jacobians, errors, RANK_TOLERANCE, rank, steps, lost)
-                factorised[row] += 1
                 if lost[0]:
                     status[row] = DEFICIENT
             damping[row] = damping_next(rule, damping[row], norm, error_before[row])  # (14), (18)

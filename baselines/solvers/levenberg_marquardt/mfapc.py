@@ -6,7 +6,6 @@ import dataclasses
 from typing import ClassVar
 
 import numpy as np
-import numpy.typing as npt
 
 from baselines.policy import Batch, Memory
 from baselines.solvers.arm_task import arm_task_of, plain_arm_task, pose_arrays
@@ -104,14 +103,6 @@ class ModelFreeAdaptivePredictiveControl(DampedIteration):
             found,
         )
 
-    def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
-        """One Jacobian at the start, where all n are the same, then n poses and 1 or n Jacobians an iteration."""
-        if self.one_step:
-            return 0, 1, self.horizon, 1
-        if self.jacobians == "predicted":
-            return 0, 1 + self.horizon * iterations, self.horizon * iterations, 0
-        return (self.horizon - 1) * iterations, 1 + iterations, self.horizon * iterations, 0
-
 
 @kernel
 def iterate_horizon_rows(arm_task, law, limits, ahead, observed, memory, found):
@@ -131,7 +122,7 @@ def iterate_horizon_rows(arm_task, law, limits, ahead, observed, memory, found):
     size, rank, longest, tolerance, most, one_step = limits
     horizon, predicted, whole_horizon = ahead
     start, poses, nominal = observed
-    damping, error_before, factorised = memory
+    damping, error_before = memory
     q, status, iterations = found
     n, m = start.shape[1], poses.shape[1]
     rotation, position, geometric, coordinates = pose_arrays(n, m)
@@ -182,14 +173,11 @@ def iterate_horizon_rows(arm_task, law, limits, ahead, observed, memory, found):
             if rule.condition_bounds.shape[0] > 0:
                 for j in range(horizon if predicted and i > 0 else 1):
                     condition = max(condition, condition_number(jacobians[j], rank, scratch))
-                    factorised[row] += 1
             damping[row] = damping_now(rule, norm, condition, damping[row])  # (37)
             _difference(residuals, differences)
             solved = damped_horizon_step(jacobians, differences, damping[row], blocks, steps)  # (36)
-            factorised[row] += min(solved + 1, horizon)  # the one that failed, too
             if solved < horizon:
                 pseudoinverse_rows(jacobians, differences, RANK_TOLERANCE, rank, steps, lost)  # (38)
-                factorised[row] += horizon
                 if lost.any():
                     status[row] = DEFICIENT
             damping[row] = damping_next(rule, damping[row], norm, error_before[row])  # (44)

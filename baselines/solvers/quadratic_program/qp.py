@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from typing import Any, ClassVar
 
 import numpy as np
-import numpy.typing as npt
 
 from baselines.policy_kernels import REFUSED, all_finite, cut_rows
 from baselines.solvers.arm_task import period_of
@@ -127,10 +126,6 @@ class QuadraticProgram(TaskFeedback):
         """See :meth:`TaskFeedback.numbers`."""
         share = self.braking_share if self._brakes else 0.0
         return self.damping, self.lm_damping, share, self.task_scaling, self._pull, limits_with_braking(self.problem)
-
-    def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
-        """A factorisation for each active set, which are the iterations, and one for the braking, where used."""
-        return 0, 1, iterations + self._brakes, 1
 
 
 @kernel

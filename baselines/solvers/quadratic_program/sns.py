@@ -6,7 +6,6 @@ import dataclasses
 from typing import Any, ClassVar
 
 import numpy as np
-import numpy.typing as npt
 
 from baselines.policy_kernels import REFUSED, all_finite, cut_rows
 from baselines.solvers.arm_task import period_of
@@ -63,10 +62,6 @@ class SaturationInNullSpace(TaskFeedback):
     def numbers(self) -> tuple[Any, ...]:
         """See :meth:`TaskFeedback.numbers`."""
         return self.damping, limits_with_braking(self.problem)
-
-    def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
-        """A decomposition for each set of saturated joints, which are the iterations."""
-        return 0, 1, iterations, 1
 
 
 @kernel

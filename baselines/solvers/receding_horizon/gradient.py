@@ -7,7 +7,6 @@ import functools
 from typing import Any, ClassVar
 
 import numpy as np
-import numpy.typing as npt
 
 from baselines.policy import Batch, Memory, Solution, SolverPolicy
 from baselines.solvers.receding_horizon.descent import (
@@ -154,14 +153,6 @@ class RecedingHorizonGradient(SolverPolicy):
     def diagnostics(self, state: Memory) -> dict[str, FloatArray]:
         """The last α of the descent, as ``alpha``, of shape (B,)."""
         return {"alpha": DescentMemory(*self.memory_of(state)).alpha}
-
-    def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
-        """A gradient before each step and one for the last test, over the HL - 1 stages of the horizon."""
-        stages, joints, gradients = self.horizon - 1, self.problem.model.joints, iterations + 1
-        if self.gradient == "analytic":
-            return 0, gradients * stages, 0, 0
-        # A velocity of the i-th stage moves that stage and all behind it.
-        return gradients * (stages + joints * stages * (stages + 1) // 2), 0, 0, 0
 
 
 @kernel

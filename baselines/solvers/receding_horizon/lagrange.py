@@ -7,7 +7,6 @@ import functools
 from typing import Any, ClassVar
 
 import numpy as np
-import numpy.typing as npt
 
 from baselines.solvers.receding_horizon.descent import (
     DIVERGED,
@@ -93,18 +92,6 @@ class RecedingHorizonLagrange(RecedingHorizonGradient):
     def _descend(self) -> Any:
         """See :class:`RecedingHorizonGradient`."""
         return functools.partial(reduce_rows, bool(self.states))
-
-    def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
-        """A gradient before each step and one for the last test.
-
-        The system of the multipliers is factorised for each with ``states``, and once without.
-        """
-        stages, joints, gradients = self.horizon - 1, self.problem.model.joints, iterations + 1
-        factorisations = gradients if self.states else 1
-        if self.gradient == "analytic":
-            return 0, gradients * stages, factorisations, 0
-        # A difference in a joint coordinate moves that grid point alone.
-        return gradients * stages * (1 + joints), 0, factorisations, 0
 
 
 @kernel

@@ -179,18 +179,3 @@ class RecedingHorizon(CompiledPolicy):
         """
         plans, n = HorizonMemory(*self.memory_of(state)).plans, self.problem.model.joints
         return plans[:, 0, : len(self.offsets) * n].reshape(len(plans), -1, n).copy()
-
-    def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
-        """Jacobians and a factorisation a knot in each Newton step, and forward kinematics for one length tried.
-
-        Stated: a step that is damped or shortened takes more, and an initial guess its own Jacobians.
-        """
-        # An optimum is linearised once more to be known as one; who makes so many steps and stops is spared that.
-        steps = iterations * len(self.offsets)
-        linearised = steps + len(self.offsets) if self.iterations is None else steps
-        return steps, linearised, linearised, 0
-
-    @property
-    def stated(self) -> bool:
-        """The number of Newton steps does not tell what each of them took."""
-        return True

@@ -93,10 +93,6 @@ class TaskFeedback(CompiledPolicy, abc.ABC):
     def numbers(self) -> tuple[Any, ...]:
         """What the formula needs to know besides."""
 
-    def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
-        """One Jacobian, one factorisation, one measurement."""
-        return 0, 1, 1, 1
-
     @property
     def full_rank(self) -> int:
         """The rank that the task Jacobian has where nothing is lost: redundant coordinates add none."""

@@ -78,10 +78,6 @@ class JacobianTranspose(ResolvedRate):
         transpose_rows(jacobian, shift, self._weights, self.rank_tolerance, out, stuck)
         return out, status_of(stuck & (size == self.full_rank))
 
-    def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
-        """One Jacobian and one measurement; nothing is factorised."""
-        return 0, 1, 0, 1
-
 
 @kernel
 def jacobian_transpose_rows(

@@ -123,11 +123,6 @@ class NullSpace(MoorePenrose):
         objective_rows(plain_arm_task(self.problem), (lines, reach, gain, target), q, out)
         return out
 
-    def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
-        """A pseudoinverse; a damped system, and the geometric Jacobian with its own factorisation, where used."""
-        manipulability, damped = self.objective == "manipulability", self.damping > 0.0
-        return 0, 1 + manipulability, 1 + manipulability + damped, 1
-
 
 def _centre(model: Arm) -> tuple[FloatArray, FloatArray]:
     """The middles between the limits and how strongly to go there, 0 for joints without limits; shapes (n,)."""

@@ -148,15 +148,6 @@ class Rival(SolverPolicy, abc.ABC):
         kept = StartMemory(start, np.ones(rows, dtype=np.bool_))
         return Solution(qdot, kept, status, np.ones(rows, dtype=np.int64))
 
-    @property
-    def stated(self) -> bool:
-        """What a package does within a call is not counted."""
-        return True
-
-    def count(self, iterations: npt.NDArray[np.int64]) -> tuple[npt.ArrayLike, ...]:
-        """One Jacobian and one factorisation at least; what the package says of itself."""
-        return 0, 1, 1, 0
-
     def _step(self) -> Step:
         made = _made.__dict__.setdefault("steps", weakref.WeakKeyDictionary())
         if self not in made:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from typing import ClassVar
 
-from baselines.policy import Batch, Memory, Operations, Problem, Solution
+from baselines.policy import Batch, Memory, Problem, Solution
 from baselines.solvers.wrappers import orientation
 from baselines.wrapper import NamedWrapper
 from ikgym.preview import furthest
@@ -49,7 +49,3 @@ class FullOrientation(NamedWrapper):
         seen, kept = orientation.resolve_orientation(self.problem, shown, own)
         step = self.ask(seen, inside)
         return self.solution(step.action * self.problem.velocity_limit, kept, step)
-
-    def counted(self, inside: Operations) -> Operations:
-        """The orientation of the arm is a forward kinematics more."""
-        return inside._replace(forward_kinematics=inside.forward_kinematics + 1)

@@ -8,7 +8,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from baselines.policy import Batch, Memory, Operations, Solution
+from baselines.policy import Batch, Memory, Solution
 from baselines.wrapper import NamedWrapper
 from ikgym.exceptions import InvalidInputError
 from ikgym.task_kernels import pose_rows
@@ -108,14 +108,6 @@ class Smoothed(NamedWrapper):
             np.ones_like(own.known), calculated + dt * velocity, velocity, sent + dt * acceleration
         )  # eq. 17
         return self.solution(own.smooth.copy(), kept, step)
-
-    def counted(self, inside: Operations) -> Operations:
-        """What is calculated is a forward kinematics more, and no pose is measured."""
-        if self.feedback == "measured":
-            return inside
-        return inside._replace(
-            forward_kinematics=inside.forward_kinematics + 1, measurements=np.zeros_like(inside.measurements)
-        )
 
     def _pose(self, q: FloatArray) -> FloatArray:
         out = np.empty((len(q), self.problem.task.size))

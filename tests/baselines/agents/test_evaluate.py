@@ -44,7 +44,6 @@ def test_rows(file):
         assert row.policy == "agent"
         assert row.parameters == {"path": file, "trust": False, "offsets": None, "hash": digits, "any_arm": False}
         assert row.preview == OFFSETS[-1]
-        assert row.operations == {"forward_kinematics": 0, "jacobians": 1, "factorisations": 1, "measurements": 1}
     assert list(report.labels(summarise(rows)).values()) == [f"agent:path={file}"]
 
 

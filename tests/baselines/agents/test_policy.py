@@ -135,7 +135,6 @@ class TestContract:
             assert identical((action, after, observation), (again, same, before))
             assert state is None or identical(state, kept)
             assert policy.report(after).status[0] in set(Status)
-            assert all(count.shape == (1,) and count[0] >= 0 for count in policy.operations(after))
             state = after
 
     def test_works_inside_evaluate_policy_with_several_environments(self, tmp_path):
@@ -189,7 +188,6 @@ class TestBasePolicy:
         shown = {**observation, "nominal": observation["nominal"][:, : base.preview]}
         states = policy.predict(observation)[1], base.predict(shown)[1]
         assert identical(states[0][1:], states[1][1:])
-        assert identical(policy.operations(states[0]), base.operations(states[1]))
         assert identical(policy.diagnostics(states[0]), base.diagnostics(states[1]))
 
     def test_an_output_adds_to_it(self, tmp_path):
@@ -197,16 +195,6 @@ class TestBasePolicy:
         observation = next(observations(FAST, policy.preview, 1))
         base, _ = baselines.make("dls", FAST).predict(observation)
         assert (policy.predict(observation)[0] != base).all()
-
-    def test_operations_without_one_and_through_the_null_space(self, tmp_path):
-        def operations(**options):
-            policy = agent_for(tmp_path, FAST, **options)
-            return [int(c[0]) for c in policy.operations(policy.predict(next(observations(FAST, OFFSETS, 1)))[1])]
-
-        assert operations() == [0, 0, 0, 1]
-        assert operations(base_policy="dls") == [0, 1, 1, 1]
-        assert operations(null_space=1e-2) == [0, 1, 1, 1]
-        assert operations(base_policy="dls", null_space=1e-2) == [0, 2, 2, 1]
 
     def test_the_worse_status_counts(self, tmp_path):
         straight = ikgym.scenarios.get("varga7-fast").replace(start=np.zeros(7), steps=STEPS)

@@ -14,7 +14,6 @@ from baselines.episodes import Episode, rollout
 from baselines.evaluate import evaluate
 from baselines.evaluation.metrics import TIME_COLUMNS, Row, lost, measure
 from baselines.evaluation.summary import Spread, geometric_mean, summarise
-from baselines.policy import Operations
 from baselines.status import Status
 from ikgym.exceptions import InvalidInputError
 from tests.limited import limited
@@ -48,7 +47,6 @@ def handmade(steps=4, **changes):
     }
     return Episode(
         diagnostics={},
-        operations=Operations(*np.ones((4, steps), dtype=np.int64)),
         **{**arrays, **{k: np.asarray(v) for k, v in changes.items()}},
     )
 
@@ -142,8 +140,6 @@ def test_the_warm_up_call_leaves_no_trace_in_the_episode():
         commands = 0
         report = staticmethod(solver.report)
         diagnostics = staticmethod(solver.diagnostics)
-        counters = staticmethod(solver.counters)
-        operations_of = staticmethod(solver.operations_of)
 
         def predict(self, observation, state=None):
             calls.append(state)

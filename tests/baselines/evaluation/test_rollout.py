@@ -68,8 +68,6 @@ def test_one_call_of_the_policy_a_step():
         commands = 0
         report = staticmethod(solver.report)
         diagnostics = staticmethod(solver.diagnostics)
-        counters = staticmethod(solver.counters)
-        operations_of = staticmethod(solver.operations_of)
 
         def predict(self, observation, state=None):
             shapes.append(observation["q"].shape)
@@ -100,23 +98,3 @@ def test_a_preview_that_is_none_is_refused():
     scenario = ikgym.scenarios.get("varga7-random")
     with pytest.raises(InvalidInputError, match="preview"):
         rollouts(scenario, baselines.make("dls", scenario), SEEDS, preview=0)
-
-
-@pytest.mark.parametrize("name", ["mfac", "full_orientation"])
-def test_operations_are_those_that_each_step_counted(name):
-    """The rule `condition` decomposes J once more in each iteration, which the number of iterations does not tell."""
-    scenario = ikgym.scenarios.get("varga7-fast").replace(steps=STEPS)
-    options = {"rule": "condition"}
-    policy = baselines.make(name, scenario, **(options if name == "mfac" else {"policy": "mfac", "options": options}))
-    told, state = [], None
-    env = ikgym.RedundantIKEnv(scenario, preview=policy.preview)
-    observation, _ = env.reset(seed=3)
-    for _ in range(STEPS):
-        action, state = policy.predict(observation, state)
-        told.append(policy.operations(state))
-        observation, *_ = env.step(action)
-    played = rollout(scenario, policy, 3, timed=False)
-    assert [tuple(of) for of in zip(*played.operations, strict=True)] == [tuple(int(c[0]) for c in of) for of in told]
-    assert (played.operations.factorisations == 2 * played.iterations).all()
-    several = rollouts(scenario, policy, [3, 4])
-    assert identical(several[0].operations, played.operations)

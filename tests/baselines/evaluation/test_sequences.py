@@ -41,9 +41,6 @@ class Counting(SolverPolicy):
         qdot = 1e-3 * (batch.q + batch.pose[:, -1:]) / (1.0 + memory[0][:, None])
         return Solution(qdot, memory, statuses(len(qdot)), np.zeros(len(qdot), dtype=np.int64))
 
-    def count(self, iterations):
-        return 0, 0, 0, 0
-
 
 @pytest.mark.parametrize("alone", [True, False])
 def test_the_state_is_handed_on(alone):

@@ -28,9 +28,6 @@ class Spy(SolverPolicy):
         SEEN.append(batch)
         return Solution(np.zeros(batch.q.shape), memory, *([statuses(len(batch.q))] * 2))
 
-    def count(self, iterations):
-        return 0, 0, 0, 0
-
 
 def observed(rows=None, **extras):
     lead = () if rows is None else (rows,)

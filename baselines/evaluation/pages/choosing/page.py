@@ -30,7 +30,7 @@ OWN = (
     *("rhc:horizon=100,iterations=1,move_blocks=23", "rhc", FORESIGHT),
 )
 #: Who takes milliseconds a step where a path cannot be followed, and plays nothing but the paths of real arms.
-SLOW = ("rhc", "ssik")
+SLOW = ("rhc",)
 #: Who is shown beside the one that is named: what is plain and widely used.
 PLAIN = "dls"
 #: The share of each test set's episodes, the first ones, that is played.

@@ -110,17 +110,6 @@ def test_is_dls_where_the_model_is_right():
     assert not np.array_equal(one.q, other.q)
 
 
-@pytest.mark.parametrize(("learns", "first", "later"), [("jacobian", 1, 0), ("correction", 1, 1)])
-def test_operations(learns, first, later):
-    scenario = ikgym.scenarios.get("khan8-q1")
-    policy = baselines.make("broyden", scenario, learns=learns)
-    observation = observe(scenario, np.full(8, 0.3), scenario.nominal()[0])
-    _, state = policy.predict(observation)
-    assert [int(c[0]) for c in policy.operations(state)] == [0, first, 1, 1]
-    _, state = policy.predict(observation, state)
-    assert [int(c[0]) for c in policy.operations(state)] == [0, later, 1, 1]
-
-
 @pytest.mark.parametrize(
     ("change", "error", "message"),
     [

@@ -10,7 +10,6 @@ import baselines
 import ikgym
 from baselines.policy import Batch
 from baselines.solvers.arm_size import error_weights, jacobian_bound
-from baselines.solvers.fixed_point import fixed_point, iteration
 from baselines.solvers.fixed_point.contraction import contraction, evaluate
 from baselines.status import Status
 from ikgym.exceptions import InvalidInputError, UnknownNameError
@@ -315,11 +314,6 @@ class TestExtended:
             longer = np.vstack([arm.jacobian(q)[:3], np.transpose(step)])
             assert np.linalg.norm(longer) ** 2 <= policy._jacobian_bound() + 1e-6
 
-    def test_counts_both_chains(self):
-        policy = baselines.make("fixed_point_extended", REGULAR)
-        _, state = policy.predict(observed(REGULAR, Q))
-        assert [int(c[0]) for c in policy.operations(state)] == [2, 20, 0, 0]
-
     @pytest.mark.parametrize(
         ("name", "change", "message"),
         [
@@ -369,23 +363,3 @@ class TestExtended:
 def test_bad_parameters(change, error, message):
     with pytest.raises(error, match=message):
         baselines.make("fixed_point", REGULAR, **change)
-
-
-@pytest.mark.parametrize("transformation", ["transpose", "none", "sign", "sign_by_growth"])
-def test_operations_are_what_is_called(transformation, monkeypatch):
-    """Counted by calling the kernel as plain Python."""
-    calls = {"forward": 0, "forward_and_jacobian": 0}
-    for name in calls:
-        kernel = getattr(iteration, name)
-
-        def counted(*args, name=name, kernel=kernel):
-            calls[name] += 1
-            return kernel(*args)
-
-        monkeypatch.setattr(iteration, name, counted)
-    monkeypatch.setattr(fixed_point, "iterate_rows", iteration.iterate_rows.py_func)
-    policy = baselines.make("fixed_point", REGULAR, transformation=transformation, iterations=7)
-    _, state = policy.predict(away())
-    forwards, jacobians, factorisations, measurements = (int(c[0]) for c in policy.operations(state))
-    assert (forwards, jacobians) == (calls["forward"], calls["forward_and_jacobian"])
-    assert factorisations == measurements == 0

@@ -8,7 +8,6 @@ import pytest
 import baselines
 import ikgym
 from baselines.episodes import rollout
-from baselines.solvers.levenberg_marquardt import mfapc as module
 from baselines.status import Status
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 from tests.baselines.solvers.levenberg_marquardt.test_block_tridiagonal import printed as dense
@@ -229,52 +228,6 @@ def test_example_2_tracks_in_ten_iterations():
     nearest = rollout(scenario, baselines.make("mfapc_line", scenario, stop="first_point"), seed=0)
     assert set(nearest.status) == {Status.CONVERGED}
     assert nearest.iterations.max() <= 3
-
-
-@pytest.mark.parametrize(
-    "numbers",
-    [
-        {"rule": "constant"},
-        {"rule": "constant", "jacobians": "constant"},
-        {"rule": "condition"},
-        {"rule": "condition", "jacobians": "constant"},
-        {"rule": "constant", "damping": 0.0, "iterations": 3},
-        {"one_step": True},
-    ],
-)
-def test_operations_are_what_is_called(numbers, monkeypatch):
-    """Counted by calling the kernels as plain Python; a horizon is as many matrices as it has points."""
-    scenario = ikgym.scenarios.get("zhang3-helix")
-    policy = baselines.make("mfapc", scenario, horizon=3, **numbers)
-    weights = {
-        "forward": 0,
-        "forward_and_jacobian": 0,
-        "damped_horizon_step": 3,
-        "pseudoinverse_rows": 3,
-        "condition_number": 1,
-    }
-    calls = dict.fromkeys(weights, 0)
-    for name in weights:
-        kernel = getattr(module, name)
-
-        def counted(*args, name=name, kernel=kernel):
-            result = kernel(*args)
-            # The elimination ends at the first block that cannot be factorised.
-            calls[name] += min(result + 1, 3) / 3 if name == "damped_horizon_step" else 1
-            return result
-
-        monkeypatch.setattr(module, name, counted)
-    monkeypatch.setattr(module, "iterate_horizon_rows", module.iterate_horizon_rows.py_func)
-    nominal = np.array([[0.1, 0.1, 18.0], [0.2, 0.2, 18.0], [0.4, 0.3, 18.0]])
-    pose = scenario.model.forward(np.zeros(3))[1]
-    _, state = policy.predict(
-        {"q": np.zeros(3), "qdot": np.zeros(3), "pose": pose, "nominal": nominal, "remaining": [1]}
-    )
-    operations = policy.operations(state)
-    assert operations.forward_kinematics == calls["forward"]
-    assert operations.jacobians == calls["forward_and_jacobian"]
-    assert operations.factorisations == pytest.approx(sum(weights[name] * count for name, count in calls.items()))
-    assert operations.measurements == numbers.get("one_step", False)
 
 
 @pytest.mark.parametrize(

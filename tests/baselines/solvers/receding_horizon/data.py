@@ -44,17 +44,3 @@ def with_tasks(scenario, q, nominal, qdot):
     x = Unknowns(np.empty((len(qdot), e)), q + scenario.dt * np.cumsum(qdot, axis=0), qdot.copy())
     kinematic_errors(data, nominal, x.q, x.errors)
     return data, x, task_system(len(qdot), e, scenario.joints), Unknowns(*map(np.empty_like, x))
-
-
-def counted(module, monkeypatch):
-    """Counts how often a module calls the kinematics."""
-    calls = {"forward": 0, "forward_and_jacobian": 0}
-    for name in calls:
-        kernel = getattr(module, name)
-
-        def counting(*args, name=name, kernel=kernel):
-            calls[name] += 1
-            return kernel(*args)
-
-        monkeypatch.setattr(module, name, counting)
-    return calls

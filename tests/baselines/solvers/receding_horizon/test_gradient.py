@@ -9,7 +9,6 @@ import pytest
 import baselines
 import ikgym
 from baselines.evaluation import rollout as episodes
-from baselines.solvers.receding_horizon import horizon as horizon_module
 from baselines.solvers.receding_horizon.descent import DescentMemory, DescentSettings
 from baselines.solvers.receding_horizon.gradient import descend_rows
 from baselines.solvers.receding_horizon.horizon import analytic_gradient, difference_gradient, horizon_cost
@@ -208,31 +207,3 @@ def test_preview_is_what_the_horizon_needs():
 def test_bad_parameters(change, error, message):
     with pytest.raises(error, match=message):
         baselines.make("rhc_gradient", "varga7-fast", **change)
-
-
-@pytest.mark.parametrize(("gradient", "horizon"), [("finite_difference", 3), ("finite_difference", 5), ("analytic", 3)])
-def test_operations_are_what_is_called(gradient, horizon, monkeypatch):
-    """Counted by calling the kernels as plain Python."""
-    policy = baselines.make("rhc_gradient", "varga7-fast", gradient=gradient, horizon=horizon)
-    calls = {"forward": 0, "forward_and_jacobian": 0}
-    for name in calls:
-        kernel = getattr(horizon_module, name)
-
-        def counted(*args, name=name, kernel=kernel):
-            calls[name] += 1
-            return kernel(*args)
-
-        monkeypatch.setattr(horizon_module, name, counted)
-    for name in ("_roll", "frame_workspace"):
-        monkeypatch.setattr(horizon_module, name, getattr(horizon_module, name).py_func)
-    scenario = ikgym.scenarios.get("varga7-fast")
-    common = (data_of(scenario), np.zeros(7), scenario.nominal()[1:horizon])
-    qdot, out = np.zeros((horizon - 1, 7)), np.empty((horizon - 1, 7))
-    if gradient == "analytic":
-        analytic_gradient.py_func(*common, qdot, out)
-    else:
-        difference_gradient.py_func(*common, qdot, 1e-3, out)
-    forwards, jacobians, factorisations, measurements = policy.count(np.array([0]))
-    assert np.all(forwards == calls["forward"])
-    assert np.all(jacobians == calls["forward_and_jacobian"])
-    assert factorisations == measurements == 0

@@ -9,7 +9,6 @@ import pytest
 import baselines
 import ikgym
 from baselines.episodes import rollout
-from baselines.solvers.receding_horizon import horizon as horizon_module
 from baselines.solvers.receding_horizon.horizon import (
     analytic_gradient,
     analytic_state_gradient,
@@ -20,7 +19,7 @@ from baselines.solvers.receding_horizon.lagrange import factorise, reduce_gradie
 from baselines.solvers.receding_horizon.task_constraints import analytic_task_gradient
 from baselines.status import Status
 from ikgym.exceptions import InvalidInputError, UnknownNameError
-from tests.baselines.solvers.receding_horizon.data import HORIZONS, constraints, counted, data_of, problem, with_tasks
+from tests.baselines.solvers.receding_horizon.data import constraints, data_of, problem, with_tasks
 from tests.every_scenario import ONE_OF_EACH
 
 
@@ -166,19 +165,6 @@ def test_statuses():
         policy = baselines.make("rhc_lagrange", "varga7-fast", **parameters)
         _, state = policy.predict(observation)
         assert policy.report(state).status[0] == wanted
-
-
-@HORIZONS
-def test_operations_are_what_is_called(kind, horizon, monkeypatch):
-    policy = baselines.make("rhc_lagrange", "varga7-fast", gradient=kind, horizon=horizon)
-    calls = counted(horizon_module, monkeypatch)
-    scenario, _, nominal, qdot = problem("varga7-fast", horizon - 1)
-    data, out = data_of(scenario), np.empty((2, *qdot.shape))
-    if kind == "analytic":
-        analytic_state_gradient.py_func(data, nominal, qdot.copy(), qdot, out[0], out[1])
-    else:
-        difference_state_gradient.py_func(data, nominal, qdot.copy(), qdot, 1e-3, out[0], out[1])
-    assert [int(c) for c in policy.count(np.array(0))] == [*calls.values(), 1, 0]
 
 
 @pytest.mark.parametrize(

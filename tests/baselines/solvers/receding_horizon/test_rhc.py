@@ -394,10 +394,6 @@ def test_newton_steps_do_not_grow_with_the_horizon():
         most.append(float(np.median(policy.report(state).iterations)))
     assert max(most) <= 3.0 * most[0] + 10.0
     assert np.mean(episode("varga7-fast", steps=800)[1]) < 15.0
-    policy = baselines.make("rhc", scenario, horizon=31)
-    longer = baselines.make("rhc", scenario, horizon=301)
-    one = np.ones(1, dtype=np.int64)
-    assert np.array_equal(np.multiply(policy.count(one)[:3], 10), longer.count(one)[:3])
 
 
 RESTARTED = {"horizon": 40, "iterations": 1, "move_blocks": 12, "starts": 4, "restart_steps": 5}

@@ -5,8 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-import baselines
-from baselines.solvers.receding_horizon import task_constraints as task_module
 from baselines.solvers.receding_horizon.horizon import analytic_gradient
 from baselines.solvers.receding_horizon.task_constraints import (
     Unknowns,
@@ -15,7 +13,7 @@ from baselines.solvers.receding_horizon.task_constraints import (
     reduce_task_gradient,
     reduced_task_gradient,
 )
-from tests.baselines.solvers.receding_horizon.data import HORIZONS, constraints, counted, problem, with_tasks
+from tests.baselines.solvers.receding_horizon.data import constraints, problem, with_tasks
 
 
 @pytest.mark.parametrize("stages", [1, 2, 5])
@@ -84,18 +82,3 @@ def test_no_reduced_gradient_of_numbers_that_are_not_finite():
     x.q[0, 0] = np.nan
     for difference in (0.0, 1e-3):
         assert reduced_task_gradient(data, nominal, difference, x, system, g) == np.inf
-
-
-@HORIZONS
-def test_operations_with_task_coordinates_are_what_is_called(kind, horizon, monkeypatch):
-    policy = baselines.make("rhc_lagrange", "varga7-fast", gradient=kind, horizon=horizon, states=True)
-    scenario, q, nominal, qdot = problem("varga7-fast", horizon - 1)
-    data, x, system, g = with_tasks(scenario, q, nominal, qdot)
-    calls = counted(task_module, monkeypatch)
-    monkeypatch.setattr(task_module, "_error", task_module._error.py_func)
-    if kind == "analytic":
-        analytic_task_gradient.py_func(data, nominal, x, system.jacobian, g)
-    else:
-        difference_task_gradient.py_func(data, nominal, x, 1e-3, system.jacobian, g)
-    assert [int(c) for c in policy.count(np.array(0))] == [*calls.values(), 1, 0]
-    assert policy.count(np.array(7))[2] == 8

@@ -87,10 +87,6 @@ def test_the_length_is_the_models():
     assert policy.parameters["length"] == policy.length == radian(policy.problem.model)
 
 
-def test_nothing_is_inverted():
-    assert baselines.make("jacobian_transpose", "varga7-fast").count(np.ones(1)) == (0, 1, 0, 1)
-
-
 def test_bad_parameters():
     with pytest.raises(InvalidInputError, match="rank_tolerance: expected a finite number of at least 0, got -1"):
         baselines.make("jacobian_transpose", "varga7-fast", rank_tolerance=-1.0)

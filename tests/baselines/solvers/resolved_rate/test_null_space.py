@@ -164,16 +164,3 @@ def test_by_default_joints_with_limits_are_centred_and_others_go_to_0():
 def test_bad_parameters(change, error, message):
     with pytest.raises(error, match=message):
         baselines.make("null_space", "varga7-fast", **change)
-
-
-@pytest.mark.parametrize(
-    ("change", "counts"),
-    [
-        ({"damping": 0.0}, (0, 1, 1, 1)),
-        ({}, (0, 1, 2, 1)),
-        ({"objective": "manipulability"}, (0, 2, 3, 1)),
-        ({"objective": "manipulability", "damping": 0.0}, (0, 2, 2, 1)),
-    ],
-)
-def test_operations(change, counts):
-    assert baselines.make("null_space", "varga7-fast", **change).count(np.ones(1)) == counts

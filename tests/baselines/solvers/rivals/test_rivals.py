@@ -22,7 +22,7 @@ from tests.baselines.making import circle, made, usual
 RIVALS = [name for name in baselines.names() if get(name).rival]
 every_rival = pytest.mark.parametrize("name", RIVALS)
 #: Those that keep limits of velocity.
-LIMITED = ["pink", "mink", "ssik"]
+LIMITED = ["pink", "mink"]
 
 
 def observation(scenario, policy, q=None):
@@ -31,7 +31,7 @@ def observation(scenario, policy, q=None):
 
 
 def test_rivals_are_those_of_the_extra():
-    assert RIVALS == ["pink", "mink", "roboticstoolbox", "ssik"]
+    assert RIVALS == ["pink", "mink"]
     assert all(issubclass(get(name), Rival) for name in RIVALS)
 
 
@@ -55,8 +55,7 @@ def test_programs_wait_for_a_slow_joint_and_the_pseudoinverse_does_not(name):
     """TIAGo's torso is slow: who knows of it lets the arm do the work."""
     scenario = circle("tiago", dt=4e-3)
     made(name, scenario)
-    made("roboticstoolbox", scenario)
-    program, inverse = evaluate(scenario, [name, "roboticstoolbox"])
+    program, inverse = evaluate(scenario, [name, "moore_penrose"])
     assert program.position_error_max < 2e-5
     assert program.steps_at_velocity_limit == 0
     assert inverse.position_error_max > 1e-2
@@ -114,30 +113,6 @@ def test_pink_without_a_solution():
     seen = observation(scenario, policy, np.array(scenario.arm.upper) - 1e-4)
     _, state = policy.predict({**seen, "qdot": np.array(scenario.arm.velocity_limit)})
     assert policy.report(state).status[0] == Status.DIVERGED
-
-
-def test_ssik_holds_what_it_cannot_reach():
-    scenario = circle()
-    policy = made("ssik", scenario)
-    seen = observation(scenario, policy)
-    far = seen["nominal"].copy()
-    far[:, -3:] += 3.0
-    action, state = policy.predict({**seen, "nominal": far})
-    assert not action.any()
-    assert policy.report(state).status[0] == Status.DIVERGED
-
-
-@pytest.mark.parametrize(
-    ("arm", "message"),
-    [
-        ("tiago", "expected an arm of 6 or 7 revolute joints, got 7 revolute and 1 prismatic"),
-        ("fetch_arm", "expected an arm that it has a closed form for, got 'fetch_arm'"),
-    ],
-)
-def test_ssik_says_which_arms_it_has(arm, message):
-    pytest.importorskip("ssik", reason='pip install "ikgym[rivals]"')
-    with pytest.raises(InvalidInputError, match=message):
-        baselines.make("ssik", circle(arm))
 
 
 @every_rival
