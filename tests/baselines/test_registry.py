@@ -177,6 +177,7 @@ def test_names_that_are_taken_are_refused(name):
 
 def test_classes_that_are_no_policies_are_refused_and_leave_nothing_behind():
     class Unfinished(SolverPolicy):
+        pass
 
     with pytest.raises(InvalidInputError, match="expected a class derived from SolverPolicy"):
         baselines.register("mine", dict)
