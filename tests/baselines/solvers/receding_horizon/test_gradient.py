@@ -8,7 +8,7 @@ import pytest
 
 import baselines
 import ikgym
-from baselines.evaluation import rollout as episodes
+from baselines import episodes
 from baselines.solvers.receding_horizon.descent import DescentMemory, DescentSettings
 from baselines.solvers.receding_horizon.gradient import descend_rows
 from baselines.solvers.receding_horizon.horizon import analytic_gradient, difference_gradient, horizon_cost
