@@ -20,7 +20,7 @@ from baselines.evaluation.plan import Job
 from baselines.evaluation.trajectory_log import trajectory_log
 from baselines.evaluation.units import BLOCK, Checks, Done, Played, Unit, processor, units
 from baselines.oracle import best_known
-from baselines.workers import TRIES, LostError, Report, WorkerError, Workers, finished
+from baselines.workers import WorkerError, Workers, finished
 from ikgym.compilation import logger
 from ikgym.exceptions import InvalidInputError
 from ikgym.preview import furthest
@@ -85,23 +85,23 @@ def _elsewhere(away: Sequence[Unit], workers: Workers) -> Iterator[tuple[Unit, l
         return
     check_sendable({unit.jobs[0].entrant: None for unit in away})
     checks = None if workers.cluster is None else Checks(play)
-    with workers.pool(len(away)) as pool:
-        for unit, done in finished(pool, do, away):
-            if isinstance(done, LostError):
+    with contextlib.closing(finished(do, away, workers)) as all_done:
+        for unit, future in all_done:
+            try:
+                done = future.result()
+            except WorkerError as e:
                 first = unit.jobs[0]
                 raise WorkerError(
-                    f"{first.policy} in {first.scenario.name}: workers have died over it {TRIES} times, the last one "
-                    f"because {done}; perhaps for want of memory: try fewer --workers. What was finished is kept; go "
-                    "on with --resume."
-                )
+                    f"{first.policy} in {first.scenario.name}: {e} If memory is short, try fewer --workers. Finished "
+                    "episodes are kept; continue with --resume."
+                ) from None
             if checks is not None:
                 checks.check(unit, done)
             yield unit, done.played
 
 
-def do(unit: Unit, report: Report) -> Done:
+def do(unit: Unit) -> Done:
     """Plays a unit, in the process of a worker."""
-    del report
     return Done(unit.digest, play(unit.jobs), processor())
 
 

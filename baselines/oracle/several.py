@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import functools
 import math
@@ -15,7 +16,7 @@ from baselines.oracle.episode import EpisodeProblem, path_of
 from baselines.oracle.optimum import Optimum, Search
 from baselines.oracle.stripped import stripped
 from baselines.spec import parse_policy
-from baselines.workers import ALONE, TOLERANCE, LostError, Report, WorkerError, Workers, finished
+from baselines.workers import ALONE, TOLERANCE, WorkerError, Workers, finished
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray
 
@@ -39,12 +40,12 @@ class Wanted:
     cached: bool = True
 
 
-def find(wanted: Wanted, report: Report) -> Optimum:
+def find(wanted: Wanted, tick: Callable[[float], None] = lambda share: None) -> Optimum:
     """The cheapest path that is found, in this process.
 
     Args:
         wanted: Of which episode.
-        report: Called now and then with the share of the work done since the last call.
+        tick: Called now and then with the share of the work done since the last call.
 
     Raises:
         UnknownNameError: There is no such policy or parameter.
@@ -53,7 +54,7 @@ def find(wanted: Wanted, report: Report) -> Optimum:
     scenario, draw = wanted.scenario, wanted.draw
     true = stripped(scenario, draw.seed, draw.arm_seed)
     paths = {spec: path(true, draw.seed, spec) for spec in wanted.policies}
-    given = {"arm_seed": draw.arm_seed, "cached": wanted.cached, "tick": report, "paths": paths}
+    given = {"arm_seed": draw.arm_seed, "cached": wanted.cached, "tick": tick, "paths": paths}
     return solve(scenario, draw.seed, wanted.how, **given)  # type: ignore[arg-type]  # the types of a dict are joined
 
 
@@ -88,16 +89,16 @@ def find_all(
             left.append(one)
         else:
             yield one, known
-    with workers.pool(len(left)) as pool:
-        for one, optimum in finished(pool, find, left, report=tick):
-            if isinstance(optimum, LostError):
-                raise WorkerError(
-                    f"{one.scenario.name}, seed {one.draw.seed}: workers have died over it, the last one because "
-                    f"{optimum}. What was found is kept."
-                )
+    with contextlib.closing(finished(find, left, workers)) as done:
+        for one, future in done:
+            try:
+                optimum = future.result()
+            except WorkerError as e:
+                raise WorkerError(f"{one.scenario.name}, seed {one.draw.seed}: {e} Results so far are kept.") from None
             _check(one, optimum)
             if one.cached and not one.policies:
                 keep(optimum, one.scenario, one.draw.seed, one.how, one.draw.arm_seed)
+            tick(one, 1.0)
             yield one, optimum
 
 

@@ -16,7 +16,7 @@ from tqdm import tqdm
 from baselines.files import write
 from baselines.training.config.base import Config
 from baselines.training.score import Score
-from baselines.workers import TRIES, LostError, Report, Workers, finished
+from baselines.workers import TRIES, WorkerError, Workers, finished
 from ikgym.exceptions import IkgymError
 
 
@@ -67,34 +67,38 @@ LESS_MEMORY = "Choose fewer arms (--n-envs), a smaller --buffer-size, --batch-si
 
 
 class Bar:
-    """One progress bar for all seeds, on stderr."""
+    """The progress bar of one seed, on stderr.
 
-    def __init__(self, segments: int, seeds: int, *, show: bool) -> None:
+    Args:
+        segments: Segments of the training.
+        seed: The seed.
+        line: The line of the bar below the cursor; None for no bar.
+    """
+
+    def __init__(self, segments: int, seed: int, line: int | None) -> None:
         self._bar = tqdm(
-            total=segments * seeds,
-            disable=not show,
+            total=segments,
+            desc=f"seed {seed}",
+            disable=line is None,
+            position=line,
             file=sys.stderr,
             unit="segment",
             dynamic_ncols=True,
             # A log file has no cursor to go back with.
             mininterval=0.1 if sys.stderr.isatty() else 10.0,
         )
-        self._done: dict[int, int] = {}
-        self._scores: dict[int, str] = {}
+        self._seed = seed
 
-    def advance(self, seed: int, done: int, score: Score | None) -> None:
-        """Segments that a seed has done, and its last score."""
+    def advance(self, done: int, score: Score | None) -> None:
+        """Shows the number of finished segments, and the last score."""
         if score is not None:
             number = score.cost if score.cost_ratio is None else score.cost_ratio
-            self._scores[seed] = f"{'cost' if score.cost_ratio is None else 'cost ratio'} {number:.4g}"
-            self._bar.set_description(
-                " · ".join(f"seed {s}: {text}" for s, text in sorted(self._scores.items())), refresh=False
-            )
-        self._bar.update(done - self._done.get(seed, 0))
-        self._done[seed] = done
+            text = f"{'cost' if score.cost_ratio is None else 'cost ratio'} {number:.4g}"
+            self._bar.set_description(f"seed {self._seed}: {text}", refresh=False)
+        self._bar.update(done - self._bar.n)
 
     def close(self) -> None:
-        """Leaves the bar as it stands."""
+        """Leaves the bar as it is."""
         self._bar.close()
 
 
@@ -103,13 +107,13 @@ def train_seeds(runs: SeedRuns, seeds: Sequence[int], *, workers: Workers, progr
 
     One seed is trained in this process; several in processes of their own, so that a seed that fails or dies takes no
     other with it. Nodes of a cluster write into the folder of the runs, which all of them see: a seed whose node is
-    lost goes on elsewhere from its last checkpoint.
+    lost is resumed elsewhere from its last checkpoint.
 
     Args:
         runs: What they have in common.
         seeds: One run each.
         workers: Who trains.
-        progress: Whether to show a bar on stderr.
+        progress: Whether to show bars on stderr.
 
     Returns:
         What came of each, in the order of the seeds.
@@ -117,13 +121,21 @@ def train_seeds(runs: SeedRuns, seeds: Sequence[int], *, workers: Workers, progr
     Raises:
         ClusterError: There is no cluster.
     """
-    bar = Bar(runs.config.segments, len(seeds), show=progress)
-    try:
-        if workers.cluster is None and len(seeds) == 1:
-            return [train_seed(Seed(runs, seeds[0]), lambda said: bar.advance(seeds[0], *said))]
-        return _elsewhere(runs, seeds, workers, bar)
-    finally:
-        bar.close()
+    lines = {seed: line if progress and workers.cluster is None else None for line, seed in enumerate(seeds)}
+    if workers.cluster is None and len(seeds) == 1:
+        return [train_seed(Seed(runs, seeds[0], line=lines[seeds[0]]))]
+    far = workers.cluster is not None
+    shared = dataclasses.replace(runs, out=runs.out.absolute()) if far else runs
+    results = dict[int, SeedResult]()
+    tries = TRIES if far else 1  # a process of this machine that dies does not do so by chance
+    with _marked(shared.out, far) as mark:
+        every = [Seed(shared, seed, mark, lines[seed]) for seed in seeds]
+        for one, future in finished(attempt, every, workers, tries=tries):
+            try:
+                results[one.seed] = future.result()
+            except WorkerError as e:
+                results[one.seed] = SeedResult(one.seed, error=f"{e} Continue with --resume.")
+    return [results[seed] for seed in seeds]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -134,20 +146,17 @@ class Seed:
         runs: What all seeds have in common.
         seed: Which.
         mark: The name of a file in the folder of the runs that a worker of a cluster has to see; empty elsewhere.
+        line: See :class:`Bar`.
     """
 
     runs: SeedRuns
     seed: int
     mark: str = ""
+    line: int | None = None
 
 
-def train_seed(one: Seed, report: Report) -> SeedResult:
-    """Trains the agent of a seed, in the process of a worker.
-
-    Args:
-        one: Which.
-        report: Told the segments that are done, and the last score.
-    """
+def train_seed(one: Seed) -> SeedResult:
+    """Trains the agent of a seed, in the process of a worker."""
     # PyTorch takes seconds to load, which the parent of processes has no need to do.
     from baselines.training.run import train
 
@@ -155,16 +164,21 @@ def train_seed(one: Seed, report: Report) -> SeedResult:
     if one.mark and not (runs.out / one.mark).exists():
         unseen = f"{platform.node()} does not see {runs.out}: expected a folder that all nodes of the cluster share"
         return SeedResult(seed, error=unseen)
+    begun = runs.out / f"{one.mark}-{seed}"
+    again = bool(one.mark) and begun.exists()  # on a node that was lost
+    if one.mark:
+        begun.touch()
+    bar = Bar(runs.config.segments, seed, one.line)
     try:
         result = train(
             runs.config,
             seed,
             runs.folder(seed),
-            resume=runs.resume,
-            overwrite=runs.overwrite,
+            resume=runs.resume or again,
+            overwrite=runs.overwrite and not again,
             checkpoint_every=runs.checkpoint_every,
             command=runs.command,
-            on_segment=lambda done, score: report((done, score)),
+            on_segment=bar.advance,
         )
     except IkgymError as e:
         return SeedResult(seed, error=" ".join(str(e).split()))
@@ -172,43 +186,18 @@ def train_seed(one: Seed, report: Report) -> SeedResult:
         if isinstance(e, RuntimeError) and "allocate memory" not in str(e):  # PyTorch's words
             raise
         return SeedResult(seed, error=f"Out of memory: {' '.join(str(e).split())[:200]}. {LESS_MEMORY}")
+    finally:
+        bar.close()
     return SeedResult(seed, result.score, result.weights_sha256)
 
 
-def attempt(one: Seed, report: Report) -> SeedResult:
-    """The same, whatever goes wrong: other seeds go on."""
+def attempt(one: Seed) -> SeedResult:
+    """Trains the agent of a seed; whatever goes wrong, other seeds go on."""
     try:
-        return train_seed(one, report)
+        return train_seed(one)
     except Exception as e:
         traceback.print_exc()
         return SeedResult(one.seed, error=f"{type(e).__name__}: {' '.join(str(e).split())}")
-
-
-def _elsewhere(runs: SeedRuns, seeds: Sequence[int], workers: Workers, bar: Bar) -> list[SeedResult]:
-    results = dict[int, SeedResult]()
-    far = workers.cluster is not None
-    shared = dataclasses.replace(runs, out=runs.out.absolute()) if far else runs
-    with workers.pool(len(seeds)) as pool, _marked(shared.out, far) as mark:
-        every = [Seed(shared, seed, mark) for seed in seeds]
-        # A process of this machine that dies has not done so by chance.
-        tries = TRIES if far else 1
-
-        def heard(one: Seed, said: tuple[int, Score | None]) -> None:
-            bar.advance(one.seed, *said)
-
-        done = finished(pool, attempt, every, tries=tries, again=_resumed, report=heard)
-        for one, result in done:
-            if isinstance(result, LostError):
-                result = SeedResult(one.seed, error=f"{result}; go on with --resume")
-            elif not result.error:
-                bar.advance(one.seed, runs.config.segments, result.score)
-            results[one.seed] = result
-    return [results[seed] for seed in seeds]
-
-
-def _resumed(one: Seed) -> Seed:
-    """A seed whose node was lost: it goes on from its last checkpoint."""
-    return dataclasses.replace(one, runs=dataclasses.replace(one.runs, resume=True, overwrite=False))
 
 
 @contextlib.contextmanager
@@ -222,4 +211,5 @@ def _marked(folder: pathlib.Path, wanted: bool) -> Iterator[str]:
     try:
         yield file.name
     finally:
-        file.unlink(missing_ok=True)
+        for left in folder.glob(f"{file.name}*"):
+            left.unlink()

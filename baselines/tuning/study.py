@@ -20,7 +20,7 @@ from optuna.trial import FrozenTrial, Trial, TrialState
 from tqdm import tqdm
 
 from baselines.files import ResultsError
-from baselines.workers import LostError, Report, Workers
+from baselines.workers import WorkerError, Workers
 from baselines.workers import finished as done_by
 from ikgym.exceptions import IkgymError
 
@@ -163,18 +163,20 @@ def _work(folder: pathlib.Path, study: Study[Any], worker: int, show: Callable[[
 
 
 def _in_processes(folder: pathlib.Path, studies: Sequence[Study[Any]], workers: int, show: Callable[[], None]) -> None:
-    with Workers(workers).pool(workers) as pool:
-        for study in studies:
-            units = [(folder, study, worker) for worker in range(workers)]
-            # Not tried again: who is killed may leave the journal locked, which is mended where a search begins.
-            for _, result in done_by(pool, _share, units, tries=1, report=lambda unit, said: show()):
-                if isinstance(result, LostError):
-                    raise StudyError(f"A worker is lost: {result}. What was finished is kept; go on with --resume.")
+    for study in studies:
+        units = [(folder, study, worker) for worker in range(workers)]
+        # Not tried again: who is killed may leave the journal locked, which is mended where a search begins.
+        for _, future in done_by(_share, units, Workers(workers), tries=1):
+            try:
+                future.result()
+            except WorkerError as e:
+                raise StudyError(f"{study.name}: {e} Finished trials are kept; continue with --resume.") from None
+            show()
 
 
-def _share(unit: tuple[pathlib.Path, Study[Any], int], report: Report) -> None:
+def _share(unit: tuple[pathlib.Path, Study[Any], int]) -> None:
     """What one of several workers does of a study."""
-    _work(*unit, show=lambda: report(None))
+    _work(*unit)
 
 
 def _storage(file: pathlib.Path) -> optuna.storages.JournalStorage:

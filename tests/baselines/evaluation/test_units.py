@@ -13,7 +13,7 @@ from baselines.evaluation import runner, units
 from baselines.evaluation.plan import make_plan
 from baselines.evaluation.results import read_rows
 from baselines.workers import TOLERANCE, ClusterError, WorkerError, Workers
-from tests.baselines.workers.losing import LosingPool, instead
+from tests.baselines.losing import LosingCluster
 
 STEPS = 5
 FAR = {"cpu": "another one"}
@@ -22,7 +22,7 @@ FAR = {"cpu": "another one"}
 @pytest.fixture
 def pool(monkeypatch):
     """The workers of the cluster."""
-    return instead(monkeypatch, LosingPool())
+    return LosingCluster(monkeypatch)
 
 
 @pytest.fixture
@@ -33,8 +33,8 @@ def one_by_one(monkeypatch):
 def on_another_machine(monkeypatch, factor, processor=None):
     """Has workers say that they are another machine, or processor of the same name, and cost more by a factor."""
 
-    def do(unit, report, plain=runner.do):
-        done = plain(unit, report)
+    def do(unit, plain=runner.do):
+        done = plain(unit)
         worse = [
             one._replace(row=dataclasses.replace(one.row, machine=FAR, total_cost=factor * one.row.total_cost))
             for one in done.played
@@ -69,7 +69,9 @@ def test_a_lost_node_changes_nothing(pool, one_by_one, tmp_path):
 
 def test_a_unit_that_kills_every_worker_is_named_and_the_others_are_kept(pool, one_by_one, tmp_path):
     pool.lost = {2, 3, 4}
-    with pytest.raises(WorkerError, match="dls in varga7-random: workers have died over it 3 times, the last one"):
+    with pytest.raises(
+        WorkerError, match="dls in varga7-random: workers died over it 3 times, the last time because its node was lost"
+    ):
         play(cluster="ray", out=tmp_path)
     kept = [row.seed for row in read_rows(tmp_path / "results.json")]
     assert len(kept) == 2
@@ -93,7 +95,7 @@ def test_digests_tell_units_apart():
 
 def test_another_version_of_the_code_is_refused(pool, monkeypatch):
     done = runner.do
-    monkeypatch.setattr(runner, "do", lambda unit, report: done(unit, report)._replace(digest="0" * 24))
+    monkeypatch.setattr(runner, "do", lambda unit: done(unit)._replace(digest="0" * 24))
     with pytest.raises(WorkerError, match="has played something else than dls in varga7-random: it has ikgym"):
         play(cluster="ray")
 

@@ -12,7 +12,7 @@ from baselines.oracle.cache import kept
 from baselines.oracle.several import Wanted, find_all
 from baselines.workers import WorkerError, Workers
 from ikgym import scenarios
-from tests.baselines.workers.losing import LosingPool, instead
+from tests.baselines.losing import LosingCluster
 
 HOW = Search(starts=1, chains=1, generations=0, polished=1, knots=20)
 FAR = Workers(cluster="ray")
@@ -20,7 +20,7 @@ FAR = Workers(cluster="ray")
 
 @pytest.fixture
 def pool(monkeypatch):
-    return instead(monkeypatch, LosingPool(lost=[0]))
+    return LosingCluster(monkeypatch, lost=[0])
 
 
 def wanted(*, cached=True):
@@ -46,8 +46,8 @@ def test_they_are_the_same_and_kept_here(pool, monkeypatch, tmp_path):
 
 
 def test_a_path_that_costs_something_else_here_is_refused(pool, monkeypatch):
-    def find(one, report, plain=several.find):
-        optimum = plain(one, report)
+    def find(one, plain=several.find):
+        optimum = plain(one)
         return dataclasses.replace(optimum, cost=optimum.cost * (1.0 - 1e-5))
 
     monkeypatch.setattr(several, "find", find)
@@ -56,6 +56,6 @@ def test_a_path_that_costs_something_else_here_is_refused(pool, monkeypatch):
 
 
 def test_an_episode_over_which_all_workers_die_is_named(pool):
-    pool.lost = {0, 2, 3}
-    with pytest.raises(WorkerError, match="varga7-random, seed 7000000: workers have died over it"):
+    pool.lost = {0, 1, 2}
+    with pytest.raises(WorkerError, match="varga7-random, seed 7000000: workers died over it 3 times"):
         costs(find_all(wanted(cached=False), FAR))

@@ -18,7 +18,7 @@ from baselines.workers import Workers
 from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError
 from tests.baselines.evaluation.pages.builders import KNOWN, TEST_SEEDS, fake, write_runs
-from tests.baselines.workers.losing import LosingPool, instead
+from tests.baselines.losing import LosingCluster
 
 FEW = (
     fake(),
@@ -89,7 +89,7 @@ class TestMeasure:
             measure(sets.MAIN, PAGES, out, episodes=2)
 
     def test_a_cluster_plays_what_is_not_timed(self, monkeypatch):
-        pool = instead(monkeypatch, LosingPool(lost=[0]))
+        pool = LosingCluster(monkeypatch, lost=[0])
         plans = plan("varga7-pose-random-frequency", [solver("dls", timed=1)], 3)
         (there,) = play(plans, workers=Workers(cluster="ray")).values()
         (here,) = play(plans).values()

@@ -28,7 +28,7 @@ from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 from ikgym.scenarios import imperfect
 from tests.baselines.evaluation.test_report import row
-from tests.baselines.workers.losing import LosingPool, instead
+from tests.baselines.losing import LosingCluster
 
 STEPS = 30
 ENTRY = Entry("panda-camera", "dls", False, 64, 650.0, (500.0, 800.0), 0.25, 1.2, 540.0, (400.0, 700.0))
@@ -96,7 +96,7 @@ def test_a_cluster_changes_nothing(short, tmp_path, monkeypatch):
     play = functools.partial(measure.cells, "panda-field", {"dls": "dls"}, severities=[0.5], episodes=2)
     here = play(tmp_path / "here")
     monkeypatch.setenv(cache.VARIABLE, str(tmp_path / "empty"))
-    pool = instead(monkeypatch, LosingPool(lost=[0, 2]))
+    pool = LosingCluster(monkeypatch, lost=[0, 2])
     assert play(tmp_path / "there", workers=Workers(cluster="ray")) == here
     assert len(pool.units) == 1 + 2 + 2  # a block of two seeds, two best known costs, and what was lost
 

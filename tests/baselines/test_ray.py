@@ -18,8 +18,8 @@ from ray.cluster_utils import Cluster
 
 from baselines.evaluate import evaluate
 from baselines.evaluation import runner
-from baselines.workers import ClusterError, Workers, finished, ray_cluster
-from tests.baselines.workers.test_lifetime import needs_proc, wait_for
+from baselines.workers import ClusterError, Workers, finished
+from tests.baselines.test_workers import needs_proc, wait_for
 
 # Ray leaves files and sockets to the garbage collector.
 pytestmark = [
@@ -79,7 +79,7 @@ def at_work_in(folder):
     return found - {os.getpid()}
 
 
-def do(unit, report):
+def do(unit):
     """Plays a unit. The node that is to be killed stays at its second one; the other waits for that with its sixth."""
     folder, node = pathlib.Path(os.environ[FOLDER]), os.environ[NODE]
     (folder / f"{node}-{unit.jobs[0].seed}").touch()
@@ -89,7 +89,7 @@ def do(unit, report):
         time.sleep(2 * PATIENCE)
     if node == "head" and number == EPISODES // 2:
         wait_for((folder / AT_WORK).exists, PATIENCE)
-    return runner.do(unit, report)
+    return runner.do(unit)
 
 
 class Unknown:
@@ -119,13 +119,13 @@ def test_one_of_two_nodes_is_killed_half_way(cluster, monkeypatch, tmp_path, cap
     monkeypatch.setattr(runner.Checks, "check", kill_half_way)
     rows = evaluate(**given, cluster="ray", out=tmp_path)
     assert len(done) == len(set(done)) == EPISODES
-    assert caplog.text.count("its unit is done again") == 1
+    assert caplog.text.count("its job is retried") == 1
     assert [untimed(row) for row in rows] == [untimed(row) for row in alone]
     assert [row.time_p50_us is None for row in rows] == [False] + [True] * EPISODES
     # To start nodes takes long: so here is also seen what they say of units that they cannot read.
-    expected = "cannot do its work: .*no_such_module.* Install ikgym, and whatever its policies are made of"
-    with Workers(cluster="ray").pool(1) as pool, pytest.raises(ClusterError, match=expected):
-        list(finished(pool, runner.do, [Unknown()]))
+    ((_, future),) = finished(runner.do, [Unknown()], Workers(cluster="ray"))
+    with pytest.raises(ClusterError, match=r"cannot do its work: .*no_such_module.* Install ikgym and the packages"):
+        future.result()
 
 
 def untimed(row):
@@ -137,10 +137,10 @@ def untimed(row):
 @pytest.mark.parametrize(
     ("address", "message"),
     [
-        ("", "expected its address in the environment variable RAY_ADDRESS"),
+        ("", "expected the address of the cluster in the environment variable RAY_ADDRESS"),
         ("nowhere", "RAY_ADDRESS: expected HOST:PORT or auto, got 'nowhere'"),
         ("ray://127.0.0.1:1", "expected HOST:PORT or auto, got 'ray://127.0.0.1:1'"),
-        ("127.0.0.1:99999", "No cluster of Ray can be reached at 127.0.0.1:99999"),
+        ("127.0.0.1:99999", "No cluster of Ray can be reached at RAY_ADDRESS=127.0.0.1:99999"),
         ("closed", r"No cluster of Ray can be reached at .* \(Connection refused\)"),
     ],
 )
@@ -152,13 +152,3 @@ def test_addresses_without_a_cluster(monkeypatch, address, message):
     monkeypatch.setenv("RAY_ADDRESS", address)
     with pytest.raises(ClusterError, match=message):
         Workers(cluster="ray").check()
-
-
-def test_one_who_does_not_answer_is_given_up(monkeypatch):
-    monkeypatch.setattr(ray_cluster, "CONNECTED", 0.1)
-    with socket.socket() as mute:
-        mute.bind(("127.0.0.1", 0))
-        mute.listen()
-        monkeypatch.setattr(ray_cluster.ray, "init", lambda **_: time.sleep(1.0))
-        with pytest.raises(ClusterError, match=r"no answer of Ray within 0\.1 s"):
-            ray_cluster.connect(f"127.0.0.1:{mute.getsockname()[1]}")

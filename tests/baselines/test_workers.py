@@ -1,0 +1,167 @@
+"""Work in other processes: dead workers are replaced, errors reach the caller, and workers end with their parent."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import pathlib
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from baselines.workers import WorkerError, Workers, finished
+from ikgym import parallel
+from ikgym.exceptions import InvalidInputError, MissingDependencyError, UnknownNameError
+from tests.baselines.losing import LosingCluster
+
+FAR = Workers(cluster="ray")
+EVALUATE = (
+    *("baselines.evaluate", "--scenarios", "varga7-random", "--episodes", "400", "--no-plots", "--workers", "2"),
+    *("--policies", "rhc:horizon=100,starts=1"),
+)
+# Segments enough that nobody is done before it is stopped.
+TRAIN = (
+    *("baselines.training.command", "ppo", "--preset", "smoke", "--segments", "100000", "--evaluate-every", "100000"),
+    *("--seeds", "0", "1", "--workers", "2", "--out"),
+)
+# `baselines.training.command` has no main of its own: train.py calls it.
+MAIN = "import sys; from {module} import main; sys.exit(main(sys.argv[1:]))"
+
+needs_proc = pytest.mark.skipif(not pathlib.Path("/proc/self/stat").exists(), reason="looks processes up in /proc")
+
+
+def alive(pid):
+    try:
+        return pathlib.Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] not in "ZX"
+    except OSError:
+        return False
+
+
+def descendants(pid):
+    """Processes that were started by the threads of one, without Python's tracker of resources."""
+    threads = pathlib.Path(f"/proc/{pid}/task").glob("*/children")
+    children = [child for thread in threads for child in thread.read_text().split()]
+    commands = {child: pathlib.Path(f"/proc/{child}/cmdline").read_text() for child in children}
+    return [int(child) for child, command in commands.items() if "spawn_main" in command]
+
+
+def wait_for(condition, seconds):
+    end = time.monotonic() + seconds
+    while not condition() and time.monotonic() < end:
+        time.sleep(0.05)
+    return condition()
+
+
+def square(unit):
+    if unit < 0:
+        raise InvalidInputError(f"expected at least 0, got {unit}")
+    return unit * unit
+
+
+def dies_once(unit):
+    """Is killed at the unit 1 unless a file exists that it makes before."""
+    folder, number = unit
+    mark = folder / "mark"
+    if number == 1 and not mark.exists():
+        mark.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return number
+
+
+def waits(folder):
+    """Says which process it is, and stays; the first one fails once all are there."""
+    (folder / str(os.getpid())).touch()
+    if (folder / "first").exists():
+        time.sleep(60.0)
+    (folder / "first").touch()
+    assert wait_for(lambda: len(list(folder.iterdir())) == 3, 30.0)
+    raise InvalidInputError("enough")
+
+
+def results(*arguments, **options):
+    with contextlib.closing(finished(*arguments, **options)) as done:
+        return {unit: future.result() for unit, future in done}
+
+
+def test_a_dead_worker_costs_a_retry(monkeypatch, caplog):
+    cluster = LosingCluster(monkeypatch, lost=[1, 4])
+    assert results(square, range(4), FAR) == {0: 0, 1: 1, 2: 4, 3: 9}
+    assert cluster.units == [0, 1, 1, 2, 3, 3]
+    assert caplog.text.count("its job is retried") == 2
+
+
+def test_a_unit_that_kills_all_workers_is_an_error_and_the_others_are_done(monkeypatch):
+    LosingCluster(monkeypatch, lost=[1, 2, 3])
+    futures = dict(finished(square, range(3), FAR))
+    with pytest.raises(WorkerError, match="workers died over it 3 times, the last time because its node was lost"):
+        futures.pop(1).result()
+    assert {unit: future.result() for unit, future in futures.items()} == {0: 0, 2: 4}
+
+
+@needs_proc
+@pytest.mark.slow
+def test_a_process_that_dies_is_replaced(tmp_path):
+    done = results(dies_once, [(tmp_path, n) for n in range(5)], Workers(2))
+    assert sorted(done.values()) == list(range(5))
+    assert (tmp_path / "mark").exists()
+    assert not descendants(os.getpid())
+
+
+@needs_proc
+@pytest.mark.slow
+def test_an_error_reaches_the_caller_and_ends_the_other_workers(tmp_path):
+    with pytest.raises(InvalidInputError, match="enough"):
+        results(waits, [tmp_path] * 2, Workers(2))
+    pids = [int(file.name) for file in tmp_path.iterdir() if file.name.isdigit()]
+    assert len(pids) == 2
+    assert wait_for(lambda: not any(map(alive, pids)), 30.0)
+
+
+def test_workers_are_checked():
+    assert Workers().here
+    assert not Workers(2).here
+    assert not FAR.here
+    with pytest.raises(InvalidInputError, match="workers: expected a whole number of at least 1, got 0"):
+        Workers(0)
+    with pytest.raises(UnknownNameError, match=r"There is no cluster 'rya'\. Did you mean 'ray'\? Available: ray\."):
+        Workers(cluster="rya")
+
+
+def test_without_ray_the_extra_is_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "ray", None)
+    with pytest.raises(MissingDependencyError, match=r'pip install "ikgym\[cluster\]"'):
+        FAR.check()
+
+
+def test_fewer_cores(monkeypatch):
+    monkeypatch.setattr(parallel, "_limit", None)
+    everything = parallel.cores()
+    parallel.limit(1)
+    assert parallel.cores() == 1
+    parallel.limit(None)
+    assert parallel.cores() == everything
+
+
+@needs_proc
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("command", "end"), [(EVALUATE, signal.SIGTERM), (TRAIN, signal.SIGKILL)], ids=["evaluate", "train"]
+)
+def test_workers_of_commands_end_with_them(tmp_path, command, end):
+    module, *options = command
+    if options[-1] == "--out":
+        pytest.importorskip("stable_baselines3")
+        options.append(str(tmp_path))
+    line = [sys.executable, "-c", MAIN.format(module=module), *options]
+    with subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as parent:
+        try:
+            assert wait_for(lambda: len(descendants(parent.pid)) == 2, 60.0)
+            workers = descendants(parent.pid)
+            time.sleep(4.0)  # they have loaded what they need, and are at work
+            assert all(map(alive, workers))
+        finally:
+            parent.send_signal(end)
+        assert wait_for(lambda: not any(map(alive, workers)), 30.0)
