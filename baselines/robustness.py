@@ -1,8 +1,167 @@
-"""The command line: ``python -m baselines.robustness``."""
+"""Maps the cost of policies over two severities of an imperfect plant: ``ikgym robustness``."""
 
-import sys
+from __future__ import annotations
 
-from baselines.evaluation.pages.robustness.command import main
+import dataclasses
+import itertools
+import pathlib
+from collections.abc import Mapping, Sequence
+from typing import Annotated
+
+import tyro
+from tqdm import tqdm
+
+from baselines import command as shared
+from baselines.episodes import Draw
+from baselines.evaluate import evaluate
+from baselines.evaluation import table
+from baselines.evaluation.metrics import Row
+from baselines.evaluation.results import Rows
+from baselines.files import write
+from baselines.oracle import Search
+from baselines.oracle.several import Wanted, find_all
+from ikgym import scenarios
+from ikgym.exceptions import InvalidInputError
+from ikgym.scenarios import Scenario, imperfect
+from ikgym.validation import number
+
+#: The name of the command where Python runs its module.
+PROGRAM = "python -m baselines.robustness"
+#: How thoroughly best known costs are searched that are not recorded: on these paths all starts find the same optimum.
+HOW = Search(starts=20, generations=0)
+
+
+@dataclasses.dataclass(frozen=True)
+class Options:
+    """Options of the command line."""
+
+    out: Annotated[pathlib.Path, tyro.conf.arg(metavar="DIR")]
+    """Folder for the results, the table and the map."""
+    policies: Annotated[tuple[str, ...], tyro.conf.arg(metavar="POLICY …")] = ("dls", "rhc", "rhc_foresight", "told")
+    """Policies as those of evaluate."""
+    scenario: Annotated[str, tyro.conf.arg(metavar="NAME|FILE.toml")] = imperfect.FIELD_NAME
+    """Scenario whose plant stands for severity 1; of panda-field that is the worst one."""
+    severities: Annotated[tuple[float, ...], tyro.conf.arg(metavar="S …")] = (0.0, 0.25, 0.5, 0.75, 1.0)
+    """Severities, from 0, of what is unknown (calibration, payload, camera) and of the drives (lag, delay)."""
+    episodes: Annotated[int, tyro.conf.arg(metavar="N")] = 4
+    """Test episodes of each policy in each cell of the map."""
+    resume: bool = False
+    """Continue with the results in the folder."""
+    overwrite: bool = False
+    """Replace the results in the folder."""
+    workers: Annotated[int, tyro.conf.arg(metavar="N")] = 1
+    """Processes that play episodes."""
+    cluster: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
+    """Play on a cluster: ray, at the address in RAY_ADDRESS."""
+
+
+def manual(prog: str) -> str:
+    """The text of ``--help`` above the options."""
+    return f"""\
+Maps the cost ratio of policies over two severities of an imperfect plant: of what is unknown (calibration, payload,
+camera), and of the drives (lag, delay). Test sets of imperfect plants: ikgym leaderboard --test-sets panda-field …
+
+Examples:
+  {prog} --policies dls rhc told --out results/map
+  {prog} --scenario lab.toml --severities 0 0.5 1 2 --episodes 8 --out results/lab
+
+Files in DIR, besides those of evaluate:
+  map.csv, map.md, map.png"""
+
+
+def at(name: str, knowledge: float, drives: float) -> Scenario:
+    """The scenario with its plant at two severities.
+
+    Args:
+        name: The name of the scenario, or its file.
+        knowledge: Severity of calibration, payload and camera.
+        drives: Severity of lag and delay.
+
+    Raises:
+        UnknownNameError: There is no such scenario.
+        InvalidInputError: Its plant is ideal or cannot be scaled, or a severity is below 0.
+    """
+    base = scenarios.find(name)
+    if base.plant.ideal:
+        raise InvalidInputError(f"Scenario {base.name!r}: expected a plant that is not ideal.")
+    scaled = (
+        imperfect.field(knowledge, drives)
+        if name == imperfect.FIELD_NAME
+        else base.replace(plant=base.plant.scaled(knowledge, drives))
+    )
+    return scaled.replace(name=f"{base.name} {knowledge:g} {drives:g}")
+
+
+def with_cost_ratios(rows: Rows, places: Mapping[str, Scenario]) -> list[Row]:
+    """The rows with their cost ratios; best known costs that are not recorded are searched and cached.
+
+    Args:
+        rows: The results.
+        places: The scenarios by their names.
+    """
+    missing = {(row.scenario, row.seed): None for row in rows if row.cost_ratio is None}
+    wanted = [Wanted(places[name], Draw(seed), HOW) for name, seed in missing]
+    found = {}
+    for one, optimum in tqdm(find_all(wanted), total=len(wanted), unit="best known cost"):
+        found[one.scenario.name, one.draw.seed] = optimum.cost
+    return [
+        row
+        if row.cost_ratio is not None
+        else dataclasses.replace(row, cost_ratio=row.total_cost / found[row.scenario, row.seed])
+        for row in rows
+    ]
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """The command line.
+
+    Args:
+        arguments: The words after the command; those of the process if left out.
+
+    Returns:
+        The exit code: 0, 2 after an expected error, 130 after Ctrl-C.
+    """
+    return shared.run_resumable(Options, arguments, shared.program("robustness", PROGRAM), manual, _work)
+
+
+def _work(options: Options, command: str) -> None:
+    del command
+    severities = sorted({number("severities", one, at_least=0.0) for one in options.severities})
+    by_place = {place: at(options.scenario, *place) for place in itertools.product(severities, severities)}
+    rows = evaluate(
+        tuple(by_place.values()),
+        options.policies,
+        episodes=options.episodes,
+        out=options.out,
+        resume=options.resume,
+        overwrite=options.overwrite,
+        workers=options.workers,
+        cluster=options.cluster,
+        plots=False,
+        report_page=False,
+        progress=True,
+    )
+    places = {scenario.name: place for place, scenario in by_place.items()}
+    scored = with_cost_ratios(rows, {scenario.name: scenario for scenario in by_place.values()})
+    lines = []
+    for line in table.records(scored, options.policies):
+        knowledge, drives = places[line["scenario"]]
+        lines.append({"policy": line.pop("policy"), "knowledge": knowledge, "drives": drives, **line})
+    _write(options.out, lines)
+    print(f"written to {options.out}")
+
+
+def _write(out: pathlib.Path, lines: Sequence[table.Record]) -> None:
+    from baselines.evaluation.plots.style import png
+    from baselines.evaluation.table_plots import severity_map
+
+    columns = ("policy", "knowledge", "drives", "episodes", "cost_ratio", "low", "worst", "lost_percent")
+    text = table.markdown(lines, columns)
+    write(out / "map.csv", table.to_csv(lines).encode())
+    write(out / "map.md", f"{text}\n".encode())
+    write(out / "map.png", png(severity_map(lines)))
+    print(text)
+
 
 if __name__ == "__main__":
-    sys.exit(main())
+    raise SystemExit(main())

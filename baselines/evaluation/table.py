@@ -8,16 +8,19 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from baselines.canonical import canonical
+from baselines import registry
+from baselines.canonical import canonical, jsonable
 from baselines.evaluation.metrics import Row
-from baselines.evaluation.report import NOTHING, number
+from baselines.evaluation.report import NOTHING, labels, number
 from baselines.evaluation.statistics import geometric_interval, geometric_mean
-from baselines.evaluation.summary import by_seed, times
+from baselines.evaluation.summary import Summary, by_seed, summarise, times
+from baselines.spec import parse_policy
 from ikgym.exceptions import InvalidInputError
 from ikgym.preview import furthest
 from ikgym.validation import FloatArray
@@ -33,25 +36,57 @@ UNITS = {"us": "µs", "ms": "ms", "s": "s", "mm": "mm", "mrad": "mrad", "rad": "
 CODE = ("policy", "scenario", "agent", "solver", "beside")
 
 
-def records(rows: Mapping[str, Sequence[Row]]) -> list[dict[str, Any]]:
-    """One record per policy and scenario, sorted by scenario and cost ratio.
+def records(rows: Sequence[Row], policies: Sequence[str] = ()) -> list[dict[str, Any]]:
+    """One record per policy and scenario, sorted by cost ratio within each scenario.
+
+    Agents whose files lie in ``DIR/seed-N/`` are training seeds of one agent, which is called DIR. Cost ratios are
+    relative to best known costs; if one is missing, to the lowest cost in the table.
 
     Args:
-        rows: The rows of each policy by its label; rows of one label that differ in their parameters are training
-            seeds.
+        rows: Results of an evaluation.
+        policies: The policies that were evaluated, as text; each is the label of its line. Others are called by their
+            name and the parameters that are not at their defaults.
 
     Raises:
-        InvalidInputError: The training seeds of a label have played different episodes.
+        InvalidInputError: The training seeds of an agent have played different episodes.
     """
-    scenarios = dict.fromkeys(row.scenario for of_label in rows.values() for row in of_label)
     out: list[dict[str, Any]] = []
-    for scenario in scenarios:
-        here = {label: found for label, some in rows.items() if (found := [r for r in some if r.scenario == scenario])}
-        known = all(row.cost_ratio is not None for some in here.values() for row in some)
-        lowest = {} if known else _lowest(row for some in here.values() for row in some)
-        found = [_record(label, some, lowest) for label, some in here.items()]
+    for scenario in dict.fromkeys(row.scenario for row in rows):
+        here = [row for row in rows if row.scenario == scenario]
+        known = all(row.cost_ratio is not None for row in here)
+        lowest = {} if known else _lowest(here)
+        found = [_record(label, some, lowest) for label, some in _by_label(here, policies).items()]
         out += sorted(found, key=lambda one: one["cost_ratio"])
     return out
+
+
+def _by_label(rows: Sequence[Row], policies: Sequence[str]) -> dict[str, list[Row]]:
+    """The rows of one scenario by the label of their policy."""
+    groups: dict[str, list[Row]] = {}
+    for row in rows:
+        groups.setdefault(canonical([row.policy, row.parameters]), []).append(row)
+    given = {text: parse_policy(text) for text in policies if registry.known(text.partition(":")[0])}
+    summaries = summarise(rows)
+    names = labels(summaries)
+    out: dict[str, list[Row]] = {}
+    for summary in summaries:
+        label = _label(summary, given) or names[id(summary)]
+        out.setdefault(label, []).extend(groups[canonical([summary.policy, summary.parameters])])
+    return out
+
+
+def _label(summary: Summary, given: Mapping[str, tuple[str, dict[str, Any]]]) -> str | None:
+    """The folder of an agent's training seeds, or the policy as text that names most of the parameters; else None."""
+    if seed := re.search(r"([^/\\]+)[/\\]seed-\d+[/\\]", str(summary.parameters.get("path", ""))):
+        return seed[1]
+    there = {name: canonical(value) for name, value in summary.parameters.items()}
+    fitting = {
+        text: len(parameters)
+        for text, (name, parameters) in given.items()
+        if name == summary.policy
+        and all(there.get(key) == canonical(jsonable(value)) for key, value in parameters.items())
+    }
+    return max(fitting, key=fitting.__getitem__, default=None)
 
 
 def _lowest(rows: Iterable[Row]) -> dict[int, float]:

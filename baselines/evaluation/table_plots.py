@@ -1,0 +1,160 @@
+"""Plots of a table of results: cost against time, cost against foresight, and cost over two severities."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure
+from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter, NullLocator
+
+from baselines.evaluation.plots import style
+from baselines.evaluation.report import number
+from baselines.evaluation.table import Record
+
+#: Excess costs below this are drawn here, in [%].
+FLOOR = 0.01
+#: Cost ratios above this have the colour of this one.
+CUT = 100.0
+
+
+def front(lines: Sequence[Record]) -> list[Record]:
+    """The Pareto front: lines that no other line beats in both 99th percentile of the time and cost ratio.
+
+    Args:
+        lines: Lines of one scenario; those without times, or with fewer episodes than others, are left out.
+
+    Returns:
+        From fast to slow.
+    """
+    most = max(int(line["episodes"]) for line in lines)
+    timed = [line for line in lines if line["time_p99_us"] not in ("", None) and int(line["episodes"]) == most]
+    out: list[Record] = []
+    for line in sorted(timed, key=lambda line: (float(line["time_p99_us"]), float(line["cost_ratio"]))):
+        if not out or float(line["cost_ratio"]) < float(out[-1]["cost_ratio"]):
+            out.append(line)
+    return out
+
+
+def cost_time(lines: Sequence[Record], title: str) -> Figure:
+    """Excess cost against the 99th percentile of the time per call, with intervals and the Pareto front.
+
+    Args:
+        lines: Lines of one scenario.
+        title: Stands above the plot.
+
+    Raises:
+        InvalidInputError: There are no times.
+    """
+    drawn = style.figure(4.6)
+    axes = drawn.subplots()
+    best = front(lines)
+    for line in lines:
+        if line not in best and line["time_p99_us"] not in ("", None):
+            _interval(axes, float(line["time_p99_us"]), line, color=style.STEEL, marker="o", ms=3.5, lw=0.8)
+    times, excess = [float(line["time_p99_us"]) for line in best], [_excess(line["cost_ratio"]) for line in best]
+    axes.step(times, excess, where="post", color=style.MIST, lw=3.0, zorder=1)
+    points = []
+    for place, (time, line) in enumerate(zip(times, best, strict=True)):
+        look = {"color": style.looks(place)["color"], "marker": "osD^v"[place % 5]}
+        points.append(_interval(axes, time, line, ms=7.0, lw=1.2, ls="", **look))
+    _logarithmic(axes)
+    style.dress(axes, xlabel="time of a call, 99th percentile [µs]", ylabel="cost above the reference [%]")
+    style.legend(drawn, f"{title}: cost against time, and the Pareto front", points, [str(o["policy"]) for o in best])
+    return drawn
+
+
+def foresight(lines: Sequence[Record], title: str, by: str) -> Figure:
+    """Excess cost against foresight, with intervals; one panel per scenario.
+
+    Args:
+        lines: The lines.
+        title: Stands above the plot.
+        by: The column whose values are the series.
+    """
+    drawn = style.figure(3.4)
+    scenarios = list(dict.fromkeys(line["scenario"] for line in lines))
+    panels = drawn.subplots(1, len(scenarios), squeeze=False)[0]
+    series = list(dict.fromkeys(line[by] for line in lines))
+    for axes, scenario in zip(panels, scenarios, strict=True):
+        here = [line for line in lines if line["scenario"] == scenario]
+        handles = []
+        for place, value in enumerate(series):
+            some = sorted((line for line in here if line[by] == value), key=lambda line: int(line["foresight"]))
+            ahead = np.array([int(line["foresight"]) for line in some])
+            handles += axes.plot(ahead, [_excess(line["cost_ratio"]) for line in some], lw=1.4, **style.looks(place))
+            for steps, line in zip(ahead, some, strict=True):
+                _interval(axes, float(steps), line, marker="o", ms=4.5, color=style.looks(place)["color"])
+        _logarithmic(axes)
+        axes.xaxis.set_major_locator(FixedLocator(sorted({int(line["foresight"]) for line in here})))
+        style.dress(axes, xlabel="foresight [steps]", ylabel="cost above the reference [%]", title=str(scenario))
+    names = [f"{by.replace('_', ' ')}: {value}" for value in series]
+    style.legend(drawn, title, handles, names)
+    return drawn
+
+
+def severity_map(lines: Sequence[Record]) -> Figure:
+    """Cost ratios over two severities of the plant, one panel per policy; below them the share of lost episodes.
+
+    Args:
+        lines: Lines with the columns `knowledge` and `drives`.
+    """
+    policies = list(dict.fromkeys(str(line["policy"]) for line in lines))
+    across = min(len(policies), 2)
+    down = -(-len(policies) // across)
+    drawn = style.figure(3.4 * down + 0.4, 3.8 * across + 0.8)
+    panels = drawn.subplots(down, across, squeeze=False).ravel()
+    shade = None
+    for axes, policy in zip(panels, policies, strict=False):
+        shade = _severities(axes, policy, [line for line in lines if line["policy"] == policy])
+    for axes in panels[len(policies) :]:
+        axes.set_visible(False)
+    bar = drawn.colorbar(shade, ax=panels.tolist(), shrink=0.7, extend="max")
+    bar.set_label("cost ratio", fontsize=style.SMALL)
+    bar.ax.tick_params(labelsize=style.SMALL)
+    return drawn
+
+
+def _severities(axes: Axes, policy: str, lines: Sequence[Record]) -> object:
+    knowledge, drives = (sorted({float(line[name]) for line in lines}) for name in ("knowledge", "drives"))
+    ratios = np.full((len(drives), len(knowledge)), np.nan)
+    for line in lines:
+        x, y, ratio = knowledge.index(float(line["knowledge"])), drives.index(float(line["drives"])), line["cost_ratio"]
+        ratios[y, x] = float(ratio)
+        lost = float(line["lost_percent"])
+        text = number(float(ratio)) + (f"\n{lost:.0f} % lost" if lost else "")
+        colour = "white" if float(ratio) > np.sqrt(CUT) else style.INK
+        axes.text(x, y, text, ha="center", va="center", fontsize=style.SMALL, color=colour)
+    shade = axes.imshow(np.clip(ratios, 1.0, CUT), norm=LogNorm(1.0, CUT), cmap="viridis_r", origin="lower")
+    axes.set_title(policy, fontsize=style.MEDIUM, loc="left")
+    axes.set_xticks(range(len(knowledge)), [f"{one:g}" for one in knowledge], fontsize=style.SMALL)
+    axes.set_yticks(range(len(drives)), [f"{one:g}" for one in drives], fontsize=style.SMALL)
+    axes.set_xlabel("severity of calibration, payload and camera", fontsize=style.SMALL)
+    axes.set_ylabel("severity of lag and delay", fontsize=style.SMALL)
+    return shade
+
+
+def _logarithmic(axes: Axes) -> None:
+    """Logarithmic axes with plain numbers."""
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.10g}"))
+        axis.set_minor_formatter(NullFormatter())
+    axes.xaxis.set_minor_locator(NullLocator())
+
+
+def _excess(cost_ratio: object) -> float:
+    """The cost above the reference, in [%]."""
+    return max(100.0 * (float(str(cost_ratio)) - 1.0), FLOOR)
+
+
+def _interval(axes: Axes, x: float, line: Record, **look: Any) -> Artist:
+    """A point with the interval of its geometric mean."""
+    middle, low, high = (_excess(line[name]) for name in ("cost_ratio", "low", "high"))
+    lengths = [[middle - min(low, middle)], [max(high, middle) - middle]]
+    return axes.errorbar([x], [middle], yerr=lengths, **look).lines[0]
