@@ -260,8 +260,6 @@ class Options:
     """Play each episode so often, with other noise in sensors and drives. Episodes without noise are played once."""
     pairs: bool = False
     """Play each scenario whose plant is not ideal with an ideal one, too, and say what the plant costs each policy."""
-    operations: bool = False
-    """Print what a step costs in evaluations of the kinematics, factorisations and measured poses, too."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -307,9 +305,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             export=written,
             progress=True,
             command=shlex.join([*_program().split(), *arguments]),
-            show=lambda rows: print(
-                report.table(rows, plan.skipped, operations=options.operations, width=command.width()), flush=True
-            ),
+            show=lambda rows: print(report.table(rows, plan.skipped, width=command.width()), flush=True),
         )
         if out is not None:
             print(f"\nwritten to {out}" + (f"; open {out / PAGE} in a browser" if options.report else ""))

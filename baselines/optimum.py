@@ -13,7 +13,7 @@ import tyro
 from tqdm import tqdm
 
 from baselines import command
-from baselines.episodes import Draw
+from baselines.episodes import Seeds
 from baselines.evaluation import test_sets as known_sets
 from baselines.oracle import best_known
 from baselines.oracle.best_known import MARGIN, MEANINGLESS
@@ -29,7 +29,7 @@ from ikgym.scenarios import Scenario
 from ikgym.validation import whole_number
 
 #: A scenario, and which of its episodes is meant.
-SeededScenario = tuple[Scenario, Draw]
+SeededScenario = tuple[Scenario, Seeds]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -112,9 +112,9 @@ def episodes(scenarios: Sequence[str], test_sets: Sequence[str], seeds: Sequence
         every = map(scenario_registry.get, scenario_registry.names())
         named = [scenario for scenario in every if not _drawn(scenario)]
         test_sets = known_sets.names()
-    out = [(scenario, Draw(seed)) for scenario in named for seed in (seeds if _drawn(scenario) else (0,))]
+    out = [(scenario, Seeds(seed)) for scenario in named for seed in (seeds if _drawn(scenario) else (0,))]
     for one in map(known_sets.get, test_sets):
-        out += [(one.scenario, Draw(seed, one.arm_seed(seed))) for seed in one.seeds]
+        out += [(one.scenario, Seeds(seed, one.arm_seed(seed))) for seed in one.seeds]
     return out
 
 
@@ -130,7 +130,7 @@ def optima(
     *,
     cache: bool,
     workers: Workers = ALONE,
-) -> Iterator[tuple[Scenario, Draw, Optimum]]:
+) -> Iterator[tuple[Scenario, Seeds, Optimum]]:
     """Solves episodes, with a bar on stderr; workers hand them out in the order in which they are done.
 
     Args:

@@ -16,7 +16,7 @@ import numpy as np
 from tqdm import tqdm
 
 from baselines import registry
-from baselines.episodes import Draw, rollouts
+from baselines.episodes import Seeds, rollouts
 from baselines.evaluation import test_sets
 from baselines.evaluation.pages.statistics import geometric_interval
 from baselines.files import write
@@ -60,7 +60,7 @@ def policies(scenario: Scenario, agents: Sequence[str]) -> dict[str, str]:
 
 def costs(scenario: Scenario, policy: SolverPolicy, seeds: Sequence[int], noise_seeds: int) -> list[float]:
     """The cost of each episode, the mean over its noise seeds."""
-    draws = [Draw(seed, noise_seed=noise) for seed in seeds for noise in range(noise_seeds)]
+    draws = [Seeds(seed, noise_seed=noise) for seed in seeds for noise in range(noise_seeds)]
     found = [float(np.sum(e.tracking_cost + e.velocity_cost)) for e in rollouts(scenario, policy, draws)]
     return [float(f"{x:.7g}") for x in np.reshape(found, (len(seeds), noise_seeds)).mean(axis=1)]
 

@@ -22,7 +22,7 @@ from tqdm import tqdm
 
 from baselines.datasets.folder import Folder
 from baselines.datasets.record import Block, blocks, record
-from baselines.episodes import added_up
+from baselines.episodes import add_up
 from baselines.evaluation.entrants import AnyPolicy
 from baselines.evaluation.machine import describe
 from baselines.evaluation.plan import Job, make_plan
@@ -200,8 +200,8 @@ def _episodes(
     """The episodes of all blocks, one block in memory at a time; what is known of each goes into the list."""
     for number, jobs in enumerate(parts):
         block = folder.read(number)
-        costs = [added_up(block[key]) for key in ("infos/tracking_cost", "infos/velocity_cost")]
-        totals = added_up(-block["rewards"])
+        costs = [add_up(block[key]) for key in ("infos/tracking_cost", "infos/velocity_cost")]
+        totals = add_up(-block["rewards"])
         for row, job in enumerate(jobs):
             metadatas.append(
                 {

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from baselines.episodes import TICK, Player, Tick, finite, play
+from baselines.episodes import TICK, Policy, Tick, check_finite, play
 from baselines.evaluation.entrants import ForeignPolicy
 from baselines.evaluation.plan import Job
 from ikgym.outcome import Outcome, observation
@@ -57,8 +57,8 @@ def record(jobs: Sequence[Job], tick: Tick | None = None) -> Block:
     return _record(jobs, policy, tick, single=False)
 
 
-def _record(jobs: Sequence[Job], policy: Player, tick: Tick | None, *, single: bool) -> Block:
-    scenario, draws, rows = jobs[0].scenario, [job.draw for job in jobs], len(jobs)
+def _record(jobs: Sequence[Job], policy: Policy, tick: Tick | None, *, single: bool) -> Block:
+    scenario, draws, rows = jobs[0].scenario, [job.seeds for job in jobs], len(jobs)
     kept: Block = {}
     made, state = 0, None
 
@@ -75,7 +75,7 @@ def _record(jobs: Sequence[Job], policy: Player, tick: Tick | None, *, single: b
         nonlocal state
         keep_seen(out)
         chosen, state = policy.predict(observation(out, 0 if single else None), state)
-        finite(chosen, policy, scenario, draws, made)
+        check_finite(chosen, policy, scenario, draws, made)
         action = np.asarray(chosen, dtype=np.float32)
         keep({"actions": np.clip(action, -1.0, 1.0).reshape(rows, -1)})  # as the environment does, which says so
         return action

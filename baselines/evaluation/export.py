@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from baselines.episodes import Draw, Episode
+from baselines.episodes import Episode, Seeds
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray, known_names
 
@@ -36,7 +36,7 @@ class Motion:
     qdot: FloatArray
 
     @classmethod
-    def of(cls, scenario: Scenario, draw: int | Draw, episode: Episode) -> Motion:
+    def of(cls, scenario: Scenario, draw: int | Seeds, episode: Episode) -> Motion:
         """The motion of an episode that was played.
 
         Args:
@@ -44,7 +44,7 @@ class Motion:
             draw: The reset seed, or what was drawn how.
             episode: What happened.
         """
-        arm, draw = scenario.arm, Draw.of(draw)
+        arm, draw = scenario.arm, Seeds.of(draw)
         return cls(
             tuple(arm.joint_names),
             tuple("m" if prismatic else "rad" for prismatic in arm.prismatic),

@@ -69,8 +69,6 @@ Columns:
   arm_seed                                       which arm moved, null where the reset seed said so
   noise_seed                                     which noise there was, 0 is that of the reset seed
   ideal                                          fingerprint of the scenario with an ideal plant
-  operations                                     mean kinematics, Jacobians, factorisations, measurements in a step,
-                                                 empty where nobody counts
 
 Costs and errors of scenarios that hold their nominal points are those of the last step of each point."""
 

@@ -11,7 +11,7 @@ from typing import Any, Self
 import numpy as np
 
 from baselines.canonical import canonical
-from baselines.episodes import Draw, Episode, added_up
+from baselines.episodes import Episode, Seeds, add_up
 from baselines.files.json_files import JsonError, made, shown
 from baselines.status import Status
 from ikgym.arms import Arm
@@ -20,7 +20,7 @@ from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray
 
 #: What says which episode of an evaluation is meant: scenario, policy, its parameters, what is drawn how, steps.
-Key = tuple[str, str, str, Draw, int]
+Key = tuple[str, str, str, Seeds, int]
 #: The columns that are measured with a clock, and so differ from run to run.
 TIME_COLUMNS = ("time_first_us", "time_p50_us", "time_p99_us", "deadline_misses")
 #: An arm that was at some time farther from its nominal position than this, in [m], has lost track; and so has one that
@@ -69,8 +69,6 @@ class Row:
         status_counts: How many steps ended with which status.
         preview: Steps ahead that the policy was shown; the furthest where it was shown some of them.
         fingerprint: Tells scenarios apart that share a name, see :func:`baselines.fingerprints.fingerprint`.
-        operations: Mean numbers of operations in one step, empty where they
-            are not known.
         time_first_us: Wall time of the first call of the policy, in [µs].
         test_set: The digest of the test set that the episode belongs to, see :mod:`baselines.evaluation.test_sets`.
         arm_seed: Which arm moved; None where the reset seed said so.
@@ -108,7 +106,6 @@ class Row:
     status_counts: dict[str, int]
     preview: int
     fingerprint: str
-    operations: dict[str, float]
     time_first_us: float | None
     test_set: str | None
     arm_seed: int | None = None
@@ -123,7 +120,7 @@ class Row:
     @property
     def key(self) -> Key:
         """What says which episode of an evaluation this is."""
-        draw = Draw(self.seed, self.arm_seed, self.noise_seed)
+        draw = Seeds(self.seed, self.arm_seed, self.noise_seed)
         return key(self.scenario, self.policy, self.parameters, draw, self.steps)
 
     def to_json(self) -> dict[str, Any]:
@@ -163,7 +160,7 @@ def lost(position_error: float, orientation_error: float | None) -> bool:
     return turned or not position_error <= LOST_POSITION
 
 
-def key(scenario: str, policy: str, parameters: Mapping[str, Any], draw: Draw, steps: int) -> Key:
+def key(scenario: str, policy: str, parameters: Mapping[str, Any], draw: Seeds, steps: int) -> Key:
     """What says which episode of an evaluation is meant; two are the same where their keys are."""
     return scenario, policy, canonical(parameters), draw, steps
 
@@ -172,7 +169,7 @@ def measure(
     scenario: Scenario,
     policy: str,
     parameters: Mapping[str, Any],
-    seed: int | Draw,
+    seed: int | Seeds,
     episode: Episode,
     *,
     machine: Mapping[str, Any],
@@ -183,8 +180,8 @@ def measure(
     ideal: str | None = None,
 ) -> Row:
     """The row of a recorded episode; see :class:`Row`; the cost ratio is stated against `best_known`."""
-    draw = Draw.of(seed)
-    total = float(added_up(episode.tracking_cost + episode.velocity_cost))
+    draw = Seeds.of(seed)
+    total = float(add_up(episode.tracking_cost + episode.velocity_cost))
     timed, later = len(episode.time_ns) > 0, episode.time_ns[1:] if len(episode.time_ns) > 1 else episode.time_ns
     counted = scenario.counted()[1:]
     angles = episode.orientation_error[counted] if scenario.task.has_orientation else None
@@ -198,8 +195,8 @@ def measure(
         seed=draw.seed,
         steps=scenario.steps,
         total_cost=total,
-        tracking_cost=float(added_up(episode.tracking_cost)),
-        velocity_cost=float(added_up(episode.velocity_cost)),
+        tracking_cost=float(add_up(episode.tracking_cost)),
+        velocity_cost=float(add_up(episode.velocity_cost)),
         cost_ratio=None if best_known is None else total / best_known,
         position_error_max=float(episode.position_error[counted].max()),
         position_error_rms=_rms(episode.position_error[counted]),
@@ -222,7 +219,6 @@ def measure(
         status_counts={Status(status).label: count for status, count in sorted(statuses.items())},
         preview=preview,
         fingerprint=fingerprint,
-        operations={},
         time_first_us=float(episode.time_ns[0]) / 1e3 if timed else None,
         test_set=test_set,
         arm_seed=draw.arm_seed,

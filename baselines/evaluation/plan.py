@@ -7,7 +7,7 @@ import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Literal, Self
 
-from baselines.episodes import Draw, Player
+from baselines.episodes import Policy, Seeds
 from baselines.evaluation import metrics
 from baselines.evaluation import test_sets as known_sets
 from baselines.evaluation.entrants import ALL, AnyPolicy, Entrant, Wrap, entrants
@@ -39,7 +39,7 @@ class Job:
         test_set: The digest of the test set that it belongs to, None where to none.
         exported: Whether its joint motion is kept.
         arm_seed: Which arm moves; the seed's own if it is None.
-        noise_seed: Which noise there is in sensors and drives, see :class:`baselines.episodes.Draw`.
+        noise_seed: Which noise there is in sensors and drives, see :class:`baselines.episodes.Seeds`.
         before: Reset seeds of the episodes that the arm plays before, and whose last state the policy is handed.
         ideal: The fingerprint of the scenario with an ideal plant.
     """
@@ -62,16 +62,16 @@ class Job:
     ideal: str | None = None
 
     @property
-    def draw(self) -> Draw:
-        """What is drawn how."""
-        return Draw(self.seed, self.arm_seed, self.noise_seed)
+    def seeds(self) -> Seeds:
+        """Seeds of the episode."""
+        return Seeds(self.seed, self.arm_seed, self.noise_seed)
 
     @property
     def key(self) -> metrics.Key:
         """The key of the row to come."""
-        return metrics.key(self.scenario.name, self.policy, self.parameters, self.draw, self.scenario.steps)
+        return metrics.key(self.scenario.name, self.policy, self.parameters, self.seeds, self.scenario.steps)
 
-    def make(self) -> Player:
+    def make(self) -> Policy:
         """The policy.
 
         Raises:
@@ -198,7 +198,7 @@ class _Episodes:
     """
 
     scenario: Scenario
-    draws: tuple[Draw, ...]
+    draws: tuple[Seeds, ...]
     test_set: str | None = None
     sequence: int = 1
 
@@ -209,10 +209,10 @@ class _Episodes:
         """The episodes with these seeds; each of them once where there is no noise."""
         times = noise_seeds if scenario.plant.noisy else 1
         arm_seeds = {seed: seed // sequence if sequence > 1 else None for seed in seeds}
-        draws = tuple(Draw(seed, arm, noise) for seed, arm in arm_seeds.items() for noise in range(times))
+        draws = tuple(Seeds(seed, arm, noise) for seed, arm in arm_seeds.items() for noise in range(times))
         return cls(scenario, draws, test_set, sequence)
 
-    def before(self, draw: Draw) -> tuple[int, ...]:
+    def before(self, draw: Seeds) -> tuple[int, ...]:
         """The seeds of the episodes that the same arm plays before."""
         return () if draw.arm_seed is None else tuple(range(draw.arm_seed * self.sequence, draw.seed))
 

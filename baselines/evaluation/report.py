@@ -42,13 +42,12 @@ def number(value: float | None, scale: float = 1.0) -> str:
     return f"{mantissa}e{int(exponent)}" if exponent else mantissa.removesuffix(".")
 
 
-def table(rows: Sequence[Row], skipped: Sequence[Skipped] = (), *, operations: bool = False, width: int = WIDTH) -> str:
+def table(rows: Sequence[Row], skipped: Sequence[Skipped] = (), *, width: int = WIDTH) -> str:
     """The tables of all scenarios as plain text.
 
     Args:
         rows: The results.
         skipped: What was left out, to be said below.
-        operations: Whether to show what a step costs in kinematics, factorisations and measurements.
         width: Characters that a line may have. Columns that do not fit are left out, and named below.
     """
     parts: list[str] = []
@@ -60,8 +59,6 @@ def table(rows: Sequence[Row], skipped: Sequence[Skipped] = (), *, operations: b
         parts.append(f"{heading(scenario, summaries)}\n{plain(columns, summaries, width)}")
         if spread := _spread(names, summaries):
             parts.append(f"{_judged_by(summaries)} over the episodes of {scenario}\n{plain(spread, summaries, width)}")
-        if operations:
-            parts.append(f"operations in one step of {scenario}, mean\n{plain(_operations(names), summaries, width)}")
     notes = remarks(rows)
     if absent:
         notes.append(f"left out at {width} characters a line: {', '.join(absent)}")
@@ -94,8 +91,6 @@ def readme(
         if spread := _spread(names, summaries):
             title = f"{_judged_by(summaries).capitalize()} over the episodes:"
             out += [title, "", *_markdown(spread, summaries), ""]
-        audit = _markdown(_operations(names), summaries)
-        out += ["<details>", "<summary>Operations in one step, mean</summary>", "", *audit, "", "</details>", ""]
         for group, files in (pictures or {}).get(scenario, {}).items():
             # Those of each policy are many: collapsed, so that the tables stay together.
             collapsed = group != OVERVIEW
@@ -230,21 +225,6 @@ def _beside_ideal() -> list[Column]:
         column("ideal", "ratio", lambda pair: number(pair.cost_ratio)),
         column("× ideal", "cost", lambda pair: number(pair.mean)),
         column("95 %", "", lambda pair: f"{number(pair.low)} … {number(pair.high)}"),
-    ]
-
-
-def _operations(names: Mapping[int, str]) -> list[Column]:
-    """The columns of the operation audit."""
-
-    def column(title: str, unit: str, name: str) -> Column:
-        return Column(title, unit, lambda s: number(s.operations.get(name)))
-
-    return [
-        _policy(names),
-        column("forward", "kinematics", "forward_kinematics"),
-        column("Jacobians", "", "jacobians"),
-        column("factorisations", "", "factorisations"),
-        column("poses", "measured", "measurements"),
     ]
 
 

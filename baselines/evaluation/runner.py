@@ -11,7 +11,7 @@ from typing import Any
 from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
-from baselines.episodes import Draw, Episode, Player, Tick, rollout, rollouts, sequence
+from baselines.episodes import Episode, Policy, Seeds, Tick, rollouts, sequences
 from baselines.evaluation.entrants import ForeignPolicy, check_sendable, play_wrapped
 from baselines.evaluation.export import Motion
 from baselines.evaluation.machine import describe
@@ -162,7 +162,7 @@ def play(batch: Sequence[Job], tick: Tick | None = None) -> list[Played]:
         batch: The jobs.
         tick: See :data:`baselines.episodes.Tick`.
     """
-    first, draws = batch[0], [job.draw for job in batch]
+    first, draws = batch[0], [job.seeds for job in batch]
     # The matrices of one arm are too small to share out, and threads would blur the times. Environment variables
     # would be heeded only by libraries that are not loaded yet, and NumPy is.
     with threadpool_limits(limits=1):
@@ -173,39 +173,35 @@ def play(batch: Sequence[Job], tick: Tick | None = None) -> list[Played]:
     return [_played(job, one) for job, one in zip(batch, episodes, strict=True)]
 
 
-def _in_sequence(batch: Sequence[Job], policy: Player, tick: Tick | None) -> list[Episode]:
+def _in_sequence(batch: Sequence[Job], policy: Policy, tick: Tick | None) -> list[Episode]:
     """Episodes of arms that play several in a row: those before are played, too, since the policy learns from them.
 
     Raises:
         InvalidInputError: The policy plays a wrapped environment, whose states are its own.
     """
     first = batch[0]
-    alone = first.timed or isinstance(policy, ForeignPolicy)
     if isinstance(policy, ForeignPolicy) and policy.wrap is not None:
         raise InvalidInputError(f"wrap: {first.scenario.name} is played in sequences of episodes, without wrappers.")
     length = max(len(job.before) for job in batch) + 1
-    starts = list(dict.fromkeys(job.draw._replace(seed=job.seed - len(job.before)) for job in batch))
-    out: dict[Draw, Episode] = {}
-    for arms in [[one] for one in starts] if alone else [starts]:
-        episodes = [[one._replace(seed=one.seed + k) for one in arms] for k in range(length)]
-        all_played = sequence(
-            first.scenario, policy, episodes, preview=first.preview, alone=alone, timed=first.timed, tick=tick
-        )
-        for draws, played in zip(episodes, all_played, strict=True):
-            out |= zip(draws, played, strict=True)
-    return [out[job.draw] for job in batch]
+    starts = dict.fromkeys(job.seeds._replace(seed=job.seed - len(job.before)) for job in batch)
+    chains = [[start._replace(seed=start.seed + k) for k in range(length)] for start in starts]
+    episodes = sequences(first.scenario, policy, chains, preview=first.preview, timed=first.timed, tick=tick)
+    played = {
+        seeds: episode for pair in zip(chains, episodes, strict=True) for seeds, episode in zip(*pair, strict=True)
+    }
+    return [played[job.seeds] for job in batch]
 
 
 def _played(job: Job, episode: Episode) -> Played:
-    log = trajectory_log(job.scenario, job.draw, episode) if job.first else None
-    motion = Motion.of(job.scenario, job.draw, episode) if job.exported else None
+    log = trajectory_log(job.scenario, job.seeds, episode) if job.first else None
+    motion = Motion.of(job.scenario, job.seeds, episode) if job.exported else None
     return Played(job, _row(job, episode), log, motion)
 
 
 def play_episodes(
     scenario: Scenario,
-    policy: Player,
-    draws: Sequence[int | Draw],
+    policy: Policy,
+    draws: Sequence[int | Seeds],
     preview: Preview,
     *,
     timed: bool,
@@ -224,14 +220,9 @@ def play_episodes(
     Raises:
         InvalidInputError: The policy refuses what it is shown, or chooses no action.
     """
-    if isinstance(policy, ForeignPolicy):
-        if policy.wrap is not None:
-            return [play_wrapped(scenario, policy, draw, timed=timed, tick=tick) for draw in draws]
-        return [rollout(scenario, policy, draw, preview=preview, timed=timed, tick=tick) for draw in draws]
-    if timed:
-        (draw,) = draws
-        return [rollout(scenario, policy, draw, preview=preview, tick=tick)]
-    return rollouts(scenario, policy, draws, preview=preview, tick=tick)
+    if isinstance(policy, ForeignPolicy) and policy.wrap is not None:
+        return [play_wrapped(scenario, policy, one, timed=timed, tick=tick) for one in draws]
+    return rollouts(scenario, policy, draws, preview=preview, timed=timed, tick=tick)
 
 
 def _row(job: Job, episode: Episode) -> Row:
@@ -239,7 +230,7 @@ def _row(job: Job, episode: Episode) -> Row:
         job.scenario,
         job.policy,
         job.parameters,
-        job.draw,
+        job.seeds,
         episode,
         machine=describe(),
         preview=furthest(job.preview),

@@ -95,7 +95,6 @@ class Summary:
         time_p99_us: The largest, in [µs].
         deadline_misses: Their sum.
         status: The worst.
-        operations: Means over the episodes; empty where they are not known.
         time_first_us: The largest, in [µs].
         lost: In how many the arm lost track, see :func:`baselines.evaluation.metrics.lost`; each noise seed counts.
         paired: The policy beside itself on an ideal plant; None where the plant is ideal, or it has not played there.
@@ -120,7 +119,6 @@ class Summary:
     time_p99_us: float | None
     deadline_misses: int | None
     status: str
-    operations: dict[str, float]
     time_first_us: float | None
     lost: int
     paired: Paired | None = None
@@ -250,7 +248,6 @@ def _summary(rows: Sequence[Row], ideal: Sequence[Row] | None) -> Summary:
         time_p99_us=clocked.p99_us,
         deadline_misses=sum(misses) if misses else None,
         status=max((row.status for row in rows), key=lambda status: Status[status.upper()]),
-        operations={name: statistics.fmean(row.operations[name] for row in rows) for name in first.operations},
         time_first_us=clocked.first_us,
         lost=sum(row.lost for row in rows),
         paired=None if ideal is None or first.fingerprint == first.ideal else paired(rows, ideal),

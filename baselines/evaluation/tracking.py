@@ -12,7 +12,7 @@ import numpy.typing as npt
 from matplotlib.figure import Figure
 from threadpoolctl import threadpool_limits
 
-from baselines.episodes import Draw, Episode, added_up
+from baselines.episodes import Episode, Seeds, add_up
 from baselines.evaluation.entrants import AnyPolicy, Wrap, entrant
 from baselines.evaluation.export import Motion, message, table
 from baselines.evaluation.plots import tracking as picture
@@ -70,7 +70,7 @@ class Tracking:
     @property
     def total_cost(self) -> float:
         """Sum of −reward, as in the row of an evaluation."""
-        return float(added_up(self.tracking_cost + self.velocity_cost))
+        return float(add_up(self.tracking_cost + self.velocity_cost))
 
     @property
     def status(self) -> Status:
@@ -146,12 +146,12 @@ def track(
         found = found.replace(steps=min(whole_number("steps", steps, at_least=1), found.steps))
     whole_number("seed", seed, at_least=0)
     one = entrant(policy, wrap=wrap)
-    if reason := one.unsuited(found, Draw(seed), preview):
+    if reason := one.unsuited(found, Seeds(seed), preview):
         raise InvalidInputError(f"{one.name} does not suit {found.name}: {reason}")
-    player = one.make(found, one.for_episode(found, Draw(seed)), preview)
+    player = one.make(found, one.for_episode(found, Seeds(seed)), preview)
     shown = one.shown(player, preview)
     with threadpool_limits(limits=1):
-        (episode,) = play_episodes(found, player, [Draw(seed)], shown, timed=True)
+        (episode,) = play_episodes(found, player, [Seeds(seed)], shown, timed=True)
     return _tracking(found, one.name, one.parameters(found, player), seed, episode)
 
 

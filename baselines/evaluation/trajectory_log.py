@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from baselines.episodes import Draw, Episode
+from baselines.episodes import Episode, Seeds
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray
 
@@ -17,7 +17,7 @@ FRAMES = 400
 TrajectoryLog = dict[str, npt.NDArray[Any]]
 
 
-def trajectory_log(scenario: Scenario, seed: int | Draw, episode: Episode) -> TrajectoryLog:
+def trajectory_log(scenario: Scenario, seed: int | Seeds, episode: Episode) -> TrajectoryLog:
     """What plots show of an episode, at the steps that count.
 
     Args:
@@ -35,7 +35,7 @@ def trajectory_log(scenario: Scenario, seed: int | Draw, episode: Episode) -> Tr
         (f, n, 2, 3), where the joints of the arm that moves begin and end, ``tool`` (f, 3), both in [m], and
         ``tool_rotation`` (f, 3, 3).
     """
-    draw = Draw.of(seed)
+    draw = Seeds.of(seed)
     after = np.flatnonzero(scenario.counted())
     kept = after - 1
     log: TrajectoryLog = {
@@ -70,7 +70,7 @@ def frame_rows(rows: int, most: int) -> npt.NDArray[np.int64]:
     return frames
 
 
-def _arm_in_space(scenario: Scenario, draw: Draw, q: FloatArray, made: npt.NDArray[np.int64]) -> TrajectoryLog:
+def _arm_in_space(scenario: Scenario, draw: Seeds, q: FloatArray, made: npt.NDArray[np.int64]) -> TrajectoryLog:
     """Where the arm is after so many steps: the one that moves, and not the one in the data sheet."""
     plant = scenario.drawn_plant(draw.seed, draw.arm_seed)
     arms = [plant.loaded_arm if steps >= plant.payload_step else plant.arm for steps in made]

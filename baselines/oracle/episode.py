@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium.utils import seeding
 
-from baselines.episodes import added_up, play
+from baselines.episodes import add_up, play
 from baselines.policy import Memory, SolverPolicy
 from baselines.solvers.receding_horizon.newton.grid import Grid
 from baselines.solvers.receding_horizon.newton.workspace import PathProblem
@@ -182,7 +182,7 @@ class EpisodeProblem:
         q, costs = np.empty_like(qdot), np.empty(len(qdot))
         for k, out in enumerate(played):
             q[k], costs[k] = out.true_q[0], out.tracking_cost[0] + out.velocity_cost[0]
-        return q, float(added_up(costs))
+        return q, float(add_up(costs))
 
 
 def path_of(policy: SolverPolicy, scenario: Scenario, seed: int) -> FloatArray:

@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 
 from baselines import registry
-from baselines.episodes import Draw
+from baselines.episodes import Seeds
 from baselines.oracle.best_known import MEANINGLESS
 from baselines.oracle.cache import keep, kept, solve
 from baselines.oracle.episode import EpisodeProblem, path_of
@@ -34,7 +34,7 @@ class Wanted:
     """
 
     scenario: Scenario
-    draw: Draw
+    draw: Seeds
     how: Search
     policies: tuple[str, ...] = ()
     cached: bool = True

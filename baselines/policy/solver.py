@@ -55,6 +55,8 @@ class SolverPolicy(Frozen, abc.ABC):
     rival: ClassVar[bool] = False
     #: Whether it is shown the ages of measurements and past commands, where an observation has them.
     sees_extras: ClassVar[bool] = True
+    #: Whether `predict` accepts the observations of several arms at once.
+    batched: ClassVar[bool] = True
     #: Rows that are worth a thread of their own: the fewer, the longer a row takes.
     grain: ClassVar[int] = 256
     #: Whether the policy is read from a file, as learned agents are.

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from stable_baselines3.common.callbacks import BaseCallback
 
-from baselines.episodes import Draw, added_up
+from baselines.episodes import Seeds, add_up
 from baselines.evaluation.entrants import Wrap, entrant
 from baselines.evaluation.runner import play_episodes
 from baselines.evaluation.summary import geometric_mean
@@ -71,11 +71,11 @@ class ValidationCallback(BaseCallback):
         return True
 
     def _measured(self) -> dict[str, float]:
-        scenario, draws = self._scenario, [Draw(seed) for seed in self._seeds]
+        scenario, draws = self._scenario, [Seeds(seed) for seed in self._seeds]
         one = entrant(self.model, wrap=self._wrap)
         player: Any = one.make(scenario, one.for_episode(scenario, draws[0]), self._preview)
         episodes = play_episodes(scenario, player, draws, one.shown(player, self._preview), timed=False)
-        costs = np.array([float(added_up(e.tracking_cost + e.velocity_cost)) for e in episodes])
+        costs = np.array([float(add_up(e.tracking_cost + e.velocity_cost)) for e in episodes])
         errors = np.array([e.position_error for e in episodes])
         out = {
             "cost": geometric_mean(costs.tolist()),

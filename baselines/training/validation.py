@@ -21,7 +21,7 @@ import tyro
 from baselines import registry
 from baselines.agents.features import Features
 from baselines.agents.protocols import Transform
-from baselines.episodes import Act, added_up, rollouts
+from baselines.episodes import Act, add_up, rollouts
 from baselines.episodes import play as play_episodes
 from baselines.evaluation.metrics import lost
 from baselines.evaluation.summary import geometric_mean
@@ -139,7 +139,7 @@ def played(scenario: Scenario, seeds: Sequence[int], act: Act, preview: Preview)
         errors = np.maximum(errors, out.position_error)
         if scenario.task.has_orientation:
             angles = np.maximum(angles, out.orientation_error)
-    return added_up(costs), errors, angles
+    return add_up(costs), errors, angles
 
 
 def reference_costs(digest: str, seeds: Sequence[int]) -> FloatArray | None:

@@ -15,7 +15,7 @@ from optuna.trial import FrozenTrial, Trial
 
 from baselines import registry
 from baselines.canonical import DIGITS, canonical, jsonable, rounded
-from baselines.episodes import added_up, rollouts
+from baselines.episodes import add_up, rollouts
 from baselines.evaluation.pages.tuning import EPISODES, SPLIT, Tuned, Tuning
 from baselines.evaluation.summary import geometric_mean
 from baselines.fingerprints import fingerprint
@@ -74,7 +74,7 @@ class Cost:
         name, parameters = parse_policy(self.spec)
         policy = registry.make(name, self.scenario, **{**parameters, **settings})
         played = rollouts(self.scenario, policy, seeds)
-        return [float(added_up(one.tracking_cost + one.velocity_cost)) for one in played]
+        return [float(add_up(one.tracking_cost + one.velocity_cost)) for one in played]
 
     def as_it_is(self) -> float:
         """The cost of the solver without any of the settings."""

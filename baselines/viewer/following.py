@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from baselines.controller import Controller
-from baselines.episodes import Draw
+from baselines.episodes import Seeds
 from baselines.evaluation.entrants import entrant
 from baselines.policy import SolverPolicy
 from baselines.status import Status
@@ -79,7 +79,7 @@ def followers(stage: Stage, policies: Sequence[str]) -> list[Follower | None]:
 
 def _follower(stage: Stage, policy: str) -> Follower | None:
     one = entrant(policy)
-    player = one.make(stage.scenario, one.for_episode(stage.scenario, Draw(stage.seed)), None)
+    player = one.make(stage.scenario, one.for_episode(stage.scenario, Seeds(stage.seed)), None)
     if not isinstance(player, SolverPolicy) or player.reference:
         return None
     return Follower(stage.scenario, player, stage.start)

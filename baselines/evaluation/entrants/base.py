@@ -7,7 +7,7 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Any
 
-from baselines.episodes import Draw, Player
+from baselines.episodes import Policy, Seeds
 from ikgym.exceptions import InvalidInputError
 from ikgym.preview import offsets
 from ikgym.scenarios import Preview, Scenario
@@ -26,17 +26,17 @@ class Entrant(abc.ABC):
     #: Whether rows tell it from another one of its name, so that results of both cannot be taken for each other.
     told_apart = True
 
-    def for_episode(self, scenario: Scenario, draw: Draw) -> dict[str, Any]:
+    def for_episode(self, scenario: Scenario, draw: Seeds) -> dict[str, Any]:
         """The parameters that it is made with for one episode."""
         del scenario, draw
         return {}
 
     def made_for_episodes(self, scenario: Scenario) -> bool:
         """Whether it is made anew for each episode, as references are that know which one they play."""
-        return self.for_episode(scenario, Draw(0)) != self.for_episode(scenario, Draw(1))
+        return self.for_episode(scenario, Seeds(0)) != self.for_episode(scenario, Seeds(1))
 
     @abc.abstractmethod
-    def make(self, scenario: Scenario, given: Mapping[str, Any], preview: Preview | None) -> Player:
+    def make(self, scenario: Scenario, given: Mapping[str, Any], preview: Preview | None) -> Policy:
         """Who plays, made with what :meth:`for_episode` gave.
 
         Raises:
@@ -44,15 +44,15 @@ class Entrant(abc.ABC):
         """
 
     @abc.abstractmethod
-    def parameters(self, scenario: Scenario, player: Player) -> dict[str, Any]:
+    def parameters(self, scenario: Scenario, player: Policy) -> dict[str, Any]:
         """The parameters that rows have."""
 
     @abc.abstractmethod
-    def unsuited(self, scenario: Scenario, draw: Draw, preview: Preview | None) -> str | None:
+    def unsuited(self, scenario: Scenario, draw: Seeds, preview: Preview | None) -> str | None:
         """Why it does not suit a scenario; None where it does."""
 
     @abc.abstractmethod
-    def shown(self, player: Player, preview: Preview | None) -> Preview:
+    def shown(self, player: Policy, preview: Preview | None) -> Preview:
         """The steps ahead that it is shown.
 
         Raises:
@@ -60,7 +60,7 @@ class Entrant(abc.ABC):
         """
 
 
-def covering(player: Player, preview: Preview | None) -> Preview:
+def covering(player: Policy, preview: Preview | None) -> Preview:
     """What a solver is shown: what it asks for, or something that has it in the place where it looks for it.
 
     Raises:

@@ -12,7 +12,7 @@ import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
 
-from baselines.episodes import Draw, Episode, Tick, finite
+from baselines.episodes import Episode, Seeds, Tick, check_finite
 from baselines.policy import Report
 from baselines.status import Status
 from ikgym.env import RedundantIKEnv
@@ -56,6 +56,7 @@ class ForeignPolicy:
     model: Predictor
     preview: Preview
     commands: ClassVar[int] = 0
+    batched: ClassVar[bool] = False
     wrap: Wrap | None = None
     parameters: Mapping[str, Any] = dataclasses.field(default_factory=dict)
 
@@ -187,7 +188,7 @@ class Recorder(gym.Wrapper[Any, Any, Any, Any]):
 
 
 def play_wrapped(
-    scenario: Scenario, policy: ForeignPolicy, seed: int | Draw, *, timed: bool = True, tick: Tick | None = None
+    scenario: Scenario, policy: ForeignPolicy, seed: int | Seeds, *, timed: bool = True, tick: Tick | None = None
 ) -> Episode:
     """Plays one episode in the wrapped environment; costs and errors are those below the wrappers, in float64.
 
@@ -201,8 +202,8 @@ def play_wrapped(
     Raises:
         InvalidInputError: The environment cannot be wrapped, the episode ends early, or an action is refused.
     """
-    draw = Draw.of(seed)
-    if draw != Draw(draw.seed):
+    draw = Seeds.of(seed)
+    if draw != Seeds(draw.seed):
         raise InvalidInputError(f"wrap: expected an episode that its reset seed says all of, got {draw}.")
     env, recorder = policy.environment(scenario)
     seen, _ = env.reset(seed=draw.seed)
@@ -212,7 +213,7 @@ def play_wrapped(
         begin = time.perf_counter_ns()
         action, state = policy.predict(seen, state)
         times.append(time.perf_counter_ns() - begin)
-        finite(action, policy, scenario, [draw], len(recorder.rows))
+        check_finite(action, policy, scenario, [draw], len(recorder.rows))
         seen, _, terminated, truncated, _ = env.step(action)
         over = terminated or truncated
     if not recorder.ended:

@@ -9,7 +9,7 @@ from typing import Any, cast
 
 from baselines import registry
 from baselines.canonical import jsonable
-from baselines.episodes import Draw, Player
+from baselines.episodes import Policy, Seeds
 from baselines.evaluation.entrants.base import Entrant, covering
 from baselines.evaluation.entrants.foreign import ForeignPolicy, Predictor, Wrap
 from baselines.evaluation.entrants.solvers import InstanceEntrant
@@ -43,7 +43,7 @@ class ForeignEntrant(Entrant):
         """Objects are not told from others of their class; places and classes are."""
         return isinstance(self.model, (str, type))
 
-    def make(self, scenario: Scenario, given: Mapping[str, Any], preview: Preview | None) -> Player:
+    def make(self, scenario: Scenario, given: Mapping[str, Any], preview: Preview | None) -> Policy:
         """See :meth:`Entrant.make`.
 
         Raises:
@@ -54,7 +54,7 @@ class ForeignEntrant(Entrant):
         if isinstance(model, type) or not callable(getattr(model, "predict", None)):
             model = self._called(model, scenario)
         if isinstance(model, SolverPolicy):
-            if reason := InstanceEntrant(self.name, model).unsuited(scenario, Draw(0), preview):
+            if reason := InstanceEntrant(self.name, model).unsuited(scenario, Seeds(0), preview):
                 raise _RefusedError(reason)
             return model
         if not callable(getattr(model, "predict", None)):
@@ -63,12 +63,12 @@ class ForeignEntrant(Entrant):
         own = self.given or (known if isinstance(known, Mapping) else {})
         return ForeignPolicy(self.name, cast(Predictor, model), self._preview(model, preview), self.wrap, jsonable(own))
 
-    def parameters(self, scenario: Scenario, player: Player) -> dict[str, Any]:
+    def parameters(self, scenario: Scenario, player: Policy) -> dict[str, Any]:
         """Those that are known."""
         del scenario
         return dict(jsonable(getattr(player, "parameters")))  # noqa: B009
 
-    def unsuited(self, scenario: Scenario, draw: Draw, preview: Preview | None) -> str | None:
+    def unsuited(self, scenario: Scenario, draw: Seeds, preview: Preview | None) -> str | None:
         """See :meth:`Entrant.unsuited`."""
         del draw
         try:
@@ -77,7 +77,7 @@ class ForeignEntrant(Entrant):
             return str(e)
         return player.misfit(scenario) if isinstance(player, ForeignPolicy) else None
 
-    def shown(self, player: Player, preview: Preview | None) -> Preview:
+    def shown(self, player: Policy, preview: Preview | None) -> Preview:
         """See :meth:`Entrant.shown`."""
         return covering(player, preview) if isinstance(player, SolverPolicy) else player.preview
 

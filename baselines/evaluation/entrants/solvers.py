@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from baselines.canonical import jsonable
-from baselines.episodes import Draw, Player
+from baselines.episodes import Policy, Seeds
 from baselines.evaluation.entrants.base import Entrant, covering
 from baselines.fingerprints import same
 from baselines.policy import Problem, SolverPolicy
@@ -28,7 +28,7 @@ class SolverEntrant(Entrant):
     kind: type[SolverPolicy]
     given: Mapping[str, Any]
 
-    def for_episode(self, scenario: Scenario, draw: Draw) -> dict[str, Any]:
+    def for_episode(self, scenario: Scenario, draw: Seeds) -> dict[str, Any]:
         """The parameters, with the episode's seeds for a reference that has to know which one it plays."""
         return {**self._seeded(scenario, draw), **self.given}
 
@@ -37,13 +37,13 @@ class SolverEntrant(Entrant):
         del preview
         return self.kind.for_scenario(scenario, **given)
 
-    def parameters(self, scenario: Scenario, player: Player) -> dict[str, Any]:
+    def parameters(self, scenario: Scenario, player: Policy) -> dict[str, Any]:
         """All parameters, but for the seeds that a reference was given for its episode."""
         assert isinstance(player, SolverPolicy)
-        hidden = self._seeded(scenario, Draw(0, player.parameters.get("arm_seed"))).keys() - self.given.keys()
+        hidden = self._seeded(scenario, Seeds(0, player.parameters.get("arm_seed"))).keys() - self.given.keys()
         return {name: jsonable(value) for name, value in player.parameters.items() if name not in hidden}
 
-    def unsuited(self, scenario: Scenario, draw: Draw, preview: Preview | None) -> str | None:
+    def unsuited(self, scenario: Scenario, draw: Seeds, preview: Preview | None) -> str | None:
         """See :meth:`Entrant.unsuited`; a policy that is refused with other parameters only is not unsuited.
 
         One whose package is not installed suits no scenario here.
@@ -55,11 +55,11 @@ class SolverEntrant(Entrant):
             return str(e)
         return None
 
-    def shown(self, player: Player, preview: Preview | None) -> Preview:
+    def shown(self, player: Policy, preview: Preview | None) -> Preview:
         """See :meth:`Entrant.shown`."""
         return covering(player, preview)
 
-    def _seeded(self, scenario: Scenario, draw: Draw) -> dict[str, Any]:
+    def _seeded(self, scenario: Scenario, draw: Seeds) -> dict[str, Any]:
         """What a reference asks for among the seeds of an episode."""
         asked = self.kind.parameter_names() if self.kind.reference else ()
         drawn = {"seed": scenario.random or scenario.plant.random, "arm_seed": draw.arm_seed is not None}
@@ -82,12 +82,12 @@ class InstanceEntrant(Entrant):
         del scenario, given, preview
         return self.policy
 
-    def parameters(self, scenario: Scenario, player: Player) -> dict[str, Any]:
+    def parameters(self, scenario: Scenario, player: Policy) -> dict[str, Any]:
         """All parameters."""
         del scenario, player
         return {name: jsonable(value) for name, value in self.policy.parameters.items()}
 
-    def unsuited(self, scenario: Scenario, draw: Draw, preview: Preview | None) -> str | None:
+    def unsuited(self, scenario: Scenario, draw: Seeds, preview: Preview | None) -> str | None:
         """See :meth:`Entrant.unsuited`."""
         del draw, preview
         if self.policy.reference and scenario.random:
@@ -98,7 +98,7 @@ class InstanceEntrant(Entrant):
                 return f"{self.name} was made for a scenario with another {field.name}."
         return None
 
-    def shown(self, player: Player, preview: Preview | None) -> Preview:
+    def shown(self, player: Policy, preview: Preview | None) -> Preview:
         """See :meth:`Entrant.shown`."""
         return covering(player, preview)
 
@@ -114,18 +114,18 @@ class BrokenEntrant(Entrant):
 
     reason: str
 
-    def make(self, scenario: Scenario, given: Mapping[str, Any], preview: Preview | None) -> Player:
+    def make(self, scenario: Scenario, given: Mapping[str, Any], preview: Preview | None) -> Policy:
         """See :meth:`Entrant.make`."""
         raise InvalidInputError(self.reason)
 
-    def parameters(self, scenario: Scenario, player: Player) -> dict[str, Any]:
+    def parameters(self, scenario: Scenario, player: Policy) -> dict[str, Any]:
         """None."""
         raise InvalidInputError(self.reason)
 
-    def unsuited(self, scenario: Scenario, draw: Draw, preview: Preview | None) -> str:
+    def unsuited(self, scenario: Scenario, draw: Seeds, preview: Preview | None) -> str:
         """See :meth:`Entrant.unsuited`."""
         return self.reason
 
-    def shown(self, player: Player, preview: Preview | None) -> Preview:
+    def shown(self, player: Policy, preview: Preview | None) -> Preview:
         """See :meth:`Entrant.shown`."""
         raise InvalidInputError(self.reason)

@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 
 from baselines import registry
-from baselines.episodes import added_up
+from baselines.episodes import add_up
 from baselines.episodes import play as play_episodes
 from baselines.policy import Memory
 from baselines.spec import parse_policy
@@ -93,7 +93,7 @@ class ImitateTrainer(ActorTrainer):
         for k, out in enumerate(play_episodes(scenario, seeds, mixture.act, preview=self._ahead)):
             costs[:, k] = out.tracking_cost + out.velocity_cost
         self.model.num_timesteps += costs.size
-        mean = float(np.exp(np.mean(np.log(np.maximum(added_up(costs), 1e-300)))))
+        mean = float(np.exp(np.mean(np.log(np.maximum(add_up(costs), 1e-300)))))
         return mixture.examples(), mean
 
     def _learn(self) -> float:

@@ -419,7 +419,7 @@ def renamed(row, old, new):
     [
         lambda row: renamed(row, "cost_ratio", "regret"),
         lambda row: renamed(row, "test_set", "frozen"),
-        lambda row: {name: value for name, value in row.items() if name != "operations"},
+        lambda row: {name: value for name, value in row.items() if name != "iterations"},
         lambda row: {**row, "qdddot_peak": 1.0},
         lambda row: {**row, "status": "no such status"},
     ],

@@ -138,6 +138,7 @@ def test_the_warm_up_call_leaves_no_trace_in_the_episode():
     class Counting:
         preview = solver.preview
         commands = 0
+        batched = True
         report = staticmethod(solver.report)
         diagnostics = staticmethod(solver.diagnostics)
 
@@ -164,6 +165,7 @@ def test_garbage_collection_is_as_before_even_after_an_error():
     class Failing:
         preview = 1
         commands = 0
+        batched = True
         calls = 0
 
         def predict(self, observation, state=None):

@@ -51,7 +51,6 @@ BASE = Row(
     status_counts={"converged": 3000},
     preview=1,
     fingerprint="0",
-    operations={"forward_kinematics": 0.0, "jacobians": 1.0, "factorisations": 1.0, "measurements": 1.0},
     time_first_us=120.0,
     test_set=None,
 )
@@ -208,7 +207,7 @@ def test_readme():
     assert "`damping=0.001`" in text
     tables = [line for line in text.split("\n") if line.startswith("|")]
     heads = {len(re.findall(r"(?<!\\)\|", line)) for line in tables}
-    assert heads == {13, 6, 4}  # twelve columns of results, five of operations, three of parameters
+    assert heads == {13, 4}  # twelve columns of results, three of parameters
 
 
 def test_readme_says_where_times_cannot_be_compared():
@@ -435,13 +434,3 @@ def test_what_has_no_time_has_no_place_against_it():
 def test_lines_can_be_told_apart():
     looks = [tuple(style.looks(number).values()) for number in range(24)]
     assert len(set(looks)) == 24
-
-
-def test_operations_are_shown_when_asked_for():
-    audit = {"forward_kinematics": 23.5, "jacobians": 0.0, "factorisations": 0.0, "measurements": 1.0}
-    rows = [row(operations=audit), row(operations={name: 2 * n for name, n in audit.items()}, seed=1)]
-    assert "factorisations" not in report.table(rows)
-    text = report.table(rows, operations=True)
-    line = next(line for line in text.splitlines()[::-1] if line.startswith("dls"))
-    assert line.split()[-4:] == ["35.25", "0", "0", "1.500"]
-    assert "Operations in one step" in report.readme(rows, command="c", date=DATE)

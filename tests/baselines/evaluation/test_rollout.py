@@ -66,6 +66,7 @@ def test_one_call_of_the_policy_a_step():
     class Watched:
         preview = solver.preview
         commands = 0
+        batched = True
         report = staticmethod(solver.report)
         diagnostics = staticmethod(solver.diagnostics)
 

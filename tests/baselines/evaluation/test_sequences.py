@@ -10,7 +10,7 @@ import pytest
 
 import baselines
 import ikgym
-from baselines.episodes import Draw, rollout, sequence
+from baselines.episodes import Seeds, rollout, sequences
 from baselines.evaluate import evaluate
 from baselines.evaluation import test_sets
 from baselines.evaluation.plan import make_plan
@@ -42,22 +42,22 @@ class Counting(SolverPolicy):
         return Solution(qdot, memory, statuses(len(qdot)), np.zeros(len(qdot), dtype=np.int64))
 
 
-@pytest.mark.parametrize("alone", [True, False])
-def test_the_state_is_handed_on(alone):
-    draws = [[Draw(seed, 0)] for seed in range(3)]
+@pytest.mark.parametrize("timed", [True, False])
+def test_the_state_is_handed_on(timed):
+    draws = [[Seeds(seed, 0) for seed in range(3)]]
     policy = Counting.for_scenario(SAME_ARM)
-    first, second, third = (some[0] for some in sequence(SAME_ARM, policy, draws, alone=alone))
+    ((first, second, third),) = sequences(SAME_ARM, policy, draws, timed=timed)
     assert identical(first.q, rollout(SAME_ARM, policy, draws[0][0], timed=False).q)
-    for episode, draw, times in ((second, draws[1][0], 2.0), (third, draws[2][0], 3.0)):
+    for episode, draw, times in ((second, draws[0][1], 2.0), (third, draws[0][2], 3.0)):
         fresh = rollout(SAME_ARM, policy, draw, timed=False)
         np.testing.assert_allclose(episode.qdot[0] * times, fresh.qdot[0], rtol=1e-5)
 
 
 def test_what_does_not_survive_is_cleared():
-    draws = [[Draw(seed, 0)] for seed in range(2)]
+    draws = [[Seeds(seed, 0) for seed in range(2)]]
     policy = baselines.make("rhc", SAME_ARM, horizon=3)
-    *_, (last,) = sequence(SAME_ARM, policy, draws)
-    assert identical(last.q, rollout(SAME_ARM, policy, draws[1][0], timed=False).q)
+    ((*_, last),) = sequences(SAME_ARM, policy, draws)
+    assert identical(last.q, rollout(SAME_ARM, policy, draws[0][1], timed=False).q)
 
 
 def jobs_of(episodes=7, **options):

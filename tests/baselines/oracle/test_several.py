@@ -6,7 +6,7 @@ import dataclasses
 
 import pytest
 
-from baselines.episodes import Draw
+from baselines.episodes import Seeds
 from baselines.oracle import Search, several
 from baselines.oracle.cache import kept
 from baselines.oracle.several import Wanted, find_all
@@ -25,7 +25,7 @@ def pool(monkeypatch):
 
 def wanted(*, cached=True):
     scenario = scenarios.get("varga7-random").replace(steps=40)
-    return [Wanted(scenario, Draw(seed), HOW, cached=cached) for seed in (7_000_000, 7_000_001)]
+    return [Wanted(scenario, Seeds(seed), HOW, cached=cached) for seed in (7_000_000, 7_000_001)]
 
 
 def costs(found):

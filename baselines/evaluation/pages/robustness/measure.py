@@ -10,7 +10,7 @@ from typing import Any
 
 from tqdm import tqdm
 
-from baselines.episodes import Draw
+from baselines.episodes import Seeds
 from baselines.evaluation.metrics import Row
 from baselines.evaluation.pages import measure
 from baselines.evaluation.pages.robustness.measured import Cell, Effect, Entry
@@ -205,7 +205,7 @@ def _bounds(
         if (cost := best_known.cost(scenario, seed)) is not None:
             out[place][seed] = cost
         else:
-            missing[Wanted(scenario, Draw(seed), HOW)] = place
+            missing[Wanted(scenario, Seeds(seed), HOW)] = place
     with tqdm(total=len(missing), disable=not progress, unit="best known cost") as bar:
         # One search takes all cores of this machine; a cluster gives each a core.
         for one, optimum in find_all(list(missing), workers if workers.cluster else ALONE):

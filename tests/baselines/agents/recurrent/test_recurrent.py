@@ -11,7 +11,7 @@ from baselines.agents.recurrent.files import load_recurrent, save_recurrent
 from baselines.agents.recurrent.network import GatedNetwork, shapes
 from baselines.agents.recurrent.policy import RecurrentPolicy
 from baselines.agents.shipped import FOLDER
-from baselines.episodes import Draw, rollout, rollouts, sequence
+from baselines.episodes import rollout, rollouts, sequences
 from baselines.files import ResultsError
 from baselines.training.config.observe import Observe
 from ikgym.exceptions import InvalidInputError
@@ -43,7 +43,7 @@ def test_with_outputs_that_never_change_it_is_the_calibration_with_those_setting
 def test_what_it_remembers_ends_with_the_episode():
     policy = made(scenario=SHORT)
     alone = rollout(SHORT, policy, SEEDS[1])
-    _, (second,) = sequence(SHORT, policy, [[Draw(SEEDS[0])], [Draw(SEEDS[1])]], alone=True)
+    ((_, second),) = sequences(SHORT, policy, [SEEDS[:2]])
     np.testing.assert_array_equal(second.q, alone.q)
 
 

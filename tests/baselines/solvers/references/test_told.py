@@ -7,7 +7,7 @@ import pytest
 
 import baselines
 import ikgym
-from baselines.episodes import Draw, rollout
+from baselines.episodes import Seeds, rollout
 from baselines.evaluation.report import is_reference
 from ikgym import Plant
 from ikgym.exceptions import InvalidInputError
@@ -37,8 +37,8 @@ def test_it_tracks_the_arm_that_moves():
 
 
 def test_another_arm_seed_is_another_arm():
-    _, right = told(CALIBRATION, Draw(SEED, arm_seed=3), arm_seed=3)
-    _, wrong = told(CALIBRATION, Draw(SEED, arm_seed=3), arm_seed=4)
+    _, right = told(CALIBRATION, Seeds(SEED, arm_seed=3), arm_seed=3)
+    _, wrong = told(CALIBRATION, Seeds(SEED, arm_seed=3), arm_seed=4)
     assert right.position_error[-1] < 1e-5
     assert wrong.position_error[-1] > 1e-4
 
