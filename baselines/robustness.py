@@ -12,7 +12,7 @@ import tyro
 from tqdm import tqdm
 
 from baselines import command as shared
-from baselines.episodes import Draw
+from baselines.episodes import Seeds
 from baselines.evaluate import evaluate
 from baselines.evaluation import table
 from baselines.evaluation.metrics import Row
@@ -100,7 +100,7 @@ def with_cost_ratios(rows: Rows, places: Mapping[str, Scenario]) -> list[Row]:
         places: The scenarios by their names.
     """
     missing = {(row.scenario, row.seed): None for row in rows if row.cost_ratio is None}
-    wanted = [Wanted(places[name], Draw(seed), HOW) for name, seed in missing]
+    wanted = [Wanted(places[name], Seeds(seed), HOW) for name, seed in missing]
     found = {}
     for one, optimum in tqdm(find_all(wanted), total=len(wanted), unit="best known cost"):
         found[one.scenario.name, one.draw.seed] = optimum.cost
