@@ -1,16 +1,40 @@
-"""Files of results and agents: written in one go, read within bounds."""
+"""Files that the project writes itself: each replaced in one go, one writer a folder, one check on reading."""
 
 from __future__ import annotations
 
+import contextlib
+import dataclasses
+import errno
+import io
+import json
+import logging
 import os
 import pathlib
+import sys
+import time
+from collections.abc import Iterator, Mapping
+from typing import Any, TypeVar
+
+import numpy as np
+import numpy.typing as npt
 
 from ikgym import files
 from ikgym.exceptions import IkgymError
 
+logger = logging.getLogger("ikgym")
+
+#: The file in a folder that is locked. It holds the number of the process that writes into the folder.
+LOCK = ".lock"
+# Seconds between two attempts to get a lock.
+_PAUSE = 0.02
+# The byte that is locked: Windows lets nobody read a locked byte, and the number should be readable.
+_BYTE = 2**20
+
+T = TypeVar("T")
+
 
 class ResultsError(IkgymError):
-    """A folder of results, or the file of an agent, cannot be read, written or gone on with."""
+    """A file or folder of results cannot be read, written or resumed; the message names it."""
 
 
 def write(file: pathlib.Path, content: bytes) -> None:
@@ -25,19 +49,208 @@ def write(file: pathlib.Path, content: bytes) -> None:
         raise ResultsError(f"Cannot write {file}: {e.strerror or e}.") from None
 
 
-def read_bytes(file: pathlib.Path, most: int) -> bytes:
-    """All bytes of a file, none of which is read if there are too many.
+def write_json(file: pathlib.Path, value: object) -> None:
+    """Writes a value as JSON, in one go.
+
+    Raises:
+        ResultsError: The file cannot be written.
+    """
+    write(file, (json.dumps(value, indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode())
+
+
+def read_json(file: pathlib.Path, advice: str = "") -> Any:
+    """The value in a JSON file.
 
     Args:
-        file: Where to read.
-        most: How many there may be.
+        file: The file.
+        advice: A sentence at the end of the message if the file is damaged.
+
+    Raises:
+        ResultsError: It cannot be read, or is not JSON.
+    """
+    with reading(file, advice):
+        return json.loads(file.read_bytes())
+
+
+def read_arrays(file: pathlib.Path, advice: str = "") -> dict[str, npt.NDArray[Any]]:
+    """The arrays in an .npz file, by name.
+
+    Args:
+        file: The file.
+        advice: A sentence at the end of the message if the file is damaged.
+
+    Raises:
+        ResultsError: It cannot be read, or is damaged.
+    """
+    with reading(file, advice), np.load(io.BytesIO(file.read_bytes()), allow_pickle=False) as arrays:
+        return dict(arrays)
+
+
+def from_json(kind: type[T], values: object) -> T:
+    """A dataclass from a JSON object with its fields as keys.
+
+    Raises:
+        ValueError: It is not an object, a key is missing, or there is an unknown key.
+    """
+    if not isinstance(values, dict):
+        raise ValueError(f"expected an object with the keys of a {kind.__name__}, got {type(values).__name__}")
+    fields = {field.name: field for field in dataclasses.fields(kind)}  # type: ignore[arg-type]  # T is a dataclass
+    required = [name for name, field in fields.items() if _required(field)]
+    if wrong := [*(name for name in required if name not in values), *(name for name in values if name not in fields)]:
+        raise ValueError(f"the key {wrong[0]!r} is {'unknown' if wrong[0] in values else 'missing'}")
+    return kind(**values)
+
+
+def _required(field: dataclasses.Field[Any]) -> bool:
+    return field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
+
+
+def read_bytes(file: pathlib.Path, most: int) -> bytes:
+    """All bytes of a file that has no more than `most`.
 
     Raises:
         OSError: It cannot be read.
-        ValueError: There are more.
+        ValueError: It has more.
     """
     with file.open("rb") as stream:
         size = os.fstat(stream.fileno()).st_size
         if size > most:
             raise ValueError(f"it is too large: expected at most {most} bytes, got {size}")
         return stream.read(size)
+
+
+@contextlib.contextmanager
+def reading(file: pathlib.Path, advice: str = "") -> Iterator[None]:
+    """Turns errors while a file is read into one that names the file.
+
+    Args:
+        file: The file.
+        advice: A sentence at the end of the message if the file is damaged.
+
+    Raises:
+        ResultsError: The file cannot be read, or its content is not as expected.
+    """
+    try:
+        yield
+    except ResultsError:
+        raise
+    except OSError as e:
+        raise ResultsError(f"Cannot read {file}: {e.strerror or e}.") from None
+    except Exception as e:  # a damaged file makes readers raise anything
+        reason = (" ".join(str(e).split()) or type(e).__name__)[:300].removesuffix(".")
+        raise ResultsError(f"{file} is damaged, or was written by another version: {reason}. {advice}".rstrip()) from e
+
+
+def resumed(
+    manifest: pathlib.Path, about: Mapping[str, Any], *, resume: bool, overwrite: bool, advice: str = ""
+) -> dict[str, Any] | None:
+    """Decides whether the work in a folder is resumed; the caller has locked the folder.
+
+    Args:
+        manifest: The JSON file that says which work the folder holds; nothing is written to it.
+        about: Values that must be equal in the manifest of the work that is resumed.
+        resume: Whether to continue with work that exists.
+        overwrite: Whether to replace work that exists.
+        advice: A sentence at the end of the message if the manifest is damaged.
+
+    Returns:
+        The manifest of the work to be resumed; None if it begins anew.
+
+    Raises:
+        ResultsError: There is work and neither flag is given, or it is other work, or the manifest is damaged.
+    """
+    check_flags(manifest, resume=resume, overwrite=overwrite)
+    if overwrite or not manifest.exists():
+        return None
+    there = read_json(manifest, advice)
+    if not isinstance(there, dict):
+        raise ResultsError(f"{manifest} is damaged: expected an object, got {type(there).__name__}. {advice}".rstrip())
+    if names := [name for name in about if there.get(name) != about[name]]:
+        what = ", ".join(f"{name} ({there.get(name)!r} there, {about[name]!r} here)" for name in names)
+        raise ResultsError(f"{manifest} differs in {what}: resume with the same, or choose another folder.")
+    return there
+
+
+def check_flags(file: pathlib.Path, *, resume: bool, overwrite: bool) -> None:
+    """Refuses to replace a file unless a flag says so.
+
+    Raises:
+        ResultsError: Both flags are given, or neither and the file exists.
+    """
+    if resume and overwrite:
+        raise ResultsError("--resume keeps existing results, --overwrite replaces them: choose one.")
+    if not (resume or overwrite) and file.exists():
+        raise ResultsError(
+            f"{file} already exists: continue with --resume, replace it with --overwrite, or choose another folder."
+        )
+
+
+@contextlib.contextmanager
+def locked(folder: pathlib.Path, patience: float = 0.0) -> Iterator[None]:
+    """Keeps a folder for this process; the operating system frees the lock of a process that dies.
+
+    Args:
+        folder: The folder; it is made if it does not exist.
+        patience: How long to wait for another process that writes into it, in [s].
+
+    Raises:
+        ResultsError: Another process, or another call in this one, writes into it, or it cannot be written.
+    """
+    file, until = folder / LOCK, time.monotonic() + patience
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        while (number := _acquired(file)) is None:
+            if time.monotonic() >= until:
+                holder = file.read_text(errors="replace") if file.exists() else ""
+                who = f"process {holder}" if holder.isdecimal() else "another process"
+                raise ResultsError(
+                    f"{folder} is in use: {who} writes into it. Wait until it has ended, or choose another folder."
+                )
+            time.sleep(_PAUSE)
+    except OSError as e:
+        raise ResultsError(f"Cannot write into {folder}: {e.strerror or e}.") from None
+    try:
+        yield
+    finally:
+        with contextlib.suppress(OSError):  # Windows does not remove open files: it stays, without effect
+            file.unlink()
+        os.close(number)
+
+
+def _acquired(file: pathlib.Path) -> int | None:
+    """The descriptor of the locked file; None if another process holds the lock."""
+    while True:
+        number = os.open(file, os.O_RDWR | os.O_CREAT, 0o666)
+        try:
+            free = _lock(number)
+            # The previous holder may have removed the file after it was opened here.
+            if free and file.exists() and os.path.samestat(os.fstat(number), file.stat()):
+                os.ftruncate(number, 0)
+                os.write(number, str(os.getpid()).encode())
+                return number
+        except BaseException:
+            os.close(number)
+            raise
+        os.close(number)
+        if not free:
+            return None
+
+
+def _lock(number: int) -> bool:
+    """Locks an open file, unless another process has locked it."""
+    try:
+        if sys.platform == "win32":
+            import msvcrt
+
+            os.lseek(number, _BYTE, os.SEEK_SET)
+            msvcrt.locking(number, msvcrt.LK_NBLCK, 1)
+            os.lseek(number, 0, os.SEEK_SET)
+        else:
+            import fcntl
+
+            fcntl.flock(number, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as e:
+        if e.errno in (errno.EAGAIN, errno.EACCES, errno.EWOULDBLOCK):
+            return False
+        logger.warning("This file system has no locks (%s): let no two processes write into one folder.", e.strerror)
+    return True

@@ -15,8 +15,7 @@ import pathlib
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple, Protocol
 
-from baselines.files import ResultsError, json_files, write
-from baselines.files.locks import locked
+from baselines.files import ResultsError, from_json, locked, read_json, reading, write
 from baselines.fingerprints import episode_hash, fingerprint
 from baselines.oracle.stripped import stripped
 from ikgym.scenarios import Scenario
@@ -170,15 +169,10 @@ def _stated(known: Record | None) -> float | None:
 
 @functools.cache
 def _read(path: pathlib.Path) -> _Records:
-    try:
-        content = json_files.read(path)
-        if not isinstance(content, list):
-            raise ValueError(f"expected a list of records, got {json_files.shown(content)}")
-        records = [json_files.made(Record, values) for values in content]
-    except FileNotFoundError:
+    if not path.exists():
         return _Records({}, {})
-    except (OSError, ValueError) as e:
-        raise ResultsError(f"{path} is damaged: {e}. Mend it, or find the costs anew with: {UPDATE}") from None
+    with reading(path, f"Repair it, or compute the costs again with: {UPDATE}"):
+        records = [from_json(Record, values) for values in read_json(path)]
     return _Records({(one.scenario, one.seed): one for one in records}, {one.hash: one for one in records})
 
 

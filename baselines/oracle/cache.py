@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import io
+import json
 import logging
 import os
 import pathlib
@@ -14,9 +15,9 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from baselines.canonical import canonical
-from baselines.files import ResultsError, archives, json_files, read_bytes, write
+from baselines.files import ResultsError, from_json, read_arrays, reading, write
 from baselines.fingerprints import episode_hash, fingerprint
-from baselines.oracle.optimum import Optimum, Search
+from baselines.oracle.optimum import Optimum, Search, Start
 from baselines.oracle.polishing import polish
 from baselines.oracle.search import VERSION, search
 from baselines.oracle.stripped import ideal, stripped
@@ -144,15 +145,14 @@ def _packed(optimum: Optimum) -> bytes:
 
 
 def _read(file: pathlib.Path) -> Optimum | None:
-    try:
-        content = archives.arrays(read_bytes(file, archives.MOST))
-        rest = json_files.parse(str(content.pop("rest")).encode(), finite=False)
-        optimum = json_files.made(Optimum, {**rest, **content})
-        if not all(path.dtype == np.float64 and path.ndim == 2 for path in content.values()):
-            raise ValueError("expected paths of finite numbers")
-        return optimum
-    except FileNotFoundError:
+    if not file.exists():
         return None
-    except (OSError, ValueError, KeyError, TypeError) as e:
-        logger.warning("%s is damaged, and is made anew: %s", file, e)
+    try:
+        with reading(file):
+            content = read_arrays(file)
+            rest = json.loads(str(content.pop("rest")))
+            rest["starts"] = tuple(from_json(Start, values) for values in rest["starts"])
+            return from_json(Optimum, {**rest, **content})
+    except ResultsError as e:
+        logger.warning("%s It is replaced.", e)
         return None

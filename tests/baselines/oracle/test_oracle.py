@@ -358,7 +358,7 @@ class TestCache:
             file.unlink()
             file.mkdir()
         after = solve(short(), 0, QUICK)
-        assert "is damaged, and is made anew" in caplog.text
+        assert "It is replaced." in caplog.text
         assert identical(after.q, before.q)
         if how == "folder":
             assert "The optimum is not kept" in caplog.text

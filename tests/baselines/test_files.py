@@ -1,7 +1,8 @@
-"""Two processes never write into one folder, and a process that was killed holds none."""
+"""One writer a folder, one check on reading, and one error that names the file."""
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import os
 import pathlib
@@ -9,15 +10,15 @@ import signal
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 
 from baselines.evaluate import evaluate
-from baselines.files import ResultsError
-from baselines.files.locks import NAME, locked
+from baselines.files import LOCK, ResultsError, from_json, locked, read_arrays, read_json, resumed, write_json
 
 HOLD = """
 import pathlib, sys, time
-from baselines.files.locks import locked
+from baselines.files import locked
 with locked(pathlib.Path(sys.argv[1])):
     print("held", flush=True)
     time.sleep(60)
@@ -40,10 +41,10 @@ def test_a_second_process_is_told_who_has_the_folder_and_a_dead_one_has_none(tmp
                 evaluate("varga7-fast", "dls", steps=5, out=tmp_path, overwrite=True, plots=False)
         finally:
             process.send_signal(signal.SIGKILL)
-    assert (tmp_path / NAME).exists()
+    assert (tmp_path / LOCK).exists()
     with locked(tmp_path):
-        assert (tmp_path / NAME).read_text() == str(os.getpid())
-    assert not (tmp_path / NAME).exists()
+        assert (tmp_path / LOCK).read_text() == str(os.getpid())
+    assert not (tmp_path / LOCK).exists()
 
 
 def test_one_process_does_not_have_a_folder_twice(tmp_path):
@@ -95,4 +96,51 @@ def test_who_is_patient_waits(tmp_path):
             pass
         process.send_signal(signal.SIGKILL)
         with locked(tmp_path, 30.0):
-            assert (tmp_path / NAME).read_text() == str(os.getpid())
+            assert (tmp_path / LOCK).read_text() == str(os.getpid())
+
+
+@dataclasses.dataclass(frozen=True)
+class Point:
+    x: float
+    y: float = 0.0
+
+
+def test_a_dataclass_has_its_fields_as_keys():
+    assert from_json(Point, {"x": 1.0}) == Point(1.0)
+    for values, message in [({"y": 1.0}, "'x' is missing"), ({"x": 1.0, "z": 2.0}, "'z' is unknown"), ([], "got list")]:
+        with pytest.raises(ValueError, match=message):
+            from_json(Point, values)
+
+
+@pytest.mark.parametrize("content", [b"", b"{", b"\xff", b"[" * 100_000])
+@pytest.mark.parametrize("read", [read_json, read_arrays])
+def test_a_damaged_file_is_named(tmp_path, content, read):
+    file = tmp_path / "it"
+    file.write_bytes(content)
+    with pytest.raises(ResultsError, match=f"{file} is damaged, or was written by another version: .*Run it again"):
+        read(file, "Run it again.")
+    with pytest.raises(ResultsError, match=f"Cannot read {tmp_path / 'none'}: No such file"):
+        read(tmp_path / "none")
+
+
+def test_arrays(tmp_path):
+    np.savez(tmp_path / "it.npz", q=np.arange(3.0))
+    assert read_arrays(tmp_path / "it.npz")["q"].tolist() == [0.0, 1.0, 2.0]
+
+
+def test_only_the_same_work_is_resumed(tmp_path):
+    file, about = tmp_path / "it.json", {"seed": 1, "steps": 5}
+    assert resumed(file, about, resume=True, overwrite=False) is None
+    write_json(file, {**about, "done": 3})
+    assert resumed(file, about, resume=True, overwrite=False) == {**about, "done": 3}
+    assert resumed(file, about, resume=False, overwrite=True) is None
+    for given, flags, message in [
+        (about, (False, False), "it.json already exists: continue with --resume"),
+        (about, (True, True), "choose one"),
+        ({**about, "seed": 2}, (True, False), r"it.json differs in seed \(1 there, 2 here\)"),
+    ]:
+        with pytest.raises(ResultsError, match=message):
+            resumed(file, given, resume=flags[0], overwrite=flags[1])
+    file.write_text("[]")
+    with pytest.raises(ResultsError, match=r"it\.json is damaged"):
+        resumed(file, about, resume=True, overwrite=False)
