@@ -167,7 +167,7 @@ def rotation_matrices(name: str, value: npt.ArrayLike) -> FloatArray:
     Raises:
         InvalidInputError: One is no orthogonal matrix with determinant 1; the message has it.
     """
-    matrices = float_array(name, value)
+    matrices = float_array(name, value, at_most=LARGEST)
     if matrices.shape[-2:] != (3, 3):
         raise InvalidInputError(f"{name}: expected shape (..., 3, 3), got {matrices.shape}.")
     rows = matrices.reshape(-1, 3, 3)

@@ -5,12 +5,11 @@ from __future__ import annotations
 import pytest
 
 import ikgym
-from ikgym.scenarios import catalogue
 
 #: One of each kind among the scenarios that several arms have: task, trajectory, Δt, prismatic joint, random.
 KINDS = ("panda-circle", "panda-glue", "panda-singular", "tiago-raster", "iiwa14-random")
 #: What solvers are tested on: all scenarios but those that say nothing new of a solver's arithmetic.
-ONE_OF_EACH = (*catalogue.SCENARIOS, *KINDS)
+ONE_OF_EACH = (*ikgym.scenarios.names("papers"), *KINDS)
 
 
 def every_scenario(make=lambda name: name):

@@ -15,7 +15,7 @@ from ikgym import kinematics
 from ikgym.arms import checks
 from ikgym.exceptions import InvalidInputError
 from ikgym.kinematics import Chain
-from ikgym.validation import LARGEST, FloatArray, Frozen, float_array, frozen_array, rotation_matrix
+from ikgym.validation import LARGEST, FloatArray, Frozen, float_array, frozen_array, rotation_matrix, shortened
 
 
 class UrdfReference(NamedTuple):
@@ -85,11 +85,15 @@ class Arm(Frozen):
     urdf: UrdfReference | None = dataclasses.field(init=False, repr=False, default=None)
 
     def __post_init__(self) -> None:
+        if not isinstance(self.name, str):
+            raise InvalidInputError(f"name of an arm: expected a text, got {shortened(self.name)}.")
         offsets = frozen_array(f"offsets of arm {self.name!r}", self.offsets, (None, 3), at_most=LARGEST)
         n = len(offsets)
         if n == 0:
             raise InvalidInputError(f"Arm {self.name!r}: expected at least one joint, got none.")
-        axes = checks.unit_axes(self.name, float_array(f"axes of arm {self.name!r}", self.axes, (n, 3)))
+        axes = checks.unit_axes(
+            self.name, float_array(f"axes of arm {self.name!r}", self.axes, (n, 3), at_most=LARGEST)
+        )
         prismatic = checks.truth_values(self.name, self.prismatic, n)
         tool = frozen_array(f"tool of arm {self.name!r}", self.tool, (3,), at_most=LARGEST)
         tool_rotation = rotation_matrix(f"tool_rotation of arm {self.name!r}", self.tool_rotation)

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ikgym.exceptions import InvalidInputError
-from ikgym.validation import UNIT_TOLERANCE, FloatArray, read_only
+from ikgym.validation import UNIT_TOLERANCE, FloatArray, read_only, shortened
 
 # Within this of length 1, a vector is a rounded unit vector: three floats cannot come closer in general.
 ROUNDING = 4e-16
@@ -43,7 +43,7 @@ def truth_values(name: str, prismatic: Any, n: int) -> tuple[bool, ...]:
     values = (tuple(prismatic) or (False,) * n) if isinstance(prismatic, Iterable) else ()
     if len(values) != n or not all(isinstance(value, (bool, np.bool_)) for value in values):
         raise InvalidInputError(
-            f"prismatic of arm {name!r}: expected {n} truth values, one a joint, got {prismatic!r}."
+            f"prismatic of arm {name!r}: expected {n} truth values, one a joint, got {shortened(prismatic)}."
         )
     return tuple(bool(value) for value in values)
 
@@ -62,7 +62,7 @@ def joint_names(name: str, given: Sequence[str], n: int) -> tuple[str, ...]:
     names = (tuple(given) or numbered_joints(n)) if isinstance(given, (tuple, list)) else ()
     texts = [one for one in names if isinstance(one, str) and one]
     if not len(texts) == len(set(texts)) == len(names) == n:
-        raise InvalidInputError(f"joint_names of arm {name!r}: expected {n} different texts, got {given!r}.")
+        raise InvalidInputError(f"joint_names of arm {name!r}: expected {n} different texts, got {shortened(given)}.")
     return names
 
 
@@ -82,7 +82,7 @@ def limits(
         if raw.dtype.kind not in "fiu" or raw.shape != (n,) or np.isnan(raw).any():
             raise ValueError
     except (TypeError, ValueError):
-        raise InvalidInputError(f"{field} of arm {name!r}: expected {n} numbers, got {value!r}.") from None
+        raise InvalidInputError(f"{field} of arm {name!r}: expected {n} numbers, got {shortened(value)}.") from None
     if positive and (raw <= 0.0).any():
         raise InvalidInputError(f"{field} of arm {name!r}: expected numbers above 0, got {raw.tolist()}.")
     return read_only(raw.astype(np.float64))

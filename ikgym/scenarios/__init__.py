@@ -4,22 +4,26 @@
 >>> ikgym.scenarios.get("varga7-fast").steps
 3000
 
-A scenario of your own is made in Python, or read from a file; see :func:`find` for all the ways to name one.
+The scenarios of this package are the TOML files in the folder ``catalogue``. A scenario of your own is such a file, or
+is made in Python; :func:`find` takes all the ways to name one.
 """
 
 from __future__ import annotations
 
+import functools
 import os
+import pathlib
 from collections.abc import Callable
 
+from ikgym import problems
 from ikgym.exceptions import InvalidInputError
 from ikgym.preview import Preview
 from ikgym.registry import Registry
-from ikgym.scenarios import catalogue, elsewhere, families, imperfect
+from ikgym.scenarios import files
 from ikgym.scenarios.importing import imported
 from ikgym.scenarios.reachability import Gap, gaps
-from ikgym.scenarios.reading import load
 from ikgym.scenarios.scenario import Scenario
+from ikgym.trajectories import PublishedPath
 from ikgym.validation import known_name, shortened, whole_number
 
 __all__ = [
@@ -37,20 +41,44 @@ __all__ = [
     "seeds",
 ]
 
-#: Reset seeds of the random scenarios, by what they are for. Scores are published on the test seeds, counted from
-#: their first; nothing may be trained or tuned on them, nor on those for validation.
+#: Reset seeds of the random scenarios, by purpose. Scores are published on the test seeds, counted from their first;
+#: nothing may be trained or tuned on them, nor on those for validation.
 SPLITS = {
     "train": range(0, 1_000_000),
     "validation": range(1_000_000, 2_000_000),
     "test": range(2_000_000, 3_000_000),
 }
+#: The files of the catalogue: those of the papers, paths for several arms, imperfect plants, problems of others.
+FILES = {
+    family: sorted((pathlib.Path(__file__).parent / "catalogue" / family).glob("*.toml"))
+    for family in ("papers", "paths", "plants", "published")
+}
+
+
+def load(file: str | os.PathLike[str]) -> Scenario:
+    """The scenario of a file.
+
+    Args:
+        file: A TOML file, as :meth:`Scenario.save` writes it. Paths of other files in it are relative to it. With the
+            key `like`, the name of another scenario, all missing keys are those of that scenario.
+
+    Returns:
+        The scenario, checked like one that is made in Python.
+
+    Raises:
+        InvalidInputError: The file cannot be read, lacks a key, or a value is of a wrong type, length or range; the
+            message names file and key.
+        UnknownNameError: There is no such key, arm, task or kind of trajectory; the message has the nearest one.
+        MissingDependencyError: An arm comes from a URDF file, and Pinocchio is not installed.
+    """
+    with files.located("", file):
+        table = files.read_table(file)
+        base = get(table.pop("like")) if "like" in table else None
+        fields = files.arguments(Scenario, table, pathlib.Path(file).parent, like=base is not None)
+        return Scenario(**fields) if base is None else base.replace(**fields)
+
 
 _registry: Registry[Scenario] = Registry("scenario", Scenario)
-for _scenarios in (catalogue.SCENARIOS, families.SCENARIOS, imperfect.SCENARIOS):
-    for _name, _make in _scenarios.items():
-        _registry.register(_name, _make)
-for _name, _make in elsewhere.SCENARIOS.items():
-    _registry.register(_name, _make, listed=False)
 
 
 def get(name: str) -> Scenario:
@@ -58,30 +86,40 @@ def get(name: str) -> Scenario:
 
     Raises:
         UnknownNameError: There is no such scenario; the message has the nearest name.
-        InvalidInputError: What makes it fails, or makes something else.
+        InvalidInputError: The registered function fails, or does not return a scenario.
     """
     return _registry.get(name)
 
 
-def names() -> tuple[str, ...]:
-    """The names of all scenarios but :func:`problems_from_elsewhere`, which "all" does not stand for."""
-    return _registry.names()
+def names(family: str | None = None) -> tuple[str, ...]:
+    """The names of all scenarios but :func:`problems_from_elsewhere`, which "all" does not stand for.
+
+    Args:
+        family: Only those of a folder of the catalogue: ``papers``, ``paths``, ``plants`` or ``published``.
+
+    Raises:
+        UnknownNameError: There is no such folder.
+    """
+    if family is None:
+        return _registry.names()
+    known_name("family of scenarios", family, FILES)
+    return tuple(file.stem for file in FILES[family])
 
 
 def problems_from_elsewhere() -> tuple[str, ...]:
-    """The scenarios that others published; the hundred paths of ``rlitg-random`` have names of their own, too."""
-    return elsewhere.names()
+    """The scenarios that others published; the hundred paths of ``rlitg-random`` also have names of their own."""
+    return names("published")
 
 
 def register(scenario: Scenario | str, make: Callable[[], Scenario] | None = None) -> None:
     """Adds a scenario of your own.
 
     Args:
-        scenario: The scenario, which is registered under its own name; or a name, with the function that makes it.
-        make: Called without arguments when the scenario of that name is first asked for.
+        scenario: The scenario, registered under its own name; or a name, with a function that returns the scenario.
+        make: Called without arguments when the scenario is first needed.
 
     Raises:
-        InvalidInputError: The name is taken or no text, or there is nothing that makes the scenario.
+        InvalidInputError: The name is taken or no text, or `make` cannot be called.
     """
     if not isinstance(scenario, Scenario):
         _registry.register(scenario, make)  # type: ignore[arg-type]  # checked there
@@ -92,15 +130,15 @@ def register(scenario: Scenario | str, make: Callable[[], Scenario] | None = Non
 
 
 def find(item: Scenario | str | os.PathLike[str]) -> Scenario:
-    """A scenario, in whichever way it is named.
+    """A scenario, however it is named.
 
     Args:
         item: A scenario; a registered name; a file that ends in ``.toml``; or ``"package.module:attribute"``, where
-            the attribute is a scenario or a function that makes one. Registered names take precedence.
+            the attribute is a scenario or a function that returns one. Registered names take precedence.
 
     Raises:
         UnknownNameError: There is no scenario of that name; the message has the nearest one.
-        InvalidInputError: The file or the module does not give a scenario, or the item is nothing of all this.
+        InvalidInputError: The file or the module does not give a scenario, or the item is none of these.
         MissingDependencyError: The file names a URDF file, and Pinocchio is not installed.
     """
     if isinstance(item, Scenario):
@@ -109,7 +147,7 @@ def find(item: Scenario | str | os.PathLike[str]) -> Scenario:
         return load(item)
     if not isinstance(item, str):
         raise InvalidInputError(
-            "scenario: expected a Scenario, a name of one, a file ending in .toml or 'package.module:attribute', got "
+            "scenario: expected a Scenario, its name, a file ending in .toml or 'package.module:attribute', got "
             f"{shortened(item)}."
         )
     if item not in _registry:
@@ -125,7 +163,7 @@ def seeds(split: str, episodes: int) -> tuple[int, ...]:
 
     Args:
         split: One of the names in :data:`SPLITS`.
-        episodes: How many seeds.
+        episodes: Number of seeds.
 
     Raises:
         UnknownNameError: There is no such split.
@@ -136,3 +174,16 @@ def seeds(split: str, episodes: int) -> tuple[int, ...]:
     if whole_number("episodes", episodes, at_least=1) > len(available):
         raise InvalidInputError(f"episodes: expected at most {len(available)} in split {split!r}, got {episodes}.")
     return tuple(available[:episodes])
+
+
+def _published(problem: str) -> Scenario:
+    """One of the random paths of RL-ITG."""
+    steps = 10 * (len(problems.waypoints(problem).positions) - 1)
+    return get("rlitg-random").replace(name=problem, trajectory=PublishedPath(problem, 0.2), steps=steps)
+
+
+for _family, _files in FILES.items():
+    for _file in _files:
+        _registry.register(_file.stem, functools.partial(load, _file), listed=_family != "published")
+for _name in problems.names("rlitg-random-"):
+    _registry.register(_name, functools.partial(_published, _name), listed=False)

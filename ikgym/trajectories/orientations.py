@@ -175,7 +175,7 @@ def aligned_quaternions(name: str, value: npt.ArrayLike) -> FloatArray:
     Raises:
         InvalidInputError: See :class:`OrientationThrough`.
     """
-    given = float_array(name, value, (None, 4))
+    given = float_array(name, value, (None, 4), at_most=LARGEST)
     lengths = np.linalg.norm(given, axis=1)
     if (np.abs(lengths - 1.0) > QUATERNION_TOLERANCE).any():
         i = int(np.argmax(np.abs(lengths - 1.0)))

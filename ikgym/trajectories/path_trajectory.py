@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
-import typing
-from collections.abc import Mapping
 
 import numpy as np
 
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
-from ikgym.trajectories.orientations import ORIENTATIONS, Orientation
-from ikgym.trajectories.paths import PATHS, Path
-from ikgym.trajectories.time_laws import TIME_LAWS, TimeLaw
+from ikgym.trajectories.orientations import Orientation
+from ikgym.trajectories.paths import Path
+from ikgym.trajectories.time_laws import TimeLaw
 from ikgym.trajectories.trajectory import Trajectory
 from ikgym.validation import FloatArray
 
@@ -36,11 +34,6 @@ class PathTrajectory(Trajectory):
     path: Path
     time_law: TimeLaw
     orientation: Orientation | None = None
-    parts: typing.ClassVar[Mapping[str, Mapping[str, type]]] = {
-        "path": PATHS,
-        "time_law": TIME_LAWS,
-        "orientation": ORIENTATIONS,
-    }
 
     def __post_init__(self) -> None:
         for name, kind in {"path": Path, "time_law": TimeLaw, "orientation": Orientation}.items():

@@ -13,7 +13,7 @@ from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 from ikgym.trajectories.timed_waypoints import TimedWaypoints
 from ikgym.trajectories.trajectory import Trajectory
-from ikgym.validation import LARGEST, SMALLEST, FloatArray, number
+from ikgym.validation import LARGEST, SMALLEST, FloatArray, number, shortened
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -34,7 +34,6 @@ class PublishedPath(Trajectory):
 
     problem: str
     period: float
-    texts: typing.ClassVar[tuple[str, ...]] = ("problem",)
 
     def __post_init__(self) -> None:
         problems.waypoints(self.problem)
@@ -79,14 +78,13 @@ class RandomPublishedPath(Trajectory):
     family: str
     period: float
     random: typing.ClassVar[bool] = True
-    texts: typing.ClassVar[tuple[str, ...]] = ("family",)
 
     def __post_init__(self) -> None:
-        members = problems.names(self.family)
+        members = problems.names(self.family) if isinstance(self.family, str) else ()
         if not members or not all(len(problems.waypoints(name).starts) for name in members):
             raise InvalidInputError(
-                f"family: expected what names of problems with starts begin with, got {self.family!r}; available: "
-                f"{', '.join(problems.names())}."
+                f"family: expected the beginning of names of problems with starts, got {shortened(self.family)}; "
+                f"available: {', '.join(problems.names())}."
             )
         object.__setattr__(self, "period", number("period", self.period, at_least=SMALLEST, at_most=LARGEST))
 

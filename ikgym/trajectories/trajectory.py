@@ -1,10 +1,10 @@
-"""What all nominal trajectories have in common."""
+"""The base class of nominal trajectories."""
 
 from __future__ import annotations
 
 import abc
 import typing
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -14,16 +14,12 @@ from ikgym.validation import FloatArray, Frozen
 
 
 class Trajectory(Frozen, abc.ABC):
-    """What all trajectories have."""
+    """Base of all trajectories."""
 
     #: Whether an episode's trajectory is drawn when it begins.
     random: typing.ClassVar[bool] = False
     #: Whether the trajectory prescribes orientations.
     has_orientation: typing.ClassVar[bool] = True
-    #: Fields that are parts with a kind of their own: their classes by the names of these kinds in scenario files.
-    parts: typing.ClassVar[Mapping[str, Mapping[str, type]]] = {}
-    #: Fields that are texts.
-    texts: typing.ClassVar[tuple[str, ...]] = ()
 
     def sample(self, rng: np.random.Generator) -> Trajectory:
         """The trajectory of one episode.

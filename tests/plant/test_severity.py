@@ -7,7 +7,7 @@ import math
 import pytest
 
 import ikgym
-from ikgym import Plant
+from ikgym import Plant, scenarios
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import imperfect
 
@@ -15,7 +15,7 @@ from ikgym.scenarios import imperfect
 def test_0_is_ideal_and_1_the_plant_itself():
     assert imperfect.FIELD.scaled(0.0) == Plant()
     assert imperfect.FIELD.scaled(1.0) == imperfect.FIELD
-    assert imperfect.FIELD.scaled(0.0, 1.0) == Plant(**imperfect.BUS)
+    assert imperfect.FIELD.scaled(0.0, 1.0) == scenarios.get("panda-bus").plant
 
 
 def test_what_grows_in_proportion_and_what_in_whole_steps():

@@ -10,7 +10,7 @@ from baselines.fingerprints import fingerprint
 from baselines.oracle.stripped import ideal, stripped
 from ikgym.scenarios import imperfect
 
-NAMES = tuple(imperfect.SCENARIOS)
+NAMES = ikgym.scenarios.names("plants")
 PLAIN = ikgym.scenarios.get("panda-ideal")
 
 
@@ -28,8 +28,8 @@ def test_paths_are_smooth_and_gentle_and_go_from_rest_to_rest():
         q = PLAIN.nominal_joint_path(seed)
         qdot = np.diff(q, axis=0) / PLAIN.dt
         qddot = np.diff(qdot, axis=0) / PLAIN.dt
-        assert abs(qdot).max() < imperfect.SPEED
-        assert abs(qddot).max() < imperfect.ACCELERATION
+        assert abs(qdot).max() < 1.0
+        assert abs(qddot).max() < 4.0
         assert abs(qdot[[0, -1]]).max() < 1e-3
         assert np.ptp(q, axis=0).max() > 0.1
 
@@ -41,14 +41,10 @@ def test_the_field_at_severities():
     assert imperfect.field(0.5, 0.0).plant.zero == ikgym.scenarios.get("panda-camera").plant.zero
 
 
-def test_equal_kinematics():
-    """What scenarios share their arms and best known costs by."""
-    kinematics = ("zero", "link", "axis", "payload", "arms")
-    camera, slow, same = (
-        ikgym.scenarios.get(f"panda-{name}").plant for name in ("camera", "camera-slow", "same-arm")
-    )  # fmt: skip
-    for name in kinematics:
-        assert getattr(camera, name) == getattr(slow, name) == getattr(same, name)
+def test_three_of_them_draw_the_same_arms():
+    plants = [ikgym.scenarios.get(f"panda-{name}").plant for name in ("camera", "camera-slow", "same-arm")]
+    for name in ("zero", "link", "axis", "payload", "arms"):
+        assert len({getattr(plant, name) for plant in plants}) == 1
 
 
 @pytest.mark.parametrize("name", NAMES)

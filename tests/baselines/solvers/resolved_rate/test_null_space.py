@@ -11,7 +11,6 @@ import baselines
 import ikgym
 from baselines.policy import Problem
 from ikgym.exceptions import InvalidInputError, UnknownNameError
-from ikgym.scenarios import catalogue
 from tests.baselines.solvers.resolved_rate.test_base import jacobians
 
 AIMS = [{"objective": "posture", "posture": 0.7}, {"objective": "manipulability"}]
@@ -25,7 +24,7 @@ def with_limits(scenario):
 
 @pytest.mark.parametrize("damping", [0.0, 1e-3])
 @pytest.mark.parametrize("aim", [*AIMS, {"objective": "joint_centring"}], ids=lambda aim: aim["objective"])
-@pytest.mark.parametrize("name", catalogue.SCENARIOS)
+@pytest.mark.parametrize("name", ikgym.scenarios.names("papers"))
 def test_changes_no_task_velocity(name, aim, damping):
     scenario = with_limits(ikgym.scenarios.get(name))
     gain = 1.0 / scenario.dt

@@ -1,15 +1,23 @@
-"""Bounds of a scenario: no episode of it fills the memory, and none costs more than floats can add up."""
+"""Checks of a scenario: its parts fit together, and no episode exceeds the memory or the range of floats."""
 
 from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
 from ikgym import task_kernels
+from ikgym.arms import Arm
 from ikgym.cost import TrackingCost
 from ikgym.exceptions import InvalidInputError
 from ikgym.memory import afford, gib
+from ikgym.plant import Plant
 from ikgym.tasks import Task
+from ikgym.trajectories import Trajectory
 from ikgym.validation import FloatArray, whole_number
+
+KINDS = {"arm": Arm, "task": Task, "trajectory": Trajectory, "cost": TrackingCost, "plant": Plant}
 
 #: Most steps of an episode, and for which one nominal point is held: a day of work at 1 kHz.
 MOST_STEPS = 100_000_000
@@ -17,11 +25,32 @@ MOST_STEPS = 100_000_000
 LARGEST_COST = 1e150
 
 
+def check_parts(fields: Mapping[str, Any]) -> None:
+    """Checks the classes of a scenario's parts, and that model and task suit arm and trajectory.
+
+    Raises:
+        InvalidInputError: One is something else, or does not fit.
+    """
+    name, arm, model, task = (fields[key] for key in ("name", "arm", "model", "task"))
+    for field in ("name", "source"):
+        if not isinstance(fields[field], str):
+            raise InvalidInputError(f"{field} of a scenario: expected a text, got {fields[field]!r}.")
+    for field, kind in KINDS.items():
+        if not isinstance(fields[field], kind):
+            raise InvalidInputError(f"{field} of scenario {name!r}: expected {kind.__name__}, got {fields[field]!r}.")
+    if model is not None and (not isinstance(model, Arm) or model.joints != arm.joints):
+        got = f"{model.name!r} with {model.joints}" if isinstance(model, Arm) else repr(model)
+        raise InvalidInputError(f"model of scenario {name!r}: expected an Arm with {arm.joints} joints, got {got}.")
+    fields["trajectory"].check(arm if model is None else model)
+    if task.has_orientation and not fields["trajectory"].has_orientation:
+        raise InvalidInputError(f"Scenario {name!r}: task {task.name!r} needs orientations, the trajectory has none.")
+
+
 def step_count(name: str, value: int, joints: int) -> int:
     """A number of steps.
 
     Args:
-        name: What it is called in messages.
+        name: Name of the field in messages.
         value: The number.
         joints: Of the arm, for the memory that the message states.
 
@@ -44,7 +73,7 @@ def bytes_of(points: int, joints: int) -> int:
 
 
 def afford_points(points: int, joints: int) -> None:
-    """Insists that there is memory for the nominal points of an episode.
+    """Checks that there is memory for the nominal points of an episode.
 
     Raises:
         InvalidInputError: There is not; the message says how much it takes and how much is available.
@@ -58,8 +87,8 @@ def largest_step_cost(task: Task, cost: TrackingCost, velocity_limit: FloatArray
     Args:
         task: The task coordinates.
         cost: The stage cost.
-        velocity_limit: What the joint velocities do not exceed, in [rad/s] or [m/s]. Shape (n,).
-        distance: What the position error does not exceed, in [m].
+        velocity_limit: Largest joint velocities in [rad/s] or [m/s]. Shape (n,).
+        distance: Largest position error in [m].
     """
     # Parts of two rotations differ by 2 at most; a rotation vector is no longer than π.
     turned = np.pi if task.kind in (task_kernels.POSE, task_kernels.AXIS) else 2.0
@@ -68,7 +97,7 @@ def largest_step_cost(task: Task, cost: TrackingCost, velocity_limit: FloatArray
 
 
 def check_cost(name: str, step_cost: float, steps: int) -> None:
-    """Insists that the cost of an episode stays finite.
+    """Checks that the cost of an episode stays finite.
 
     Args:
         name: The scenario's.

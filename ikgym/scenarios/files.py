@@ -1,0 +1,288 @@
+"""Scenarios as TOML files: one walker over the fields of dataclasses reads and writes all of their parts."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import inspect
+import os
+import pathlib
+import tomllib
+import typing
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ikgym import arms, files, tasks
+from ikgym.arms import Arm
+from ikgym.arms.checks import numbered_joints
+from ikgym.cost import TrackingCost
+from ikgym.exceptions import IkgymError, InvalidInputError, UnknownNameError
+from ikgym.plant import Plant
+from ikgym.scenarios.toml import document
+from ikgym.tasks import Task
+from ikgym.trajectories import KINDS, TimeLaw, Trajectory, from_csv
+from ikgym.trajectories.orientations import ORIENTATIONS, Orientation
+from ikgym.trajectories.paths import PATHS, Path
+from ikgym.trajectories.time_laws import TIME_LAWS
+from ikgym.validation import known_names
+
+Table = dict[str, Any]
+
+#: Parts of several kinds: their classes by the values of the key `kind`.
+CHOICES: dict[type, Mapping[str, Callable[..., Any]]] = {
+    Trajectory: {**KINDS, "csv": from_csv},
+    Path: PATHS,
+    TimeLaw: TIME_LAWS,
+    Orientation: ORIENTATIONS,
+}
+PARTS = (Arm, Task, TrackingCost, Plant, *CHOICES)
+#: Classes in the annotations of texts.
+TEXTS = {str, type(None), os.PathLike[str]}
+#: Largest size of a file in bytes.
+LARGEST = 2**24
+
+
+def read_table(file: str | os.PathLike[str]) -> Table:
+    """The content of a TOML file.
+
+    Raises:
+        InvalidInputError: The file cannot be read, or is no TOML.
+    """
+    try:
+        with pathlib.Path(file).open("rb") as stream:
+            content = stream.read(LARGEST + 1)
+        if len(content) > LARGEST:
+            raise ValueError(f"it has more than {LARGEST} bytes")
+        return tomllib.loads(content.decode())
+    except tomllib.TOMLDecodeError as error:
+        raise InvalidInputError(f"expected TOML, got a fault: {error}.") from None
+    except UnicodeDecodeError as error:
+        raise InvalidInputError(f"expected a text in UTF-8: {error}.") from None
+    except (OSError, TypeError, ValueError, RecursionError) as error:
+        raise InvalidInputError(f"expected a TOML file, got none that can be read: {error}.") from None
+
+
+def arguments(
+    make: Callable[..., Any], table: Table, folder: pathlib.Path, where: str = "", like: bool = False
+) -> Table:
+    """The arguments of a dataclass or a function, from a table.
+
+    Args:
+        make: The class or the function; its annotations say which arguments are parts, and have tables of their own.
+        table: Keys are names of arguments.
+        folder: Paths of other files are relative to it.
+        where: Name of the table in messages.
+        like: Whether arguments without a default may be missing.
+
+    Raises:
+        InvalidInputError: A key is missing, or a value is of a wrong type.
+        UnknownNameError: There is no such key, arm, task or kind; the message has the nearest one.
+    """
+    parameters, hints = inspect.signature(make).parameters, typing.get_type_hints(make)
+    with located(where):
+        known_names("key", table, parameters)
+        for name, parameter in parameters.items():
+            if parameter.default is parameter.empty and name not in table and not like:
+                raise InvalidInputError(f"{name}: expected {_meaning(hints[name])}, got no such key.")
+    return {name: _value(hints[name], name, value, folder, where) for name, value in table.items()}
+
+
+def _value(hint: Any, name: str, value: Any, folder: pathlib.Path, where: str) -> Any:
+    """The value of an argument with some annotation."""
+    kind, several = _part(hint), typing.get_origin(hint) is Sequence
+    with located(where):
+        if kind is Arm and several and not isinstance(value, list):
+            raise InvalidInputError(f"{name}: expected a list of arms, got {value!r}.")
+        if kind is None or kind is Task or (kind is Arm and isinstance(value, str)):
+            _check_plain(hint, name, value)
+            return tasks.get(value) if kind is Task else arms.get(value) if kind is Arm else value
+        if not isinstance(value, list if several else dict):
+            raise InvalidInputError(f"{name}: expected {_meaning(hint)}, got {value!r}.")
+    if several:
+        return [_value(Arm, name, one, folder, where) for one in value]
+    where = f"{where}.{name}" if where else name
+    if kind is Arm:
+        return _arm(value, folder, where)
+    make: Callable[..., Any] = kind
+    if kind in CHOICES:
+        with located(where):
+            make = _choice(CHOICES[kind], value)
+        value = {key: part for key, part in value.items() if key != "kind"}
+    given = arguments(make, value, folder, where)
+    with located(where):
+        if make is from_csv:
+            given["file"] = folder / given["file"]
+        return make(**given)
+
+
+def _arm(table: Table, folder: pathlib.Path, where: str) -> Arm:
+    """An arm in numbers, from a URDF file, or like another one; the last two with other fields replaced."""
+    make: Callable[..., Arm] = Arm
+    given, changes = table, {}
+    if "like" in table:
+        make, given = arms.get, {"name": table["like"]}
+        changes = {key: value for key, value in table.items() if key != "like"}
+    elif "urdf" in table:
+        make, own = arms.from_urdf, ("name", "base", "tip", "tool", "tool_rotation")
+        with located(where):
+            known_names("key", table, ("urdf", *own, *inspect.signature(Arm).parameters))
+        given = {"path": table["urdf"], **{key: table[key] for key in own if key in table}}
+        changes = {key: value for key, value in table.items() if key not in ("urdf", *own)}
+    given = arguments(make, given, folder, where)
+    changes = arguments(Arm, changes, folder, where, like=True)
+    with located(where):
+        if make is arms.from_urdf:
+            given["path"] = folder / given["path"]
+        arm = make(**given)
+        return arm.replace(**changes) if changes else arm
+
+
+def _choice(kinds: Mapping[str, Any], table: Table) -> Any:
+    if not isinstance(table.get("kind"), str):
+        got = repr(table["kind"]) if "kind" in table else "no such key"
+        raise InvalidInputError(f"kind: expected one of {', '.join(kinds)}, got {got}.")
+    known_names("kind", [table["kind"]], kinds)
+    return kinds[table["kind"]]
+
+
+def _part(hint: Any) -> type | None:
+    """The class of a part that an annotation names."""
+    return next((kind for kind in (hint, *typing.get_args(hint)) if kind in PARTS), None)
+
+
+def _meaning(hint: Any) -> str:
+    """How messages describe a value."""
+    kind, classes = _part(hint), set(typing.get_args(hint))
+    if kind is Arm:
+        return "the name of an arm or a table"
+    if kind is Task or hint is str or (typing.get_origin(hint) is not Sequence and {str} <= classes <= TEXTS):
+        return "a text"
+    return "numbers" if kind is None else "a table"
+
+
+def _check_plain(hint: Any, name: str, value: Any) -> None:
+    """Refuses texts and truth values where numbers are expected, and the other way round."""
+    if _meaning(hint) == "a text" or _part(hint) is Arm:
+        if not isinstance(value, str):
+            raise InvalidInputError(f"{name}: expected a text, got {value!r}.")
+    elif isinstance(value, list):
+        for one in value:
+            _check_plain(hint, name, one)
+    elif hint not in (Sequence[bool], Sequence[str]) and (
+        isinstance(value, bool) or not isinstance(value, (int, float))
+    ):
+        raise InvalidInputError(f"{name}: expected numbers, got {value!r}.")
+
+
+@contextlib.contextmanager
+def located(where: str, file: object = None) -> Iterator[None]:
+    """Adds the file or the table to the messages of errors."""
+    if not where and file is None:
+        yield
+        return
+    before, after = (f"[{where}] ", f" of [{where}]") if file is None else (f"{file}: ", f" in {file}")
+    try:
+        yield
+    except UnknownNameError as error:
+        raise UnknownNameError(f"{error.kind}{after}", error.name, error.available) from None
+    except InvalidInputError as error:
+        raise InvalidInputError(f"{before}{error}") from None
+
+
+def save(fields: Mapping[str, Any], file: str | os.PathLike[str]) -> None:
+    """Writes a scenario to a file, in one go.
+
+    Args:
+        fields: The fields of the scenario.
+        file: A name that ends in ``.toml``.
+
+    Raises:
+        InvalidInputError: A part of the scenario has no form in a file, or the file cannot be written. An existing file
+            is unchanged then.
+    """
+    try:
+        path = pathlib.Path(file)
+    except TypeError:
+        raise InvalidInputError(f"file: expected a path that ends in .toml, got {file!r}.") from None
+    if path.suffix != ".toml":
+        raise InvalidInputError(f"file: expected a path that ends in .toml, got {str(file)!r}.")
+    try:
+        values = {name: _plain(value, path.parent) for name, value in fields.items()}
+        if fields["model"] is fields["arm"]:
+            values["model"] = None
+        content = document(values).encode()
+    except (InvalidInputError, UnicodeEncodeError) as error:
+        raise InvalidInputError(f"Scenario {fields['name']!r} cannot be written: {error}") from None
+    try:
+        files.write(path, content)
+    except (OSError, ValueError) as error:
+        raise InvalidInputError(f"Cannot write {path}: {error}.") from None
+
+
+def _plain(value: Any, folder: pathlib.Path) -> Any:
+    """A value in texts, numbers, arrays and tables of them."""
+    if isinstance(value, Task):
+        if value.name not in tasks.names() or value != tasks.get(value.name):
+            raise InvalidInputError(f"task: expected one of {', '.join(tasks.names())}, got {value!r}.")
+        return value.name
+    if isinstance(value, tuple) and value and isinstance(value[0], Arm):
+        return [_plain(one, folder) for one in value]
+    if not isinstance(value, PARTS):
+        return value
+    for base, kinds in CHOICES.items():
+        if isinstance(value, base):
+            name = next((name for name, kind in kinds.items() if type(value) is kind), None)
+            if name is None:
+                raise InvalidInputError(
+                    f"expected one of the kinds {', '.join(kinds)}, got a {type(value).__name__}, which a file cannot "
+                    "hold. A scenario in Python is named by 'package.module:attribute'."
+                )
+            return {"kind": name, **_fields(value, folder)}
+    if type(value) not in PARTS:
+        raise InvalidInputError(f"expected no class of your own, got {type(value).__name__}, which a file cannot hold.")
+    if isinstance(value, Arm):
+        return _plain_arm(value, folder)
+    fields = _fields(value, folder)
+    return fields if not isinstance(value, Plant) else {name: fields[name] for name in value.switched_on()} or None
+
+
+def _fields(part: Any, folder: pathlib.Path) -> Table:
+    return {f.name: _plain(getattr(part, f.name), folder) for f in dataclasses.fields(part) if f.init}
+
+
+def _plain_arm(arm: Arm, folder: pathlib.Path) -> str | Table:
+    """The name of an arm of this package, a reference to a URDF file, or numbers."""
+    if arm.name in arms.SHIPPED and _same(arm, arms.get(arm.name)):
+        return arm.name
+    numbers = _fields(arm, folder)
+    if arm.joint_names == numbered_joints(arm.joints):
+        del numbers["joint_names"]
+    return _urdf(arm, folder) or numbers
+
+
+def _urdf(arm: Arm, folder: pathlib.Path) -> Table | None:
+    """A reference to the URDF file of an arm; None where there is none, or it has changed since."""
+    if arm.urdf is None:
+        return None
+    path, *where = arm.urdf
+    where = dict(zip(("base", "tip", "tool", "tool_rotation"), where, strict=True))
+    try:
+        if not _same(arm, arms.from_urdf(path, name=arm.name, **where)):
+            return None
+        name = os.path.relpath(path, folder.resolve())
+    except IkgymError:
+        return None
+    except ValueError:  # on another drive
+        name = str(path)
+    return {"name": arm.name, "urdf": pathlib.Path(name).as_posix(), **where}
+
+
+def _same(one: Arm, other: Arm) -> bool:
+    """Whether two arms are the same bit for bit, names aside."""
+    return all(
+        np.asarray(getattr(one, f.name)).tobytes() == np.asarray(getattr(other, f.name)).tobytes()
+        for f in dataclasses.fields(Arm)
+        if f.init and f.name != "name"
+    )
