@@ -91,17 +91,15 @@ def arguments(
 
 def _value(hint: Any, name: str, value: Any, folder: pathlib.Path, where: str) -> Any:
     """The value of an argument with some annotation."""
-    kind, several = _part(hint), typing.get_origin(hint) is Sequence
+    kind = _part(hint)
+    if kind is Arm and isinstance(value, list) and typing.get_origin(hint) is Sequence:
+        return [_value(Arm, name, one, folder, where) for one in value]
     with located(where):
-        if kind is Arm and several and not isinstance(value, list):
-            raise InvalidInputError(f"{name}: expected a list of arms, got {value!r}.")
-        if kind is None or kind is Task or (kind is Arm and isinstance(value, str)):
+        if kind is None or kind is Task or (hint is Arm and isinstance(value, str)):
             _check_plain(hint, name, value)
             return tasks.get(value) if kind is Task else arms.get(value) if kind is Arm else value
-        if not isinstance(value, list if several else dict):
+        if typing.get_origin(hint) is Sequence or not isinstance(value, dict):
             raise InvalidInputError(f"{name}: expected {_meaning(hint)}, got {value!r}.")
-    if several:
-        return [_value(Arm, name, one, folder, where) for one in value]
     where = f"{where}.{name}" if where else name
     if kind is Arm:
         return _arm(value, folder, where)
@@ -156,7 +154,7 @@ def _meaning(hint: Any) -> str:
     """How messages describe a value."""
     kind, classes = _part(hint), set(typing.get_args(hint))
     if kind is Arm:
-        return "the name of an arm or a table"
+        return "the name of an arm or a table" if hint is Arm else "a list of arms"
     if kind is Task or hint is str or (typing.get_origin(hint) is not Sequence and {str} <= classes <= TEXTS):
         return "a text"
     return "numbers" if kind is None else "a table"
@@ -266,8 +264,8 @@ def _urdf(arm: Arm, folder: pathlib.Path) -> Table | None:
     """A reference to the URDF file of an arm; None where there is none, or it has changed since."""
     if arm.urdf is None:
         return None
-    path, *where = arm.urdf
-    where = dict(zip(("base", "tip", "tool", "tool_rotation"), where, strict=True))
+    path, base, tip, tool, tool_rotation = arm.urdf
+    where: Table = {"base": base, "tip": tip, "tool": tool, "tool_rotation": tool_rotation}
     try:
         if not _same(arm, arms.from_urdf(path, name=arm.name, **where)):
             return None

@@ -95,7 +95,7 @@ class Reference:
             InvalidInputError: There is no memory for so many.
         """
         last = self.steps + furthest(preview)
-        checks.afford_points(last + 1, self.joints)
+        checks.afford_points(last + 1, self.model.joints)
         # What is held for longer than the episode is held to its end.
         *first, usual = (min(held, last + 1) for held in self._held())
         ends = np.cumsum(first, dtype=np.int64)
