@@ -35,12 +35,11 @@ PAGES = Path(__file__).parent
 
 def arms() -> list[tuple[str, ...]]:
     """One line an arm."""
-    rows = [("arm", "joints", "of which prismatic", "limits", "tool at q = 0 [m]")]
+    rows = [("arm", "joints", "prismatic", "limits")]
     for name in ikgym.arms.names():
         arm = ikgym.arms.get(name)
-        tool = ", ".join(f"{x:.4g}" for x in np.round(arm.forward(np.zeros(arm.joints))[1], 9) + 0.0)
         limits = ", ".join(kinds_of_limits(arm)) or "none"
-        rows.append((f"`{name}`", str(arm.joints), str(sum(arm.prismatic)), limits, f"({tool})"))
+        rows.append((f"`{name}`", str(arm.joints), str(sum(arm.prismatic)), limits))
     return rows
 
 
@@ -53,21 +52,32 @@ def tasks() -> list[tuple[str, ...]]:
 
 
 def scenarios() -> list[tuple[str, ...]]:
-    """One line a scenario."""
-    rows = [("scenario", "arm", "solvers know", "task", "Δt [s]", "steps", "source")]
-    for s in map(ikgym.scenarios.get, ikgym.scenarios.names()):
-        model = "the arm" if s.model is s.arm else f"`{s.model.name}`"
-        rows.append(
-            (f"`{s.name}`", f"`{s.arm.name}`", model, f"`{s.task.name}`", f"{s.dt:g}", f"{s.steps:,}", s.source)
-        )
+    """One line a scenario; the paths that several arms have are in :func:`paths`."""
+    rows = [("scenario", "arm", "task", "Δt [s]", "steps", "source")]
+    for name in ikgym.scenarios.names():
+        s = ikgym.scenarios.get(name)
+        if name not in ikgym.scenarios.names("paths") or s.random:
+            arm = f"`{s.arm.name}`" if s.model is s.arm else f"`{s.arm.name}`, model `{s.model.name}`"
+            source = s.source.replace("random motion of this project", "")
+            rows.append((f"`{name}`", arm, f"`{s.task.name}`", f"{s.dt:g}", f"{s.steps:,}", source.strip(", ")))
     return rows
+
+
+def paths() -> list[tuple[str, ...]]:
+    """One line a path, with the durations of its scenarios."""
+    found: dict[str, dict[str, str]] = {}
+    for s in map(ikgym.scenarios.get, ikgym.scenarios.names("paths")):
+        if not s.random:
+            found.setdefault(s.name.split("-")[1], {})[s.arm.name] = f"{s.steps * s.dt:.1f}"
+    arms_of = tuple(next(iter(found.values())))
+    return [("path", *(f"`{arm}` [s]" for arm in arms_of))] + [
+        (f"`{path}`", *(times[arm] for arm in arms_of)) for path, times in found.items()
+    ]
 
 
 def problems() -> list[tuple[str, ...]]:
     """One line a problem from elsewhere."""
-    rows = [
-        ("scenario", "arm", "waypoints", "starts", "trajectories", "Δt [s]", "steps", "longest [mm]", "largest [°]")
-    ]
+    rows = [("scenario", "arm", "waypoints", "starts", "longest [mm]", "largest [°]")]
     for name in ikgym.scenarios.problems_from_elsewhere():
         scenario = ikgym.scenarios.get(name)
         members = ikgym.problems.names(f"{name}-") if scenario.random else (name,)
@@ -76,7 +86,6 @@ def problems() -> list[tuple[str, ...]]:
         longest = max(np.linalg.norm(np.diff(one.positions, axis=0), axis=1).max() for one in found)
         cosines = min(np.abs((one.quaternions[1:] * one.quaternions[:-1]).sum(axis=1)).min() for one in found)
         cells = ["–".join(f"{counts[i]}" for i in sorted({0, len(counts) - 1})), str(len(found[0].starts) or NOTHING)]
-        cells += [str(len(ikgym.problems.published(members[0])) or NOTHING), f"{scenario.dt:g}", f"{scenario.steps:,}"]
         turn = np.degrees(2.0 * np.arccos(min(cosines, 1.0)))
         rows.append((f"`{name}`", f"`{scenario.arm.name}`", *cells, f"{1e3 * longest:.1f}", f"{turn:.1f}"))
     return rows
@@ -154,14 +163,6 @@ def statuses() -> list[tuple[str, ...]]:
     return rows
 
 
-def plant() -> list[tuple[str, ...]]:
-    """One line an effect, from the docstring of the class."""
-    text = inspect.getdoc(ikgym.Plant).split("Args:\n")[1].split("\n\nRaises:")[0]
-    meanings = {name: " ".join(said.split()) for name, said in re.findall(r"^    (\w+): (.*(?:\n {8}.*)*)", text, re.M)}
-    defaults = {field.name: field.default for field in dataclasses.fields(ikgym.Plant)}
-    return [("key", "meaning", "off")] + [(f"`{n}`", m, f"`{defaults[n]!r}`") for n, m in meanings.items()]
-
-
 def demo() -> str:
     """The table of the README."""
     readme = (PAGES.parent / "README.md").read_text(encoding="utf-8")
@@ -169,10 +170,10 @@ def demo() -> str:
 
 
 TABLES = {
-    "plant": plant,
     "arms": arms,
     "tasks": tasks,
     "scenarios": scenarios,
+    "paths": paths,
     "problems": problems,
     "splits": splits,
     "policies": policies,

@@ -50,7 +50,7 @@ SPLITS = {
 }
 #: The files of the catalogue: those of the papers, paths for several arms, imperfect plants, problems of others.
 FILES = {
-    family: sorted((pathlib.Path(__file__).parent / "catalogue" / family).glob("*.toml"))
+    family: sorted((pathlib.Path(__file__).parent / "catalogue" / family).glob("*.toml"), key=lambda file: file.stem)
     for family in ("papers", "paths", "plants", "published")
 }
 
