@@ -1,4 +1,4 @@
-"""Draws the picture of the README: ``python -m docs.pictures``."""
+"""Draws the pictures of the README and of the results: ``python -m docs.pictures``."""
 
 from __future__ import annotations
 
@@ -12,12 +12,15 @@ from matplotlib.ticker import MaxNLocator
 import baselines
 import ikgym
 from baselines.episodes import rollout
+from baselines.evaluation import table_plots
 from baselines.evaluation.plots import style
+from baselines.evaluation.table import from_csv
 from baselines.files import write
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray
 
-FILE = Path(__file__).parent / "images" / "environment.png"
+IMAGES = Path(__file__).parent / "images"
+RESULTS = Path(__file__).parent / "results"
 SCENARIO = "varga7-fast"
 #: Policies whose paths are drawn, the first one in space, too.
 POLICIES = ("rhc_gradient", "rhc", "rhc_foresight")
@@ -126,9 +129,26 @@ def _close(axes: Any, paths: dict[str, FloatArray], reference: FloatArray, step:
     )
 
 
+def results(name: str) -> list[dict[str, str]]:
+    """The lines of a CSV file of results."""
+    return from_csv((RESULTS / f"{name}.csv").read_text(encoding="utf-8"))
+
+
+def drawn() -> dict[str, Figure]:
+    """The pictures of the results, by the names of their files."""
+    title = "rhc_foresight by horizon, geometric mean and 95 % interval"
+    on_main = [line for line in results("cost_time") if line["scenario"] == "varga7-pose-random"]
+    return {
+        "cost-time": table_plots.cost_time(on_main, "varga7-pose-random, 256 episodes"),
+        "foresight": table_plots.foresight(results("foresight"), title, "knows_end"),
+        "robustness": table_plots.severity_map(results("robustness_map")),
+    }
+
+
 def main() -> None:
-    """Writes the picture."""
-    write(FILE, style.small_png(draw()))
+    """Writes the pictures."""
+    for name, figure in {"environment": draw(), **drawn()}.items():
+        write(IMAGES / f"{name}.png", style.small_png(figure))
 
 
 if __name__ == "__main__":

@@ -27,7 +27,6 @@ from baselines.oracle.best_known import MARGIN
 from baselines.papers import PAPERS
 from baselines.registry import get
 from baselines.status import Status
-from docs import cluster
 from docs.paper_pages import figures, verdicts
 
 PAGES = Path(__file__).parent
@@ -184,7 +183,6 @@ TABLES = {
 }
 #: What is no table.
 TEXTS: dict[str, Callable[[], str]] = {
-    "cluster": cluster.paragraph,
     "demo": demo,
     **{f"figures_{name}": functools.partial(figures, paper) for name, paper in PAPERS.items()},
 }

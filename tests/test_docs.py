@@ -291,8 +291,9 @@ def test_links_and_commands_exist(page):
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
     for target in re.findall(r"(?:^|`)make (\w+)", text, re.MULTILINE):
         assert re.search(rf"^{target}:", makefile, re.MULTILINE), target
-    for path in re.findall(r"`((?:ikgym|baselines|docs|tests|benchmarks|examples)/[\w./]*)`", text):
-        assert (ROOT / path).exists(), path
+    if page.name != "CHANGELOG.md":  # which names files of former versions
+        for path in re.findall(r"`((?:ikgym|baselines|docs|tests|benchmarks|examples)/[\w./]*)`", text):
+            assert (ROOT / path).exists(), path
 
 
 def test_make_help_lists_every_target():

@@ -11,10 +11,10 @@ from typing import Annotated
 import tyro
 
 from baselines import command
-from baselines.evaluation.pages.markdown import table
-from baselines.evaluation.pages.tuning import EPISODES, SPLIT, Tuning
 from baselines.evaluation.report import number
+from baselines.evaluation.table import grid
 from baselines.files.locks import locked
+from baselines.tuning.settings import EPISODES, SPLIT, Tuning
 from ikgym import scenarios
 from ikgym.validation import whole_number
 
@@ -120,7 +120,7 @@ def shown(found: Tuning) -> str:
         ]
         for one in found.solvers
     ]
-    return "\n".join(table(["solver", "as it is", "tuned", "ratio", "tried", "settings"], lines, text=(0, 5)))
+    return grid(["solver", "as it is", "tuned", "ratio", "tried", "settings"], lines, text=(0, 5))
 
 
 def _program() -> str:

@@ -16,11 +16,11 @@ from optuna.trial import FrozenTrial, Trial
 from baselines import registry
 from baselines.canonical import DIGITS, canonical, jsonable, rounded
 from baselines.episodes import add_up, rollouts
-from baselines.evaluation.pages.tuning import EPISODES, SPLIT, Tuned, Tuning
 from baselines.evaluation.summary import geometric_mean
 from baselines.fingerprints import fingerprint
 from baselines.spec import parse_policy
 from baselines.tuning.ranges import Range, Ranges, ends, read, suggested
+from baselines.tuning.settings import EPISODES, SPLIT, Tuned, Tuning
 from baselines.tuning.study import Study, finished, opened
 from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError

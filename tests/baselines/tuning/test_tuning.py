@@ -13,18 +13,17 @@ import pytest
 
 from baselines import registry
 from baselines.evaluate import evaluate
-from baselines.evaluation.pages import entries, sets
-from baselines.evaluation.pages.tuning import Tuning
 from baselines.spec import parse_policy
 from baselines.tuning import solvers, study
 from baselines.tuning.command import main
 from baselines.tuning.ranges import Range, read, suggested
+from baselines.tuning.settings import Tuning
 from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 
 RANGES = str(Path(__file__).with_name("refused.toml"))
 ROOT = Path(__file__).parents[3]
-SKEW = scenarios.get(sets.SKEW)
+SKEW = scenarios.get("varga7-random")
 SHORT = SKEW.replace(name="short", steps=30)
 
 
@@ -189,7 +188,7 @@ def test_ranges_look_no_further_and_are_taken():
         name, parameters = parse_policy(spec)
         lines = solvers.of(spec, ranges)
         ahead = registry.make(name, SKEW, **parameters).preview
-        assert ahead <= entries.PAPER
+        assert ahead <= 2
         for _ in range(8):
             settings = suggested(there.ask(), lines, parameters)
             made = registry.make(name, SKEW, **{**parameters, **settings})
@@ -200,7 +199,7 @@ def test_ranges_look_no_further_and_are_taken():
 def test_some_solvers_suit_skew_coordinates_alone():
     ranges = solvers.stated()
     assert solvers.suiting(SKEW, ranges) == list(ranges)
-    left = {*ranges} - {*solvers.suiting(scenarios.get(sets.MAIN), ranges)}
+    left = {*ranges} - {*solvers.suiting(scenarios.get("varga7-pose-random"), ranges)}
     assert left == {spec for spec in ranges if "full_orientation" in spec}
 
 
@@ -286,7 +285,7 @@ def test_the_command(tmp_path, capsys):
             {"--policies": "dls:gain=0.5,damping=0.1"},
             "No range is stated for a parameter of 'dls:gain=0.5,damping=0.1'",
         ),
-        ({"--policies": "full_orientation", "--scenario": sets.MAIN}, "expected the task 'skew'"),
+        ({"--policies": "full_orientation", "--scenario": "varga7-pose-random"}, "expected the task 'skew'"),
         ({"--episodes": "0"}, "episodes: expected a whole number of at least 1, got 0."),
         ({"--workers": "0"}, "workers: expected a whole number of at least 1, got 0."),
         ({"--seed": "-1"}, "seed: expected a whole number of at least 0, got -1."),

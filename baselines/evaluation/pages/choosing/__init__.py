@@ -1,1 +1,0 @@
-"""Which solver for my arm: situations, how solvers stand in them, and the page made from that."""

@@ -1,1 +1,0 @@
-"""The page of the problems that others published: policies, and the initial trajectories that were published."""

@@ -1,1 +1,0 @@
-"""The page of robustness: what imperfect plants cost policies, set by set and over two severities."""
