@@ -6,7 +6,6 @@ import subprocess
 import sys
 
 import gymnasium as gym
-import matplotlib as mpl
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
@@ -104,16 +103,6 @@ def test_a_picture_changes_with_the_arm_and_only_with_it():
         assert (before != after).any()
 
 
-def test_a_picture_is_the_callers_own():
-    env = environment()
-    first = env.render()
-    kept = first.copy()
-    move(env)
-    env.render()[:] = 0
-    np.testing.assert_array_equal(first, kept)
-    assert env.render().any()
-
-
 def test_restoring_the_background_gives_the_same_pixels_as_drawing_all_anew():
     env = environment()
     for _ in range(4):
@@ -145,32 +134,6 @@ def test_the_axes_stay_during_an_episode():
     assert len(set(limits)) == 1
 
 
-def test_lengths_look_the_same_in_all_directions():
-    env = environment()
-    env.render()
-    space, *_ = renderer_of(env).figure.axes
-    sides = np.ptp([space.get_xlim(), space.get_ylim(), space.get_zlim()], axis=1)
-    aspect = space._box_aspect  # has no getter
-    np.testing.assert_allclose(sides / sides[0], aspect / aspect[0])
-
-
-@pytest.mark.parametrize("name", ["varga7-fast", "khan8-q1", "zhang3-helix", "zhang6-lspb"])
-def test_ticks_are_as_far_apart_on_all_axes_and_stay_away_from_the_ends(name):
-    env = environment(name)
-    env.render()
-    space, *_ = renderer_of(env).figure.axes
-    distances = []
-    for ticks, (low, high) in [
-        (space.get_xticks(), space.get_xlim()),
-        (space.get_yticks(), space.get_ylim()),
-        (space.get_zticks(), space.get_zlim()),
-    ]:
-        assert 2 <= len(ticks) <= 8
-        assert low + 0.05 * (high - low) < ticks[0] < ticks[-1] < high - 0.05 * (high - low)
-        distances.extend(np.diff(ticks))
-    np.testing.assert_allclose(distances, distances[0])
-
-
 def test_prismatic_joints_have_an_artist_of_their_own():
     env = environment()
     for _ in range(3):
@@ -188,14 +151,6 @@ def test_prismatic_joints_have_an_artist_of_their_own():
     # The link is interrupted where the joint is prismatic.
     links = np.transpose(artist(env, "links").get_data_3d())
     assert np.isnan(links).all(axis=1).sum() == prismatic.sum()
-
-
-@pytest.mark.parametrize(("name", "shown"), [("varga7-fast", True), ("zhang6-lspb", False)])
-def test_the_legend_has_prismatic_joints_only_where_there_are_some(name, shown):
-    env = environment(name)
-    env.render()
-    (legend,) = renderer_of(env).figure.legends
-    assert ("prismatic joint" in [text.get_text() for text in legend.get_texts()]) == shown
 
 
 def test_tool_target_and_paths_are_where_they_should_be():
@@ -228,25 +183,6 @@ def test_the_tool_frame_is_turned_with_the_tool():
     np.testing.assert_allclose(ends, ends[0])
     env.render()  # the same state again
     np.testing.assert_allclose(np.transpose(artist(env, "tool z").get_data_3d())[0], position)
-
-
-@pytest.mark.parametrize(("name", "shown"), [("varga7-fast", True), ("zhang3-helix", False)])
-def test_a_tool_frame_is_there_where_the_task_has_an_orientation(name, shown):
-    env = environment(name)
-    env.render()
-    (legend,) = renderer_of(env).figure.legends
-    assert ("tool x, y, z" in [text.get_text() for text in legend.get_texts()]) == shown
-    assert (len(artist(env, "tool x").get_data_3d()[0]) == 2) == shown
-
-
-def test_both_paths_are_seen_where_one_lies_on_the_other():
-    """The actual path is narrower, drawn later, and of another colour."""
-    env = environment()
-    env.render()
-    nominal, actual = artist(env, "nominal path"), artist(env, "actual path")
-    assert nominal.get_linewidth() > 2.0 * actual.get_linewidth()
-    assert nominal.get_zorder() < actual.get_zorder()
-    assert len({nominal.get_color(), actual.get_color(), *scene.AXES.values()}) == 5
 
 
 @pytest.mark.parametrize(("name", "panels"), [("varga7-fast", 2), ("zhang3-helix", 1)])
@@ -327,20 +263,6 @@ def test_human_mode_passes_over_states_but_never_the_first_or_the_last(monkeypat
     assert len(painted) == 6
 
 
-def test_a_window_does_not_outrun_the_episode(monkeypatch):
-    monkeypatch.setattr(renderer.backend_registry, "resolve_backend", lambda name: (name, "pretended"))
-    monkeypatch.setattr(renderer.Figure, "show", lambda _: None)
-    painted, now = count_paintings(monkeypatch), [100.0]
-    monkeypatch.setattr(renderer.clock, "perf_counter", lambda: now[0])
-    monkeypatch.setattr(renderer.clock, "sleep", lambda seconds: now.append(now.pop() + seconds))
-    env = environment(mode="human", steps=100)
-    for _ in range(100):
-        move(env)  # takes no time at all
-    assert now[0] - 100.0 == pytest.approx(2 / 30, abs=1e-9)
-    assert len(painted) == 1 + 2 + 1  # at 0, 34, 68 and 100 ms
-    env.close()
-
-
 def test_a_window_is_drawn_on_until_it_is_closed(monkeypatch):
     """The backend of the tests has no windows; that pyplot keeps the figure stands for one."""
     monkeypatch.setattr(renderer.backend_registry, "resolve_backend", lambda name: (name, "pretended"))
@@ -362,17 +284,6 @@ def test_a_window_is_drawn_on_until_it_is_closed(monkeypatch):
     for _ in range(2):
         env.close()
         assert plt.get_fignums() == []
-
-
-def test_rgb_array_mode_draws_only_when_asked(monkeypatch):
-    painted = count_paintings(monkeypatch)
-    env = environment()
-    move(env)
-    assert painted == []
-    assert renderer_of(env).figure is None
-    env.render()
-    env.render()
-    assert painted == [True, False]
 
 
 def test_a_video_can_be_recorded(tmp_path):
@@ -412,33 +323,6 @@ def test_render_without_a_mode_warns():
     env = environment(mode=None)
     with pytest.warns(UserWarning, match="render_mode"):
         assert env.render() is None
-
-
-def test_closing_twice_does_no_harm_and_a_new_episode_draws_again():
-    env = environment()
-    before = env.render()
-    for _ in range(2):
-        env.close()
-        assert renderer_of(env).figure is None
-    env.reset(seed=0)
-    np.testing.assert_array_equal(env.render(), before)
-
-
-@pytest.mark.parametrize("mode", [None, "rgb_array", "human"])
-def test_closing_before_the_first_picture_does_no_harm(mode):
-    ikgym.RedundantIKEnv(short(), render_mode=mode).close()
-
-
-def test_rgb_array_mode_leaves_matplotlib_as_it_was():
-    settings, backend, figures = dict(mpl.rcParams), mpl.get_backend(), plt.get_fignums()
-    env = environment()
-    env.render()
-    move(env)
-    env.render()
-    env.close()
-    assert dict(mpl.rcParams) == settings
-    assert mpl.get_backend() == backend
-    assert plt.get_fignums() == figures
 
 
 def test_rgb_array_mode_imports_no_pyplot_and_no_mode_no_matplotlib():

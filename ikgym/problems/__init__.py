@@ -5,7 +5,12 @@
 - ``cppflow-…``: jstmn/cppflow (MIT; Morgan, Millard and Sukhatme, *CppFlow: generative inverse kinematics for efficient
   and robust Cartesian path planning*, ICRA 2024). Arms ``fetch_arm``, ``fetch`` and ``panda``.
 
-The licences lie beside this file, and so does the script that wrote the data from the repositories.
+Taken from RL-ITG at commit 0866661f83c09e9f5a20adbdbdadeb120d80a703 and cppflow at
+c92e0a45aeee257a9a489b49cf83370193fe5844, whose licences are beside this file: the problems without obstacles, except
+`hello_mini`, the beginning of `hello`. Poses are published in the frame of `torso_lift_link`, which is parallel to
+`base_link`; here they are in the base frame of the arm. The i-th start of a random path belongs to its i-th waypoint,
+so only the first one is kept. Initial trajectories are those from the first start; `reinforcement` is the published
+network `FREEALL_Task` (`pirl_rl_test_1`). RL-ITG's joint interpolations, which do not follow the paths, are left out.
 """
 
 from __future__ import annotations
@@ -16,17 +21,17 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
-from ikgym.problems import packing
 from ikgym.validation import FloatArray, known_name, read_only
 
 FOLDER = pathlib.Path(__file__).parent
 WAYPOINTS, TRAJECTORIES = FOLDER / "waypoints.npz", FOLDER / "trajectories.npz"
-#: One over the resolution of waypoints and starts in [m], [rad] or 1, and of trajectories in [rad], which are published
-#: with six digits; and the orders of the differences that they are stored in.
+#: One over the resolution of waypoints and starts in [m], [rad] or 1, and of trajectories in [rad]; and the orders of
+#: the differences in which they are stored, which change little from row to row and so compress well.
 FINE, COARSE = 10**6, 10**5
 WAYPOINTS_ORDER, TRAJECTORIES_ORDER = 3, 2
-#: The paths of RL-ITG that were drawn, how many random ones there are, and those of CppFlow's problems on the Fetch.
+#: RL-ITG's drawn paths, the number of its random ones, and CppFlow's paths for the Fetch.
 DRAWN, RANDOM, ON_FETCH = ("hello", "rotation", "zig", "kaist", "sgvr"), 100, ("hello", "rot_yz", "rot_yz2")
 NAMES = (
     *(f"rlitg-{path}" for path in DRAWN),
@@ -34,7 +39,7 @@ NAMES = (
     *(f"cppflow-{arm}-{path}" for arm in ("fetch_arm", "fetch") for path in ON_FETCH),
     "cppflow-panda-square",
 )
-#: How initial trajectories were made, and what each is called.
+#: Methods behind the initial trajectories, and their names in prose.
 METHODS = {
     "greedy": "greedy IK",
     "cloning": "behaviour cloning",
@@ -43,7 +48,7 @@ METHODS = {
 
 
 class Waypoints(NamedTuple):
-    """What a path leads through; all arrays are read-only.
+    """Waypoints of a path; all arrays are read-only.
 
     Attributes:
         positions: In the base frame of the arm, in [m]. Shape (k, 3).
@@ -98,7 +103,7 @@ def trajectory(name: str, method: str) -> FloatArray:
 @functools.cache
 def _stored() -> dict[str, Waypoints]:
     stored = _load(WAYPOINTS)
-    poses = packing.restored(stored["poses"], stored["lengths"].tolist(), FINE, WAYPOINTS_ORDER)
+    poses = _restored(stored["poses"], stored["lengths"].tolist(), FINE, WAYPOINTS_ORDER)
     starts = _parts(stored["starts"] / FINE, stored["start_counts"].tolist())
     problems = zip(stored["names"].tolist(), poses, starts, strict=True)
     return {name: Waypoints(*_split(pose), read_only(start)) for name, pose, start in problems}
@@ -109,8 +114,18 @@ def _trajectories() -> dict[tuple[str, str], FloatArray]:
     stored = _load(TRAJECTORIES)
     keys = zip(stored["names"].tolist(), stored["methods"].tolist(), strict=True)
     lengths = [len(_stored()[name].positions) for name in stored["names"].tolist()]
-    paths = packing.restored(stored["joints"], lengths, COARSE, TRAJECTORIES_ORDER)
+    paths = _restored(stored["joints"], lengths, COARSE, TRAJECTORIES_ORDER)
     return {key: read_only(path) for key, path in zip(keys, paths, strict=True)}
+
+
+def _restored(packed: npt.NDArray[np.int32], lengths: Sequence[int], scale: int, order: int) -> list[FloatArray]:
+    """Tables of k_i rows from the differences of some order of whole multiples of 1 / scale. Shape (c, Σ k_i)."""
+    out = []
+    for part in np.split(packed.T.astype(np.int64), np.cumsum(lengths)[:-1]):
+        for _ in range(order):
+            part = np.cumsum(part, axis=0)
+        out.append(part / scale)
+    return out
 
 
 def _load(file: pathlib.Path) -> dict[str, Any]:

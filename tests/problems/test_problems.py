@@ -11,7 +11,6 @@ from scipy.spatial.transform import Rotation
 import ikgym
 from ikgym import problems
 from ikgym.exceptions import UnknownNameError
-from ikgym.problems import packing, write
 
 RANDOM = problems.names("rlitg-random-")
 DRAWN = [name for name in problems.NAMES if name not in RANDOM]
@@ -102,43 +101,3 @@ def test_the_hand_of_the_panda_points_forward():
 def test_what_there_is_not(call, message):
     with pytest.raises(UnknownNameError, match=message):
         call()
-
-
-def test_what_is_packed_is_restored(tmp_path):
-    rng = np.random.default_rng(0)
-    tables = [np.cumsum(rng.normal(size=(k, 3)), axis=0) for k in (1, 2, 40)]
-    packed = packing.differences(tables, 1000, order=2)
-    packing.save(tmp_path / "x.npz", {"packed": packed})
-    packing.save(tmp_path / "y.npz", {"packed": packed})
-    assert (tmp_path / "x.npz").read_bytes() == (tmp_path / "y.npz").read_bytes()
-    with np.load(tmp_path / "x.npz", allow_pickle=False) as archive:
-        restored = packing.restored(archive["packed"], [1, 2, 40], 1000, order=2)
-    for table, again in zip(tables, restored, strict=True):
-        np.testing.assert_allclose(again, table, atol=0.5e-3 + 1e-12)
-
-
-def clone(folder):
-    """A folder as the repositories have it, with numbers of ours."""
-    config = folder / "rlitg" / write.CONFIG
-    for kind in ("path", "start_conf", "initial_traj"):
-        (config / kind).mkdir(parents=True)
-    (config / "path" / "random_7").write_text("0.1,0.2,0.3;1,0,0,0\n0.1,0.2,0.4;0.8,0.6,0,0\n")
-    (config / "start_conf" / "random_7_config.csv").write_text("1,2,3,4,5,6,7\n2,2,3,4,5,6,7\n")
-    (config / "initial_traj" / "random_7-torm_test-0-0.csv").write_text("1,2,3,4,5,6,7\n1,2,3,4,5,6,7\n")
-    (folder / "cppflow" / "cppflow" / "paths").mkdir(parents=True)
-    text = "time,x,y,z,qw,qx,qy,qz\n0.0,0.1,0.2,0.3,0.8,0.6,0.0,0.0\n"
-    (folder / "cppflow" / "cppflow" / "paths" / "square.csv").write_text(text)
-    return folder / "rlitg", folder / "cppflow"
-
-
-def test_what_the_script_reads(tmp_path):
-    rlitg, cppflow = clone(tmp_path)
-    poses = write.poses_of_rlitg(rlitg, "random_7")
-    np.testing.assert_allclose(poses[1], [0.013125, 0.2, 0.77743, 0.8, 0.6, 0.0, 0.0], atol=1e-15)
-    assert write.starts_of_rlitg(rlitg, "random_7").tolist() == [[1, 2, 3, 4, 5, 6, 7]]
-    ((method, joints),) = write.trajectories(rlitg, "random_7")
-    assert (method, joints.shape) == ("greedy", (2, 7))
-    (pose,) = write.poses_of_cppflow(cppflow, write.CPPFLOW["panda-square"])
-    np.testing.assert_allclose(pose[:3], [0.85, 0.2, 0.8], atol=1e-15)
-    turned = Rotation.from_quat([0.6, 0.0, 0.0, 0.8]) * Rotation.from_euler("y", 90, degrees=True)
-    np.testing.assert_allclose(pose[3:], turned.as_quat(scalar_first=True), atol=1e-15)

@@ -34,11 +34,6 @@ def test_the_example_is_the_file_of_the_examples():
     assert tomllib.loads(WHOLE) == tomllib.loads((ROOT / "examples" / "planar4.toml").read_text(encoding="utf-8"))
 
 
-def test_the_plant_of_the_page_is_one(tmp_path):
-    (tmp_path / "x.toml").write_text(WHOLE + PLANT, encoding="utf-8")
-    assert not ikgym.scenarios.load(tmp_path / "x.toml").plant.ideal
-
-
 def test_the_file_and_the_lines_of_python_give_the_same(tmp_path, monkeypatch, registry):
     monkeypatch.chdir(tmp_path)
     Path("page.toml").write_text(WHOLE, encoding="utf-8")
