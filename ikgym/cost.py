@@ -48,9 +48,9 @@ class TrackingCost(Frozen):
 
     def __post_init__(self) -> None:
         for name in ("delta_x", "delta_qdot"):
-            object.__setattr__(self, name, number(name, getattr(self, name), at_least=SMALLEST, at_most=LARGEST))
+            self._settle(**{name: number(name, getattr(self, name), at_least=SMALLEST, at_most=LARGEST)})
         for name in ("p_x", "p_out", "p_in"):
-            object.__setattr__(self, name, number(name, getattr(self, name), at_least=1.0, at_most=LARGEST_EXPONENT))
+            self._settle(**{name: number(name, getattr(self, name), at_least=1.0, at_most=LARGEST_EXPONENT)})
 
     @property
     def parameters(self) -> CostParameters:

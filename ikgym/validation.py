@@ -1,4 +1,4 @@
-"""Checks of what users hand in: clear words where it is wrong, a read-only copy where it is right."""
+"""Checks of user input: a clear error, or a read-only copy."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]
 
-# What is this close to unit length, or to a rotation, was meant to be one, and is made one exactly.
+# A vector this close to unit length, or a matrix this close to a rotation, is made exact.
 UNIT_TOLERANCE = 1e-6
 
 IDENTITY = np.eye(3)
@@ -31,10 +31,10 @@ def float_array(
     """A fresh, C-contiguous float64 copy of finite numbers.
 
     Args:
-        name: What the value is called in messages.
+        name: Name of the value in messages.
         value: Anything that NumPy can cast to float64 without losing its meaning.
-        shape: The shape to insist on; None stands for any length. All shapes are right if it is left out.
-        at_most: Absolute value that no number may exceed.
+        shape: Required shape, None for any length; any shape by default.
+        at_most: Largest absolute value.
 
     Returns:
         The copy. Shape as given.
@@ -83,7 +83,7 @@ def per_joint(name: str, value: npt.ArrayLike, n: int, *, at_most: float = math.
 
 
 def as_given(given: npt.ArrayLike, array: FloatArray) -> float | tuple[float, ...]:
-    """What :func:`per_joint` has checked, as plain numbers: one where one was given for all, or else all of them."""
+    """An array of :func:`per_joint` as plain numbers: one if one was given, else one a joint."""
     return float(array[0]) if np.ndim(given) == 0 else tuple(array.tolist())
 
 
@@ -138,7 +138,7 @@ def whole_number(name: str, value: int, *, at_least: int) -> int:
 
 
 def flag(name: str, value: bool) -> bool:
-    """True or false, in the words of the files that hold it.
+    """A truth value.
 
     Raises:
         InvalidInputError: The value is neither.
@@ -161,7 +161,7 @@ def rotation_matrices(name: str, value: npt.ArrayLike) -> FloatArray:
     """Rotation matrices, each made exactly orthogonal as :func:`rotation_matrix` does, as a fresh array.
 
     Args:
-        name: What the value is called in messages.
+        name: Name of the value in messages.
         value: The matrices. Shape (..., 3, 3).
 
     Raises:
@@ -184,7 +184,7 @@ def rotation_matrices(name: str, value: npt.ArrayLike) -> FloatArray:
 
 
 def known_names(kind: str, given: Iterable[str], available: Iterable[str]) -> None:
-    """Insists that all names given are among those available.
+    """Checks that all names are available.
 
     Raises:
         UnknownNameError: One is not; the message has the nearest match.
@@ -195,7 +195,7 @@ def known_names(kind: str, given: Iterable[str], available: Iterable[str]) -> No
 
 
 def known_name(kind: str, name: object, available: Iterable[str]) -> None:
-    """Insists that a name is among those available; what is no text, such as a list or an array, is none of them.
+    """Checks that a name is available; anything but a text is not.
 
     Raises:
         UnknownNameError: It is not; the message has the nearest match.
@@ -218,6 +218,11 @@ class Frozen:
         known_names(f"field of {type(self).__name__}", changes, self._fields())
         return type(self)(**{**self._fields(), **changes})
 
+    def _settle(self, **values: Any) -> None:
+        """Sets checked fields while the object is made."""
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
+
     def _fields(self) -> Mapping[str, Any]:
         return {f.name: getattr(self, f.name) for f in dataclasses.fields(self) if f.init}  # type: ignore[arg-type]
 
@@ -234,7 +239,7 @@ def _fits(shape: tuple[int, ...], wanted: tuple[int | None, ...]) -> bool:
 
 
 def _range(above: float | None, at_least: float | None, at_most: float | None) -> str:
-    """How messages say which numbers are allowed."""
+    """The allowed numbers, in words."""
     if above is not None:
         return f" above {above:g}" + ("" if at_most is None else f" and of at most {at_most:g}")
     if at_least is None:
@@ -243,6 +248,6 @@ def _range(above: float | None, at_least: float | None, at_most: float | None) -
 
 
 def shortened(value: object, limit: int = 120) -> str:
-    """A value as messages show it: in one line, and not all of a long one."""
+    """A value in one line for messages, truncated if it is long."""
     text = " ".join(repr(value).split())
     return text if len(text) <= limit else text[: limit - 1] + "…"

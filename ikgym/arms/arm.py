@@ -108,24 +108,23 @@ class Arm(Frozen):
             )
         chain = Chain(offsets, axes, np.array(prismatic, dtype=np.bool_), tool, tool_rotation)
         chain.prismatic.flags.writeable = False
-        for field, value in {
-            "offsets": offsets,
-            "axes": axes,
-            "prismatic": prismatic,
-            "tool": tool,
-            "tool_rotation": tool_rotation,
-            "lower": lower,
-            "upper": upper,
-            "velocity_limit": fastest,
-            "acceleration_limit": hardest,
-            "joint_names": checks.joint_names(self.name, self.joint_names, n),
-            "chain": chain,
-        }.items():
-            object.__setattr__(self, field, value)
+        self._settle(
+            offsets=offsets,
+            axes=axes,
+            prismatic=prismatic,
+            tool=tool,
+            tool_rotation=tool_rotation,
+            lower=lower,
+            upper=upper,
+            velocity_limit=fastest,
+            acceleration_limit=hardest,
+            joint_names=checks.joint_names(self.name, self.joint_names, n),
+            chain=chain,
+        )
         if self.home is not None:
             home = frozen_array(f"home of arm {self.name!r}", self.home, (n,))
             self.check_posture("home", home)
-            object.__setattr__(self, "home", home)
+            self._settle(home=home)
 
     @property
     def joints(self) -> int:

@@ -74,26 +74,25 @@ class Scenario(Frozen, Reference):
     source: str = ""
 
     def __post_init__(self) -> None:
-        def settle(field: str, value: object) -> None:
-            object.__setattr__(self, field, value)
-
         checks.check_parts(self._fields())
         n = self.arm.joints
-        settle("model", self.arm if self.model is None else self.model)
-        settle("velocity_limit", velocity_scale(self.arm, self.velocity_limit))
-        settle("dt", number("dt", self.dt, at_least=SMALLEST, at_most=LARGEST))
-        settle("steps", checks.step_count("steps", self.steps, n))
+        self._settle(model=self.arm if self.model is None else self.model)
+        self._settle(velocity_limit=velocity_scale(self.arm, self.velocity_limit))
+        self._settle(dt=number("dt", self.dt, at_least=SMALLEST, at_most=LARGEST))
+        self._settle(steps=checks.step_count("steps", self.steps, n))
         if self.start is not None:
-            settle("start", frozen_array("start", self.start, (n,), at_most=LARGEST))
+            self._settle(start=frozen_array("start", self.start, (n,), at_most=LARGEST))
         elif self.random and not self.starts_nominally:
             raise InvalidInputError(f"Scenario {self.name!r}: a random Cartesian trajectory needs a start.")
         if self.initial_pose is not None:
-            settle("initial_pose", frozen_array("initial_pose", self.initial_pose, (self.task.size,), at_most=LARGEST))
+            self._settle(
+                initial_pose=frozen_array("initial_pose", self.initial_pose, (self.task.size,), at_most=LARGEST)
+            )
         held = self._held()
         if not held:
             raise InvalidInputError("iterations_per_point: expected at least one number, got none.")
         held = tuple(checks.step_count("iterations_per_point", number_of_steps, n) for number_of_steps in held)
-        settle("iterations_per_point", held)
+        self._settle(iterations_per_point=held)
         self.plant.check(self.arm, self.steps)
         if not self.starts_nominally or (self.arm.limited and not self.random):
             self.first_q(self.trajectory)  # says whether the arm can be there

@@ -9,8 +9,8 @@ import numpy as np
 
 from ikgym.arms import Arm
 from ikgym.trajectories.joint_spline import JointSpline, splines_at
-from ikgym.trajectories.sinusoid import Sinusoid, frames_along, waves
-from ikgym.trajectories.trajectory import Trajectory
+from ikgym.trajectories.sinusoid import Sinusoid, waves
+from ikgym.trajectories.trajectory import Trajectory, frames_along
 from ikgym.validation import FloatArray
 
 

@@ -37,10 +37,10 @@ class Helix(Trajectory):
     has_orientation: typing.ClassVar[bool] = False
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "center", frozen_array("center", self.center, (3,), at_most=LARGEST))
-        object.__setattr__(self, "radius", number("radius", self.radius, above=0.0, at_most=LARGEST))
+        self._settle(center=frozen_array("center", self.center, (3,), at_most=LARGEST))
+        self._settle(radius=number("radius", self.radius, above=0.0, at_most=LARGEST))
         for name in ("frequency", "climb", "start"):
-            object.__setattr__(self, name, signed(name, getattr(self, name)))
+            self._settle(**{name: signed(name, getattr(self, name))})
 
     def frames(self, times: FloatArray, model: Arm) -> FloatArray:
         """See :meth:`Trajectory.frames`."""

@@ -6,9 +6,7 @@ import dataclasses
 
 import numpy as np
 
-from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
-from ikgym.trajectories.sinusoid import frames_along
 from ikgym.trajectories.trajectory import Trajectory
 from ikgym.validation import LARGEST, SMALLEST, FloatArray, frozen_array, number
 
@@ -42,17 +40,13 @@ class JointSpline(Trajectory):
         ends = control[[1, 2, -2, -3]] - control[[0, 0, -1, -1]]
         if ends.any():
             raise InvalidInputError("control: expected the first three to be the same and the last three, for rest.")
-        object.__setattr__(self, "control", control)
-        object.__setattr__(self, "duration", number("duration", self.duration, at_least=SMALLEST, at_most=LARGEST))
+        self._settle(control=control)
+        self._settle(duration=number("duration", self.duration, at_least=SMALLEST, at_most=LARGEST))
 
     def joint_path(self, times: FloatArray) -> FloatArray:
         """See :meth:`Trajectory.joint_path`."""
         path: FloatArray = splines_at(self.control[None], times[None], self.duration)[0]
         return path
-
-    def frames(self, times: FloatArray, model: Arm) -> FloatArray:
-        """See :meth:`Trajectory.frames`."""
-        return frames_along(self.joint_path(times), model)
 
     def joint_bound(self) -> FloatArray:
         """See :meth:`Trajectory.joint_bound`."""

@@ -58,7 +58,7 @@ class FixedOrientation(Orientation):
     rotation: FloatArray
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "rotation", rotation_matrix("rotation", self.rotation))
+        self._settle(rotation=rotation_matrix("rotation", self.rotation))
 
     def rotations(self, path: Path, s: FloatArray) -> FloatArray:
         """See :meth:`Orientation.rotations`."""
@@ -84,8 +84,8 @@ class AlongPath(Orientation):
         approach = frozen_array("approach", self.approach, (3,), at_most=LARGEST)
         if not approach.any():
             raise InvalidInputError("approach: expected a direction, got the zero vector.")
-        object.__setattr__(self, "approach", approach)
-        object.__setattr__(self, "rotation", rotation_matrix("rotation", self.rotation))
+        self._settle(approach=approach)
+        self._settle(rotation=rotation_matrix("rotation", self.rotation))
 
     def check(self, path: Path) -> None:
         """See :meth:`Orientation.check`: the path may nowhere lead in the direction of the approach."""
@@ -127,8 +127,8 @@ class Turning(Orientation):
     vector: FloatArray
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "rotation", rotation_matrix("rotation", self.rotation))
-        object.__setattr__(self, "vector", frozen_array("vector", self.vector, (3,), at_most=LARGEST))
+        self._settle(rotation=rotation_matrix("rotation", self.rotation))
+        self._settle(vector=frozen_array("vector", self.vector, (3,), at_most=LARGEST))
 
     def rotations(self, path: Path, s: FloatArray) -> FloatArray:
         """See :meth:`Orientation.rotations`, with Rodrigues' formula."""
@@ -155,7 +155,7 @@ class OrientationThrough(Orientation):
     quaternions: FloatArray
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "quaternions", aligned_quaternions("quaternions", self.quaternions))
+        self._settle(quaternions=aligned_quaternions("quaternions", self.quaternions))
 
     def check(self, path: Path) -> None:
         """See :meth:`Orientation.check`: the path has as many waypoints."""

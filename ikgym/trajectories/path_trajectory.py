@@ -43,7 +43,7 @@ class PathTrajectory(Trajectory):
         self.time_law.time(self.path)
         if self.orientation is not None:
             self.orientation.check(self.path)
-        object.__setattr__(self, "has_orientation", self.orientation is not None)
+        self._settle(has_orientation=self.orientation is not None)
 
     @property
     def duration(self) -> float:

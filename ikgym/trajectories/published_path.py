@@ -37,7 +37,7 @@ class PublishedPath(Trajectory):
 
     def __post_init__(self) -> None:
         problems.waypoints(self.problem)
-        object.__setattr__(self, "period", number("period", self.period, at_least=SMALLEST, at_most=LARGEST))
+        self._settle(period=number("period", self.period, at_least=SMALLEST, at_most=LARGEST))
 
     @property
     def waypoints(self) -> problems.Waypoints:
@@ -86,20 +86,12 @@ class RandomPublishedPath(Trajectory):
                 f"family: expected the beginning of names of problems with starts, got {shortened(self.family)}; "
                 f"available: {', '.join(problems.names())}."
             )
-        object.__setattr__(self, "period", number("period", self.period, at_least=SMALLEST, at_most=LARGEST))
+        self._settle(period=number("period", self.period, at_least=SMALLEST, at_most=LARGEST))
 
     def sample(self, rng: np.random.Generator) -> PublishedPath:
         """See :meth:`Trajectory.sample`."""
         members = problems.names(self.family)
         return PublishedPath(members[rng.integers(len(members))], self.period)
-
-    def frames(self, times: FloatArray, model: Arm) -> FloatArray:
-        """A distribution has no path.
-
-        Raises:
-            InvalidInputError: Always; :meth:`sample` first.
-        """
-        raise InvalidInputError("A random trajectory has no path of its own: sample one first.")
 
     def first_joints_bound(self) -> FloatArray:
         """See :meth:`Trajectory.first_joints_bound`; true for all that may be drawn."""

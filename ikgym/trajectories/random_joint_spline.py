@@ -65,17 +65,16 @@ class RandomJointSpline(Trajectory):
         low, high = frozen_array("scale", self.scale, (2,)).tolist()
         if not 0.0 <= low <= high <= 1.0:
             raise InvalidInputError(f"scale: expected a range (low, high) within 0 and 1, got ({low:g}, {high:g}).")
-        for name, value in {
-            "lower": lower,
-            "upper": upper,
-            "velocity_limit": _positive("velocity_limit", self.velocity_limit, n),
-            "acceleration_limit": _positive("acceleration_limit", self.acceleration_limit, n),
-            "duration": number("duration", self.duration, at_least=SMALLEST, at_most=LARGEST),
-            "spans": whole_number("spans", self.spans, at_least=3),
-            "margin": number("margin", self.margin, at_least=0.0, at_most=0.99),
-            "scale": (low, high),
-        }.items():
-            object.__setattr__(self, name, value)
+        self._settle(
+            lower=lower,
+            upper=upper,
+            velocity_limit=_positive("velocity_limit", self.velocity_limit, n),
+            acceleration_limit=_positive("acceleration_limit", self.acceleration_limit, n),
+            duration=number("duration", self.duration, at_least=SMALLEST, at_most=LARGEST),
+            spans=whole_number("spans", self.spans, at_least=3),
+            margin=number("margin", self.margin, at_least=0.0, at_most=0.99),
+            scale=(low, high),
+        )
 
     @classmethod
     def within(cls, arm: Arm, duration: float, **parameters: typing.Any) -> Self:
@@ -110,14 +109,6 @@ class RandomJointSpline(Trajectory):
         drawn = np.array([rng.random((self.spans, n)) for rng in generators])
         controls = self._controls(drawn[:, 0], drawn[:, 1], 2.0 * drawn[:, 2:] - 1.0)
         return [JointSpline(control, self.duration) for control in controls]
-
-    def frames(self, times: FloatArray, model: Arm) -> FloatArray:
-        """A distribution has no path.
-
-        Raises:
-            InvalidInputError: Always; :meth:`sample` first.
-        """
-        raise InvalidInputError("A random trajectory has no path of its own: sample one first.")
 
     def joint_bound(self) -> FloatArray:
         """See :meth:`Trajectory.joint_bound`; true for all that may be drawn."""

@@ -7,7 +7,6 @@ import typing
 
 import numpy as np
 
-from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 from ikgym.trajectories.trajectory import Trajectory
 from ikgym.validation import LARGEST, FloatArray, frozen_array, number, per_joint
@@ -37,19 +36,15 @@ class Sinusoid(Trajectory):
     sigmoid: float | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "amplitude", frozen_array("amplitude", self.amplitude, (None,), at_most=LARGEST))
+        self._settle(amplitude=frozen_array("amplitude", self.amplitude, (None,), at_most=LARGEST))
         for name in ("frequency", "phase", "offset"):
-            object.__setattr__(self, name, per_joint(name, getattr(self, name), len(self.amplitude), at_most=LARGEST))
+            self._settle(**{name: per_joint(name, getattr(self, name), len(self.amplitude), at_most=LARGEST)})
         if self.sigmoid is not None:
-            object.__setattr__(self, "sigmoid", number("sigmoid", self.sigmoid, above=0.0, at_most=LARGEST))
+            self._settle(sigmoid=number("sigmoid", self.sigmoid, above=0.0, at_most=LARGEST))
 
     def joint_path(self, times: FloatArray) -> FloatArray:
         """See :meth:`Trajectory.joint_path`."""
         return waves(times[:, None], self.amplitude, self.frequency, self.phase, self.offset, self.sigmoid)
-
-    def frames(self, times: FloatArray, model: Arm) -> FloatArray:
-        """See :meth:`Trajectory.frames`."""
-        return frames_along(self.joint_path(times), model)
 
     def joint_bound(self) -> FloatArray:
         """See :meth:`Trajectory.joint_bound`."""
@@ -78,12 +73,12 @@ class RandomSinusoid(Trajectory):
     random: typing.ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "amplitude", frozen_array("amplitude", self.amplitude, (None,), at_most=LARGEST))
+        self._settle(amplitude=frozen_array("amplitude", self.amplitude, (None,), at_most=LARGEST))
         for name in ("scale", "frequency", "phase"):
             low, high = frozen_array(name, getattr(self, name), (2,), at_most=LARGEST).tolist()
             if low > high:
                 raise InvalidInputError(f"{name}: expected a range (low, high), got ({low:g}, {high:g}).")
-            object.__setattr__(self, name, (low, high))
+            self._settle(**{name: (low, high)})
         frozen_array("amplitude times scale", self.joint_bound(), at_most=LARGEST)
 
     def sample(self, rng: np.random.Generator) -> Sinusoid:
@@ -91,14 +86,6 @@ class RandomSinusoid(Trajectory):
         n = len(self.amplitude)
         scale, frequency, phase = (rng.uniform(*limits, n) for limits in (self.scale, self.frequency, self.phase))
         return Sinusoid(self.amplitude * scale, frequency, phase)
-
-    def frames(self, times: FloatArray, model: Arm) -> FloatArray:
-        """A distribution has no path.
-
-        Raises:
-            InvalidInputError: Always; :meth:`sample` first.
-        """
-        raise InvalidInputError("A random trajectory has no path of its own: sample one first.")
 
     def joint_bound(self) -> FloatArray:
         """See :meth:`Trajectory.joint_bound`; true for all that may be drawn."""
@@ -118,9 +105,3 @@ def waves(
     if sigmoid is not None:
         wave = sigmoid * wave / (1.0 + np.abs(wave))
     return wave + offset
-
-
-def frames_along(path: FloatArray, model: Arm) -> FloatArray:
-    """The poses that an arm takes along joint coordinates of shape (..., n)."""
-    rotations, positions = model.forward(path)
-    return np.concatenate([rotations.reshape(*path.shape[:-1], 9), positions], axis=-1)

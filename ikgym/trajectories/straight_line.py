@@ -39,9 +39,9 @@ class StraightLine(Trajectory):
         for name in ("start", "end"):
             frame = frozen_array(name, getattr(self, name), (12,), at_most=LARGEST)
             rotation_matrix(f"rotation of {name}", frame[:9].reshape(3, 3))
-            object.__setattr__(self, name, frame)
+            self._settle(**{name: frame})
         for name in ("duration", "blend"):
-            object.__setattr__(self, name, number(name, getattr(self, name), at_least=SMALLEST, at_most=LARGEST))
+            self._settle(**{name: number(name, getattr(self, name), at_least=SMALLEST, at_most=LARGEST)})
         if 2.0 * self.blend > self.duration:
             raise InvalidInputError(
                 f"blend: expected at most half of the duration of {self.duration:g} s, got {self.blend:g} s."

@@ -37,7 +37,7 @@ class TimeLaw(Frozen, abc.ABC):
         for name in ("speed", "acceleration", "duration"):
             value = getattr(self, name)
             if value is not None or name != "duration":
-                object.__setattr__(self, name, number(name, value, at_least=SMALLEST, at_most=LARGEST))
+                self._settle(**{name: number(name, value, at_least=SMALLEST, at_most=LARGEST)})
 
     def time(self, path: Path) -> float:
         """How long it takes, in [s].

@@ -48,13 +48,13 @@ class TimedWaypoints(Trajectory):
                 f"times: expected times that rise, got {times[i]:g} s and {times[i + 1]:g} s as numbers {i} and "
                 f"{i + 1}."
             )
-        object.__setattr__(self, "times", times)
+        self._settle(times=times)
         positions = frozen_array("positions", self.positions, (len(times), 3), at_most=LARGEST)
-        object.__setattr__(self, "positions", positions)
+        self._settle(positions=positions)
         if self.quaternions is not None:
             quaternions = frozen_array("quaternions", self.quaternions, (len(times), 4))
-            object.__setattr__(self, "quaternions", aligned_quaternions("quaternions", quaternions))
-        object.__setattr__(self, "has_orientation", self.quaternions is not None)
+            self._settle(quaternions=aligned_quaternions("quaternions", quaternions))
+        self._settle(has_orientation=self.quaternions is not None)
 
     def frames(self, times: FloatArray, model: Arm) -> FloatArray:
         """See :meth:`Trajectory.frames`."""

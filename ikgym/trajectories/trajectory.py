@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import abc
 import typing
 from collections.abc import Sequence
 
@@ -13,7 +12,7 @@ from ikgym.exceptions import InvalidInputError
 from ikgym.validation import FloatArray, Frozen
 
 
-class Trajectory(Frozen, abc.ABC):
+class Trajectory(Frozen):
     """Base of all trajectories."""
 
     #: Whether an episode's trajectory is drawn when it begins.
@@ -50,7 +49,6 @@ class Trajectory(Frozen, abc.ABC):
         del times
         return None
 
-    @abc.abstractmethod
     def frames(self, times: FloatArray, model: Arm) -> FloatArray:
         """The nominal poses.
 
@@ -61,7 +59,14 @@ class Trajectory(Frozen, abc.ABC):
         Returns:
             Per time the 9 numbers of the rotation, row by row, and the 3 of the position in [m]; the position
             alone where there is no orientation. Shape (k, 12) or (k, 3).
+
+        Raises:
+            InvalidInputError: The trajectory is random: :meth:`sample` draws one that has poses.
         """
+        path = self.joint_path(times)
+        if path is None:
+            raise InvalidInputError("A random trajectory has no path of its own: sample one first.")
+        return frames_along(path, model)
 
     def joint_bound(self) -> FloatArray | None:
         """Absolute joint coordinates that no nominal motion exceeds, in [rad] or [m]; None in Cartesian space.
@@ -101,7 +106,7 @@ class Trajectory(Frozen, abc.ABC):
         return float(np.linalg.norm(self.frames(times, model)[:, -3:], axis=1).max())
 
     def check(self, model: Arm) -> None:
-        """Insists that the trajectory suits an arm.
+        """Checks that the trajectory suits an arm.
 
         Raises:
             InvalidInputError: It has another number of joints.
@@ -111,3 +116,9 @@ class Trajectory(Frozen, abc.ABC):
             raise InvalidInputError(
                 f"Trajectory: expected {model.joints} joints, as arm {model.name!r} has, got {len(bound)}."
             )
+
+
+def frames_along(path: FloatArray, model: Arm) -> FloatArray:
+    """The poses that an arm takes along joint coordinates of shape (..., n)."""
+    rotations, positions = model.forward(path)
+    return np.concatenate([rotations.reshape(*path.shape[:-1], 9), positions], axis=-1)

@@ -27,7 +27,7 @@ class Line(Path):
 
     def __post_init__(self) -> None:
         for name in ("start", "end"):
-            object.__setattr__(self, name, frozen_array(name, getattr(self, name), (3,), at_most=LARGEST))
+            self._settle(**{name: frozen_array(name, getattr(self, name), (3,), at_most=LARGEST)})
         points_of("start and end", [self.start, self.end])
 
     @property

@@ -53,9 +53,9 @@ class Polyline(Path):
     corner_radius: float
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "points", points_of("points", self.points))
+        self._settle(points=points_of("points", self.points))
         radius = number("corner_radius", self.corner_radius, at_least=SMALLEST, at_most=LARGEST)
-        object.__setattr__(self, "corner_radius", radius)
+        self._settle(corner_radius=radius)
         self._check_corners()
 
     @property
@@ -164,9 +164,9 @@ class Square(Outline):
 
     def __post_init__(self) -> None:
         settle_placement(self)
-        object.__setattr__(self, "side", number("side", self.side, at_least=SMALLEST, at_most=LARGEST))
+        self._settle(side=number("side", self.side, at_least=SMALLEST, at_most=LARGEST))
         radius = number("corner_radius", self.corner_radius, at_least=SMALLEST, at_most=0.5 * self.side)
-        object.__setattr__(self, "corner_radius", radius)
+        self._settle(corner_radius=radius)
 
     @functools.cached_property
     def outline(self) -> Polyline:
@@ -201,12 +201,12 @@ class Raster(Outline):
 
     def __post_init__(self) -> None:
         settle_placement(self)
-        object.__setattr__(self, "lines", whole_number("lines", self.lines, at_least=2))
+        self._settle(lines=whole_number("lines", self.lines, at_least=2))
         for name in ("width", "height"):
-            object.__setattr__(self, name, number(name, getattr(self, name), at_least=SMALLEST, at_most=LARGEST))
+            self._settle(**{name: number(name, getattr(self, name), at_least=SMALLEST, at_most=LARGEST)})
         most = 0.5 * min(self.height / (self.lines - 1), self.width)
         radius = number("corner_radius", self.corner_radius, at_least=SMALLEST, at_most=most)
-        object.__setattr__(self, "corner_radius", radius)
+        self._settle(corner_radius=radius)
 
     @functools.cached_property
     def outline(self) -> Polyline:

@@ -37,8 +37,8 @@ class CircularHelix(Path):
     def __post_init__(self) -> None:
         settle_placement(self)
         for name in ("radius", "turns"):
-            object.__setattr__(self, name, number(name, getattr(self, name), at_least=SMALLEST, at_most=LARGEST))
-        object.__setattr__(self, "pitch", signed("pitch", self.pitch))
+            self._settle(**{name: number(name, getattr(self, name), at_least=SMALLEST, at_most=LARGEST)})
+        self._settle(pitch=signed("pitch", self.pitch))
 
     @property
     def length(self) -> float:
@@ -101,7 +101,7 @@ class Lemniscate(Path):
 
     def __post_init__(self) -> None:
         settle_placement(self)
-        object.__setattr__(self, "radius", number("radius", self.radius, at_least=SMALLEST, at_most=LARGEST))
+        self._settle(radius=number("radius", self.radius, at_least=SMALLEST, at_most=LARGEST))
 
     @property
     def length(self) -> float:

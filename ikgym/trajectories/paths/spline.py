@@ -33,7 +33,7 @@ class SplinePath(Path):
     points: FloatArray
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "points", points_of("points", self.points))
+        self._settle(points=points_of("points", self.points))
         speed = np.linalg.norm(self._spline(_refined(self._spline.knots, SAMPLES), 1), axis=1)
         if speed.min() < LEAST_SPEED:
             i = round(int(np.argmin(speed)) / SAMPLES)
