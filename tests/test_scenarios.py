@@ -13,7 +13,6 @@ from ikgym import compilation, parallel, scenarios
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 from ikgym.plant import Plant
 from ikgym.random_numbers import uniform as _uniform
-from ikgym.scenarios import Scenario
 from tests.every_scenario import every_scenario
 
 
@@ -134,25 +133,6 @@ def test_seed_ranges_are_disjoint_and_documented():
 def test_bad_scenarios(change, message):
     with pytest.raises(InvalidInputError, match=message):
         scenarios.get("varga7-fast").replace(**change)
-
-
-def test_a_bias_may_be_negative_but_no_matrix():
-    assert Plant(bias=-0.5).bias == -0.5
-    with pytest.raises(InvalidInputError, match="bias: expected a number or one a joint"):
-        Plant(bias=[[1.0]])
-
-
-def test_register_your_own(monkeypatch):
-    monkeypatch.setattr(scenarios._registry, "_makers", dict(scenarios._registry._makers))
-    monkeypatch.setattr(scenarios._registry, "_made", {})
-    scenarios.register("mine", lambda: scenarios.get("varga7-fast").replace(name="mine", steps=3))
-    assert isinstance(scenarios.get("mine"), Scenario)
-    assert ikgym.RedundantIKEnv("mine").scenario.steps == 3
-    scenarios.register("nothing", lambda: 3)
-    with pytest.raises(InvalidInputError, match="'nothing': expected its maker to give an object of Scenario, got 3"):
-        scenarios.get("nothing")
-    with pytest.raises(InvalidInputError, match="scenario 'mine' is registered already"):
-        scenarios.register("mine", lambda: scenarios.get("varga7-slow"))
 
 
 def test_disturbance_moves_the_arm_as_said():

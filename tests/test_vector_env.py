@@ -119,14 +119,6 @@ def test_rows_that_end_by_themselves_leave_what_held_them_back_to_the_final_info
         assert (got[4].get("at_limit", np.zeros((N, 3)))[got[3]] == 0).all()
 
 
-def test_mask_is_left_in_the_options_for_wrappers():
-    native, _ = pair(short("varga7-fast", 5), AutoresetMode.NEXT_STEP)
-    options = {"reset_mask": np.array([True, False, False])}
-    native.reset(seed=0)
-    native.reset(options=options)
-    assert list(options) == ["reset_mask"]
-
-
 def test_rows_count_and_threads_do_not_matter():
     """Beyond a few hundred rows the kernel runs in several threads."""
     scenario = noisy("varga7-random", 4)

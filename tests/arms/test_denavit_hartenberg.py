@@ -3,7 +3,7 @@ import pytest
 
 from ikgym import arms
 from ikgym.arms import from_dh
-from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.exceptions import InvalidInputError
 
 
 def rot(axis, angle):
@@ -90,21 +90,6 @@ def test_one_puma_in_both_conventions():
         np.testing.assert_allclose(standard, craig, rtol=0, atol=1e-14)
 
 
-def test_theta_is_where_the_coordinate_begins():
-    a, d, alpha, theta = [0.5, 0.4], [0.1, 0.2], [0.3, -0.6], np.array([0.7, -1.2])
-    plain, shifted = from_dh("plain", a, d, alpha), from_dh("shifted", a, d, alpha, theta)
-    q = np.random.default_rng(0).uniform(-np.pi, np.pi, (10, 2))
-    for one, other in zip(plain.forward(q + theta), shifted.forward(q), strict=True):
-        np.testing.assert_allclose(one, other, rtol=0, atol=1e-15)
-
-
-def test_limits_are_handed_on():
-    arm = from_dh("one", [1], [0], [0], lower=[-1], upper=[2], velocity_limit=[3], acceleration_limit=[4])
-    np.testing.assert_array_equal(
-        [arm.lower, arm.upper, arm.velocity_limit, arm.acceleration_limit], [[-1], [2], [3], [4]]
-    )
-
-
 @pytest.mark.parametrize(
     ("table", "message"),
     [
@@ -120,8 +105,3 @@ def test_limits_are_handed_on():
 def test_bad_tables_are_refused(table, message):
     with pytest.raises(InvalidInputError, match=message):
         from_dh("one", **({"a": [1], "d": [0], "alpha": [0]} | table))
-
-
-def test_an_unknown_convention_is_answered_with_the_nearest():
-    with pytest.raises(UnknownNameError, match=r"'modfied'\. Did you mean 'modified'"):
-        from_dh("one", [1], [0], [0], convention="modfied")

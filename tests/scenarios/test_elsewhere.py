@@ -49,19 +49,6 @@ def test_the_waypoints_are_met_at_their_steps_from_the_start_on(name):
         assert identical(first, starts[0])
 
 
-def test_limits_are_those_of_the_arms_but_for_accelerations():
-    for name, arm in (
-        ("rlitg-hello", "fetch_arm"),
-        ("cppflow-fetch-hello", "fetch"),
-        ("cppflow-panda-square", "panda"),
-    ):
-        scenario, known = scenarios.get(name), ikgym.arms.get(arm)
-        for limit in ("lower", "upper", "velocity_limit"):
-            assert identical(getattr(scenario.arm, limit), getattr(known, limit))
-        assert np.isinf(scenario.arm.acceleration_limit).all()
-        assert identical(scenario.velocity_limit, known.velocity_limit)
-
-
 def test_the_panda_ends_at_its_hand():
     """`panda_hand` stands on the flange, turned by -45° about its z axis (franka_description)."""
     flange, hand = ikgym.arms.get("panda"), scenarios.get("cppflow-panda-square").arm
@@ -89,31 +76,6 @@ def test_shorter_random_paths_end_at_rest():
     frames = trajectory.frames(RANDOM.times(RANDOM.steps + 1), RANDOM.model)
     assert not np.diff(frames[waypoint_steps(379)[-1] :], axis=0).any()
     assert np.diff(frames[: waypoint_steps(379)[-1]], axis=0).any(axis=1).all()
-
-
-def test_single_and_vector_environments_agree_on_random_paths():
-    rows, steps = 3, 12
-    short = RANDOM.replace(steps=steps)
-    native = gym.make_vec("RedundantIK-v0", num_envs=rows, scenario=short, preview=2)
-    single = [gym.make("RedundantIK-v0", scenario=short, preview=2) for _ in range(rows)]
-    batch = native.reset(seed=5)[0]
-    alone = [env.reset(seed=5 + i)[0] for i, env in enumerate(single)]
-    rng = np.random.default_rng(0)
-    for _ in range(steps - 1):
-        for i in range(rows):
-            assert all(identical(batch[key][i], alone[i][key]) for key in batch)
-        actions = rng.uniform(-1, 1, (rows, 7)).astype(np.float32)
-        batch = native.step(actions)[0]
-        alone = [env.step(action)[0] for env, action in zip(single, actions, strict=True)]
-
-
-@pytest.mark.parametrize("name", ["rlitg-zig", "cppflow-panda-square", "rlitg-random"])
-def test_they_survive_their_files(name, tmp_path):
-    scenario = scenarios.get(name)
-    scenario.save(tmp_path / "x.toml")
-    assert (tmp_path / "x.toml").stat().st_size < 4000, "the waypoints stand in no file of a scenario"
-    read = scenarios.load(tmp_path / "x.toml").replace(steps=50)
-    assert identical(read.nominal(2), scenario.replace(steps=50).nominal(2))
 
 
 def test_what_is_out_of_reach():

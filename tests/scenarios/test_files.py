@@ -248,6 +248,17 @@ def test_an_arm_of_your_own_is_written_in_numbers_though_it_has_a_name_of_ours(t
     assert tomllib.loads((tmp_path / "y.toml").read_text())["arm"] == "varga7"
 
 
+def test_names_of_joints_are_kept_but_no_part_of_the_digest(tmp_path):
+    scenario = scenarios.get("planar2-bent")
+    plain = scenario.replace(arm=scenario.arm.replace(name="leg"))
+    named = scenario.replace(arm=scenario.arm.replace(name="leg", joint_names=("hip", "knee")))
+    for one, there in ((plain, False), (named, True)):
+        one.save(tmp_path / "x.toml")
+        assert ("joint_names" in (tmp_path / "x.toml").read_text(encoding="utf-8")) is there
+        assert load(tmp_path / "x.toml").arm.joint_names == one.arm.joint_names
+    assert fingerprint(plain) == fingerprint(named)
+
+
 # What no file can hold.
 
 

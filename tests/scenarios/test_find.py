@@ -70,11 +70,6 @@ def test_find(folder, item):
     assert sys.path == before
 
 
-def test_a_scenario_is_found_as_it_is():
-    assert scenarios.find(FAST) is FAST
-    assert scenarios.find("varga7-fast") is FAST
-
-
 def test_registered_names_take_precedence(folder, registry):
     scenarios.register("short.toml", lambda: FAST)
     scenarios.register("my_scenarios:SHORT", lambda: FAST)
@@ -111,36 +106,3 @@ def test_all_that_takes_a_scenario_finds_it(folder, item):
     policy = baselines.make("dls", item)
     observation, _ = ikgym.RedundantIKEnv(item, policy.preview).reset()
     assert policy.predict(observation)[0].shape == (7,)
-
-
-def test_a_scenario_is_registered_under_its_name(registry):
-    mine = FAST.replace(name="mine", steps=3)
-    scenarios.register(mine)
-    assert scenarios.get("mine") is mine
-    assert "mine" in scenarios.names()
-    with pytest.raises(InvalidInputError, match="scenario 'mine' is registered already"):
-        scenarios.register(mine)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (("new",), "The scenario 'new': expected a function without arguments that makes it, got None"),
-        (("new", 3), "The scenario 'new': expected a function without arguments that makes it, got 3"),
-        ((3, lambda: FAST), "scenario: expected a text as its name, got 3"),
-        ((None,), "scenario: expected a text as its name, got None"),
-        ((" ", lambda: FAST), "scenario: expected a text as its name, got ' '"),
-        ((FAST.replace(name=""),), "scenario: expected a text as its name, got ''"),
-        ((FAST.replace(name="new"), lambda: FAST), "make: expected none beside the scenario 'new', got <function"),
-    ],
-)
-def test_bad_registrations_are_refused(arguments, message, registry):
-    before = scenarios.names()
-    with pytest.raises(InvalidInputError, match=message):
-        scenarios.register(*arguments)
-    assert scenarios.names() == before
-
-
-def test_arms_are_registered_with_the_same_checks():
-    with pytest.raises(InvalidInputError, match="The arm 'new': expected a function without arguments"):
-        ikgym.arms.register("new", ikgym.arms.get("varga7"))

@@ -43,18 +43,6 @@ def test_the_arm_begins_at_the_first_pose_within_its_limits(task):
     np.testing.assert_array_equal(rows["q"], [q] * 3)
 
 
-def test_another_path_has_another_start():
-    one = scenario()
-    assert one.start is None
-    other = one.replace(trajectory=line(begin=(0.4, 0.1, 0.3)))
-    assert abs(other.first_q(other.trajectory) - one.first_q(one.trajectory)).max() > 0.1
-
-
-def test_a_start_that_is_given_is_kept():
-    one = scenario(start=PANDA.home)
-    np.testing.assert_array_equal(one.first_q(one.trajectory), PANDA.home)
-
-
 def test_a_file_leaves_the_start_out(tmp_path):
     one, file = scenario(), tmp_path / "x.toml"
     one.save(file)

@@ -127,15 +127,10 @@ def test_only_with_an_orientation_is_there_one():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: Quintic(0.0, 1.0), "speed: expected a finite number"),
-        (lambda: Quintic(1.0, None), "acceleration: expected a finite number"),
         (
             lambda: PathTrajectory(LINE, Trapezoidal(0.5, 2.0, 2.0)),
             "duration: expected at least 2.25 s for a path",
         ),
-        (lambda: PathTrajectory("line", Quintic(1, 1)), "path: expected a Path, got 'line'"),
-        (lambda: PathTrajectory(LINE, None), "time_law: expected a TimeLaw, got None"),
-        (lambda: PathTrajectory(LINE, Quintic(1, 1), DOWN), "orientation: expected a Orientation, got array"),
         (lambda: AlongPath([0, 0, 0]), "approach: expected a direction, got the zero vector"),
         (
             lambda: PathTrajectory(Circle([0, 0, 0], 1.0), Quintic(1, 1), AlongPath([1, 0, 0])),

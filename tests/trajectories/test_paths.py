@@ -111,8 +111,6 @@ def test_points_in_a_line_have_no_corners():
     ("make", "message"),
     [
         (lambda: SplinePath([[0, 0, 0]]), "points: expected at least 2 points, got 1"),
-        (lambda: SplinePath([[0, 0, 0], [1, 0, np.nan]]), "points: expected finite numbers"),
-        (lambda: SplinePath([[0, 0], [1, 0]]), r"points: expected shape \(any, 3\), got \(2, 2\)"),
         (lambda: SplinePath([[1, 0, 0], [0, 0, 0], [0, 0, 0]]), "at least 1e-09 m apart, got .* as numbers 1 and 2"),
         (
             lambda: SplinePath([[0, 0, 0], [1, 0, 0], [0, 0, 0]]),
@@ -122,9 +120,6 @@ def test_points_in_a_line_have_no_corners():
         (lambda: Polyline([[0, 0, 0], [1, 0, 0], [0, 0, 0]], 0.1), "no corner that turns straight back, got one at nu"),
         (lambda: Polyline([[0, 0, 0], [1, 0, 0], [1, 1, 0]], 2.0), "at most 1 m, .* number 0 and 1, got 2 m"),
         (lambda: Polyline([[0, 0, 0], [1, 0, 0], [1, 1, 0]], 0.0), "corner_radius: expected a finite number of|from"),
-        (lambda: Circle(CENTER, -1.0), "radius: expected a finite number"),
-        (lambda: Circle([0, 0], 1.0), r"center: expected shape \(3,\)"),
-        (lambda: Circle(CENTER, 1.0, rotation=np.ones((3, 3))), "rotation: expected a rotation matrix"),
         (lambda: Square(CENTER, 0.1, 0.06), "corner_radius: expected a finite number from 1e-12 to 0.05, got 0.06"),
         (lambda: Raster(CENTER, 1.0, 1.0, 1, 0.1), "lines: expected a whole number of at least 2, got 1"),
         (lambda: Raster(CENTER, 1.0, 0.3, 4, 0.1), "corner_radius: expected a finite number from 1e-12 to 0.05"),
