@@ -9,8 +9,7 @@ import numpy as np
 import torch
 from torch import nn
 
-from baselines import evaluate
-from baselines.datasets.dataset import planned, write
+from baselines import datasets, evaluate
 
 SCENARIO, EXPERT = "panda-random", "dls:damping=1e-2"
 
@@ -48,7 +47,7 @@ class Clone:
 def recorded(episodes):
     """What the expert saw in its episodes on training seeds, and what it did."""
     with tempfile.TemporaryDirectory() as folder:
-        write(planned(SCENARIO, EXPERT, episodes=episodes), Path(folder) / "expert-v0")
+        datasets.write(SCENARIO, EXPERT, Path(folder) / "expert-v0", episodes=episodes)
         data = list(minari.MinariDataset(Path(folder) / "expert-v0" / "data"))
     seen = np.concatenate([features(episode.observations)[:-1] for episode in data])
     return torch.from_numpy(seen), torch.from_numpy(np.concatenate([episode.actions for episode in data]))

@@ -1,9 +1,12 @@
-"""Files that are written in one go."""
+"""Files: written in one go; those of users read with bounds."""
 
 from __future__ import annotations
 
 import os
 import pathlib
+import stat
+
+from ikgym.exceptions import InvalidInputError
 
 
 def write(file: pathlib.Path, content: bytes) -> None:
@@ -28,3 +31,28 @@ def write(file: pathlib.Path, content: bytes) -> None:
     except BaseException:
         draft.unlink(missing_ok=True)
         raise
+
+
+def read_user_file(file: str | pathlib.Path, most: int = 2**28) -> bytes:
+    """All bytes of a file that a user names.
+
+    Args:
+        file: The file.
+        most: Bytes that it may have.
+
+    Raises:
+        InvalidInputError: It does not exist, is not a regular file, is larger, or cannot be read.
+    """
+    try:
+        # A pipe would wait for its writer.
+        with os.fdopen(os.open(file, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0)), "rb") as stream:
+            about = os.fstat(stream.fileno())
+            if not stat.S_ISREG(about.st_mode):
+                raise InvalidInputError(f"Cannot read {file}: expected a regular file.")
+            if about.st_size > most:
+                raise InvalidInputError(f"Cannot read {file}: expected at most {most} bytes, got {about.st_size}.")
+            return stream.read(most)
+    except InvalidInputError:
+        raise
+    except (OSError, ValueError) as e:  # such as a path with a null byte
+        raise InvalidInputError(f"Cannot read {file}: {getattr(e, 'strerror', None) or e}.") from None

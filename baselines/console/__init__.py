@@ -19,8 +19,8 @@ from ikgym.exceptions import UnknownNameError
 COMMANDS = {
     "evaluate": ("play policies on scenarios: table, files and plots", "baselines.evaluate"),
     "train": ("train an agent", "baselines.training.command"),
-    "tune": ("search settings of solvers", "baselines.tuning.command"),
-    "dataset": ("write episodes as a data set of Minari", "baselines.datasets.command"),
+    "tune": ("search settings of solvers", "baselines.tune"),
+    "dataset": ("write episodes as a data set of Minari", "baselines.dataset"),
     "reproduce": ("draw the figures of the papers again, and test their claims", "baselines.reproduce"),
     "leaderboard": ("compare agents and solvers on the test sets", "baselines.leaderboard"),
     "robustness": ("map what imperfect plants cost policies", "baselines.robustness"),

@@ -1,0 +1,76 @@
+"""The command line of ``ikgym dataset``."""
+
+from __future__ import annotations
+
+import dataclasses
+import pathlib
+import sys
+from collections.abc import Sequence
+from typing import Annotated
+
+import tyro
+
+from baselines import command
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Options:
+    """Options of the command."""
+
+    scenario: Annotated[str, tyro.conf.arg(metavar="NAME")]
+    """A scenario: its name, FILE.toml, or MODULE:ATTRIBUTE."""
+    policy: Annotated[str, tyro.conf.arg(metavar="POLICY")]
+    """A policy as NAME or NAME:PARAMETER=VALUE,…, agent:PATH for an agent in a file, or MODULE:CLASS."""
+    episodes: Annotated[int, tyro.conf.arg(metavar="N")]
+    """Number of episodes, the first seeds of the split. A scenario that is the same at every reset has one."""
+    out: Annotated[pathlib.Path, tyro.conf.arg(metavar="DIR")]
+    """Folder of the data set. Minari knows the data set by its name, which ends with a version, such as dls-v0."""
+    split: Annotated[str, tyro.conf.arg(metavar="NAME")] = "train"
+    """Seeds of random scenarios: train, validation or test. Scores of agents that learn from test are void."""
+    preview: Annotated[int | None, tyro.conf.arg(metavar="P")] = None
+    """Steps ahead that the policy is shown; its own preview if left out."""
+    resume: bool = False
+    """Continue with the data set in the folder."""
+    overwrite: bool = False
+    """Replace the data set in the folder."""
+
+
+def manual(prog: str) -> str:
+    """The text of ``--help`` above the options."""
+    return f"""\
+Plays episodes and writes them as a data set of Minari: observations, actions, rewards and infos, with the seed and the
+cost of each episode, and the scenario, the policy and the versions that they come from.
+
+Example:
+  {prog} --scenario varga7-random --policy dls:damping=1e-2 --episodes 100 --out datasets/dls-v0
+
+In Python, with MINARI_DATASETS_PATH=datasets:
+  minari.load_dataset("dls-v0")
+
+DIR/data appears in one go when all episodes are written."""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """The command line.
+
+    Args:
+        arguments: The arguments of the command; taken from the process if left out.
+
+    Returns:
+        The exit code: 0, 2 after an expected error, 130 after Ctrl-C.
+    """
+    program = command.program("dataset", "python -m baselines.dataset")
+    return command.run_resumable(Options, arguments, program, manual, _work)
+
+
+def _work(options: Options, _: str) -> None:
+    from baselines import datasets  # imports Minari, an extra
+
+    command.find_own_modules()
+    datasets.write(**{field.name: getattr(options, field.name) for field in dataclasses.fields(options)}, progress=True)
+    folder = options.out.resolve()
+    print(f'{options.out}: MINARI_DATASETS_PATH={options.out.parent}, minari.load_dataset("{folder.name}")')
+
+
+if __name__ == "__main__":
+    sys.exit(main())

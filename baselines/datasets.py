@@ -1,0 +1,181 @@
+"""Episodes of a policy as a data set of Minari: ``ikgym dataset``."""
+
+from __future__ import annotations
+
+import contextlib
+import pathlib
+import shutil
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+import gymnasium as gym
+import h5py  # noqa: F401  # Minari's own message does not say which extra installs it
+import minari
+import numpy as np
+from minari.data_collector import EpisodeBuffer
+from minari.dataset.minari_dataset import parse_dataset_id
+from minari.dataset.minari_storage import MinariStorage
+from tqdm import tqdm
+
+from baselines.episodes import add_up
+from baselines.evaluation.entrants import AnyPolicy
+from baselines.evaluation.machine import describe
+from baselines.evaluation.plan import Job, make_plan
+from baselines.files import ResultsError, locked, resumed, write_json
+from baselines.fingerprints import fingerprint
+from ikgym import scenarios
+from ikgym.env import RedundantIKEnv
+from ikgym.exceptions import InvalidInputError
+from ikgym.scenarios import Preview, Scenario
+
+#: Episodes that are written together; they are lost if the process is killed before.
+BLOCK = 16
+
+
+def write(
+    scenario: str | Scenario,
+    policy: AnyPolicy,
+    out: pathlib.Path,
+    *,
+    episodes: int,
+    split: str = "train",
+    preview: Preview | None = None,
+    resume: bool = False,
+    overwrite: bool = False,
+    progress: bool = False,
+) -> None:
+    """Plays episodes and writes them as a data set; a folder with a data set in it has all of its episodes.
+
+    Args:
+        scenario: The scenario, as :func:`ikgym.scenarios.find` takes it.
+        policy: The policy, as :func:`baselines.evaluate.evaluate` takes it.
+        out: The folder. Minari knows the data set by its name, such as ``dls-v0``.
+        episodes: Number of episodes, the first seeds of the split.
+        split: The split, see :data:`ikgym.scenarios.SPLITS`.
+        preview: Steps ahead that the policy is shown; its own preview if left out.
+        resume: Whether to continue with the data set in the folder.
+        overwrite: Whether to replace it.
+        progress: Whether to show a progress bar on stderr.
+
+    Raises:
+        UnknownNameError: There is no such scenario, policy, parameter or split.
+        InvalidInputError: A value is out of range, the policy does not suit the scenario, its episodes do not differ or
+            depend on each other, or Minari does not accept the name of the folder.
+        ResultsError: The folder cannot be written, or holds another data set.
+    """
+    name, jobs = out.resolve().name, _jobs(scenario, policy, episodes, split, preview)
+    try:
+        parse_dataset_id(name)
+    except (ValueError, TypeError):
+        raise InvalidInputError(f"out: expected a name with a version, such as dls-v0; got {name!r}.") from None
+    first = jobs[0]
+    about = {
+        "scenario": first.scenario.name,
+        "fingerprint": first.fingerprint,
+        "policy": first.policy,
+        "parameters": dict(first.parameters),
+        "split": split,
+        "episodes": episodes,
+        "preview": list(first.preview) if isinstance(first.preview, Sequence) else first.preview,
+        "versions": {package: describe()[package] for package in ("ikgym", "python", "numpy", "numba")},
+    }
+    blocks, draft, data = out / "blocks", out / ".draft", out / "data"
+    with locked(out):
+        there = resumed(out / "dataset.json", about, resume=resume, overwrite=overwrite)
+        if there is None and data.exists() and not overwrite:
+            raise ResultsError(f"{out}: expected an empty folder, or that of a data set of ikgym.")
+        for stale in [draft, *([blocks, data] if there is None else [])]:
+            shutil.rmtree(stale, ignore_errors=True)
+        write_json(out / "dataset.json", about)
+        if data.exists():
+            return
+        with tqdm(total=episodes, disable=not progress, file=sys.stderr, unit="episode", dynamic_ncols=True) as bar:
+            for number in range(0, episodes, BLOCK):
+                block = blocks / f"{number:06}"
+                if not block.exists():
+                    _record(jobs[number : number + BLOCK], draft)
+                    block.parent.mkdir(exist_ok=True)
+                    draft.rename(block)
+                bar.update(min(BLOCK, episodes - number))
+        whole = _storage(_environment(first), draft)
+        for block in sorted(blocks.iterdir()):
+            whole.update_from_storage(MinariStorage.read(block))
+        # Minari loses the seeds when it copies episodes.
+        seeds = [{"seed": job.seed} for job in jobs]
+        whole.update_episode_metadata([a | b for a, b in zip(seeds, whole.apply(_costs), strict=True)])
+        text = ",".join(f"{key}={value!r}" for key, value in first.parameters.items())
+        whole.update_metadata(
+            {
+                "dataset_id": name,
+                "minari_version": minari.__version__,
+                "algorithm_name": f"{first.policy}:{text}".rstrip(":"),
+                "description": f"{episodes} episodes of {first.policy} in {first.scenario.name}.",
+                "ikgym": {**about, "machine": describe()},
+            }
+        )
+        if "env_spec" not in whole.metadata:
+            with contextlib.suppress(InvalidInputError):  # a trajectory of the user's own class, which no file can hold
+                first.scenario.save(out / "scenario.toml")
+        draft.rename(data)
+        shutil.rmtree(blocks)
+
+
+def _jobs(
+    scenario: str | Scenario, policy: AnyPolicy, episodes: int, split: str, preview: Preview | None
+) -> tuple[Job, ...]:
+    if policy == "all" or scenario == "all":
+        raise InvalidInputError("A data set is of one policy in one scenario, got all of them.")
+    jobs = make_plan([scenario], [policy], episodes=episodes, split=split, preview=preview).jobs
+    if len(jobs) < episodes or any(job.before for job in jobs):
+        raise InvalidInputError(
+            f"{jobs[0].scenario.name}: expected a scenario with {episodes} different and independent episodes."
+        )
+    return jobs
+
+
+def _environment(job: Job) -> gym.Env[Any, Any]:
+    options: dict[str, Any] = {"preview": job.preview, "commands": job.make().commands}
+    name = job.scenario.name
+    if name in scenarios.names() and fingerprint(scenarios.get(name)) == job.fingerprint:
+        return gym.make("ikgym:RedundantIK-v0", scenario=name, **options)  # Minari can make it again
+    return RedundantIKEnv(job.scenario, **options)
+
+
+def _storage(env: gym.Env[Any, Any], folder: pathlib.Path) -> MinariStorage:
+    spaces = {"observation_space": env.observation_space, "action_space": env.action_space}
+    return MinariStorage.new(folder.absolute(), env_spec=env.spec, **spaces)
+
+
+def _record(jobs: Sequence[Job], folder: pathlib.Path) -> None:
+    """Plays episodes and writes them into a folder."""
+    env = _environment(jobs[0])
+    _storage(env, folder).update_episodes(_episode(env, job) for job in jobs)
+
+
+def _episode(env: gym.Env[Any, Any], job: Job) -> EpisodeBuffer:
+    """Plays an episode. Minari's own collector would need jax."""
+    policy, state, ended = job.make(), None, False
+    observations, infos = [env.reset(seed=job.seed)[0]], list[dict[str, Any]]()
+    actions, rewards = list[Any](), list[float]()
+    while not ended:
+        action, state = policy.predict(observations[-1], state, np.array([not actions]))
+        seen, reward, _, ended, info = env.step(action)
+        observations.append(seen)
+        actions.append(np.clip(action, -1.0, 1.0))  # as it was applied
+        rewards.append(float(reward))
+        infos.append(info)
+    return EpisodeBuffer(
+        seed=job.seed,
+        observations={key: np.array([one[key] for one in observations]) for key in observations[0]},
+        actions=np.array(actions),
+        rewards=np.array(rewards),
+        infos={key: np.array([one[key] for one in infos]) for key in infos[0]},
+        terminations=np.zeros(len(actions), dtype=np.bool_),
+        truncations=np.arange(len(actions)) == len(actions) - 1,
+    )
+
+
+def _costs(episode: dict[str, Any]) -> dict[str, float]:
+    costs = {name: float(add_up(episode["infos"][name])) for name in ("tracking_cost", "velocity_cost")}
+    return {"total_cost": float(add_up(-episode["rewards"])), **costs}
