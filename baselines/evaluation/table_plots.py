@@ -10,6 +10,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter, NullLocator
 
 from baselines.evaluation.plots import style
@@ -108,18 +109,19 @@ def severity_map(lines: Sequence[Record]) -> Figure:
     down = -(-len(policies) // across)
     drawn = style.figure(3.4 * down + 0.4, 3.8 * across + 0.8)
     panels = drawn.subplots(down, across, squeeze=False).ravel()
-    shade = None
-    for axes, policy in zip(panels, policies, strict=False):
-        shade = _severities(axes, policy, [line for line in lines if line["policy"] == policy])
+    shades = [
+        _severities(axes, policy, [line for line in lines if line["policy"] == policy])
+        for axes, policy in zip(panels, policies, strict=False)
+    ]
     for axes in panels[len(policies) :]:
         axes.set_visible(False)
-    bar = drawn.colorbar(shade, ax=panels.tolist(), shrink=0.7, extend="max")
+    bar = drawn.colorbar(shades[0], ax=panels.tolist(), shrink=0.7, extend="max")
     bar.set_label("cost ratio", fontsize=style.SMALL)
     bar.ax.tick_params(labelsize=style.SMALL)
     return drawn
 
 
-def _severities(axes: Axes, policy: str, lines: Sequence[Record]) -> object:
+def _severities(axes: Axes, policy: str, lines: Sequence[Record]) -> AxesImage:
     knowledge, drives = (sorted({float(line[name]) for line in lines}) for name in ("knowledge", "drives"))
     ratios = np.full((len(drives), len(knowledge)), np.nan)
     for line in lines:
