@@ -90,6 +90,12 @@ class RedundantIKVecEnv(VecEnv):
         self._made = time.perf_counter()
         super().__init__(envs.num_envs, envs.single_observation_space, envs.single_action_space)
 
+    @property
+    def preview(self) -> tuple[int, ...]:
+        """The steps ahead at which the nominal coordinates are shown."""
+        ahead: tuple[int, ...] = self._envs.unwrapped.preview
+        return ahead
+
     def reset(self) -> Observation:
         """Begins episodes in all rows, with what `seed()` and `set_options()` have left for this reset.
 

@@ -15,13 +15,11 @@ import pytest
 import baselines
 import ikgym
 from baselines import console, registry
-from baselines.agents.features import Processing
 from baselines.console import main
 from baselines.evaluate import evaluate
 from baselines.oracle import best_known
 from baselines.oracle.best_known import beaten
 from baselines.papers import PAPERS
-from baselines.policy import Problem
 from docs.paper_pages import CAPTIONS, figures_in, picture
 from docs.tables import PAGES, filled
 from docs.terminal import manual_of
@@ -90,26 +88,12 @@ def test_scenarios_snippets_run(tmp_path, monkeypatch):
     assert ikgym.scenarios.load("mine.toml").steps == names["scenario"].steps
 
 
-class Features(gym.Env):
-    """Spaces of what the page on agents takes a model to have been trained on."""
-
-    observation_space = gym.spaces.Box(
-        -np.inf,
-        np.inf,
-        (Processing((1, 2, 10, 30, 60, 120)).size(Problem.of(ikgym.scenarios.get("varga7-random"))),),
-        np.float32,
-    )
-    action_space = gym.spaces.Box(-1.0, 1.0, (7,), np.float32)
-
-
 @pytest.mark.slow
-def test_the_snippet_on_agents_converts_a_zip(tmp_path, monkeypatch):
-    ppo = pytest.importorskip("stable_baselines3").PPO
+def test_snippets_on_agents_run(tmp_path, monkeypatch):
+    pytest.importorskip("stable_baselines3")
     monkeypatch.chdir(tmp_path)
-    ppo("MlpPolicy", Features(), device="cpu").save("model.zip")
-    (snippet,) = [snippet for snippet in snippets_of("agents.md") if "model.zip" in snippet]
-    exec(snippet, {})
-    assert (tmp_path / "agent.safetensors").stat().st_size > 1000
+    for snippet in snippets_of("agents.md"):
+        exec(snippet, {})
 
 
 @pytest.mark.parametrize("paper", PAPERS)
@@ -122,7 +106,7 @@ def test_snippets_on_papers_run(paper, capsys):
 
 
 def test_no_page_has_snippets_that_nobody_runs():
-    here = {"README.md", "evaluation.md", "policies.md", "scenarios.md", "agents.md", "agents_rewards.md"}
+    here = {"README.md", "evaluation.md", "policies.md", "scenarios.md", "agents.md"}
     run = {ROOT / "README.md", *TUTORIALS, *(PAGES / name for name in here), *(PAGES / "papers").glob("*.md")}
     with_snippets = {page for page in PROSE if "```python" in page.read_text(encoding="utf-8")}
     assert with_snippets <= run

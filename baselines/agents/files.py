@@ -1,28 +1,21 @@
-"""The file of an agent: tensors, and one JSON text that says what they mean. Reading one runs nothing in it."""
+"""The file of an agent: tensors, and a JSON text that describes them. Reading one executes nothing in it."""
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
-import itertools
 import json
 import pathlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
-import numpy as np
 from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
 import ikgym
-from baselines.agents.base_policy import check_base_policy
-from baselines.agents.bilinear.processing import Bilinear
-from baselines.agents.features import Processing
-from baselines.agents.network import Network, Singles
-from baselines.agents.protocols import AgentFile, Described, StoredTransform
-from baselines.agents.relative.processing import Relative
-from baselines.agents.untrusted import parse_json, read, refuse
+from baselines.agents.processing import NetworkLike, Processing
 from baselines.canonical import canonical
-from baselines.files import write
+from baselines.files import ResultsError, read_bytes, write
 from baselines.fingerprints import arm_fingerprint, fingerprint
 from ikgym import cost_kernels
 from ikgym.exceptions import InvalidInputError, UnknownNameError
@@ -30,68 +23,60 @@ from ikgym.scenarios import Scenario
 
 #: The version of the format.
 FORMAT: Final = 2
-#: The ikgym that reads a format of before.
-READERS: Final = {1: "0.1.0"}
 #: The key of the JSON text in the metadata of the file.
 KEY: Final = "ikgym"
-#: Most bytes of a header.
-MOST_HEADER = 2**20
+#: Largest size of a file in bytes.
+MOST = 2**28
+#: Digits of a hash that identify an agent in results.
+DIGITS = 12
+#: The texts and numbers that every file holds.
+_PARTS: Final = {
+    "scenario": ("name", "fingerprint"),
+    "arm": ("name", "fingerprint"),
+    "task": ("name", "size", "error_size"),
+}
 
-#: What is raised by descriptions that are JSON, and no more.
-UNREADABLE = (InvalidInputError, UnknownNameError, KeyError, TypeError, ValueError, OverflowError)
 
-
-def save_agent(
-    file: pathlib.Path,
-    network: Network,
-    processing: StoredTransform,
-    scenario: Scenario,
-    training: Mapping[str, Any] | None = None,
-) -> str:
-    """Writes an agent, in one go.
+@dataclasses.dataclass(frozen=True, eq=False)
+class AgentFile:
+    """An agent, read from a file or in memory.
 
     Args:
-        file: Where to; usually ``NAME.safetensors``.
+        source: The file, as messages name it.
         network: Its network.
-        processing: What it sees, and what its outputs mean.
-        scenario: What it was trained on.
-        training: How, in whatever JSON can say.
-
-    Returns:
-        Its hash, see :class:`AgentFile`.
-
-    Raises:
-        InvalidInputError: `training` is no JSON.
-        ResultsError: The file cannot be written.
+        processing: What the network sees, and what its outputs mean.
+        about: The description in the file: where and how the agent was trained.
+        hash: SHA-256 of the description and the tensors, in 64 hexadecimal digits.
     """
-    tensors = _tensors(network)
-    about = {
-        **description(processing, scenario, training),
-        "network": {"sizes": list(network.sizes), "activation": network.activation, "squash": network.squash},
-    }
-    return write_file(file, tensors, about)
+
+    source: str
+    network: NetworkLike
+    processing: Processing
+    about: Mapping[str, Any]
+    hash: str
+
+    @property
+    def digits(self) -> str:
+        """The first digits of the hash, which identify the agent in results."""
+        return self.hash[:DIGITS]
 
 
-def write_file(file: pathlib.Path, tensors: list[tuple[str, Singles]], about: Mapping[str, Any]) -> str:
-    """Writes tensors and what they mean, in one go.
+def agent_of(
+    network: NetworkLike,
+    processing: Processing,
+    scenario: Scenario,
+    training: Mapping[str, Any] | None = None,
+) -> AgentFile:
+    """An agent in memory.
 
-    Returns:
-        Their hash.
+    Args:
+        network: Its network.
+        processing: What the network sees, and what its outputs mean.
+        scenario: The scenario of its training.
+        training: How it was trained, as JSON values.
 
     Raises:
-        ResultsError: The file cannot be written.
-    """
-    found = digest(tensors, about)
-    metadata = {KEY: json.dumps({**about, "hash": found}, ensure_ascii=False, allow_nan=False)}
-    write(file, save(dict(tensors), metadata))
-    return found
-
-
-def description(processing: Described, scenario: Scenario, training: Mapping[str, Any] | None) -> dict[str, Any]:
-    """What files say of an agent besides its network, as JSON has it.
-
-    Raises:
-        InvalidInputError: `training` is no JSON.
+        InvalidInputError: `training` cannot be written as JSON.
     """
     about = {
         "format": FORMAT,
@@ -103,169 +88,82 @@ def description(processing: Described, scenario: Scenario, training: Mapping[str
         "training": dict(training or {}),
         "ikgym": ikgym.__version__,
         "cost_version": cost_kernels.COST_VERSION,
+        "network": network.to_json(),
     }
     try:
-        same = json.loads(json.dumps(about, allow_nan=False))
+        about = json.loads(json.dumps(about, allow_nan=False))
     except (TypeError, ValueError) as e:
-        raise InvalidInputError(f"training: expected what JSON can say, got {training!r} ({e}).") from None
-    return dict(same)
+        raise InvalidInputError(f"training: expected JSON values, got {training!r} ({e}).") from None
+    return AgentFile("in memory", network, processing, about, _digest(network, about))
 
 
-def load_agent(file: pathlib.Path) -> AgentFile:
-    """Reads what :func:`save_agent` wrote. Whatever is in the file, none of it is executed.
-
-    Raises:
-        ResultsError: There is no such file, or it is damaged, changed, or of another version.
-    """
-    return parse_agent(str(file), read(file))
-
-
-def parse_agent(source: str, content: bytes) -> AgentFile:
-    """The agent in the content of a file.
+def save_agent(file: pathlib.Path, agent: AgentFile) -> str:
+    """Writes an agent in one go.
 
     Args:
-        source: What messages call the file.
-        content: All of its bytes.
+        file: Usually ``NAME.safetensors``.
+        agent: The agent.
+
+    Returns:
+        Its hash.
 
     Raises:
-        ResultsError: It is damaged, changed, or of another version.
+        ResultsError: The file cannot be written.
     """
-    about = parse_header(source, content)
+    text = json.dumps({**agent.about, "hash": agent.hash}, ensure_ascii=False, allow_nan=False)
+    write(file, save(dict(agent.network.tensors), {KEY: text}))
+    return agent.hash
+
+
+def load_agent(file: pathlib.Path, kinds: Sequence[type[Processing]]) -> AgentFile:
+    """Reads the file of an agent.
+
+    Args:
+        file: Where to read.
+        kinds: The kinds of agents that are accepted.
+
+    Raises:
+        ResultsError: There is no such file, it is damaged, or it has another format.
+    """
     try:
-        tensors = load(content)
-    except (SafetensorError, ValueError, TypeError, KeyError, OverflowError) as e:
-        refuse(source, f"is damaged: {e}")
+        if not file.is_file():
+            raise ValueError("it is not a file" if file.exists() else "it does not exist")
+        return _parsed(str(file), read_bytes(file, MOST), {kind.kind: kind for kind in kinds})
+    except KeyError as e:
+        reason = f"the key {e} is missing"
+    except OSError as e:
+        reason = e.strerror or str(e)
+    except (InvalidInputError, UnknownNameError, SafetensorError, ValueError, TypeError, RecursionError) as e:
+        reason = str(e)
+    raise ResultsError(f"Cannot read the agent {file}: {reason[:500].removesuffix('.')}.")
+
+
+def _parsed(source: str, content: bytes, kinds: Mapping[str, type[Processing]]) -> AgentFile:
+    """The agent in the content of a file."""
+    tensors = load(content)
+    header = json.loads(content[8 : 8 + int.from_bytes(content[:8], "little")])
+    about = json.loads(header.get("__metadata__", {})[KEY])
+    if about["format"] != FORMAT:
+        raise ValueError(f"expected format {FORMAT}, got {about['format']!r}")
     claimed = about.pop("hash")
-    processing = check_described(source, about)
-    try:
-        network = _network(about["network"], tensors)
-    except UNREADABLE as e:
-        refuse(source, f"is no agent that this version can read: {said(e)}")
-    check_hash(source, _tensors(network), about, claimed)
-    return AgentFile(source, network, processing, about, claimed)
-
-
-def check_hash(source: str, tensors: list[tuple[str, Singles]], about: Mapping[str, Any], claimed: str) -> None:
-    """Refuses a file that is not what its hash was made of."""
-    found = digest(tensors, about)
+    kind = about["processing"].get("kind")
+    if kind not in kinds:
+        raise ValueError(f"expected an agent of the kind {' or '.join(kinds)}, got {kind!r}")
+    for part, names in _PARTS.items():
+        if not all(isinstance(about[part][name], (str, int)) for name in names):
+            raise ValueError(f"{part}: expected {', '.join(names)}, got {about[part]!r}")
+    processing = kinds[kind].from_json(about["processing"])
+    network = kinds[kind].network.from_json(about["network"], tensors)
+    found = _digest(network, about)
     if found != claimed:
-        refuse(source, f"was changed after it was written: expected the hash {claimed}, got {found}")
+        raise ValueError(f"it was changed after it was written: expected the hash {claimed}, got {found}")
+    return AgentFile(source, network, processing, about, found)
 
 
-def parse_header(source: str, content: bytes) -> dict[str, Any]:
-    """What a file says of its agent, taken at its word; the beginning of the file is enough.
-
-    Raises:
-        ResultsError: It is damaged, or of another version.
-    """
-    length = int.from_bytes(content[:8], "little")
-    if len(content) < 8 or length > min(len(content) - 8, MOST_HEADER):
-        refuse(
-            source,
-            f"is cut off, or no safetensors file: its header claims {length} bytes, expected at most {MOST_HEADER}, "
-            f"and {max(len(content) - 8, 0)} follow",
-        )
-    header = parse_json(source, content[8 : 8 + length])
-    metadata = header.get("__metadata__")
-    text = metadata.get(KEY) if isinstance(metadata, dict) else None
-    if not isinstance(text, str):
-        refuse(source, f"is no agent of ikgym: expected a text {KEY!r} in its metadata, got {_names(metadata)}")
-    about = parse_json(source, text.encode())
-    check_format(source, about)
-    if not isinstance(about.get("hash"), str):
-        refuse(source, f"is damaged: expected the key 'hash', got {_names(about)}")
-    return about
-
-
-def check_described(source: str, about: Mapping[str, Any]) -> Processing | Bilinear | Relative:
-    """The processing in what :func:`description` wrote, all of it being of the right type.
-
-    Raises:
-        ResultsError: Something is missing, of another type, or the base policy is one that a file must not name.
-    """
-    try:
-        values = dict(about["processing"])
-        kinds: dict[Any, type[Bilinear | Relative]] = {Bilinear.kind: Bilinear, Relative.kind: Relative}
-        processing = kinds.get(values.get("kind"), Processing).from_json(values)
-        check_types(about, processing)
-    except UNREADABLE as e:
-        refuse(source, f"is no agent that this version can read: {said(e)}")
-    try:
-        check_base_policy(processing.base_policy)
-    except (InvalidInputError, UnknownNameError) as e:
-        refuse(source, f"cannot be used: {str(e).removesuffix('.')}")
-    return processing
-
-
-def check_format(source: str, about: Mapping[str, Any]) -> None:
-    """Refuses what another version has written."""
-    version = about.get("format")
-    if isinstance(version, bool) or version != FORMAT:
-        hint = READERS.get(version) if type(version) is int else None
-        needed = "" if hint is None else f", which ikgym {hint} reads"
-        refuse(source, f"is of another version: expected format {FORMAT}, got {version!r}{needed}")
-
-
-def _tensors(network: Network) -> list[tuple[str, Singles]]:
-    """The tensors of a network by name, layer by layer."""
-    out = []
-    for number, (weights, bias) in enumerate(zip(network.weights, network.biases, strict=True)):
-        out += [(f"layers.{number}.weight", weights), (f"layers.{number}.bias", bias)]
-    return out
-
-
-def _network(about: Mapping[str, Any], tensors: Mapping[str, Any]) -> Network:
-    sizes = [int(size) for size in about["sizes"]]
-    expected: dict[str, tuple[int, ...]] = {}
-    for number, (inputs, outputs) in enumerate(itertools.pairwise(sizes)):
-        expected[f"layers.{number}.weight"] = (outputs, inputs)
-        expected[f"layers.{number}.bias"] = (outputs,)
-    got = {name: tensor.shape for name, tensor in tensors.items()}
-    if got != expected or any(tensor.dtype != np.float32 for tensor in tensors.values()):
-        kinds = {name: f"{tensor.dtype} {tensor.shape}" for name, tensor in tensors.items()}
-        raise InvalidInputError(f"expected float32 tensors of the shapes {expected}, got {kinds}")
-    layers = range(len(sizes) - 1)
-    return Network(
-        tuple(tensors[f"layers.{number}.weight"] for number in layers),
-        tuple(tensors[f"layers.{number}.bias"] for number in layers),
-        about["activation"],
-        about["squash"],
-    )
-
-
-def check_types(about: Mapping[str, Any], processing: Described) -> None:
-    """Insists on the types of what others rely on.
-
-    Raises:
-        InvalidInputError: One is another.
-    """
-    texts = about["scenario"]["name"], about["scenario"]["fingerprint"], about["task"]["name"], about["ikgym"]
-    numbers = about["joints"], about["task"]["size"], about["task"]["error_size"], about["cost_version"]
-    base_policy = processing.base_policy is None or isinstance(processing.base_policy, str)
-    if not (
-        all(isinstance(text, str) for text in texts) and all(type(value) is int for value in numbers) and base_policy
-    ):
-        raise InvalidInputError(f"expected names as texts and sizes as whole numbers, got {texts} and {numbers}")
-    arm = about.get("arm", {"name": "", "fingerprint": ""})  # files of before have none
-    if not (isinstance(arm, dict) and all(isinstance(arm.get(key), str) for key in ("name", "fingerprint"))):
-        raise InvalidInputError(f"arm: expected a name and a fingerprint as texts, got {arm!r}")
-    if not isinstance(about["training"], dict):
-        raise InvalidInputError(f"training: expected an object, got {about['training']!r}")
-
-
-def digest(tensors: list[tuple[str, Singles]], about: Mapping[str, Any]) -> str:
-    """The hash of a file: of what it says, and of its tensors in their order."""
+def _digest(network: NetworkLike, about: Mapping[str, Any]) -> str:
+    """The hash of a description and of the tensors in their order."""
     out = hashlib.sha256(canonical(about).encode())
-    for name, tensor in tensors:
+    for name, tensor in network.tensors.items():
         out.update(f"{name}{tensor.shape}".encode())
         out.update(tensor.astype("<f4", copy=False).tobytes())
     return out.hexdigest()
-
-
-def _names(value: object) -> str:
-    return f"the keys {sorted(value)}" if isinstance(value, dict) else repr(value)
-
-
-def said(error: Exception) -> str:
-    """What is wrong, without the quotes of a missing key alone."""
-    return f"the key {error} is missing" if isinstance(error, KeyError) else str(error)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -15,13 +17,14 @@ from ikgym.validation import Frozen, known_name
 
 Singles = npt.NDArray[np.float32]
 
-#: What may stand between the layers, by the number that the kernel knows it by.
+#: The tensors of a layer.
+PARTS = ("weight", "bias")
+#: Activations between the layers, in the order of their numbers in the kernel.
 ACTIVATIONS = ("linear", "relu", "tanh", "silu", "elu")
-#: What brings the last layer into [-1, 1]: PPO and A2C cut it off, SAC, TD3 and DDPG put tanh behind it. Linear outputs
-#: stay as they are.
+#: What brings the outputs of the last layer into [-1, 1]; linear outputs stay as they are.
 SQUASHES = ("clip", "tanh", "linear")
 
-# Inputs that are added up in one sweep over the outputs: each sweep reads and writes all outputs.
+# Inputs added in one sweep over the outputs: each sweep reads and writes all outputs.
 SWEEP = 8
 
 _RELU, _TANH, _SILU, _ELU = (ACTIVATIONS.index(name) for name in ("relu", "tanh", "silu", "elu"))
@@ -75,14 +78,29 @@ class Network(Frozen):
             object.__setattr__(self, name, value)
 
     @property
-    def inputs(self) -> int:
-        """The number of features."""
-        return self.sizes[0]
+    def tensors(self) -> dict[str, Singles]:
+        """All tensors by name, layer by layer."""
+        layers = enumerate(zip(self.weights, self.biases, strict=True))
+        return {f"layers.{k}.{part}": tensor for k, pair in layers for part, tensor in zip(PARTS, pair, strict=True)}
 
-    @property
-    def outputs(self) -> int:
-        """The number of outputs."""
-        return self.sizes[-1]
+    def to_json(self) -> dict[str, Any]:
+        """The sizes, activation and squash."""
+        return {"sizes": list(self.sizes), "activation": self.activation, "squash": self.squash}
+
+    @classmethod
+    def from_json(cls, about: Mapping[str, Any], tensors: Mapping[str, npt.NDArray[Any]]) -> Self:
+        """The inverse of :meth:`to_json`, with the tensors.
+
+        Raises:
+            InvalidInputError: They do not fit together.
+        """
+        sizes = tuple(int(size) for size in about["sizes"])
+        expected: dict[str, tuple[int, ...]] = {}
+        for k, (inputs, outputs) in enumerate(itertools.pairwise(sizes)):
+            expected |= {f"layers.{k}.weight": (outputs, inputs), f"layers.{k}.bias": (outputs,)}
+        check_tensors(tensors, expected)
+        weights, biases = ([tensors[f"layers.{k}.{part}"] for k in range(len(sizes) - 1)] for part in PARTS)
+        return cls(tuple(weights), tuple(biases), about["activation"], about["squash"])
 
     def forward(self, features: Singles) -> Singles:
         """The output of the network; a row of a batch is the single call, bit for bit.
@@ -96,13 +114,26 @@ class Network(Frozen):
         Raises:
             InvalidInputError: The features have another shape or are not in float32.
         """
-        if features.dtype != np.float32 or features.ndim != 2 or features.shape[1] != self.inputs:
+        if features.dtype != np.float32 or features.ndim != 2 or features.shape[1] != self.sizes[0]:
             raise InvalidInputError(
-                f"features: expected float32 of shape (any, {self.inputs}), got {features.dtype} {features.shape}."
+                f"features: expected float32 of shape (any, {self.sizes[0]}), got {features.dtype} {features.shape}."
             )
-        out = np.empty((len(features), self.outputs), dtype=np.float32)
+        out = np.empty((len(features), self.sizes[-1]), dtype=np.float32)
         forward_rows(*self.constants, np.ascontiguousarray(features), out)
         return out
+
+
+def check_tensors(tensors: Mapping[str, npt.NDArray[Any]], expected: Mapping[str, tuple[int, ...]]) -> None:
+    """Refuses tensors of other names, shapes or types, or with numbers that are not finite.
+
+    Raises:
+        InvalidInputError: There is one.
+    """
+    got = {name: tensor.shape for name, tensor in tensors.items()}
+    if got != expected or any(tensor.dtype != np.float32 for tensor in tensors.values()):
+        raise InvalidInputError(f"tensors: expected float32 of the shapes {dict(expected)}, got {got}.")
+    if not all(np.isfinite(tensor).all() for tensor in tensors.values()):
+        raise InvalidInputError("tensors: expected finite numbers, got NaN or infinity.")
 
 
 def _layers(name: str, arrays: Sequence[npt.ArrayLike], axes: int) -> tuple[Singles, ...]:

@@ -1,236 +1,205 @@
-"""Learned agents as policies."""
+"""Learned agents without memory as policies."""
 
 from __future__ import annotations
 
-import abc
 import dataclasses
 import os
 import pathlib
-from collections.abc import Mapping
-from typing import Any, ClassVar
+from collections.abc import Sequence
+from typing import ClassVar
 
 import numpy as np
 
-from baselines.agents import files, untrusted
-from baselines.agents.protocols import AgentFile
-from baselines.agents.view import AgentView
+from baselines.agents.bilinear.processing import Bilinear
+from baselines.agents.bounds import Bounds
+from baselines.agents.files import AgentFile, load_agent
+from baselines.agents.network import Network
+from baselines.agents.processing import Processing
+from baselines.agents.relative import Relative
 from baselines.files import ResultsError
 from baselines.fingerprints import arm_fingerprint
-from baselines.policy import Batch, Memory, Problem, Solution, statuses
+from baselines.policy import Batch, Memory, Problem, Solution, SolverPolicy, statuses
 from baselines.solvers.wrappers import orientation
-from baselines.status import Status
-from baselines.wrapper import Wrapper
-from ikgym import scenarios
-from ikgym.exceptions import InvalidInputError, UnknownNameError
-from ikgym.preview import offsets as checked_offsets
+from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Preview
+from ikgym.validation import flag
+
+#: The agents that come with the package.
+FOLDER = pathlib.Path(__file__).parents[1] / "data" / "agents"
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class LearnedPolicy(Wrapper, abc.ABC):
-    """A network between the features of an observation and an action, perhaps on top of a base policy.
+class LearnedPolicy(SolverPolicy):
+    """A network between the features of an observation and an action.
 
-    It plays every scenario of its arm whose features have the shape of those that it was trained on. The
-    base policy sees what it would see alone, and has its memory in that of the agent: a network output of 0 is the
-    base policy, bit for bit. The status is that of the base policy, at best ``applied``.
-
-    Its preview is a tuple of steps ahead. Observations that show 1, 2, … up to the furthest of them do, too. An agent
-    that was trained on whole poses plays scenarios that show skew coordinates, too: their 90° ambiguity is resolved by
-    :func:`baselines.solvers.wrappers.orientation.resolve_orientation`, which takes all steps up to the furthest.
-
-    Args:
-        problem: What the policy is told of the scenario.
-
-    Raises:
-        ResultsError: There is no such file, or it cannot be used.
-        InvalidInputError: The scenario does not fit the agent, or the base policy.
+    It plays every scenario of its arm whose features have the shape of those that it was trained on. Its preview is a
+    tuple of steps ahead; observations that show 1, 2, … up to the furthest of them are accepted, too. An agent trained
+    on whole poses also plays scenarios that show skew coordinates: their orientation is resolved by
+    :func:`baselines.solvers.wrappers.orientation.resolve_orientation`, which needs all steps up to the furthest.
     """
 
-    #: What was read.
+    #: The agent in the file.
     file: AgentFile = dataclasses.field(init=False, repr=False)
-    #: What it sees of the problem, or of that of whole poses.
-    view: AgentView = dataclasses.field(init=False, repr=False)
+    #: The problem as the agent sees it: with whole poses where it was trained on them.
+    seen: Problem = dataclasses.field(init=False, repr=False)
+    #: Bounds of joint velocities that respect the limits of the arm; None where it has none.
+    bounds: Bounds | None = dataclasses.field(init=False, repr=False)
 
     grain: ClassVar[int] = 32
     from_file: ClassVar[bool] = True
 
-    def __post_init__(self) -> None:
-        file = self.load()
-        problem = _problem_for(file, self.problem)
-        _check_size(file, problem)
-        if not self._takes_any_arm:
-            check_arm(file.source, file.about, problem)
-        try:
-            view = AgentView.of(file.processing, problem)
-        except UnknownNameError as e:
-            raise ResultsError(f"Agent {file.source} cannot be used: {e}") from None
-        except InvalidInputError as e:
-            raise InvalidInputError(f"Agent {file.source}: {e}") from None
-        for field, value in {"file": file, "view": view, "inner": view.base}.items():
-            object.__setattr__(self, field, value)
-
-    @abc.abstractmethod
-    def load(self) -> AgentFile:
-        """Reads the file.
+    def _take(self, file: AgentFile, *, any_arm: bool = False) -> None:
+        """Plays the agent of a file.
 
         Raises:
-            ResultsError: There is no such file, or it cannot be used.
+            InvalidInputError: The scenario does not fit the agent.
         """
-
-    @property
-    def _takes_any_arm(self) -> bool:
-        """Whether it may play on an arm that it was not trained for."""
-        return False
+        skew = (file.about["task"]["name"], self.problem.task.name) == ("pose", "skew")
+        seen = orientation.full_problem(self.problem) if skew else self.problem
+        check_scenario(file, seen, any_arm=any_arm)
+        try:
+            needed = file.processing.size(seen), file.processing.outputs(seen)  # type: ignore[attr-defined]
+        except InvalidInputError as e:
+            raise InvalidInputError(f"Agent {file.source}: {e}") from None
+        shape = file.network.sizes[0], file.network.sizes[-1]  # type: ignore[attr-defined]
+        if shape != needed:
+            raise InvalidInputError(
+                f"Agent {file.source}: expected a network from {needed[0]} features to {needed[1]} outputs, got "
+                f"{shape[0]} and {shape[1]}."
+            )
+        for field, value in {"file": file, "seen": seen, "bounds": Bounds.of(seen)}.items():
+            object.__setattr__(self, field, value)
 
     @property
     def preview(self) -> Preview:
         """The steps ahead that are seen, or how many there are up to the furthest."""
-        return self.view.preview.furthest if self._resolves else self.view.preview.shown
+        return self._offsets[-1] if self._resolves else self._offsets
+
+    @property
+    def _offsets(self) -> tuple[int, ...]:
+        offsets: tuple[int, ...] = self.file.processing.offsets  # type: ignore[attr-defined]
+        return offsets
 
     @property
     def _resolves(self) -> bool:
-        """Whether the agent knows whole poses, and the scenario shows skew coordinates."""
-        return self.view.problem is not self.problem
+        """Whether the agent needs whole poses where the scenario shows skew coordinates."""
+        return self.seen is not self.problem
 
-    def own_memory(self, rows: int) -> Memory:
+    def memory(self, rows: int) -> Memory:
         """That of the orientation where its ambiguity is resolved."""
         return orientation.start_memory(rows) if self._resolves else ()
 
     def solve(self, batch: Batch, memory: Memory) -> Solution:
         """See :meth:`SolverPolicy.solve`."""
-        own, inside = self.split(memory)
         if self._resolves:
-            batch, own = orientation.resolve_orientation(self.problem, batch, own)
-        fractions, step = self.view.act(batch, inside, self.file.network)
-        qdot = fractions * self.problem.velocity_limit
-        if step is None:
-            return Solution(qdot, own, statuses(len(qdot)), np.ones(len(qdot), dtype=np.int64))
-        # Where the base policy has converged, its action with a correction has not.
-        status = np.maximum(step.status, int(Status.APPLIED))
-        return self.solution(qdot, own, step._replace(status=status))
+            assert isinstance(memory, orientation.OrientationMemory)
+            batch, memory = orientation.resolve_orientation(self.problem, batch, memory)
+            batch = batch._replace(nominal=batch.nominal.take(np.array(self._offsets) - 1, axis=1))
+        processing, network = self.file.processing, self.file.network
+        assert isinstance(processing, (Bilinear, Relative))
+        assert isinstance(network, Network)
+        fractions = processing.act(self.seen, batch, network)
+        if self.bounds is not None:
+            self.bounds.keep(batch, fractions)
+        rows = len(fractions)
+        return Solution(fractions * self.problem.velocity_limit, memory, statuses(rows), np.ones(rows, dtype=np.int64))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Agent(LearnedPolicy):
-    """An agent from a file: one of ours (`.safetensors`), or a model of Stable-Baselines3 (`.zip`).
-
-    Reading one of ours runs nothing that is in it. A model needs `trust`: Stable-Baselines3 loads it then, and runs
-    whatever code is in the file.
+    """An agent from a file, ``agent:FILE.safetensors``.
 
     Args:
         problem: What the policy is told of the scenario.
         path: The file.
-        trust: Whether a model may run its own code. Only for files whose maker you know; no file can grant it.
-        offsets: Steps ahead at which a model sees the nominal coordinates that was trained on the observation itself;
-            1, 2, … if left out, as its file does not tell. Files that do tell are not to be contradicted.
         hash: The first twelve digits of the agent's hash, to insist on; in results those of the agent that played.
-        any_arm: Whether it may play on an arm that it was not trained for, which is refused otherwise.
+        any_arm: Whether it may play on an arm that it was not trained for.
+        given: An agent in memory, in place of a file.
 
     Raises:
-        ResultsError: There is no such file, it is damaged, or needs to be trusted.
+        ResultsError: The file cannot be read.
         InvalidInputError: A parameter is refused, or the scenario does not fit the agent.
     """
 
     path: str = ""
-    trust: bool = False
-    offsets: tuple[int, ...] | None = None
     hash: str | None = None
     any_arm: bool = False
+    given: dataclasses.InitVar[AgentFile | None] = dataclasses.field(default=None, kw_only=True)
 
     name: ClassVar[str] = "agent"
     nameless: ClassVar[str] = "path"
-    decisive: ClassVar[tuple[str, ...]] = ("path", "trust")
+    decisive: ClassVar[tuple[str, ...]] = ("path",)
 
-    def __post_init__(self) -> None:
-        if not isinstance(self.path, (str, os.PathLike)) or not os.fspath(self.path):
-            raise ResultsError(f"agent: expected the path of its file, as in agent:PATH, got {self.path!r}.")
-        for option in ("trust", "any_arm"):
-            if not isinstance(getattr(self, option), bool):
-                raise InvalidInputError(f"{option}: expected True or False, got {getattr(self, option)!r}.")
-        if self.offsets is not None:
-            object.__setattr__(self, "offsets", checked_offsets(self.offsets))
+    def __post_init__(self, given: AgentFile | None) -> None:
+        flag("any_arm", self.any_arm)
+        file = given or agent_at(self.path, self.hash, (Bilinear, Relative))
+        self._take(file, any_arm=self.any_arm)
         object.__setattr__(self, "path", os.fspath(self.path))
-        super().__post_init__()
-        digits = self.file.digits
-        if self.hash is not None and (not isinstance(self.hash, str) or self.hash != digits):
-            raise InvalidInputError(f"hash: expected {digits}, which {self.path} has, got {self.hash!r}.")
-        object.__setattr__(self, "hash", digits)
-
-    @property
-    def _takes_any_arm(self) -> bool:
-        return self.any_arm
-
-    def load(self) -> AgentFile:
-        """See :meth:`LearnedPolicy.load`."""
-        try:
-            file = pathlib.Path(self.path).expanduser()
-        except RuntimeError:
-            raise ResultsError(f"Agent {self.path}: expected a path, got one with an unknown user's home.") from None
-        if file.suffix == untrusted.ZIP:
-            untrusted.check_trust(file, trust=self.trust)
-            # Only these files need a learning library.
-            from baselines.agents import sb3_zip
-
-            return sb3_zip.load_zip(file, self.problem, trust=self.trust, offsets=self.offsets)
-        if self.offsets is not None:
-            raise InvalidInputError(f"offsets: {self.path} says itself what it sees, got {self.offsets}.")
-        return files.load_agent(file)
+        object.__setattr__(self, "hash", file.digits)
 
 
-def _problem_for(file: AgentFile, problem: Problem) -> Problem:
-    """The problem as the agent knows it."""
-    trained = file.about.get("task", {}).get("name")
-    return orientation.full_problem(problem) if (trained, problem.task.name) == ("pose", "skew") else problem
-
-
-def _check_size(file: AgentFile, problem: Problem) -> None:
-    """Refuses a scenario whose features have another shape."""
-    n, task = problem.model.joints, problem.task
-    trained = file.about.get("joints", n), file.about.get("task", {"size": task.size, "error_size": task.error_size})
-    sizes = trained[0], trained[1]["size"], trained[1]["error_size"]
-    here = n, task.size, task.error_size
-    if sizes != here:
-        words = "{} joints and {} task coordinates with {} components of the error"
-        raise InvalidInputError(
-            f"Agent {file.source} was trained for {words.format(*sizes)}; here there are {words.format(*here)}."
-        )
-    shape, needed = (
-        (file.network.inputs, file.network.outputs),
-        (file.processing.size(problem), file.processing.outputs(problem)),
-    )
-    if shape != needed:
-        raise InvalidInputError(
-            f"Agent {file.source}: expected a network from {needed[0]} features to {needed[1]} outputs, got "
-            f"{shape[0]} and {shape[1]}."
-        )
-
-
-def check_arm(source: str, about: Mapping[str, Any], problem: Problem) -> None:
-    """Refuses an arm that moves differently from the one that the agent was trained for, where its file says which.
+@dataclasses.dataclass(frozen=True, eq=False)
+class AgentAlone(LearnedPolicy):
+    """Learned agent that comes with the package, trained on `varga7-random` by apg.
 
     Args:
-        source: The file, as messages name it.
-        about: What it says of the agent.
-        problem: What the agent is told of the scenario.
+        problem: What the policy is told of the scenario.
+        hash: The first twelve digits of its hash, which tells its results from those of a successor.
 
     Raises:
-        InvalidInputError: The arm is another one.
+        InvalidInputError: The file has another hash, or the scenario does not fit the agent.
     """
-    trained, here = _trained_arm(about), arm_fingerprint(problem.model)
-    if trained is not None and trained["fingerprint"] != here:
+
+    hash: str = "25357e60147d"
+
+    name: ClassVar[str] = "agent_alone"
+
+    def __post_init__(self) -> None:
+        file = agent_at(FOLDER / f"{self.name}.safetensors", self.hash, (Bilinear,))
+        self._take(dataclasses.replace(file, source=self.name))
+
+
+def agent_at(path: str | os.PathLike[str], digits: str | None, kinds: Sequence[type[Processing]]) -> AgentFile:
+    """The agent of a file.
+
+    Args:
+        path: The file; ``~`` stands for the home of the user.
+        digits: The first digits of its hash; None for any.
+        kinds: The kinds of agents that are accepted.
+
+    Raises:
+        ResultsError: The file cannot be read.
+        InvalidInputError: Its hash is another one.
+    """
+    if not isinstance(path, (str, os.PathLike)) or not os.fspath(path):
+        raise ResultsError(f"path: expected the file of an agent, got {path!r}.")
+    agent = load_agent(pathlib.Path(os.path.expanduser(path)), kinds)  # noqa: PTH111  # never raises, unlike Path's
+    if digits is not None and digits != agent.digits:
+        raise InvalidInputError(f"hash: expected {agent.digits}, the hash of {path}, got {digits!r}.")
+    return agent
+
+
+def check_scenario(agent: AgentFile, problem: Problem, *, any_arm: bool) -> None:
+    """Refuses a scenario with another number of joints, another task or another arm than the agent was trained for.
+
+    Args:
+        agent: The agent.
+        problem: What it is told of the scenario.
+        any_arm: Whether it may play on another arm.
+
+    Raises:
+        InvalidInputError: The scenario does not fit the agent.
+    """
+    about, model, task = agent.about, problem.model, problem.task
+    trained = about["joints"], about["task"]["size"], about["task"]["error_size"]
+    here = model.joints, task.size, task.error_size
+    if trained != here:
+        words = "{} joints and {} task coordinates with {} components of the error"
         raise InvalidInputError(
-            f"Agent {source} was trained for the arm {trained['name']}, which moves differently from "
-            f"{problem.model.name}: expected that arm, or any_arm=True, as in agent:path=FILE,any_arm=True."
+            f"Agent {agent.source} was trained for {words.format(*trained)}; here there are {words.format(*here)}."
         )
-
-
-def _trained_arm(about: Mapping[str, Any]) -> Mapping[str, str] | None:
-    """Name and fingerprint of the arm; of older files that of the scenario of that name, None where there is none."""
-    if "arm" in about:
-        arm: Mapping[str, str] = about["arm"]
-        return arm
-    name = about.get("scenario", {}).get("name")
-    if name not in scenarios.names():
-        return None
-    model = scenarios.get(name).model
-    return {"name": model.name, "fingerprint": arm_fingerprint(model)}
+    if not any_arm and about["arm"]["fingerprint"] != arm_fingerprint(model):
+        raise InvalidInputError(
+            f"Agent {agent.source} was trained for the arm {about['arm']['name']}, which moves differently from "
+            f"{model.name}: expected that arm, or any_arm=True, as in agent:path=FILE,any_arm=True."
+        )

@@ -1,4 +1,4 @@
-"""Where a run stands: all that it needs to go on as if nothing had happened, in one file."""
+"""The state of a run in one file, from which it continues as if it had never been interrupted."""
 
 from __future__ import annotations
 
@@ -11,30 +11,28 @@ from typing import Any
 
 import torch
 
-from baselines.files import archives, read_bytes, write
+from baselines.files import write
 from baselines.training.errors import TrainingError
 
-#: Changes when earlier files can no longer be resumed.
-FORMAT = 2
-#: What a file begins with, before the digest of all that follows.
+#: The version of the format.
+FORMAT = 3
+#: The beginning of a file, before the digest of the rest.
 MAGIC = b"ikgym checkpoint "
-#: Bytes of a file that are read at most: one with a buffer of the largest size has fewer.
-MOST = 2**36
-# Letters of the digest and the end of its line.
+# Length of the digest with the end of its line.
 _DIGEST = 65
 
 
 @dataclasses.dataclass
 class Checkpoint:
-    """Where a run stands after a segment.
+    """The state of a run after a segment.
 
     Args:
         segments: Segments done.
-        trainer: What the trainer's `state` gave; None before the first segment.
-        history: A row an evaluation or a segment, see :mod:`baselines.training.run`.
-        best: The best evaluation so far: its score, segment and the weights of the policy; None without one.
+        trainer: The `state` of the trainer; None before the first segment.
+        history: A row for each segment, see :mod:`baselines.training.run`.
+        best: The best validation so far: its score, segment and the weights of the policy; None without one.
         core_seconds: CPU time of this process and of those before it, in [s].
-        wall_seconds: Time on the clock, in [s].
+        wall_seconds: Elapsed time, in [s].
     """
 
     segments: int = 0
@@ -57,34 +55,32 @@ class Checkpoint:
 
 
 def load(file: pathlib.Path) -> Checkpoint:
-    """The checkpoint of a file; nothing in it is executed.
+    """The checkpoint of a file.
 
     Raises:
-        TrainingError: It cannot be read, or is not as it was written.
+        TrainingError: It cannot be read, is damaged, or has another format.
     """
     try:
-        content = torch.load(io.BytesIO(_payload(file)), map_location="cpu", weights_only=True)
+        content = torch.load(io.BytesIO(_payload(file.read_bytes())), map_location="cpu", weights_only=True)
         if content.pop("format") != FORMAT:
-            raise ValueError("it was written by another version")
+            raise ValueError("it has another format")
         return Checkpoint(**content)
     except (OSError, RuntimeError, ValueError, KeyError, TypeError, AttributeError, EOFError, pickle.PickleError) as e:
         reason = " ".join(str(e).split()) or type(e).__name__
-        raise TrainingError(f"Cannot go on from {file}: {reason[:300]}. Begin anew with --overwrite.") from None
+        raise TrainingError(f"Cannot resume from {file}: {reason[:300]}. Begin anew with --overwrite.") from None
 
 
 def sealed(payload: bytes) -> bytes:
-    """What a file holds: the digest, and what it is of."""
+    """The content of a file: its digest, then the payload."""
     return b"".join([MAGIC, hashlib.sha256(payload).hexdigest().encode(), b"\n", payload])
 
 
-def _payload(file: pathlib.Path) -> bytes:
-    """What :func:`torch.load` may read: as it was written, and no archive that unpacks to more than its own bytes."""
-    content = read_bytes(file, MOST)
+def _payload(content: bytes) -> bytes:
+    """The payload of a file whose digest is right."""
     if not content.startswith(MAGIC):
-        raise ValueError("it is no checkpoint, or was written by another version")
+        raise ValueError("it is no checkpoint")
     begin = len(MAGIC) + _DIGEST
     claimed, payload = content[len(MAGIC) : begin].rstrip(b"\n").decode(errors="replace"), content[begin:]
     if (digest := hashlib.sha256(payload).hexdigest()) != claimed:
         raise ValueError(f"it is damaged: expected the SHA-256 {claimed}, got {digest}")
-    archives.check_stored(payload)
     return payload

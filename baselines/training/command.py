@@ -16,11 +16,10 @@ from typing import Annotated, Any, Generic, TypeVar, Union
 import tyro
 
 from baselines import command as shared
-from baselines import registry
-from baselines.spec import refuse_trust
 from baselines.training import methods, presets
-from baselines.training.config.base import SHAPE, Config
+from baselines.training.config.base import Config
 from baselines.training.errors import TrainingError
+from baselines.training.folder import read_run
 from baselines.training.seeds import SeedResult, SeedRuns, train_seeds
 from baselines.workers import ALONE, Workers
 from ikgym import scenarios
@@ -32,30 +31,24 @@ PROGRAM = "train.py"
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Options:
-    """Where to, and how: nothing of this changes what comes of a seed."""
+    """Options that do not change the result of a seed."""
 
     out: Annotated[pathlib.Path, tyro.conf.arg(metavar="DIR")]
     """Folder for the files; the run with seed N has the folder seed-N in it."""
     seeds: Annotated[tuple[int, ...], tyro.conf.arg(metavar="N …")] = (0,)
     """One run each."""
     workers: Annotated[int, tyro.conf.arg(metavar="N")] = 1
-    """Processes that train at the same time, one seed each."""
+    """Processes that train in parallel, one seed each."""
     cluster: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
     """Train on a cluster: ray, at the address in RAY_ADDRESS, a core for each seed. Its nodes share the folder."""
     preset: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
-    """Options of a preset, or of a file that ends in .toml; those on the command line take precedence."""
+    """Options of a preset, or of a file NAME.toml; those on the command line take precedence."""
     resume: bool = False
-    """Go on with the runs in the folder; they end with the same weights as if they had never been stopped."""
+    """Continue the runs in the folder; they end with the same weights as without the interruption."""
     overwrite: bool = False
     """Replace the runs in the folder."""
     checkpoint_every: Annotated[float, tyro.conf.arg(metavar="SECONDS")] = 15.0
     """Shortest time between two checkpoints; there are none within a segment."""
-    study: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
-    """Search options by Optuna instead: N trainings with one seed, judged on validation episodes, of which those that
-    are worse than the median of the others are ended early. --workers trains some at the same time. The best options
-    are written into the folder as a preset, best.toml."""
-    study_ranges: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
-    """What --study tries: a table for the method, with a range for each option. Its own ranges if left out."""
     progress: bool = True
     """Show a progress bar."""
 
@@ -73,14 +66,14 @@ class Command(Generic[C]):
 
 @dataclasses.dataclass(frozen=True)
 class Repeat:
-    """Repeats a run from its run.json, and compares the final weights; exit code 1 where they differ."""
+    """Repeats a run from its run.json and compares the final weights; exit code 1 where they differ."""
 
     run: Annotated[tyro.conf.Positional[pathlib.Path], tyro.conf.arg(metavar="RUN_JSON")]
     """The run.json of a run."""
     out: Annotated[pathlib.Path, tyro.conf.arg(metavar="DIR")]
     """Folder for the files."""
     resume: bool = False
-    """Go on with the repetition in the folder."""
+    """Continue the repetition in the folder."""
     overwrite: bool = False
     """Replace the run in the folder."""
     checkpoint_every: Annotated[float, tyro.conf.arg(metavar="SECONDS")] = 15.0
@@ -93,8 +86,9 @@ def manual() -> str:
     """The text of ``--help`` above the options."""
     prog, evaluate = _program(), shared.program("evaluate", "python -m baselines.evaluate")
     return f"""\
-Trains agents: networks from observations to joint velocities, alone or as residual policies on a base policy.
-Each method has options of its own: {prog} METHOD --help
+Trains agents: networks from observations to joint velocities. apg differentiates the cost through the arm, ppo, sac and
+td3 are the algorithms of Stable-Baselines3 on ikgym.sb3.make_vec, observe trains agents with memory for plants that
+differ from the model. Each method has its own options: {prog} METHOD --help
 
 {_listing("Methods", methods.METHODS)}
 
@@ -102,26 +96,20 @@ Each method has options of its own: {prog} METHOD --help
 
 {_listing("Scenarios", scenarios.names())}
 
-{_listing("Policies for --base-policy", (name for name in registry.names() if not registry.get(name).reference))}
-
 Examples:
-  {prog} ppo --preset smoke --out runs/smoke
-  {prog} ppo --base-policy dls:damping=1e-2 --action-scale 0.5 --seeds 0 1 2 3 4 --workers 2 --out runs/residual-dls
-  {prog} imitate --preset residual --seeds 0 1 2 3 4 --workers 2 --out runs/residual
   {prog} apg --preset quick --out runs/apg
-  {prog} ppo --preset finetune --init runs/imitate/seed-0/model.safetensors --out runs/finer
-  {prog} ppo --preset smoke --out runs/smoke --resume
-  {prog} ppo --preset smoke --study 30 --workers 2 --out runs/study
-  {prog} repeat runs/smoke/seed-0/run.json --out runs/again
+  {prog} apg --preset standard --seeds 0 1 2 --workers 2 --out runs/apg
+  {prog} ppo --total-timesteps 200000 --set n_steps=256 learning_rate=3e-4 --out runs/ppo
+  {prog} sac --scenario panda-random --learning furthest=20.0 --out runs/sac
+  {prog} apg --preset quick --out runs/apg --resume
+  {prog} repeat runs/apg/seed-0/run.json --out runs/again
 
-Files in the folder of a run, each replaced in one go, so that it may be stopped or killed at any time:
-  run.json           all that is needed to repeat it, its validation, what it has cost, the hash of its final weights
-  history.json       a row a segment
+Files in the folder of a run, which may be killed at any time:
+  run.json           options, seed, versions, validations, computing time, hash of the final weights
+  history.json       a row for each segment
   tensorboard/       the same, for: tensorboard --logdir DIR
-  checkpoint.pt      where it stands, for --resume
-  model.safetensors  at the end, the kept model with its critics, for --init; not of apg and observe
-  model.zip          at the end, the same model, for Stable-Baselines3; not of apg and observe
-  agent.safetensors  at the end, its actor, for --init and for: {evaluate} --policies agent:FILE;
+  checkpoint.pt      the state, for --resume
+  agent.safetensors  at the end, the agent, for: {evaluate} --policies agent:FILE;
                      of observe for: {evaluate} --policies recurrent:FILE
 
 Agents are trained on the seeds of the split "train" and validated on those of "validation"; those of "test" are not
@@ -139,24 +127,24 @@ def main(arguments: Sequence[str] | None = None) -> int:
         arguments: What stands behind the command; taken from the process if left out.
 
     Returns:
-        The exit code: 0; 1 where a repetition came to other weights; 2 where something expected went wrong, be it in
-        one seed of several; 130 after Ctrl-C.
+        The exit code: 0; 1 where a repetition ends with other weights; 2 after an error, also in one of several seeds;
+        130 after Ctrl-C.
     """
     arguments = sys.argv[1:] if arguments is None else list(arguments)
     out: pathlib.Path | None = None
 
     def work() -> int:
         nonlocal out
-        command, given = parse(arguments)
+        command = parse(arguments)
         _require_extra()
         if isinstance(command, Repeat):
             out = command.out
             return _repeat(command)
         out = command.options.out
-        return _train(command, given, shlex.join([*_program().split(), *arguments]))
+        return _train(command, shlex.join([*_program().split(), *arguments]))
 
     def stopped() -> str:
-        kept = "" if out is None else f" What was done up to the last checkpoint is in {out}; go on with --resume."
+        kept = "" if out is None else f" The last checkpoint is in {out}; continue with --resume."
         return f"Stopped.{kept}"
 
     return shared.run(work, stopped)
@@ -167,7 +155,7 @@ def _program() -> str:
 
 
 def _require_extra() -> None:
-    """Insists on the packages that only the training needs.
+    """Checks for the packages that only training needs.
 
     Raises:
         MissingDependencyError: One is missing.
@@ -177,17 +165,13 @@ def _require_extra() -> None:
         raise MissingDependencyError(f'Training needs {", ".join(missing)}: pip install "ikgym[train]"')
 
 
-def parse(arguments: Sequence[str]) -> tuple[Command[Any] | Repeat, frozenset[str]]:
-    """What a command line asks for.
-
-    Returns:
-        The command, and the names of the options in :data:`baselines.training.config.base.SHAPE` that it gives, be it
-        by a preset.
+def parse(arguments: Sequence[str]) -> Command[Any] | Repeat:
+    """The command in a command line.
 
     Raises:
-        UnknownNameError: There is no such preset, or the method has no option that the preset gives.
+        UnknownNameError: There is no such preset, or the method has no option of the preset.
         InvalidInputError: A value is refused, or there is no method.
-        SystemExit: With 0 after ``--help``, with 2 where the options are none.
+        SystemExit: With 0 after ``--help``, with 2 where an option is unknown.
     """
     if not arguments:
         with contextlib.suppress(SystemExit):
@@ -195,21 +179,15 @@ def parse(arguments: Sequence[str]) -> tuple[Command[Any] | Repeat, frozenset[st
         raise InvalidInputError(f"expected a method, one of {', '.join(methods.METHODS)}, or repeat; got none.")
     chosen = next((argument for argument in arguments if argument in methods.METHODS), None)
     preset = _value_of("--preset", arguments)
-    given = {name for name in SHAPE if _value_of(f"--{name.replace('_', '-')}", arguments) is not None}
     kinds: list[Any] = []
-    for name, method in methods.METHODS.items():
-        config, of_preset = presets.configure(method.config, preset if name == chosen else None)
-        default: Any = Command(config, Options(out=tyro.MISSING))
-        summary = (method.config.__doc__ or "").strip()
-        generic: Any = Command
-        kinds.append(
-            Annotated[generic[method.config], tyro.conf.subcommand(name, default=default, description=summary)]
-        )
-        given |= of_preset
+    for name, kind in methods.METHODS.items():
+        default: Any = Command(presets.configure(kind, preset if name == chosen else None), Options(out=tyro.MISSING))
+        summary, generic = (kind.__doc__ or "").strip(), Command
+        kinds.append(Annotated[generic[kind], tyro.conf.subcommand(name, default=default, description=summary)])
     kinds.append(Annotated[Repeat, tyro.conf.subcommand("repeat")])
     any_of_them: Any = Union[tuple(kinds)]  # noqa: UP007  # made at run time
     command: Command[Any] | Repeat = shared.parse(any_of_them, arguments, prog=_program(), description=manual())
-    return command, frozenset(given)
+    return command
 
 
 def _value_of(option: str, arguments: Sequence[str]) -> str | None:
@@ -221,16 +199,13 @@ def _value_of(option: str, arguments: Sequence[str]) -> str | None:
     return None
 
 
-def _train(command: Command[Any], given: frozenset[str], text: str) -> int:
-    # PyTorch takes seconds to load, and --help needs none.
-    from baselines.training.trainers.initial_weights import inherit
-
+def _train(command: Command[Any], text: str) -> int:
     options = command.options
     seeds = tuple(dict.fromkeys(whole_number("seeds", seed, at_least=0) for seed in options.seeds))
     if not seeds:
         raise TrainingError("seeds: expected at least one.")
     runs = SeedRuns(
-        inherit(command.config, given),
+        command.config,
         options.out,
         resume=options.resume,
         overwrite=options.overwrite,
@@ -238,10 +213,6 @@ def _train(command: Command[Any], given: frozenset[str], text: str) -> int:
         command=text,
     )
     workers = Workers(options.workers, options.cluster)
-    if options.study is not None:
-        return _study(runs, seeds, options, whole_number("study", options.study, at_least=1))
-    if options.study_ranges is not None:
-        raise InvalidInputError("study_ranges: expected --study, the number of trials, beside it.")
     results = train_seeds(runs, seeds, workers=workers, progress=options.progress)
     print(table(results))
     for result in results:
@@ -251,31 +222,12 @@ def _train(command: Command[Any], given: frozenset[str], text: str) -> int:
     return 2 if any(result.error for result in results) else 0
 
 
-def _study(runs: SeedRuns, seeds: Sequence[int], options: Options, trials: int) -> int:
-    # Only a search needs Optuna.
-    from baselines.training.study import BEST, searched
-
-    if len(seeds) > 1:
-        raise InvalidInputError(f"seeds: expected one for a study, got {', '.join(map(str, seeds))}.")
-    if options.cluster is not None:
-        raise InvalidInputError("--cluster: a study runs on this machine; expected --workers.")
-    given: dict[str, Any] = {"trials": trials, "ranges": options.study_ranges, "workers": options.workers}
-    print(searched(runs, seeds[0], **given, progress=options.progress))
-    print(f"\nwritten to {options.out}; train with --preset {options.out / BEST}")
-    return 0
-
-
 def _repeat(command: Repeat) -> int:
-    from baselines.training.folder import read_run
-
     about = read_run(command.run)
     wanted = about.get("weights_sha256")
     if not wanted:
-        raise TrainingError(f"{command.run} is of a run that has not ended: finish it with --resume.")
-    for name in {"base_policy", "expert"} & about["config"].keys():
-        if about["config"][name] is not None:
-            refuse_trust(about["config"][name], f"{command.run}: {name}")
-    config = methods.get(about["method"]).config.from_json(about["config"])
+        raise TrainingError(f"{command.run} belongs to a run that has not ended: finish it with --resume.")
+    config = methods.get(about["method"]).from_json(about["config"])
     runs = SeedRuns(
         config,
         command.out,
@@ -284,7 +236,9 @@ def _repeat(command: Repeat) -> int:
         checkpoint_every=command.checkpoint_every,
         command=shlex.join([*_program().split(), "repeat", str(command.run)]),
     )
-    (result,) = train_seeds(runs, [about["seed"]], workers=ALONE, progress=command.progress)
+    (result,) = train_seeds(
+        runs, [whole_number("seed", about["seed"], at_least=0)], workers=ALONE, progress=command.progress
+    )
     if result.error:
         raise TrainingError(result.error)
     if result.weights_sha256 == wanted:
@@ -297,14 +251,14 @@ def _repeat(command: Repeat) -> int:
 
 
 def _reasons(there: dict[str, Any], here: dict[str, Any]) -> Iterable[str]:
-    """What may have led to other weights."""
-    for part in ("scenario", "init", "versions", "machine"):
+    """Differences that may have led to other weights."""
+    for part in ("scenario", "versions", "machine"):
         if there.get(part) != here.get(part):
             yield f"  {part}: {there.get(part)} there, {here.get(part)} here"
 
 
 def table(results: Sequence[SeedResult]) -> str:
-    """Seeds and their scores, as text."""
+    """A table of seeds and their scores."""
     lines = [f"{'seed':>4}  {'cost ratio':>8}  {'cost':>10}  {'worst':>8}  {'lost':>6}"]
     for result in results:
         if result.score is None:

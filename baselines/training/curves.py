@@ -23,16 +23,16 @@ FEW = 10.0
 
 @dataclasses.dataclass(frozen=True)
 class Options:
-    """What the command line takes."""
+    """Options of the command line."""
 
     runs: tyro.conf.Positional[Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=DIR")]]
-    """Trainings: what to call each, and the folder of its seeds."""
+    """Trainings: a name for each, and the folder of its seeds."""
     write: Annotated[pathlib.Path, tyro.conf.arg(metavar="FILE")]
     """The picture, a PNG."""
 
 
 def curves(trainings: dict[str, pathlib.Path]) -> Figure:
-    """Validation costs ÷ those of what a run began with, over core-minutes, a line a seed.
+    """Validation costs ÷ those of the untrained agents, over core-minutes, a line for each seed.
 
     Args:
         trainings: The folders of seeds by name.
@@ -68,13 +68,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         arguments: What stands behind the command; taken from the process if left out.
 
     Returns:
-        The exit code: 0, or 2 where something expected went wrong.
+        The exit code: 0, or 2 after an error.
     """
     options = tyro.cli(
         Options,
         prog="python -m baselines.training.curves",
-        description="Draws how agents got better: the geometric mean of their costs on validation episodes over that "
-        "of what they began with.",
+        description="Draws training curves: the geometric mean of the costs on validation episodes over that of the "
+        "untrained agent.",
         args=arguments,
     )
     try:

@@ -6,101 +6,102 @@ import pathlib
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
 from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.policies import ActorCriticPolicy
+from stable_baselines3.sac.policies import SACPolicy
+from stable_baselines3.td3.policies import TD3Policy
 from torch import nn
 
-from baselines.agents.bilinear.processing import Bilinear
-from baselines.agents.features import Features
-from baselines.agents.files import save_agent
+from baselines.agents.files import AgentFile, agent_of, save_agent
 from baselines.agents.network import Network
-from baselines.agents.relative.processing import Relative, Squash
-from baselines.agents.sb3_zip import network_of_model
+from baselines.agents.relative import Relative
 from baselines.policy import Problem
-from baselines.training.environment.inverse_env import InverseVecEnv
-from baselines.training.policies.bilinear import ACTIVATION
-from baselines.training.trainers.models import bilinear_actor
+from baselines.training.networks import runtime
 from ikgym.exceptions import InvalidInputError
 from ikgym.preview import offsets
 from ikgym.sb3 import LearningVecEnv
-from ikgym.scenarios import Scenario
+
+#: Observations for which the actions of model and agent are compared, and the largest difference.
+_COMPARED, _NEAR = 64, 1e-4
 
 
 def export(
     model: BaseAlgorithm,
-    envs: LearningVecEnv | InverseVecEnv,
+    envs: LearningVecEnv,
     file: str | pathlib.Path,
     training: Mapping[str, Any] | None = None,
 ) -> str:
     """Writes a model as an agent that needs no learning library: ``ikgym evaluate --policies agent:FILE`` plays it.
 
     Args:
-        model: PPO, A2C, SAC, TD3 or DDPG with Stable-Baselines3's `MlpPolicy`, or with one of
-            :mod:`baselines.training.policies`.
-        envs: What it was trained in: of :func:`ikgym.sb3.make_vec`, without a history, or with actions that weigh a
-            damped inverse.
-        file: Where to; usually ``NAME.safetensors``.
-        training: How, in whatever JSON can say.
+        model: PPO, A2C, SAC, TD3 or DDPG with Stable-Baselines3's `MlpPolicy`.
+        envs: The environment of its training, of :func:`ikgym.sb3.make_vec`, without a history.
+        file: Usually ``NAME.safetensors``.
+        training: How it was trained, as JSON values.
 
     Returns:
         The agent's hash.
 
     Raises:
-        InvalidInputError: The model is another, or the environment shows more than such agents see.
+        InvalidInputError: The model is another, or the environment shows more than agents see.
         ResultsError: The file cannot be written.
     """
-    if isinstance(envs, InverseVecEnv):
-        network = network_of_model(model.policy, model.policy_kwargs)
-        return _saved(file, network, envs.processing, envs.scenario, training)
-    learning, scenario = envs.learning, envs.scenario
-    actor = bilinear_actor(model)
-    if actor is None:
-        network, tanh = _unsquashed(network_of_model(model.policy, model.policy_kwargs))
-        gain = learning.largest if tanh else learning.share
-    else:
-        network, tanh, gain = _layers(actor.network), hasattr(model.policy, "critic"), learning.share
-    squash: Squash = "tanh" if tanh else "clip"
-    ahead = offsets(learning.preview)
-    damping = None if actor is None else actor.damping
-    processing = Relative(ahead, learning.furthest, learning.largest, gain, squash, actor is not None, damping)
-    return _saved(file, network, processing, scenario, training)
+    return save_agent(pathlib.Path(file), exported(model, envs, training))
 
 
-def _saved(
-    file: str | pathlib.Path,
-    network: Network,
-    processing: Bilinear | Relative,
-    scenario: Scenario,
-    training: Mapping[str, Any] | None,
-) -> str:
-    """Writes an agent whose network is of the right size."""
-    problem = Problem.of(scenario)
-    sizes, needed = (network.inputs, network.outputs), (processing.size(problem), processing.outputs(problem))
+def exported(model: BaseAlgorithm, envs: LearningVecEnv, training: Mapping[str, Any] | None = None) -> AgentFile:
+    """A model as an agent in memory; see :func:`export`.
+
+    Raises:
+        InvalidInputError: The model is another, or the environment shows more than agents see.
+    """
+    learning, scenario, problem = envs.learning, envs.scenario, Problem.of(envs.scenario)
+    modules, squash = _actor(model.policy)
+    try:
+        network = runtime(modules, "linear")
+    except TypeError as e:
+        raise InvalidInputError(f"model: {e}.") from None
+    gain = learning.largest if squash == "tanh" else learning.share
+    processing = Relative(offsets(learning.preview), learning.furthest, learning.largest, gain, squash)  # type: ignore[arg-type]
+    sizes, needed = (network.sizes[0], network.sizes[-1]), (processing.size(problem), processing.outputs(problem))
     if sizes != needed:
         raise InvalidInputError(
             f"model: expected a network from {needed[0]} features to {needed[1]} outputs, got {sizes[0]} and "
-            f"{sizes[1]}; agents see no history and no commands."
+            f"{sizes[1]}; agents see no history, no commands and no Jacobian."
         )
-    return save_agent(pathlib.Path(file), network, processing, scenario, training)
+    _check_actions(model, network, squash)
+    return agent_of(network, processing, scenario, training)
 
 
-def _unsquashed(network: Network) -> tuple[Network, bool]:
-    """A network with linear outputs, and whether tanh was behind them."""
-    linear = Network(network.weights, network.biases, network.activation, "linear")
-    return linear, network.squash == "tanh"
+def _actor(policy: Any) -> tuple[list[nn.Module], str]:
+    """The layers from features to actions, and what keeps actions within their bounds.
+
+    Raises:
+        InvalidInputError: The policy is of another kind.
+    """
+    if isinstance(policy, ActorCriticPolicy):
+        return [*policy.mlp_extractor.policy_net, policy.action_net], "clip"
+    if isinstance(policy, SACPolicy):
+        last: Any = policy.actor.mu  # with gSDE a layer and a Hardtanh
+        return [*policy.actor.latent_pi, last[0] if isinstance(last, nn.Sequential) else last], "tanh"
+    if isinstance(policy, TD3Policy):
+        return [*policy.actor.mu][:-1], "tanh"
+    raise InvalidInputError(
+        f"model: expected one of PPO, A2C, SAC, TD3 and DDPG with an MlpPolicy, got {type(policy).__name__}."
+    )
 
 
-def _layers(layers: nn.Sequential) -> Network:
-    """The layers of a bilinear actor."""
-    linear = [layer for layer in layers if isinstance(layer, nn.Linear)]
-    weights, biases = ([numbers(layer) for layer in linear] for numbers in (_weight, _bias))
-    return Network(tuple(weights), tuple(biases), ACTIVATION, "linear")
+def _check_actions(model: BaseAlgorithm, network: Network, squash: str) -> None:
+    """Compares the actions of a model with those of its network.
 
-
-def _weight(layer: nn.Linear) -> Features:
-    out: Features = layer.weight.detach().cpu().numpy()
-    return out
-
-
-def _bias(layer: nn.Linear) -> Features:
-    out: Features = layer.bias.detach().cpu().numpy()
-    return out
+    Raises:
+        InvalidInputError: They differ: there is more to the model than its layers.
+    """
+    space: Any = model.action_space
+    features = np.random.default_rng(0).uniform(-1.0, 1.0, (_COMPARED, network.sizes[0])).astype(np.float32)
+    found, _ = model.predict(features, deterministic=True)
+    output = network.forward(features)
+    wanted = space.high * np.tanh(output) if squash == "tanh" else np.clip(output, space.low, space.high)
+    if not np.abs(found - wanted).max() <= _NEAR * space.high.max():
+        raise InvalidInputError("model: its actions are not those of its layers; a custom features extractor?")

@@ -1,4 +1,4 @@
-"""The folder of a run: its files, each replaced in one go, and who may resume them."""
+"""The folder of a run: its files, each replaced in one go, and the conditions to resume it."""
 
 from __future__ import annotations
 
@@ -7,13 +7,12 @@ import pathlib
 from collections.abc import Mapping
 from typing import Any
 
-from baselines.files import json_files, write
+from baselines.files import write
 from baselines.training.config.base import differences
 from baselines.training.errors import TrainingError
-from ikgym.validation import whole_number
 
-#: The version of `run.json`. Its configuration had other names before 2.
-FORMAT = 2
+#: The version of `run.json`.
+FORMAT = 3
 
 
 class Folder:
@@ -28,21 +27,19 @@ class Folder:
         self.run = path / "run.json"
         self.history = path / "history.json"
         self.checkpoint = path / "checkpoint.pt"
-        self.zip = path / "model.zip"
-        self.model = path / "model.safetensors"
         self.agent = path / "agent.safetensors"
         self.tensorboard = path / "tensorboard"
 
     def prepare(self, identity: Mapping[str, Any], *, resume: bool, overwrite: bool) -> dict[str, Any] | None:
-        """Makes sure that a run may write here.
+        """Prepares the folder for a run.
 
         Args:
-            identity: What must be the same in the `run.json` of a run that is resumed, part by part.
-            resume: Goes on with what is there.
-            overwrite: Replaces what is there.
+            identity: Parts of `run.json` that must be equal in a run that is resumed.
+            resume: Whether to continue the run that is there.
+            overwrite: Whether to replace it.
 
         Returns:
-            The `run.json` of the run to go on with, None where there is none.
+            The `run.json` of the run to resume; None where there is none.
 
         Raises:
             TrainingError: There is a run, and neither flag is given; it cannot be read, or was another one; the
@@ -53,7 +50,7 @@ class Folder:
         there = self.read() if self.run.exists() and not overwrite else None
         if there is not None and not resume:
             raise TrainingError(
-                f"{self.run} is there already: go on with it by --resume, replace it by --overwrite, or choose "
+                f"{self.run} is there already: resume it by --resume, replace it by --overwrite, or choose "
                 "another directory."
             )
         if there is not None:
@@ -62,7 +59,7 @@ class Folder:
             self.path.mkdir(parents=True, exist_ok=True)
             if there is None:
                 self._clear()
-            for draft in self.path.glob(".*.tmp"):  # of one that was killed while it wrote
+            for draft in self.path.glob(".*.tmp"):  # of a run that was killed while writing
                 draft.unlink(missing_ok=True)
         except OSError as e:
             raise TrainingError(f"Cannot write into {self.path}: {e.strerror or e}.") from None
@@ -94,9 +91,9 @@ class Folder:
             )
 
     def _clear(self) -> None:
-        """Removes what a run writes, and nothing else that may lie in the folder."""
-        # First what says that there is a run: whoever is killed on the way leaves no run that is half there.
-        for file in (self.run, self.checkpoint, self.history, self.zip, self.model, self.agent):
+        """Removes the files of a run, and nothing else."""
+        # run.json first: without it, what is left after a kill is no run.
+        for file in (self.run, self.checkpoint, self.history, self.agent):
             file.unlink(missing_ok=True)
         for file in self.tensorboard.glob("events.out.tfevents.*"):
             file.unlink(missing_ok=True)
@@ -106,25 +103,14 @@ def read_run(file: pathlib.Path) -> dict[str, Any]:
     """The content of a `run.json`.
 
     Raises:
-        TrainingError: It cannot be read, is none, or is of another version.
-        InvalidInputError: Its seed is none.
+        TrainingError: It cannot be read, or has another format.
     """
     try:
-        content = json_files.read(file)
-    except OSError as e:
-        raise TrainingError(f"Cannot read {file}: {e.strerror}.") from None
-    except ValueError as e:
-        raise TrainingError(f"{file} is damaged: {e}.") from None
-    if not isinstance(content, dict) or not {"method", "seed", "config"} <= content.keys():
-        raise TrainingError(f"{file} is no run.json of a training.")
-    if content.get("format") != FORMAT:
-        versions = content.get("versions")
-        version = versions.get("ikgym") if isinstance(versions, dict) else None
-        raise TrainingError(
-            f"{file} was written by ikgym {version or 'of another version'}, whose options have other names: go on "
-            f'with it by that version, pip install "ikgym=={version or "0.1.0"}", or train anew.'
-        )
-    if not isinstance(content["config"], dict) or not isinstance(content["method"], str):
-        raise TrainingError(f"{file} is damaged: expected a method, and its config by name.")
-    whole_number("seed", content["seed"], at_least=0)
+        content: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
+        if content["format"] != FORMAT:
+            raise ValueError(f"expected format {FORMAT}, got {content['format']!r}")
+        if not {"method", "seed", "config"} <= content.keys():
+            raise ValueError("expected a method, a seed and a config")
+    except (OSError, ValueError, KeyError, TypeError, RecursionError) as e:
+        raise TrainingError(f"Cannot read {file}: {e}. Expected the run.json of a training.") from None
     return content

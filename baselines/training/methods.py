@@ -1,54 +1,85 @@
-"""All methods of training, by name."""
+"""All methods of training by name, and the interface of their trainers."""
 
 from __future__ import annotations
 
+import abc
 import importlib
-from collections.abc import Callable
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any
 
-from baselines.training.config.actor_only import APG, Imitate
+from baselines.training.config.apg import APG
 from baselines.training.config.base import Config
 from baselines.training.config.observe import Observe
-from baselines.training.config.off_policy import SAC, TD3
-from baselines.training.config.ppo import PPO
-from baselines.training.trainer import Trainer
+from baselines.training.config.reinforcement import PPO, SAC, TD3
 from ikgym.exceptions import UnknownNameError
 from ikgym.scenarios import Scenario
 
-#: Makes a trainer from its configuration, the scenario and the seed of the run.
-Maker = Callable[[Config, Scenario, int], Trainer]
+if TYPE_CHECKING:  # the command line is read without PyTorch
+    from torch import nn
 
+    from baselines.agents.files import AgentFile
 
-class Method(NamedTuple):
-    """A method of training.
+#: Metrics of a segment by name.
+SegmentMetrics = dict[str, float]
 
-    Attributes:
-        config: Its configuration, whose docstring says on the command line what the method is.
-        maker: Where its trainer is: module and name.
-    """
-
-    config: type[Config]
-    maker: tuple[str, str]
-
-    def make(self, config: Config, scenario: Scenario, seed: int) -> Trainer:
-        """A trainer."""
-        module, name = self.maker
-        make: Maker = getattr(importlib.import_module(module), name)
-        return make(config, scenario, seed)
-
-
-METHODS: dict[str, Method] = {
-    "ppo": Method(PPO, ("baselines.training.trainers.ppo", "PPOTrainer")),
-    "sac": Method(SAC, ("baselines.training.trainers.off_policy", "SACTrainer")),
-    "td3": Method(TD3, ("baselines.training.trainers.off_policy", "TD3Trainer")),
-    "imitate": Method(Imitate, ("baselines.training.trainers.imitate", "ImitateTrainer")),
-    "apg": Method(APG, ("baselines.training.trainers.apg", "APGTrainer")),
-    "observe": Method(Observe, ("baselines.training.trainers.observe", "ObserveTrainer")),
+#: Configurations by the names of their methods; the docstring of each describes the method on the command line.
+METHODS: dict[str, type[Config]] = {kind.method: kind for kind in (PPO, SAC, TD3, APG, Observe)}
+#: Trainers by the names of their methods: modules and classes, called with configuration, scenario and seed.
+_TRAINERS = {
+    "ppo": ("baselines.training.trainers.sb3", "SB3Trainer"),
+    "sac": ("baselines.training.trainers.sb3", "SB3Trainer"),
+    "td3": ("baselines.training.trainers.sb3", "SB3Trainer"),
+    "apg": ("baselines.training.trainers.apg", "APGTrainer"),
+    "observe": ("baselines.training.trainers.observe", "ObserveTrainer"),
 }
 
 
-def get(name: str) -> Method:
-    """The method of a name.
+class Trainer(abc.ABC):
+    """A training that proceeds segment by segment.
+
+    Before it is constructed and before each segment, :func:`baselines.training.randomness.reseed` seeds the generators
+    of Python, NumPy and PyTorch; all other randomness comes from :func:`baselines.training.randomness.sequence`. A
+    segment depends on nothing but :meth:`state` and its number: a run that was killed and resumed from any earlier
+    state ends with the same weights, bit for bit.
+
+    Attributes:
+        policy: The module whose weights are evaluated and kept.
+        steps: Steps of the environment so far, those of all arms together.
+    """
+
+    policy: nn.Module
+    steps: int
+
+    @abc.abstractmethod
+    def segment(self, number: int) -> SegmentMetrics:
+        """Trains for one segment.
+
+        Args:
+            number: Counted from 0.
+        """
+
+    @abc.abstractmethod
+    def agent(self, training: dict[str, Any] | None = None) -> AgentFile:
+        """The agent with the present weights of `policy`.
+
+        Args:
+            training: How it was trained, as JSON values.
+        """
+
+    @abc.abstractmethod
+    def state(self) -> dict[str, Any]:
+        """All that later segments depend on: tensors, numbers, texts, and lists and dicts of them."""
+
+    @abc.abstractmethod
+    def restore(self, state: dict[str, Any]) -> None:
+        """Continues from a state.
+
+        Args:
+            state: As :meth:`state` returned it, in this process or another.
+        """
+
+
+def get(name: str) -> type[Config]:
+    """The configuration of a method.
 
     Raises:
         UnknownNameError: There is no such method; the message has the nearest name.
@@ -56,3 +87,17 @@ def get(name: str) -> Method:
     if name not in METHODS:
         raise UnknownNameError("method", name, METHODS)
     return METHODS[name]
+
+
+def new_trainer(config: Config, scenario: Scenario, seed: int) -> Trainer:
+    """The trainer of a configuration.
+
+    Args:
+        config: Of any method.
+        scenario: The scenario to train on.
+        seed: Of the run.
+    """
+    module, name = _TRAINERS[config.method]
+    kind: Any = getattr(importlib.import_module(module), name)
+    trainer: Trainer = kind(config, scenario, seed)
+    return trainer

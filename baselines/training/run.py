@@ -1,14 +1,12 @@
 """One run: the training of one agent with one seed, in one folder, which can be killed at any moment and resumed.
 
-| file | what it holds |
+| file | content |
 |---|---|
-| `run.json` | configuration, seed, versions, machine, what it has cost, evaluations, hash of the final weights |
-| `history.json` | a row a segment: its metrics, and the score where there was an evaluation |
-| `checkpoint.pt` | where the run stands, to go on from |
+| `run.json` | configuration, seed, versions, machine, computing time, validations, hash of the final weights |
+| `history.json` | a row for each segment: its metrics, and the score where there was a validation |
+| `checkpoint.pt` | the state to resume from |
 | `tensorboard/` | the history, for TensorBoard |
-| `model.zip` | at the end: the kept model, for Stable-Baselines3; not of ``apg``, which has no critic |
-| `model.safetensors` | likewise: all its weights, for ``--init``; cannot run code |
-| `agent.safetensors` | at the end: the same agent, for :mod:`baselines` |
+| `agent.safetensors` | at the end: the agent, a policy of :mod:`baselines` |
 """
 
 from __future__ import annotations
@@ -28,39 +26,37 @@ import numba
 import numpy as np
 import stable_baselines3
 import torch
+from torch import nn
 from torch.utils.tensorboard import SummaryWriter
 
 import ikgym
+from baselines.agents.files import save_agent
 from baselines.evaluation.machine import describe
 from baselines.files.locks import locked
 from baselines.fingerprints import fingerprint
-from baselines.training import checkpoint, methods
+from baselines.training import checkpoint
 from baselines.training.checkpoint import Checkpoint
 from baselines.training.config.base import Config
 from baselines.training.errors import TrainingError
 from baselines.training.folder import FORMAT, Folder
-from baselines.training.networks import MemoryModel
+from baselines.training.methods import SegmentMetrics, new_trainer
 from baselines.training.randomness import deterministic_torch, reseed
-from baselines.training.score import Score
-from baselines.training.trainer import SegmentMetrics, Trainer
-from baselines.training.trainers.export import export
-from baselines.training.trainers.models import Model, weights_hash
-from ikgym.scenarios import Scenario
+from baselines.training.validation import Score, validate
 
-#: No weight of a network that has learned anything is this large.
+#: Weights above this have diverged.
 LARGEST = 1e9
 
-#: Called after each segment with how many are done, and the last score.
+#: Called after each segment with the number of segments done, and the score where there was a validation.
 OnSegment = Callable[[int, Score | None], object]
 
 
 @dataclasses.dataclass(frozen=True)
 class Result:
-    """What came of a run.
+    """The result of a run.
 
     Args:
-        folder: Where its files are.
-        weights_sha256: Of all weights at the end, see :func:`baselines.training.trainers.models.weights_hash`.
+        folder: The folder of its files.
+        weights_sha256: Of all weights at the end, see :func:`weights_hash`.
         score: Of the kept agent.
     """
 
@@ -84,17 +80,16 @@ def train(
 
     Args:
         config: Of any method.
-        seed: From which all that is random follows.
+        seed: Determines all randomness.
         path: The folder of the run.
-        resume: Goes on with what is in the folder, if there is something.
-        overwrite: Replaces what is in the folder.
-        checkpoint_every: Shortest time between two checkpoints, in [s]; they change nothing but what is lost when the
-            run is killed.
-        command: What to say in `run.json` that the run was begun by.
+        resume: Whether to continue the run in the folder, if there is one.
+        overwrite: Whether to replace the run in the folder.
+        checkpoint_every: Shortest time between two checkpoints, in [s].
+        command: The command that began the run, for `run.json`.
         on_segment: See :data:`OnSegment`.
 
     Raises:
-        IkgymError: What training, validation or files can go wrong with.
+        IkgymError: Training, validation or a file failed.
     """
     with locked(path), deterministic_torch():
         run = _Run(config, seed, Folder(path), command)
@@ -115,18 +110,20 @@ class _Run:
             "status": "running",
             "command": command,
             "config": config.to_json(),
-            "processing": config.processing.to_json(),
-            "scenario": about_scenario(self._scenario),
-            "init": about_file(config.init),
+            "scenario": {
+                "name": self._scenario.name,
+                "steps": self._scenario.steps,
+                "fingerprint": fingerprint(self._scenario),
+            },
             "versions": versions(),
             "machine": describe(),
         }
 
     def begin(self, *, resume: bool, overwrite: bool) -> None:
-        identity = {part: self._about[part] for part in ("method", "seed", "config", "scenario", "init", "versions")}
+        identity = {part: self._about[part] for part in ("method", "seed", "config", "scenario", "versions")}
         there = self._folder.prepare(identity, resume=resume, overwrite=overwrite)
         reseed(self._seed, None)
-        self._trainer: Trainer = methods.get(self._config.method).make(self._config, self._scenario, self._seed)
+        self._trainer = new_trainer(self._config, self._scenario, self._seed)
         if there is not None:
             self._about["command"] = there.get("command", self._about["command"])
             if self._folder.checkpoint.exists():
@@ -141,14 +138,14 @@ class _Run:
                 self._note(0, {}, board)
                 self._count()
             saved = -math.inf
-            while self._at.segments < self._trainer.segments:
+            while self._at.segments < self._config.segments:
                 number = self._at.segments
                 reseed(self._seed, number)
                 metrics = self._segment(number)
                 self._at.segments = number + 1
                 score = self._note(number + 1, metrics, board)
                 self._count()
-                if self._at.segments == self._trainer.segments or time.monotonic() - saved >= checkpoint_every:
+                if self._at.segments == self._config.segments or time.monotonic() - saved >= checkpoint_every:
                     self._save()
                     saved = time.monotonic()
                 if on_segment is not None:
@@ -156,31 +153,30 @@ class _Run:
         return self._finish()
 
     def _segment(self, number: int) -> SegmentMetrics:
-        """A segment of the trainer, and a clear message where its weights diverge."""
+        """A segment of the trainer, with a clear message where its weights diverge."""
         try:
             metrics = self._trainer.segment(number)
         except (ValueError, RuntimeError):
-            if _finite(self._trainer.model):
+            if _finite(self._trainer.policy):
                 raise
         else:
-            if _finite(self._trainer.model):
+            if _finite(self._trainer.policy):
                 return metrics
         raise TrainingError(
-            f"The weights were no longer finite in segment {number + 1}: try a lower learning rate, or another seed."
+            f"The weights diverged in segment {number + 1}: try a lower learning rate, or another seed."
         )
 
     def _note(self, done: int, metrics: SegmentMetrics, board: SummaryWriter) -> Score | None:
-        """Adds a row to the history, with a score where one is due."""
+        """Adds a row to the history, with a score where a validation is due."""
         config, trainer = self._config, self._trainer
         row: dict[str, Any] = {"segment": done, "steps": trainer.steps}
         row.update({name: value for name, value in metrics.items() if math.isfinite(value)})
         score = None
-        if done % config.evaluate_every == 0 or done == trainer.segments:
-            model = trainer.model
-            score = trainer.score(config.validation_episodes)
+        if done % config.evaluate_every == 0 or done == config.segments:
+            score = validate(trainer.agent(), self._scenario, config.validation_episodes)
             row["validation"] = score.to_json()
             if self._at.best is None or score.cost < self._at.best["score"]["cost"]:
-                weights = {name: tensor.clone() for name, tensor in model.policy.state_dict().items()}
+                weights = {name: tensor.clone() for name, tensor in trainer.policy.state_dict().items()}
                 self._at.best = {"segment": done, "score": score.to_json(), "policy": weights}
         self._at.history.append(row)
         for name, value in [*row.items(), *(score.to_json() if score else {}).items()]:
@@ -189,21 +185,22 @@ class _Run:
         return score
 
     def _finish(self) -> Result:
-        """Writes the agent, and what came of the run."""
-        model, config = self._trainer.model, self._config
-        final = weights_hash(model)
-        kept = {"segment": self._trainer.segments, "by": "end"}
+        """Writes the agent and the result of the run."""
+        policy, config = self._trainer.policy, self._config
+        final = weights_hash(policy)
+        kept = {"segment": self._config.segments, "by": "end"}
         last = self._at.history[-1]["validation"]
         best = self._at.best
         if config.keep_best and best is not None:
-            model.policy.load_state_dict(best["policy"])
+            policy.load_state_dict(best["policy"])
             kept, last = {"segment": best["segment"], "by": "validation"}, best["score"]
         self._about["status"] = "finished"
         self._about["weights_sha256"] = final
-        self._about["kept"] = {**kept, "weights_sha256": weights_hash(model), "validation": last}
+        self._about["kept"] = {**kept, "weights_sha256": weights_hash(policy), "validation": last}
         content = self._content()
-        export(self._trainer, config.activation, self._folder, self._scenario, content)
-        # Killed between its last checkpoint and the history that belongs to it, a run lacks the last row.
+        training = {name: content[name] for name in ("method", "seed", "training", "kept", "versions")}
+        save_agent(self._folder.agent, self._trainer.agent(training))
+        # A run that was killed after its last checkpoint and before its history lacks the last row.
         self._folder.write_json(self._folder.history, self._at.history)
         self._folder.write_json(self._folder.run, content)
         return Result(self._folder.path, final, Score(**last))
@@ -215,7 +212,7 @@ class _Run:
         self._write_about()
 
     def _count(self) -> None:
-        """Adds what has passed since the last call to the run's times."""
+        """Adds the time since the last call to the times of the run."""
         clock, core = time.monotonic(), time.process_time()
         self._at.wall_seconds += clock - self._clock
         self._at.core_seconds += core - self._core
@@ -243,7 +240,7 @@ class _Run:
 
     @contextlib.contextmanager
     def _board(self) -> Iterator[SummaryWriter]:
-        """TensorBoard's file; what a killed run had written behind its checkpoint is taken back."""
+        """The file of TensorBoard, without the rows that a killed run wrote after its last checkpoint."""
         gone_on = bool(self._at.history)
         board = SummaryWriter(str(self._folder.tensorboard), purge_step=self._trainer.steps + 1 if gone_on else None)
         try:
@@ -252,28 +249,8 @@ class _Run:
             board.close()
 
 
-def about_scenario(scenario: Scenario) -> dict[str, Any]:
-    """Which scenario it is, in `run.json`."""
-    return {"name": scenario.name, "steps": scenario.steps, "fingerprint": fingerprint(scenario)}
-
-
-def about_file(file: pathlib.Path | None) -> dict[str, Any] | None:
-    """Which file it is, in `run.json`.
-
-    Raises:
-        TrainingError: It cannot be read.
-    """
-    if file is None:
-        return None
-    try:
-        with file.open("rb") as stream:
-            return {"file": str(file), "sha256": hashlib.file_digest(stream, "sha256").hexdigest()}
-    except OSError as e:
-        raise TrainingError(f"Cannot read {file}: {e.strerror or e}.") from None
-
-
 def versions() -> dict[str, str]:
-    """The versions that a result depends on, in `run.json`."""
+    """The versions that a result depends on."""
     return {
         "ikgym": ikgym.__version__,
         "python": platform.python_version(),
@@ -285,6 +262,16 @@ def versions() -> dict[str, str]:
     }
 
 
-def _finite(model: Model | MemoryModel) -> bool:
-    """Whether all weights are numbers that can still be added up."""
-    return all(bool((parameter.detach().abs() < LARGEST).all()) for parameter in model.policy.parameters())
+def weights_hash(policy: nn.Module) -> str:
+    """SHA-256 of all weights of a module."""
+    digest = hashlib.sha256()
+    for name, tensor in sorted(policy.state_dict().items()):
+        array = np.ascontiguousarray(tensor.detach().cpu().numpy())
+        digest.update(f"{name} {array.dtype} {array.shape} ".encode())
+        digest.update(array.tobytes())
+    return digest.hexdigest()
+
+
+def _finite(policy: nn.Module) -> bool:
+    """Whether no weight has diverged."""
+    return all(bool((parameter.detach().abs() < LARGEST).all()) for parameter in policy.parameters())

@@ -1,4 +1,4 @@
-"""Several seeds in one call: one run each, in processes of their own."""
+"""Several seeds in one call: one run each, in separate processes or on a cluster."""
 
 from __future__ import annotations
 
@@ -10,23 +10,26 @@ import sys
 import traceback
 import uuid
 from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
 from tqdm import tqdm
 
 from baselines.files import write
 from baselines.training.config.base import Config
-from baselines.training.score import Score
 from baselines.workers import TRIES, WorkerError, Workers, finished
 from ikgym.exceptions import IkgymError
+
+if TYPE_CHECKING:  # the command line is read without agents
+    from baselines.training.validation import Score
 
 
 @dataclasses.dataclass(frozen=True)
 class SeedRuns:
-    """What all seeds have in common.
+    """The options that all seeds have in common.
 
     Args:
         config: Of any method.
-        out: The folder; a run with seed N has ``seed-N`` in it.
+        out: The folder; the run with seed N has the folder ``seed-N`` in it.
         resume: See :func:`baselines.training.run.train`.
         overwrite: See there.
         checkpoint_every: See there.
@@ -41,19 +44,19 @@ class SeedRuns:
     command: str = ""
 
     def folder(self, seed: int) -> pathlib.Path:
-        """Where a run goes."""
+        """The folder of a run."""
         return self.out / f"seed-{seed}"
 
 
 @dataclasses.dataclass(frozen=True)
 class SeedResult:
-    """What came of a seed.
+    """The result of a seed.
 
     Args:
-        seed: Which.
+        seed: The seed.
         score: Of the kept agent; None where the run failed.
         weights_sha256: Of the final weights; empty where it failed.
-        error: Why it failed; empty where it did not.
+        error: Why it failed; empty otherwise.
     """
 
     seed: int
@@ -62,8 +65,8 @@ class SeedResult:
     error: str = ""
 
 
-#: What takes memory.
-LESS_MEMORY = "Choose fewer arms (--n-envs), a smaller --buffer-size, --batch-size or network (--hidden)."
+#: The advice where memory is short.
+LESS_MEMORY = "Choose fewer arms (--n-envs), a smaller network (--hidden), or --set buffer_size=…"
 
 
 class Bar:
@@ -84,7 +87,6 @@ class Bar:
             file=sys.stderr,
             unit="segment",
             dynamic_ncols=True,
-            # A log file has no cursor to go back with.
             mininterval=0.1 if sys.stderr.isatty() else 10.0,
         )
         self._seed = seed
@@ -105,29 +107,29 @@ class Bar:
 def train_seeds(runs: SeedRuns, seeds: Sequence[int], *, workers: Workers, progress: bool) -> list[SeedResult]:
     """Trains one agent a seed.
 
-    One seed is trained in this process; several in processes of their own, so that a seed that fails or dies takes no
-    other with it. Nodes of a cluster write into the folder of the runs, which all of them see: a seed whose node is
-    lost is resumed elsewhere from its last checkpoint.
+    One seed is trained in this process, several in separate ones, so that a seed that fails does not end the others.
+    On a cluster, all nodes write into one shared folder: a seed whose node is lost is resumed elsewhere from its last
+    checkpoint.
 
     Args:
-        runs: What they have in common.
+        runs: The common options.
         seeds: One run each.
-        workers: Who trains.
+        workers: Processes of this machine or of a cluster.
         progress: Whether to show bars on stderr.
 
     Returns:
-        What came of each, in the order of the seeds.
+        The results, in the order of the seeds.
 
     Raises:
         ClusterError: There is no cluster.
     """
-    lines = {seed: line if progress and workers.cluster is None else None for line, seed in enumerate(seeds)}
-    if workers.cluster is None and len(seeds) == 1:
-        return [train_seed(Seed(runs, seeds[0], line=lines[seeds[0]]))]
     far = workers.cluster is not None
+    lines = {seed: line if progress and not far else None for line, seed in enumerate(seeds)}
+    if len(seeds) == 1 and not far:
+        return [train_seed(Seed(runs, seeds[0], line=lines[seeds[0]]))]
     shared = dataclasses.replace(runs, out=runs.out.absolute()) if far else runs
     results = dict[int, SeedResult]()
-    tries = TRIES if far else 1  # a process of this machine that dies does not do so by chance
+    tries = TRIES if far else 1  # on one machine a second attempt would fail again
     with _marked(shared.out, far) as mark:
         every = [Seed(shared, seed, mark, lines[seed]) for seed in seeds]
         for one, future in finished(attempt, every, workers, tries=tries):
@@ -140,12 +142,12 @@ def train_seeds(runs: SeedRuns, seeds: Sequence[int], *, workers: Workers, progr
 
 @dataclasses.dataclass(frozen=True)
 class Seed:
-    """What a worker does.
+    """The task of a worker.
 
     Args:
-        runs: What all seeds have in common.
-        seed: Which.
-        mark: The name of a file in the folder of the runs that a worker of a cluster has to see; empty elsewhere.
+        runs: The common options.
+        seed: The seed.
+        mark: The name of a file that shows a worker of a cluster that the folder is shared; empty on one machine.
         line: See :class:`Bar`.
     """
 
@@ -157,7 +159,7 @@ class Seed:
 
 def train_seed(one: Seed) -> SeedResult:
     """Trains the agent of a seed, in the process of a worker."""
-    # PyTorch takes seconds to load, which the parent of processes has no need to do.
+    # PyTorch takes seconds to load, and the parent process does not need it.
     from baselines.training.run import train
 
     runs, seed = one.runs, one.seed
@@ -192,7 +194,7 @@ def train_seed(one: Seed) -> SeedResult:
 
 
 def attempt(one: Seed) -> SeedResult:
-    """Trains the agent of a seed; whatever goes wrong, other seeds go on."""
+    """The same, with any error as a result, so that other seeds continue."""
     try:
         return train_seed(one)
     except Exception as e:
@@ -202,7 +204,7 @@ def attempt(one: Seed) -> SeedResult:
 
 @contextlib.contextmanager
 def _marked(folder: pathlib.Path, wanted: bool) -> Iterator[str]:
-    """A file by which workers tell that they see the folder of this machine; its name."""
+    """The name of a file that exists meanwhile in a folder; empty if not wanted."""
     if not wanted:
         yield ""
         return

@@ -1,6 +1,6 @@
-"""How good an agent is on episodes of the validation split, on which it is not trained, and no score is published.
+"""The score of an agent on episodes of the validation split, which are used neither for training nor for publication.
 
-``python -m baselines.training.validation --update`` computes the reference costs anew.
+``python -m baselines.training.validation`` computes the reference costs anew, in some minutes.
 """
 
 from __future__ import annotations
@@ -8,51 +8,65 @@ from __future__ import annotations
 import dataclasses
 import functools
 import json
-import math
 import pathlib
-import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import tyro
 
 from baselines import registry
-from baselines.agents.features import Features
-from baselines.agents.protocols import Transform
-from baselines.episodes import Act, add_up, rollouts
-from baselines.episodes import play as play_episodes
+from baselines.agents.files import AgentFile
+from baselines.agents.policy import Agent
+from baselines.agents.recurrent.policy import RecurrentPolicy
+from baselines.agents.recurrent.processing import Recurrent
+from baselines.episodes import add_up, play, rollouts
 from baselines.evaluation.metrics import lost
 from baselines.evaluation.summary import geometric_mean
 from baselines.files import write
 from baselines.fingerprints import fingerprint
-from baselines.policy import SolverPolicy
+from baselines.policy import Problem
 from baselines.spec import parse_policy
-from baselines.training.environment.view import View
-from baselines.training.score import Score
 from ikgym import scenarios, tasks
 from ikgym.outcome import observation
 from ikgym.scenarios import Preview, Scenario
 from ikgym.simulation import Outcome
 from ikgym.validation import FloatArray
 
-#: Where the reference costs are kept, those of which policy, and of which scenario, tasks, and how many episodes.
+#: The file of the reference costs, the policy that they are of, and the scenario, tasks and number of episodes.
 FILE = pathlib.Path(__file__).with_name("validation_reference.json")
 #: All initial guesses are tried in the first call, which takes longer there than real time, and costs less.
 POLICY = "rhc_foresight:horizon=1501,move_blocks=48,starts=64,start_steps=0,recovery_steps=0"
 SCENARIO, TASKS, EPISODES = "varga7-random", ("skew", "pose"), 64
-#: Digits of a cost that are kept.
+#: Digits of a cost in the file.
 DIGITS = 7
 
-#: From features of shape (N, f) to the deterministic outputs of an agent's network, of shape (N, n).
-Actor = Callable[[Features], npt.NDArray[np.float32]]
 
+@dataclasses.dataclass(frozen=True)
+class Score:
+    """The performance of an agent on the validation split.
 
-def reference_policy(scenario: Scenario) -> SolverPolicy:
-    """The policy whose costs are the reference."""
-    name, parameters = parse_policy(POLICY)
-    return registry.make(name, scenario, **parameters)
+    Args:
+        episodes: Number of episodes.
+        cost: Geometric mean of their costs.
+        cost_ratio: Geometric mean of their costs over those of the reference; None where there is no reference.
+        worst: Largest of these ratios; of the costs where there is no reference.
+        lost: Share of the episodes in which the arm lost track, see :func:`baselines.evaluation.metrics.lost`.
+        position_error_max_mm: Mean over the episodes of their largest position error, in [mm].
+        orientation_error_max_mrad: The same of the orientation, in [mrad]; None where the task has none.
+    """
+
+    episodes: int
+    cost: float
+    cost_ratio: float | None
+    worst: float
+    lost: float
+    position_error_max_mm: float
+    orientation_error_max_mrad: float | None = None
+
+    def to_json(self) -> dict[str, Any]:
+        """The fields by name."""
+        return dataclasses.asdict(self)
 
 
 def validation_seeds(scenario: Scenario, episodes: int) -> tuple[int, ...]:
@@ -61,36 +75,49 @@ def validation_seeds(scenario: Scenario, episodes: int) -> tuple[int, ...]:
     return scenarios.seeds("validation", episodes if random else 1)
 
 
-def validate(actor: Actor, processing: Transform, scenario: Scenario, episodes: int) -> Score:
+def validate(agent: AgentFile, scenario: Scenario, episodes: int) -> Score:
     """Plays episodes of the validation split with an agent.
 
     Args:
-        actor: The agent's.
-        processing: What the agent sees, and what the outputs of its network mean.
-        scenario: What is to be tracked.
-        episodes: How many; a deterministic scenario has one.
+        agent: The agent.
+        scenario: The scenario.
+        episodes: Number of episodes; a deterministic scenario has one.
     """
-    seeds = validation_seeds(scenario, episodes)
-    return score_of(scenario, seeds, *play(actor, processing, scenario, seeds))
+    kind: Any = RecurrentPolicy if isinstance(agent.processing, Recurrent) else Agent
+    policy = kind(Problem.of(scenario), given=agent)
+    return score(policy, scenario, episodes, policy.preview)
 
 
-def score_of(
-    scenario: Scenario, seeds: Sequence[int], costs: FloatArray, errors: FloatArray, angles: FloatArray
-) -> Score:
-    """The score of episodes that were played.
+def score(policy: Any, scenario: Scenario, episodes: int, preview: Preview) -> Score:
+    """Plays episodes of the validation split with a policy, all of them in step.
 
     Args:
-        scenario: What was tracked.
-        seeds: The reset seeds.
-        costs: Of the episodes. Shape (N,).
-        errors: The largest position errors in [m]. Shape (N,).
-        angles: The largest orientation errors in [rad], 0 where the scenario has no orientation. Shape (N,).
+        policy: Any object with the `predict` of Stable-Baselines3 for observations of the environment.
+        scenario: The scenario.
+        episodes: Number of episodes; a deterministic scenario has one.
+        preview: Steps ahead that the policy is shown.
     """
-    reference = reference_costs(fingerprint(scenario), seeds)
-    ratios = costs if reference is None else costs / reference
+    seeds, state = validation_seeds(scenario, episodes), None
+    rows, starting = len(seeds), np.ones(len(seeds), dtype=np.bool_)
+
+    def act(out: Outcome) -> npt.NDArray[Any]:
+        nonlocal state
+        action, state = policy.predict(observation(out), state, starting, deterministic=True)
+        starting[:] = False
+        actions: npt.NDArray[Any] = action
+        return actions
+
+    costs, errors, angles = np.empty((rows, scenario.steps)), np.zeros(rows), np.zeros(rows)
+    for k, out in enumerate(play(scenario, seeds, act, preview=preview)):
+        costs[:, k] = out.tracking_cost + out.velocity_cost
+        errors = np.maximum(errors, out.position_error)
+        if scenario.task.has_orientation:
+            angles = np.maximum(angles, out.orientation_error)
+    total, reference = add_up(costs), reference_costs(fingerprint(scenario), seeds)
+    ratios = total if reference is None else total / reference
     return Score(
-        episodes=len(seeds),
-        cost=geometric_mean(costs.tolist()),
+        episodes=rows,
+        cost=geometric_mean(total.tolist()),
         cost_ratio=None if reference is None else geometric_mean(ratios.tolist()),
         worst=float(ratios.max()),
         lost=float(np.mean([lost(distance, angle) for distance, angle in zip(errors, angles, strict=True)])),
@@ -99,55 +126,15 @@ def score_of(
     )
 
 
-def play(actor: Actor, processing: Transform, scenario: Scenario, seeds: Sequence[int]) -> tuple[FloatArray, ...]:
-    """Plays episodes in step, as :func:`baselines.episodes.rollouts` does.
-
-    Args:
-        actor: The agent's.
-        processing: What the agent sees, and what the outputs of its network mean.
-        scenario: What is to be tracked.
-        seeds: The reset seeds.
-
-    Returns:
-        Costs of the episodes, the largest position errors in [m], and the largest orientation errors in [rad], 0
-        where the scenario has no orientation. Shapes (N,).
-    """
-    view, rows = View(processing, scenario), len(seeds)
-    starting = np.ones(rows, dtype=np.bool_)
-
-    def act(out: Outcome) -> npt.NDArray[Any]:
-        features = view.see(observation(out), starting)
-        starting[:] = False
-        return view.act(actor(features))
-
-    return played(scenario, seeds, act, view.preview)
-
-
-def played(scenario: Scenario, seeds: Sequence[int], act: Act, preview: Preview) -> tuple[FloatArray, ...]:
-    """What :func:`play` returns, of anybody's actions.
-
-    Args:
-        scenario: What is to be tracked.
-        seeds: The reset seeds.
-        act: Called before each step with what all arms show.
-        preview: Steps ahead that they show.
-    """
-    rows = len(seeds)
-    costs, errors, angles = np.empty((rows, scenario.steps)), np.zeros(rows), np.zeros(rows)
-    for k, out in enumerate(play_episodes(scenario, seeds, act, preview=preview)):
-        costs[:, k] = out.tracking_cost + out.velocity_cost
-        errors = np.maximum(errors, out.position_error)
-        if scenario.task.has_orientation:
-            angles = np.maximum(angles, out.orientation_error)
-    return add_up(costs), errors, angles
-
-
 def reference_costs(digest: str, seeds: Sequence[int]) -> FloatArray | None:
     """The costs of the reference policy on some episodes, None where they are not known.
 
     Args:
         digest: The fingerprint of the scenario.
-        seeds: The reset seeds. Shape of what is returned: (N,).
+        seeds: The reset seeds.
+
+    Returns:
+        Shape (N,).
     """
     known: dict[int, float] = {}
     for record in _records():
@@ -162,19 +149,11 @@ def _records() -> list[dict[str, Any]]:
     return content
 
 
-def update() -> None:
-    """Computes the costs of the reference anew, and writes them down."""
-    records, seeds = [], scenarios.seeds("validation", EPISODES)
-    for task in TASKS:
-        scenario = scenarios.get(SCENARIO).replace(task=tasks.get(task))
-        episodes = rollouts(scenario, reference_policy(scenario), seeds)
-        costs = [float(np.sum(e.tracking_cost + e.velocity_cost)) for e in episodes]
-        records.append(record_of(scenario, seeds, costs))
-    write(FILE, (json.dumps(records, indent=1) + "\n").encode())
-
-
-def record_of(scenario: Scenario, seeds: Sequence[int], costs: Sequence[float]) -> dict[str, Any]:
-    """The costs of the reference, as they are written down."""
+def record_of(scenario: Scenario, seeds: Sequence[int]) -> dict[str, Any]:
+    """The costs of the reference policy on some episodes, as the file has them."""
+    name, parameters = parse_policy(POLICY)
+    episodes = rollouts(scenario, registry.make(name, scenario, **parameters), seeds)
+    costs = [float(np.sum(e.tracking_cost + e.velocity_cost)) for e in episodes]
     return {
         "scenario": scenario.name,
         "task": scenario.task.name,
@@ -185,38 +164,7 @@ def record_of(scenario: Scenario, seeds: Sequence[int], costs: Sequence[float]) 
     }
 
 
-@dataclasses.dataclass(frozen=True)
-class Options:
-    """What the command line takes."""
-
-    update: bool = False
-    """Compute the costs anew, which takes some minutes, and write them down."""
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """The command line: prints the mean costs of the reference, or computes them anew.
-
-    Args:
-        arguments: What stands behind the command; taken from the process if left out.
-
-    Returns:
-        The exit code, 0.
-    """
-    options = tyro.cli(
-        Options,
-        prog="python -m baselines.training.validation",
-        description=f"Prints the mean cost of {POLICY} on the first {EPISODES} validation episodes of {SCENARIO}: the "
-        "costs of agents in training are divided by those of it.",
-        args=arguments,
-    )
-    if options.update:
-        update()
-        _records.cache_clear()
-    for record in _records():
-        mean, where = math.exp(float(np.mean(np.log(record["costs"])))), f"{record['scenario']} ({record['task']})"
-        print(f"{record['policy']} on {where}: geometric mean of {len(record['costs'])} costs {mean:.6g}")
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    _scenario, _seeds = scenarios.get(SCENARIO), scenarios.seeds("validation", EPISODES)
+    _found = [record_of(_scenario.replace(task=tasks.get(task)), _seeds) for task in TASKS]
+    write(FILE, (json.dumps(_found, indent=1) + "\n").encode())

@@ -84,6 +84,28 @@ def feature_row(kind, prismatic, axis, q, ahead, speed, remaining, out):
 
 
 @kernel
+def context_rows(kind, prismatic, axis, dt, offsets, q, nominal, remaining, out, speed):
+    """:func:`feature_row` of N arms: posture, twists ahead, their speed, and steps left.
+
+    Args:
+        kind: Of task coordinates.
+        prismatic: Shape (n,).
+        axis: Shape (3,).
+        dt: Δt in [s].
+        offsets: Steps ahead at which the reference is seen. Shape (p,).
+        q: Shape (N, n).
+        nominal: At the offsets. Shape (N, p, m).
+        remaining: Shape (N, 1).
+        out: Receives the features in its first columns. Shape (N, f).
+        speed: Receives the speeds s. Shape (N,).
+    """
+    error, ahead = np.empty(6), np.empty((offsets.shape[0] - 1, twist_size(kind)))
+    for row in range(q.shape[0]):
+        speed[row] = mean_twists(kind, dt, offsets, nominal[row], error, ahead)
+        feature_row(kind, prismatic, axis, q[row], ahead, speed[row], remaining[row, 0], out[row])
+
+
+@kernel
 def command_unit(kind, lead, furthest, pose, nominal, speed, error, due):
     """The twist that is due, as a share of itself and a little more, and the unit of velocities that goes with it.
 

@@ -1,21 +1,22 @@
-"""Agents with random numbers in them, for tests."""
+"""Agents with random weights, for tests."""
 
 from __future__ import annotations
 
 import itertools
+import pathlib
 
 import numpy as np
 
-from baselines.agents.features import Processing
-from baselines.agents.files import save_agent
+from baselines.agents.files import agent_of, save_agent
 from baselines.agents.network import Network
+from baselines.agents.relative import Relative
 from baselines.policy import Problem
 
 OFFSETS = (1, 2, 5, 20)
 
 
-def network(sizes, activation="silu", squash="clip", *, zero=False, seed=0):
-    """A network whose answers fill the box; with zero, one that answers zero."""
+def network(sizes, activation="silu", squash="linear", *, zero=False, seed=0):
+    """A network with outputs of about 1; with zero, outputs are 0."""
     rng = np.random.default_rng(seed)
     weights = [rng.normal(size=(o, i)) / np.sqrt(i) for i, o in itertools.pairwise(sizes)]
     biases = [rng.normal(0.0, 0.1, size=size) for size in sizes[1:]]
@@ -25,20 +26,14 @@ def network(sizes, activation="silu", squash="clip", *, zero=False, seed=0):
     return Network(tuple(weights), tuple(biases), activation, squash)
 
 
-def write_agent(
-    file,
-    scenario,
-    base_policy=None,
-    *,
-    zero=False,
-    hidden=(16, 9),
-    seed=0,
-    offsets=OFFSETS,
-    null_space=None,
-    training=None,
-):
-    """Writes an agent that suits a scenario, and gives its path as a text."""
-    processing = Processing(offsets=offsets, base_policy=base_policy, null_space=null_space)
-    sizes = (processing.size(Problem.of(scenario)), *hidden, scenario.joints)
-    save_agent(file, network(sizes, zero=zero, seed=seed), processing, scenario, training)
+def random_agent(scenario, *, zero=False, hidden=(16, 9), seed=0, training=None, processing=None):
+    """An agent in memory that fits a scenario."""
+    processing, problem = processing or Relative(OFFSETS, furthest=5.0, largest=2.0), Problem.of(scenario)
+    sizes = (processing.size(problem), *hidden, processing.outputs(problem))
+    return agent_of(network(sizes, zero=zero, seed=seed), processing, scenario, training)
+
+
+def write_agent(file, scenario, **options):
+    """Writes an agent that fits a scenario, and returns its path as a text."""
+    save_agent(pathlib.Path(file), random_agent(scenario, **options))
     return str(file)

@@ -10,17 +10,15 @@ import os
 import pathlib
 import tempfile
 
-import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from baselines.agents.features import Processing
-from baselines.agents.files import parse_agent, save_agent
-from baselines.agents.network import Network
-from baselines.policy import Problem
+from baselines.agents.files import load_agent
+from baselines.agents.relative import Relative
 from ikgym import scenarios
 from ikgym.exceptions import IkgymError
+from tests.baselines.random_agents import write_agent
 
 EXAMPLES = int(os.environ.get("IKGYM_FUZZ", "25"))
 #: What takes the place of something in a file.
@@ -53,20 +51,14 @@ def tried(name, content, read):
 
 @pytest.fixture(scope="module")
 def agent(tmp_path_factory):
-    scenario = scenarios.get("varga7-fast")
-    processing = Processing((1, 5))
-    sizes = processing.size(Problem.of(scenario)), scenario.joints
-    weights, bias = np.ones(sizes[::-1], np.float32), np.zeros(sizes[1], np.float32)
-    file = tmp_path_factory.mktemp("agent") / "agent.safetensors"
-    save_agent(file, Network((weights,), (bias,), "tanh", "clip"), processing, scenario)
-    return file.read_bytes()
+    file = write_agent(tmp_path_factory.mktemp("agent") / "it.safetensors", scenarios.get("varga7-fast"), hidden=(2,))
+    return pathlib.Path(file).read_bytes()
 
 
 @settings(max_examples=EXAMPLES)
 @given(cuts=BYTES)
 def test_agents(agent, cuts):
-    with contextlib.suppress(IkgymError):
-        parse_agent("X", spliced(agent, cuts))
+    tried("it.safetensors", spliced(agent, cuts), lambda file: load_agent(file, (Relative,)))
 
 
 @settings(max_examples=EXAMPLES)

@@ -18,7 +18,7 @@ from stable_baselines3.common.vec_env import DummyVecEnv
 
 import baselines
 import ikgym
-from baselines.agents.shipped import ShippedAgent
+from baselines.agents.policy import AgentAlone
 from baselines.policy import Batch, Problem, Solution, SolverPolicy, statuses
 from baselines.policy.compiled import CompiledPolicy
 from baselines.registry import get
@@ -67,7 +67,7 @@ def policy_for(name, on):
             return None
         # An agent suits the arms of its size, and only skew coordinates have an ambiguity to resolve.
         suits = name != "full_orientation" or scenario(on).task.name == "skew"
-        if suits and not (issubclass(get(name), ShippedAgent) or (name, on) in UNSUITED):
+        if suits and not (issubclass(get(name), AgentAlone) or (name, on) in UNSUITED):
             assert name in HANDED_THE_PATH
             assert scenario(on).nominal_joint_path(1) is None
         return None

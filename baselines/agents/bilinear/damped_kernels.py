@@ -78,26 +78,6 @@ def held_rows(kind, chain, damping, q, output, out):
 
 
 @kernel
-def with_matrix(w, output):
-    """Outputs of a network that gives no G, and those of one that gives G = 0.
-
-    Args:
-        w: Components of a twist.
-        output: h, ln λ and ln U. Shape (B, 2 n + 1).
-
-    Returns:
-        The rows of G and h, joint by joint, then ln λ and ln U. Shape (B, n (w + 1) + 1 + n).
-    """
-    n = (output.shape[1] - 1) // 2
-    out = np.zeros((output.shape[0], n * (w + 1) + 1 + n), output.dtype)
-    for row in range(output.shape[0]):
-        for j in range(n):
-            out[row, j * (w + 1) + w] = output[row, j]
-        out[row, n * (w + 1) :] = output[row, n:]
-    return out
-
-
-@kernel
 def held_gradient_rows(kind, chain, damping, q, output, by_held, by_output, by_q):
     """From the gradient by what :func:`held_rows` gives to those by what it is given, row by row.
 

@@ -6,11 +6,12 @@ import dataclasses
 import itertools
 import math
 from collections.abc import Mapping
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
+import numpy.typing as npt
 
-from baselines.agents.network import Singles, multiply_add
+from baselines.agents.network import Singles, check_tensors, multiply_add
 from ikgym.exceptions import InvalidInputError
 from ikgym.jit import inlined, kernel
 from ikgym.validation import Frozen
@@ -34,30 +35,41 @@ class GatedNetwork(Frozen):
     """
 
     sizes: tuple[int, ...]
-    tensors: Mapping[str, Singles]
+    tensors: dict[str, Singles]
 
     #: All tensors in one row, matrices transposed, and the sizes, as the kernel takes them.
     constants: tuple[object, ...] = dataclasses.field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         expected = shapes(self.sizes)
-        got = {name: tensor.shape for name, tensor in self.tensors.items()}
-        if got != expected or any(tensor.dtype != np.float32 for tensor in self.tensors.values()):
-            raise InvalidInputError(f"expected float32 tensors of the shapes {expected}, got {got}")
-        if not all(np.isfinite(tensor).all() for tensor in self.tensors.values()):
-            raise InvalidInputError("expected finite weights, got NaN or infinity")
-        packed = np.concatenate([self.tensors[name].T.ravel() for name in expected])
+        check_tensors(self.tensors, expected)
+        tensors = {name: self.tensors[name] for name in expected}
+        packed = np.concatenate([tensor.T.ravel() for tensor in tensors.values()])
         packed.flags.writeable = False
+        object.__setattr__(self, "tensors", tensors)
         object.__setattr__(self, "constants", (packed, np.array(self.sizes)))
+
+    def to_json(self) -> dict[str, Any]:
+        """The sizes."""
+        return {"sizes": list(self.sizes)}
+
+    @classmethod
+    def from_json(cls, about: Mapping[str, Any], tensors: Mapping[str, npt.NDArray[Any]]) -> Self:
+        """The inverse of :meth:`to_json`, with the tensors.
+
+        Raises:
+            InvalidInputError: They do not fit together.
+        """
+        return cls(tuple(int(size) for size in about["sizes"]), dict(tensors))
 
     @property
     def units(self) -> int:
-        """Numbers that are remembered."""
+        """The size of its hidden state."""
         return sum(self.sizes[1:-1])
 
     @classmethod
     def quiet(cls, sizes: tuple[int, ...]) -> Self:
-        """One whose outputs are all 0."""
+        """A network whose outputs are all 0."""
         return cls(sizes, {name: np.zeros(shape, np.float32) for name, shape in shapes(sizes).items()})
 
 

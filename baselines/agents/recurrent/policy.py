@@ -4,25 +4,26 @@ from __future__ import annotations
 
 import dataclasses
 import os
-import pathlib
 from collections.abc import Mapping
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from baselines.agents.files import AgentFile
 from baselines.agents.network import Singles
-from baselines.agents.policy import check_arm
-from baselines.agents.recurrent.files import RecurrentFile, load_recurrent
+from baselines.agents.policy import FOLDER, agent_at, check_scenario
 from baselines.agents.recurrent.kernels import remember_rows
-from baselines.agents.shipped import FOLDER
-from baselines.files import ResultsError
+from baselines.agents.recurrent.network import GatedNetwork
+from baselines.agents.recurrent.processing import Recurrent
 from baselines.policy import Batch
 from baselines.solvers.adaptive.corrected import Corrected
 from baselines.solvers.adaptive.measurements import Measurement
 from baselines.spec import parse_policy
+from baselines.wrapper import policies_in
+from ikgym import task_kernels
 from ikgym.exceptions import InvalidInputError
-from ikgym.validation import FloatArray
+from ikgym.validation import FloatArray, flag
 
 #: The agent that comes with the package.
 SHIPPED = "agent_memory"
@@ -65,7 +66,7 @@ class RecurrentPolicy(Corrected):
         path: The file of the agent; the one that comes with the package if left out.
         any_arm: Whether it may play on an arm that it was not trained for.
         hash: The first twelve digits of the agent's hash, to insist on; in results those of the agent that played.
-        given: An agent that is in no file yet.
+        given: An agent in memory, in place of a file.
 
     Raises:
         ResultsError: There is no such file, or it cannot be used.
@@ -80,9 +81,10 @@ class RecurrentPolicy(Corrected):
     any_arm: bool = False
     hash: str | None = None
 
-    #: What was read, or given in place of a file.
-    file: RecurrentFile = dataclasses.field(init=False, repr=False)
-    given: dataclasses.InitVar[RecurrentFile | None] = dataclasses.field(default=None, kw_only=True)
+    #: What the file describes.
+    processing: Recurrent = dataclasses.field(init=False, repr=False)
+    network: GatedNetwork = dataclasses.field(init=False, repr=False)
+    given: dataclasses.InitVar[AgentFile | None] = dataclasses.field(default=None, kw_only=True)
 
     name: ClassVar[str] = "recurrent"
     from_file: ClassVar[bool] = True
@@ -91,40 +93,31 @@ class RecurrentPolicy(Corrected):
     #: As :class:`Calibrated`.
     evaluated: ClassVar[int] = 5
 
-    def __post_init__(self, given: RecurrentFile | None) -> None:
-        if not isinstance(self.path, (str, os.PathLike)):
-            raise ResultsError(f"recurrent: expected the path of a file, as in recurrent:PATH, got {self.path!r}.")
-        if not isinstance(self.any_arm, bool):
-            raise InvalidInputError(f"any_arm: expected True or False, got {self.any_arm!r}.")
-        file = self.load() if given is None else given
-        _check_task(file, self.problem.task.name)
-        if not self.any_arm:
-            check_arm(file.source, file.about, self.problem)
-        if self.hash is not None and self.hash != file.digits:
-            raise InvalidInputError(f"hash: expected {file.digits}, which {file.source} has, got {self.hash!r}.")
-        name, options = parse_policy(file.processing.base_policy)
-        known = {"path": os.fspath(self.path), "hash": file.digits}
-        for field, value in {**known, "file": file, "policy": name, "options": options}.items():
+    def __post_init__(self, given: AgentFile | None) -> None:
+        flag("any_arm", self.any_arm)
+        file = given or agent_at(self.path or FOLDER / f"{SHIPPED}.safetensors", self.hash, (Recurrent,))
+        check_scenario(file, self.problem, any_arm=self.any_arm)
+        processing, network = file.processing, file.network
+        assert isinstance(processing, Recurrent)
+        assert isinstance(network, GatedNetwork)
+        if network.sizes != Recurrent.sizes(network.sizes[1:-1]) or self.problem.task.kind != task_kernels.POSE:
+            raise InvalidInputError(
+                f"Agent {file.source}: expected a network of the sizes {Recurrent.sizes(network.sizes[1:-1])} and the "
+                f"task pose, got {network.sizes} and {self.problem.task.name}."
+            )
+        if any(kind.from_file for kind in policies_in(processing.base_policy)):
+            raise InvalidInputError(f"base_policy: expected a policy that is no agent, got {processing.base_policy}.")
+        policy, options = parse_policy(processing.base_policy)
+        fields = {"path": os.fspath(self.path), "hash": file.digits, "policy": policy, "options": options}
+        for field, value in {**fields, "processing": processing, "network": network}.items():
             object.__setattr__(self, field, value)
         super().__post_init__()
 
-    def load(self) -> RecurrentFile:
-        """Reads the file.
-
-        Raises:
-            ResultsError: There is no such file, or it cannot be used.
-        """
-        try:
-            file = pathlib.Path(self.path).expanduser() if self.path else FOLDER / f"{SHIPPED}.safetensors"
-        except RuntimeError:
-            raise ResultsError(f"Agent {self.path}: expected a path, got one with an unknown user's home.") from None
-        return load_recurrent(file)
-
     def own_memory(self, rows: int) -> RecurrentMemory:
         """See :meth:`Wrapper.own_memory`."""
-        prior = self.file.processing.prior(self.problem.model.joints)
+        prior = self.processing.prior(self.problem.model.joints)
         covariance = np.repeat(np.diag(prior**2)[None], rows, axis=0)
-        hidden = np.zeros((rows, self.file.network.units), np.float32)
+        hidden = np.zeros((rows, self.network.units), np.float32)
         since = np.zeros(rows, np.int64)
         return RecurrentMemory(*self.sensors(rows), np.zeros((rows, len(prior))), covariance, hidden, since)
 
@@ -133,11 +126,10 @@ class RecurrentPolicy(Corrected):
     ) -> RecurrentMemory:
         """See :meth:`Corrected.learn`."""
         kept = own._replace(**{name: getattr(own, name).copy() for name in own._fields[3:]})
-        processing = self.file.processing
         remember_rows(
             self.problem.model.chain,
-            self.file.network.constants,
-            (processing.gap, processing.start**2),
+            self.network.constants,
+            (self.processing.gap, self.processing.start**2),
             (batch.q, batch.pose, measured.q, measured.new),
             (measured.first, np.ascontiguousarray(batch.nominal[:, 0])),
             kept,
@@ -145,10 +137,3 @@ class RecurrentPolicy(Corrected):
             old,
         )
         return kept
-
-
-def _check_task(file: RecurrentFile, task: str) -> None:
-    """Refuses another task than the agent was trained for."""
-    trained = file.about["task"]["name"]
-    if task != trained:
-        raise InvalidInputError(f"Agent {file.source} was trained for the task {trained!r}; here it is {task!r}.")

@@ -1,24 +1,25 @@
-"""What an agent with memory corrects, what its filter begins with, and what the outputs of its network mean."""
+"""The base policy of an agent with memory, and the prior of its filter."""
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
-from typing import Any, ClassVar, Self
+from typing import ClassVar
 
 import numpy as np
 
+from baselines.agents.processing import Processing
 from baselines.agents.recurrent.kernels import FEATURES, OUTPUTS
+from baselines.agents.recurrent.network import GatedNetwork
 from ikgym.exceptions import InvalidInputError
-from ikgym.validation import FloatArray, Frozen, known_names, number, whole_number
+from ikgym.validation import FloatArray, number, whole_number
 
-#: Who is corrected if nothing else is said: a receding horizon that identifies delay and lag of the drives.
+#: The default base policy: a receding horizon that identifies delay and lag of the drives.
 BASE_POLICY = "predicted:policy=rhc,options={'horizon':60,'iterations':3,'move_blocks':8}"
 
 
 @dataclasses.dataclass(frozen=True)
-class Recurrent(Frozen):
-    """The filter of :class:`baselines.solvers.adaptive.calibrated.Calibrated`, tuned by a network from pose to pose.
+class Recurrent(Processing):
+    """The filter of :class:`baselines.solvers.adaptive.calibrated.Calibrated`, tuned by a network at each measurement.
 
     Args:
         base_policy: The policy that is corrected.
@@ -26,7 +27,7 @@ class Recurrent(Frozen):
         link: The same of each part of the offsets from joint to joint, and of the tool point, in [m].
         axis: The same of each of the two tilts of an axis, in [rad].
         start: How far from its reference the arm begins an episode, as a standard deviation in [m] and [rad].
-        gap: Steps from one pose that is taken in to the next, at least.
+        gap: Smallest number of steps between two measurements that the filter uses.
 
     Raises:
         InvalidInputError: A number is out of its range.
@@ -39,8 +40,8 @@ class Recurrent(Frozen):
     start: float = 1e-5
     gap: int = 1
 
-    #: What files call it.
     kind: ClassVar[str] = "recurrent"
+    network: ClassVar = GatedNetwork
     #: Steps ahead that the network itself sees; the base policy sees more.
     offsets: ClassVar[tuple[int, ...]] = (1,)
 
@@ -51,26 +52,11 @@ class Recurrent(Frozen):
             object.__setattr__(self, name, number(name, getattr(self, name), above=0.0))
         object.__setattr__(self, "gap", whole_number("gap", self.gap, at_least=1))
 
-    def to_json(self) -> dict[str, Any]:
-        """The fields, as JSON has them."""
-        return {"kind": self.kind, **dataclasses.asdict(self)}
-
-    @classmethod
-    def from_json(cls, values: Mapping[str, Any]) -> Self:
-        """What :meth:`to_json` gave.
-
-        Raises:
-            UnknownNameError: There is a key that is none of the fields.
-            InvalidInputError: A value is refused.
-        """
-        known_names("field of the processing", values, ["kind", *(f.name for f in dataclasses.fields(cls))])
-        return cls(**{name: value for name, value in values.items() if name != "kind"})
-
     def prior(self, joints: int) -> FloatArray:
         """Standard deviations of the parameters, see :mod:`baselines.solvers.adaptive.chain_parameters`. Shape (p,)."""
         return np.repeat([self.zero, self.link, self.axis], [joints, 3 * joints + 3, 2 * joints])
 
     @staticmethod
     def sizes(hidden: tuple[int, ...]) -> tuple[int, ...]:
-        """Those of the network: inputs, units of each layer, outputs."""
+        """The sizes of the network: inputs, units of each layer, outputs."""
         return FEATURES, *hidden, OUTPUTS

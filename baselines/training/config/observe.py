@@ -1,4 +1,4 @@
-"""What runs of the method are that trains agents with memory."""
+"""The configuration of the training of agents with memory."""
 
 from __future__ import annotations
 
@@ -8,15 +8,14 @@ from typing import Annotated, ClassVar, Literal, get_args
 import tyro
 
 from baselines.agents.recurrent.processing import Recurrent
-from baselines.training.config.actor_only import ActorOnly
-from baselines.training.config.base import Activation
-from baselines.training.config.limits import between, count, share
-from baselines.training.config.reinforcement import LOG_STD
+from baselines.training.config.base import MOST_BATCH, ActorOnly, count
 from ikgym.exceptions import InvalidInputError
 from ikgym.validation import known_names, number, whole_number
 
 #: How the gradient is estimated.
 Estimator = Literal["analytic", "ppo"]
+#: Limits of the logarithm of a standard deviation.
+LOG_STD = (-20.0, 2.0)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -34,12 +33,8 @@ class Observe(ActorOnly):
     """Whose arm and paths the plants are drawn for, and on whose own plant agents are validated."""
     base_policy: Annotated[str, tyro.conf.arg(metavar="POLICY")] = Recurrent.base_policy
     """The policy that is corrected. It changes nothing in the training, but for the validation."""
-    offsets: Annotated[tuple[int, ...], tyro.conf.arg(metavar="N …")] = Recurrent.offsets
-    """These agents see the next step alone; the base policy sees what it asks for."""
     hidden: Annotated[tuple[int, ...], tyro.conf.arg(metavar="N …")] = (32,)
     """Units of the recurrent layers."""
-    activation: Activation = "tanh"
-    """That of gated recurrent units; there is no other."""
     n_envs: Annotated[int, tyro.conf.arg(metavar="N")] = 128
     """Episodes of a segment, a multiple of the plants."""
     segments: Annotated[int, tyro.conf.arg(metavar="N")] = 40
@@ -80,33 +75,24 @@ class Observe(ActorOnly):
     """Of ppo: the same in the last segment; in between it goes by equal parts."""
 
     def __post_init__(self) -> None:
-        known_names("estimator", [self.estimator], get_args(Estimator))
-        if self.estimator != "ppo":
-            names = ("group_size", "n_epochs", "clip_range", "gamma", "log_std_init", "log_std_end")
-            self._expect_defaults(*names, estimator=self.estimator)
-        if self.offsets != Recurrent.offsets or self.activation != "tanh" or self.init is not None:
-            raise InvalidInputError(
-                "observe: expected no offsets, no activation and no init: its agents have none of the first two, and "
-                f"begin anew; got {self.offsets}, {self.activation!r} and {self.init}."
-            )
         super().__post_init__()
-        for name in ("plants", "gradient_steps"):
+        known_names("estimator", [self.estimator], get_args(Estimator))
+        for name in ("plants", "gradient_steps", "n_epochs"):
             self._set(name, whole_number(name, getattr(self, name), at_least=1))
-        self._set("measurements", whole_number("measurements", self.measurements, at_least=2))
-        self._set("batch_size", count("batch_size", self.batch_size, at_most=self.n_envs))
-        self._set("group_size", whole_number("group_size", self.group_size, at_least=2))
-        self._set("n_epochs", whole_number("n_epochs", self.n_epochs, at_least=1))
-        self._set("clip_range", number("clip_range", self.clip_range, above=0.0))
-        self._set("gamma", share("gamma", self.gamma))
+        for name in ("measurements", "group_size"):
+            self._set(name, whole_number(name, getattr(self, name), at_least=2))
+        self._set("batch_size", count("batch_size", self.batch_size, at_most=min(self.n_envs, MOST_BATCH)))
+        for name in ("clip_range", "step_cost"):
+            self._set(name, number(name, getattr(self, name), above=0.0))
+        self._set("gamma", number("gamma", self.gamma, above=0.0, at_most=1.0))
         for name in ("log_std_init", "log_std_end"):
-            self._set(name, between(name, getattr(self, name), *LOG_STD))
-        self._set("step_cost", number("step_cost", self.step_cost, above=0.0))
+            self._set(name, number(name, getattr(self, name), at_least=LOG_STD[0], at_most=LOG_STD[1]))
         if self.n_envs % self.plants:
             raise InvalidInputError(f"n_envs: expected a multiple of {self.plants} plants, got {self.n_envs}.")
 
     @property
     def processing(self) -> Recurrent:
-        """What the agent corrects, and what its filter begins with."""
+        """The base policy and the prior of the filter."""
         return Recurrent(self.base_policy)
 
     def log_std_of(self, segment: int) -> float:

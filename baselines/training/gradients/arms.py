@@ -18,37 +18,30 @@ Indices = npt.NDArray[np.int64]
 
 #: Steps between those that the mean cost of the reference joint path is taken from.
 EVERY = 16
-#: Added to that mean, so that an arm at rest has something to be compared with.
+#: Added to that mean, which is 0 for an arm at rest.
 LEAST = 1e-3
 
 
-def spread_steps(scenario: Scenario, rows: int, every: int = 1) -> Indices:
-    """Where arms enter their episodes so that an update sees all parts of one, not one part in all arms.
+def spread_steps(scenario: Scenario, rows: int) -> Indices:
+    """Steps at which arms enter their episodes, so that an update sees all parts of one.
 
     Args:
-        scenario: What is to be tracked. Trajectories that are no joint path are begun at their beginning.
+        scenario: The scenario. Where it has no reference joint path, episodes begin at step 0.
         rows: N.
-        every: Steps that all entries are a multiple of.
 
     Returns:
-        Steps that are left out. Shape (N,).
+        Shape (N,).
     """
     if scenario.nominal_joint_path(scenarios.SPLITS["train"].start) is None:
         return np.zeros(rows, dtype=np.int64)
-    return np.arange(rows) * (scenario.steps // every) // rows * every
-
-
-def drawn_seeds(generator: np.random.Generator, count: int) -> Indices:
-    """Reset seeds of new episodes of the split `train`. Shape (count,)."""
-    train = scenarios.SPLITS["train"]
-    return generator.integers(train.start, train.stop, count)
+    return np.arange(rows) * scenario.steps // rows
 
 
 class Arms:
-    """N arms, each in an episode of its own, and the reference trajectories of these.
+    """N arms, each in an episode of its own, with their reference trajectories.
 
     Args:
-        scenario: What is to be tracked.
+        scenario: The scenario.
         rows: N.
         offsets: Steps ahead at which the reference is seen.
     """
@@ -82,7 +75,7 @@ class Arms:
         return out
 
     def rows(self, steps: int, speed: FloatArray) -> Rows:
-        """What is to be done in a segment.
+        """The input of a segment.
 
         Args:
             steps: K.
@@ -93,77 +86,46 @@ class Arms:
         return Rows(self._nominal[self._every, at], self._counted[at], left, speed)
 
     def advance(self, steps: Indices, cost: Tensor) -> None:
-        """Counts what was done in a segment.
+        """Adds up steps and costs of a segment.
 
         Args:
-            steps: That each arm made. Shape (N,).
-            cost: That each arm spent. Shape (N,).
+            steps: Steps of each arm. Shape (N,).
+            cost: Cost of each arm. Shape (N,).
         """
         self.made += steps
         self.played += steps
         self.spent += cost.detach().numpy()
 
     def relative(self, cost: Tensor, prior: float) -> Tensor:
-        """Parts of what the arms have spent ÷ the mean stage cost of their episodes so far.
+        """Costs ÷ the mean stage cost of the episodes so far.
 
         The mean counts as a constant: the gradient is that of its logarithm, times the steps.
 
         Args:
-            cost: The part of each arm. Shape (N,).
-            prior: Steps that the mean cost of the reference joint path counts as much as.
+            cost: Of each arm. Shape (N,).
+            prior: Weight of the mean cost of the reference joint path, in steps.
 
         Returns:
             Shape (N,).
         """
         return cost * torch.from_numpy((self.played + prior) / (self.spent + prior * self.usual))
 
-    @property
-    def cost_ratio(self) -> FloatArray:
-        """What their episodes have cost so far ÷ what the reference joint paths do in as many steps. Shape (N,)."""
-        ratio: FloatArray = self.spent / (np.maximum(self.played, 1.0) * self.usual)
-        return ratio
-
-    def begin(self, rows: Indices, seeds: Indices, at: Indices) -> None:
-        """Begins episodes, or enters them after some steps, where their reference joint path is then.
-
-        Args:
-            rows: Which arms. Shape (R,).
-            seeds: Reset seeds. Shape (R,).
-            at: Steps that are left out; 0 where there is no joint path. Shape (R,).
-        """
-        self._know(rows, seeds)
-        self._put(rows, at)
-
-    def begin_new(
-        self, rows: Indices, generator: np.random.Generator, at: Indices | None = None, group_size: int = 1
-    ) -> None:
-        """Begins new episodes of the split `train`, or enters them.
+    def begin(self, rows: Indices, generator: np.random.Generator, at: Indices | None = None) -> None:
+        """Begins new episodes of the split `train`, or enters them where their reference joint path is then.
 
         Args:
             rows: Which arms. Shape (R,).
             generator: Draws the reset seeds.
-            at: See :meth:`begin`; their beginnings if left out. Shape (R,).
-            group_size: Arms that get the same seed, one after the other; R is a multiple.
+            at: Steps that are skipped; none if left out. Shape (R,).
         """
-        seeds = drawn_seeds(generator, len(rows) // group_size).repeat(group_size)
-        self.begin(rows, seeds, np.zeros(len(rows), dtype=np.int64) if at is None else at)
+        train = scenarios.SPLITS["train"]
+        self._load(rows, generator.integers(train.start, train.stop, len(rows)))
+        self._put(rows, np.zeros(len(rows), dtype=np.int64) if at is None else at)
 
-    def spread(self, generator: np.random.Generator, every: int = 1, group_size: int = 1) -> None:
-        """Begins a new episode in each group of arms, see :meth:`begin_new` and :func:`spread_steps`."""
+    def spread(self, generator: np.random.Generator) -> None:
+        """Begins a new episode for each arm, see :func:`spread_steps`."""
         rows = np.arange(len(self.seed))
-        at = spread_steps(self._scenario, len(rows) // group_size, every).repeat(group_size)
-        self.begin_new(rows, generator, at, group_size)
-
-    def displace(self, rows: Indices, by: FloatArray) -> None:
-        """Moves arms off their paths, within their stops.
-
-        Args:
-            rows: Which arms. Shape (R,).
-            by: In [rad] or [m]. Shape (R, n).
-        """
-        q, arm = self.q.detach().numpy().copy(), self._scenario.arm
-        q[rows] = np.clip(q[rows] + by, arm.lower, arm.upper)
-        self._replace(rows, q, self.qdot.detach().numpy())
+        self.begin(rows, generator, spread_steps(self._scenario, len(rows)))
 
     def give_up(self, rows: Indices) -> None:
         """Puts arms that are lost back on their reference joint paths, or to the starts where there are none."""
@@ -176,7 +138,7 @@ class Arms:
 
     def restore(self, state: dict[str, Any]) -> None:
         """Goes on from what :meth:`state` gave."""
-        self._know(np.arange(len(self.seed)), state["seed"].numpy())
+        self._load(np.arange(len(self.seed)), state["seed"].numpy())
         self.q, self.qdot = state["q"].clone(), state["qdot"].clone()
         for name in ("made", "spent", "played"):
             setattr(self, name, state[name].numpy().copy())
@@ -200,23 +162,19 @@ class Arms:
         self.made[rows], self.spent[rows], self.played[rows] = at, 0.0, 0.0
 
     def _replace(self, rows: Indices, q: FloatArray, qdot: FloatArray) -> None:
-        """Gives some arms what arrays of all arms say; the others keep their gradients."""
+        """Sets the state of some arms; the others keep their gradients."""
         chosen = torch.zeros(len(q), 1, dtype=torch.bool)
         chosen[torch.from_numpy(rows)] = True
         self.q = torch.where(chosen, torch.from_numpy(q), self.q)
         self.qdot = torch.where(chosen, torch.from_numpy(qdot), self.qdot)
 
-    def _know(self, rows: Indices, seeds: Indices) -> None:
-        """The references of the arms' episodes; those of equal seeds are worked out once."""
+    def _load(self, rows: Indices, seeds: Indices) -> None:
+        """Computes the references of the arms' episodes."""
         self.seed[rows] = seeds
-        _, first, which = np.unique(seeds, return_index=True, return_inverse=True)
-        for row in rows[first].tolist():
-            self._work_out(row, int(self.seed[row]))
-        if len(first) < len(rows):
-            for array in (self._nominal, self._path, self.usual):
-                array[rows] = array[rows[first[which]]]
+        for row, seed in zip(rows.tolist(), seeds.tolist(), strict=True):
+            self._load_row(row, seed)
 
-    def _work_out(self, row: int, seed: int) -> None:
+    def _load_row(self, row: int, seed: int) -> None:
         """The reference of an arm's episode."""
         scenario = self._scenario
         self._nominal[row] = scenario.nominal(seed, int(self._offsets[-1]))

@@ -6,27 +6,18 @@ from typing import Any
 
 import numpy as np
 import torch
-from torch import Tensor, nn
+from torch import Tensor
 from torch.autograd.function import once_differentiable
 
 from baselines.agents.bilinear.damped_kernels import held_gradient_rows, held_rows
 from baselines.agents.bilinear.kernels import feature_gradient_rows, seen_rows
 from baselines.agents.bilinear.processing import Bilinear
-from baselines.agents.bilinear.rate_kernels import (
-    AT_REST,
-    EXPONENT,
-    FIRST,
-    HERE,
-    LITTLE,
-    PREDICTED,
-    rate_gradient_rows,
-)
+from baselines.agents.bilinear.rates import AT_REST, EXPONENT, LITTLE
 from baselines.policy import Problem
 from baselines.training.gradients.adjoint import Gradient, adjoint
 from baselines.training.gradients.segment import Path, Rows, Task, segment
 from ikgym.exceptions import InvalidInputError
 from ikgym.parallel import in_chunks
-from ikgym.rl.twists import twist_size
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray
 
@@ -57,13 +48,12 @@ class Law:
         self.task = Task.of(scenario)
         self.chain, self._offsets = scenario.model.chain, np.array(processing.offsets)
         self._damping, self._twists = processing.damping, len(processing.offsets) - 1
-        self._matrix, self._rates = processing.matrix, processing.rates
 
     def features(self, q: Tensor, nominal: FloatArray, remaining: FloatArray) -> tuple[Tensor, FloatArray]:
         """See :class:`Bilinear`.
 
-        Where joint rates are predicted, features have no gradient: that of costs goes through the arm and its law, not
-        through what is seen of the arm.
+        With joint rates among them, features are constants for the gradient: that of costs then goes through the arm
+        and its law, not through the features.
 
         Args:
             q: Joint coordinates in [rad] or [m]. Shape (N, n), float64.
@@ -74,7 +64,7 @@ class Law:
             Features of shape (N, f), float64, and speeds of shape (N,).
         """
         speed = np.empty(len(nominal))
-        if self._rates == PREDICTED:
+        if self._damping is not None:
             seen = np.empty((len(nominal), self.inputs))
             self.see(q.detach().numpy(), nominal, remaining, seen, speed)
             return torch.from_numpy(seen), speed
@@ -82,13 +72,7 @@ class Law:
         return out, speed
 
     def see(
-        self,
-        q: FloatArray,
-        nominal: FloatArray,
-        remaining: FloatArray,
-        out: FloatArray,
-        speed: FloatArray,
-        for_network: bool = True,
+        self, q: FloatArray, nominal: FloatArray, remaining: FloatArray, out: FloatArray, speed: FloatArray
     ) -> None:
         """:meth:`features` without a gradient.
 
@@ -98,16 +82,13 @@ class Law:
             remaining: Shape (N, 1).
             out: Receives the features. Shape (N, f).
             speed: Receives the speeds. Shape (N,).
-            for_network: Whether a network looks at them. What :meth:`held` does is a small part, which takes less time
-                where joint rates are predicted; the rest then stays as it was.
         """
-        task, chain = self.task, self.chain
-        rates = FIRST if self._rates == PREDICTED and not for_network else self._rates
+        task, rates = self.task, self._damping is not None
 
         def work(start: int, stop: int) -> None:
             some = slice(start, stop)
             arrays = q[some], nominal[some], remaining[some], out[some], speed[some]
-            seen_rows(task.kind, chain, task.dt, self._offsets, rates, *arrays)
+            seen_rows(task.kind, self.chain, task.dt, self._offsets, rates, *arrays)
 
         in_chunks(work, len(out), GRAIN)
 
@@ -125,9 +106,6 @@ class Law:
         if self._damping is None:
             return output
         n = q.shape[1]
-        if not self._matrix:
-            rows = nn.functional.pad(output[:, :n, None], (int(twist_size(self.task.kind)), 0))
-            output = torch.cat([rows.flatten(1), output[:, n:]], dim=1)
         first = self.inputs - n * self._twists
         squares = features[:, first : first + n].square()
         metric = -EXPONENT * (squares / (squares.mean(1, keepdim=True) + LITTLE) + AT_REST).log()
@@ -166,12 +144,10 @@ class _Features(torch.autograd.Function):
     def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor, None, None, None, None]:
         law, (joints, features) = ctx.law, ctx.seen
         kind, chain = law.task.kind, law.chain
-        out, by_rates = np.empty(joints.shape), np.zeros(joints.shape)
-        given = gradient.numpy().copy()
-        if law._rates == HERE:
-            rate_gradient_rows(kind, chain, law._twists, joints, features, given, by_rates)
+        out = np.empty(joints.shape)
+        given = np.ascontiguousarray(gradient.numpy())
         feature_gradient_rows(kind, chain.prismatic, chain.axes[0], law._twists, features, given, out)
-        return torch.from_numpy(out + by_rates), None, None, None, None
+        return torch.from_numpy(out), None, None, None, None
 
 
 class _Held(torch.autograd.Function):

@@ -10,12 +10,12 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 import torch
 from torch import Tensor
 from torch.distributions import Normal
 
 from baselines.agents.recurrent.processing import Recurrent
-from baselines.training.groups import beside_the_others
 from baselines.training.memory.episodes import Measurements, taken
 from baselines.training.memory.filter import Gated, costs
 
@@ -109,8 +109,7 @@ def explored(
         returns = -(spent / usual[:, None])
         for k in range(returns.shape[1] - 2, -1, -1):
             returns[:, k] += gamma * returns[:, k + 1]
-    beside = beside_the_others(returns.T.numpy().astype(np.float32), group_size)
-    advantages = torch.from_numpy(np.ascontiguousarray(beside.T))
+    advantages = torch.from_numpy(np.ascontiguousarray(_leave_one_out(returns.T.numpy(), group_size).T))
     return Rollout(features, outputs, again.arrived[:, :-1], log_prob, advantages)
 
 
@@ -133,6 +132,14 @@ def surrogate(network: Gated, rollout: Rollout, std: float, clip_range: float) -
     scaled = advantages / (advantages[arrived].square().mean() + LITTLE).sqrt()
     least = torch.minimum(ratio * scaled, ratio.clamp(1.0 - clip_range, 1.0 + clip_range) * scaled)
     out: Tensor = -least[arrived].mean()
+    return out
+
+
+def _leave_one_out(returns: npt.NDArray[np.float64], group_size: int) -> npt.NDArray[np.float32]:
+    """Returns of shape (T, N), each minus the mean of the others of its group (Kool et al. 2019)."""
+    groups = returns.astype(np.float32).reshape(len(returns), -1, group_size)
+    relative = (groups - groups.mean(axis=2, keepdims=True)) * (group_size / (group_size - 1))
+    out: npt.NDArray[np.float32] = relative.reshape(returns.shape).astype(np.float32)
     return out
 
 

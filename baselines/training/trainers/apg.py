@@ -1,4 +1,4 @@
-"""Analytic policy gradient: the cost itself is differentiated, through the arm, over windows of some steps."""
+"""Analytic policy gradient: the cost is differentiated through the arm, over windows of some steps."""
 
 from __future__ import annotations
 
@@ -10,54 +10,52 @@ import numpy.typing as npt
 import torch
 from torch import Tensor, nn
 
-from baselines.training.config.actor_only import APG
+from baselines.agents.bilinear.processing import Bilinear
+from baselines.agents.files import AgentFile, agent_of, load_agent
+from baselines.training.config.apg import APG
+from baselines.training.errors import TrainingError
 from baselines.training.gradients.arms import Arms
 from baselines.training.gradients.law import Law
-from baselines.training.gradients.starts import Starts
-from baselines.training.networks import ActorModel
+from baselines.training.methods import SegmentMetrics
+from baselines.training.networks import new_actor, runtime
 from baselines.training.randomness import sequence
-from baselines.training.trainer import SegmentMetrics
 from baselines.training.trainers.actor_only import ActorTrainer
-from baselines.training.trainers.initial_weights import begin_actor_from
 from ikgym.scenarios import Scenario
 
-#: No gradient by a joint coordinate that still says anything is this long.
+#: Norm at which gradients with respect to joint coordinates are clipped: longer ones have overflowed.
 OVERFLOW = 1e30
 
 
 class APGTrainer(ActorTrainer):
-    """See :class:`APG`. The model is the average; the actor that Adam moves is one of its own."""
+    """See :class:`APG`. `policy` is the average of the actor, whose weights Adam changes.
+
+    Args:
+        config: Of the method.
+        scenario: The scenario to train on.
+        seed: Of the run.
+
+    Raises:
+        InvalidInputError: The scenario's plant is not ideal.
+        TrainingError: The agent of `init` has another structure.
+    """
 
     _config: APG
+    policy: nn.Sequential
 
     def __init__(self, config: APG, scenario: Scenario, seed: int) -> None:
         self._law = Law(scenario, config.processing)
-        model = ActorModel.new((self._law.inputs, *config.hidden, self._law.outputs), config.activation)
+        policy = new_actor((self._law.inputs, *config.hidden, self._law.outputs), config.activation)
         if config.init is not None:
-            begin_actor_from(model.policy, config)
-        super().__init__(config, scenario, seed, model, copy.deepcopy(model.policy))
+            _load_weights(policy, config)
+        super().__init__(config, scenario, seed, policy, copy.deepcopy(policy))
         self._updates = 0
         self._arms = Arms(scenario, config.n_envs, config.offsets)
-        self._starts = Starts(scenario, config.replay_share, config.singular_share, config.start_noise)
         self._farthest = config.reset_distance
-        self.spread(np.random.default_rng(sequence(seed, None)))
-
-    @property
-    def actor(self) -> nn.Module:
-        """What gradients are taken by; the model is its average."""
-        return self._actor
-
-    def spread(self, generator: np.random.Generator) -> None:
-        """Begins new episodes, spread over their steps, so that each step of Adam sees all parts of them.
-
-        Args:
-            generator: Draws their seeds.
-        """
-        self._arms.spread(generator)
-        self._far = np.zeros(self._config.n_envs)
+        self._arms.spread(np.random.default_rng(sequence(seed, None)))
+        self._far = np.zeros(config.n_envs)
 
     def segment(self, number: int) -> SegmentMetrics:
-        """See :meth:`baselines.training.trainer.Trainer.segment`."""
+        """See :meth:`Trainer.segment`."""
         config, generator = self._config, np.random.default_rng(sequence(self._seed, number))
         self._set_learning_rate(number)
         losses, refused, lost = [], 0, 0
@@ -68,35 +66,39 @@ class APGTrainer(ActorTrainer):
             self._average()
             losses.append(loss.item())
             lost += given_up
-        self.model.num_timesteps += config.n_envs * config.segment_steps
+        self.steps += config.n_envs * config.segment_steps
         return {"train/loss": float(np.median(losses)), "train/refused": float(refused), "train/lost": float(lost)}
 
+    def agent(self, training: dict[str, Any] | None = None) -> AgentFile:
+        """See :meth:`Trainer.agent`."""
+        network = runtime(list(self.policy), "linear")
+        return agent_of(network, self._config.processing, self._scenario, training)
+
     def state(self) -> dict[str, Any]:
-        """See :meth:`baselines.training.trainer.Trainer.state`."""
+        """See :meth:`Trainer.state`."""
         actor, far = copy.deepcopy(self._actor.state_dict()), torch.from_numpy(self._far.copy())
         own = {"actor": actor, "updates": self._updates, "far": far}
-        return {**super().state(), **own, "arms": self._arms.state(), "starts": self._starts.state()}
+        return {**super().state(), **own, "arms": self._arms.state()}
 
     def restore(self, state: dict[str, Any]) -> None:
-        """See :meth:`baselines.training.trainer.Trainer.restore`."""
+        """See :meth:`Trainer.restore`."""
         super().restore(state)
         self._actor.load_state_dict(state["actor"])
         self._updates, self._far = state["updates"], state["far"].numpy().copy()
         self._arms.restore(state["arms"])
-        self._starts.restore(state["starts"])
 
     def window(self, steps: int, generator: np.random.Generator) -> tuple[Tensor, int]:
-        """Moves all arms through a window, from where they are, of which no gradient is taken.
+        """Moves all arms through a window; their states at its start are constants for the gradient.
 
-        All steps of an episode in it have the same weight, by what the episode has cost at its end. With weights by
-        what it had cost before each step, the way into a costly passage would count far more than the passage.
+        All steps of an episode in it have the same weight, from the cost of the episode at the end of the window.
+        Weights from the cost before each step would favour the way into a costly passage over the passage itself.
 
         Args:
             steps: A multiple of `hold`.
             generator: Draws the seeds of new episodes.
 
         Returns:
-            The loss, and how many arms were given up.
+            The loss, and how many arms were lost.
         """
         config, arms, total, given_up = self._config, self._arms, torch.zeros((), dtype=torch.float64), 0
         spent = torch.zeros(config.n_envs, dtype=torch.float64)  # in this window, each arm in its episode
@@ -119,14 +121,12 @@ class APGTrainer(ActorTrainer):
         return total / (config.n_envs * steps), given_up
 
     def _renew(self, generator: np.random.Generator) -> int:
-        """Puts lost arms back, and begins new episodes where they are over; how many arms were lost."""
+        """Puts lost arms back and begins new episodes where one has ended; returns how many arms were lost."""
         lost, ended = self._lost, self._arms.ended
-        over = np.flatnonzero(ended)
-        self._starts.note(self._arms, np.flatnonzero(lost | ended))
         if (lost & ~ended).any():
             self._arms.give_up(np.flatnonzero(lost & ~ended))
-        if len(over):
-            self._starts.renew(self._arms, over, generator)
+        if ended.any():
+            self._arms.begin(np.flatnonzero(ended), generator)
         return int(lost.sum())
 
     @property
@@ -141,16 +141,16 @@ class APGTrainer(ActorTrainer):
         return next(self._actor.parameters()).dtype
 
     def _average(self) -> None:
-        """Lets the model follow the actor, at first faster."""
+        """Moves the average towards the actor, at first faster."""
         kept = min(self._config.averaging, (1.0 + self._updates) / (10.0 + self._updates))
         self._updates += 1
         with torch.no_grad():
-            for mean, weights in zip(self.model.policy.parameters(), self._actor.parameters(), strict=True):
+            for mean, weights in zip(self.policy.parameters(), self._actor.parameters(), strict=True):
                 mean.lerp_(weights, 1.0 - kept)
 
 
 def _limited(tensor: Tensor, most: float) -> Tensor:
-    """The same numbers, whose gradients are cut row by row at a length; those that overflowed count as none."""
+    """The same numbers, whose gradients are clipped row by row at a norm; values that overflowed count as 0."""
 
     def cut(gradient: Tensor) -> Tensor:
         finite = gradient.nan_to_num(0.0, 0.0, 0.0)
@@ -161,3 +161,22 @@ def _limited(tensor: Tensor, most: float) -> Tensor:
     if out.requires_grad:
         out.register_hook(cut)  # type: ignore[no-untyped-call]
     return out
+
+
+def _load_weights(policy: nn.Sequential, config: APG) -> None:
+    """Gives a network the weights of the agent in `init`.
+
+    Raises:
+        ResultsError: The file cannot be read.
+        TrainingError: The agent has another structure.
+    """
+    assert config.init is not None
+    agent, own = load_agent(config.init, (Bilinear,)), runtime(list(policy), "linear")
+    if (agent.processing, agent.network.to_json()) != (config.processing, own.to_json()):
+        raise TrainingError(
+            f"{config.init}: expected an agent with {config.processing} and a network {own.to_json()}, got "
+            f"{agent.processing} and {agent.network.to_json()}."
+        )
+    with torch.no_grad():
+        for parameter, tensor in zip(policy.parameters(), agent.network.tensors.values(), strict=True):
+            parameter.copy_(torch.from_numpy(tensor.copy()))

@@ -6,27 +6,19 @@ import math
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import torch
 
-from baselines.agents.recurrent.files import in_memory
-from baselines.agents.recurrent.policy import RecurrentPolicy
-from baselines.policy import Memory, Problem
+from baselines.agents.files import AgentFile, agent_of
 from baselines.training.config.observe import Observe
 from baselines.training.memory.episodes import Measurements, draw_plant, joined, measure, taken
 from baselines.training.memory.filter import Gated, loss
 from baselines.training.memory.rewards import explored, surrogate
-from baselines.training.networks import MemoryModel
+from baselines.training.methods import SegmentMetrics
 from baselines.training.randomness import episode_seed, sequence
-from baselines.training.score import Score
-from baselines.training.trainer import SegmentMetrics
 from baselines.training.trainers.actor_only import ActorTrainer
-from baselines.training.validation import played, score_of, validation_seeds
 from ikgym import task_kernels
 from ikgym.exceptions import InvalidInputError
-from ikgym.outcome import observation
 from ikgym.scenarios import Scenario
-from ikgym.simulation import Outcome
 
 
 class ObserveTrainer(ActorTrainer):
@@ -42,6 +34,7 @@ class ObserveTrainer(ActorTrainer):
     """
 
     _config: Observe
+    policy: Gated
 
     def __init__(self, config: Observe, scenario: Scenario, seed: int) -> None:
         if scenario.task.kind != task_kernels.POSE:
@@ -49,16 +42,16 @@ class ObserveTrainer(ActorTrainer):
                 f"task: expected pose, whose errors are those of position and rotation, got {scenario.task.name!r}."
             )
         network = Gated(config.processing.sizes(config.hidden))
-        super().__init__(config, scenario, seed, MemoryModel(network), network)
+        super().__init__(config, scenario, seed, network, network)
 
     def segment(self, number: int) -> SegmentMetrics:
-        """See :meth:`baselines.training.trainer.Trainer.segment`."""
+        """See :meth:`Trainer.segment`."""
         config, processing = self._config, self._config.processing
         self._set_learning_rate(number)
         measured, losses = self._measure(number), []
         for _ in range(config.gradient_steps):
             some = taken(measured, torch.randperm(config.n_envs)[: config.batch_size])
-            about = self.model.policy, processing, some, self._scenario.cost.delta_x, config.step_cost
+            about = self.policy, processing, some, self._scenario.cost.delta_x, config.step_cost
             if config.estimator == "ppo":
                 self._learn_from_costs(about, math.exp(config.log_std_of(number)))
                 with torch.no_grad():
@@ -79,22 +72,11 @@ class ObserveTrainer(ActorTrainer):
         config = self._config
         rollout = explored(*about, std=std, group_size=config.group_size, gamma=config.gamma)
         for _ in range(config.n_epochs):
-            self._descend(surrogate(self.model.policy, rollout, std, config.clip_range))
+            self._descend(surrogate(self.policy, rollout, std, config.clip_range))
 
-    def score(self, episodes: int) -> Score:
-        """Of the agent on the scenario's own plant."""
-        scenario = self._scenario
-        file = in_memory(self.model.policy.to_runtime(), self._config.processing, scenario)
-        policy = RecurrentPolicy(Problem.of(scenario), given=file)
-        seeds = validation_seeds(scenario, episodes)
-        state: Memory | None = None
-
-        def act(out: Outcome) -> npt.NDArray[Any]:
-            nonlocal state
-            action, state = policy.predict(observation(out), state)
-            return action
-
-        return score_of(scenario, seeds, *played(scenario, seeds, act, policy.preview))
+    def agent(self, training: dict[str, Any] | None = None) -> AgentFile:
+        """See :meth:`Trainer.agent`."""
+        return agent_of(self.policy.to_runtime(), self._config.processing, self._scenario, training)
 
     def _measure(self, number: int) -> Measurements:
         """Draws plants and episodes, and measures them."""
@@ -106,5 +88,5 @@ class ObserveTrainer(ActorTrainer):
             plant = draw_plant(generator, config.processing, config.measurements, scenario.steps)
             seeds = range(first + k * each, first + (k + 1) * each)
             parts.append(measure(scenario.replace(plant=plant), seeds, config.measurements))
-            self.model.num_timesteps += each * min(config.measurements * plant.pose_every, scenario.steps)
+            self.steps += each * min(config.measurements * plant.pose_every, scenario.steps)
         return joined(parts, max(part.error.shape[1] for part in parts))

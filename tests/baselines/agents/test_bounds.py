@@ -6,11 +6,11 @@ import itertools
 
 import numpy as np
 
-import baselines
 from baselines.agents.bilinear.processing import Bilinear
 from baselines.agents.bounds import Bounds
-from baselines.agents.files import save_agent
+from baselines.agents.files import agent_of
 from baselines.agents.network import Network
+from baselines.agents.policy import Agent
 from baselines.episodes import rollouts
 from baselines.policy import Batch, Problem
 from baselines.solvers.quadratic_program.limits import limits_with_braking
@@ -43,38 +43,20 @@ def test_an_arm_without_limits_has_no_bounds():
     assert Bounds.of(Problem.of(scenarios.get("varga7-pose-random"))) is None
 
 
-def pushing(file):
+def pushing():
     """An agent that pushes joints against their stops as fast as it can."""
     processing, problem = Bilinear((1, 10, 40), 1e-3), Problem.of(PANDA)
     sizes = processing.size(problem), 8, processing.outputs(problem)
     rng = np.random.default_rng(1)
     weights = tuple(rng.normal(size=(b, a)) for a, b in itertools.pairwise(sizes))
-    save_agent(
-        file,
-        Network(weights, (np.zeros(8), rng.normal(scale=9.0, size=sizes[2])), "silu", "linear"),
-        processing,
-        PANDA,
-    )
-    return baselines.make("agent", PANDA, path=str(file))
+    network = Network(weights, (np.zeros(8), rng.normal(scale=9.0, size=sizes[2])), "silu", "linear")
+    return Agent(problem, given=agent_of(network, processing, PANDA))
 
 
-def test_no_limit_holds_an_agent_back(tmp_path):
-    policy = pushing(tmp_path / "a.safetensors")
+def test_no_limit_holds_an_agent_back():
+    policy = pushing()
     episodes = rollouts(PANDA, policy, [1, 2])
     assert not any(episode.at_limit.any() for episode in episodes)
-    object.__setattr__(policy.view, "bounds", None)
+    object.__setattr__(policy, "bounds", None)
     held_back = sum(episode.at_limit for episode in rollouts(PANDA, policy, [1, 2])).sum(axis=0)
     assert held_back[0] > 0  # by stops
-
-
-def test_agents_are_validated_as_they_play(tmp_path):
-    """In one call or in parts, as trainers validate: bounded both times."""
-    policy, rng = pushing(tmp_path / "a.safetensors"), np.random.default_rng(2)
-    view, network, arm = policy.view, policy.file.network, policy.problem.model
-    q, last = rng.uniform(arm.lower, arm.upper, (50, 7)), rng.uniform(-0.3, 0.3, (50, 7))
-    pose = PANDA.task.coordinates(*arm.forward(q))
-    batch = Batch(q, last, pose, np.repeat(pose[:, None], 3, 1) + 1e-3, np.full((50, 1), 300.0))
-    seen = view.see(batch, ())
-    played, validated = view.act(batch, (), network)[0], view.action(seen, network.forward(seen.features))
-    assert np.array_equal(played, validated)
-    assert not np.array_equal(played, view.processing.law(view.problem, batch, network))

@@ -62,7 +62,7 @@ def test_rows_are_single_calls(activation):
 
 def test_extreme_numbers():
     for activation in ACTIVATIONS:
-        net = network((4, 8, 2), activation)
+        net = network((4, 8, 2), activation, "clip")
         assert np.abs(net.forward(np.full((1, 4), 1e30, dtype=np.float32))).max() <= 1.0
         assert np.isfinite(net.forward(np.full((1, 4), -1e30, dtype=np.float32))).all()
 
@@ -82,7 +82,6 @@ def test_networks_are_frozen_copies():
         arrays = [*other.weights, *other.biases, *(a for a in other.constants if isinstance(a, np.ndarray))]
         assert not any(array.flags.writeable for array in arrays)
     assert net.sizes == (3, 2)
-    assert (net.inputs, net.outputs) == (3, 2)
 
 
 @pytest.mark.parametrize(

@@ -1,47 +1,64 @@
-"""Runs that take a moment: what the tests of the training have in common."""
+"""Runs that take a moment, for the tests of training."""
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import pathlib
 from typing import Any
 
 from baselines.training import methods
 from baselines.training.config.base import Config
+from baselines.training.methods import Trainer, new_trainer
+from baselines.training.randomness import reseed
 
-#: Options of a run on an arm of three joints, 20 steps an episode.
-TINY: dict[str, Any] = {
-    "scenario": "faitli3-regular",
-    "steps": 20,
-    "hidden": (8, 8),
-    "offsets": (1, 2, 10),
-    "segments": 3,
-    "evaluate_every": 2,
-    "validation_episodes": 2,
-    "n_envs": 4,
-    "batch_size": 20,
-}
-#: Random episodes of seven joints, over a policy with a memory.
-OVER: dict[str, Any] = {**TINY, "scenario": "varga7-random", "base_policy": "mfac", "action_scale": 0.5}
-
-
-#: What else makes a run of a method short.
-FEW: dict[str, dict[str, Any]] = {
-    "ppo": {},
-    "sac": {"buffer_size": 200, "train_freq": 5, "gradient_steps": 2},
-    "td3": {"buffer_size": 200, "train_freq": 5, "gradient_steps": 2},
-    "imitate": {"expert": "dls", "gradient_steps": 3},
-    "apg": {"hold": 4, "window": (8, 16), "segment_steps": 16},
+#: Options that make a run of a method short.
+SHORT: dict[str, dict[str, Any]] = {"segments": 3, "evaluate_every": 2, "validation_episodes": 2, "n_envs": 4}
+LEARNING: dict[str, Any] = {"scenario": "varga7-random", "steps": 20, "total_timesteps": 240}
+TINY: dict[str, dict[str, Any]] = {
+    "apg": {
+        "scenario": "varga7-random",
+        "task": "pose",
+        "steps": 100,
+        "hidden": (8, 8),
+        "offsets": (1, 2, 10),
+        "hold": 8,
+        "segment_steps": 48,
+        "window": (16, 48),
+    },
+    "observe": {
+        "base_policy": "dls:damping=1e-2",
+        "steps": 60,
+        "hidden": (6,),
+        "n_envs": 6,
+        "plants": 3,
+        "measurements": 8,
+        "gradient_steps": 2,
+        "batch_size": 4,
+    },
+    "ppo": {**LEARNING, "settings": ("n_steps=10", "batch_size=20")},
+    "sac": {**LEARNING, "settings": ("learning_starts=40", "buffer_size=200")},
+    "td3": {**LEARNING, "settings": ("learning_starts=40", "action_noise=0.1")},
 }
 
 
 def tiny(method: str, **changes: Any) -> Config:
-    """A configuration that is trained within a second."""
-    kind = methods.get(method).config
-    known = {field.name for field in dataclasses.fields(kind)}
-    usual = {name: value for name, value in TINY.items() if name in known}
-    return kind(**{**usual, **FEW[method], **{name: value for name, value in changes.items() if name in known}})
+    """A configuration that is trained within a second or two."""
+    return methods.get(method)(**{**SHORT, **TINY[method], **changes})
+
+
+def trainer_of(config: Config, seed: int = 1) -> Trainer:
+    """The trainer of a configuration, before its first segment."""
+    reseed(seed, None)
+    return new_trainer(config, config.make_scenario(), seed)
+
+
+def play_segments(trainer: Trainer, numbers: Any, seed: int = 1) -> list[dict[str, float]]:
+    """The metrics of some segments."""
+    metrics = []
+    for number in numbers:
+        reseed(seed, number)
+        metrics.append(trainer.segment(number))
+    return metrics
 
 
 def about(folder: pathlib.Path) -> dict[str, Any]:
@@ -51,6 +68,6 @@ def about(folder: pathlib.Path) -> dict[str, Any]:
 
 
 def timeless(folder: pathlib.Path) -> list[dict[str, Any]]:
-    """The history of a run, without what a clock said."""
+    """The history of a run, without times."""
     rows = json.loads((folder / "history.json").read_text(encoding="utf-8"))
     return [{name: value for name, value in row.items() if name != "core_minutes"} for row in rows]

@@ -1,41 +1,41 @@
-"""The command line: presets, exit codes, several seeds, repetition."""
+"""The command line of training: presets, exit codes, several seeds, repetition."""
 
 from __future__ import annotations
 
-import base64
 import contextlib
 import importlib.util
 import json
 import pathlib
-import pickle
 import subprocess
 import sys
-import zipfile
 
 import pytest
 
-from baselines.training import command, methods, run, seeds
+from baselines.training import command, presets, run, seeds
 from baselines.training.command import main, parse
-from baselines.training.config.ppo import PPO
-from baselines.training.errors import TrainingError
+from baselines.training.config.apg import APG
+from baselines.training.config.base import differences
+from baselines.training.config.reinforcement import PPO
 from baselines.training.folder import FORMAT
+from baselines.training.methods import METHODS, get
 from baselines.training.seeds import SeedRuns
-from tests.baselines.losing import LosingCluster
-from tests.baselines.training.small import about, timeless
+from ikgym.exceptions import InvalidInputError, UnknownNameError
+from tests.baselines.training.small import about, timeless, tiny
 from tests.spawning import dies_with_seed_7
 
 ROOT = pathlib.Path(__file__).parents[3]
 TINY = [
-    "--scenario", "faitli3-regular", "--steps", "20", "--hidden", "8", "--offsets", "1", "2", "10",
-    "--segments", "2", "--n-envs", "4", "--batch-size", "20", "--validation-episodes", "1", "--no-progress",
+    "--scenario", "varga7-random", "--task", "pose", "--steps", "40", "--hidden", "8", "--offsets", "1", "2", "10",
+    "--segments", "2", "--n-envs", "4", "--window", "16", "--segment-steps", "48", "--validation-episodes", "1",
+    "--no-progress",
 ]  # fmt: skip
 
 
 @pytest.fixture(scope="module")
 def several(tmp_path_factory):
-    """Two seeds in two processes; that seeds wait their turn is seen where one dies."""
+    """Two seeds in two processes."""
     folder = tmp_path_factory.mktemp("several")
-    code = main(["ppo", *TINY, "--seeds", "1", "5", "--workers", "2", "--out", str(folder)])
+    code = main(["apg", *TINY, "--seeds", "1", "5", "--workers", "2", "--out", str(folder)])
     return folder, code
 
 
@@ -45,7 +45,7 @@ def test_several_seeds(several, tmp_path, capsys):
     assert code == 0
     assert sorted(path.name for path in folder.iterdir()) == ["seed-1", "seed-5"]
     assert len({about(folder / f"seed-{seed}")["weights_sha256"] for seed in (1, 5)}) == 2
-    assert main(["ppo", *TINY, "--seeds", "5", "--out", str(tmp_path)]) == 0
+    assert main(["apg", *TINY, "--seeds", "5", "--out", str(tmp_path)]) == 0
     assert about(tmp_path / "seed-5")["weights_sha256"] == about(folder / "seed-5")["weights_sha256"]
     assert timeless(tmp_path / "seed-5") == timeless(folder / "seed-5")
     printed = capsys.readouterr().out.splitlines()
@@ -53,80 +53,70 @@ def test_several_seeds(several, tmp_path, capsys):
     assert printed[1].split()[:2] == ["5", "–"]
 
 
-def test_a_seed_that_dies_takes_no_other_with_it(several, tmp_path, monkeypatch, capfd):
-    """Nor do those that wait for its process to end."""
+def test_a_seed_that_dies_does_not_end_the_others(several, tmp_path, monkeypatch, capfd):
     monkeypatch.setattr(seeds, "attempt", dies_with_seed_7)
-    assert main(["ppo", *TINY, "--seeds", "7", "1", "--workers", "1", "--out", str(tmp_path)]) == 2
+    assert main(["apg", *TINY, "--seeds", "7", "1", "--workers", "1", "--out", str(tmp_path)]) == 2
     assert about(tmp_path / "seed-1")["weights_sha256"] == about(several[0] / "seed-1")["weights_sha256"]
     printed = capfd.readouterr()
     assert "   7  failed" in printed.out
-    assert "error: seed 7: its process has died (signal SIGKILL); go on with --resume" in printed.err
+    assert "error: seed 7: " in printed.err
+    assert "--resume" in printed.err
 
 
-@pytest.mark.slow
-def test_seeds_that_fail_or_die_side_by_side_take_no_other_with_them(tmp_path, monkeypatch, capfd):
-    for seed in (0, 1):
-        (tmp_path / f"seed-{seed}").mkdir()
+def test_errors_of_a_seed_are_results(tmp_path, monkeypatch, capfd):
+    (tmp_path / "seed-0").mkdir()
     (tmp_path / "seed-0" / "run.json").write_text("{")
-    monkeypatch.setattr(seeds, "attempt", dies_with_seed_7)
-    code = main(["ppo", *TINY, "--seeds", "7", "0", "1", "--workers", "2", "--resume", "--out", str(tmp_path)])
-    assert code == 2
-    assert about(tmp_path / "seed-1")["status"] == "finished"
-    printed = capfd.readouterr()
-    assert "   0  failed" in printed.out
-    assert "   7  failed" in printed.out
-    assert "error: seed 0: " in printed.err
-    assert "run.json is damaged" in printed.err
-    assert "error: seed 7: its process has died (signal SIGKILL); go on with --resume" in printed.err
+    result = seeds.attempt(seeds.Seed(SeedRuns(tiny("apg"), tmp_path, resume=True), 0))
+    assert "Cannot read" in result.error
+    monkeypatch.setattr(seeds, "train_seed", lambda *_: 1 / 0)
+    assert seeds.attempt(seeds.Seed(SeedRuns(PPO(), tmp_path), 3)).error == "ZeroDivisionError: division by zero"
+    assert "Traceback" in capfd.readouterr().err
 
 
 def test_repeat(several, tmp_path, capsys):
-    run = several[0] / "seed-1" / "run.json"
-    arguments = ["--no-progress", "--out"]
-    assert main(["repeat", str(run), *arguments, str(tmp_path / "again")]) == 0
+    folder, arguments = several[0] / "seed-1", ["--no-progress", "--out"]
+    assert main(["repeat", str(folder / "run.json"), *arguments, str(tmp_path / "again")]) == 0
     assert "The same final weights, bit for bit" in capsys.readouterr().out
-    assert timeless(tmp_path / "again" / "seed-1") == timeless(run.parent)
-
-    content = about(run.parent)
-    changed = {**content, "seed": 2, "machine": {"cpu": "another"}}
-    (tmp_path / "run.json").write_text(json.dumps(changed))
+    assert timeless(tmp_path / "again" / "seed-1") == timeless(folder)
+    content = about(folder)
+    (tmp_path / "run.json").write_text(json.dumps({**content, "seed": 2, "machine": {"cpu": "another"}}))
     assert main(["repeat", str(tmp_path / "run.json"), *arguments, str(tmp_path / "other")]) == 1
     printed = capsys.readouterr().out
     assert f"Other final weights: expected {content['weights_sha256']}, got " in printed
     assert "  machine: {'cpu': 'another'} there, " in printed
 
-    del content["weights_sha256"]
-    (tmp_path / "run.json").write_text(json.dumps(content))
-    assert main(["repeat", str(tmp_path / "run.json"), *arguments, str(tmp_path / "third")]) == 2
-    assert "has not ended" in capsys.readouterr().err
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ({"weights_sha256": None}, "has not ended"),
+        ({"method": "pp"}, "There is no method 'pp'"),
+        ({"config": {"hidden": 3}}, "hidden: expected 1 to 10 layers, got 3"),
+        ({"seed": -1}, "seed: expected a whole number of at least 0, got -1"),
+        ({"format": 1}, f"expected format {FORMAT}, got 1"),
+    ],
+)
+def test_files_that_cannot_be_repeated(content, message, tmp_path, capsys):
+    usual = {"format": FORMAT, "method": "apg", "seed": 0, "config": {}, "weights_sha256": "0"}
+    (tmp_path / "run.json").write_text(json.dumps(usual | content))
+    assert main(["repeat", str(tmp_path / "run.json"), "--out", str(tmp_path / "out")]) == 2
+    assert message in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["ppo", "--preset", "smok"], "There is no preset 'smok'. Did you mean 'smoke'?"),
-        (["ppo", *TINY, "--base-policy", "dlss"], "There is no policy 'dlss'. Did you mean 'dls'?"),
-        (["ppo", *TINY, "--base-policy", "oracle"], "got the reference 'oracle'"),
-        (
-            ["ppo", *TINY, "--base-policy", "dls:dampin=1"],
-            "There is no parameter of dls 'dampin'. Did you mean 'damping'?",
-        ),
-        (["ppo", *TINY, "--scenario", "varga"], "There is no scenario 'varga'"),
-        (["ppo", *TINY, "--workers", "0"], "workers: expected a whole number of at least 1, got 0"),
-        (["ppo", *TINY, "--seeds", "-1"], "seeds: expected a whole number of at least 0, got -1"),
-        (["ppo", *TINY, "--n-steps", "7"], "n_steps: expected a divisor"),
-        (["ppo", *TINY, "--init", "nowhere.safetensors"], "nowhere.safetensors does not exist"),
+        (["apg", "--preset", "smok"], "There is no preset 'smok'. Did you mean 'smoke'?"),
+        (["ppo", "--preset", "quick"], "The preset quick is for apg, not for ppo"),
+        (["apg", *TINY, "--scenario", "varga"], "There is no scenario 'varga'"),
+        (["apg", *TINY, "--workers", "0"], "workers: expected a whole number of at least 1, got 0"),
+        (["apg", *TINY, "--seeds", "-1"], "seeds: expected a whole number of at least 0, got -1"),
+        (["apg", *TINY, "--window", "7"], "window: expected multiples of hold"),
+        (["apg", *TINY, "--init", "nowhere.safetensors"], "nowhere.safetensors: it does not exist"),
         (["repeat", "nowhere.json"], "Cannot read nowhere.json"),
-        (["ppo", *TINY, "--batch-size", "1"], "batch_size: expected a whole number of at least 2, got 1"),
-        (["ppo", *TINY, "--log-std-init", "-1000"], "log_std_init: expected a number from -20 to 2, got -1000"),
-        (["sac", *TINY, "--buffer-size", "10000000000000"], "buffer_size: expected a whole number from 1 to 10000000"),
-        (["ppo", *TINY, "--hidden", "1000000", "1000000"], "hidden: expected a whole number from 1 to 2048"),
-        (["ppo", *TINY, "--hidden", *["9"] * 11], "hidden: expected at least one hidden layer, at most 10, got 11"),
-        (["ppo", *TINY, "--n-envs", "10000000"], "n_envs: expected a whole number from 1 to 10000, got 10000000"),
-        (["ppo", *TINY, "--offsets", "1", "1000000000"], "offsets: expected a whole number from 1 to 100000"),
-        (["ppo", *TINY, "--sde-sample-freq", "4"], "sde_sample_freq: expected use_sde beside it, got 4"),
-        (["sac", *TINY, "--ent-coef", "auto_x"], "ent_coef: expected auto, auto_X or a number"),
-        (["ppo", *TINY, "--init", "model.zip"], "model.zip: a .zip of Stable-Baselines3 can run code"),
+        (["apg", *TINY, "--hidden", "1000000"], "hidden: expected a whole number from 1 to 2048"),
+        (["apg", *TINY, "--n-envs", "10000000"], "n_envs: expected a whole number from 1 to 10000, got 10000000"),
+        (["ppo", "--set", "n_steps"], "set: expected NAME=VALUE, got 'n_steps'"),
     ],
 )
 def test_errors_have_words_and_exit_code_2(arguments, message, tmp_path, capsys):
@@ -137,98 +127,23 @@ def test_errors_have_words_and_exit_code_2(arguments, message, tmp_path, capsys)
     assert len(error.splitlines()) == 1
 
 
-@pytest.mark.parametrize(
-    "arguments", [["ppo", "--n-epoch", "3"], ["pp"], ["sac", "--n-epochs", "3"], ["ppo", "--gamma", "no"]]
-)
+@pytest.mark.parametrize("arguments", [["apg", "--windo", "3"], ["pp"], ["sac", "--window", "3"]])
 def test_unknown_options_are_errors(arguments, tmp_path, capsys):
     with pytest.raises(SystemExit) as ended:
         main([*arguments, "--out", str(tmp_path)])
     assert ended.value.code == 2
-    assert arguments[1 if len(arguments) > 1 else 0] in capsys.readouterr().err
-
-
-def test_values_out_of_range_on_the_command_line(tmp_path, capsys):
-    try:
-        code = main(["ppo", "--gamma", "2", "--out", str(tmp_path)])
-    except SystemExit as ended:
-        code = ended.code
-    assert code == 2
-    assert "gamma" in capsys.readouterr().err
+    assert arguments[min(len(arguments) - 1, 1)] in capsys.readouterr().err
 
 
 def test_no_method(capsys):
     """The help, and one line that says what is missing."""
     assert main([]) == 2
     printed = capsys.readouterr()
-    assert "Methods: ppo, sac, td3, imitate, apg, observe." in printed.out
-    assert printed.err.splitlines() == [
-        "error: expected a method, one of ppo, sac, td3, imitate, apg, observe, or repeat; got none."
-    ]
+    assert "Methods: ppo, sac, td3, apg, observe." in printed.out
+    assert printed.err == "error: expected a method, one of ppo, sac, td3, apg, observe, or repeat; got none.\n"
 
 
-@pytest.mark.parametrize(
-    ("content", "message"),
-    [
-        ({"method": []}, "expected a method"),
-        ({"method": "pp"}, "There is no method 'pp'"),
-        ({"config": []}, "its config by name"),
-        ({"config": {"hidden": 3}}, "hidden: expected whole numbers, got 3"),
-        ({"seed": -1}, "seed: expected a whole number of at least 0, got -1"),
-        ({"format": 1, "versions": {"ikgym": "0.1.0"}}, 'pip install "ikgym==0.1.0"'),
-    ],
-)
-def test_files_that_cannot_be_repeated(content, message, tmp_path, capsys):
-    usual = {"format": 2, "method": "ppo", "seed": 0, "config": {}, "weights_sha256": "0"}
-    (tmp_path / "run.json").write_text(json.dumps(usual | content))
-    assert main(["repeat", str(tmp_path / "run.json"), "--out", str(tmp_path / "out")]) == 2
-    error = capsys.readouterr().err
-    assert message in error
-    assert len(error.splitlines()) == 1
-
-
-@pytest.mark.parametrize(
-    "error",
-    [
-        MemoryError("Unable to allocate 9 TiB"),
-        RuntimeError("[enforce fail] DefaultCPUAllocator: can't allocate memory: you tried to allocate 9 bytes."),
-    ],
-)
-def test_out_of_memory_is_named(error, tmp_path, monkeypatch, capsys):
-    def fails(*_, **__):
-        raise error
-
-    monkeypatch.setattr(run, "train", fails)
-    assert main(["ppo", *TINY, "--out", str(tmp_path)]) == 2
-    printed = capsys.readouterr().err
-    assert printed.startswith("error: seed 0: Out of memory: ")
-    assert "fewer arms (--n-envs)" in printed
-    assert len(printed.splitlines()) == 1
-
-
-@pytest.mark.parametrize("package", ["torch", "stable_baselines3", "tensorboard"])
-def test_a_missing_extra_is_named(package, tmp_path, monkeypatch, capsys):
-    find = importlib.util.find_spec
-    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == package else find(name))
-    assert main(["ppo", *TINY, "--out", str(tmp_path)]) == 2
-    assert capsys.readouterr().err == f'error: Training needs {package}: pip install "ikgym[train]"\n'
-
-
-def test_the_command_line_is_read_without_torch():
-    """Which takes seconds to load, and is an extra."""
-    code = (
-        "import sys; from importlib.machinery import PathFinder\n"
-        "def find(name, *others, found=PathFinder.find_spec):\n"
-        "    return None if name.partition('.')[0] in ('torch', 'stable_baselines3') else found(name, *others)\n"
-        "PathFinder.find_spec = find\n"
-        "from baselines.training.command import main, parse\n"
-        "parse(['sac', '--preset', 'sac', '--out', 'x']); sys.exit(main(['ppo', '--preset', 'smoke', '--out', 'x']))"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd=ROOT)
-    assert done.returncode == 2, done.stderr
-    assert "Training needs torch, stable_baselines3: pip install" in done.stderr
-
-
-@pytest.mark.parametrize("arguments", [[], *([name] for name in methods.METHODS), ["repeat"]])
+@pytest.mark.parametrize("arguments", [[], *([name] for name in METHODS), ["repeat"]])
 def test_help(arguments, capsys):
     with pytest.raises(SystemExit) as ended:
         main([*arguments, "--help"])
@@ -238,14 +153,15 @@ def test_help(arguments, capsys):
         assert word in text
 
 
-def test_the_command_line_takes_precedence_over_the_preset(tmp_path):
-    file = tmp_path / "mine.toml"
-    file.write_text("action_scale = 0.25\nsegments = 7\n")
-    asked, given = parse(["ppo", "--preset", str(file), "--segments", "9", "--null-space", "0.1", "--out", "x"])
-    assert asked.config == PPO(action_scale=0.25, segments=9, null_space=0.1)
-    assert given == {"action_scale", "segments", "null_space"}
-    assert parse(["ppo", f"--preset={file}", "--hidden=3", "--out", "x"])[1] == {"action_scale", "segments", "hidden"}
-    assert parse(["td3", "--out", "x"])[1] == frozenset()
+def test_out_of_memory_is_named(tmp_path, monkeypatch, capsys):
+    def fails(*_, **__):
+        raise MemoryError("Unable to allocate 9 TiB")
+
+    monkeypatch.setattr(run, "train", fails)
+    assert main(["apg", *TINY, "--out", str(tmp_path)]) == 2
+    printed = capsys.readouterr().err
+    assert printed.startswith("error: seed 0: Out of memory: Unable to allocate 9 TiB")
+    assert "fewer arms (--n-envs)" in printed
 
 
 def test_ctrl_c(tmp_path, capsys, monkeypatch):
@@ -253,34 +169,32 @@ def test_ctrl_c(tmp_path, capsys, monkeypatch):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(command, "train_seeds", interrupted)
-    assert main(["ppo", *TINY, "--out", str(tmp_path)]) == 130
-    assert f"is in {tmp_path}; go on with --resume" in capsys.readouterr().err
+    assert main(["apg", *TINY, "--out", str(tmp_path)]) == 130
+    assert f"is in {tmp_path}; continue with --resume" in capsys.readouterr().err
 
 
-def silent(said):
-    """Takes what a worker says on its way."""
+@pytest.mark.parametrize("package", ["torch", "stable_baselines3", "tensorboard"])
+def test_a_missing_extra_is_named(package, tmp_path, monkeypatch, capsys):
+    find = importlib.util.find_spec
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == package else find(name))
+    assert main(["apg", *TINY, "--out", str(tmp_path)]) == 2
+    assert capsys.readouterr().err == f'error: Training needs {package}: pip install "ikgym[train]"\n'
 
 
-def test_expected_errors_of_a_seed_are_told(tmp_path):
-    (tmp_path / "seed-0").mkdir()
-    (tmp_path / "seed-0" / "run.json").write_text("{")
-    result = seeds.attempt(seeds.Seed(SeedRuns(PPO(), tmp_path, resume=True), 0), silent)
-    assert result.seed == 0
-    assert "run.json is damaged" in result.error
-
-
-def test_unexpected_errors_of_a_seed_are_told(tmp_path, monkeypatch, capfd):
-    monkeypatch.setattr(seeds, "train_seed", lambda *_: 1 / 0)
-    result = seeds.attempt(seeds.Seed(SeedRuns(PPO(), tmp_path), 3), silent)
-    assert result.error == "ZeroDivisionError: division by zero"
-    assert "Traceback" in capfd.readouterr().err
+def test_the_command_line_is_read_without_torch():
+    """Which takes seconds to load, and is an extra."""
+    code = (
+        "import sys; from baselines.training.command import parse\n"
+        "parse(['sac', '--preset', 'smoke', '--out', 'x']); assert 'torch' not in sys.modules"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd=ROOT)
+    assert done.returncode == 0, done.stderr
 
 
 def test_from_the_shell(tmp_path):
     """As a program of its own, with warnings as errors."""
-    arguments = [*TINY, "--out", str(tmp_path)]
     done = subprocess.run(
-        [sys.executable, "-W", "error", ROOT / "train.py", "td3", *arguments, "--learning-starts", "80"],
+        [sys.executable, "-W", "error", ROOT / "train.py", "td3", "--preset", "smoke", "--no-progress", "--out", "."],
         capture_output=True,
         text=True,
         check=False,
@@ -288,55 +202,89 @@ def test_from_the_shell(tmp_path):
     )
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
-    assert f"written to {tmp_path}" in done.stdout
-    assert about(tmp_path / "seed-0")["command"].startswith("python train.py td3 --scenario faitli3-regular")
+    assert "written to ." in done.stdout
+    assert about(tmp_path / "seed-0")["command"].startswith("python train.py td3 --preset smoke")
 
 
-def test_no_seeds(tmp_path):
-    asked, given = parse(["ppo", *TINY, "--out", str(tmp_path)])
-    options = asked.options
-    object.__setattr__(options, "seeds", ())
-    with pytest.raises(TrainingError, match="seeds: expected at least one"):
-        command._train(asked, given, "")
+def test_the_command_line_takes_precedence_over_the_preset(tmp_path):
+    (tmp_path / "mine.toml").write_text("hold = 4\nsegments = 7\n")
+    asked = parse(["apg", "--preset", str(tmp_path / "mine.toml"), "--segments", "9", "--out", "x"])
+    assert asked.config == APG(hold=4, segments=9)
+    asked = parse(["ppo", "--set", "n_steps=8", "gamma=0.9", "--learning", "furthest=20", "--out", "x"])
+    assert asked.config.algorithm_settings == {"n_steps": 8, "gamma": 0.9}
+    assert asked.config.learning_settings == {"furthest": 20}
+
+
+def test_nodes_of_a_cluster_have_to_share_the_folder(tmp_path):
+    one = seeds.Seed(SeedRuns(tiny("apg"), tmp_path), 1, mark="not-there")
+    assert "expected a folder that all nodes of the cluster share" in seeds.train_seed(one).error
+    with seeds._marked(tmp_path, True) as mark:
+        result = seeds.train_seed(seeds.Seed(SeedRuns(tiny("apg", segments=1), tmp_path), 1, mark))
+        assert not result.error
+        again = seeds.train_seed(seeds.Seed(SeedRuns(tiny("apg", segments=1), tmp_path, overwrite=True), 1, mark))
+        assert again.weights_sha256 == result.weights_sha256  # resumed, as after the loss of a node
+    assert not list(tmp_path.glob(".cluster-*"))
+
+
+@pytest.mark.parametrize("kind", METHODS.values(), ids=METHODS)
+def test_configurations_are_json(kind):
+    config = tiny(kind.method)
+    values = json.loads(json.dumps(config.to_json()))
+    assert kind.from_json(values) == config
+    assert differences(values, config.to_json()) == []
+    assert kind.__doc__
 
 
 @pytest.mark.parametrize(
-    "expert",
+    ("kind", "values", "error", "message"),
     [
-        "agent:path={zip},trust=True",
-        "smoothed:policy=agent,options={{'path': '{zip}', 'trust': True}}",
+        (APG, {"windo": 3}, UnknownNameError, "no option of apg 'windo'. Did you mean 'window'"),
+        (APG, {"activation": "sili"}, UnknownNameError, "Did you mean 'silu'"),
+        (APG, {"hidden": []}, InvalidInputError, "hidden: expected 1 to 10 layers"),
+        (APG, {"hidden": [8, 0]}, InvalidInputError, "hidden: expected a whole number of at least 1, got 0"),
+        (APG, {"offsets": [2, 5]}, InvalidInputError, "offsets: expected steps ahead that rise from 1"),
+        (APG, {"segments": 0}, InvalidInputError, "segments: expected"),
+        (APG, {"steps": 0}, InvalidInputError, "steps: expected"),
+        (APG, {"keep_best": "yes"}, InvalidInputError, "keep_best: expected true or false"),
+        (APG, {"learning_rate": -1}, InvalidInputError, "learning_rate: expected a finite number above 0"),
+        (APG, {"window": 64}, InvalidInputError, "window: expected whole numbers, got 64"),
+        (APG, {"window": (88,)}, InvalidInputError, "window: expected .* that divide segment_steps, 1920, got 88"),
+        (APG, {"averaging": 1.5}, InvalidInputError, "averaging"),
+        (APG, {"damping": 0.0}, InvalidInputError, "damping"),
+        (APG, {"reset_distance": -1.0}, InvalidInputError, "reset_distance"),
     ],
 )
-def test_a_run_json_grants_no_trust(tmp_path, capsys, expert):
-    """Whoever repeats the run of somebody else runs none of their code."""
-
-    class Evil:
-        def __reduce__(self):
-            return pathlib.Path.touch, (tmp_path / "ran",)
-
-    with zipfile.ZipFile(tmp_path / "evil.zip", "w") as archive:
-        serialized = base64.b64encode(pickle.dumps(Evil())).decode()
-        archive.writestr("data", json.dumps({"policy_class": {":type:": "x", ":serialized:": serialized}}))
-    config = {**methods.get("imitate").config().to_json(), "expert": expert.format(zip=tmp_path / "evil.zip")}
-    about = {"format": FORMAT, "method": "imitate", "seed": 0, "config": config, "weights_sha256": "0" * 64}
-    (tmp_path / "run.json").write_text(json.dumps(about))
-    assert main(["repeat", str(tmp_path / "run.json"), "--out", str(tmp_path / "again"), "--no-progress"]) == 2
-    said = capsys.readouterr().err
-    assert "run.json: expert: trust is given on the command line or by the caller, never by a file" in said
-    assert not (tmp_path / "ran").exists()
+def test_refused_configurations(kind, values, error, message):
+    with pytest.raises(error, match=message):
+        kind.from_json(values)
 
 
-def test_a_seed_whose_node_is_lost_goes_on_elsewhere(several, tmp_path, monkeypatch, capsys):
-    pool = LosingCluster(monkeypatch, lost=[0])
-    assert main(["ppo", *TINY, "--seeds", "1", "--cluster", "ray", "--overwrite", "--out", str(tmp_path)]) == 0
-    assert about(tmp_path / "seed-1")["weights_sha256"] == about(several[0] / "seed-1")["weights_sha256"]
-    assert len(pool.units) == 2
-    assert not list(tmp_path.glob(".cluster-*"))
-    capsys.readouterr()
+def test_values_of_segments():
+    config = APG(segments=3, learning_rate=1e-2, learning_rate_end=1e-4)
+    assert [config.learning_rate_of(n) for n in range(3)] == pytest.approx([1e-2, 1e-3, 1e-4], rel=1e-12)
+    assert (APG(steps=50).make_scenario().steps, APG(steps=5000).make_scenario().steps) == (50, 1000)
+    with pytest.raises(UnknownNameError, match=r"no method 'pp'\. Did you mean 'ppo'"):
+        get("pp")
 
 
-def test_nodes_have_to_share_the_folder(tmp_path, monkeypatch, capsys):
-    LosingCluster(monkeypatch)
-    monkeypatch.setattr(seeds, "_marked", lambda folder, wanted: contextlib.nullcontext("not-there"))
-    assert main(["ppo", *TINY, "--seeds", "1", "--cluster", "ray", "--out", str(tmp_path)]) == 2
-    assert "expected a folder that all nodes of the cluster share" in capsys.readouterr().err
+def test_presets(tmp_path):
+    assert presets.names() == ("quick", "standard", "long", "smoke")
+    for kind in METHODS.values():
+        assert presets.configure(kind, "smoke").make_scenario()
+        assert presets.configure(kind, None) == kind()
+    for name in ("quick", "standard", "long"):
+        assert presets.configure(APG, name).damping == 1e-2
+    for text, error, message in [
+        ("windo = 2\n", UnknownNameError, "no option of apg 'windo'"),
+        ("window = \n", InvalidInputError, "Cannot read the preset .*mine.toml"),
+    ]:
+        (tmp_path / "mine.toml").write_text(text)
+        with pytest.raises(error, match=message):
+            presets.configure(APG, str(tmp_path / "mine.toml"))
+    with pytest.raises(InvalidInputError, match="Cannot read the preset"):
+        presets.configure(APG, str(tmp_path / "none.toml"))
+
+
+def test_no_seeds(tmp_path, capsys):
+    with contextlib.suppress(SystemExit):
+        assert main(["apg", *TINY, "--out", str(tmp_path), "--seeds"]) == 2

@@ -1,4 +1,4 @@
-"""Validation scores what an evaluation would, on episodes of its own."""
+"""Scores on the validation split are those of an evaluation."""
 
 from __future__ import annotations
 
@@ -8,58 +8,53 @@ import numpy as np
 import pytest
 
 import baselines
-from baselines.agents.features import Processing
 from baselines.episodes import rollouts
 from baselines.evaluation.summary import geometric_mean
 from baselines.fingerprints import fingerprint
-from baselines.spec import parse_policy
 from baselines.training import validation
-from baselines.training.validation import play, reference_costs, validate, validation_seeds
+from baselines.training.validation import record_of, reference_costs, score, validation_seeds
 from ikgym import scenarios, tasks
 
-
-def zero(features):
-    return np.zeros((len(features), 7), np.float32)
+SCENARIO = scenarios.get("varga7-random").replace(steps=40)
 
 
-@pytest.mark.parametrize("base_policy", ["dls", "mfac", "rhc_gradient:horizon=3"])
-def test_outputs_of_zero_score_like_the_base_policy(base_policy):
-    scenario = scenarios.get("varga7-random").replace(steps=40)
-    seeds = validation_seeds(scenario, 3)
-    name, parameters = parse_policy(base_policy)
-    episodes = rollouts(scenario, baselines.make(name, scenario, **parameters), seeds)
-    wanted = [float(np.sum(e.tracking_cost + e.velocity_cost)) for e in episodes]
-    costs, errors, angles = play(zero, Processing(base_policy=base_policy), scenario, seeds)
-    np.testing.assert_allclose(costs, wanted, rtol=1e-12)
-    np.testing.assert_array_equal(errors, [e.position_error.max() for e in episodes])
-    np.testing.assert_array_equal(angles, [e.orientation_error.max() for e in episodes])
-    score = validate(zero, Processing(base_policy=base_policy), scenario, 3)
-    assert score.cost == pytest.approx(geometric_mean(wanted), rel=1e-12)
-    assert (score.cost_ratio, score.episodes, score.lost) == (None, 3, 0.0)
-    assert score.worst == pytest.approx(max(wanted), rel=1e-12)
-    assert score.position_error_max_mm == pytest.approx(1e3 * np.mean(errors), rel=1e-12)
-    assert score.orientation_error_max_mrad == pytest.approx(1e3 * np.mean(angles), rel=1e-12)
+@pytest.mark.parametrize("name", ["dls", "mfac"])
+def test_scores_are_those_of_the_episodes(name):
+    policy = baselines.make(name, SCENARIO)
+    episodes = rollouts(SCENARIO, policy, validation_seeds(SCENARIO, 3))
+    costs = [float(np.sum(e.tracking_cost + e.velocity_cost)) for e in episodes]
+    found = score(policy, SCENARIO, 3, policy.preview)
+    assert found.cost == pytest.approx(geometric_mean(costs), rel=1e-12)
+    assert (found.cost_ratio, found.episodes, found.lost) == (None, 3, 0.0)
+    assert found.worst == pytest.approx(max(costs), rel=1e-12)
+    assert found.position_error_max_mm == pytest.approx(1e3 * np.mean([e.position_error.max() for e in episodes]))
+    assert found.orientation_error_max_mrad == pytest.approx(
+        1e3 * np.mean([e.orientation_error.max() for e in episodes])
+    )
+
+
+class Still:
+    """Stands still."""
+
+    def predict(self, observation, state=None, episode_start=None, deterministic=True):
+        del episode_start, deterministic
+        return np.zeros_like(observation["q"]), state
 
 
 def test_lost_arms_are_counted():
-    scenario = scenarios.get("varga7-random").replace(steps=300)
-    assert validate(zero, Processing(), scenario, 4).lost == 1.0
+    assert score(Still(), SCENARIO.replace(steps=300), 4, 1).lost == 1.0
 
 
 def test_cost_ratio_is_over_the_reference(monkeypatch):
-    scenario = scenarios.get("varga7-random").replace(steps=40)
-    costs, *_ = play(zero, Processing(base_policy="dls"), scenario, validation_seeds(scenario, 2))
-    record = {
-        "fingerprint": fingerprint(scenario),
-        "seeds": list(validation_seeds(scenario, 2)),
-        "costs": costs / [2.0, 8.0],
-    }
+    policy, seeds = baselines.make("dls", SCENARIO), validation_seeds(SCENARIO, 2)
+    costs = [float(np.sum(e.tracking_cost + e.velocity_cost)) for e in rollouts(SCENARIO, policy, seeds)]
+    record = {"fingerprint": fingerprint(SCENARIO), "seeds": list(seeds), "costs": np.array(costs) / [2.0, 8.0]}
     monkeypatch.setattr(validation, "_records", lambda: [record])
-    score = validate(zero, Processing(base_policy="dls"), scenario, 2)
-    assert score.cost_ratio == pytest.approx(4.0, rel=1e-12)
-    assert score.worst == pytest.approx(8.0, rel=1e-12)
-    assert validate(zero, Processing(base_policy="dls"), scenario, 3).cost_ratio is None
-    assert validate(zero, Processing(base_policy="dls"), scenario.replace(dt=2e-3), 2).cost_ratio is None
+    found = score(policy, SCENARIO, 2, 1)
+    assert found.cost_ratio == pytest.approx(4.0, rel=1e-12)
+    assert found.worst == pytest.approx(8.0, rel=1e-12)
+    assert score(policy, SCENARIO, 3, 1).cost_ratio is None
+    assert reference_costs(fingerprint(SCENARIO.replace(dt=2e-3)), seeds) is None
 
 
 def test_validation_seeds():
@@ -70,14 +65,14 @@ def test_validation_seeds():
 
 @pytest.fixture(params=validation.TASKS)
 def recorded(request):
-    """A scenario, and what is on record of it."""
+    """A scenario, and its record."""
     scenario = scenarios.get(validation.SCENARIO).replace(task=tasks.get(request.param))
     records = json.loads(validation.FILE.read_text(encoding="utf-8"))
     return scenario, next(record for record in records if record["task"] == request.param)
 
 
 def test_the_record_is_of_the_scenario_as_it_is(recorded):
-    """Where this fails, the scenario or the cost has changed: python -m baselines.training.validation --update."""
+    """Where this fails, the scenario or the cost has changed: python -m baselines.training.validation."""
     scenario, record = recorded
     assert record["fingerprint"] == fingerprint(scenario)
     assert tuple(record["seeds"]) == scenarios.seeds("validation", validation.EPISODES)
@@ -86,19 +81,8 @@ def test_the_record_is_of_the_scenario_as_it_is(recorded):
 
 
 @pytest.mark.slow
-def test_the_record_holds_what_the_reference_costs(recorded):
+def test_the_record_holds_the_costs_of_the_reference(recorded):
     scenario, record = recorded
-    (episode,) = rollouts(scenario, validation.reference_policy(scenario), scenarios.seeds("validation", 1))
-    assert float(np.sum(episode.tracking_cost + episode.velocity_cost)) == pytest.approx(record["costs"][0], rel=1e-6)
-
-
-def test_command_line(capsys, monkeypatch, tmp_path):
-    assert validation.main([]) == 0
-    assert f"{validation.POLICY} on varga7-random (skew): geometric mean of 64 costs" in capsys.readouterr().out
-    monkeypatch.setattr(validation, "FILE", tmp_path / "record.json")
-    monkeypatch.setattr(validation, "POLICY", "dls")
-    monkeypatch.setattr(validation, "EPISODES", 2)
-    monkeypatch.setattr(scenarios, "get", lambda name, get=scenarios.get: get(name).replace(steps=20))
-    assert validation.main(["--update"]) == 0
-    assert "dls on varga7-random (pose): geometric mean of 2 costs" in capsys.readouterr().out
-    validation._records.cache_clear()
+    again = record_of(scenario, record["seeds"][:1])
+    assert again["costs"] == pytest.approx(record["costs"][:1], rel=1e-6)
+    assert {**again, "costs": 0, "seeds": 0} == {**record, "costs": 0, "seeds": 0}

@@ -7,15 +7,15 @@ import pytest
 from gymnasium.utils import seeding
 
 import baselines
-from baselines.agents.bilinear.kernels import feature_gradient_rows, feature_rows
+from baselines.agents.bilinear.kernels import action_rows, feature_gradient_rows, seen_rows
 from baselines.agents.bilinear.processing import Bilinear
-from baselines.agents.files import load_agent, save_agent
-from baselines.agents.network import Network
+from baselines.agents.files import load_agent
 from baselines.episodes import rollouts
 from baselines.policy import Batch, Problem
 from ikgym import arms, scenarios, tasks
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 from ikgym.simulator import Simulator
+from tests.baselines.random_agents import write_agent
 from tests.comparison import identical
 
 OFFSETS = (1, 5, 20)
@@ -39,8 +39,13 @@ def batch_of(problem, seed=0, turned=0.0):
     return Batch(q, np.zeros_like(q), pose, nominal, rng.uniform(0.0, 900.0, (ROWS, 1)))
 
 
-def features(problem, batch):
-    return Bilinear(OFFSETS).features(problem, batch)
+def features(problem, batch, offsets=OFFSETS, damping=None, speed=None):
+    """The features of the network, in single precision as it sees them."""
+    out = np.empty((len(batch.q), Bilinear(offsets, damping).size(problem)), np.float32)
+    speed = np.empty(len(batch.q)) if speed is None else speed
+    arrays = batch.q, batch.nominal, batch.remaining, out, speed
+    seen_rows(problem.task.kind, problem.model.chain, problem.dt, np.array(offsets), damping is not None, *arrays)
+    return out
 
 
 def outputs(problem, seed=1):
@@ -48,7 +53,10 @@ def outputs(problem, seed=1):
 
 
 def qdot(problem, batch, output):
-    return Bilinear(OFFSETS).action(problem, batch, output) * problem.velocity_limit
+    """The joint velocities of (G, h)."""
+    out, scene = np.empty(batch.q.shape), (problem.task.kind, problem.model.chain, problem.dt, np.array(OFFSETS))
+    action_rows(scene, problem.velocity_limit, batch.q, batch.pose, batch.nominal, output, out)
+    return out * problem.velocity_limit
 
 
 @pytest.mark.parametrize("task", ["position", "matrix", "pose", "axis"])
@@ -138,7 +146,7 @@ def test_gradients_of_features(arm, task):
     def seen(q):
         out, speed = np.empty((ROWS, size)), np.empty(ROWS)
         arrays = offsets, q, batch.nominal, batch.remaining, out, speed
-        feature_rows(problem.task.kind, chain.prismatic, chain.axes[0], problem.dt, *arrays)
+        seen_rows(problem.task.kind, chain, problem.dt, arrays[0], False, *arrays[1:])
         return out
 
     given = np.empty(batch.q.shape)
@@ -160,38 +168,23 @@ def test_a_row_of_a_batch_is_the_single_call():
         assert identical(qdot(problem, alone, output[row : row + 1]), qdot(problem, batch, output)[row : row + 1])
 
 
-@pytest.fixture
-def agent(tmp_path):
-    """The file of an agent for whole poses of `varga7`."""
-    scenario, processing = scenarios.get("varga7-pose-random"), Bilinear(OFFSETS)
-    problem, rng = Problem.of(scenario), np.random.default_rng(5)
-    sizes = processing.size(problem), 16, processing.outputs(problem)
-    weights = tuple(0.1 * rng.normal(size=shape) for shape in ((16, sizes[0]), (sizes[2], 16)))
-    net = Network(weights, (np.zeros(16), np.zeros(sizes[2])), "silu", "linear")
-    save_agent(tmp_path / "a.safetensors", net, processing, scenario)
-    return tmp_path / "a.safetensors"
-
-
-def test_agents_play(agent):
-    """From their file, also where skew coordinates are shown, but no arm with other joints."""
-    read = load_agent(agent)
-    assert read.processing == Bilinear(OFFSETS)
+def test_agents_play(tmp_path):
+    """The first action of an agent is that of its parts, also where skew coordinates are shown."""
     scenario = scenarios.get("varga7-pose-random").replace(steps=20)
-    policy = baselines.make("agent", scenario, path=str(agent))
-    assert policy.preview == OFFSETS
+    file = write_agent(tmp_path / "a.safetensors", scenario, processing=Bilinear(OFFSETS))
+    policy = baselines.make("agent", scenario, path=file)
     (episode,) = rollouts(scenario, policy, [3])
     simulator = Simulator(scenario, 1, OFFSETS)
     simulator.reset(np.ones(1, dtype=bool), [seeding.np_random(3)[0]])
     out, problem = simulator.observe(), Problem.of(scenario)
     batch = Batch(*[getattr(out, name).copy() for name in Batch._fields])
-    output = read.network.forward(Bilinear(OFFSETS).features(problem, batch))
-    first = Bilinear(OFFSETS).action(problem, batch, output).astype(np.float32) * scenario.velocity_limit
+    output = load_agent(tmp_path / "a.safetensors", (Bilinear,)).network.forward(features(problem, batch))
+    limit = scenario.velocity_limit
+    first = np.clip(qdot(problem, batch, output) / limit, -1.0, 1.0).astype(np.float32) * limit
     np.testing.assert_allclose(episode.qdot[0], first[0], rtol=1e-12)
     skew = scenarios.get("varga7-random").replace(steps=20)
-    (shown,) = rollouts(skew, baselines.make("agent", skew, path=str(agent)), [3])
+    (shown,) = rollouts(skew, baselines.make("agent", skew, path=file), [3])
     np.testing.assert_allclose(shown.qdot, episode.qdot, rtol=1e-3, atol=1e-5)
-    with pytest.raises(InvalidInputError, match="was trained for 7 joints"):
-        baselines.make("agent", scenarios.get("zhang6-lspb"), path=str(agent))
 
 
 def test_json():

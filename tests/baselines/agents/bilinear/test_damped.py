@@ -1,18 +1,15 @@
-"""The damped inverse that the matrix of a bilinear actor begins as."""
+"""The damped inverse that the matrix of a bilinear agent begins as."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-import torch
 
 from baselines.agents.bilinear.damped_kernels import LARGEST, held_gradient_rows, held_rows
 from baselines.agents.bilinear.processing import Bilinear
-from baselines.training.gradients.law import Law
-from ikgym import scenarios, tasks
+from baselines.agents.network import Network
 from ikgym.exceptions import InvalidInputError
 from tests.baselines.agents.bilinear.test_bilinear import OFFSETS, ROWS, batch_of, outputs, problem_of, qdot
-from tests.comparison import identical
 
 DAMPING = 4e-3
 DAMPED = Bilinear(OFFSETS, DAMPING)
@@ -103,44 +100,13 @@ def test_an_untrained_network_is_damped_least_squares():
     arm, batch = problem.model, batch_of(problem)
     near = batch.q + np.random.default_rng(2).normal(scale=1e-4, size=batch.q.shape)
     batch = batch._replace(nominal=np.stack([problem.task.coordinates(*arm.forward(near))] * 3, 1))
-    actions = DAMPED.action(problem, batch, np.zeros((ROWS, DAMPED.outputs(problem)), np.float32))
+    sizes = DAMPED.size(problem), DAMPED.outputs(problem)
+    actions = DAMPED.act(problem, batch, Network((np.zeros(sizes[::-1]),), (np.zeros(sizes[1]),), "silu", "linear"))
     moved = batch.q + problem.dt * actions * problem.velocity_limit
     after = problem.task.error(batch.nominal[:, 0], problem.task.coordinates(*arm.forward(moved)))
     before = problem.task.error(batch.nominal[:, 0], batch.pose)
     assert np.median(np.abs(after).max(1) / np.abs(before).max(1)) < 0.1
     assert not qdot(problem, batch, np.zeros_like(outputs(problem))).any()
-
-
-@pytest.mark.parametrize(("arm", "task"), [("varga7", "pose"), ("tiago", "axis"), ("varga7", "position")])
-def test_without_a_matrix_it_is_as_with_one_of_0(arm, task):
-    """In actions and in what gradients go through, with the same gradient."""
-    problem, alone = problem_of(arm, task), DAMPED.replace(matrix=False)
-    n, batch = problem.model.joints, batch_of(problem)
-    given = np.random.default_rng(4).normal(size=(ROWS, alone.outputs(problem)))
-    rows = np.zeros((ROWS, n, (DAMPED.outputs(problem) - 1 - n) // n))
-    rows[:, :, -1] = given[:, :n]
-    whole = np.hstack([rows.reshape(ROWS, -1), given[:, n:]])
-    assert identical(alone.action(problem, batch, given), DAMPED.action(problem, batch, whole))
-
-    scenario = scenarios.get("tiago-line" if arm == "tiago" else "varga7-random").replace(task=tasks.get(task))
-    q, held, gradients = torch.from_numpy(batch.q), [], []
-    for processing, output in ((alone, given), (DAMPED, whole)):
-        law, leaf = Law(scenario, processing), torch.from_numpy(output).requires_grad_()
-        features, _ = law.features(q, batch.nominal, batch.remaining)
-        held.append(law.held(q, features, leaf))
-        held[-1].square().sum().backward()
-        gradients.append(leaf.grad.numpy())
-    assert identical(held[0].detach().numpy(), held[1].detach().numpy())
-    of_h = gradients[1][:, : rows[0].size].reshape(rows.shape)[:, :, -1]
-    assert identical(gradients[0], np.hstack([of_h, gradients[1][:, rows[0].size :]]))
-
-
-def test_files():
-    assert Bilinear.from_json(DAMPED.to_json()) == DAMPED
-    alone = DAMPED.replace(matrix=False)
-    assert Bilinear.from_json(alone.to_json()) == alone
-    assert "damping" not in Bilinear(OFFSETS).to_json()  # those of before
-    assert "matrix" not in DAMPED.to_json()
 
 
 @pytest.mark.parametrize("damping", [0.0, -1.0, float("nan"), "much"])

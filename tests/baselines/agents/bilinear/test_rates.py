@@ -1,4 +1,4 @@
-"""What twists ahead would ask of the joints, and the metric that begins with it."""
+"""Joint rates that the reference ahead requires at predicted postures, and the law that uses them."""
 
 from __future__ import annotations
 
@@ -6,111 +6,107 @@ import numpy as np
 import pytest
 import torch
 
-from baselines.agents.bilinear.damped_kernels import LARGEST, held_rows
-from baselines.agents.bilinear.processing import Bilinear, held
-from baselines.agents.bilinear.rate_kernels import metric_rows
+from baselines.agents.bilinear.damped_kernels import held_rows
+from baselines.agents.bilinear.processing import Bilinear
+from baselines.agents.bilinear.rates import FARTHEST, metric_rows, rate_rows
+from baselines.policy import Problem
 from baselines.training.gradients.law import Law
-from ikgym import scenarios, tasks
-from tests.baselines.agents.bilinear.test_bilinear import OFFSETS, ROWS, batch_of, problem_of
+from ikgym import scenarios
+from ikgym.rl.twists import twist
+from tests.baselines.agents.bilinear.test_bilinear import OFFSETS, ROWS, batch_of, features, problem_of, qdot
+from tests.baselines.random_agents import network
 
 DAMPED = Bilinear(OFFSETS, 1e-3)
 TWISTS = len(OFFSETS) - 1
 CASES = [("varga7", "pose"), ("varga7", "position"), ("puma560", "matrix"), ("tiago", "axis")]
 
 
-def seen_jacobian(problem, q):
-    """That of the twist, at joint coordinates of which the first is 0 where twists are seen from its frame."""
-    seen = q.copy()
-    if problem.model.name != "tiago":  # whose joint 1 is prismatic
-        seen[:, 0] = 0.0
-    return problem.model.jacobian(seen)[:, : 3 if problem.task.name == "position" else 6]
+def rates_of(problem, batch, offsets=OFFSETS):
+    """Joint rates in [rad/s] or [m/s]. Shape (B, p - 1, n)."""
+    speed = np.empty(len(batch.q))
+    seen = features(problem, batch, offsets, 1e-3, speed)[:, -(len(offsets) - 1) * problem.model.joints :]
+    return seen.reshape(len(seen), len(offsets) - 1, -1) * speed[:, None, None] / 0.3
 
 
-def rates_of(problem, features):
-    return features[:, -TWISTS * problem.model.joints :].reshape(len(features), TWISTS, -1)
+def postures(problem, batch):
+    """Joint coordinates at the offsets, by damped least squares from one reference pose to the next. (ROWS, p, n)."""
+    w, found = 3 if problem.task.name == "position" else 6, []
+    for row in range(ROWS):
+        q = batch.q[row].copy()
+        for nominal in batch.nominal[row]:
+            pose, due = problem.task.coordinates(*problem.model.forward(q[None])), np.empty(w)
+            twist(problem.task.kind, nominal, pose[0], np.empty(6), due)
+            jacobian = problem.model.jacobian(q[None])[0, :w]
+            q = q + np.linalg.solve(jacobian @ jacobian.T + 1e-2 * np.eye(w), due) @ jacobian
+            found.append(q)
+    return np.reshape(found, (ROWS, len(OFFSETS), -1))
 
 
 @pytest.mark.parametrize(("arm", "task"), CASES)
-def test_rates_are_damped_least_squares(arm, task):
+def test_rates_are_those_between_predicted_postures(arm, task):
     problem = problem_of(arm, task)
-    batch, n = batch_of(problem), problem.model.joints
-    features = DAMPED.features(problem, batch)
-    plain = Bilinear(OFFSETS).features(problem, batch)
-    assert np.array_equal(features[:, : -TWISTS * n], plain)
-    jacobian = seen_jacobian(problem, batch.q)
-    twists = plain[:, -2 - TWISTS * jacobian.shape[1] : -2].reshape(ROWS, TWISTS, -1)
-    for row in range(ROWS):
-        j = jacobian[row]
-        wanted = 0.3 * twists[row] @ np.linalg.inv(j @ j.T + 1e-2 * np.eye(len(j))) @ j
-        np.testing.assert_allclose(rates_of(problem, features)[row], wanted, rtol=1e-4, atol=1e-5)
+    batch = batch_of(problem)
+    wanted = np.diff(postures(problem, batch), axis=1) / (np.diff(OFFSETS)[:, None] * problem.dt)
+    found = rates_of(problem, batch)
+    np.testing.assert_allclose(found, wanted, rtol=2e-4, atol=1e-5 * np.abs(wanted).max())
+    own = TWISTS * problem.model.joints
+    assert np.array_equal(features(problem, batch, OFFSETS, 1e-3)[:, :-own], features(problem, batch))
 
 
-@pytest.mark.parametrize("name", ["varga7-random", "panda-random", "tiago-circle"])
-def test_gradients_through_the_law(name):
-    """Of features and of (G, h), against central differences."""
-    scenario = scenarios.get(name)
-    scenario = scenario.replace(task=tasks.get("pose"))
-    law, rng = Law(scenario, DAMPED), np.random.default_rng(0)
-    q = torch.from_numpy(rng.uniform(-1.0, 1.0, (ROWS, scenario.joints)))
-    near = q[:, None].numpy() + 0.05 * rng.normal(size=(ROWS, len(OFFSETS), scenario.joints))
-    nominal = scenario.task.coordinates(*scenario.model.forward(near))
-    remaining = np.full((ROWS, 1), 100.0)
-    output = torch.from_numpy(rng.normal(scale=0.3, size=(ROWS, law.outputs)))
-    of_features = torch.from_numpy(rng.normal(size=(ROWS, law.inputs)))
-    of_held = torch.from_numpy(rng.normal(size=(ROWS, scenario.joints * 7)))
-
-    def value(q):
-        features, _ = law.features(q, nominal, remaining)
-        return (features * of_features).sum(1) + (law.held(q, features, output) * of_held).sum(1)
-
-    at = q.clone().requires_grad_()
-    (given,) = torch.autograd.grad(value(at).sum(), at)
-    for j in range(scenario.joints):
-        step = torch.zeros_like(q)
-        step[:, j] = 1e-6
-        wanted = (value(q + step) - value(q - step)) / 2e-6
-        torch.testing.assert_close(given[:, j], wanted, rtol=1e-5, atol=1e-5 * float(given.abs().max()))
+def test_a_turn_of_joint_1_changes_nothing():
+    problem = problem_of()
+    here, there = (features(problem, batch_of(problem, turned=turned), OFFSETS, 1e-3) for turned in (0.0, 0.8))
+    np.testing.assert_allclose(there, here, atol=2e-5)
 
 
-def test_training_and_playing_have_one_metric():
-    """(G, h) of the training in float64, and of the kernels that play."""
-    scenario = scenarios.get("varga7-pose-random")
-    law, problem = Law(scenario, DAMPED), problem_of()
-    batch, rng = batch_of(problem), np.random.default_rng(1)
-    output = rng.normal(scale=0.3, size=(ROWS, law.outputs))
-    features, _ = law.features(torch.from_numpy(batch.q), batch.nominal, batch.remaining)
-    with_metric, played = output.copy(), np.empty((ROWS, 49))
-    metric_rows(problem.task.kind, problem.model.chain.prismatic, TWISTS, features.numpy(), with_metric)
-    assert (with_metric[:, :-7] == output[:, :-7]).all()
-    assert np.ptp(with_metric[:, -7:] - output[:, -7:]) > 0.1
-    held_rows(problem.task.kind, problem.model.chain, DAMPED.damping, batch.q, with_metric, played)
-    trained = law.held(torch.from_numpy(batch.q), features, torch.from_numpy(output)).numpy()
-    np.testing.assert_allclose(trained, played, rtol=1e-9, atol=1e-12)
-
-
-def test_the_metric_spares_fast_joints():
-    """What costs, the sum of fourth powers, is less than that of least squares, for the same twists."""
-    problem, ratios = problem_of("varga7", "pose"), []
-    for seed in range(20):
-        batch = batch_of(problem, seed)
-        features, output = DAMPED.features(problem, batch), np.zeros((ROWS, DAMPED.outputs(problem)))
-        output[:, 49] = -LARGEST
-        metric_rows(problem.task.kind, problem.model.chain.prismatic, TWISTS, features, output)
-        of_metric = held(problem, 1e-3, batch.q, output).reshape(ROWS, 7, 7)[:, :, :6]
-        output[:, 50:] = 0.0
-        of_least_squares = held(problem, 1e-3, batch.q, output).reshape(ROWS, 7, 7)[:, :, :6]
-        twist = features[:, 11:17, None]
-        costs = [((matrix @ twist) ** 4).sum((1, 2)) for matrix in (of_metric, of_least_squares)]
-        ratios.append(costs[0] / costs[1])
-    assert np.median(ratios) < 0.995
-    assert np.quantile(ratios, 0.1) < 0.95
-    assert np.quantile(ratios, 0.9) < 1.05
-
-
-def test_nothing_due_gives_a_metric_all_the_same():
-    """An arm that stands at the end of its path."""
+def test_steps_are_bounded_far_off_the_path():
     problem = problem_of()
     batch = batch_of(problem)
-    batch = batch._replace(nominal=np.repeat(batch.pose[:, None], len(OFFSETS), 1))
-    action = DAMPED.action(problem, batch, np.zeros((ROWS, DAMPED.outputs(problem))))
-    np.testing.assert_allclose(action, 0.0, atol=1e-9)
+    far = batch._replace(nominal=batch.nominal + np.array([3.0, 0.0, 0.0, *np.zeros(batch.pose.shape[1] - 3)]))
+    steps = rates_of(problem, far) * np.diff(OFFSETS)[:, None] * problem.dt
+    assert np.abs(steps).max() == pytest.approx(FARTHEST, rel=1e-5)
+
+
+def test_nan_is_not_taken_for_a_step():
+    problem = problem_of()
+    batch, n = batch_of(problem), problem.model.joints
+    batch.nominal[1, 1, 0] = np.nan
+    out = np.zeros((ROWS, TWISTS * n))
+    arrays = batch.q, batch.nominal, np.ones(ROWS), out
+    rate_rows(problem.task.kind, problem.model.chain, problem.dt, np.array(OFFSETS), *arrays)
+    assert np.isnan(out[1]).all()
+    assert np.isfinite(np.delete(out, 1, axis=0)).all()
+
+
+def test_features_are_constants_for_the_gradient_and_actions_are_not():
+    scenario = scenarios.get("varga7-pose-random")
+    law, problem = Law(scenario, DAMPED), Problem.of(scenario)
+    batch, speeds = batch_of(problem), np.empty(ROWS)
+    q = torch.from_numpy(batch.q).requires_grad_()
+    seen, speed = law.features(q, batch.nominal, batch.remaining)
+    assert not seen.requires_grad
+    wanted = features(problem, batch, OFFSETS, 1e-3, speeds)
+    np.testing.assert_array_equal(seen.numpy().astype(np.float32), wanted)
+    np.testing.assert_array_equal(speed, speeds)
+    assert law.held(q, seen, torch.zeros(ROWS, law.outputs, dtype=torch.float64)).requires_grad
+
+
+@pytest.mark.parametrize("damping", [None, 1e-3])
+@pytest.mark.parametrize(("arm", "task"), [("varga7", "pose"), ("tiago", "axis"), ("varga7", "position")])
+def test_one_call_is_the_parts_of_the_law(arm, task, damping):
+    """Features, network, metric, inverse and action, bit for bit."""
+    problem, processing = problem_of(arm, task), Bilinear(OFFSETS, damping)
+    batch, kind, chain = batch_of(problem), problem.task.kind, problem.model.chain
+    net = network((processing.size(problem), 16, processing.outputs(problem)))
+    seen = features(problem, batch, OFFSETS, damping)
+    output = net.forward(seen)
+    if damping is not None:
+        metric_rows(kind, chain.prismatic, TWISTS, seen, output)
+        held = np.empty((ROWS, Bilinear(OFFSETS).outputs(problem)))
+        held_rows(kind, chain, damping, batch.q, output, held)
+        output = held
+    found = processing.act(problem, batch, net)
+    assert np.array_equal(found, qdot(problem, batch, output) / problem.velocity_limit) or np.allclose(
+        found, qdot(problem, batch, output) / problem.velocity_limit, rtol=1e-15
+    )
+    assert np.ptp(found) > 0.0

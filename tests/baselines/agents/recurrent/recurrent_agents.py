@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import ikgym
-from baselines.agents.recurrent.files import in_memory
+from baselines.agents.files import agent_of
 from baselines.agents.recurrent.kernels import MOST
 from baselines.agents.recurrent.network import GatedNetwork, shapes
 from baselines.agents.recurrent.policy import RecurrentPolicy
@@ -35,5 +35,5 @@ def constant(outputs):
 def made(network=None, scenario="panda-camera-slow", processing=PROCESSING, **options):
     """A policy with such a network."""
     on = ikgym.scenarios.get(scenario) if isinstance(scenario, str) else scenario
-    file = in_memory(drawn() if network is None else network, processing, ikgym.scenarios.get("panda-field"))
+    file = agent_of(drawn() if network is None else network, processing, ikgym.scenarios.get("panda-field"))
     return RecurrentPolicy(Problem.of(on), given=file, **options)

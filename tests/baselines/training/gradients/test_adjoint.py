@@ -140,10 +140,8 @@ def test_a_segment_is_the_environment(name):
     output = np.random.default_rng(1).normal(scale=2.0, size=(1, n * (w + 1)))
     for k in range(scenario.steps):
         action, path, ahead = np.empty((1, n)), Path.empty(1, 1, n), np.empty((1, w))
-        action_rows(
-            task.kind, chain.prismatic, chain.axes[0], task.dt, offsets, task.velocity_limit,
-            out.q, out.pose, out.nominal, output, action,
-        )  # fmt: skip
+        scene = task.kind, chain, task.dt, offsets
+        action_rows(scene, task.velocity_limit, out.q, out.pose, out.nominal, output, action)
         path.q[:, 0], path.qdot[:, 0] = out.q, out.qdot
         speed = np.array([mean_twists(task.kind, task.dt, offsets, out.nominal[0], np.empty(6), ahead)])
         rows = Rows(out.nominal[:, :1].copy(), counted[None, k + 1 : k + 2], np.ones(1, int), speed)

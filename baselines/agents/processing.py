@@ -1,0 +1,82 @@
+"""From observations to features, and from network outputs to actions: what all kinds of agents have in common."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any, ClassVar, Protocol, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from ikgym.exceptions import InvalidInputError
+from ikgym.preview import offsets as checked_offsets
+from ikgym.validation import Frozen, known_names
+
+
+class NetworkLike(Protocol):
+    """A network that can be written to the file of an agent and read again."""
+
+    @property
+    def tensors(self) -> dict[str, npt.NDArray[np.float32]]:
+        """All tensors by name, in the order in which they are hashed."""
+
+    def to_json(self) -> dict[str, Any]:
+        """The sizes of the layers, and what stands between them."""
+
+    @classmethod
+    def from_json(cls, about: Mapping[str, Any], tensors: Mapping[str, npt.NDArray[Any]]) -> Self:
+        """The inverse of :meth:`to_json`, with the tensors.
+
+        Raises:
+            InvalidInputError: They do not fit together.
+        """
+
+
+class Processing(Frozen):
+    """A frozen dataclass that the file of an agent describes by the values of its fields."""
+
+    #: The name of the class in files.
+    kind: ClassVar[str]
+    #: The kind of network that goes with it.
+    network: ClassVar[type[NetworkLike]]
+
+    def to_json(self) -> dict[str, Any]:
+        """The kind and the fields, as JSON values."""
+        return {"kind": self.kind, **{name: _plain(getattr(self, name)) for name in _fields(type(self))}}
+
+    @classmethod
+    def from_json(cls, values: Mapping[str, Any]) -> Self:
+        """The inverse of :meth:`to_json`; fields left out have their defaults.
+
+        Raises:
+            UnknownNameError: A key is not a field.
+            InvalidInputError: A value is refused.
+        """
+        known_names("field of the processing", values, ["kind", *_fields(cls)])
+        return cls(**{name: tuple(v) if isinstance(v, list) else v for name, v in values.items() if name != "kind"})
+
+
+def check_offsets(offsets: tuple[int, ...]) -> tuple[tuple[int, ...], npt.NDArray[np.int64]]:
+    """Steps ahead at which an agent sees the reference trajectory, and the same as a read-only array for kernels.
+
+    Raises:
+        InvalidInputError: There are fewer than two, or they do not rise from 1 or more.
+    """
+    try:
+        steps = checked_offsets(offsets)
+    except InvalidInputError as e:
+        raise InvalidInputError(str(e).replace("preview", "offsets", 1)) from None
+    if len(steps) < 2:
+        raise InvalidInputError(f"offsets: expected at least two steps ahead, got {offsets}.")
+    array = np.array(steps, dtype=np.int64)
+    array.flags.writeable = False
+    return steps, array
+
+
+def _fields(kind: Any) -> list[str]:
+    return [field.name for field in dataclasses.fields(kind) if field.init]
+
+
+def _plain(value: Any) -> Any:
+    return list(value) if isinstance(value, tuple) else value

@@ -1,1 +1,0 @@
-"""The environment as agents see it in training."""
