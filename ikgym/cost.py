@@ -1,4 +1,4 @@
-"""The tracking cost: what every policy is scored by."""
+"""The tracking cost, the score of every policy."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class TrackingCost(Frozen):
         p_out: The exponent of velocities above Δq̇. From 1 to 100.
         p_in: The exponent of velocities up to Δq̇. From 1 to 100.
 
-    A scenario refuses a cost that is within these bounds, but may grow too large in an episode of it.
+    A scenario also refuses costs that may grow too large within an episode.
 
     Raises:
         InvalidInputError: A parameter is not within its bounds.
@@ -58,11 +58,11 @@ class TrackingCost(Frozen):
         return CostParameters(self.delta_x, self.p_x, self.delta_qdot, self.p_out, self.p_in)
 
     def largest(self, errors: FloatArray, velocities: FloatArray) -> float:
-        """The most that a step can cost, Φ^X + Φ^U; infinite where that is beyond all floats.
+        """The largest cost of a step, Φ^X + Φ^U; infinite where it exceeds all floats.
 
         Args:
-            errors: What the components of the error do not exceed. Shape (e,).
-            velocities: What the joint velocities do not exceed, in [rad/s] or [m/s]. Shape (n,).
+            errors: Largest absolute components of the error. Shape (e,).
+            velocities: Largest joint velocities in [rad/s] or [m/s]. Shape (n,).
         """
         x, u = errors / self.delta_x, velocities / self.delta_qdot
         with np.errstate(over="ignore", under="ignore"):

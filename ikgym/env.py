@@ -45,20 +45,20 @@ class RedundantIKEnv(gym.Env[Any, Any]):
     shape is an error; the state stays as it was.
 
     ## Transition
-    q(k+1) = q(k) + Δt q̇(k) (Varga 2021, eq. 5) with the joint velocities q̇ that the arm makes of the command, joint
-    by joint, in this order:
+    q(k+1) = q(k) + Δt q̇(k) (Varga 2021, eq. 5), where the command becomes the joint velocity q̇, joint by joint, in
+    this order:
 
     1. The command of an earlier step takes its place, if the scenario's plant has a delay.
     2. It is cut to the arm's velocity limit.
     3. Its change from the q̇ last applied is cut to the acceleration limit times Δt. An episode begins at rest. This
-       is q̇, which is observed and charged; what the plant makes of it is not.
+       is q̇, which is observed and enters the cost; the effects below do not.
     4. The drive lags behind it, bias and noise are added, and backlash lies between drive and joint, if the plant has
        some.
     5. A joint that would pass a limit of its coordinate stops there, whatever the acceleration limit says. Its q̇ is
        (q(k+1) − q(k)) / Δt then, no faster than the velocity limit: 0 where it stood at the stop already.
 
-    An ideal plant without limits does what it is told. `info["at_limit"]` counts the joints that were held back, by
-    more than a millionth of the scenario's `velocity_limit`, which is more than what rounding to float32 does.
+    An ideal plant without limits applies the command. `info["at_limit"]` counts the joints that were held back, by
+    more than a millionth of the scenario's `velocity_limit`, which exceeds the rounding of float32.
 
     ## Observation space
     A `Dict` of float64:
@@ -74,14 +74,14 @@ class RedundantIKEnv(gym.Env[Any, Any]):
     | `pose_age` | (1,) | steps since `pose` was measured; where sensors are slow or late | 1 |
     | `commands` | (h, n) | the last h commands within the velocity limit, newest first; with `commands=h` | as `qdot` |
 
-    `q` and `pose` are what the sensors of the scenario's plant show; those of an ideal plant show what is true.
-    `preview` = an int p gives X^N(k+1) … X^N(k+p); a tuple such as (1, 10, 40, 120) gives just those steps ahead.
+    `q` and `pose` are the measurements of the scenario's plant; with an ideal plant they are exact.
+    `preview` = an int p gives X^N(k+1) … X^N(k+p); a tuple such as (1, 10, 40, 120) gives only those steps.
     The nominal goes on past the end of the episode. All bounds are finite and true: they follow from the start,
     the limits, the number of steps and the arm's reach.
 
     ## Reward
     −(Φ^X(X^N(k+1) − F(q(k+1))) + Φ^U(q̇(k))), minus the stage cost of the scenario's `TrackingCost`, of the true joint
-    coordinates and the kinematics of the arm that moves, whatever is measured; so are the errors in `info`. Where a
+    coordinates and the kinematics of the arm that moves; so are the errors in `info`. Where a
     scenario holds its nominal points for several steps, only the last step of each point costs anything.
 
     ## Info
@@ -98,29 +98,30 @@ class RedundantIKEnv(gym.Env[Any, Any]):
     After a reset `info` is empty.
 
     ## Starting state
-    The scenario's start, with no velocity. `reset(seed=…)` chooses the trajectory of a random scenario, and whatever
-    its plant draws; see `ikgym.scenarios.SPLITS` for the seeds. `reset(options={"arm_seed": k})` has the arm and the
-    drives that k draws, for this episode, whatever the seed; it is an error where the plant draws neither, as that of
-    an ideal plant. `reset(options={"q": …})` starts elsewhere, within the limits of the arm. A
-    joint without limits starts at most 2π [rad] or [m] from home (or as far as the scenario's own start, if that is
-    farther). `reset(options={"step": k})` enters the episode after k of its steps, where its reference joint path is
-    then and at the velocity that it has; with `q` beside it, there and at rest. Sensors and drives remember an arm that
-    was like that before. It is an error where the reference is a path of the tool alone.
+    The scenario's start, with no velocity. `reset(seed=…)` chooses the trajectory of a random scenario, and all random
+    effects of its plant; see `ikgym.scenarios.SPLITS` for the seeds. Options of a reset:
+
+    - `{"arm_seed": k}` uses the arm and the drives that k draws, for this episode, whatever the seed; it is an error
+      where the plant draws neither.
+    - `{"q": …}` starts elsewhere, within the limits of the arm. A joint without limits starts at most 2π [rad] or [m]
+      from home (or as far as the scenario's own start, if that is farther).
+    - `{"step": k}` enters the episode after k steps, on its reference joint path and at its velocity; with `q`, at that
+      posture and at rest. Sensor and drive histories are initialised as if the arm had been there before. It is an
+      error where the reference is a path of the tool alone.
 
     ## Episode end
-    Truncated by the environment itself after the scenario's `steps`, which `spec.max_episode_steps` repeats for
-    wrappers that ask for it. Terminated where the position error exceeds `lost_distance`, if there is one. The next
-    reset that says nothing else then enters another episode at the step at which the last one was lost, on its joint
-    path (at its beginning where the reference is a path of the tool alone), so that all parts of episodes are seen
-    alike by those who still lose their track early.
+    Truncated by the environment itself after the scenario's `steps`, also given by `spec.max_episode_steps`. Terminated
+    where the position error exceeds `lost_distance`, if there is one. The next reset without other options then enters
+    another episode at the step at which the last one was lost, on its joint path (at its beginning where the reference
+    is a path of the tool alone), so that a policy that still loses its track early also sees the later parts.
 
     Args:
-        scenario: A scenario or what names one: a registered name, a file ending in `.toml`, or
+        scenario: A scenario, or its name: a registered one, a file ending in `.toml`, or
             `"package.module:attribute"`; see `ikgym.scenarios.find`.
-        preview: How many steps ahead the nominal coordinates are shown, or which ones.
+        preview: Steps ahead at which the nominal coordinates are shown.
         render_mode: None, `"human"` (a window) or `"rgb_array"`.
-        commands: h, how many of the last commands are shown.
-        lost_distance: Position error in [m] beyond which the arm has lost its track, and its episode ends.
+        commands: h, the number of past commands shown.
+        lost_distance: Position error in [m] beyond which the episode ends; None for never.
 
     Raises:
         UnknownNameError: There is no such scenario.
@@ -145,7 +146,7 @@ class RedundantIKEnv(gym.Env[Any, Any]):
         self.scenario = scenarios.find(scenario)
         self._spec: EnvSpec | None = None
         self.render_mode = render_mode
-        # First: it says whether there is memory.
+        # First, since it checks the memory.
         self._simulator = Simulator(self.scenario, None, preview, commands=commands)
         self.observation_space = observation_space(self.scenario, preview, commands)
         self.action_space = action_space(self.scenario)
@@ -159,12 +160,12 @@ class RedundantIKEnv(gym.Env[Any, Any]):
 
     @property
     def preview(self) -> tuple[int, ...]:
-        """How many steps ahead the reference is shown."""
+        """Steps ahead at which the reference is shown."""
         return self._simulator.preview
 
     @property
     def spec(self) -> EnvSpec | None:  # an attribute of the base, which gym.make() sets
-        """What the environment was made from, with the steps of its episodes; None without `gym.make`."""
+        """The specification, with the steps of an episode; None without `gym.make`."""
         return self._spec
 
     @spec.setter
@@ -187,9 +188,8 @@ class RedundantIKEnv(gym.Env[Any, Any]):
 
         Raises:
             UnknownNameError: There is no such option.
-            InvalidInputError: The options are no dict, the start has a wrong shape, is not finite, out of range or
-                outside the limits, or the seed of the arm is none, or there is nothing that it could keep; or there is
-                no such step, or no joint path that says where the arm is then.
+            InvalidInputError: The options are no dict; the start has a wrong shape, is not finite or outside the
+                limits; the seed of the arm is none, or the plant draws no arm; there is no such step or joint path.
         """
         options = checked_options(options, OPTIONS)
         starts = self._simulator.checked_starts(options.get("q"))
@@ -208,7 +208,7 @@ class RedundantIKEnv(gym.Env[Any, Any]):
         return observation(out, 0), {}
 
     def step(self, action: npt.NDArray[np.float32]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Applies joint velocities for one time step; the class says what comes back.
+        """Applies joint velocities for one time step; see the class for the returned values.
 
         Raises:
             ResetNeededError: There is no episode, or it has ended.
@@ -277,7 +277,7 @@ def _renderer(scenario: Scenario, mode: str) -> Any:
 
 
 def limited(spec: EnvSpec | None, scenario: Scenario) -> EnvSpec | None:
-    """A copy of a specification that says how long episodes are, which is known only with the scenario."""
+    """A copy of a specification with the number of steps, which only the scenario knows."""
     if spec is None:
         return None
     spec = copy.copy(spec)

@@ -1,4 +1,4 @@
-"""Every error that ikgym raises on purpose, under one base class."""
+"""The errors of ikgym, under one base class."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 import gymnasium
 
-#: Letters of a name that messages show.
+#: Characters of a name that messages show at most.
 SHOWN = 200
 
 
@@ -16,7 +16,7 @@ class IkgymError(Exception):
 
 
 class InvalidInputError(IkgymError, ValueError):
-    """A value does not have the shape, type, range or form that was asked for."""
+    """A value has a wrong shape, type, range or form."""
 
 
 class UnknownNameError(IkgymError, LookupError):
@@ -36,7 +36,7 @@ class UnknownNameError(IkgymError, LookupError):
 
 
 class NoAttributeError(IkgymError, AttributeError):
-    """Arms that are stepped together were asked for an attribute that they do not have one by one."""
+    """A row of a vector environment has no such attribute."""
 
 
 class ResetNeededError(IkgymError, gymnasium.error.ResetNeeded):
@@ -44,4 +44,4 @@ class ResetNeededError(IkgymError, gymnasium.error.ResetNeeded):
 
 
 class MissingDependencyError(IkgymError, ImportError):
-    """An optional package is needed for what was asked; the message says how to install it."""
+    """An optional package is needed; the message says how to install it."""

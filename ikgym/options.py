@@ -1,4 +1,4 @@
-"""What users ask of an environment and of its rows, checked: options, seeds, masks, and how ended rows go on."""
+"""Checks of the arguments of environments: options, seeds, masks and autoreset modes."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def checked_seeds(seed: int | Sequence[int | None] | None, rows: int) -> Sequenc
 
 
 def checked_mask(mask: Any, rows: int) -> npt.NDArray[np.bool_]:
-    """Which rows are reset, all of them where nothing is said. Shape (N,).
+    """Rows to reset, by default all. Shape (N,).
 
     Raises:
         InvalidInputError: It is no Boolean array of that shape, or has no true entry.
@@ -50,7 +50,7 @@ def checked_mask(mask: Any, rows: int) -> npt.NDArray[np.bool_]:
 
 
 def checked_mode(mode: str | AutoresetMode) -> AutoresetMode:
-    """A mode of Gymnasium, or the one that has this value.
+    """A mode of Gymnasium, also by its value.
 
     Raises:
         UnknownNameError: There is none.

@@ -1,4 +1,4 @@
-"""Previews: which steps ahead the nominal coordinates are shown."""
+"""Previews: the steps ahead at which the nominal coordinates are shown."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ import numpy as np
 from ikgym.exceptions import InvalidInputError
 from ikgym.validation import whole_number
 
-#: An int p shows the steps 1 … p ahead, a sequence just those that it names.
+#: An int p shows the steps 1 … p ahead, a sequence only those it contains.
 Preview = int | Sequence[int]
 
-# A preview beyond would fill the memory before it served any policy.
+# A longer preview would fill the memory.
 FARTHEST = 1_000_000
 
 

@@ -1,4 +1,4 @@
-"""A table of named things, each made when it is first asked for."""
+"""A registry of named members, each made when first needed."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ Member = TypeVar("Member")
 
 
 class Registry(Generic[Member]):
-    """Names and the makers behind them.
+    """Names, and functions that make the members.
 
     Args:
-        kind: What the members are called in messages, for example ``"arm"``.
+        kind: Word for a member in messages, for example ``"arm"``.
         member: The class that all members are of.
     """
 
@@ -29,11 +29,11 @@ class Registry(Generic[Member]):
 
         Args:
             name: The new name.
-            make: Called without arguments, once, when the member is first asked for.
+            make: Called without arguments, once, when the member is first needed.
             listed: Whether :meth:`names` has it.
 
         Raises:
-            InvalidInputError: The name is taken, or no text; or the maker cannot be called.
+            InvalidInputError: The name is taken, or no text; or `make` cannot be called.
         """
         if not isinstance(name, str) or not name.strip():
             raise InvalidInputError(f"{self.kind}: expected a text as its name, got {name!r}.")
@@ -60,7 +60,7 @@ class Registry(Generic[Member]):
 
         Raises:
             UnknownNameError: There is no such name; the message has the nearest one.
-            InvalidInputError: Its maker fails, or makes something else; all others can be had nevertheless.
+            InvalidInputError: Its function fails, or returns something else; other members are unaffected.
         """
         if name not in self:
             raise UnknownNameError(self.kind, name, self.names())

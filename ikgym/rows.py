@@ -1,4 +1,4 @@
-"""One arm of many that are stepped together, for those who ask each arm for what a single environment has."""
+"""One row of a vector environment, with the attributes of a single environment."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from ikgym.scenarios import Scenario
 
 
 class ArmRow:
-    """What one of N arms says of itself: what all of them share, its generator, and what users have given it.
+    """Attributes of one of N arms: the shared ones, its generator, and those set by users.
 
     Args:
         envs: The vector environment.
-        index: Which of its rows is meant.
+        index: Number of the row.
     """
 
     metadata: ClassVar[dict[str, Any]] = RedundantIKEnv.metadata
@@ -28,7 +28,7 @@ class ArmRow:
 
     @property
     def scenario(self) -> Scenario:
-        """What is tracked."""
+        """The tracking problem."""
         scenario: Scenario = self._envs.scenario
         return scenario
 

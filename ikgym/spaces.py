@@ -20,12 +20,12 @@ def action_space(scenario: Scenario) -> spaces.Box:
 
 
 def observation_space(scenario: Scenario, preview: Preview, commands: int = 0) -> spaces.Dict:
-    """What a policy sees; the bounds follow from start, limits, number of steps and reach.
+    """The observation space; its bounds follow from start, limits, number of steps and reach.
 
     Args:
         scenario: The tracking problem.
         preview: As in the environment.
-        commands: h, how many of the last commands are shown.
+        commands: h, the number of past commands shown.
 
     Returns:
         Boxes of float64: q (n,), qdot (n,), pose (m,), nominal (p, m), remaining (1,); where sensors are slow or late
@@ -63,7 +63,7 @@ def observation_space(scenario: Scenario, preview: Preview, commands: int = 0) -
 
 
 def _coordinate_bound(scenario: Scenario, reach: float) -> FloatArray:
-    """Parts of a rotation do not exceed 1, positions not the reach. Shape (m,)."""
+    """Bounds of task coordinates: 1 for parts of a rotation, the reach for positions. Shape (m,)."""
     return SLACK * np.array([1.0] * (scenario.task.size - 3) + [reach] * 3)
 
 

@@ -18,7 +18,7 @@ class Task(Frozen):
     """One choice of task coordinates.
 
     Args:
-        name: What the task is called.
+        name: Name of the task.
         kind: Its number in the kernels.
         size: Number of coordinates, m.
         error_size: Number of components of the error, e.
@@ -56,7 +56,7 @@ class Task(Frozen):
         return out
 
     def error(self, nominal: npt.ArrayLike, coordinates: npt.ArrayLike) -> FloatArray:
-        """What is missing from coordinates to their nominal values.
+        """The error of coordinates with respect to their nominal values.
 
         Args:
             nominal: Nominal coordinates. Shape (..., m).

@@ -30,7 +30,7 @@ Infos = dict[str, Any]
 
 
 class _Class(type):
-    """How the class below shows itself: all that Stable-Baselines3 says of an environment that it refuses."""
+    """Adds a hint to the class name, which is all that Stable-Baselines3 shows of an environment that it refuses."""
 
     def __repr__(cls) -> str:
         return f"{super().__repr__()[:-1]}; for Stable-Baselines3 there is ikgym.sb3.RedundantIKVecEnv>"
@@ -51,8 +51,8 @@ class RedundantIKVectorEnv(
     | `SAME_STEP` | it is reset at once: the last observation and info are in `final_obs` and `final_info` |
     | `DISABLED` | it must be reset with a mask before the next step, which is an error otherwise |
 
-    `get_attr`, `set_attr` and `call` are there for what rows have in common with single environments, but nothing in a
-    row can be stepped or drawn alone.
+    `get_attr`, `set_attr` and `call` work for the attributes of single environments, but no row can be stepped or drawn
+    alone.
 
     `reset(options={"reset_mask": mask})` resets just the rows where the mask, a Boolean array of shape (N,), is
     true; `options={"q": …}` starts elsewhere, with shape (n,) for all rows or (N, n); `options={"arm_seed": …}` keeps
@@ -60,13 +60,13 @@ class RedundantIKVectorEnv(
 
     Args:
         num_envs: N.
-        scenario: A scenario or what names one, see `ikgym.scenarios.find`.
-        preview: How many steps ahead the nominal coordinates are shown, or which ones.
+        scenario: A scenario or its name, see `ikgym.scenarios.find`.
+        preview: Steps ahead at which the nominal coordinates are shown.
         autoreset_mode: A mode of Gymnasium, or its value such as ``"SameStep"``.
-        render_mode: None; there is nothing to see of N arms. Make a single environment to render.
+        render_mode: None; only a single environment renders.
         max_episode_steps: None or the scenario's own number of steps, as Gymnasium hands it over from a `spec`.
-        commands: h, how many of the last commands are shown.
-        lost_distance: Position error in [m] beyond which an arm has lost its track, and its episode ends.
+        commands: h, the number of past commands shown.
+        lost_distance: Position error in [m] beyond which an episode ends; None for never.
 
     Raises:
         UnknownNameError: There is no such scenario or autoreset mode.
@@ -98,7 +98,7 @@ class RedundantIKVectorEnv(
                 f"max_episode_steps: expected the {self.scenario.steps} of the scenario, got {max_episode_steps!r}."
             )
         self._spec: EnvSpec | None = None
-        # First: it says whether there is memory.
+        # First, since it checks the memory.
         self._simulator = Simulator(self.scenario, self.num_envs, preview, commands=commands)
         self.single_observation_space = observation_space(self.scenario, preview, commands)
         self.single_action_space = action_space(self.scenario)
@@ -106,7 +106,7 @@ class RedundantIKVectorEnv(
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self.lost_distance = checked_distance(lost_distance)
         self._entered = has_joint_path(self.scenario)
-        # Steps after which the rows that have lost their track enter their next episode; 0 elsewhere.
+        # Steps at which rows that have lost their track enter their next episode; 0 elsewhere.
         self._resumed = np.zeros(self.num_envs, dtype=np.int64)
         self._generators: list[np.random.Generator | None] = [None] * self.num_envs
         self._seeds: list[int | None] = [None] * self.num_envs
@@ -115,12 +115,12 @@ class RedundantIKVectorEnv(
 
     @property
     def preview(self) -> tuple[int, ...]:
-        """How many steps ahead the reference is shown."""
+        """Steps ahead at which the reference is shown."""
         return self._simulator.preview
 
     @property
     def spec(self) -> EnvSpec | None:  # an attribute of the base, which gym.make_vec() sets
-        """What the environment was made from, with the steps of its episodes; None without `gym.make_vec`."""
+        """The specification, with the steps of an episode; None without `gym.make_vec`."""
         return self._spec
 
     @spec.setter
@@ -176,7 +176,7 @@ class RedundantIKVectorEnv(
         return observation(self._simulator.observe()), {}
 
     def step(self, actions: npt.NDArray[np.float32]) -> tuple[Observation, FloatArray, BoolArray, BoolArray, Infos]:
-        """One step of all arms; the class of the single environment says what comes back.
+        """One step of all arms; see the single environment for the returned values.
 
         Raises:
             ResetNeededError: A row has no episode, or an ended one that nobody resets.
@@ -214,7 +214,7 @@ class RedundantIKVectorEnv(
         return observation(out), rewards, lost, over, infos
 
     def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
-        """What `get_attr` finds in the rows; what can be called is called, as `SyncVectorEnv` does.
+        """Attributes of the rows; callable ones are called, as in `SyncVectorEnv`.
 
         Raises:
             NoAttributeError: Rows have no such attribute.
@@ -223,7 +223,7 @@ class RedundantIKVectorEnv(
         return tuple(one(*args, **kwargs) if callable(one) else one for one in found)
 
     def get_attr(self, name: str) -> tuple[Any, ...]:
-        """What rows say of themselves: `scenario`, spaces, `np_random`, … and what `set_attr` has given them.
+        """Attributes of the rows: `scenario`, spaces, `np_random`, … and those set by `set_attr`.
 
         Raises:
             NoAttributeError: They have no such attribute.
@@ -231,7 +231,7 @@ class RedundantIKVectorEnv(
         return self.call(name)
 
     def set_attr(self, name: str, values: Any) -> None:
-        """Gives rows an attribute of no meaning to the arms: one value a row in a list or tuple, or one for all.
+        """Sets an attribute of the rows, which the arms ignore: one value a row in a list or tuple, or one for all.
 
         Raises:
             NoAttributeError: All arms share it, such as the scenario: make another environment.
@@ -269,7 +269,7 @@ class RedundantIKVectorEnv(
         self._ended = self._ended & ~mask
 
     def _infos(self, out: Outcome, rows: BoolArray) -> Infos:
-        """The infos of some rows, as Gymnasium's vector environments lay them out; zero in the others."""
+        """The infos of some rows in the layout of Gymnasium's vector environments; zero in the others."""
         if not rows.any():
             return {}
         columns = {
@@ -293,7 +293,7 @@ class RedundantIKVectorEnv(
 
 
 def _rows_of(observation: Observation, rows: BoolArray) -> npt.NDArray[np.object_]:
-    """One observation a row, as `final_obs` has them; None in the rows that are not asked for."""
+    """One observation a row, in the layout of `final_obs`; None in the other rows."""
     out = np.full(len(rows), None, dtype=object)
     for row in np.flatnonzero(rows):
         out[row] = {key: value[row].copy() for key, value in observation.items()}

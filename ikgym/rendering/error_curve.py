@@ -11,18 +11,18 @@ from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 from ikgym.rendering.style import MEDIUM, MIST, SMALL, stride, thinned
 from ikgym.validation import FloatArray
 
-SMALLEST, LARGEST = 1e-9, 1e99  # errors beyond are drawn as these, in [m] or [rad]
+SMALLEST, LARGEST = 1e-9, 1e99  # errors are clipped to this range, in [m] or [rad]
 
 
 class ErrorCurve:
     """An error over time, on a logarithmic axis that grows by whole decades and never shrinks.
 
     Args:
-        axes: Where to draw.
+        axes: The axes.
         name: Of the error.
         unit: Of the error.
         color: Of the curve.
-        last: Whether these are the lowest axes, where the times are written.
+        last: Whether these are the lowest axes, which show the times.
     """
 
     def __init__(self, axes: Any, name: str, unit: str, color: str, *, last: bool) -> None:
@@ -40,7 +40,7 @@ class ErrorCurve:
         axes.tick_params(labelsize=SMALL)
 
     def begin(self, duration: float) -> None:
-        """Begins an episode: its errors are unknown, and their axis without numbers.
+        """Begins an episode, with an axis without numbers until errors are known.
 
         Args:
             duration: Of the episode, in [s].
@@ -50,7 +50,7 @@ class ErrorCurve:
         self._axes.tick_params(labelbottom=self._last, labelleft=False)
 
     def show(self, time: FloatArray, error: FloatArray, steps: int) -> bool:
-        """Moves the curve on.
+        """Updates the curve.
 
         Args:
             time: The times so far in [s]. Shape (k,).
@@ -62,12 +62,12 @@ class ErrorCurve:
         """
         known = self._decades
         error = error.clip(SMALLEST, LARGEST)
-        # A start on the spot would open the axis downwards, and says nothing.
+        # An error of 0 at the start would open the axis downwards.
         seen = error[1:] if error[0] == SMALLEST else error
         if len(seen):
             low = min(self._decades[0], math.floor(math.log10(seen.min())))
             high = max(self._decades[1], math.ceil(math.log10(seen.max())))
-            # Two decades at least: downwards, where errors go, as far as there is anything to be seen.
+            # At least two decades, downwards where possible.
             low = max(min(low, high - 2), math.floor(math.log10(SMALLEST)))
             high = max(high, low + 2)
             if (low, high) != self._decades:

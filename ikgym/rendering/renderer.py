@@ -1,4 +1,4 @@
-"""The episode as the pictures know it, and where they are shown: in memory or in a window."""
+"""Draws episodes, in memory or in a window."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ class Renderer:
 
     Args:
         arm: The arm that moves.
-        mode: ``"rgb_array"`` draws in memory, without pyplot; ``"human"`` in a window of pyplot's, or in
-            memory and unseen where the backend has no windows.
-        title: Stands above the picture.
+        mode: ``"rgb_array"`` draws in memory, without pyplot; ``"human"`` in a window of pyplot, or invisibly in
+            memory where the backend has no windows.
+        title: Title of the picture.
         has_orientation: Whether there is an orientation error to show.
         width: Of the picture in [px], a multiple of 4; it is half as high, and all in it grows with it.
     """
@@ -43,19 +43,19 @@ class Renderer:
         self._shown_at = self._shown = -math.inf  # the last picture, in wall time and in the episode's own
 
     def __getstate__(self) -> dict[str, Any]:
-        """All but the figure: a copy knows the episode, and draws on a figure of its own when it is asked to."""
+        """All but the figure: a copy keeps the episode and draws on its own figure."""
         return {**self.__dict__, "_scene": None, "_in_window": False, "_staged": False}
 
     @property
     def figure(self) -> Figure | None:
-        """What is drawn on: None before the first picture, and after :meth:`close`."""
+        """The figure; None before the first picture, and after :meth:`close`."""
         return None if self._scene is None else self._scene.figure
 
     def begin(self, nominal_positions: FloatArray, duration: float) -> None:
         """Begins an episode and forgets the one before.
 
         Args:
-            nominal_positions: Where the tool is to be, one row a step, in [m]. Shape (steps + 1, 3).
+            nominal_positions: Nominal tool points, one row a step, in [m]. Shape (steps + 1, 3).
             duration: Of the episode, in [s].
         """
         self._duration = duration
@@ -63,16 +63,16 @@ class Renderer:
         self._nominal = nominal_positions.copy()
         self._q, self._tool = np.empty((states, self._arm.joints)), np.empty((states, 3))
         self._time, self._errors = np.empty(states), np.empty((states, 2))
-        self._states = self._tools = 0  # how many rows are known
+        self._states = self._tools = 0  # number of known rows
         self._staged = False  # whether the scene is set for this episode
 
     def add(self, q: FloatArray, position_error: float, orientation_error: float, time: float) -> None:
-        """Takes note of a state and draws nothing; at most steps + 1 states an episode.
+        """Records a state without drawing; at most steps + 1 states an episode.
 
         Args:
             q: Joint coordinates in [rad] or [m]. Shape (n,).
             position_error: In [m].
-            orientation_error: In [rad]; not looked at where the task has no orientation.
+            orientation_error: In [rad]; ignored where the task has no orientation.
             time: Since the start of the episode, in [s].
         """
         k = self._states
@@ -82,10 +82,10 @@ class Renderer:
         self._states = k + 1
 
     def draw(self) -> npt.NDArray[np.uint8] | None:
-        """Draws the state noted last, and the way there.
+        """Draws the last recorded state, and the path to it.
 
-        In a window the episode goes at most as fast as its own time, with some thirty pictures a second; the
-        states between them are passed over, the first and the last one never.
+        In a window the episode plays at most in real time, with about thirty pictures a second; states between them
+        are skipped, except the first and the last one.
 
         Returns:
             The picture in mode ``"rgb_array"``, fresh, of shape (width / 2, width, 3); None in mode ``"human"``.
@@ -133,7 +133,7 @@ class Renderer:
         return self._states in (1, len(self._time)) or clock.perf_counter() - self._shown_at >= INTERVAL
 
     def _window(self) -> Figure:
-        # pyplot reaches for a window system: not for those who only ask for pixels.
+        # pyplot may need a window system, which pixels do not.
         import matplotlib.pyplot as plt
 
         backend, registry = plt.get_backend(), backend_registry

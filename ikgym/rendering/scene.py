@@ -1,7 +1,7 @@
 """The picture of an arm and its paths in space, with the error curves beside it.
 
-What stays (axes, grid, legend) is drawn once an episode and kept as pixels. A frame restores them and draws
-only what moves.
+Axes, grid and legend are drawn once an episode and kept as pixels. A frame restores them and draws only the moving
+parts.
 """
 
 from __future__ import annotations
@@ -38,17 +38,17 @@ from ikgym.validation import FloatArray
 
 #: Colours of the tool's axes.
 AXES = {"x": VERMILION, "y": GREEN, "z": PURPLE}
-#: Their length, as a share of the longest side of what is seen.
+#: Their length, as a share of the longest side of the visible box.
 FRAME = 0.14
 
 
 class Scene:
-    """The picture and what moves in it.
+    """The picture and its moving parts.
 
     Args:
-        figure: What to draw on.
+        figure: The figure.
         arm: The arm that moves.
-        title: Stands above the picture.
+        title: Title of the picture.
         has_orientation: Whether there is an orientation error to show.
     """
 
@@ -65,7 +65,7 @@ class Scene:
         self._actual = self._line("actual path", color=BLUE, lw=1.3)
         self._links = self._line("links", color=STEEL, lw=4.0, solid_capstyle="round", solid_joinstyle="round")
         self._base = self._line("base", ls="", marker="^", ms=11, mfc=INK, mec=INK)
-        # The dashes are the way that a prismatic joint has moved, the square (point 1 of each 3) is where it stands.
+        # Dashes show the travel of a prismatic joint, the square (point 1 of each 3) its position.
         self._rails = self._line(
             "prismatic joint",
             color=ORANGE,
@@ -89,11 +89,11 @@ class Scene:
         if figure.canvas.supports_blit:
             for artist in self._moving:
                 artist.set_animated(True)
-            # A canvas draws by itself, too: when its window is resized or the view turned.
+            # A canvas also draws by itself, when its window is resized or the view turned.
             figure.canvas.mpl_connect("draw_event", self._keep_background)
 
     def set_stage(self, nominal: FloatArray, start: FloatArray, margin: float, duration: float) -> None:
-        """Sets what stays during an episode.
+        """Sets the parts that are fixed during an episode.
 
         Args:
             nominal: The nominal positions in [m]. Shape (steps + 1, 3).
@@ -105,7 +105,7 @@ class Scene:
         points = np.vstack([np.zeros(3), start, nominal])
         low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
         self._frame_length = FRAME * float((high - low).max())
-        # In a flat box nothing can be read.
+        # Nothing is readable in a flat box.
         sides = np.maximum(high - low, 0.6 * (high - low).max())
         low, high = 0.5 * (low + high - sides), 0.5 * (low + high + sides)
         self._space.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
@@ -122,8 +122,8 @@ class Scene:
         """Moves the arm.
 
         Args:
-            joints: Where each joint begins and ends in [m]. Shape (n, 2, 3).
-            rotation: How the tool is turned now. Shape (3, 3).
+            joints: The two ends of each joint in [m]. Shape (n, 2, 3).
+            rotation: Orientation of the tool. Shape (3, 3).
             tool: The tool points so far in [m]. Shape (k, 3).
             nominal: The nominal positions in [m]. Shape (steps + 1, 3).
         """
@@ -161,7 +161,7 @@ class Scene:
         """Brings the picture up to date.
 
         Args:
-            anew: Whether what else stays has changed.
+            anew: Whether a fixed part has changed.
         """
         canvas: Any = self.figure.canvas
         if anew or self._background is None:
@@ -198,7 +198,7 @@ class Scene:
         for axis, name in zip((space.xaxis, space.yaxis, space.zaxis), "xyz", strict=True):
             axis.set_label_text(f"{name} [m]", size=MEDIUM)
             axis.pane.set(facecolor=PALE, edgecolor=MIST)
-            # The only way to the grid's colour but rcParams, which belong to the user.
+            # The only other way to the grid's colour is rcParams, which belong to the user.
             axis._axinfo["grid"].update(color=MIST, linewidth=0.6)
 
     def _error_curves(self, has_orientation: bool) -> list[ErrorCurve]:

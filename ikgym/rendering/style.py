@@ -1,4 +1,4 @@
-"""What the parts of a picture share: colours, sizes of letters, and curves of no more points than can be seen."""
+"""Style of the pictures: colours, font sizes, and thinning of long curves."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ import numpy as np
 
 from ikgym.validation import FloatArray
 
-MOST_POINTS = 1000  # of a curve: more cannot be told apart in so few pixels
+MOST_POINTS = 1000  # of a curve, more than its pixels resolve
 
-# Okabe and Ito's colours, which the colour-blind can tell apart, and greys.
+# The colour-blind-safe palette of Okabe and Ito, and greys.
 BLUE, ORANGE, VERMILION, GREEN = "#0072B2", "#E69F00", "#D55E00", "#009E73"
 PALE_GREEN, PURPLE = "#97d8c4", "#CC79A7"
 INK, STEEL, MIST, PALE = "#222222", "#808080", "#d9d9d9", "#f7f7f7"
@@ -16,7 +16,7 @@ SMALL, MEDIUM, LARGE = 8.5, 9.5, 11.0  # letters, in [pt]
 
 
 def stride(points: int) -> int:
-    """How many points of a curve one is drawn for."""
+    """The number of points from one drawn point to the next."""
     return -(-points // MOST_POINTS)
 
 

@@ -1,4 +1,4 @@
-"""Where arms begin: at starts of one's own, or after some steps, where their reference joint path is then."""
+"""Starts chosen by the user: joint coordinates, or a step at which an episode is entered on its joint path."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ def has_joint_path(scenario: Scenario) -> bool:
 
 
 def checked_starts(q: npt.ArrayLike | None, rows: int, scenario: Scenario) -> FloatArray | None:
-    """Starts that a user asks for.
+    """Starts chosen by the user.
 
     Args:
         q: Joint coordinates in [rad] or [m], of shape (n,) for all rows, or (N, n). None for the scenario's own.
         rows: N.
-        scenario: What is tracked.
+        scenario: The tracking problem.
 
     Returns:
         One start a row, of shape (N, n), or None.
@@ -51,15 +51,15 @@ def checked_starts(q: npt.ArrayLike | None, rows: int, scenario: Scenario) -> Fl
 
 
 def checked_steps(given: Any, rows: int, scenario: Scenario) -> Steps | None:
-    """Steps after which a user asks to enter episodes.
+    """Steps at which episodes are entered, chosen by the user.
 
     Args:
         given: A whole number for all rows, or one a row, where None stands for the beginning.
         rows: N.
-        scenario: What is tracked.
+        scenario: The tracking problem.
 
     Returns:
-        One a row, of shape (N,), or None where nothing is asked for.
+        One a row, of shape (N,), or None.
 
     Raises:
         InvalidInputError: They are no such numbers, not one a row, or there is no joint path to enter on.
@@ -83,11 +83,11 @@ def checked_steps(given: Any, rows: int, scenario: Scenario) -> Steps | None:
 
 
 def on_path(scenario: Scenario, episodes: Sequence[Trajectory], steps: Steps) -> tuple[FloatArray, FloatArray]:
-    """Where reference joint paths are after some steps, and their velocities in the last of these.
+    """Reference joint paths after some steps, and their velocities in the last of these.
 
     Args:
-        scenario: What is tracked.
-        episodes: What was drawn for the k episodes.
+        scenario: The tracking problem.
+        episodes: Trajectories of the k episodes.
         steps: At least 1 each. Shape (k,).
 
     Returns:

@@ -1,4 +1,4 @@
-"""Scenarios from modules of other people: ``"package.module:attribute"``."""
+"""Scenarios from a user's modules: ``"package.module:attribute"``."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ikgym.scenarios.scenario import Scenario
 
 
 def imported(place: str) -> Scenario:
-    """The scenario at a place.
+    """The scenario with an import path.
 
     Args:
         place: ``"package.module:attribute"``. The attribute is a scenario, or is called without arguments to make

@@ -1,4 +1,4 @@
-"""Which poses of a path an arm cannot take."""
+"""Poses of a path that an arm cannot reach."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from ikgym.validation import whole_number
 
 @dataclasses.dataclass(frozen=True)
 class Gap:
-    """A pose of a path, and how far the nearest is that was found within the limits of the arm.
+    """A pose of a path that was not reached, and the distance to the nearest one found within the limits.
 
     Args:
-        time: When the path is there, in [s].
-        position: Where the path is then, in [m].
+        time: Time of the pose in [s].
+        position: Nominal position in [m].
         distance: Between both positions, in [m].
-        angle: Between both orientations, in [rad]; 0 where the position alone was looked for.
+        angle: Between both orientations, in [rad]; 0 if only the position was searched.
     """
 
     time: float
@@ -32,16 +32,16 @@ class Gap:
 def gaps(scenario: Scenario, poses: int = 200) -> tuple[Gap, ...]:
     """The poses of the reference trajectory for which `arm.inverse` finds no joint coordinates within the limits.
 
-    Poses are looked at one by one, at equal distances of time over the episode: whether the joints can follow from one
-    to the next is what policies show. Where the rotation about the tool's axis is free, or the orientation, positions
-    alone are looked at. What was not found is out of reach in all likelihood, but that is no proof.
+    Poses are searched one by one, at equal distances in time over the episode; whether the joints can follow from one
+    to the next is not checked. Where the orientation is free, or the rotation about the tool's axis, only positions are
+    searched. A pose that was not found is most likely out of reach, but that is no proof.
 
     Args:
-        scenario: What is to be tracked, the same at every reset.
-        poses: How many are looked at, the first and the last among them; all where there are fewer.
+        scenario: A scenario that is the same at every reset.
+        poses: Number of poses searched, including the first and the last; all if there are fewer.
 
     Returns:
-        The poses that were missed, by time; none where all can be taken.
+        The poses that were not reached, by time.
 
     Raises:
         InvalidInputError: The number is less than 2, or the scenario is random.

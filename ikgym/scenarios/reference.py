@@ -39,7 +39,7 @@ class Reference:
 
         Args:
             seed: The reset seed; needed where the scenario is random.
-            preview: How far past the end of the episode to go on, as in the environment.
+            preview: Steps past the end of the episode, as in the environment.
 
         Returns:
             Task coordinates. Shape (steps + preview + 1, m).
@@ -57,7 +57,7 @@ class Reference:
 
         Args:
             seed: The reset seed; needed where the scenario is random.
-            preview: How far past the end of the episode to go on.
+            preview: Steps past the end of the episode.
 
         Returns:
             Joint coordinates in [rad] or [m]. Shape (steps + preview + 1, n).
@@ -83,10 +83,10 @@ class Reference:
         return self.trajectory.sample(seeding.np_random(seed)[0]) if self.random else self.trajectory
 
     def points(self, preview: Preview = 0) -> npt.NDArray[np.int64]:
-        """Which nominal point is the target after k steps.
+        """Numbers of the nominal points that are the target after k steps.
 
         Args:
-            preview: How far past the end of the episode to go on.
+            preview: Steps past the end of the episode.
 
         Returns:
             Numbers of points. Shape (steps + preview + 1,).
@@ -118,8 +118,8 @@ class Reference:
         """The nominal frames of one episode, one row a point; see :meth:`Trajectory.frames`.
 
         Args:
-            trajectory: What was drawn for the episode.
-            points: How many points.
+            trajectory: Trajectory of the episode.
+            points: Number of points.
 
         Returns:
             Frames. Shape (points, 12), or (points, 3) where the task has no orientation.
@@ -131,7 +131,7 @@ class Reference:
         """The nominal frames of several episodes, each at points of its own; bit for bit those of :meth:`frames`.
 
         Args:
-            episodes: What was drawn for the k episodes.
+            episodes: Trajectories of the k episodes.
             points: Numbers of points. Shape (k, p).
 
         Returns:
@@ -141,7 +141,7 @@ class Reference:
         return frames if self.task.has_orientation else frames[..., -3:]
 
     def times(self, points: int) -> FloatArray:
-        """When the trajectory is at its nominal points, in [s]. Shape (points,)."""
+        """Times of the nominal points in [s]. Shape (points,)."""
         return np.arange(points, dtype=np.float64) * self.dt
 
     def _held(self) -> tuple[int, ...]:

@@ -95,7 +95,7 @@ class Scenario(Frozen, Reference):
         self._settle(iterations_per_point=held)
         self.plant.check(self.arm, self.steps)
         if not self.starts_nominally or (self.arm.limited and not self.random):
-            self.first_q(self.trajectory)  # says whether the arm can be there
+            self.first_q(self.trajectory)  # raises if the arm cannot be there
         checks.check_cost(self.name, self.largest_step_cost(), self.steps)
 
     def replace(self, **changes: Any) -> Self:
@@ -161,10 +161,10 @@ class Scenario(Frozen, Reference):
         return Draws(self.plant, self.arm).one(key)
 
     def first_q(self, trajectory: Trajectory) -> FloatArray:
-        """Where the arm of the data sheet begins an episode, in [rad] or [m]. Shape (n,).
+        """Start of the arm of the data sheet in an episode, in [rad] or [m]. Shape (n,).
 
         Args:
-            trajectory: What was drawn for the episode.
+            trajectory: Trajectory of the episode.
 
         Raises:
             InvalidInputError: The arm cannot be there; the message names the joint.
@@ -190,11 +190,11 @@ class Scenario(Frozen, Reference):
 
     @property
     def jogs(self) -> bool:
-        """Whether episodes begin where the arm that moves, not that of the data sheet, has the first pose."""
+        """Whether episodes begin at the first pose of the arm that moves, which is not that of the data sheet."""
         return self.start is None and self.plant.other_arm
 
     def jogged(self, q: FloatArray, chains: Iterable[Chain]) -> FloatArray:
-        """Starts of arms that are not that of the data sheet: each where it has the pose that this would begin with.
+        """Starts of other arms: each at the pose at which the arm of the data sheet would begin.
 
         Args:
             q: Starts of the arm of the data sheet in [rad] or [m]. Shape (k, n).
@@ -208,10 +208,10 @@ class Scenario(Frozen, Reference):
         return alike(self.arm, chains, q, oriented=self.task.has_orientation)
 
     def first_q_of(self, episodes: Sequence[Trajectory]) -> FloatArray:
-        """Where the arm of the data sheet begins several episodes, as :meth:`first_q` gives it. Shape (k, n).
+        """Starts of the arm of the data sheet in several episodes, see :meth:`first_q`. Shape (k, n).
 
         Args:
-            episodes: What was drawn for the k episodes.
+            episodes: Trajectories of the k episodes.
 
         Raises:
             InvalidInputError: The arm cannot be at one of them; the message names the joint.
@@ -235,10 +235,10 @@ class Scenario(Frozen, Reference):
         return np.minimum(self.velocity_limit, self.arm.velocity_limit)
 
     def largest_step_cost(self) -> float:
-        """The most that one step of any episode can cost."""
+        """The largest cost of one step of any episode."""
         trajectory = self.trajectory
         if trajectory.random and trajectory.joint_bound() is None and type(trajectory).reach is Trajectory.reach:
-            nominal = LARGEST  # a distribution that does not say how far its paths go
+            nominal = LARGEST  # a distribution with unknown reach
         else:
             nominal = trajectory.reach(self.times(int(self.points()[-1]) + 1), self.model)
         distance = self.plant.reach(self.arm, self.joint_bound()) + nominal
@@ -254,7 +254,7 @@ class Scenario(Frozen, Reference):
 
     @property
     def starts_nominally(self) -> bool:
-        """Whether the trajectory says where episodes begin: on its joint path, or at a published start."""
+        """Whether the trajectory determines the start: on its joint path, or at a published start."""
         return self.start is None and self.trajectory.first_joints_bound() is not None
 
     @functools.cached_property

@@ -39,7 +39,7 @@ def found(name: str, arm: Arm, frame: FloatArray) -> FloatArray:
 
 
 def distances(arm: Arm, q: FloatArray, rotation: FloatArray | None, position: FloatArray) -> tuple[float, float]:
-    """How far an arm is from a pose: in [m], and in [rad], which is 0 where no orientation is asked for."""
+    """Distances of an arm from a pose, in [m] and in [rad]; the angle is 0 without an orientation."""
     there_rotation, there = arm.forward(q)
     angle = 0.0 if rotation is None else float(geodesic_angle(rotation, there_rotation))
     return float(np.linalg.norm(there - position)), angle

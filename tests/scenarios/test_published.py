@@ -10,13 +10,18 @@ from scipy.spatial.transform import Rotation
 import ikgym
 from ikgym import problems, scenarios
 from ikgym.exceptions import InvalidInputError, UnknownNameError
-from ikgym.scenarios import elsewhere
-from ikgym.scenarios.elsewhere import waypoint_steps
 from ikgym.trajectories import PublishedPath, RandomPublishedPath
 from tests.comparison import identical
 
-NAMES = scenarios.problems_from_elsewhere()
+NAMES = scenarios.names("published")
+#: From waypoint to waypoint in [s], and in control steps.
+PERIOD, STEPS = 0.2, 10
 RANDOM = scenarios.get("rlitg-random")
+
+
+def waypoint_steps(waypoints):
+    """The control steps at which the waypoints are reached; the first one is the start."""
+    return range(0, STEPS * (waypoints - 1) + 1, STEPS)
 
 
 def test_names():
@@ -72,15 +77,18 @@ def test_the_seed_chooses_a_path_and_its_start():
 
 def test_shorter_random_paths_end_at_rest():
     (name,) = [n for n in problems.names("rlitg-random-") if len(problems.waypoints(n).positions) == 379]
-    trajectory = PublishedPath(name, elsewhere.PERIOD)
+    trajectory = PublishedPath(name, PERIOD)
     frames = trajectory.frames(RANDOM.times(RANDOM.steps + 1), RANDOM.model)
     assert not np.diff(frames[waypoint_steps(379)[-1] :], axis=0).any()
     assert np.diff(frames[: waypoint_steps(379)[-1]], axis=0).any(axis=1).all()
 
 
 def test_what_is_out_of_reach():
-    assert elsewhere.unreached("cppflow-panda-square").tolist() == list(range(153, 182))
-    assert not len(elsewhere.unreached("cppflow-fetch-rot_yz"))
+    for name, missed in {"cppflow-panda-square": range(153, 182), "cppflow-fetch-rot_yz": ()}.items():
+        scenario, (positions, quaternions, _) = scenarios.get(name), problems.waypoints(name)
+        rotations = Rotation.from_quat(quaternions, scalar_first=True).as_matrix()
+        converged = scenario.arm.inverse(rotations, positions, restarts=300)[1]
+        assert np.flatnonzero(~converged).tolist() == list(missed)
 
 
 @pytest.mark.parametrize(
@@ -103,6 +111,6 @@ def test_bad_input(make, error, message):
 def test_reach_bounds_all_random_paths():
     bound = RANDOM.trajectory.reach(np.zeros(1), RANDOM.model)
     times = np.arange(0.0, 200.0, 0.01)
-    drawn = (PublishedPath(name, elsewhere.PERIOD) for name in problems.names("rlitg-random-")[::9])
+    drawn = (PublishedPath(name, PERIOD) for name in problems.names("rlitg-random-")[::9])
     farthest = max(np.linalg.norm(one.frames(times, RANDOM.model)[:, 9:], axis=1).max() for one in drawn)
     assert 0.8 * bound < farthest <= bound
