@@ -1,6 +1,6 @@
-"""Writes the tables of the documentation, and what else is worked out: ``python -m docs.tables``.
+"""Writes the tables of the documentation that follow from the code or from CSV files: ``python -m docs.tables``.
 
-A test fails where a page does not hold what this writes.
+A test fails if a table in a page differs.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ PAGES = Path(__file__).parent
 
 
 def arms() -> list[tuple[str, ...]]:
-    """One line an arm."""
+    """One line per arm."""
     rows = [("arm", "joints", "prismatic", "limits")]
     for name in ikgym.arms.names():
         arm = ikgym.arms.get(name)
@@ -43,7 +43,7 @@ def arms() -> list[tuple[str, ...]]:
 
 
 def tasks() -> list[tuple[str, ...]]:
-    """One line a task."""
+    """One line per task."""
     return [("task", "coordinates", "components of the error", "orientation")] + [
         (f"`{task.name}`", str(task.size), str(task.error_size), "yes" if task.has_orientation else "no")
         for task in map(ikgym.tasks.get, ikgym.tasks.names())
@@ -51,7 +51,7 @@ def tasks() -> list[tuple[str, ...]]:
 
 
 def scenarios() -> list[tuple[str, ...]]:
-    """One line a scenario; the paths that several arms have are in :func:`paths`."""
+    """One line per scenario; the paths that several arms have are in :func:`paths`."""
     rows = [("scenario", "arm", "task", "Δt [s]", "steps", "source")]
     for name in ikgym.scenarios.names():
         s = ikgym.scenarios.get(name)
@@ -63,7 +63,7 @@ def scenarios() -> list[tuple[str, ...]]:
 
 
 def paths() -> list[tuple[str, ...]]:
-    """One line a path, with the durations of its scenarios."""
+    """One line per path, with the durations of its scenarios."""
     found: dict[str, dict[str, str]] = {}
     for s in map(ikgym.scenarios.get, ikgym.scenarios.names("paths")):
         if not s.random:
@@ -75,7 +75,7 @@ def paths() -> list[tuple[str, ...]]:
 
 
 def problems() -> list[tuple[str, ...]]:
-    """One line a problem from elsewhere."""
+    """One line per problem from elsewhere."""
     rows = [("scenario", "arm", "waypoints", "starts", "longest [mm]", "largest [°]")]
     for name in ikgym.scenarios.problems_from_elsewhere():
         scenario = ikgym.scenarios.get(name)
@@ -91,7 +91,7 @@ def problems() -> list[tuple[str, ...]]:
 
 
 def splits() -> list[tuple[str, ...]]:
-    """One line a split."""
+    """One line per split."""
     rows = [("split", "seeds")]
     for name, seeds in ikgym.scenarios.SPLITS.items():
         rows.append((name, f"{seeds.start:,} … {seeds.stop - 1:,}"))
@@ -99,7 +99,7 @@ def splits() -> list[tuple[str, ...]]:
 
 
 def policies() -> list[tuple[str, ...]]:
-    """One line a policy."""
+    """One line per policy."""
     rows = [("policy", "what it does", "parameters and defaults")]
     for name in baselines.names():
         policy = get(name)
@@ -109,7 +109,7 @@ def policies() -> list[tuple[str, ...]]:
 
 
 def test_sets() -> list[tuple[str, ...]]:
-    """One line a test set."""
+    """One line per test set."""
     rows: list[tuple[str, ...]] = [("set", "episodes", "noise seeds", "steps", "task coordinates")]
     for one in map(sets.get, sets.names()):
         scenario = one.scenario
@@ -120,7 +120,7 @@ def test_sets() -> list[tuple[str, ...]]:
 
 
 def records() -> list[tuple[str, ...]]:
-    """One line a test set whose best known costs were searched: how they were found."""
+    """One line per test set whose best known costs were searched."""
     several, alone = "two or more kinds of starts came to it", "random starts or local search alone did"
     head = ("set", "starts: least, median, most", several, alone, "which gained", "largest gradient [s/rad]")
     known = {one.scenario for one in best_known.read() if "starts" in one.spread}
@@ -152,7 +152,7 @@ def _parameter(field: dataclasses.Field[object]) -> str:
 
 
 def statuses() -> list[tuple[str, ...]]:
-    """One line a status, from good to bad."""
+    """One line per status, from good to bad."""
     source = inspect.getsource(Status)
     rows = [("status", "meaning")]
     for status in Status:
@@ -181,7 +181,7 @@ TABLES = {
     "records": records,
     **{f"verdicts_{name}": functools.partial(verdicts, paper) for name, paper in PAPERS.items()},
 }
-#: What is no table.
+#: Texts that are no tables.
 TEXTS: dict[str, Callable[[], str]] = {
     "demo": demo,
     **{f"figures_{name}": functools.partial(figures, paper) for name, paper in PAPERS.items()},
@@ -218,7 +218,7 @@ def table(words: str) -> str:
 
 
 def filled(text: str) -> str:
-    """A page with its tables and texts written anew."""
+    """A page with its tables and texts updated."""
     return re.sub(
         r"(<!-- table: (.+?) -->\n).*?(<!-- end -->)",
         lambda m: f"{m[1]}{table(m[2])}\n{m[3]}",

@@ -37,6 +37,13 @@ def test_tables_are_up_to_date(page):
     assert filled(text) == text, "write the tables anew with: python -m docs.tables"
 
 
+def test_every_picture_and_every_table_of_results_is_shown():
+    text = "".join(page.read_text(encoding="utf-8") for page in PROSE)
+    pictures = [file.relative_to(PAGES).as_posix() for file in (PAGES / "images").rglob("*.png")]
+    tables = [file.name for file in (PAGES / "results").glob("*.csv")]
+    assert [name for name in [*pictures, *tables] if name not in text] == []
+
+
 def files() -> dict[str, str]:
     """What the README says stands in files of one's own, by their names."""
     return dict(re.findall(r"<!-- file: (\S+) -->\n```\w+\n(.*?)```", README, re.DOTALL))

@@ -20,6 +20,7 @@ from baselines.evaluation.metrics import Row
 from baselines.evaluation.report import NOTHING, labels, number
 from baselines.evaluation.statistics import geometric_interval, geometric_mean
 from baselines.evaluation.summary import Summary, by_seed, summarise, times
+from baselines.oracle import best_known
 from baselines.spec import parse_policy
 from ikgym.exceptions import InvalidInputError
 from ikgym.preview import furthest
@@ -90,16 +91,16 @@ def _label(summary: Summary, given: Mapping[str, tuple[str, dict[str, Any]]]) ->
 
 
 def _lowest(rows: Iterable[Row]) -> dict[int, float]:
-    """The lowest cost of each episode, by its reset seed."""
+    """The lowest cost of each episode, by its reset seed; costs too small for a ratio count as the smallest allowed."""
     out: dict[int, float] = {}
     for row in rows:
-        out[row.seed] = min(out.get(row.seed, np.inf), row.total_cost)
+        out[row.seed] = min(out.get(row.seed, np.inf), max(row.total_cost, best_known.MEANINGLESS))
     return out
 
 
 def _record(label: str, rows: Sequence[Row], lowest: Mapping[int, float]) -> dict[str, Any]:
     ratios, clocked = _cost_ratios(label, rows, lowest), times(rows)
-    low, high = geometric_interval(ratios)
+    low, high = geometric_interval(ratios) if ratios.min() > 0.0 else (None, None)
     return {
         "policy": label,
         "scenario": rows[0].scenario,

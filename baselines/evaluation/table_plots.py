@@ -157,6 +157,6 @@ def _excess(cost_ratio: object) -> float:
 
 def _interval(axes: Axes, x: float, line: Record, **look: Any) -> Artist:
     """A point with the interval of its geometric mean."""
-    middle, low, high = (_excess(line[name]) for name in ("cost_ratio", "low", "high"))
+    middle, low, high = (_excess(line[name] or line["cost_ratio"]) for name in ("cost_ratio", "low", "high"))
     lengths = [[middle - min(low, middle)], [max(high, middle) - middle]]
     return axes.errorbar([x], [middle], yerr=lengths, **look).lines[0]

@@ -1,7 +1,7 @@
-"""Evaluation sets that stay as they are, so that results of different days can be compared.
+"""Test sets: fixed scenarios and seeds, so that results of different days can be compared.
 
-A set is a scenario and its seeds. The digest of both, and of the version of the cost, is written down here: a set that
-has drifted is refused, and results of different sets are never put together.
+The digest of scenario, seeds and version of the cost is stated here. A set whose digest has changed is refused, and
+results of different sets are never combined.
 """
 
 from __future__ import annotations
@@ -16,16 +16,16 @@ from ikgym.scenarios import Scenario
 
 @dataclasses.dataclass(frozen=True)
 class TestSet:
-    """Episodes that are never changed; other episodes are another set.
+    """A fixed set of test episodes.
 
     Args:
-        name: Of the set, and of its scenario, which is played to its end.
-        episodes: How many: the first seeds of the split.
-        digest: What :func:`baselines.fingerprints.set_hash` gave when the set was made.
-        split: Where the seeds come from, see :data:`ikgym.scenarios.SPLITS`.
-        noise_seeds: How often each episode is played, with other noise in sensors and drives.
-        sequence: Episodes that one arm plays one after the other: those with the seed s have the arm seed
-            s // sequence, and a policy's state is handed on. 1 where every episode has its own arm.
+        name: The name of the set and of its scenario.
+        episodes: The number of episodes: the first seeds of the split.
+        digest: The value of :func:`baselines.fingerprints.set_hash` when the set was defined.
+        split: The split of the seeds, see :data:`ikgym.scenarios.SPLITS`.
+        noise_seeds: Repetitions of each episode with other noise in sensors and drives.
+        sequence: Episodes that one arm plays in a row: seed s has the arm seed s // sequence, and the policy keeps its
+            state. 1 if every episode has its own arm.
     """
 
     name: str
@@ -37,7 +37,7 @@ class TestSet:
 
     @property
     def scenario(self) -> Scenario:
-        """What is played."""
+        """The scenario."""
         return scenarios.get(self.name)
 
     @property
@@ -50,7 +50,7 @@ class TestSet:
         return seed // self.sequence if self.sequence > 1 else None
 
 
-#: All test sets: those that scores are published on, and those in the papers' own skew coordinates.
+#: All test sets.
 SETS = {
     one.name: one
     for one in (
@@ -58,11 +58,11 @@ SETS = {
         TestSet("varga7-pose-random-long", episodes=32, digest="fe2dfbb641c8"),
         TestSet("varga7-random", episodes=64, digest="f18d6765c034"),
         TestSet("varga7-random-long", episodes=16, digest="f6956633fa43"),
-        # Half of the episodes of the first: each needs a search of its own for its best known cost.
+        # Fewer episodes than in the first set: each needs a search of its own for its best known cost.
         TestSet("panda-random", episodes=128, digest="f4492864d6be"),
         TestSet("iiwa14-random", episodes=128, digest="4b2efa43deaa"),
-        # Those of imperfect plants. 64 episodes each, of 3,000 steps: with three noise seeds a policy moves for 576,000
-        # steps, and every episode needs a best known cost on an arm of its own.
+        # Imperfect plants. Three noise seeds of 64 episodes are 576,000 steps, and every episode needs a best known
+        # cost on an arm of its own.
         TestSet("panda-ideal", episodes=64, digest="48bde4a871be"),
         TestSet("panda-measured", episodes=64, digest="c6fd6151ddef"),
         TestSet("panda-camera", episodes=64, digest="fef44af732ba", noise_seeds=3),
@@ -77,7 +77,7 @@ SETS = {
 
 
 def sequence(name: str) -> int:
-    """Episodes that one arm plays one after the other in a scenario, as its test set says; 1 where there is none."""
+    """Episodes that one arm plays in a row in a scenario, as its test set says; 1 if it is no test set."""
     return SETS[name].sequence if name in SETS else 1
 
 
@@ -91,14 +91,14 @@ def get(name: str) -> TestSet:
 
     Raises:
         UnknownNameError: There is no such set.
-        InvalidInputError: Its scenario, its seeds or the cost are no longer what they were.
+        InvalidInputError: Its scenario, its seeds or the cost have changed.
     """
     if name not in SETS:
         raise UnknownNameError("test set", name, SETS)
     found = SETS[name]
     if (now := set_hash(found.scenario, found.seeds)) != found.digest:
         raise InvalidInputError(
-            f"The test set {name!r} has drifted: its digest is {now}, expected {found.digest}. Its scenario, its "
-            "seeds or the cost have changed; what is meant to differ needs a new set with a name of its own."
+            f"The test set {name!r} has changed: its digest is {now}, expected {found.digest}. Its scenario, its seeds "
+            "or the cost are no longer the same; define a new set with another name."
         )
     return found

@@ -59,7 +59,7 @@ def test_a_set_that_has_drifted_is_refused(monkeypatch, drift):
         monkeypatch.setattr(cost_kernels, "COST_VERSION", 0)
     else:
         monkeypatch.setitem(scenarios.SPLITS, "test", range(2_000_001, 3_000_000))
-    with pytest.raises(InvalidInputError, match="'varga7-random' has drifted"):
+    with pytest.raises(InvalidInputError, match="'varga7-random' has changed"):
         evaluate(test_sets="varga7-random", policies="dls")
 
 
