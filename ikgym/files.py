@@ -1,4 +1,4 @@
-"""Files: written in one go; those of users read with bounds."""
+"""Files: atomic writing, and bounded reading of files of users."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from ikgym.exceptions import InvalidInputError
 
 
 def write(file: pathlib.Path, content: bytes) -> None:
-    """Writes a file in one go: whoever reads it, and whatever happens meanwhile, finds it old or new, never half.
+    """Writes a file atomically: readers see the old content or the new one, also after a crash.
 
     Args:
-        file: Where to write; folders that are missing are made.
-        content: All of it.
+        file: The file; missing folders are made.
+        content: All of its bytes.
 
     Raises:
         OSError: It cannot be written.
     """
-    # In the same folder, since only within one file system is renaming one step.
+    # In the same folder, since renaming is atomic only within one file system.
     draft = file.with_name(f".{file.name}.{os.getpid()}.tmp")
     file.parent.mkdir(parents=True, exist_ok=True)
     try:
@@ -33,12 +33,12 @@ def write(file: pathlib.Path, content: bytes) -> None:
         raise
 
 
-def read_user_file(file: str | pathlib.Path, most: int = 2**28) -> bytes:
-    """All bytes of a file that a user names.
+def read_user_file(file: str | os.PathLike[str], most: int = 2**28) -> bytes:
+    """The content of a file of a user.
 
     Args:
         file: The file.
-        most: Bytes that it may have.
+        most: Largest size in bytes.
 
     Raises:
         InvalidInputError: It does not exist, is not a regular file, is larger, or cannot be read.
@@ -54,5 +54,5 @@ def read_user_file(file: str | pathlib.Path, most: int = 2**28) -> bytes:
             return stream.read(most)
     except InvalidInputError:
         raise
-    except (OSError, ValueError) as e:  # such as a path with a null byte
+    except (OSError, TypeError, ValueError) as e:  # such as a path with a null byte
         raise InvalidInputError(f"Cannot read {file}: {getattr(e, 'strerror', None) or e}.") from None

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 from ikgym.arms.arm import Arm
-from ikgym.exceptions import InvalidInputError
 from ikgym.validation import FloatArray
 
 FILE = pathlib.Path(__file__).with_name("arms.toml")
@@ -28,12 +27,10 @@ def read(file: str | os.PathLike[str] = FILE) -> dict[str, Callable[[], Arm]]:
             as ``"z -y x"``. The key `like` names another arm of the file, which supplies the missing fields.
 
     Raises:
-        InvalidInputError: The file is no TOML. The functions raise where a table is no arm.
+        OSError: The file cannot be read.
+        tomllib.TOMLDecodeError: It is no TOML.
     """
-    try:
-        tables = tomllib.loads(pathlib.Path(file).read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise InvalidInputError(f"{file}: expected a TOML file with a table an arm: {error}.") from None
+    tables = tomllib.loads(pathlib.Path(file).read_text(encoding="utf-8"))
     return {name: functools.partial(_arm, name, tables) for name in tables}
 
 

@@ -14,6 +14,7 @@ from ikgym.arms.arm import Arm, UrdfReference
 from ikgym.arms.home import from_home
 from ikgym.arms.urdf_check import MOVING, UrdfJoint, read_chain
 from ikgym.exceptions import InvalidInputError, MissingDependencyError
+from ikgym.files import read_user_file
 from ikgym.validation import FloatArray, frozen_array, rotation_matrix
 
 # Descriptions of whole humanoids take a few hundred kilobytes.
@@ -68,8 +69,9 @@ def from_urdf(
         UnknownNameError: There is no link of that name; the message has the nearest one.
         MissingDependencyError: Pinocchio is not installed.
     """
+    content = read_user_file(path, MAX_BYTES)
     try:
-        robot, joints = read_chain(_content(path), base, tip)
+        robot, joints = read_chain(content, base, tip)
         moving = [joint for joint in joints if joint.kind in MOVING]
         tool = None if tool is None else frozen_array("tool", tool, (3,))
         tool_rotation = None if tool_rotation is None else rotation_matrix("tool_rotation", tool_rotation)
@@ -97,17 +99,6 @@ def _with_tool(tip: _Home, tool: FloatArray | None, tool_rotation: FloatArray | 
     if tool is not None:
         tip = tip._replace(position=tip.position + tip.rotation @ tool)
     return tip if tool_rotation is None else tip._replace(rotation=tip.rotation @ tool_rotation)
-
-
-def _content(path: str | PathLike[str]) -> bytes:
-    try:
-        with Path(path).open("rb") as file:
-            content = file.read(MAX_BYTES + 1)
-    except (OSError, TypeError, ValueError) as error:
-        raise InvalidInputError(f"expected a URDF file, got none that can be read: {error}.") from error
-    if len(content) > MAX_BYTES:
-        raise InvalidInputError(f"expected a URDF file of at most {MAX_BYTES} bytes, got more.")
-    return content
 
 
 def _home(joints: Sequence[UrdfJoint]) -> _Home:

@@ -71,8 +71,8 @@ def load(file: str | os.PathLike[str]) -> Scenario:
         UnknownNameError: There is no such key, arm, task or kind of trajectory; the message has the nearest one.
         MissingDependencyError: An arm comes from a URDF file, and Pinocchio is not installed.
     """
+    table = files.read_table(file)
     with files.located("", file):
-        table = files.read_table(file)
         base = get(table.pop("like")) if "like" in table else None
         fields = files.arguments(Scenario, table, pathlib.Path(file).parent, like=base is not None)
         return Scenario(**fields) if base is None else base.replace(**fields)

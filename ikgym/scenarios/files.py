@@ -50,18 +50,11 @@ def read_table(file: str | os.PathLike[str]) -> Table:
     Raises:
         InvalidInputError: The file cannot be read, or is no TOML.
     """
+    content = files.read_user_file(file, LARGEST)
     try:
-        with pathlib.Path(file).open("rb") as stream:
-            content = stream.read(LARGEST + 1)
-        if len(content) > LARGEST:
-            raise ValueError(f"it has more than {LARGEST} bytes")
         return tomllib.loads(content.decode())
-    except tomllib.TOMLDecodeError as error:
-        raise InvalidInputError(f"expected TOML, got a fault: {error}.") from None
-    except UnicodeDecodeError as error:
-        raise InvalidInputError(f"expected a text in UTF-8: {error}.") from None
-    except (OSError, TypeError, ValueError, RecursionError) as error:
-        raise InvalidInputError(f"expected a TOML file, got none that can be read: {error}.") from None
+    except (ValueError, RecursionError) as error:
+        raise InvalidInputError(f"{file}: expected TOML in UTF-8, got a fault: {error}.") from None
 
 
 def arguments(

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import csv
 import os
-import pathlib
 
 import numpy as np
 import numpy.typing as npt
 
 from ikgym.exceptions import InvalidInputError
+from ikgym.files import read_user_file
 from ikgym.trajectories.orientations import Orientation, OrientationThrough
 from ikgym.trajectories.path_trajectory import PathTrajectory
 from ikgym.trajectories.paths import Path, Polyline, SplinePath
@@ -114,11 +114,11 @@ def from_csv(
 
 def _columns(file: str | os.PathLike[str]) -> dict[str, FloatArray]:
     """The columns of a file by their names."""
+    content = read_user_file(file)
     try:
-        text = pathlib.Path(file).read_text(encoding="utf-8-sig")
-        rows = list(csv.reader(text.splitlines(), skipinitialspace=True))
-    except (OSError, TypeError, ValueError, csv.Error) as error:
-        raise InvalidInputError(f"{file}: expected a CSV file, got none that can be read: {error}.") from None
+        rows = list(csv.reader(content.decode("utf-8-sig").splitlines(), skipinitialspace=True))
+    except (ValueError, csv.Error) as error:
+        raise InvalidInputError(f"{file}: expected a CSV file: {error}.") from None
     # Lines are counted as an editor does; those without anything may only stand at the end.
     while rows and not any(cell.strip() for cell in rows[-1]):
         rows.pop()

@@ -175,8 +175,8 @@ def test_files_are_shown_like_members(tmp_path, monkeypatch, capsys):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["arms", "none.urdf"], "none.urdf: expected a URDF file, got none that can be read"),
-        (["scenarios", "none.toml"], "none.toml: expected a TOML file, got none that can be read"),
+        (["arms", "none.urdf"], "Cannot read none.urdf"),
+        (["scenarios", "none.toml"], "Cannot read none.toml"),
         (["arms", "mine.toml"], "There is no arm 'mine.toml'."),
     ],
 )

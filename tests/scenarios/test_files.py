@@ -414,11 +414,11 @@ BAD = {
     "one arm of a plant": ({"plant": "{arms = 'panda-2'}"}, r"\[plant\] arms: expected a list of arms, got 'panda-2'"),
     "offsets of a plant's arm": ({"plant": "{arms = [{name = 'a'}]}"}, r"\[plant.arms\] offsets: expected numbers"),
     "no offsets": ({"arm": "{name = 'varga7'}"}, r"\[arm\] offsets: expected numbers, got no such key"),
-    "no file": ({"arm": "{urdf = 'a.urdf'}"}, r"\[arm\] .*a\.urdf: expected a URDF file, got none that can be read"),
+    "no file": ({"arm": "{urdf = 'a.urdf'}"}, r"\[arm\] Cannot read .*a\.urdf"),
     "urdf": ({"arm": "{urdf = 3}"}, r"\[arm\] path: expected a text, got 3"),
     "tip": ({"arm": "{urdf = 'a.urdf', tip = 3}"}, r"\[arm\] tip: expected a text, got 3"),
-    "no toml": ({"name": "'"}, "expected TOML, got a fault"),
-    "deep": ({"dt": "[" * 10**5}, "expected a TOML file, got none that can be read|expected TOML"),
+    "no toml": ({"name": "'"}, "expected TOML in UTF-8, got a fault"),
+    "deep": ({"dt": "[" * 10**5}, "expected TOML"),
 }
 
 
@@ -430,10 +430,10 @@ def test_bad_files_are_refused(changes, message, tmp_path):
 
 def test_what_cannot_be_read_is_refused(tmp_path):
     for file in (tmp_path, tmp_path / "missing.toml", "bad\0name", 7.5, None):
-        with pytest.raises(InvalidInputError, match="expected a TOML file, got none that can be read"):
+        with pytest.raises(InvalidInputError, match="Cannot read"):
             load(file)
     (tmp_path / "latin.toml").write_bytes("name = 'größe'".encode("latin-1"))
-    with pytest.raises(InvalidInputError, match=r"latin\.toml: expected a text in UTF-8"):
+    with pytest.raises(InvalidInputError, match=r"latin\.toml: expected TOML in UTF-8"):
         load(tmp_path / "latin.toml")
 
 

@@ -82,7 +82,7 @@ def test_registered_names_take_precedence(folder, registry):
         ("varga7-fats", UnknownNameError, r"There is no scenario 'varga7-fats'\. Did you mean 'varga7-fast'\?"),
         (3, InvalidInputError, r"scenario: expected a Scenario, its name, a file ending in \.toml or .* got 3"),
         (None, InvalidInputError, "got None"),
-        ("shot.toml", InvalidInputError, r"shot\.toml: expected a TOML file, got none that can be read"),
+        ("shot.toml", InvalidInputError, r"Cannot read shot\.toml"),
         ("my_scenarios:SHOT", UnknownNameError, r"attribute of my_scenarios 'SHOT'\. Did you mean 'SHORT'\?"),
         ("my_scenarios:number", InvalidInputError, "expected a Scenario or what makes one, got 3"),
         ("my_scenarios:fail", InvalidInputError, "making it failed: ZeroDivisionError: division by zero"),

@@ -98,7 +98,7 @@ def test_bad_files(text, message, tmp_path):
 def test_what_cannot_be_read(tmp_path):
     (tmp_path / "latin.csv").write_bytes("größe".encode("latin-1"))
     for file in (tmp_path, tmp_path / "missing.csv", tmp_path / "latin.csv", None):
-        with pytest.raises(InvalidInputError, match="expected a CSV file, got none that can be read"):
+        with pytest.raises(InvalidInputError, match=r"Cannot read|expected a CSV file"):
             from_csv(file)
 
 
