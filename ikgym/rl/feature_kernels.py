@@ -1,4 +1,4 @@
-"""Kernels of what agents see: what is due, what joints can do about it, and the twists ahead, in their own unit."""
+"""Kernels of the features of learning agents: the required twist, each joint's share in it, and the twists ahead."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from ikgym.jit import kernel
 from ikgym.kinematics import forward_and_jacobian
 from ikgym.rl.twists import is_turned, turn, twist, twist_size
 
-#: Added to the speed of what is ahead, in [m/s], [rad/s] or [1/s]: at rest there is nothing to measure by.
+#: Added to the speed of the reference, in [m/s], [rad/s] or [1/s], since a reference at rest has no scale.
 SLOWEST = 0.02
-#: Fewer steps left than this are seen: only then does the end of an episode matter.
+#: Steps left are shown below this number, where the end of an episode matters.
 STEPS_LEFT = 500.0
-#: Added to |v̂|, so that an arm that is where it should be can still move.
+#: Added to |v̂|, so that an arm without error can still move.
 LEAST = 0.2
-#: Joint velocities are seen up to so many units.
+#: Bound of joint velocities in units.
 FASTEST = 4.0
-#: What joints can do is seen up to so much.
+#: Bound of the products of required twist and Jacobian.
 MOST = 10.0
-#: What 1 rad counts as, as a part of an arm's length: so that position and orientation are of a size.
+#: 1 rad weighs as much as this share of the arm's length, so that position and orientation are comparable.
 RADIAN = 0.25
-#: What is not due now is shown that much smaller: a network begins with what counts most in each step.
+#: Scale of the features that matter less in each step, so that a network begins with the important ones.
 CONTEXT = 0.3
 
 
@@ -40,7 +40,7 @@ def mean_twists(kind, dt, offsets, nominal, error, out):
         out: Receives the mean twists between the offsets in [m/s] and [rad/s]. Shape (p - 1, w).
 
     Returns:
-        The speed s of what is ahead: their root mean square, and a little more.
+        The speed s: their root mean square, and 0.02.
     """
     square = 0.0
     for i in range(out.shape[0]):
@@ -92,7 +92,7 @@ def context_rows(kind, prismatic, axis, dt, offsets, q, nominal, remaining, out,
         prismatic: Shape (n,).
         axis: Shape (3,).
         dt: Δt in [s].
-        offsets: Steps ahead at which the reference is seen. Shape (p,).
+        offsets: Steps ahead at which the reference is shown. Shape (p,).
         q: Shape (N, n).
         nominal: At the offsets. Shape (N, p, m).
         remaining: Shape (N, 1).
@@ -107,12 +107,12 @@ def context_rows(kind, prismatic, axis, dt, offsets, q, nominal, remaining, out,
 
 @kernel
 def command_unit(kind, lead, furthest, pose, nominal, speed, error, due):
-    """The twist that is due, as a share of itself and a little more, and the unit of velocities that goes with it.
+    """The required twist, normalised, and the unit of velocities.
 
     Args:
         kind: Of task coordinates.
-        lead: Time in which the arm is to be at the next reference pose, in [s].
-        furthest: Where |v̂| is cut.
+        lead: Time until the next reference pose, in [s].
+        furthest: Bound of |v̂|.
         pose: Measured task coordinates. Shape (m,).
         nominal: The next reference task coordinates. Shape (m,).
         speed: s.
@@ -137,7 +137,7 @@ def command_unit(kind, lead, furthest, pose, nominal, speed, error, due):
 
 @kernel
 def radian(chain):
-    """What 1 rad counts as in [m]: a quarter of the arm's length from joint to joint, 1 m without any."""
+    """Weight of 1 rad in [m]: a quarter of the arm's length from joint to joint, 1 m for an arm without length."""
     length = math.sqrt(np.sum(chain.tool**2))
     for j in range(chain.offsets.shape[0]):
         length += math.sqrt(np.sum(chain.offsets[j] ** 2))
@@ -146,14 +146,14 @@ def radian(chain):
 
 @kernel
 def along_joints(kind, chain, metres, q, due, rotation, position, jacobians, out):
-    """What each joint can do about the twist that is due: its column of the Jacobian times the twist.
+    """Each joint's column of the Jacobian times the required twist.
 
-    Position is in units of :func:`radian`, so that what can be done about it is seen as well as orientation.
+    Position is in units of :func:`radian`, so that it is comparable with orientation.
 
     Args:
         kind: Of task coordinates.
         chain: The arm's model, see :class:`ikgym.kinematics.Chain`.
-        metres: What 1 rad counts as, see :func:`radian`.
+        metres: Weight of 1 rad, see :func:`radian`.
         q: Joint coordinates in [rad] or [m]. Shape (n,).
         due: As :func:`command_unit` gives it. Shape (w,).
         rotation: Scratch. Shape (3, 3).
@@ -181,7 +181,7 @@ def seen_jacobian(kind, chain, q, joints, rotation, position, out):
     """The geometric Jacobian from the frame in which twists are seen: that of joint 1, as if it stood at 0.
 
     Args:
-        kind: Of task coordinates, but for skew ones, which are no twists.
+        kind: Of task coordinates; not skew ones, which are no twists.
         chain: The arm's model, see :class:`ikgym.kinematics.Chain`.
         q: Joint coordinates in [rad] or [m]. Shape (n,).
         joints: Scratch. Shape (n,).
@@ -196,26 +196,15 @@ def seen_jacobian(kind, chain, q, joints, rotation, position, out):
 
 
 @kernel
-def jacobian_rows(kind, chain, q, out):
-    """The first rows of :func:`seen_jacobian` one after the other, arm by arm: shapes (N, n) and (N, w n)."""
-    n, w = q.shape[1], twist_size(kind)
-    joints, rotation, position, jacobian = np.empty(n), np.empty((3, 3)), np.empty(3), np.empty((6, n))
-    for row in range(q.shape[0]):
-        seen_jacobian(kind, chain, q[row], joints, rotation, position, jacobian)
-        for a in range(w):
-            out[row, a * n : (a + 1) * n] = jacobian[a]
-
-
-@kernel
 def observe_rows(kind, chain, dt, offsets, furthest, q, qdot, pose, nominal, remaining, out, unit):
-    """What agents see, row by row, see :class:`ikgym.rl.AgentObservation`.
+    """The features row by row, see :class:`ikgym.rl.AgentObservation`.
 
     Args:
         kind: Of task coordinates.
         chain: The arm's model, see :class:`ikgym.kinematics.Chain`.
         dt: Δt in [s].
-        offsets: Steps ahead at which the reference is seen. Shape (p,).
-        furthest: Where |v̂| is cut.
+        offsets: Steps ahead at which the reference is shown. Shape (p,).
+        furthest: Bound of |v̂|.
         q: In [rad] or [m]. Shape (N, n).
         qdot: In [rad/s] or [m/s]. Shape (N, n).
         pose: Shape (N, m).

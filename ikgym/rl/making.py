@@ -35,7 +35,6 @@ class Learning(Frozen):
         worst: See there.
         history: Number of observations shown side by side, see :class:`ikgym.rl.History`.
         commands: Number of past commands shown.
-        jacobian: Whether the Jacobian is shown.
     """
 
     preview: Preview = (10, 40, 100)
@@ -47,7 +46,6 @@ class Learning(Frozen):
     worst: float = 12.0
     history: int = 1
     commands: int = 0
-    jacobian: bool = False
 
     def arm(self, scenario: str | Scenario) -> gym.Env[Any, Any]:
         """One arm of a scenario, wrapped."""
@@ -68,7 +66,7 @@ class Learning(Frozen):
         """The environment in the wrappers of a module, in their order."""
         env = kinds.RelativeAction(env, self.share, self.largest, self.furthest)
         env = kinds.LogReward(env, self.scale, self.worst)
-        env = kinds.AgentObservation(env, self.furthest, self.jacobian)
+        env = kinds.AgentObservation(env, self.furthest)
         return env if self.history == 1 else kinds.History(env, self.history)
 
 

@@ -61,8 +61,8 @@ class Stage:
 class FeatureStage(Stage):
     """See :class:`ikgym.rl.AgentObservation`."""
 
-    def __init__(self, env: Any, furthest: float = FURTHEST, jacobian: bool = False) -> None:
-        self._view = AgentView(env, furthest, jacobian)
+    def __init__(self, env: Any, furthest: float = FURTHEST) -> None:
+        self._view = AgentView(env, furthest)
         self.observation_space = self._view.space
 
     def observation(self, observation: Any, begun: BoolArray) -> Any:

@@ -1,4 +1,4 @@
-"""Kernels of twists: what is missing from a pose to a reference pose, as vectors that turn with the base frame."""
+"""Kernels of twists: the motion from a pose to a reference pose, as vectors that turn with the base frame."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ikgym.jit import inlined, kernel
 
 @inlined
 def error_kind(kind):
-    """The kind of task whose error a twist is made of: whole rotations are compared by their rotation vector."""
+    """The kind of task whose error gives the twist: full rotations are compared by their rotation vector."""
     return task_kernels.POSE if kind == task_kernels.MATRIX else kind
 
 
@@ -23,17 +23,16 @@ def twist_size(kind):
 
 @inlined
 def is_turned(kind, prismatic):
-    """Whether twists are seen from the frame of joint 1, so that all that a turn of it changes is forgotten.
+    """Whether twists are expressed in the frame of joint 1, which makes them independent of its angle.
 
-    A prismatic joint 1 turns nothing. Skew coordinates are no vector: what they become where the base is turned does
-    not follow from them.
+    A prismatic joint 1 turns nothing, and skew coordinates are no vector that could be turned.
     """
     return kind != task_kernels.SKEW and not prismatic[0]
 
 
 @kernel
 def shown_joints(kind, prismatic):
-    """Features that joint coordinates take: one of a prismatic joint, two of a revolute one."""
+    """Number of features of joint coordinates: one for a prismatic joint, two for a revolute one."""
     shown = 0
     for j in range(1 if is_turned(kind, prismatic) else 0, prismatic.shape[0]):
         shown += 1 if prismatic[j] else 2

@@ -1,4 +1,4 @@
-"""What agents see of N arms, and the unit that their velocities are measured in: what all wrappers share."""
+"""Features of N arms for learning agents, and the unit of their velocities."""
 
 from __future__ import annotations
 
@@ -9,21 +9,20 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium import spaces
 
-from ikgym import task_kernels
 from ikgym.exceptions import InvalidInputError
 from ikgym.outcome import Observation
-from ikgym.rl.feature_kernels import CONTEXT, FASTEST, MOST, jacobian_rows, observe_rows, unit_rows
+from ikgym.rl.feature_kernels import CONTEXT, FASTEST, MOST, observe_rows, unit_rows
 from ikgym.rl.twists import is_turned, shown_joints, twist_size
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray, number
 
 Features = npt.NDArray[np.float32]
 
-#: Where |v̂| is cut.
+#: Default bound of |v̂|.
 FURTHEST = 20.0
-#: Ages of measurements are seen as a share of so many steps.
+#: Ages of measurements are shown as a share of so many steps.
 OLDEST = 100.0
-#: The logarithm of a speed is not beyond.
+#: Bound of the logarithm of a speed.
 LARGEST_LOG = 30.0
 
 
@@ -32,15 +31,14 @@ class AgentView:
 
     Args:
         env: The environment, single or vector, for its scenario and its preview.
-        furthest: Where |v̂| is cut, above 0.
-        jacobian: Whether the Jacobian is seen.
+        furthest: Bound of |v̂|, above 0.
 
     Raises:
         InvalidInputError: The environment is another, its observation has been changed, it shows less than two
-            reference poses, `furthest` is out of its range, or there is no Jacobian of skew coordinates to be seen.
+            reference poses, or `furthest` is out of its range.
     """
 
-    def __init__(self, env: Any, furthest: float, jacobian: bool = False) -> None:
+    def __init__(self, env: Any, furthest: float) -> None:
         space = _own_space(env)
         scenario, preview = env.unwrapped.scenario, env.unwrapped.preview
         if len(preview) < 2:
@@ -52,10 +50,7 @@ class AgentView:
         self._more = [key for key in ("q_age", "pose_age", "commands") if key in space.spaces]
         bounds = [bound(scenario, len(preview)), *(self._bound(key, space[key]) for key in self._more)]
         lower, upper = np.concatenate([low for low, _ in bounds]), np.concatenate([high for _, high in bounds])
-        self._size, self._jacobian = len(bounds[0][0]), 0
-        if jacobian:
-            most = _jacobian_bound(scenario)
-            lower, upper, self._jacobian = np.append(lower, -most), np.append(upper, most), len(most)
+        self._size = len(bounds[0][0])
         self.space = spaces.Box(lower.astype(np.float32), upper.astype(np.float32), dtype=np.float32)
 
     def see(self, observation: Observation) -> Features:
@@ -72,10 +67,6 @@ class AgentView:
             limit = FASTEST if key == "commands" else 1.0
             out[:, at : at + part.shape[1]] = np.clip(part / scale, -limit, limit)
             at += part.shape[1]
-        if self._jacobian:
-            jacobian = np.empty((rows, self._jacobian))
-            jacobian_rows(self._kind, self._chain, np.ascontiguousarray(observation["q"]), jacobian)
-            out[:, at:] = jacobian
         return out
 
     def unit(self, observation: Observation) -> FloatArray:
@@ -91,7 +82,7 @@ class AgentView:
 
 
 def _own_space(env: Any) -> spaces.Dict:
-    """The space of what an environment of this package shows, of one row."""
+    """The observation space of one row of an environment of this package."""
     if not isinstance(getattr(env.unwrapped, "scenario", None), Scenario):
         raise InvalidInputError(f"env: expected an environment RedundantIK-v0, single or vector, got {env}.")
     name = "single_observation_space" if hasattr(env, "single_observation_space") else "observation_space"
@@ -103,10 +94,10 @@ def _own_space(env: Any) -> spaces.Dict:
 
 
 def bound(scenario: Scenario, shown: int) -> tuple[FloatArray, FloatArray]:
-    """Lower and upper bounds of the features, whatever happens, in the order of :class:`ikgym.rl.AgentObservation`.
+    """Lower and upper bounds of the features, in the order of :class:`ikgym.rl.AgentObservation`.
 
     Args:
-        scenario: What is tracked.
+        scenario: The tracking problem.
         shown: p, the number of steps ahead that are shown.
     """
     kind, prismatic = scenario.task.kind, scenario.model.chain.prismatic
@@ -125,23 +116,3 @@ def bound(scenario: Scenario, shown: int) -> tuple[FloatArray, FloatArray]:
     lower = -upper
     lower[w] = lower[-1] = 0.0
     return lower, upper
-
-
-def _jacobian_bound(scenario: Scenario) -> FloatArray:
-    """Bounds of the Jacobian, row by row: no point is further from a joint than the arm is long.
-
-    Raises:
-        InvalidInputError: The task has skew coordinates.
-    """
-    kind, chain, n = scenario.task.kind, scenario.model.chain, scenario.joints
-    if kind == task_kernels.SKEW:
-        raise InvalidInputError("jacobian: expected False for skew coordinates, whose errors are no twists, got True.")
-    lengths = np.linalg.norm(np.vstack([chain.offsets, chain.tool]), axis=1)
-    reach = lengths.sum() + np.abs(scenario.joint_bound())[chain.prismatic].sum()
-    linear = np.where(chain.prismatic, 1.0, reach)
-    return np.concatenate([np.tile(linear, 3), np.ones((int(twist_size(kind)) - 3) * n)])
-
-
-def due_size(space: spaces.Box) -> int:
-    """w, of the twist that such features begin with; the share after it is the first of them that is not negative."""
-    return int(np.argmax(space.low == 0.0))

@@ -74,7 +74,6 @@ units of a quarter of the arm's length, and orientation apart |
     | 1 | steps left, as a share of 500, at most 1; all features from the sines up to here are multiplied by 0.3 |
     | 1 each | ages of `q` and `pose` as a share of 100 steps, where sensors are slow or late |
     | h n | the last h commands, in the unit of the joint velocities, where the environment shows them |
-    | w n | with `jacobian`: the Jacobian of the twist row by row, linear rows in [m] |
 
     Twists have w components: 3 for tasks of position alone, else 6. They are expressed in the frame of joint 1, so that
     a turn of joint 1 changes none of them. Where joint 1 is prismatic, and for skew coordinates, which are no vector,
@@ -83,15 +82,13 @@ units of a quarter of the arm's length, and orientation apart |
     Args:
         env: The environment, whose observation no other wrapper has changed.
         furthest: Bound of |v̂|, above 0.
-        jacobian: Whether the Jacobian is shown; not for skew coordinates.
 
     Raises:
-        InvalidInputError: The environment shows less than two reference poses, `furthest` is out of its range, or the
-            task has no such Jacobian.
+        InvalidInputError: The environment shows less than two reference poses, or `furthest` is out of its range.
     """
 
-    def __init__(self, env: gym.Env[Any, Any], furthest: float = FURTHEST, jacobian: bool = False) -> None:
-        super().__init__(env, FeatureStage(env, furthest, jacobian), furthest=furthest, jacobian=jacobian)
+    def __init__(self, env: gym.Env[Any, Any], furthest: float = FURTHEST) -> None:
+        super().__init__(env, FeatureStage(env, furthest), furthest=furthest)
 
     def observation(self, observation: Observation) -> Features:
         """The features of an observation. Shape (f,)."""

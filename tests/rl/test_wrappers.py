@@ -48,7 +48,6 @@ def same_bits(left, right):
 @pytest.mark.parametrize(("name", "distance"), [("varga7-random", 0.02), ("panda-camera-slow", 0.0003)])
 def test_native_is_sync_of_singles_bit_for_bit(name, distance, mode):
     scenario, changes = short(name), {"lost_distance": distance, "history": 2, "commands": 2}
-    changes["jacobian"] = scenario.task.name != "skew"
     native = rl.make_vec(scenario, N, autoreset_mode=mode, **changes)
     sync = SyncVectorEnv([lambda: rl.make(scenario, **changes)] * N, autoreset_mode=mode)
     assert native.single_observation_space == sync.single_observation_space
@@ -131,24 +130,6 @@ def test_what_joints_can_do_is_their_column_of_the_jacobian_times_what_is_due(na
     assert np.ptp(products) > 0.1
 
 
-@pytest.mark.parametrize(("name", "turned", "w"), [
-    ("varga7-pose-random", True, 6), ("tiago-turn", False, 6), ("panda-random", True, 6), ("planar2-bent", True, 3),
-])  # fmt: skip
-def test_the_jacobian_takes_joint_velocities_to_the_twist(name, turned, w):
-    """Seen from where twists are: its columns are those of the arm, turned back by joint 1."""
-    env = ikgym.RedundantIKEnv(name, preview=PREVIEW)
-    seen, _ = env.reset(seed=2)
-    scenario, agent = env.scenario, rl.AgentObservation(env, jacobian=True)
-    features = agent.observation(seen).astype(np.float64)
-    assert agent.observation_space.contains(features.astype(np.float32))
-    wanted = scenario.model.jacobian(seen["q"])[:w].reshape(-1, 3, scenario.joints)
-    if turned:
-        back = ikgym.rotations.rodrigues(scenario.model.chain.axes[0], seen["q"][0]).T
-        wanted = back @ wanted
-    assert np.allclose(features[-w * scenario.joints :], wanted.ravel(), atol=1e-6)
-    assert np.array_equal(features[: -w * scenario.joints], rl.AgentObservation(env).observation(seen))
-
-
 def test_rewards_are_what_the_logarithm_of_the_cost_leaves():
     kept = {"scenario": short(), "preview": PREVIEW, "lost_distance": 0.05}
     action = np.full(7, 0.02, dtype=np.float32)
@@ -175,8 +156,6 @@ def test_wrong_use_is_refused():
         envs.step(np.zeros(7, dtype=np.float32))
     with pytest.raises(InvalidInputError, match="at least two steps ahead"):
         rl.make(short(), preview=1)
-    with pytest.raises(InvalidInputError, match="jacobian: expected False for skew coordinates"):
-        rl.make(short("varga7-random"), jacobian=True)
     with pytest.raises(UnknownNameError, match="lost_distance"):
         rl.make(short(), lost_distanc=1.0)
     with pytest.raises(InvalidInputError, match="RedundantIK-v0"):
