@@ -35,17 +35,17 @@ class RedundantIKVecEnv(VecEnv):
     """N arms in one process, stepped by one compiled kernel, for Stable-Baselines3.
 
     Observations, rewards (as float32), ends and the episodes drawn after them are bit-identical to those of
-    `DummyVecEnv` over N single environments, each in SB3's `Monitor`. Only the infos say less: that of a row is
-    empty but at the end of its episode, where it holds what the single environment's last one does, and
+    `DummyVecEnv` over N single environments, each in SB3's `Monitor`. Only the infos hold less: that of a row is empty
+    except at the end of its episode, where it has the keys of the single environment and
 
     | key | meaning |
     |---|---|
-    | `TimeLimit.truncated` | True: no episode ends in another way |
+    | `TimeLimit.truncated` | True: all episodes end by truncation |
     | `terminal_observation` | the last observation; the one returned is already the first of the next episode |
     | `episode` | `r`, `l`, `t`: return, length in steps, time since the environment was made in [s], as of `Monitor` |
 
-    Gymnasium's vector environment, `gym.make_vec(…)`, is another interface: a model that is given one says that it is
-    not a Gymnasium environment, and names this class, which takes its place.
+    Gymnasium's vector environment, `gym.make_vec(…)`, has another interface, and Stable-Baselines3 refuses it; use this
+    class instead.
 
     As `r` is the sum of the float64 rewards before any wrapper, `env_is_wrapped(Monitor)` is true.
 
@@ -82,7 +82,7 @@ class RedundantIKVecEnv(VecEnv):
         self._take(envs)
 
     def _take(self, envs: Any) -> None:
-        """Takes over a vector environment that begins new episodes in the same step."""
+        """Sets the vector environment, which begins new episodes in the same step."""
         self._envs, self.scenario = envs, envs.scenario
         self._rows = [ArmRow(envs, index) for index in range(envs.num_envs)]
         self._actions: npt.NDArray[Any] | None = None
@@ -97,9 +97,9 @@ class RedundantIKVecEnv(VecEnv):
         return ahead
 
     def reset(self) -> Observation:
-        """Begins episodes in all rows, with what `seed()` and `set_options()` have left for this reset.
+        """Begins episodes in all rows, with the seeds and options of `seed()` and `set_options()`.
 
-        Row i is seeded with seed + i; without a seed it goes on with its generator. An option ``{"q": …}`` of shape
+        Row i is seeded with seed + i; without a seed its generator continues. An option ``{"q": …}`` of shape
         (n,), in [rad] or [m], starts elsewhere, ``{"arm_seed": k}`` keeps the arm that k draws, ``{"step": k}`` enters
         the episode after k steps.
 
@@ -151,11 +151,11 @@ class RedundantIKVecEnv(VecEnv):
         return observation, rewards.astype(np.float32), ended, infos
 
     def close(self) -> None:
-        """Nothing is open; closing does nothing."""
+        """Does nothing."""
         self._envs.close()
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
-        """What rows say of themselves: `scenario`, spaces, `np_random`, … and what `set_attr` has given them.
+        """An attribute of rows: `scenario`, spaces, `np_random`, … and those that `set_attr` added.
 
         Raises:
             NoAttributeError: They have no such attribute.
@@ -163,10 +163,10 @@ class RedundantIKVecEnv(VecEnv):
         return [getattr(self._rows[index], attr_name) for index in self._get_indices(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
-        """Gives rows an attribute that they did not have before; the arms use none.
+        """Sets a new attribute of rows; the arms use none.
 
         Raises:
-            NoAttributeError: It is one of those that all arms share, such as the scenario: make another environment.
+            NoAttributeError: All arms share it, such as the scenario.
         """
         for index in self._get_indices(indices):
             setattr(self._rows[index], attr_name, value)
@@ -174,7 +174,7 @@ class RedundantIKVecEnv(VecEnv):
     def env_method(
         self, method_name: str, *method_args: Any, indices: VecEnvIndices = None, **method_kwargs: Any
     ) -> list[Any]:
-        """Calls what `get_attr` finds; arms are not reset or stepped one by one.
+        """Calls a method of rows; arms are not reset or stepped one by one.
 
         Raises:
             NoAttributeError: Rows have no such method.
@@ -182,11 +182,11 @@ class RedundantIKVecEnv(VecEnv):
         return [method(*method_args, **method_kwargs) for method in self.get_attr(method_name, indices)]
 
     def env_is_wrapped(self, wrapper_class: type[gym.Wrapper], indices: VecEnvIndices = None) -> list[bool]:
-        """Only `Monitor` is as good as there: SB3 asks whether it may trust ``info["episode"]``."""
+        """True for `Monitor`: SB3 asks whether ``info["episode"]`` holds the return before other wrappers."""
         return [wrapper_class is Monitor for _ in self._get_indices(indices)]
 
     def _summary(self, row: int) -> dict[str, float]:
-        """What `Monitor` says of an episode, rounded as it does."""
+        """The summary of an episode by `Monitor`, rounded in the same way."""
         return {
             "r": round(self._returns[row].item(), 6),
             "l": int(self._lengths[row]),
@@ -215,15 +215,15 @@ class RedundantIKVecEnv(VecEnv):
 
 
 class LearningVecEnv(RedundantIKVecEnv):
-    """N arms, wrapped for learning as :func:`ikgym.rl.make_vec` has them, for Stable-Baselines3.
+    """N arms in the wrappers of :func:`ikgym.rl.make_vec`, for Stable-Baselines3.
 
-    As :class:`RedundantIKVecEnv` in all else: `TimeLimit.truncated` is False where a track is lost, and `episode` sums
-    up the rewards that the agent sees.
+    As :class:`RedundantIKVecEnv`, but `TimeLimit.truncated` is False where a track is lost, and `episode` holds the
+    return of the rewards that the agent sees.
 
     Args:
         num_envs: N.
         scenario: A scenario or what names one, see `ikgym.scenarios.find`.
-        learning: How it is wrapped.
+        learning: The parameters of the wrappers.
 
     Raises:
         UnknownNameError: There is no such scenario.
@@ -244,7 +244,7 @@ def make_vec(scenario: str | Scenario, num_envs: int = 1, **changes: Any) -> Lea
     Args:
         scenario: A scenario or what names one, see `ikgym.scenarios.find`.
         num_envs: N.
-        changes: Fields of :class:`ikgym.rl.Learning` that are not as usual.
+        changes: Fields of :class:`ikgym.rl.Learning` with other values than the default.
 
     Raises:
         UnknownNameError: There is no such scenario or field.
@@ -254,5 +254,5 @@ def make_vec(scenario: str | Scenario, num_envs: int = 1, **changes: Any) -> Lea
 
 
 def _plain(value: Any) -> Any:
-    """A number of Python, as a single environment reports it; an array as it is."""
+    """A Python number, as a single environment reports it, or an array."""
     return value.item() if value.ndim == 0 else value

@@ -1,1 +1,1 @@
-"""Learned agents as policies: what they see, their networks, their files. No learning library is needed to run one."""
+"""Learned agents as policies: their features, networks and files, without a learning library."""

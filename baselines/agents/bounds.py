@@ -1,4 +1,4 @@
-"""Actions of agents that stand alone, kept within the limits of the arm."""
+"""Actions of agents within the limits of the arm."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from ikgym.validation import FloatArray
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Bounds:
-    """The bounds of the joint velocities that :class:`QP` solves within: a joint brakes ahead of its stop.
+    """Bounds of joint velocities, those of the policy `qp`: a joint brakes ahead of its stop.
 
     Args:
-        limits: What :func:`limits_with_braking` gives. Shape (5, n).
+        limits: See :func:`limits_with_braking`. Shape (5, n).
         dt: Δt in [s].
         velocity_limit: What an action of 1 means, in [rad/s] or [m/s]. Shape (n,).
     """
@@ -30,7 +30,7 @@ class Bounds:
 
     @classmethod
     def of(cls, problem: Problem) -> Self | None:
-        """Those of a problem; None where the arm knows no limits, and the environment bounds the actions themselves."""
+        """The bounds of a problem; None where the arm has no limits."""
         model = problem.model
         known = np.concatenate([model.lower, model.upper, model.velocity_limit, model.acceleration_limit])
         if not np.isfinite(known).any():
@@ -41,8 +41,8 @@ class Bounds:
         """Actions within the bounds; NaN stays NaN.
 
         Args:
-            batch: What was observed.
-            action: Fractions of the velocity limit; written. Shape (B, n).
+            batch: Observations.
+            action: Fractions of the velocity limit, changed in place. Shape (B, n).
         """
         keep_rows(self.limits, self.dt, self.velocity_limit, batch.q, batch.qdot, action)
         return action
@@ -58,7 +58,7 @@ def keep_rows(limits, dt, velocity_limit, q, last, action):
         velocity_limit: Shape (n,).
         q: Shape (B, n).
         last: Joint velocities last applied. Shape (B, n).
-        action: Fractions of the velocity limit; written. Shape (B, n).
+        action: Fractions of the velocity limit, changed in place. Shape (B, n).
     """
     n = q.shape[1]
     lower, upper = np.empty(n), np.empty(n)

@@ -9,24 +9,22 @@ import pathlib
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
-from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
 import ikgym
 from baselines.agents.processing import NetworkLike, Processing
 from baselines.canonical import canonical
-from baselines.files import ResultsError, read_bytes, write
+from baselines.files import ResultsError, reading, write
 from baselines.fingerprints import arm_fingerprint, fingerprint
 from ikgym import cost_kernels
-from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.exceptions import InvalidInputError
+from ikgym.files import read_user_file
 from ikgym.scenarios import Scenario
 
 #: The version of the format.
 FORMAT: Final = 2
 #: The key of the JSON text in the metadata of the file.
 KEY: Final = "ikgym"
-#: Largest size of a file in bytes.
-MOST = 2**28
 #: Digits of a hash that identify an agent in results.
 DIGITS = 12
 #: The texts and numbers that every file holds.
@@ -126,16 +124,11 @@ def load_agent(file: pathlib.Path, kinds: Sequence[type[Processing]]) -> AgentFi
         ResultsError: There is no such file, it is damaged, or it has another format.
     """
     try:
-        if not file.is_file():
-            raise ValueError("it is not a file" if file.exists() else "it does not exist")
-        return _parsed(str(file), read_bytes(file, MOST), {kind.kind: kind for kind in kinds})
-    except KeyError as e:
-        reason = f"the key {e} is missing"
-    except OSError as e:
-        reason = e.strerror or str(e)
-    except (InvalidInputError, UnknownNameError, SafetensorError, ValueError, TypeError, RecursionError) as e:
-        reason = str(e)
-    raise ResultsError(f"Cannot read the agent {file}: {reason[:500].removesuffix('.')}.")
+        content = read_user_file(file)
+    except InvalidInputError as e:
+        raise ResultsError(str(e)) from None
+    with reading(file):
+        return _parsed(str(file), content, {kind.kind: kind for kind in kinds})
 
 
 def _parsed(source: str, content: bytes, kinds: Mapping[str, type[Processing]]) -> AgentFile:
@@ -148,7 +141,7 @@ def _parsed(source: str, content: bytes, kinds: Mapping[str, type[Processing]]) 
     claimed = about.pop("hash")
     kind = about["processing"].get("kind")
     if kind not in kinds:
-        raise ValueError(f"expected an agent of the kind {' or '.join(kinds)}, got {kind!r}")
+        raise ResultsError(f"{source}: expected an agent of the kind {' or '.join(kinds)}, got {kind!r}.")
     for part, names in _PARTS.items():
         if not all(isinstance(about[part][name], (str, int)) for name in names):
             raise ValueError(f"{part}: expected {', '.join(names)}, got {about[part]!r}")

@@ -151,8 +151,8 @@ def _layers(name: str, arrays: Sequence[npt.ArrayLike], axes: int) -> tuple[Sing
 def forward_rows(weights, biases, sizes, activation, squash, features, out):
     """The forward pass, row by row.
 
-    Sums run over the inputs outside and the outputs inside: that goes along the memory, and into vector instructions
-    without any sum being added up in another order. So a row gives the same whatever stands around it.
+    The outer loop runs over the inputs, the inner one over the outputs: that is contiguous in memory and can be
+    vectorised without a change of the order of summation, so that a row of a batch is the single call, bit for bit.
 
     Args:
         weights: Wᵀ of all layers, one after the other, flat.

@@ -1,1 +1,1 @@
-"""Training of agents: what `train.py` runs. The agents themselves, once trained, live in :mod:`baselines.agents`."""
+"""Training of agents, by `ikgym train` and `train.py`; trained agents are policies of :mod:`baselines.agents`."""

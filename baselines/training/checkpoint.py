@@ -6,13 +6,11 @@ import dataclasses
 import hashlib
 import io
 import pathlib
-import pickle
 from typing import Any
 
 import torch
 
-from baselines.files import write
-from baselines.training.errors import TrainingError
+from baselines.files import reading, write
 
 #: The version of the format.
 FORMAT = 3
@@ -58,16 +56,13 @@ def load(file: pathlib.Path) -> Checkpoint:
     """The checkpoint of a file.
 
     Raises:
-        TrainingError: It cannot be read, is damaged, or has another format.
+        ResultsError: It cannot be read, is damaged, or has another format.
     """
-    try:
+    with reading(file, "Begin anew with --overwrite."):
         content = torch.load(io.BytesIO(_payload(file.read_bytes())), map_location="cpu", weights_only=True)
         if content.pop("format") != FORMAT:
             raise ValueError("it has another format")
         return Checkpoint(**content)
-    except (OSError, RuntimeError, ValueError, KeyError, TypeError, AttributeError, EOFError, pickle.PickleError) as e:
-        reason = " ".join(str(e).split()) or type(e).__name__
-        raise TrainingError(f"Cannot resume from {file}: {reason[:300]}. Begin anew with --overwrite.") from None
 
 
 def sealed(payload: bytes) -> bytes:

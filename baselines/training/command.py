@@ -20,8 +20,8 @@ from baselines.training import methods, presets
 from baselines.training.config.base import Config
 from baselines.training.errors import TrainingError
 from baselines.training.folder import read_run
-from baselines.training.seeds import SeedResult, SeedRuns, train_seeds
-from baselines.workers import ALONE, Workers
+from baselines.training.seeds import RunOptions, SeedResult, train_seeds
+from baselines.workers import Workers
 from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError, MissingDependencyError
 from ikgym.validation import whole_number
@@ -30,11 +30,9 @@ PROGRAM = "train.py"
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Options:
+class Options(RunOptions):
     """Options that do not change the result of a seed."""
 
-    out: Annotated[pathlib.Path, tyro.conf.arg(metavar="DIR")]
-    """Folder for the files; the run with seed N has the folder seed-N in it."""
     seeds: Annotated[tuple[int, ...], tyro.conf.arg(metavar="N …")] = (0,)
     """One run each."""
     workers: Annotated[int, tyro.conf.arg(metavar="N")] = 1
@@ -43,14 +41,6 @@ class Options:
     """Train on a cluster: ray, at the address in RAY_ADDRESS, a core for each seed. Its nodes share the folder."""
     preset: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
     """Options of a preset, or of a file NAME.toml; those on the command line take precedence."""
-    resume: bool = False
-    """Continue the runs in the folder; they end with the same weights as without the interruption."""
-    overwrite: bool = False
-    """Replace the runs in the folder."""
-    checkpoint_every: Annotated[float, tyro.conf.arg(metavar="SECONDS")] = 15.0
-    """Shortest time between two checkpoints; there are none within a segment."""
-    progress: bool = True
-    """Show a progress bar."""
 
 
 C = TypeVar("C", bound=Config)
@@ -64,22 +54,12 @@ class Command(Generic[C]):
     options: Annotated[Options, tyro.conf.arg(name="")]
 
 
-@dataclasses.dataclass(frozen=True)
-class Repeat:
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Repeat(RunOptions):
     """Repeats a run from its run.json and compares the final weights; exit code 1 where they differ."""
 
     run: Annotated[tyro.conf.Positional[pathlib.Path], tyro.conf.arg(metavar="RUN_JSON")]
     """The run.json of a run."""
-    out: Annotated[pathlib.Path, tyro.conf.arg(metavar="DIR")]
-    """Folder for the files."""
-    resume: bool = False
-    """Continue the repetition in the folder."""
-    overwrite: bool = False
-    """Replace the run in the folder."""
-    checkpoint_every: Annotated[float, tyro.conf.arg(metavar="SECONDS")] = 15.0
-    """Shortest time between two checkpoints."""
-    progress: bool = True
-    """Show a progress bar."""
 
 
 def manual() -> str:
@@ -124,7 +104,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """The command line.
 
     Args:
-        arguments: What stands behind the command; taken from the process if left out.
+        arguments: The arguments; those of the process if left out.
 
     Returns:
         The exit code: 0; 1 where a repetition ends with other weights; 2 after an error, also in one of several seeds;
@@ -204,16 +184,8 @@ def _train(command: Command[Any], text: str) -> int:
     seeds = tuple(dict.fromkeys(whole_number("seeds", seed, at_least=0) for seed in options.seeds))
     if not seeds:
         raise TrainingError("seeds: expected at least one.")
-    runs = SeedRuns(
-        command.config,
-        options.out,
-        resume=options.resume,
-        overwrite=options.overwrite,
-        checkpoint_every=options.checkpoint_every,
-        command=text,
-    )
     workers = Workers(options.workers, options.cluster)
-    results = train_seeds(runs, seeds, workers=workers, progress=options.progress)
+    results = train_seeds(command.config, options, seeds, workers=workers, command=text)
     print(table(results))
     for result in results:
         if result.error:
@@ -228,24 +200,15 @@ def _repeat(command: Repeat) -> int:
     if not wanted:
         raise TrainingError(f"{command.run} belongs to a run that has not ended: finish it with --resume.")
     config = methods.get(about["method"]).from_json(about["config"])
-    runs = SeedRuns(
-        config,
-        command.out,
-        resume=command.resume,
-        overwrite=command.overwrite,
-        checkpoint_every=command.checkpoint_every,
-        command=shlex.join([*_program().split(), "repeat", str(command.run)]),
-    )
-    (result,) = train_seeds(
-        runs, [whole_number("seed", about["seed"], at_least=0)], workers=ALONE, progress=command.progress
-    )
+    seed, text = whole_number("seed", about["seed"], at_least=0), [*_program().split(), "repeat", str(command.run)]
+    (result,) = train_seeds(config, command, [seed], command=shlex.join(text))
     if result.error:
         raise TrainingError(result.error)
     if result.weights_sha256 == wanted:
         print(f"The same final weights, bit for bit: {wanted}")
         return 0
     print(f"Other final weights: expected {wanted}, got {result.weights_sha256}.")
-    for line in _reasons(about, read_run(runs.folder(about["seed"]) / "run.json")):
+    for line in _reasons(about, read_run(command.folder(seed) / "run.json")):
         print(line)
     return 1
 

@@ -65,7 +65,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """The command line.
 
     Args:
-        arguments: What stands behind the command; taken from the process if left out.
+        arguments: The arguments; those of the process if left out.
 
     Returns:
         The exit code: 0, or 2 after an error.

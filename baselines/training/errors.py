@@ -1,4 +1,4 @@
-"""What can go wrong in a training that is nobody's bug."""
+"""The error of trainings that cannot be carried out."""
 
 from __future__ import annotations
 
@@ -6,4 +6,4 @@ from ikgym.exceptions import IkgymError
 
 
 class TrainingError(IkgymError):
-    """A run cannot be begun, resumed or repeated, or its numbers are no longer finite."""
+    """A run cannot begin or be repeated, or its weights diverged."""

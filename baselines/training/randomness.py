@@ -1,4 +1,4 @@
-"""All that is random in a run follows from its seed and the number of the segment, and from nothing before."""
+"""The randomness of a run: it follows from the seed and the number of the segment alone."""
 
 from __future__ import annotations
 
@@ -14,19 +14,17 @@ from ikgym.exceptions import InvalidInputError
 
 
 def sequence(seed: int, segment: int | None) -> np.random.SeedSequence:
-    """Where the randomness of a segment comes from.
+    """The source of the randomness of a segment.
 
     Args:
         seed: Of the run.
-        segment: Counted from 0; None for what is drawn before the first one, such as the first weights.
+        segment: Counted from 0; None before the first one, such as for the first weights.
     """
     return np.random.SeedSequence(seed, spawn_key=(0 if segment is None else segment + 1,))
 
 
 def reseed(seed: int, segment: int | None) -> None:
-    """Seeds the generators of Python, NumPy and PyTorch that are shared by all.
-
-    Stable-Baselines3 draws noise, minibatches and samples from them.
+    """Seeds the global generators of Python, NumPy and PyTorch, which Stable-Baselines3 draws from.
 
     Args:
         seed: Of the run.
@@ -39,9 +37,7 @@ def reseed(seed: int, segment: int | None) -> None:
 
 
 def episode_seed(seed: int, segment: int, rows: int) -> int:
-    """The reset seed of the first of some arms in a segment; those of the others follow it.
-
-    All of them are of the split for training, whatever is drawn.
+    """The reset seed of the first of some arms in a segment, of the split for training; those of the others follow it.
 
     Args:
         seed: Of the run.
@@ -60,9 +56,9 @@ def episode_seed(seed: int, segment: int, rows: int) -> int:
 
 @contextlib.contextmanager
 def deterministic_torch() -> Iterator[None]:
-    """One thread of PyTorch, and only algorithms that give the same each time; as before at the end.
+    """One thread of PyTorch and only deterministic algorithms within the context.
 
-    Networks this small are computed faster by one thread, and several seeds have a core each.
+    Networks this small are faster in one thread, and each of several seeds has its own core.
     """
     threads, strict = torch.get_num_threads(), torch.are_deterministic_algorithms_enabled()
     warns = torch.is_deterministic_algorithms_warn_only_enabled()

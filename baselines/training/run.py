@@ -32,7 +32,7 @@ from torch.utils.tensorboard import SummaryWriter
 import ikgym
 from baselines.agents.files import save_agent
 from baselines.evaluation.machine import describe
-from baselines.files.locks import locked
+from baselines.files import locked, write_json
 from baselines.fingerprints import fingerprint
 from baselines.training import checkpoint
 from baselines.training.checkpoint import Checkpoint
@@ -201,14 +201,14 @@ class _Run:
         training = {name: content[name] for name in ("method", "seed", "training", "kept", "versions")}
         save_agent(self._folder.agent, self._trainer.agent(training))
         # A run that was killed after its last checkpoint and before its history lacks the last row.
-        self._folder.write_json(self._folder.history, self._at.history)
-        self._folder.write_json(self._folder.run, content)
+        write_json(self._folder.history, self._at.history)
+        write_json(self._folder.run, content)
         return Result(self._folder.path, final, Score(**last))
 
     def _save(self) -> None:
         self._at.trainer = self._trainer.state()
         self._at.save(self._folder.checkpoint)
-        self._folder.write_json(self._folder.history, self._at.history)
+        write_json(self._folder.history, self._at.history)
         self._write_about()
 
     def _count(self) -> None:
@@ -236,7 +236,7 @@ class _Run:
         }
 
     def _write_about(self) -> None:
-        self._folder.write_json(self._folder.run, self._content())
+        write_json(self._folder.run, self._content())
 
     @contextlib.contextmanager
     def _board(self) -> Iterator[SummaryWriter]:

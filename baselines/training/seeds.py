@@ -10,38 +10,34 @@ import sys
 import traceback
 import uuid
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
+import tyro
 from tqdm import tqdm
 
 from baselines.files import write
 from baselines.training.config.base import Config
-from baselines.workers import TRIES, WorkerError, Workers, finished
+from baselines.workers import ALONE, TRIES, WorkerError, Workers, finished
 from ikgym.exceptions import IkgymError
 
 if TYPE_CHECKING:  # the command line is read without agents
     from baselines.training.validation import Score
 
 
-@dataclasses.dataclass(frozen=True)
-class SeedRuns:
-    """The options that all seeds have in common.
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class RunOptions:
+    """Options of runs that do not change their results."""
 
-    Args:
-        config: Of any method.
-        out: The folder; the run with seed N has the folder ``seed-N`` in it.
-        resume: See :func:`baselines.training.run.train`.
-        overwrite: See there.
-        checkpoint_every: See there.
-        command: See there.
-    """
-
-    config: Config
-    out: pathlib.Path
+    out: Annotated[pathlib.Path, tyro.conf.arg(metavar="DIR")]
+    """Folder for the files; the run with seed N has the folder seed-N in it."""
     resume: bool = False
+    """Continue the runs in the folder; they end with the same weights as without the interruption."""
     overwrite: bool = False
-    checkpoint_every: float = 0.0
-    command: str = ""
+    """Replace the runs in the folder."""
+    checkpoint_every: Annotated[float, tyro.conf.arg(metavar="SECONDS")] = 15.0
+    """Shortest time between two checkpoints; there are none within a segment."""
+    progress: bool = True
+    """Show a progress bar."""
 
     def folder(self, seed: int) -> pathlib.Path:
         """The folder of a run."""
@@ -104,7 +100,9 @@ class Bar:
         self._bar.close()
 
 
-def train_seeds(runs: SeedRuns, seeds: Sequence[int], *, workers: Workers, progress: bool) -> list[SeedResult]:
+def train_seeds(
+    config: Config, options: RunOptions, seeds: Sequence[int], *, workers: Workers = ALONE, command: str = ""
+) -> list[SeedResult]:
     """Trains one agent a seed.
 
     One seed is trained in this process, several in separate ones, so that a seed that fails does not end the others.
@@ -112,10 +110,11 @@ def train_seeds(runs: SeedRuns, seeds: Sequence[int], *, workers: Workers, progr
     checkpoint.
 
     Args:
-        runs: The common options.
+        config: Of any method.
+        options: The common options.
         seeds: One run each.
         workers: Processes of this machine or of a cluster.
-        progress: Whether to show bars on stderr.
+        command: The command that began the runs, for `run.json`.
 
     Returns:
         The results, in the order of the seeds.
@@ -124,14 +123,14 @@ def train_seeds(runs: SeedRuns, seeds: Sequence[int], *, workers: Workers, progr
         ClusterError: There is no cluster.
     """
     far = workers.cluster is not None
-    lines = {seed: line if progress and not far else None for line, seed in enumerate(seeds)}
+    lines = [line if options.progress and not far else None for line in range(len(seeds))]
     if len(seeds) == 1 and not far:
-        return [train_seed(Seed(runs, seeds[0], line=lines[seeds[0]]))]
-    shared = dataclasses.replace(runs, out=runs.out.absolute()) if far else runs
+        return [train_seed(Seed(config, options, command, seeds[0], line=lines[0]))]
+    shared = dataclasses.replace(options, out=options.out.absolute()) if far else options
     results = dict[int, SeedResult]()
     tries = TRIES if far else 1  # on one machine a second attempt would fail again
     with _marked(shared.out, far) as mark:
-        every = [Seed(shared, seed, mark, lines[seed]) for seed in seeds]
+        every = [Seed(config, shared, command, seed, mark, line) for seed, line in zip(seeds, lines, strict=True)]
         for one, future in finished(attempt, every, workers, tries=tries):
             try:
                 results[one.seed] = future.result()
@@ -145,13 +144,17 @@ class Seed:
     """The task of a worker.
 
     Args:
-        runs: The common options.
+        config: Of any method.
+        options: The common options.
+        command: The command that began the run.
         seed: The seed.
         mark: The name of a file that shows a worker of a cluster that the folder is shared; empty on one machine.
         line: See :class:`Bar`.
     """
 
-    runs: SeedRuns
+    config: Config
+    options: RunOptions
+    command: str
     seed: int
     mark: str = ""
     line: int | None = None
@@ -162,24 +165,24 @@ def train_seed(one: Seed) -> SeedResult:
     # PyTorch takes seconds to load, and the parent process does not need it.
     from baselines.training.run import train
 
-    runs, seed = one.runs, one.seed
-    if one.mark and not (runs.out / one.mark).exists():
-        unseen = f"{platform.node()} does not see {runs.out}: expected a folder that all nodes of the cluster share"
+    options, seed = one.options, one.seed
+    if one.mark and not (options.out / one.mark).exists():
+        unseen = f"{platform.node()} does not see {options.out}: expected a folder that all nodes of the cluster share"
         return SeedResult(seed, error=unseen)
-    begun = runs.out / f"{one.mark}-{seed}"
+    begun = options.out / f"{one.mark}-{seed}"
     again = bool(one.mark) and begun.exists()  # on a node that was lost
     if one.mark:
         begun.touch()
-    bar = Bar(runs.config.segments, seed, one.line)
+    bar = Bar(one.config.segments, seed, one.line)
     try:
         result = train(
-            runs.config,
+            one.config,
             seed,
-            runs.folder(seed),
-            resume=runs.resume or again,
-            overwrite=runs.overwrite and not again,
-            checkpoint_every=runs.checkpoint_every,
-            command=runs.command,
+            options.folder(seed),
+            resume=options.resume or again,
+            overwrite=options.overwrite and not again,
+            checkpoint_every=options.checkpoint_every,
+            command=one.command,
             on_segment=bar.advance,
         )
     except IkgymError as e:

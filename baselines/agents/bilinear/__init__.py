@@ -1,1 +1,1 @@
-"""The bilinear actor: joint velocities linear in the twist that is due, by a matrix that a network chooses."""
+"""The bilinear agent: joint velocities linear in the twist that is due, by a matrix from a network."""

@@ -1,13 +1,13 @@
-"""Kernels of the damped inverse that the matrix of a bilinear actor may begin as, and of its gradient.
+"""Kernels of the damped inverse that the matrix of a bilinear agent may begin as, and of its gradient.
 
 With J the Jacobian of the twist, in the frame in which twists are seen, U a diagonal metric of the joints and λ a
 damping, which the network gives beside G and h,
 
     G' = G + U Jᵀ (J U Jᵀ + λ I)⁻¹
 
-takes the place of G (weighted damped least squares, as in Nakamura and Hanafusa 1986), and the null motion
-h' = (I - G' J) h that of h: what h would do to the tool is taken back. An output is that of G and h, then ln λ against
-the usual λ, then ln U; both logarithms are cut at ±:data:`LARGEST`.
+replaces G (weighted damped least squares, as in Nakamura and Hanafusa 1986), and its projection into the null space,
+h' = (I - G' J) h, replaces h. An output holds G and h, then ln λ relative to the initial λ, then ln U; both logarithms
+are clipped at ±:data:`LARGEST`.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ from ikgym.rl.twists import is_turned, twist_size
 
 Floats = npt.NDArray[np.float64]
 
-#: Of the logarithms that a network gives.
+#: Bound of the logarithms.
 LARGEST = 6.0
 
 
 class Inverse(NamedTuple):
-    """The damped inverse of one arm, and what it is made of.
+    """The damped inverse of one arm, and its parts.
 
     Attributes:
         jacobian: J, as :func:`ikgym.rl.feature_kernels.seen_jacobian` gives it. Shape (6, n).
@@ -47,7 +47,7 @@ class Inverse(NamedTuple):
 
 @inlined
 def empty_inverse(w, n):
-    """Room for one."""
+    """An uninitialised one."""
     return Inverse(np.empty((6, n)), np.empty(n), np.empty((w, w)), np.empty((w, n)))
 
 
@@ -58,7 +58,7 @@ def held_rows(kind, chain, damping, q, output, out):
     Args:
         kind: Of task coordinates.
         chain: The arm.
-        damping: The usual λ, above 0.
+        damping: The initial λ, above 0.
         q: Shape (B, n).
         output: Of the network. Shape (B, n (w + 1) + 1 + n).
         out: Receives (G', h'), float64. Shape (B, n (w + 1)).
@@ -79,17 +79,17 @@ def held_rows(kind, chain, damping, q, output, out):
 
 @kernel
 def held_gradient_rows(kind, chain, damping, q, output, by_held, by_output, by_q):
-    """From the gradient by what :func:`held_rows` gives to those by what it is given, row by row.
+    """The adjoint of :func:`held_rows`, row by row.
 
     Args:
         kind: Of task coordinates.
         chain: The arm.
-        damping: The usual λ.
+        damping: The initial λ.
         q: Shape (B, n).
         output: Of the network. Shape (B, n (w + 1) + 1 + n).
-        by_held: The gradient by (G', h'). Shape (B, n (w + 1)).
-        by_output: Receives that by the output. Shape (B, n (w + 1) + 1 + n).
-        by_q: Receives that by the joint coordinates. Shape (B, n).
+        by_held: The gradient with respect to (G', h'). Shape (B, n (w + 1)).
+        by_output: Receives that with respect to the output. Shape (B, n (w + 1) + 1 + n).
+        by_q: Receives that with respect to the joint coordinates. Shape (B, n).
     """
     n, w = q.shape[1], twist_size(kind)
     rows = n * (w + 1)
@@ -114,15 +114,15 @@ def held_gradient_rows(kind, chain, damping, q, output, by_held, by_output, by_q
 
 @kernel
 def invert(kind, chain, damping, q, given, found):
-    """Fills an :class:`Inverse`; NaN where a network gave NaN.
+    """Fills an :class:`Inverse`; an output that is NaN leads to NaN.
 
     Args:
         kind: Of task coordinates.
         chain: The arm.
-        damping: The usual λ.
+        damping: The initial λ.
         q: Shape (n,).
-        given: ln λ against the usual one, and ln U. Shape (1 + n,).
-        found: Is filled.
+        given: ln λ relative to the initial one, and ln U. Shape (1 + n,).
+        found: Receives the inverse.
 
     Returns:
         λ.
@@ -152,7 +152,7 @@ def invert(kind, chain, damping, q, given, found):
 
 @inlined
 def tool_motion(jacobian, given, moved):
-    """J h, what h alone would do to the tool."""
+    """J h, the motion of the tool that h alone causes."""
     w, n = moved.shape[0], jacobian.shape[1]
     for a in range(w):
         moved[a] = 0.0
@@ -162,14 +162,14 @@ def tool_motion(jacobian, given, moved):
 
 @kernel
 def through_null_motion(found, given, moved, by_moved, by):
-    """From the gradient by G' and h' = h - G' (J h) to those by G', h and J h.
+    """From the gradient with respect to G' and h' = h - G' (J h) to those with respect to G', h and J h.
 
     Args:
         found: An :class:`Inverse`.
         given: Of the network. Shape (n (w + 1) + 1 + n,).
         moved: Receives J h. Shape (w,).
-        by_moved: Receives the gradient by it. Shape (w,).
-        by: The gradient by (G', h'), and receives that by (G', h). Shape (n (w + 1) or more,).
+        by_moved: Receives the gradient with respect to J h. Shape (w,).
+        by: The gradient with respect to (G', h'); receives that with respect to (G', h). Shape (n (w + 1) or more,).
     """
     w, n = found.products.shape
     tool_motion(found.jacobian, given, moved)
@@ -187,22 +187,22 @@ def through_null_motion(found, given, moved, by_moved, by):
 
 @inlined
 def from_logarithm(number):
-    """What a network says by a logarithm."""
+    """The number whose logarithm is an output."""
     return math.exp(min(max(number, -LARGEST), LARGEST))
 
 
 @kernel
 def through_inverse(found, damping, by, by_logarithms, by_jacobian):
-    """From the gradient B by G' to those by λ, U and J.
+    """From the gradient B with respect to G' to those with respect to λ, U and J.
 
-    With P = M⁻¹ J and C = P U B M⁻¹, that by M is −C; what comes of M = J U Jᵀ + λ I is in C + Cᵀ.
+    With P = M⁻¹ J and C = P U B M⁻¹, that with respect to M is −C; through M = J U Jᵀ + λ I follows C + Cᵀ.
 
     Args:
         found: An :class:`Inverse`.
         damping: λ.
-        by: That by (G', h), in whose rows B is. Shape (n (w + 1) or more,).
-        by_logarithms: Receives those by ln λ and ln U. Shape (1 + n,).
-        by_jacobian: Receives that by J, in its first rows. Shape (6, n).
+        by: That with respect to (G', h), with B in its rows. Shape (n (w + 1) or more,).
+        by_logarithms: Receives those with respect to ln λ and ln U. Shape (1 + n,).
+        by_jacobian: Receives that with respect to J, in its first rows. Shape (6, n).
     """
     jacobian, metric, inverse, products = found
     w, n = products.shape
@@ -230,15 +230,15 @@ def through_inverse(found, damping, by, by_logarithms, by_jacobian):
 
 @kernel
 def jacobian_gradient(jacobian, by, out):
-    """From the gradient by the geometric Jacobian to that by the joint coordinates.
+    """From the gradient with respect to the geometric Jacobian to that with respect to the joint coordinates.
 
-    With columns (v_i, ω_i), joint j turns those from itself on, and moves the tool for those before it:
+    With columns (v_i, ω_i), joint j rotates the columns i ≥ j and moves the tool for those before it:
     ∂v_i/∂q_j = ω_j × v_i and ∂ω_i/∂q_j = ω_j × ω_i for j ≤ i, ∂v_i/∂q_j = ω_i × v_j else. ω of a prismatic joint is 0.
 
     Args:
         jacobian: Shape (6, n).
-        by: The gradient by it. Shape (6, n).
-        out: Receives that by the joint coordinates. Shape (n,).
+        by: The gradient with respect to it. Shape (6, n).
+        out: Receives that with respect to the joint coordinates. Shape (n,).
     """
     n = jacobian.shape[1]
     out[:] = 0.0
@@ -247,7 +247,7 @@ def jacobian_gradient(jacobian, by, out):
             jacobian[0, i], jacobian[1, i], jacobian[2, i], jacobian[3, i], jacobian[4, i], jacobian[5, i],
         )  # fmt: skip
         ax, ay, az, bx, by_, bz = by[0, i], by[1, i], by[2, i], by[3, i], by[4, i], by[5, i]
-        # v × a + ω × b, which ω_j is multiplied by; and a × ω, which v_j is.
+        # The factors of ω_j, v × a + ω × b, and of v_j, a × ω.
         tx = vy * az - vz * ay + wy * bz - wz * by_
         ty = vz * ax - vx * az + wz * bx - wx * bz
         tz = vx * ay - vy * ax + wx * by_ - wy * bx

@@ -1,4 +1,4 @@
-"""What the bilinear agent sees, and what the outputs of its network mean."""
+"""The features and the law of the bilinear agent."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Kernels: what the network sees of a measurement, what it says of it, and the filter's step with that."""
+"""Kernels of agents with memory: features of a measurement, the meaning of outputs, and a step of the filter."""
 
 from __future__ import annotations
 
@@ -14,32 +14,32 @@ from ikgym import task_kernels
 from ikgym.jit import kernel
 from ikgym.kinematics import forward
 
-#: Features: each part of the surprise; its parts, of position and of orientation, along what a payload would change;
-#: the logarithms of its mean square and of what was expected of that, of position and orientation each; that of the
-#: steps since the measurement before.
+#: Number of features: the six components of the innovation; its components of position and orientation along the change
+#: by a payload; the logarithms of its mean square and of the expected mean square, of position and orientation each; that
+#: of the steps since the last measurement.
 FEATURES = 13
-#: Outputs: the noise of position and of orientation, and by how much joint zeros may have changed since, each by
-#: itself, and all of them alike, as a payload of the scenarios changes them.
+#: Number of outputs: the noise of position and of orientation, and the changes of joint zeros since the last measurement,
+#: each by itself and all of them alike, as by a payload of the scenarios.
 OUTPUTS = 4
-#: Standard deviations where an output is 0: in [m], [rad], and twice [rad] or [m].
+#: Standard deviations at outputs of 0: in [m], [rad], and twice [rad] or [m].
 POSITION_NOISE, ROTATION_NOISE, CHANGE, PAYLOAD = 3e-4, 5e-4, 1e-5, 1e-5
-#: An output is the logarithm of what these are multiplied by, of changes twice that; none exceeds MOST.
+#: An output is the logarithm of a factor of these, of changes twice that; its bound is MOST.
 MOST = 4.0
-#: A part of the surprise is shown as a multiple of its standard deviation with this noise, of at most 3.
+#: Components of the innovation are features as multiples of their standard deviation with this noise, at most 3.
 SHOWN_NOISE, SHOWN_MOST = 3e-4, 3.0
-#: Logarithms of mean squares are shown from here, in units of SPAN.
+#: Logarithms of mean squares are features from here, in units of SPAN.
 SMALLEST_SQUARE, MIDDLE, SPAN = 1e-10, -16.0, 4.0
 
 
 @kernel
 def describe(surprise, loaded, spread, steps, out):
-    """What the network sees of a measurement.
+    """The features of a measurement.
 
     Args:
-        surprise: Measured less expected: position in [m], rotation vector in [rad]. Shape (6,).
-        loaded: What it changes by where all joint zeros do so alike. Shape (6,).
-        spread: The variance that the filter expects of it without noise. Shape (6,).
-        steps: Since the measurement before, at least 1.
+        surprise: The innovation, measured minus expected: position in [m], rotation vector in [rad]. Shape (6,).
+        loaded: Its derivative with respect to a common change of all joint zeros. Shape (6,).
+        spread: Its variance without noise, as the filter expects it. Shape (6,).
+        steps: Steps since the last measurement, at least 1.
         out: Receives the features. Shape (13,).
     """
     for i in range(6):
@@ -61,14 +61,14 @@ def describe(surprise, loaded, spread, steps, out):
 
 @kernel
 def believe(output, variances):
-    """What an output of the network means.
+    """The variances that an output of the network stands for.
 
     Args:
         output: Shape (4,).
         variances: Receives those of the noise of each component of the error. Shape (6,).
 
     Returns:
-        The variances by which joint zeros may have changed, each by itself, and all of them alike.
+        The variances of changes of joint zeros, each by itself, and all of them alike.
     """
     scale = np.empty(OUTPUTS)
     for i in range(OUTPUTS):
@@ -81,7 +81,7 @@ def believe(output, variances):
 
 @kernel
 def linearise(arm, q, pose, error, sensitivity):
-    """What a measured pose differs by from that of an arm, and how that depends on the arm's parameters.
+    """The difference of a measured pose from that of an arm, and its derivatives with respect to the arm's parameters.
 
     Args:
         arm: The chain with the parameters.
@@ -101,18 +101,18 @@ def linearise(arm, q, pose, error, sensitivity):
 
 @kernel
 def remember_rows(chain, network, rule, observed, first, known, deviation, old):
-    """Takes the measurements in, and tells the deviations, row by row.
+    """Updates the estimates by the measurements, and computes the deviations, row by row.
 
     Args:
         chain: The model of the arm.
         network: Of :attr:`GatedNetwork.constants`.
-        rule: Steps from one pose that is taken in to the next, at least, and the variance of the start.
-        observed: Present joint coordinates of shape (B, n), measured poses (B, m), the joint coordinates where they
-            were measured (B, n), and whether they are new (B,).
-        first: Whether an episode begins, of shape (B,), and the poses that it begins with, (B, m).
+        rule: Smallest number of steps between two measurements that are used, and the variance of the start.
+        observed: Present joint coordinates of shape (B, n), measured poses (B, m), the joint coordinates at the time of
+            the measurement (B, n), and whether they are new (B,).
+        first: Whether an episode begins, of shape (B,), and its first reference poses, (B, m).
         known: A :class:`RecurrentMemory`, changed in place.
         deviation: Receives the deviations. Shape (B, 6).
-        old: Receives what they would be without the measurements. Shape (B, 6).
+        old: Receives the deviations without the measurements. Shape (B, 6).
     """
     q, pose, then, new = observed
     gap, exact = rule
@@ -143,14 +143,14 @@ def remember_rows(chain, network, rule, observed, first, known, deviation, old):
 
 @kernel
 def weigh(network, measured, steps, covariance, hidden, variances):
-    """Asks the network what a measurement is worth.
+    """The variances of a measurement, from the network.
 
     Args:
         network: Its constants.
-        measured: The surprise and its derivatives by the parameters.
-        steps: Since the measurement before.
+        measured: The innovation and its derivatives with respect to the parameters.
+        steps: Steps since the last measurement.
         covariance: Of the parameters; those of the joint zeros become less certain, in place. Shape (p, p).
-        hidden: What the network remembers, changed in place. Shape (units,).
+        hidden: The hidden state of the network, changed in place. Shape (units,).
         variances: Receives those of the noise. Shape (6,).
     """
     error, sensitivity = measured

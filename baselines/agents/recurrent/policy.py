@@ -30,16 +30,16 @@ SHIPPED = "agent_memory"
 
 
 class RecurrentMemory(NamedTuple):
-    """What is known of the arm and of its sensors.
+    """Estimates of the arm and of its sensors.
 
     Attributes:
         before: See :class:`Measurement`. Shape (B, h, n).
         age: See :class:`Measurement`. Shape (B, 1).
-        rest: What is not blended in yet of how estimates have changed. Shape (B, 6).
+        rest: Changes of the estimates that are not blended in yet. Shape (B, 6).
         parameters: See :mod:`baselines.solvers.adaptive.chain_parameters`. Shape (B, p).
         covariance: Of their errors. Shape (B, p, p).
-        hidden: What the network remembers. Shape (B, units).
-        since: Steps since the last pose that was taken in. Shape (B,).
+        hidden: The hidden state of the network. Shape (B, units).
+        since: Steps since the last measurement that was used. Shape (B,).
     """
 
     before: FloatArray
@@ -53,13 +53,12 @@ class RecurrentMemory(NamedTuple):
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class RecurrentPolicy(Corrected):
-    """Corrects a base policy by what a recurrent network and a Kalman filter remember of the arm and its sensors.
+    """Corrects a base policy by a Kalman filter that a recurrent network tunes.
 
     The filter is that of :class:`baselines.solvers.adaptive.calibrated.Calibrated`, without its settings: at each
-    measurement a gated recurrent network sees how far it is from what was expected, and says how noisy position and
-    orientation are taken to be, and by how much joint zeros may have changed since (after KalmanNet, Revach et al.
-    2022, whose network gives the gain). It was trained over plants that were drawn, and recognises from measurements
-    alone on which one it is.
+    measurement a gated recurrent network sees the innovation and estimates the noise of position and orientation, and
+    the change of joint zeros since the last measurement (after KalmanNet, Revach et al. 2022, whose network gives the
+    gain). It was trained on randomly drawn plants.
 
     Args:
         problem: What the policy is told of the scenario.
@@ -69,8 +68,8 @@ class RecurrentPolicy(Corrected):
         given: An agent in memory, in place of a file.
 
     Raises:
-        ResultsError: There is no such file, or it cannot be used.
-        InvalidInputError: The arm or the task is another than the one it was trained for, or the hash is another.
+        ResultsError: The file cannot be read.
+        InvalidInputError: It was trained for another arm or task, or its hash is another one.
     """
 
     policy: str = dataclasses.field(default="rhc", init=False)

@@ -1,1 +1,1 @@
-"""What a training run is, as validated data."""
+"""Configurations of training runs, as validated data."""

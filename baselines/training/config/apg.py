@@ -83,7 +83,7 @@ class APG(ActorOnly):
 
     @property
     def processing(self) -> Bilinear:
-        """What the agent sees, and what the outputs of its network mean."""
+        """The features and the law of the agent."""
         return Bilinear(self.offsets, self.damping)
 
     def window_of(self, segment: int) -> int:

@@ -135,16 +135,6 @@ def count(name: str, value: int, *, at_most: int) -> int:
     return out
 
 
-def differences(there: Mapping[str, Any], here: Mapping[str, Any]) -> list[str]:
-    """What differs between two JSON objects, such as configurations, in words."""
-    names = [*there, *(name for name in here if name not in there)]
-    return [
-        f"{name} ({there.get(name)!r} there, {here.get(name)!r} here)"
-        for name in names
-        if there.get(name) != here.get(name) or (name in there) != (name in here)
-    ]
-
-
 def _plain(value: Any) -> Any:
     if isinstance(value, pathlib.Path):
         return str(value)

@@ -22,57 +22,57 @@ LOG_STD = (-20.0, 2.0)
 class Observe(ActorOnly):
     """An agent with memory for plants that differ from the model: a recurrent network tunes a Kalman filter.
 
-    Plants are drawn anew in each segment: calibration, payload, and the noise, the pace and the gaps of the camera.
-    The gradient of what the filter's estimates cost is back-propagated through all measurements of an episode, or
-    estimated from costs alone.
+    Each segment has new random plants: calibration, payload, and noise, rate and losses of the camera. The gradient of
+    the costs of the filter's estimates is back-propagated through all measurements of an episode, or estimated from
+    costs alone.
     """
 
     method: ClassVar[str] = "observe"
 
     scenario: Annotated[str, tyro.conf.arg(metavar="NAME")] = "panda-field"
-    """Whose arm and paths the plants are drawn for, and on whose own plant agents are validated."""
+    """The scenario with the arm and the paths; agents are validated on its own plant."""
     base_policy: Annotated[str, tyro.conf.arg(metavar="POLICY")] = Recurrent.base_policy
-    """The policy that is corrected. It changes nothing in the training, but for the validation."""
+    """The policy that is corrected, which matters in the validation alone."""
     hidden: Annotated[tuple[int, ...], tyro.conf.arg(metavar="N …")] = (32,)
     """Units of the recurrent layers."""
     n_envs: Annotated[int, tyro.conf.arg(metavar="N")] = 128
     """Episodes of a segment, a multiple of the plants."""
     segments: Annotated[int, tyro.conf.arg(metavar="N")] = 40
-    """Parts of the training, of some five core-seconds each."""
+    """Parts of the training, of about five core-seconds each."""
     evaluate_every: Annotated[int, tyro.conf.arg(metavar="N")] = 40
     """Segments from one validation to the next; there is one at the start and one at the end, too."""
     validation_episodes: Annotated[int, tyro.conf.arg(metavar="N")] = 16
     """Episodes of each: the first seeds of the split "validation"."""
     plants: Annotated[int, tyro.conf.arg(metavar="N")] = 16
-    """Plants that are drawn in a segment; each episode draws an arm and noise from its own."""
+    """Random plants in a segment; each episode draws an arm and noise from one of them."""
     measurements: Annotated[int, tyro.conf.arg(metavar="N")] = 96
-    """Measurements of an episode, through all of which gradients are back-propagated."""
+    """Measurements of an episode; gradients are back-propagated through all of them."""
     gradient_steps: Annotated[int, tyro.conf.arg(metavar="N")] = 10
     """Gradient steps of a segment."""
     batch_size: Annotated[int, tyro.conf.arg(metavar="N")] = 32
     """Episodes of one gradient step."""
     step_cost: Annotated[float, tyro.conf.arg(metavar="X")] = 0.13
-    """What a step costs where nothing is off: the logarithm of the cost of an episode is minimised."""
+    """The cost of a step without error: the objective is the logarithm of the cost of an episode."""
     learning_rate: Annotated[float, tyro.conf.arg(metavar="RATE")] = 5e-3
     """Of Adam, in the first segment."""
     learning_rate_end: Annotated[float, tyro.conf.arg(metavar="RATE")] = 3e-4
     """In the last segment; in between it falls by equal factors."""
     estimator: Estimator = "analytic"
     """Of the gradient. analytic: back-propagation through filter and network. ppo: proximal policy optimisation
-    (Schulman et al. 2017) from what estimates cost, by noise on what the network says; episodes are gone through
-    group_size times, each time with other noise, and compared with each other."""
+    (Schulman et al. 2017) from the costs of estimates, with noise on the network outputs; each episode is repeated
+    group_size times with different noise."""
     group_size: Annotated[int, tyro.conf.arg(metavar="N")] = 8
-    """Of ppo: how often each episode is gone through for a batch, at least twice."""
+    """Of ppo: repetitions of each episode in a batch, at least two."""
     n_epochs: Annotated[int, tyro.conf.arg(metavar="N")] = 4
     """Of ppo: gradient steps on a batch."""
     clip_range: Annotated[float, tyro.conf.arg(metavar="ε")] = 0.2
-    """Of ppo: how far the ratio of probabilities may go from 1."""
+    """Of ppo: largest distance of the ratio of probabilities from 1."""
     gamma: Annotated[float, tyro.conf.arg(metavar="γ")] = 0.95
     """Of ppo: discount factor, from one measurement to the next."""
     log_std_init: Annotated[float, tyro.conf.arg(metavar="X")] = -1.0
-    """Of ppo: logarithm of the standard deviation of what the network says, at the start."""
+    """Of ppo: logarithm of the standard deviation of the noise on outputs, at the start."""
     log_std_end: Annotated[float, tyro.conf.arg(metavar="X")] = -2.0
-    """Of ppo: the same in the last segment; in between it goes by equal parts."""
+    """Of ppo: the same in the last segment; in between it changes by equal steps."""
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -70,7 +70,7 @@ class TD3(Reinforcement):
 
 
 def values(option: str, settings: tuple[str, ...]) -> dict[str, Any]:
-    """Values by name; what is no Python literal is a text.
+    """Values by name, as Python literals or else as texts.
 
     Raises:
         InvalidInputError: A setting has another form than NAME=VALUE.

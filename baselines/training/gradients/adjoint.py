@@ -1,9 +1,10 @@
 """Kernel: the adjoint of a segment, step by step backwards, with exact kinematic Jacobians.
 
-With λ the gradient of the loss by the joint coordinates after a step, and μ that by the velocities applied in it, both
-are led back through the stops, the limits of acceleration and velocity, the bilinear law and the error of the task.
-What a limit holds back has the gradient of what is left: none by the command, that by the last velocity where the
-acceleration is at its limit, and −1/Δt by where the joint was where it comes to stand at a stop.
+λ is the gradient of the loss with respect to the joint coordinates after a step, μ that with respect to the velocities
+applied in it; both are propagated back through the stops, the limits of acceleration and velocity, the bilinear law and
+the error of the task. At a limit the gradient with respect to the command is 0; with respect to the last velocity it is
+that of the applied one where the acceleration is at its limit, and with respect to the last coordinate −1/Δt where the
+joint comes to rest at a stop.
 """
 
 from __future__ import annotations
@@ -33,12 +34,12 @@ Floats = npt.NDArray[np.float64]
 
 
 class Gradient(NamedTuple):
-    """The gradient of a number by what a segment begins with.
+    """The gradient of a number with respect to the input of a segment.
 
     Attributes:
-        q: By the joint coordinates; that by those after the segment at first. Shape (N, n).
-        qdot: By the joint velocities applied before it; likewise. Shape (N, n).
-        output: By (G, h). Shape (N, n (w + 1)).
+        q: With respect to the joint coordinates; at first to those after the segment. Shape (N, n).
+        qdot: With respect to the joint velocities applied before it; likewise. Shape (N, n).
+        output: With respect to (G, h). Shape (N, n (w + 1)).
     """
 
     q: Floats
@@ -47,15 +48,15 @@ class Gradient(NamedTuple):
 
 
 class Place(NamedTuple):
-    """What is known of the arm at one configuration, and room for Jacobians of the error there.
+    """The kinematics of the arm at one configuration, with Jacobians of the error there.
 
     Attributes:
         rotation: Of the tool. Shape (3, 3).
         position: Of the tool point in [m]. Shape (3,).
         pose: Task coordinates. Shape (m,).
         geometric: Geometric Jacobian. Shape (6, n).
-        task_jacobian: What :func:`ikgym.task_kernels.jacobian` gives, in its first rows. Shape (at least e, n).
-        jacobian: What :func:`ikgym.task_kernels.error_jacobian` gives. Shape (at least e, n).
+        task_jacobian: That of :func:`ikgym.task_kernels.jacobian`, in its first rows. Shape (at least e, n).
+        jacobian: That of :func:`ikgym.task_kernels.error_jacobian`. Shape (at least e, n).
     """
 
     rotation: Floats
@@ -68,16 +69,16 @@ class Place(NamedTuple):
 
 @kernel
 def adjoint(task, rows, output, path, by_cost, gradient, start, stop):
-    """Leads gradients back through a segment.
+    """Propagates gradients back through a segment.
 
     Args:
         task: A :class:`baselines.training.gradients.segment.Task`.
-        rows: What the segment was given.
+        rows: The input of the segment.
         output: As in the segment.
-        path: What the segment made of it.
-        by_cost: The gradient by the cost of each arm. Shape (N,).
+        path: The result of the segment.
+        by_cost: The gradient with respect to the cost of each arm. Shape (N,).
         gradient: A :class:`Gradient`; changed in place.
-        start: The first row that is meant.
+        start: The first row.
         stop: The row after the last.
     """
     chain, kind, e, dt, velocity_limit, limits, cost = task
@@ -124,22 +125,22 @@ def adjoint(task, rows, output, path, by_cost, gradient, start, stop):
 
 @uncounted
 def look(chain, kind, q, place):
-    """Where the tool is at some joint coordinates of shape (n,), and how it moves: fills a :class:`Place`."""
+    """Fills a :class:`Place` at some joint coordinates of shape (n,)."""
     forward_and_jacobian(chain, q, place.rotation, place.position, place.geometric)
     task_kernels.coordinates(kind, place.rotation, place.position, place.pose)
 
 
 @uncounted
 def through_error(kind, target, place, error, by_error, lambda_):
-    """Adds to the gradient by the joint coordinates what comes of that by the error of the task.
+    """Adds the gradient through the error of the task to that with respect to the joint coordinates.
 
     Args:
         kind: Of task coordinates.
         target: Reference task coordinates. Shape (m,).
         place: A :class:`Place`.
         error: Of the task. Shape (e,).
-        by_error: The gradient by it. Shape (e,).
-        lambda_: That by the joint coordinates. Shape (n,).
+        by_error: The gradient with respect to it. Shape (e,).
+        lambda_: That with respect to the joint coordinates. Shape (n,).
     """
     e = error.shape[0]
     task_jacobian, jacobian = place.task_jacobian[:e], place.jacobian[:e]
@@ -152,17 +153,17 @@ def through_error(kind, target, place, error, by_error, lambda_):
 
 @inlined
 def through_law(output, j, by_asked, due, speed, dt, into, by_due):
-    """Adds to the gradients by (G, h) and by the twist that is due what comes of that by a joint's command.
+    """Adds the gradient through the command of a joint to those with respect to (G, h) and the twist that is due.
 
     Args:
         output: (G, h). Shape (n (w + 1),).
         j: The joint.
-        by_asked: The gradient by its command.
+        by_asked: The gradient with respect to its command.
         due: The twist. Shape (w,).
         speed: s.
         dt: Δt in [s].
-        into: The gradient by (G, h). Shape (n (w + 1),).
-        by_due: The gradient by the twist. Shape (w,).
+        into: The gradient with respect to (G, h). Shape (n (w + 1),).
+        by_due: The gradient with respect to the twist. Shape (w,).
     """
     w, scaled = due.shape[0], by_asked / dt
     own = j * (w + 1)
@@ -174,7 +175,7 @@ def through_law(output, j, by_asked, due, speed, dt, into, by_due):
 
 @inlined
 def unlimited(limits, velocity_limit, j, asked, move, by, dt):
-    """Leads the gradients of joint ``j`` back through what :func:`ikgym.simulation.step` does to a command.
+    """Propagates the gradients of joint ``j`` back through the limits of :func:`ikgym.simulation.step`.
 
     Args:
         limits: Shape (4, n), or (0, n).
@@ -182,11 +183,11 @@ def unlimited(limits, velocity_limit, j, asked, move, by, dt):
         j: The joint.
         asked: The command in [rad/s] or [m/s].
         move: The velocity applied in the step before; the coordinate before this step in [rad] or [m], and after it.
-        by: The gradients by the coordinate after the step, and by the velocity applied in it.
+        by: The gradients with respect to the coordinate after the step, and to the velocity applied in it.
         dt: Δt in [s].
 
     Returns:
-        The gradients by the command, by the coordinate before, and by the velocity before.
+        The gradients with respect to the command, the coordinate before, and the velocity before.
     """
     last, here, reached = move
     lambda_, mu = by

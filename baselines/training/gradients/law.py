@@ -1,4 +1,4 @@
-"""The bilinear law in PyTorch: features and segments, whose gradients are compiled."""
+"""The bilinear law in PyTorch: features and segments with compiled gradients."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from ikgym.parallel import in_chunks
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray
 
-#: Rows that are worth a thread.
+#: Smallest number of rows for a thread of their own.
 GRAIN = 32
 
 
@@ -29,8 +29,8 @@ class Law:
     """The bilinear actor's law on the arm of a scenario, for N rows at a time, in float64.
 
     Args:
-        scenario: What is to be tracked.
-        processing: What the actor sees.
+        scenario: The scenario.
+        processing: The features and outputs of the network.
 
     Raises:
         InvalidInputError: The scenario's plant is not ideal, or it does not show the pose at its start.
@@ -93,11 +93,11 @@ class Law:
         in_chunks(work, len(out), GRAIN)
 
     def held(self, q: Tensor, features: Tensor, output: Tensor) -> Tensor:
-        """(G, h) from the output of the network; with the damped inverse, and h in the null space, where there is one.
+        """(G, h) from the output of the network, with the damped inverse where there is one.
 
         Args:
             q: Joint coordinates in [rad] or [m]. Shape (N, n), float64.
-            features: What :meth:`features` gave. Shape (N, f), float64.
+            features: From :meth:`features`. Shape (N, f), float64.
             output: Shape (N, outputs), float64.
 
         Returns:
@@ -120,7 +120,7 @@ class Law:
             q: Joint coordinates in [rad] or [m]. Shape (N, n), float64.
             qdot: Joint velocities last applied, in [rad/s] or [m/s]. Shape (N, n), float64.
             output: (G, h). Shape (N, n (w + 1)), float64.
-            rows: What to do; must not be changed before the gradient is known.
+            rows: The input of the segment; must not be changed before the gradient is computed.
 
         Returns:
             Joint coordinates and velocities after it, the costs of shape (N,), and the position errors at its end in

@@ -1,4 +1,4 @@
-"""Kernel: some steps of N arms under the bilinear law with a (G, h) that is held, and feedback at every step."""
+"""Kernel: some steps of N arms under the bilinear law with constant (G, h) and feedback at every step."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Floats = npt.NDArray[np.float64]
 
 
 class Task(NamedTuple):
-    """What is the same in all arms and at all times.
+    """The constants of all arms and steps.
 
     Attributes:
         chain: The arm.
@@ -29,7 +29,7 @@ class Task(NamedTuple):
         error_size: e.
         dt: Δt in [s].
         velocity_limit: What an action of 1 means, in [rad/s] or [m/s]. Shape (n,).
-        limits: What :func:`ikgym.arms.limits.limit_rows` gives. Shape (4, n), or (0, n) where there are none.
+        limits: See :func:`ikgym.arms.limits.limit_rows`. Shape (4, n), or (0, n) where there are none.
         cost: Of the tracking error and of the joint velocities.
     """
 
@@ -43,7 +43,7 @@ class Task(NamedTuple):
 
     @classmethod
     def of(cls, scenario: Scenario) -> Task:
-        """That of a scenario."""
+        """The constants of a scenario."""
         limits = limit_rows(scenario.arm, scenario.largest_qdot, scenario.dt)
         velocity_limit, cost = scenario.velocity_limit.copy(), scenario.cost.parameters
         return cls(
@@ -52,7 +52,7 @@ class Task(NamedTuple):
 
 
 class Rows(NamedTuple):
-    """What the arms are to do in a segment, and what they have done before.
+    """The input of a segment.
 
     Attributes:
         nominal: Reference task coordinates after each of the K steps. Shape (N, K, m).
@@ -68,12 +68,12 @@ class Rows(NamedTuple):
 
 
 class Path(NamedTuple):
-    """What the arms did, as the adjoint needs it.
+    """The motion of the arms, as the adjoint needs it.
 
     Attributes:
         q: Joint coordinates in [rad] or [m]. Shape (N, K + 1, n).
         qdot: Joint velocities applied before them, in [rad/s] or [m/s]. Shape (N, K + 1, n).
-        cost: The stage costs that count, added up. Shape (N,).
+        cost: The sum of the stage costs that count. Shape (N,).
         distance: The position error at the end in [m]. Shape (N,).
     """
 
@@ -84,7 +84,7 @@ class Path(NamedTuple):
 
     @classmethod
     def empty(cls, rows: int, steps: int, n: int) -> Path:
-        """Room for N arms and K steps."""
+        """An uninitialised one of N arms and K steps."""
         q, qdot = np.empty((2, rows, steps + 1, n))
         return cls(q, qdot, np.empty(rows), np.empty(rows))
 
@@ -97,8 +97,8 @@ def segment(task, rows, output, path, start, stop):
         task: A :class:`Task`.
         rows: A :class:`Rows`.
         output: (G, h) of each arm, see :func:`baselines.agents.bilinear.kernels.action_rows`. Shape (N, n (w + 1)).
-        path: A :class:`Path` with the first `q` and `qdot`; receives all else.
-        start: The first row that is meant.
+        path: A :class:`Path` with the first `q` and `qdot`; receives everything else.
+        start: The first row.
         stop: The row after the last.
     """
     chain, kind, e, dt, velocity_limit, limits, cost = task
@@ -137,7 +137,7 @@ def segment(task, rows, output, path, start, stop):
 
 @inlined
 def commanded(output, j, due, speed, dt):
-    """The velocity that joint ``j`` is asked for: row j of G times the twist that is due, and h_j s."""
+    """The velocity command of joint ``j``: row j of G times the twist that is due, plus h_j s."""
     w = due.shape[0]
     velocity = output[j * (w + 1) + w] * speed
     for a in range(w):
@@ -147,7 +147,7 @@ def commanded(output, j, due, speed, dt):
 
 @inlined
 def missing(target, position):
-    """The distance of a position from that of reference task coordinates, whose last three it is, in [m]."""
+    """The distance of a position from the last three of the reference task coordinates, in [m]."""
     m, square = target.shape[0], 0.0
     for i in range(3):
         difference = target[m - 3 + i] - position[i]

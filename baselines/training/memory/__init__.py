@@ -1,1 +1,1 @@
-"""Training of agents with memory: plants that are drawn, what their sensors show, and the filter in PyTorch."""
+"""Training of agents with memory: random plants, measurements on them, and the filter in PyTorch."""

@@ -1,4 +1,4 @@
-"""Plants that are drawn, and what measurements show of them while they follow their reference joint paths."""
+"""Random plants, and measurements on them while they follow their reference joint paths."""
 
 from __future__ import annotations
 
@@ -21,25 +21,25 @@ from ikgym.scenarios import Scenario
 from ikgym.simulation import Outcome
 from ikgym.validation import FloatArray
 
-#: Steps from one measurement to the next: up to those of a camera of 60 and of 30 Hz.
+#: Steps from one measurement to the next, such as those of cameras of 60 and 30 Hz.
 EVERY = (1, 4, 17, 33)
 #: Shares of plants with calibrated arms, with exact sensors, and with a payload.
 CALIBRATED, EXACT, LOADED = 0.25, 0.25, 0.5
-#: Most that a payload adds to all joints alike, or takes from them, in [rad].
+#: Largest change of all joint zeros by a payload, in [rad].
 PAYLOAD = 1.5e-3
 #: Smallest and largest noise of position and of orientation, in [m] and [rad]; largest share of lost poses.
 NOISE, MISSING = (1e-4, 1.5e-3), 0.25
 
 
 class Measurements(NamedTuple):
-    """What an agent with memory learns from: T measurements of each of B episodes.
+    """T measurements of each of B episodes.
 
     Attributes:
-        error: Measured pose less that of the model, position in [m], then rotation vector in [rad]. Shape (B, T, 6).
+        error: Measured pose minus that of the model, position in [m], then rotation vector in [rad]. Shape (B, T, 6).
         true: The same of the pose without noise, which only training knows. Shape (B, T, 6).
-        sensitivity: How both depend on the parameters of the arm. Shape (B, T, 6, p).
-        arrived: Whether the measurement has not been lost. Shape (B, T).
-        steps: From one measurement to the next. Shape (B,).
+        sensitivity: Derivatives of both with respect to the parameters of the arm. Shape (B, T, 6, p).
+        arrived: Whether the measurement was not lost. Shape (B, T).
+        steps: Steps from one measurement to the next. Shape (B,).
     """
 
     error: Tensor
@@ -50,12 +50,12 @@ class Measurements(NamedTuple):
 
 
 def draw_plant(generator: np.random.Generator, processing: Recurrent, events: int, steps: int) -> Plant:
-    """A plant that none of the scenarios has.
+    """A random plant.
 
     Args:
-        generator: From which it is drawn.
-        processing: Whose prior is that of the arms.
-        events: Measurements that are made of it.
+        generator: The generator.
+        processing: Its prior is that of the arms.
+        events: Measurements of an episode.
         steps: Steps of an episode.
     """
     every = int(generator.choice(EVERY))
@@ -78,12 +78,12 @@ def draw_plant(generator: np.random.Generator, processing: Recurrent, events: in
 
 
 def measure(scenario: Scenario, seeds: Sequence[int], events: int) -> Measurements:
-    """Follows the reference joint paths, and measures.
+    """Measurements of arms that follow their reference joint paths.
 
     Args:
-        scenario: With a camera, whose poses do not come late.
+        scenario: With a camera without delay.
         seeds: The reset seeds.
-        events: T, at most; fewer where the episode ends before.
+        events: T, or less where the episode ends before.
 
     Raises:
         InvalidInputError: The scenario has no reference joint path.
@@ -109,7 +109,7 @@ def measure(scenario: Scenario, seeds: Sequence[int], events: int) -> Measuremen
 
 
 def joined(parts: Sequence[Measurements], events: int) -> Measurements:
-    """Episodes of several plants side by side; those with fewer measurements than `events` lack the last ones."""
+    """Episodes of several plants in one batch; those with fewer measurements than `events` lack the last ones."""
     padded = []
     for part in parts:
         missing = events - part.error.shape[1]

@@ -1,4 +1,4 @@
-"""The filter of agents with memory in PyTorch, for gradients from its estimates to the weights of its network."""
+"""The filter of agents with memory in PyTorch, for gradients of its estimates with respect to network weights."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from baselines.agents.recurrent.processing import Recurrent
 from baselines.solvers.adaptive.calibrated import CURVATURE
 from baselines.training.memory.episodes import Measurements
 
-#: The last layer's first weights are made this much smaller.
+#: Factor of the first weights of the last layer.
 QUIET = 0.01
 
 
 class Gated(nn.Module):
-    """What :class:`baselines.agents.recurrent.network.GatedNetwork` is in PyTorch, with the same names.
+    """:class:`baselines.agents.recurrent.network.GatedNetwork` in PyTorch, with the same names of tensors.
 
     Args:
         sizes: Inputs, units of each layer, outputs.
@@ -40,7 +40,7 @@ class Gated(nn.Module):
         return self.head.weight.dtype
 
     def start(self, rows: int) -> list[Tensor]:
-        """The states of the layers when nothing has been seen."""
+        """The states of the layers at the start of an episode."""
         return [torch.zeros(rows, units, dtype=self.dtype) for units in self.sizes[1:-1]]
 
     def forward(self, x: Tensor, hidden: list[Tensor]) -> tuple[Tensor, list[Tensor]]:
@@ -52,7 +52,7 @@ class Gated(nn.Module):
         return self.head(x), after
 
     def to_runtime(self) -> GatedNetwork:
-        """The same for the compiled runtime."""
+        """The network for the compiled runtime."""
         tensors = {name: tensor.detach().numpy().copy() for name, tensor in self.state_dict().items()}
         return GatedNetwork(self.sizes, tensors)
 
@@ -77,12 +77,12 @@ def believe(output: Tensor) -> tuple[Tensor, Tensor]:
     return noise.square().repeat_interleave(3, 1), changes.square()
 
 
-class Speaker(Protocol):
-    """What is asked what measurements are worth: a :class:`Gated`, or what stands around one."""
+class Recurrence(Protocol):
+    """A network that tunes the filter: a :class:`Gated`, perhaps with noise on its outputs."""
 
     @property
     def dtype(self) -> torch.dtype:
-        """Of what it is shown."""
+        """Of the features."""
 
     def start(self, rows: int) -> list[Tensor]:
         """See :class:`Gated`."""
@@ -91,12 +91,12 @@ class Speaker(Protocol):
         """See :class:`Gated`."""
 
 
-def errors(network: Speaker, processing: Recurrent, measured: Measurements) -> tuple[Tensor, Tensor]:
-    """How far estimates are off at each measurement, before and after it was taken in. Shapes (B, T, 6).
+def errors(network: Recurrence, processing: Recurrent, measured: Measurements) -> tuple[Tensor, Tensor]:
+    """Errors of the estimates at each measurement, before and after the update by it. Shapes (B, T, 6).
 
     Args:
-        network: Says what measurements are worth.
-        processing: What the filter begins with.
+        network: Tunes the filter.
+        processing: The prior of the filter.
         measured: The episodes.
     """
     rows, events, _, p = measured.sensitivity.shape
@@ -127,30 +127,30 @@ def errors(network: Speaker, processing: Recurrent, measured: Measurements) -> t
 
 
 def loss(network: Gated, processing: Recurrent, measured: Measurements, delta_x: float, floor: float) -> Tensor:
-    """The mean logarithm of what episodes cost: a part without deviations, and what the estimates are off.
+    """The mean logarithm of the costs of episodes: a constant part, and the costs of errors of the estimates.
 
     Args:
-        network: Is trained.
-        processing: What the filter begins with.
+        network: The network that is trained.
+        processing: The prior of the filter.
         measured: The episodes.
         delta_x: The error that costs 1 a step.
-        floor: What a step costs where nothing is off.
+        floor: The cost of a step without error.
     """
     out: Tensor = (costs(network, processing, measured, delta_x).mean(1) + floor).log().mean()
     return out
 
 
-def costs(network: Speaker, processing: Recurrent, measured: Measurements, delta_x: float) -> Tensor:
-    """What estimates are off costs, from each measurement to the next. Shape (B, T - 1).
+def costs(network: Recurrence, processing: Recurrent, measured: Measurements, delta_x: float) -> Tensor:
+    """Costs of errors of the estimates, from each measurement to the next. Shape (B, T - 1).
 
     Args:
-        network: Says what measurements are worth.
-        processing: What the filter begins with.
+        network: Tunes the filter.
+        processing: The prior of the filter.
         measured: The episodes.
         delta_x: The error that costs 1 a step.
     """
     before, after = errors(network, processing, measured)
-    # In between, estimates are off by something between the two.
+    # In between, the error lies between the two.
     return 0.5 * (after[:, :-1].square() + before[:, 1:].square()).sum(2) / delta_x**2
 
 
@@ -161,13 +161,13 @@ def _product(rate: Tensor, parameters: Tensor) -> Tensor:
 def _absorbed(
     pair: tuple[Tensor, Tensor], noise: Tensor, change: Tensor, arrived: Tensor, parameters: Tensor, covariance: Tensor
 ) -> tuple[Tensor, Tensor]:
-    """The filter's step.
+    """A step of the filter.
 
     Args:
         pair: Derivatives and error, of shapes (B, 6, p) and (B, 6).
         noise: Variances. Shape (B, 6).
-        change: Variances by which joint zeros change, each by itself, and all alike. Shape (B, 2).
-        arrived: Rows that have a measurement. Shape (B,).
+        change: Variances of changes of joint zeros, each by itself, and all alike. Shape (B, 2).
+        arrived: Rows with a measurement. Shape (B,).
         parameters: Shape (B, p).
         covariance: Shape (B, p, p).
     """

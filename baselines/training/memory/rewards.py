@@ -1,8 +1,8 @@
-"""PPO of agents with memory: they learn from what estimates cost, and no gradient goes through the filter.
+"""PPO of agents with memory: they learn from the costs of estimates, without a gradient through the filter.
 
-The network says something at each measurement, with noise. Each episode is gone through several times, a group, in
-which the noise alone differs: beside the others of its group an advantage is due to what was said (leave-one-out
-baseline, Kool et al. 2019), so that no critic is needed.
+Noise is added to the output of the network at each measurement. Each episode is repeated several times, as a group in
+which only the noise differs: the mean return of the others is the baseline of each (leave-one-out baseline, Kool et al.
+2019), so that no critic is needed.
 """
 
 from __future__ import annotations
@@ -19,18 +19,18 @@ from baselines.agents.recurrent.processing import Recurrent
 from baselines.training.memory.episodes import Measurements, taken
 from baselines.training.memory.filter import Gated, costs
 
-#: Added to the variance of advantages, by whose root they are divided.
+#: Added to the variance by whose root advantages are divided.
 LITTLE = 1e-8
 
 
 class Rollout(NamedTuple):
-    """What was seen and said in B episodes, and what came of it. T is one less than the measurements of an episode.
+    """Features, outputs and advantages of B episodes. T is one less than the measurements of an episode.
 
     Attributes:
         features: Shape (B, T, f).
-        outputs: What was said. Shape (B, T, o).
-        arrived: Whether there was a measurement that it was said of. Shape (B, T).
-        log_prob: Of what was said, when it was said. Shape (B, T).
+        outputs: With noise. Shape (B, T, o).
+        arrived: Whether there was a measurement. Shape (B, T).
+        log_prob: Logarithms of the probability densities of the outputs. Shape (B, T).
         advantages: Shape (B, T).
     """
 
@@ -42,10 +42,10 @@ class Rollout(NamedTuple):
 
 
 class Exploring:
-    """A network that says what it would say with noise, and keeps what it has seen and said.
+    """A network with noise on its outputs, which records features and outputs.
 
     Args:
-        network: Stays as it is.
+        network: The network; it is not changed.
         std: Standard deviation of the noise.
     """
 
@@ -57,7 +57,7 @@ class Exploring:
 
     @property
     def dtype(self) -> torch.dtype:
-        """Of what it is shown."""
+        """Of the features."""
         return self._network.dtype
 
     def start(self, rows: int) -> list[Tensor]:
@@ -84,18 +84,18 @@ def explored(
     group_size: int,
     gamma: float,
 ) -> Rollout:
-    """Goes through episodes, each as often as a group has members.
+    """Plays each episode as often as a group has members.
 
-    Rewards are what estimates cost, ÷ what the episode costs in the mean of its group, so that in the sum the logarithm
-    of the costs of episodes is minimised, as by :func:`baselines.training.memory.filter.loss`.
+    Rewards are minus the costs of estimates ÷ the mean cost of the episode in its group, so that their sum maximises
+    minus the logarithm of the costs of episodes, as :func:`baselines.training.memory.filter.loss` does.
 
     Args:
-        network: Says what measurements are worth.
-        processing: What the filter begins with.
+        network: Tunes the filter.
+        processing: The prior of the filter.
         measured: The episodes.
         delta_x: The error that costs 1 a step.
-        floor: What a step costs where nothing is off.
-        std: Standard deviation of what is said.
+        floor: The cost of a step without error.
+        std: Standard deviation of the noise on outputs.
         group_size: At least 2.
         gamma: Discount factor, from one measurement to the next.
     """
@@ -114,13 +114,13 @@ def explored(
 
 
 def surrogate(network: Gated, rollout: Rollout, std: float, clip_range: float) -> Tensor:
-    """The clipped objective of PPO, which is minimised (Schulman et al. 2017, eq. 7, with its sign turned).
+    """The clipped objective of PPO with a minus sign (Schulman et al. 2017, eq. 7).
 
     Args:
-        network: Is trained.
-        rollout: What :func:`explored` gave.
-        std: Standard deviation of what is said.
-        clip_range: How far the ratio of probabilities may go from 1.
+        network: The network that is trained.
+        rollout: From :func:`explored`.
+        std: Standard deviation of the noise on outputs.
+        clip_range: Largest distance of the ratio of probabilities from 1.
     """
     features, outputs, arrived, log_prob, advantages = rollout
     hidden, means = network.start(len(features)), []
@@ -144,7 +144,7 @@ def _leave_one_out(returns: npt.NDArray[np.float64], group_size: int) -> npt.NDA
 
 
 def _log_prob(outputs: Tensor, means: Tensor, std: float) -> Tensor:
-    """Of what is said at each measurement. Shape (B, T)."""
+    """Of the outputs at each measurement. Shape (B, T)."""
     noise: Any = Normal(means, std)
     out: Tensor = noise.log_prob(outputs).sum(2)
     return out

@@ -1,4 +1,4 @@
-"""Agents with memory: gradients from a filter's estimates, through an episode, to the network that tunes it."""
+"""Agents with memory: gradients of a filter's estimates over an episode with respect to the network that tunes it."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class ObserveTrainer(ActorTrainer):
         seed: Of the run.
 
     Raises:
-        InvalidInputError: The task shows no whole poses.
+        InvalidInputError: The task does not show whole poses.
     """
 
     _config: Observe
@@ -66,8 +66,8 @@ class ObserveTrainer(ActorTrainer):
         """Gradient steps of PPO on some episodes.
 
         Args:
-            about: Network, processing, episodes and costs, as :func:`explored` takes them.
-            std: Standard deviation of what the network says.
+            about: The positional arguments of :func:`explored`.
+            std: Standard deviation of the noise on outputs.
         """
         config = self._config
         rollout = explored(*about, std=std, group_size=config.group_size, gamma=config.gamma)
@@ -79,7 +79,7 @@ class ObserveTrainer(ActorTrainer):
         return agent_of(self.policy.to_runtime(), self._config.processing, self._scenario, training)
 
     def _measure(self, number: int) -> Measurements:
-        """Draws plants and episodes, and measures them."""
+        """Measurements of random plants and episodes."""
         config, scenario = self._config, self._scenario
         generator = np.random.default_rng(sequence(self._seed, number))
         first, each = episode_seed(self._seed, number, config.n_envs), config.n_envs // config.plants

@@ -89,7 +89,7 @@ def test_changed_bytes_are_noticed(file):
         spoilt = bytearray(content)
         spoilt[place] ^= 1
         file.write_bytes(spoilt)
-        with pytest.raises(ResultsError, match=f"Cannot read the agent {file}: "):
+        with pytest.raises(ResultsError, match=str(file)):
             load_agent(file, KINDS)
 
 
@@ -104,7 +104,7 @@ def parts(file):
     ("spoil", "message"),
     [
         (lambda t, a: a.update(format=1), "expected format 2, got 1"),
-        (lambda t, a: a.pop("network"), "the key 'network' is missing"),
+        (lambda t, a: a.pop("network"), "'network'"),
         (lambda t, a: a["processing"].update(kind="raw"), "kind bilinear or relative or recurrent, got 'raw'"),
         (lambda t, a: a["processing"].update(future=1), "no field of the processing 'future'"),
         (lambda t, a: a["processing"].update(offsets=[2, 1]), "rising steps ahead"),
@@ -121,7 +121,7 @@ def test_other_descriptions_are_refused(file, spoil, message):
     tensors, about = parts(file)
     spoil(tensors, about)
     file.write_bytes(save(tensors, {"ikgym": json.dumps(about)}))
-    with pytest.raises(ResultsError, match=rf"(?s)Cannot read the agent {file}: .*({message})"):
+    with pytest.raises(ResultsError, match=rf"(?s){file}.*({message})"):
         load_agent(file, KINDS)
 
 
@@ -148,17 +148,17 @@ HUGE = {"dtype": "F32", "shape": [10**9, 10**9], "data_offsets": [0, 4]}
 )
 def test_other_files_are_refused(content, file):
     file.write_bytes(content)
-    with pytest.raises(ResultsError, match=f"Cannot read the agent {file}: "):
+    with pytest.raises(ResultsError, match=str(file)):
         load_agent(file, KINDS)
 
 
 def test_no_file(tmp_path):
     for name in ("none.safetensors", ".", "a\0b", "~nosuchuser/x"):
-        with pytest.raises(ResultsError, match="Cannot read the agent"):
+        with pytest.raises(ResultsError, match="Cannot read"):
             baselines.make("agent", SCENARIO, path=f"{tmp_path}/{name}")
     with (tmp_path / "large.safetensors").open("wb") as stream:
         stream.truncate(2**28 + 1)
-    with pytest.raises(ResultsError, match="too large"):
+    with pytest.raises(ResultsError, match="expected at most"):
         load_agent(tmp_path / "large.safetensors", KINDS)
 
 

@@ -14,11 +14,10 @@ import pytest
 from baselines.training import command, presets, run, seeds
 from baselines.training.command import main, parse
 from baselines.training.config.apg import APG
-from baselines.training.config.base import differences
 from baselines.training.config.reinforcement import PPO
 from baselines.training.folder import FORMAT
 from baselines.training.methods import METHODS, get
-from baselines.training.seeds import SeedRuns
+from baselines.training.seeds import RunOptions, Seed
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 from tests.baselines.training.small import about, timeless, tiny
 from tests.spawning import dies_with_seed_7
@@ -66,10 +65,10 @@ def test_a_seed_that_dies_does_not_end_the_others(several, tmp_path, monkeypatch
 def test_errors_of_a_seed_are_results(tmp_path, monkeypatch, capfd):
     (tmp_path / "seed-0").mkdir()
     (tmp_path / "seed-0" / "run.json").write_text("{")
-    result = seeds.attempt(seeds.Seed(SeedRuns(tiny("apg"), tmp_path, resume=True), 0))
-    assert "Cannot read" in result.error
+    result = seeds.attempt(Seed(tiny("apg"), RunOptions(out=tmp_path, resume=True), "", 0))
+    assert "run.json is damaged" in result.error
     monkeypatch.setattr(seeds, "train_seed", lambda *_: 1 / 0)
-    assert seeds.attempt(seeds.Seed(SeedRuns(PPO(), tmp_path), 3)).error == "ZeroDivisionError: division by zero"
+    assert seeds.attempt(Seed(PPO(), RunOptions(out=tmp_path), "", 3)).error == "ZeroDivisionError: division by zero"
     assert "Traceback" in capfd.readouterr().err
 
 
@@ -93,7 +92,7 @@ def test_repeat(several, tmp_path, capsys):
         ({"method": "pp"}, "There is no method 'pp'"),
         ({"config": {"hidden": 3}}, "hidden: expected 1 to 10 layers, got 3"),
         ({"seed": -1}, "seed: expected a whole number of at least 0, got -1"),
-        ({"format": 1}, f"expected format {FORMAT}, got 1"),
+        ({"format": 1}, f"expected the run.json of a training in format {FORMAT}"),
     ],
 )
 def test_files_that_cannot_be_repeated(content, message, tmp_path, capsys):
@@ -201,7 +200,7 @@ def test_from_the_shell(tmp_path):
         cwd=tmp_path,
     )
     assert done.returncode == 0, done.stderr
-    assert done.stderr == ""
+    assert all(line.startswith("Compiling ") for line in done.stderr.splitlines())
     assert "written to ." in done.stdout
     assert about(tmp_path / "seed-0")["command"].startswith("python train.py td3 --preset smoke")
 
@@ -216,13 +215,13 @@ def test_the_command_line_takes_precedence_over_the_preset(tmp_path):
 
 
 def test_nodes_of_a_cluster_have_to_share_the_folder(tmp_path):
-    one = seeds.Seed(SeedRuns(tiny("apg"), tmp_path), 1, mark="not-there")
+    options, config = RunOptions(out=tmp_path, overwrite=True, progress=False), tiny("apg", segments=1)
+    one = Seed(config, options, "", 1, mark="not-there")
     assert "expected a folder that all nodes of the cluster share" in seeds.train_seed(one).error
     with seeds._marked(tmp_path, True) as mark:
-        result = seeds.train_seed(seeds.Seed(SeedRuns(tiny("apg", segments=1), tmp_path), 1, mark))
-        assert not result.error
-        again = seeds.train_seed(seeds.Seed(SeedRuns(tiny("apg", segments=1), tmp_path, overwrite=True), 1, mark))
-        assert again.weights_sha256 == result.weights_sha256  # resumed, as after the loss of a node
+        first, again = (seeds.train_seed(Seed(config, options, "", 1, mark)) for _ in range(2))
+        assert not first.error
+        assert again == first  # resumed, as after the loss of a node
     assert not list(tmp_path.glob(".cluster-*"))
 
 
@@ -231,7 +230,6 @@ def test_configurations_are_json(kind):
     config = tiny(kind.method)
     values = json.loads(json.dumps(config.to_json()))
     assert kind.from_json(values) == config
-    assert differences(values, config.to_json()) == []
     assert kind.__doc__
 
 

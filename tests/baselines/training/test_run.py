@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import json
 
 import numpy as np
 import pytest
@@ -13,7 +12,7 @@ from baselines.files import ResultsError
 from baselines.training import checkpoint
 from baselines.training import run as run_module
 from baselines.training.errors import TrainingError
-from baselines.training.folder import FORMAT, Folder
+from baselines.training.folder import FORMAT
 from baselines.training.run import train
 from tests.baselines.training.small import about, timeless, tiny
 
@@ -45,15 +44,15 @@ def test_finished_runs_are_left_as_they_are(finished):
 
 
 def test_a_run_killed_between_its_last_checkpoint_and_the_history_is_complete(finished, tmp_path, monkeypatch):
-    write_json = Folder.write_json
+    write_json = run_module.write_json
 
-    def killed(self, file, content):
+    def killed(file, content):
         if file.name == "history.json" and content[-1]["segment"] == CONFIG.segments:
             raise KeyboardInterrupt
-        write_json(self, file, content)
+        write_json(file, content)
 
     with monkeypatch.context() as patched:
-        patched.setattr(Folder, "write_json", killed)
+        patched.setattr(run_module, "write_json", killed)
         with pytest.raises(KeyboardInterrupt):
             train(CONFIG, 3, tmp_path)
     assert train(CONFIG, 3, tmp_path, resume=True).weights_sha256 == finished[1].weights_sha256
@@ -70,9 +69,9 @@ def test_seeds_differ_and_validation_changes_nothing(finished, tmp_path):
 
 def test_folders_are_not_overwritten(finished, tmp_path):
     folder, _ = finished
-    with pytest.raises(TrainingError, match="is there already: resume it by --resume"):
+    with pytest.raises(ResultsError, match="already exists: continue with --resume"):
         train(CONFIG, 3, folder)
-    with pytest.raises(TrainingError, match="choose one"):
+    with pytest.raises(ResultsError, match="choose one"):
         train(CONFIG, 3, folder, resume=True, overwrite=True)
     (tmp_path / "mine.txt").write_text("stays")
     (tmp_path / ".checkpoint.pt.123.tmp").write_text("of a run that was killed")
@@ -87,23 +86,13 @@ def test_folders_are_not_overwritten(finished, tmp_path):
     assert len(list((tmp_path / "tensorboard").iterdir())) == 1
 
 
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({"learning_rate": 1e-2}, r"another config: learning_rate \(0.002 there, 0.01 here\)"),
-        ({"segments": 9, "hold": 4}, r"another config: segments \(3 there, 9 here\), hold \(8 there, 4 here\)"),
-    ],
-)
-def test_another_configuration_is_not_resumed(finished, changes, message):
-    with pytest.raises(TrainingError, match=message):
-        train(CONFIG.replace(**changes), 3, finished[0], resume=True)
-    with pytest.raises(TrainingError, match=r"another seed: \(3 there, 4 here\)"):
+def test_another_run_is_not_resumed(finished, monkeypatch):
+    with pytest.raises(ResultsError, match="differs in config"):
+        train(CONFIG.replace(learning_rate=1e-2), 3, finished[0], resume=True)
+    with pytest.raises(ResultsError, match=r"differs in seed \(3 there, 4 here\)"):
         train(CONFIG, 4, finished[0], resume=True)
-
-
-def test_other_versions_are_not_resumed(finished, monkeypatch):
     monkeypatch.setattr(run_module, "versions", lambda: {**about(finished[0])["versions"], "torch": "1.0"})
-    with pytest.raises(TrainingError, match=r"another versions: torch \('.*' there, '1.0' here\)"):
+    with pytest.raises(ResultsError, match="differs in versions"):
         train(CONFIG, 3, finished[0], resume=True)
 
 
@@ -124,19 +113,18 @@ class Evil:
 @pytest.mark.parametrize(
     ("name", "content", "message"),
     [
-        ("checkpoint.pt", b"nothing", "Cannot resume from .*checkpoint.pt: it is no checkpoint"),
+        ("checkpoint.pt", b"nothing", "checkpoint.pt is damaged.* it is no checkpoint"),
         ("checkpoint.pt", sealed({"format": 99}), "it has another format"),
-        ("checkpoint.pt", sealed({"format": checkpoint.FORMAT, "segments": Evil()}), "Cannot resume from"),
-        ("run.json", b"{", "Cannot read .*run.json"),
-        ("run.json", b"[]", "Expected the run.json of a training"),
-        ("run.json", b'{"format": 2}', f"expected format {FORMAT}, got 2"),
-        ("run.json", json.dumps({"format": FORMAT}).encode(), "expected a method, a seed and a config"),
+        ("checkpoint.pt", sealed({"format": checkpoint.FORMAT, "segments": Evil()}), "checkpoint.pt is damaged"),
+        ("run.json", b"{", "run.json is damaged"),
+        ("run.json", b"[]", "run.json is damaged"),
+        ("run.json", b'{"format": 2}', f"differs in format \\(2 there, {FORMAT} here\\)"),
     ],
 )
 def test_damaged_files(finished, tmp_path, name, content, message):
     copied(finished[0], tmp_path)
     (tmp_path / name).write_bytes(content)
-    with pytest.raises(TrainingError, match=message):
+    with pytest.raises(ResultsError, match=message):
         train(CONFIG, 3, tmp_path, resume=True)
 
 
@@ -148,13 +136,13 @@ def test_a_flipped_byte_of_a_checkpoint_is_noticed(finished, tmp_path):
         damaged = bytearray(whole)
         damaged[place] ^= 64
         (tmp_path / "checkpoint.pt").write_bytes(damaged)
-        with pytest.raises(TrainingError, match=r"Cannot resume from .*it is damaged: expected the SHA-256"):
+        with pytest.raises(ResultsError, match="it is damaged: expected the SHA-256"):
             train(CONFIG, 3, tmp_path, resume=True)
 
 
 def test_a_folder_that_is_a_file(tmp_path):
     (tmp_path / "file").write_text("")
-    with pytest.raises((TrainingError, ResultsError), match="Cannot write"):
+    with pytest.raises(ResultsError, match="Cannot write"):
         train(CONFIG, 3, tmp_path / "file" / "run")
 
 
