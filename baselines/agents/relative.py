@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import ClassVar, Literal, get_args
+from collections.abc import Mapping
+from typing import Any, ClassVar, Literal, Self, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -12,6 +13,7 @@ import numpy.typing as npt
 from baselines.agents.network import Network, forward_rows
 from baselines.agents.processing import Processing, check_offsets
 from baselines.policy import Batch, Problem
+from ikgym.exceptions import InvalidInputError
 from ikgym.jit import kernel
 from ikgym.outcome import OBSERVED
 from ikgym.rl.feature_kernels import observe_rows
@@ -55,6 +57,19 @@ class Relative(Processing):
         numbers = {name: number(name, getattr(self, name), above=0.0) for name in ("furthest", "largest", "gain")}
         for field, value in {"offsets": offsets, "_ahead": ahead, **numbers}.items():
             object.__setattr__(self, field, value)
+
+    @classmethod
+    def from_json(cls, values: Mapping[str, Any]) -> Self:
+        """See :meth:`Processing.from_json`.
+
+        Raises:
+            UnknownNameError: A key is not a field.
+            InvalidInputError: A value is refused, or the network gives G and h, as in older versions.
+        """
+        own = {"bilinear": False, "damping": None, **values}
+        if own.pop("bilinear") or own.pop("damping") is not None:
+            raise InvalidInputError("bilinear: expected joint velocities as network outputs.")
+        return super().from_json(own)
 
     def size(self, problem: Problem) -> int:
         """The number of features."""

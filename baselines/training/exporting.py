@@ -68,7 +68,7 @@ def exported(model: BaseAlgorithm, envs: LearningVecEnv, training: Mapping[str, 
     if sizes != needed:
         raise InvalidInputError(
             f"model: expected a network from {needed[0]} features to {needed[1]} outputs, got {sizes[0]} and "
-            f"{sizes[1]}; agents see no history, no commands and no Jacobian."
+            f"{sizes[1]}; agents see no history and no commands."
         )
     _check_actions(model, network, squash)
     return agent_of(network, processing, scenario, training)

@@ -14,12 +14,12 @@ from ikgym import task_kernels
 from ikgym.jit import kernel
 from ikgym.kinematics import forward
 
-#: Number of features: the six components of the innovation; its components of position and orientation along the change
-#: by a payload; the logarithms of its mean square and of the expected mean square, of position and orientation each; that
-#: of the steps since the last measurement.
+#: Number of features: the six components of the innovation; its components of position and orientation along the
+#: change by a payload; the logarithms of its mean square and of the expected mean square, of position and orientation
+#: each; that of the steps since the last measurement.
 FEATURES = 13
-#: Number of outputs: the noise of position and of orientation, and the changes of joint zeros since the last measurement,
-#: each by itself and all of them alike, as by a payload of the scenarios.
+#: Number of outputs: the noise of position and of orientation, and the changes of joint zeros since the last
+#: measurement, each by itself and all of them alike, as by a payload of the scenarios.
 OUTPUTS = 4
 #: Standard deviations at outputs of 0: in [m], [rad], and twice [rad] or [m].
 POSITION_NOISE, ROTATION_NOISE, CHANGE, PAYLOAD = 3e-4, 5e-4, 1e-5, 1e-5

@@ -108,7 +108,8 @@ def parts(file):
         (lambda t, a: a["processing"].update(kind="raw"), "kind bilinear or relative or recurrent, got 'raw'"),
         (lambda t, a: a["processing"].update(future=1), "no field of the processing 'future'"),
         (lambda t, a: a["processing"].update(offsets=[2, 1]), "rising steps ahead"),
-        (lambda t, a: a["processing"].update(offsets=5), "rising steps|at least two"),
+        (lambda t, a: a["processing"].update(offsets=None), "rising steps"),
+        (lambda t, a: a["processing"].update(bilinear=True), "joint velocities as network outputs"),
         (lambda t, a: a.update(scenario="x"), "indices"),
         (lambda t, a: a["network"].update(activation="gelu"), "no activation 'gelu'"),
         (lambda t, a: a["network"].update(sizes=[10**12, 10**12]), "tensors: expected float32 of the shapes"),
@@ -169,6 +170,8 @@ def test_processings_are_checked():
         Relative((1, 2), 0.0)
     with pytest.raises(InvalidInputError, match="offsets: expected at least two"):
         Relative((1,), 5.0)
+    older = {**Relative((2, 5), 5.0).to_json(), "bilinear": False}
+    assert Relative.from_json(older) == Relative((2, 5), 5.0)
     with pytest.raises(InvalidInputError, match="damping: expected it together with predicted rates"):
         Bilinear.from_json({"damping": 1e-2})  # of a version that knew other joint rates
     with pytest.raises(UnknownNameError, match="no activation 'relo'"):

@@ -111,7 +111,7 @@ def test_files_that_cannot_be_repeated(content, message, tmp_path, capsys):
         (["apg", *TINY, "--workers", "0"], "workers: expected a whole number of at least 1, got 0"),
         (["apg", *TINY, "--seeds", "-1"], "seeds: expected a whole number of at least 0, got -1"),
         (["apg", *TINY, "--window", "7"], "window: expected multiples of hold"),
-        (["apg", *TINY, "--init", "nowhere.safetensors"], "nowhere.safetensors: it does not exist"),
+        (["apg", *TINY, "--init", "nowhere.safetensors"], "Cannot read nowhere.safetensors"),
         (["repeat", "nowhere.json"], "Cannot read nowhere.json"),
         (["apg", *TINY, "--hidden", "1000000"], "hidden: expected a whole number from 1 to 2048"),
         (["apg", *TINY, "--n-envs", "10000000"], "n_envs: expected a whole number from 1 to 10000, got 10000000"),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 import pytest
 import torch
@@ -75,6 +77,7 @@ def test_a_run_that_was_stopped_ends_like_one_that_was_not(finished, tmp_path):
         train(config, 3, tmp_path, checkpoint_every=1e9, on_segment=stop_after(2))
     assert about(tmp_path)["training"]["segments"] == 1  # the first one is written at once
     assert not (tmp_path / "agent.safetensors").exists()
+    time.sleep(1.0)  # TensorBoard orders files by the second of their beginning
     assert train(config, 3, tmp_path, resume=True) == type(result)(tmp_path, result.weights_sha256, result.score)
     assert_same_run(folder, tmp_path)
     for each in (folder, tmp_path):

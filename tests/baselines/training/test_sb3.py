@@ -55,7 +55,7 @@ def test_exported_agents_act_as_their_models(kind, options, tmp_path):
 
 
 def test_models_that_cannot_be_exported(tmp_path):
-    for changes in ({"history": 2}, {"commands": 3}, {"jacobian": True}):
+    for changes in ({"history": 2}, {"commands": 3}):
         envs = envs_of(**changes)
         model = PPO("MlpPolicy", envs, n_steps=8, batch_size=16, device="cpu")
         with pytest.raises(InvalidInputError, match=r"expected a network from .* agents see no history"):
