@@ -7,6 +7,7 @@ import ikgym  # noqa: F401  # registers the environment
 
 
 def main() -> None:
+    """Plays one episode without moving the arm."""
     env = gym.make("RedundantIK-v0", scenario="varga7-fast", preview=2)
     observation, _ = env.reset(seed=0)
     print({key: value.shape for key, value in observation.items()})

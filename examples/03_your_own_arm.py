@@ -8,6 +8,7 @@ import ikgym
 
 
 def main() -> None:
+    """Tracks a wave with an arm of its own."""
     arm = ikgym.arms.from_dh(
         "planar4",
         a=[0.4, 0.3, 0.3, 0.2],

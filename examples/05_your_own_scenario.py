@@ -12,6 +12,7 @@ FILE = Path(__file__).with_name("planar4.toml")
 
 
 def main() -> None:
+    """Tracks the scenario of a file, and a slower copy."""
     scenario = ikgym.scenarios.load(FILE)
     slower = scenario.replace(name="planar4-slow", trajectory=scenario.trajectory.replace(frequency=1.0))
     with tempfile.TemporaryDirectory() as folder:

@@ -16,25 +16,26 @@ def bounded(reward: np.ndarray) -> np.ndarray:
 
 
 def tool_error(observation: dict) -> dict:
-    """The posture, and what is missing in the tool's position at the next step, in [mm]."""
+    """The joint coordinates, and the position error at the next step in [mm]."""
     # Positions are the last three of all task coordinates.
     missing = observation["nominal"][..., 0, -3:] - observation["pose"][..., -3:]
     return {"q": observation["q"], "missing": 1e3 * missing}
 
 
 def space(inner: gym.spaces.Dict) -> gym.spaces.Dict:
-    """Where the observations of one arm are then."""
+    """The space of these observations."""
     return gym.spaces.Dict({"q": inner["q"], "missing": gym.spaces.Box(-np.inf, np.inf, (3,), np.float64)})
 
 
 def one() -> gym.Env:
+    """One arm, wrapped."""
     env = gym.make("RedundantIK-v0", scenario=SCENARIO, preview=1)
     env = gym.wrappers.TransformObservation(env, tool_error, space(env.observation_space))
     return gym.wrappers.TransformReward(env, lambda reward: float(bounded(reward)))
 
 
 def many(num_envs: int) -> gym.vector.VectorEnv:
-    """Arms that are stepped in one kernel, and wrapped all at once."""
+    """Several arms, stepped by one kernel and wrapped together."""
     envs = gym.make_vec("RedundantIK-v0", num_envs=num_envs, scenario=SCENARIO, preview=1)
     single = space(envs.single_observation_space)
     envs = vector.TransformObservation(envs, tool_error, single_observation_space=single)
@@ -42,6 +43,7 @@ def many(num_envs: int) -> gym.vector.VectorEnv:
 
 
 def main() -> None:
+    """Compares wrapped rewards with the costs below them."""
     env = one()
     observation, _ = env.reset(seed=0)
     _, reward, *_, info = env.step(np.zeros(7, dtype=np.float32))

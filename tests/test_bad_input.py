@@ -37,7 +37,8 @@ from ikgym.trajectories.time_laws import TIME_LAWS
 
 FRAME = [*np.eye(3).ravel(), 1.0, 0.0, 0.0]
 ARM = ikgym.arms.get("panda")
-SPLINE = RandomJointSpline(-np.ones(2), np.ones(2), np.ones(2), np.ones(2), 2.0)
+ONES = np.ones(7)
+SPLINE = RandomJointSpline(-ONES, ONES, ONES / 3, ONES, 2.0)
 QUATERNIONS = [[1.0, 0, 0, 0], [0.8, 0.6, 0, 0], [0.6, 0.8, 0, 0]]
 LINE = paths.Line([0, 0, 0], [1, 2, 3])
 GOOD = (
@@ -45,8 +46,8 @@ GOOD = (
     ikgym.scenarios.get("panda-line").replace(velocity_limit=np.full(7, 2.0), start=ARM.home, initial_pose=FRAME),
     ikgym.TrackingCost(),
     Plant(zero=1e-3, bandwidth=10.0, command_delay=2, arms=(ARM,)),
-    Sinusoid([0.1, 0.2], frequency=[1.0, 2.0], phase=[0.0, 1.0], offset=[0.0, 1.0], sigmoid=0.7),
-    RandomSinusoid([0.1, 0.2]),
+    Sinusoid(0.1 * ONES, frequency=ONES, phase=ONES / 3, offset=ONES, sigmoid=0.7),
+    RandomSinusoid(0.1 * ONES),
     SPLINE,
     SPLINE.sample(np.random.default_rng(0)),
     Helix([0, 0, 0], 1.0, 1.0, 1.0),
@@ -63,8 +64,8 @@ GOOD = (
     paths.Raster([0, 0, 0], 0.3, 0.2, 4, 0.01),
     paths.Polyline(np.eye(3), 0.01),
     paths.SplinePath(np.eye(3)),
-    Quintic(1.0, 1.0, 9.0),
-    Trapezoidal(1.0, 1.0, 9.0),
+    Quintic(1.0, 1.0, 90.0),
+    Trapezoidal(1.0, 1.0, 90.0),
     FixedOrientation(np.eye(3)),
     AlongPath(),
     Turning(np.eye(3), [0.0, 0.0, 1.0]),
