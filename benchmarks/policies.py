@@ -28,7 +28,7 @@ POLICIES: dict[str, dict[str, tuple[str, dict[str, object]]]] = {
         "rhc, HL = 3, one iteration": ("rhc", {"horizon": 3, "iterations": 1}),
         "rhc_foresight": ("rhc_foresight", {}),
         "full_orientation": ("full_orientation", {}),
-        "agent_residual": ("agent_residual", {}),
+        "agent_alone": ("agent_alone", {}),
         "rhc_gradient": ("rhc_gradient", {}),
         "rhc_gradient, always 450 iterations": ("rhc_gradient", {"tolerance": 0.0}),
         "rhc_gradient, analytic": ("rhc_gradient", {"gradient": "analytic"}),

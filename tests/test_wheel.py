@@ -37,11 +37,9 @@ def test_it_holds_every_module_and_all_data(content):
         "tuned/varga7-random.json",
         "agents/agent_alone.safetensors",
         "agents/agent_memory.safetensors",
-        "agents/agent_ppo.safetensors",
-        "agents/agent_residual.safetensors",
     ):
         assert f"baselines/data/{file}" in content
-    assert "baselines/training/presets/smoke.toml" in content
+    assert "baselines/training/presets.toml" in content
     # The problems of others, and the notices that their licences ask for.
     for file in ("waypoints.npz", "trajectories.npz", "LICENSE-RL-ITG.txt", "LICENSE-CppFlow.txt"):
         assert f"ikgym/problems/{file}" in content
@@ -123,7 +121,7 @@ def test_the_environment_runs_from_the_wheel(installed):
 @pytest.mark.slow
 def test_agents_are_evaluated_from_the_wheel(installed):
     run, _, folder = installed
-    policies = ("dls", "agent_alone", "agent_residual")
+    policies = ("dls", "agent_alone")
     done = run("ikgym", "evaluate", "--scenarios", "varga7-random", "--policies", *policies, "--out", "out")
     assert "varga7-random" in done.stdout
     rows = json.loads((folder / "out" / "results.json").read_text())
@@ -136,12 +134,12 @@ def test_agents_are_evaluated_from_the_wheel(installed):
 @pytest.mark.slow
 def test_an_agent_is_trained_from_the_wheel(installed):
     run, _, folder = installed
-    tiny = "--scenario faitli3-regular --steps 20 --hidden 8 --offsets 1 2 10 --segments 2 --n-envs 4 --batch-size 20"
+    tiny = "--scenario panda-random --steps 20 --total-timesteps 80 --segments 2 --n-envs 4 --set n_steps=10"
     few = "--validation-episodes 1 --no-progress --out runs"
     run("ikgym", "train", "ppo", *tiny.split(), *few.split())
     agent = folder / "runs" / "seed-0" / "agent.safetensors"
     assert agent.is_file()
-    done = run("ikgym", "evaluate", "--scenarios", "faitli3-regular", "--policies", f"agent:{agent}", "--steps", "5")
+    done = run("ikgym", "evaluate", "--scenarios", "panda-random", "--policies", f"agent:{agent}", "--steps", "5")
     assert "agent" in done.stdout
 
 

@@ -94,7 +94,7 @@ def test_a_mistake_is_one_line_and_ends_with_2(arguments, message, capsys, tmp_p
         (["evaluate", "--steps", "few"], "Error parsing --steps: expected INT, got 'few'. See ikgym evaluate --help."),
         (["oracle", "--knots", "few"], "Error parsing --knots: expected a whole number, got 'few'."),
         (["reproduce", "--papers", "khan"], "Did you mean '--paper'? See ikgym reproduce --help."),
-        (["train", "pp"], "Available: ppo, sac, td3, imitate, apg, observe, repeat. See ikgym train --help."),
+        (["train", "pp"], "Available: ppo, sac, td3, apg, observe, repeat. See ikgym train --help."),
         (["train", "ppo"], "Missing from ikgym train ppo: --out."),
         (["arms", "--name", "varga7"], "See ikgym arms --help."),
     ],
