@@ -7,8 +7,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import gymnasium as gym
 
 from ikgym import arms, exceptions, problems, rl, rotations, scenarios, tasks, trajectories
@@ -37,12 +35,6 @@ __all__ = [
     "tasks",
     "trajectories",
 ]
-
-
-def __getattr__(name: str) -> Any:
-    if name == "Disturbance":
-        raise AttributeError("ikgym.Disturbance is gone: bias and noise belong to ikgym.Plant(bias=…, noise=…).")
-    raise AttributeError(f"module 'ikgym' has no attribute {name!r}")
 
 
 __version__ = "0.2.0"

@@ -6,7 +6,6 @@ import copy
 import dataclasses
 import math
 import pickle
-import re
 
 import numpy as np
 import pytest
@@ -72,19 +71,6 @@ def test_plants_that_do_not_suit_a_scenario(plant, message):
 def test_unknown_fields_have_a_suggestion():
     with pytest.raises(UnknownNameError, match=r"no field of Plant 'pose_evry'\. Did you mean 'pose_every'"):
         Plant().replace(pose_evry=3)
-
-
-def test_who_asks_for_a_disturbance_is_led_to_the_plant():
-    message = re.escape("disturbance: expected its bias and noise in plant, as in plant=ikgym.Plant(bias=…, noise=…)")
-    fields = {f.name: getattr(SCENARIO, f.name) for f in dataclasses.fields(SCENARIO)}
-    with pytest.raises(InvalidInputError, match=message):
-        ikgym.Scenario(**fields, disturbance=3)
-    with pytest.raises(InvalidInputError, match=message):
-        SCENARIO.replace(disturbance=3)
-    with pytest.raises(AttributeError, match=r"belong to ikgym\.Plant\(bias=…, noise=…\)"):
-        ikgym.Disturbance  # noqa: B018  # the access itself raises
-    with pytest.raises(AttributeError, match="module 'ikgym' has no attribute 'Plants'"):
-        ikgym.Plants  # noqa: B018
 
 
 ON = {
