@@ -1,8 +1,8 @@
 """PPO in one file on the native vector environment, in the manner of CleanRL: needs ``pip install "ikgym[train]"``.
 
-The task is made one that plain reinforcement learning gets better at within a minute: episodes of a tenth of a second,
-features in which errors are of the size of 1, and the logarithm of the cost as reward. Agents that keep up with solvers
-take more, see docs/agents.md.
+The task is simplified so that plain reinforcement learning improves within a minute: episodes of a tenth of a second,
+features in which errors are about 1, and the logarithm of the cost as reward. For agents that keep up with solvers see
+docs/agents.md.
 """
 
 import sys
@@ -21,7 +21,7 @@ SCENARIO, PREVIEW = ikgym.scenarios.get("varga7-random").replace(steps=STEPS), 2
 
 
 def features(observation: dict) -> torch.Tensor:
-    """What the agent sees of N arms: posture, velocity, and what is missing to the nominal coordinates ahead."""
+    """Features of N arms: posture, velocity, and the differences to the nominal coordinates ahead."""
     q, missing = observation["q"], observation["nominal"] - observation["pose"][:, None]
     parts = [np.sin(q), np.cos(q), 0.1 * observation["qdot"], 100.0 * missing.reshape(len(q), -1)]
     return torch.as_tensor(np.hstack(parts).clip(-5.0, 5.0), dtype=torch.float32)
@@ -35,7 +35,7 @@ def network(inputs: int, outputs: int, scale: float) -> nn.Sequential:
 
 
 class Agent(nn.Module):
-    """A Gaussian policy and a value, each of a network of its own."""
+    """A Gaussian policy and a value, with separate networks."""
 
     def __init__(self, inputs: int, joints: int) -> None:
         super().__init__()
@@ -43,16 +43,16 @@ class Agent(nn.Module):
         self.log_std = nn.Parameter(torch.full((joints,), -3.0))
 
     def policy(self, seen: torch.Tensor) -> Normal:
-        """Actions for what is seen."""
+        """The distribution of actions."""
         return Normal(self.actor(seen), self.log_std.exp())
 
     def value(self, seen: torch.Tensor) -> torch.Tensor:
-        """Discounted rewards to be expected."""
+        """The expected discounted return."""
         return self.critic(seen).squeeze(-1)
 
 
 def rollout(envs: gym.vector.VectorEnv, agent: Agent, seen: torch.Tensor) -> tuple[dict, torch.Tensor, list[float]]:
-    """STEPS steps of all arms: what was seen, done and earned, with advantages; and the costs of ended episodes."""
+    """STEPS steps of all arms: features, actions and rewards with advantages, and the costs of ended episodes."""
     kept: dict = {name: [] for name in ("seen", "action", "log_prob", "value", "reward", "ended")}
     costs = []
     for _ in range(STEPS):
@@ -76,7 +76,7 @@ def rollout(envs: gym.vector.VectorEnv, agent: Agent, seen: torch.Tensor) -> tup
 
 
 def advantages(batch: dict, value_after: torch.Tensor) -> torch.Tensor:
-    """Generalised advantage estimation; an episode that ends does so by truncation, after which nothing is known."""
+    """Generalised advantage estimation; the value after the end of an episode counts as 0."""
     out, last = torch.zeros_like(batch["reward"]), torch.zeros_like(value_after)
     for t in reversed(range(STEPS)):
         going_on = 1.0 - batch["ended"][t]

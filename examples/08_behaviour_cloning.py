@@ -15,13 +15,13 @@ SCENARIO, EXPERT = "panda-random", "dls:damping=1e-2"
 
 
 def features(observation):
-    """Sine and cosine of the joints, and by how much the reference is ahead, in thousandths of each coordinate."""
+    """Sine and cosine of the joints, and the distance to the reference ahead, in thousandths of each coordinate."""
     q, ahead = observation["q"], observation["nominal"][..., 0, :] - observation["pose"]
     return np.concatenate([np.sin(q), np.cos(q), 1e3 * ahead], axis=-1, dtype=np.float32)
 
 
 class Clone:
-    """The action is a gain times what is ahead, and the gain depends on the posture, as that of the expert does.
+    """The action is a gain times the distance ahead; the gain depends on the posture, as that of the expert does.
 
     It has the `predict` of Stable-Baselines3.
     """
@@ -34,18 +34,18 @@ class Clone:
         self.network = nn.Sequential(*layers, nn.Linear(256, joints * coordinates))
 
     def __call__(self, seen):
-        """Actions, before they are cut to their box."""
+        """Actions, not yet clipped to their box."""
         posture, ahead = seen.split([2 * self.shape[0], self.shape[1]], dim=-1)
         return (self.network(posture).unflatten(-1, self.shape) @ ahead[..., None])[..., 0]
 
     def predict(self, observation, state=None, episode_start=None, deterministic=True):
-        """The action for one arm; the memory is none."""
+        """The action for one arm; there is no memory."""
         with torch.no_grad():
             return self(torch.from_numpy(features(observation))).clamp(-1.0, 1.0).numpy(), None
 
 
 def recorded(episodes):
-    """What the expert saw in its episodes on training seeds, and what it did."""
+    """Features and actions of the expert in episodes of training seeds."""
     with tempfile.TemporaryDirectory() as folder:
         datasets.write(SCENARIO, EXPERT, Path(folder) / "expert-v0", episodes=episodes)
         data = list(minari.MinariDataset(Path(folder) / "expert-v0" / "data"))
