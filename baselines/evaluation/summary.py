@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 import statistics
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple, Self
@@ -12,12 +11,11 @@ import numpy as np
 
 from baselines.canonical import canonical
 from baselines.evaluation.metrics import Row
+from baselines.evaluation.statistics import geometric_interval as geometric_interval
+from baselines.evaluation.statistics import geometric_mean as geometric_mean
 from baselines.status import Status
 from ikgym.exceptions import InvalidInputError
 from ikgym.validation import FloatArray
-
-#: How many times is resampled for an interval.
-RESAMPLES = 9999
 
 
 @dataclasses.dataclass(frozen=True)
@@ -202,23 +200,8 @@ def paired(rows: Sequence[Row], ideal: Sequence[Row]) -> Paired | None:
     )
 
 
-def geometric_interval(values: Sequence[float]) -> tuple[float, float]:
-    """The interval of 95 % of a geometric mean: the percentile bootstrap over its values, always the same draws."""
-    logs = np.log(values)
-    drawn = np.random.default_rng(0).integers(len(logs), size=(RESAMPLES, len(logs)))
-    low, high = np.exp(np.percentile(logs[drawn].mean(axis=1), (2.5, 97.5)))
-    return float(low), float(high)
-
-
 def _total(row: Row) -> float:
     return row.total_cost
-
-
-def geometric_mean(values: Sequence[float]) -> float:
-    """Exp of the mean logarithm; 0 where a value is 0."""
-    if min(values) <= 0.0:
-        return 0.0
-    return values[0] if len(values) == 1 else math.exp(math.fsum(map(math.log, values)) / len(values))
 
 
 def _summary(rows: Sequence[Row], ideal: Sequence[Row] | None) -> Summary:
