@@ -2,7 +2,7 @@
 
 import sys
 
-from baselines.console import main
+from baselines.cli import main
 
 if __name__ == "__main__":
     sys.exit(main(["train", *sys.argv[1:]]))

@@ -17,7 +17,7 @@ from baselines.registry import get, make, names, register
 from baselines.status import Status
 
 if TYPE_CHECKING:
-    from baselines.evaluation.entrants import Wrap
+    from baselines.evaluation.foreign import Wrap
     from baselines.evaluation.tracking import Tracking
     from ikgym.scenarios import Preview, Scenario
 

@@ -19,9 +19,10 @@ from minari.dataset.minari_storage import MinariStorage
 from tqdm import tqdm
 
 from baselines.episodes import add_up
-from baselines.evaluation.entrants import AnyPolicy
+from baselines.evaluation.jobs import Job, plan
 from baselines.evaluation.machine import describe
-from baselines.evaluation.plan import Job, make_plan
+from baselines.evaluation.options import Options
+from baselines.evaluation.policies import AnyPolicy
 from baselines.files import ResultsError, locked, resumed, write_json
 from baselines.fingerprints import fingerprint
 from ikgym import scenarios
@@ -102,7 +103,7 @@ def write(
         for block in sorted(blocks.iterdir()):
             whole.update_from_storage(MinariStorage.read(block))
         # Minari loses the seeds when it copies episodes.
-        seeds = [{"seed": job.seed} for job in jobs]
+        seeds = [{"seed": job.seeds.seed} for job in jobs]
         whole.update_episode_metadata([a | b for a, b in zip(seeds, whole.apply(_costs), strict=True)])
         text = ",".join(f"{key}={value!r}" for key, value in first.parameters.items())
         whole.update_metadata(
@@ -121,12 +122,10 @@ def write(
         shutil.rmtree(blocks)
 
 
-def _jobs(
-    scenario: str | Scenario, policy: AnyPolicy, episodes: int, split: str, preview: Preview | None
-) -> tuple[Job, ...]:
+def _jobs(scenario: str | Scenario, policy: AnyPolicy, episodes: int, split: str, preview: Preview | None) -> list[Job]:
     if policy == "all" or scenario == "all":
         raise InvalidInputError("A data set is of one policy in one scenario, got all of them.")
-    jobs = make_plan([scenario], [policy], episodes=episodes, split=split, preview=preview).jobs
+    jobs, _ = plan([scenario], [policy], Options(episodes=episodes, split=split, preview=preview))
     if len(jobs) < episodes or any(job.before for job in jobs):
         raise InvalidInputError(
             f"{jobs[0].scenario.name}: expected a scenario with {episodes} different and independent episodes."
@@ -135,7 +134,7 @@ def _jobs(
 
 
 def _environment(job: Job) -> gym.Env[Any, Any]:
-    options: dict[str, Any] = {"preview": job.preview, "commands": job.make().commands}
+    options: dict[str, Any] = {"preview": job.preview, "commands": job.bind().commands}
     name = job.scenario.name
     if name in scenarios.names() and fingerprint(scenarios.get(name)) == job.fingerprint:
         return gym.make("ikgym:RedundantIK-v0", scenario=name, **options)  # Minari can make it again
@@ -155,8 +154,8 @@ def _record(jobs: Sequence[Job], folder: pathlib.Path) -> None:
 
 def _episode(env: gym.Env[Any, Any], job: Job) -> EpisodeBuffer:
     """Plays an episode. Minari's own collector would need jax."""
-    policy, state, ended = job.make(), None, False
-    observations, infos = [env.reset(seed=job.seed)[0]], list[dict[str, Any]]()
+    policy, state, ended = job.bind(), None, False
+    observations, infos = [env.reset(seed=job.seeds.seed)[0]], list[dict[str, Any]]()
     actions, rewards = list[Any](), list[float]()
     while not ended:
         action, state = policy.predict(observations[-1], state, np.array([not actions]))
@@ -166,7 +165,7 @@ def _episode(env: gym.Env[Any, Any], job: Job) -> EpisodeBuffer:
         rewards.append(float(reward))
         infos.append(info)
     return EpisodeBuffer(
-        seed=job.seed,
+        seed=job.seeds.seed,
         observations={key: np.array([one[key] for one in observations]) for key in observations[0]},
         actions=np.array(actions),
         rewards=np.array(rewards),

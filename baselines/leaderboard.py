@@ -10,9 +10,9 @@ from typing import Annotated, Literal
 import tyro
 
 from baselines import command as shared
-from baselines.evaluate import evaluate
 from baselines.evaluation import table
 from baselines.evaluation.results import Rows, slug
+from baselines.evaluation.run import evaluate
 from baselines.files import write
 from ikgym.exceptions import InvalidInputError
 

@@ -13,10 +13,10 @@ from tqdm import tqdm
 
 from baselines import command as shared
 from baselines.episodes import Seeds
-from baselines.evaluate import evaluate
 from baselines.evaluation import table
 from baselines.evaluation.metrics import Row
 from baselines.evaluation.results import Rows
+from baselines.evaluation.run import evaluate
 from baselines.files import write
 from baselines.oracle import Search
 from baselines.oracle.several import Wanted, find_all
@@ -138,7 +138,7 @@ def _work(options: Options, command: str) -> None:
         workers=options.workers,
         cluster=options.cluster,
         plots=False,
-        report_page=False,
+        report=False,
         progress=True,
     )
     places = {scenario.name: place for place, scenario in by_place.items()}

@@ -89,30 +89,6 @@ def parse_parameters(text: str, source: str) -> dict[str, Any]:
     return out
 
 
-def refuse_trust(spec: PolicySpec, source: str) -> None:
-    """Refuses a policy from a file that asks for trust: that is given by the caller or the command line alone.
-
-    Args:
-        spec: What the file says.
-        source: The file, for the message.
-
-    Raises:
-        UnknownNameError: There is no such policy or parameter.
-        InvalidInputError: The policy, or one that is inside of it, is made with `trust`.
-    """
-    if _trusts(parse_policy(spec)[1]):
-        raise InvalidInputError(
-            f"{source}: trust is given on the command line or by the caller, never by a file, got {spec!r}."
-        )
-
-
-def _trusts(value: object) -> bool:
-    """Whether there is a `trust` that is not False, however deep."""
-    if isinstance(value, Mapping):
-        return any((name == "trust" and item is not False) or _trusts(item) for name, item in value.items())
-    return isinstance(value, (list, tuple)) and any(map(_trusts, value))
-
-
 def _split(text: str) -> list[str]:
     """Parts between commas that stand in no bracket."""
     parts, depth = [""], 0

@@ -10,7 +10,7 @@ import numpy as np
 
 import baselines
 import ikgym
-from baselines.evaluation.runner import play_episodes
+from baselines.episodes import rollouts
 from baselines.solvers.arm_size import length
 from benchmarks.effort import FULL, Effort
 from benchmarks.table import Column, Table
@@ -95,7 +95,7 @@ def score(arm: str, policy: str, parameters: Mapping[str, Any], effort: Effort) 
     """What a policy makes of the episodes of an arm."""
     which = scenario(arm, 2 * effort.steps)
     made = baselines.make(policy, which, **parameters)
-    played = play_episodes(which, made, list(range(effort.episodes)), made.preview, timed=False)
+    played = rollouts(which, made, list(range(effort.episodes)))
     costs = [float((one.tracking_cost + one.velocity_cost).sum()) for one in played]
     return Score(
         float(np.exp(np.log(costs).mean())),

@@ -17,7 +17,7 @@ import numpy as np
 
 import baselines
 import ikgym
-from baselines.console.listing import kinds_of_limits, summary
+from baselines.cli.listing import kinds_of_limits, summary
 from baselines.evaluation import test_sets as sets
 from baselines.evaluation.report import NOTHING
 from baselines.evaluation.table import from_csv

@@ -10,7 +10,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from unittest import mock
 
-from baselines.console import main
+from baselines.cli import main
 
 #: Characters of a line.
 COLUMNS = 110

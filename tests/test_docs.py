@@ -14,8 +14,8 @@ import pytest
 
 import baselines
 import ikgym
-from baselines import console, registry
-from baselines.console import main
+from baselines import cli, registry
+from baselines.cli import main
 from baselines.evaluate import evaluate
 from baselines.oracle import best_known
 from baselines.oracle.best_known import beaten
@@ -190,7 +190,7 @@ def test_what_is_ones_own_is_evaluated_by_one_command_each(tmp_path, monkeypatch
 def test_commands_of_the_documentation_exist():
     text = "\n".join(page.read_text(encoding="utf-8") for page in PROSE if page.name != "CHANGELOG.md")
     for word in re.findall(r"^(?:\$ )?ikgym (\w+)|`ikgym (\w+)", text, re.MULTILINE):
-        assert max(word) in {*console.COMMANDS, *console.LISTS}
+        assert max(word) in {*cli.COMMANDS}
 
 
 #: What stands for ``ikgym WORD`` where Python runs a module or a file.
@@ -207,7 +207,7 @@ def lines_for_the_terminal(page: Path) -> list[str]:
     lines = blocks.replace("\\\n", " ").splitlines()
     for one, other in OTHERWISE.items():
         lines = [line.replace(one, other) for line in lines]
-    known = {*console.COMMANDS, *console.LISTS}
+    known = {*cli.COMMANDS}
     return [line for line in lines if re.match(r"ikgym (\w+)( |$)", line) and line.split()[1] in known]
 
 

@@ -36,20 +36,20 @@ class Motion:
     qdot: FloatArray
 
     @classmethod
-    def of(cls, scenario: Scenario, draw: int | Seeds, episode: Episode) -> Motion:
-        """The motion of an episode that was played.
+    def of(cls, scenario: Scenario, seeds: Seeds, episode: Episode) -> Motion:
+        """The motion of an episode.
 
         Args:
-            scenario: What was tracked.
-            draw: The reset seed, or what was drawn how.
-            episode: What happened.
+            scenario: The scenario.
+            seeds: Seeds of the episode.
+            episode: Its record.
         """
-        arm, draw = scenario.arm, Seeds.of(draw)
+        arm = scenario.arm
         return cls(
             tuple(arm.joint_names),
             tuple("m" if prismatic else "rad" for prismatic in arm.prismatic),
             scenario.times(scenario.steps + 1),
-            np.vstack([scenario.start_of(draw.seed, draw.arm_seed), episode.q]),
+            np.vstack([scenario.start_of(seeds.seed, seeds.arm_seed), episode.q]),
             np.vstack([np.zeros(arm.joints), episode.qdot]),
         )
 

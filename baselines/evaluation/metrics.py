@@ -1,4 +1,4 @@
-"""The numbers that an episode is judged by."""
+"""Rows: the scores of one episode."""
 
 from __future__ import annotations
 
@@ -6,25 +6,22 @@ import collections
 import dataclasses
 import math
 from collections.abc import Mapping
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
 from baselines.canonical import canonical
 from baselines.episodes import Episode, Seeds, add_up
-from baselines.files.json_files import JsonError, made, shown
 from baselines.status import Status
 from ikgym.arms import Arm
-from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray
 
-#: What says which episode of an evaluation is meant: scenario, policy, its parameters, what is drawn how, steps.
+#: Identifies an episode of an evaluation: scenario, policy, its parameters as text, seeds, steps.
 Key = tuple[str, str, str, Seeds, int]
-#: The columns that are measured with a clock, and so differ from run to run.
+#: The columns that are measured with a clock, and so differ between runs.
 TIME_COLUMNS = ("time_first_us", "time_p50_us", "time_p99_us", "deadline_misses")
-#: An arm that was at some time farther from its nominal position than this, in [m], has lost track; and so has one that
-#: was turned away from its nominal orientation by more than this, in [rad].
+#: An arm is lost if its position error exceeds this, in [m], at any time, or its orientation error this, in [rad].
 LOST_POSITION, LOST_ORIENTATION = 0.05, 0.3
 
 
@@ -63,17 +60,17 @@ class Row:
             played together with others.
         time_p99_us: Its 99th percentile, in [µs].
         deadline_misses: Calls, but for the first, that took longer than the scenario's Δt.
-        status: The worst status of the episode; unknown of policies that say nothing of themselves.
-        machine: What it ran on, see :func:`baselines.evaluation.machine.describe`.
+        status: The worst status of the episode; unknown for policies that report none.
+        machine: Processor and versions, see :func:`baselines.evaluation.machine.describe`.
         iterations: Mean iterations of the policy in one step; None where they are not known.
-        status_counts: How many steps ended with which status.
-        preview: Steps ahead that the policy was shown; the furthest where it was shown some of them.
-        fingerprint: Tells scenarios apart that share a name, see :func:`baselines.fingerprints.fingerprint`.
+        status_counts: Number of steps that ended with each status.
+        preview: Furthest step ahead that the policy was shown.
+        fingerprint: Digest of the scenario, see :func:`baselines.fingerprints.fingerprint`.
         time_first_us: Wall time of the first call of the policy, in [µs].
-        test_set: The digest of the test set that the episode belongs to, see :mod:`baselines.evaluation.test_sets`.
-        arm_seed: Which arm moved; None where the reset seed said so.
-        noise_seed: Which noise there was in sensors and drives; 0 is that of the reset seed.
-        ideal: The fingerprint of the scenario with an ideal plant; its own where the plant is ideal.
+        test_set: Digest of the test set of the episode, see :mod:`baselines.evaluation.test_sets`; None without one.
+        arm_seed: Seed of the arm; None if the reset seed sets it.
+        noise_seed: Seed of the noise in sensors and drives; 0 is the noise of the reset seed.
+        ideal: Fingerprint of the scenario with an ideal plant; its own if the plant is ideal.
     """
 
     scenario: str
@@ -114,14 +111,14 @@ class Row:
 
     @property
     def lost(self) -> bool:
-        """Whether the arm has lost track, see :func:`lost`."""
+        """Whether the arm was lost, see :func:`lost`."""
         return lost(self.position_error_max, self.orientation_error_max)
 
     @property
     def key(self) -> Key:
-        """What says which episode of an evaluation this is."""
-        draw = Seeds(self.seed, self.arm_seed, self.noise_seed)
-        return key(self.scenario, self.policy, self.parameters, draw, self.steps)
+        """Identifies the episode within an evaluation."""
+        seeds = Seeds(self.seed, self.arm_seed, self.noise_seed)
+        return key(self.scenario, self.policy, self.parameters, seeds, self.steps)
 
     def to_json(self) -> dict[str, Any]:
         """The row as JSON has it: numbers that are not finite are null."""
@@ -129,28 +126,16 @@ class Row:
         return {name: _finite_or_none(value) for name, value in values.items()}
 
     @classmethod
-    def from_json(cls, values: object) -> Self:
-        """The row that :meth:`to_json` gave.
-
-        Raises:
-            InvalidInputError: A key is missing, is one too many, or has a value of a wrong type.
-        """
+    def nan_restored(cls, values: Any) -> Any:
+        """The values of :meth:`to_json` with NaN where a number was not finite; anything but an object as it is."""
+        if not isinstance(values, Mapping):
+            return values
         numbers = {field.name for field in dataclasses.fields(cls) if field.type == "float"}
-        given = values
-        if isinstance(values, dict):
-            given = {name: math.nan if value is None and name in numbers else value for name, value in values.items()}
-        try:
-            row = made(cls, given)
-        except JsonError as e:
-            raise InvalidInputError(str(e)) from None
-        for status in (row.status, *row.status_counts):
-            if status.upper() not in Status.__members__:
-                raise InvalidInputError(f"the key 'status' should be one of a solve, got {shown(status)}")
-        return row
+        return {name: math.nan if value is None and name in numbers else value for name, value in values.items()}
 
 
 def lost(position_error: float, orientation_error: float | None) -> bool:
-    """Whether an arm has lost track; an error that is no number says that it has.
+    """Whether an arm was lost; an error that is NaN counts as lost.
 
     Args:
         position_error: The largest of the episode, in [m].
@@ -160,16 +145,16 @@ def lost(position_error: float, orientation_error: float | None) -> bool:
     return turned or not position_error <= LOST_POSITION
 
 
-def key(scenario: str, policy: str, parameters: Mapping[str, Any], draw: Seeds, steps: int) -> Key:
-    """What says which episode of an evaluation is meant; two are the same where their keys are."""
-    return scenario, policy, canonical(parameters), draw, steps
+def key(scenario: str, policy: str, parameters: Mapping[str, Any], seeds: Seeds, steps: int) -> Key:
+    """Identifies an episode of an evaluation."""
+    return scenario, policy, canonical(parameters), seeds, steps
 
 
 def measure(
     scenario: Scenario,
     policy: str,
     parameters: Mapping[str, Any],
-    seed: int | Seeds,
+    seeds: Seeds,
     episode: Episode,
     *,
     machine: Mapping[str, Any],
@@ -180,7 +165,6 @@ def measure(
     ideal: str | None = None,
 ) -> Row:
     """The row of a recorded episode; see :class:`Row`; the cost ratio is stated against `best_known`."""
-    draw = Seeds.of(seed)
     total = float(add_up(episode.tracking_cost + episode.velocity_cost))
     timed, later = len(episode.time_ns) > 0, episode.time_ns[1:] if len(episode.time_ns) > 1 else episode.time_ns
     counted = scenario.counted()[1:]
@@ -192,7 +176,7 @@ def measure(
         scenario=scenario.name,
         policy=policy,
         parameters=dict(parameters),
-        seed=draw.seed,
+        seed=seeds.seed,
         steps=scenario.steps,
         total_cost=total,
         tracking_cost=float(add_up(episode.tracking_cost)),
@@ -221,8 +205,8 @@ def measure(
         fingerprint=fingerprint,
         time_first_us=float(episode.time_ns[0]) / 1e3 if timed else None,
         test_set=test_set,
-        arm_seed=draw.arm_seed,
-        noise_seed=draw.noise_seed,
+        arm_seed=seeds.arm_seed,
+        noise_seed=seeds.noise_seed,
         ideal=ideal,
     )
 

@@ -13,8 +13,8 @@ from typing import Any
 from urllib.parse import quote
 
 from baselines import registry
+from baselines.evaluation.jobs import Skipped
 from baselines.evaluation.metrics import LOST_ORIENTATION, LOST_POSITION, Row
-from baselines.evaluation.plan import Skipped
 from baselines.evaluation.summary import Paired, Spread, Summary, summarise
 from baselines.evaluation.text_table import Column, fitting, plain
 from baselines.oracle import best_known

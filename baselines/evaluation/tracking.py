@@ -13,15 +13,15 @@ from matplotlib.figure import Figure
 from threadpoolctl import threadpool_limits
 
 from baselines.episodes import Episode, Seeds, add_up
-from baselines.evaluation.entrants import AnyPolicy, Wrap, entrant
 from baselines.evaluation.export import Motion, message, table
+from baselines.evaluation.foreign import Wrap
+from baselines.evaluation.play import play_episodes
 from baselines.evaluation.plots import tracking as picture
-from baselines.evaluation.runner import play_episodes
+from baselines.evaluation.policies import AnyPolicy, bind
 from baselines.evaluation.trajectory_log import trajectory_log
 from baselines.files import write
 from baselines.status import Status
 from ikgym import scenarios
-from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Preview, Scenario
 from ikgym.validation import FloatArray, read_only, whole_number
 
@@ -145,20 +145,17 @@ def track(
     if steps is not None:
         found = found.replace(steps=min(whole_number("steps", steps, at_least=1), found.steps))
     whole_number("seed", seed, at_least=0)
-    one = entrant(policy, wrap=wrap)
-    if reason := one.unsuited(found, Seeds(seed), preview):
-        raise InvalidInputError(f"{one.name} does not suit {found.name}: {reason}")
-    player = one.make(found, one.for_episode(found, Seeds(seed)), preview)
-    shown = one.shown(player, preview)
+    seeds = Seeds(seed)
+    bound, shown, one = bind(policy, found, seeds, preview, wrap)
     with threadpool_limits(limits=1):
-        (episode,) = play_episodes(found, player, [Seeds(seed)], shown, timed=True)
-    return _tracking(found, one.name, one.parameters(found, player), seed, episode)
+        (episode,) = play_episodes(found, bound, [seeds], shown, timed=True)
+    return _tracking(found, one.name, one.parameters(found, bound), seeds, episode)
 
 
-def _tracking(scenario: Scenario, policy: str, parameters: dict[str, Any], seed: int, episode: Episode) -> Tracking:
+def _tracking(scenario: Scenario, policy: str, parameters: dict[str, Any], seeds: Seeds, episode: Episode) -> Tracking:
     arrays = {
         "times": scenario.dt * np.arange(1, scenario.steps + 1),
-        "nominal": scenario.nominal(seed)[1:],
+        "nominal": scenario.nominal(seeds.seed)[1:],
         "statuses": episode.status,
         "prismatic": np.array(scenario.arm.prismatic, dtype=np.bool_),
         **{
@@ -169,5 +166,5 @@ def _tracking(scenario: Scenario, policy: str, parameters: dict[str, Any], seed:
         },
     }  # fmt: skip
     kept: dict[str, Any] = {name: read_only(np.array(values)) for name, values in arrays.items()}
-    log, motion = trajectory_log(scenario, seed, episode), Motion.of(scenario, seed, episode)
-    return Tracking(scenario.name, policy, parameters, seed, **kept, motion=motion, _log=log)
+    log, motion = trajectory_log(scenario, seeds, episode), Motion.of(scenario, seeds, episode)
+    return Tracking(scenario.name, policy, parameters, seeds.seed, **kept, motion=motion, _log=log)

@@ -17,13 +17,13 @@ FRAMES = 400
 TrajectoryLog = dict[str, npt.NDArray[Any]]
 
 
-def trajectory_log(scenario: Scenario, seed: int | Seeds, episode: Episode) -> TrajectoryLog:
+def trajectory_log(scenario: Scenario, seeds: Seeds, episode: Episode) -> TrajectoryLog:
     """What plots show of an episode, at the steps that count.
 
     Args:
-        scenario: What was tracked.
-        seed: The reset seed, or what is drawn how.
-        episode: What happened.
+        scenario: The scenario.
+        seeds: Seeds of the episode.
+        episode: Its record.
 
     Returns:
         ``time`` in [s], of shape (k,), and over it ``nominal`` and ``pose`` (k, m), ``q`` and ``qdot`` (k, n),
@@ -35,12 +35,11 @@ def trajectory_log(scenario: Scenario, seed: int | Seeds, episode: Episode) -> T
         (f, n, 2, 3), where the joints of the arm that moves begin and end, ``tool`` (f, 3), both in [m], and
         ``tool_rotation`` (f, 3, 3).
     """
-    draw = Seeds.of(seed)
     after = np.flatnonzero(scenario.counted())
     kept = after - 1
     log: TrajectoryLog = {
         "time": after * scenario.dt,
-        "nominal": scenario.nominal(draw.seed)[after],
+        "nominal": scenario.nominal(seeds.seed)[after],
         "pose": episode.pose[kept],
         "q": episode.q[kept],
         "qdot": episode.qdot[kept],
@@ -56,11 +55,11 @@ def trajectory_log(scenario: Scenario, seed: int | Seeds, episode: Episode) -> T
         start = np.zeros((1, scenario.joints))
         log["qddot"] = (np.diff(episode.qdot, axis=0, prepend=start) / scenario.dt)[kept]
         log["acceleration_limit"] = scenario.arm.acceleration_limit
-    path = scenario.nominal_joint_path(draw.seed)
+    path = scenario.nominal_joint_path(seeds.seed)
     if path is not None:
         log["nominal_q"] = path[after]
     frames = frame_rows(len(kept), FRAMES)
-    return log | {"frame": frames, **_arm_in_space(scenario, draw, log["q"][frames], after[frames])}
+    return log | {"frame": frames, **_arm_in_space(scenario, seeds, log["q"][frames], after[frames])}
 
 
 def frame_rows(rows: int, most: int) -> npt.NDArray[np.int64]:
@@ -70,9 +69,9 @@ def frame_rows(rows: int, most: int) -> npt.NDArray[np.int64]:
     return frames
 
 
-def _arm_in_space(scenario: Scenario, draw: Seeds, q: FloatArray, made: npt.NDArray[np.int64]) -> TrajectoryLog:
+def _arm_in_space(scenario: Scenario, seeds: Seeds, q: FloatArray, made: npt.NDArray[np.int64]) -> TrajectoryLog:
     """Where the arm is after so many steps: the one that moves, and not the one in the data sheet."""
-    plant = scenario.drawn_plant(draw.seed, draw.arm_seed)
+    plant = scenario.drawn_plant(seeds.seed, seeds.arm_seed)
     arms = [plant.loaded_arm if steps >= plant.payload_step else plant.arm for steps in made]
     places = [arm.forward(row) for arm, row in zip(arms, q, strict=True)]
     points = np.array([arm.joint_points(row) for arm, row in zip(arms, q, strict=True)])

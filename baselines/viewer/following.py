@@ -8,7 +8,7 @@ import numpy as np
 
 from baselines.controller import Controller
 from baselines.episodes import Seeds
-from baselines.evaluation.entrants import entrant
+from baselines.evaluation.policies import specification
 from baselines.policy import SolverPolicy
 from baselines.status import Status
 from baselines.viewer.approach import Approach
@@ -78,8 +78,8 @@ def followers(stage: Stage, policies: Sequence[str]) -> list[Follower | None]:
 
 
 def _follower(stage: Stage, policy: str) -> Follower | None:
-    one = entrant(policy)
-    player = one.make(stage.scenario, one.for_episode(stage.scenario, Seeds(stage.seed)), None)
+    one = specification(policy)
+    player = one.bind(stage.scenario, one.given(stage.scenario, Seeds(stage.seed)), None)
     if not isinstance(player, SolverPolicy) or player.reference:
         return None
     return Follower(stage.scenario, player, stage.start)

@@ -7,7 +7,7 @@ import inspect
 from types import ModuleType
 from typing import Any
 
-from baselines import console
+from baselines import cli
 from baselines.training.methods import METHODS
 from docs.terminal import manual_of
 
@@ -76,6 +76,6 @@ def commands() -> str:
     """The page of the commands: what ``--help`` prints of each."""
     parts = ["# Commands\n", "What `--help` prints.\n", f"```text\n{manual_of()}\n```\n"]
     methods = [("train", method) for method in METHODS]
-    for words in [*((word,) for word in (*console.COMMANDS, *console.LISTS)), *methods]:
+    for words in [*((word,) for word in cli.COMMANDS), *methods]:
         parts += [f"## ikgym {' '.join(words)}\n", f"```text\n{manual_of(*words)}\n```\n"]
     return "\n".join(parts)

@@ -13,8 +13,8 @@ import pytest
 
 import baselines
 import ikgym
-from baselines import console
-from baselines.console import main
+from baselines import cli
+from baselines.cli import main
 from baselines.solvers.rivals.model_files import urdf
 
 ROOT = Path(__file__).parents[2]
@@ -28,7 +28,7 @@ def called_by_its_name(monkeypatch):
 
 def test_it_is_installed():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    assert project["scripts"] == {"ikgym": "baselines.console:main"}
+    assert project["scripts"] == {"ikgym": "baselines.cli:main"}
 
 
 @pytest.mark.parametrize("arguments", [[], ["--help"], ["-h"]])
@@ -46,7 +46,7 @@ def test_version(capsys):
     assert capsys.readouterr().out.strip() == ikgym.__version__
 
 
-@pytest.mark.parametrize("word", [*console.COMMANDS, *console.LISTS])
+@pytest.mark.parametrize("word", [*cli.COMMANDS])
 def test_help_of_each_command(word, capsys):
     with pytest.raises(SystemExit) as ended:
         main([word, "--help"])
@@ -196,7 +196,7 @@ def test_the_table_stands_before_the_plots_and_the_readme_has_the_command(tmp_pa
 
 
 def test_no_list_loads_a_learning_library():
-    code = "import sys; from baselines.console import main; main(['policies']); sys.exit('torch' in sys.modules)"
+    code = "import sys; from baselines.cli import main; main(['policies']); sys.exit('torch' in sys.modules)"
     subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
 
 

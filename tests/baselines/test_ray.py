@@ -17,7 +17,7 @@ import ray
 from ray.cluster_utils import Cluster
 
 from baselines.evaluate import evaluate
-from baselines.evaluation import runner
+from baselines.evaluation import play as playing
 from baselines.workers import ClusterError, Workers, finished
 from tests.baselines.test_workers import needs_proc, wait_for
 
@@ -34,6 +34,8 @@ EPISODES = 12
 FOLDER, NODE, AT_WORK = "IKGYM_TEST_FOLDER", "IKGYM_TEST_NODE", "at-work"
 #: In [s]: far more than it takes.
 PATIENCE = 100
+#: Before a test replaces it.
+PLAIN_WORK = playing.work
 
 
 @pytest.fixture
@@ -79,17 +81,17 @@ def at_work_in(folder):
     return found - {os.getpid()}
 
 
-def do(unit):
+def work(unit):
     """Plays a unit. The node that is to be killed stays at its second one; the other waits for that with its sixth."""
     folder, node = pathlib.Path(os.environ[FOLDER]), os.environ[NODE]
-    (folder / f"{node}-{unit.jobs[0].seed}").touch()
+    (folder / f"{node}-{unit[0].seeds.seed}").touch()
     number = len(list(folder.glob(f"{node}-*")))
     if node == "other" and number == 2:
         (folder / AT_WORK).touch()
         time.sleep(2 * PATIENCE)
     if node == "head" and number == EPISODES // 2:
         wait_for((folder / AT_WORK).exists, PATIENCE)
-    return runner.do(unit)
+    return PLAIN_WORK(unit)
 
 
 class Unknown:
@@ -103,27 +105,27 @@ class Unknown:
 @needs_proc
 def test_one_of_two_nodes_is_killed_half_way(cluster, monkeypatch, tmp_path, caplog):
     nodes, other, folder = cluster
-    check, done = runner.Checks.check, []
+    check, done = playing._ClusterCheck.check, []
 
-    def kill_half_way(self, unit, outcome):
-        done.append(unit.digest)
+    def kill_half_way(self, batch, *results):
+        done.append(batch[0].key)
         if len(done) == EPISODES // 2:
             assert wait_for((folder / AT_WORK).exists, PATIENCE)
             nodes.remove_node(other, allow_graceful=False)
-        check(self, unit, outcome)
+        check(self, batch, *results)
 
     given = {"scenarios": "varga7-random", "policies": "dls", "episodes": EPISODES + 1, "steps": 50, "plots": False}
     alone = evaluate(**given)
-    for name, instead in {"BLOCK": 1, "do": do}.items():
-        monkeypatch.setattr(runner, name, instead)
-    monkeypatch.setattr(runner.Checks, "check", kill_half_way)
+    for name, instead in {"BLOCK": 1, "work": work}.items():
+        monkeypatch.setattr(playing, name, instead)
+    monkeypatch.setattr(playing._ClusterCheck, "check", kill_half_way)
     rows = evaluate(**given, cluster="ray", out=tmp_path)
     assert len(done) == len(set(done)) == EPISODES
     assert caplog.text.count("its job is retried") == 1
     assert [untimed(row) for row in rows] == [untimed(row) for row in alone]
     assert [row.time_p50_us is None for row in rows] == [False] + [True] * EPISODES
     # To start nodes takes long: so here is also seen what they say of units that they cannot read.
-    ((_, future),) = finished(runner.do, [Unknown()], Workers(cluster="ray"))
+    ((_, future),) = finished(playing.work, [Unknown()], Workers(cluster="ray"))
     with pytest.raises(ClusterError, match=r"cannot do its work: .*no_such_module.* Install ikgym and the packages"):
         future.result()
 

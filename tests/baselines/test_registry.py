@@ -16,10 +16,10 @@ import pytest
 import baselines
 from baselines import registry
 from baselines.evaluate import evaluate
-from baselines.evaluation.plan import make_plan
 from baselines.policy import Solution, SolverPolicy, statuses
 from baselines.solvers.resolved_rate.dls import DampedLeastSquares
 from ikgym.exceptions import InvalidInputError, UnknownNameError
+from tests.baselines.evaluation.planning import planned
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -121,7 +121,7 @@ def test_a_registered_class_is_a_policy_like_others():
     assert isinstance(baselines.make("still", "zhang3-helix"), Still)
     rows = evaluate("zhang3-helix", ["still"], steps=3)
     assert [(row.policy, row.status) for row in rows] == [("still", "applied")]
-    assert "still" in {job.policy for job in make_plan("zhang3-helix", "all", steps=2).jobs}
+    assert "still" in {job.policy for job in planned("zhang3-helix", "all", steps=2).jobs}
 
 
 def test_a_registered_place_is_imported_when_it_is_asked_for(tmp_path, monkeypatch):
@@ -238,7 +238,7 @@ def test_a_bad_entry_point_takes_nobody_else_away(entry_points):
         baselines.get("broken")
     with pytest.raises(InvalidInputError, match=r"expected 'package\.module:Class', got '::'"):
         evaluate("zhang3-helix", "nonsense", steps=2)
-    plan = make_plan("zhang3-helix", "all", steps=2)
+    plan = planned("zhang3-helix", "all", steps=2)
     assert {"dls", "theirs"} <= {job.policy for job in plan.jobs}
     reasons = {one.policy: one.reason for one in plan.skipped}
     assert "No module named 'not_installed'" in reasons["broken"]

@@ -3,6 +3,6 @@
 Python puts the data together and writes the tables; Plotly draws; the scripts beside this file connect the two.
 """
 
-from baselines.evaluation.html.page import PAGE, page
+from baselines.evaluation.html.page import page
 
-__all__ = ["PAGE", "page"]
+__all__ = ["page"]

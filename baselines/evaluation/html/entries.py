@@ -1,4 +1,4 @@
-"""What the page shows of each policy in each scenario."""
+"""The lines of the page: policies in scenarios."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from baselines.evaluation.summary import Summary, by_seed, geometric_interval
 
 @dataclasses.dataclass(frozen=True)
 class Entry:
-    """A policy in a scenario: a line of the table, a point in the picture of costs and times, a replay.
+    """A policy in a scenario: a line of the table, a point of cost and time, a replay.
 
     Args:
         scenario: The name of the scenario.
-        policy: What to call the policy.
+        policy: The label of the policy.
         reference: Whether it has privileged information.
-        summary: Its results, put together.
-        rows: Its results; the trajectory log is that of the first.
+        summary: The summary of its rows.
+        rows: Its rows; the first one has a trajectory log.
     """
 
     scenario: str
@@ -36,7 +36,7 @@ class Entry:
 
     @property
     def quantity(self) -> str:
-        """What it is judged by."""
+        """The score: cost ratio where it is known."""
         return "total cost" if self.summary.cost_ratio is None else "cost ratio"
 
     def _interval(self) -> tuple[float, float] | None:

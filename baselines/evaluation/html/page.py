@@ -1,27 +1,26 @@
-"""The page: a template, the tables, the data, Plotly and the scripts, in one file."""
+"""The page: template, table, data, DataTables, Plotly and the script that connects them, in one file."""
 
 from __future__ import annotations
 
 import datetime
 import importlib.resources
+import json
+import math
 import re
 from collections.abc import Iterable, Sequence
 from html import escape
+from typing import Any
 
 from baselines.canonical import canonical
-from baselines.evaluation.html.data import data, embedded
 from baselines.evaluation.html.entries import Entry, entries
+from baselines.evaluation.html.series import BUDGET, thinned
 from baselines.evaluation.html.table import table
+from baselines.evaluation.jobs import Skipped
 from baselines.evaluation.metrics import Row
-from baselines.evaluation.plan import Skipped
 from baselines.evaluation.report import NOTHING, machine_in_words, remarks
 from baselines.evaluation.results import Results
 
-#: The file in a folder of results.
-PAGE = "report.html"
-#: In the order in which they are run: later ones use earlier ones.
-SCRIPTS = ("data.js", "table.js", "plots.js", "joints.js", "scene.js", "replay.js", "main.js")
-#: Where a part of the page goes in the template.
+#: A placeholder in the template.
 PLACE = re.compile(r"\[\[(\w+)\]\]")
 
 
@@ -30,9 +29,9 @@ def page(results: Results, skipped: Sequence[Skipped] = (), *, command: str, dat
 
     Args:
         results: The folder.
-        skipped: What was left out.
-        command: What made them.
-        date: When.
+        skipped: Policies that were skipped.
+        command: The command of the evaluation.
+        date: When it finished.
 
     Raises:
         ResultsError: A trajectory log is damaged.
@@ -51,10 +50,49 @@ def page(results: Results, skipped: Sequence[Skipped] = (), *, command: str, dat
         "conditions": _items([f"command: {command}", *_machines(rows)]),
         "parameters": _items(f"{one.policy} in {one.scenario}: {_parameters(one)}" for one in shown),
         "data": embedded(data(results, shown)),
+        "datatables": _file("datatables.min.js"),
         "plotly": get_plotlyjs(),
-        "scripts": "\n".join(map(_file, SCRIPTS)),
+        "script": _file("page.js"),
     }
     return PLACE.sub(lambda found: parts[found[1]], _file("template.html")).encode()
+
+
+def data(results: Results, all_entries: Sequence[Entry]) -> list[dict[str, Any]]:
+    """The data of the plots: costs, times and the thinned trajectory log of each entry.
+
+    Args:
+        results: The folder.
+        all_entries: The lines of the table.
+
+    Raises:
+        ResultsError: A trajectory log is damaged.
+    """
+    logged = [entry for entry in all_entries if results.series_file(entry.rows[0]).exists()]
+    return [
+        {
+            "scenario": entry.scenario,
+            "policy": entry.policy,
+            "reference": entry.reference,
+            "quantity": entry.quantity,
+            "value": _finite((entry.summary.cost_ratio or entry.summary.total_cost).mean),
+            "low": _finite(entry.interval[0]) if entry.interval else None,
+            "high": _finite(entry.interval[1]) if entry.interval else None,
+            "time": entry.summary.time_p50_us,
+            "seed": entry.rows[0].seed,
+            "series": thinned(results.series(entry.rows[0]), BUDGET // len(logged)) if entry in logged else None,
+        }
+        for entry in all_entries
+    ]
+
+
+def embedded(content: Any) -> str:
+    """JSON within a page: no text in it ends the element that it is in."""
+    text = json.dumps(content, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+    return text.replace("<", "\\u003c")
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
 
 
 def _file(name: str) -> str:
@@ -66,7 +104,7 @@ def _items(texts: Iterable[str]) -> str:
 
 
 def _count(rows: Sequence[Row], shown: Sequence[Entry]) -> str:
-    """How much there is, in words."""
+    """Numbers of scenarios, policies and episodes, in words."""
     numbers = {
         "scenario": len({one.scenario for one in shown}),
         "policy": len({one.policy for one in shown}),

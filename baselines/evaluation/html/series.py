@@ -1,10 +1,9 @@
-"""Trajectory logs as the page shows them: thinned, and as text."""
+"""Trajectory logs for the page: thinned, and as text."""
 
 from __future__ import annotations
 
 import base64
 import math
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -15,9 +14,9 @@ from ikgym.validation import FloatArray
 
 #: Bytes that the series of a page may take together, as far as each of them has :data:`FEWEST` rows.
 BUDGET, FEWEST = 5_000_000, 50
-#: How near to a limit a joint is at it: in [rad] or [m] for a stop, as a share for other limits.
+#: Tolerance of limits: in [rad] or [m] for a stop, relative for other limits.
 AT_LIMIT = 1e-6
-#: What a joint may be at, from the least to the most severe; the page has a colour for each number.
+#: Limits of a joint, from the least to the most severe; the page has a colour for each number.
 FREE, ACCELERATION, VELOCITY, STOP = range(4)
 
 
@@ -70,11 +69,6 @@ def encoded(values: npt.NDArray[Any]) -> dict[str, Any]:
     kept = values.astype(np.uint8 if values.dtype == np.uint8 else "<f4")
     kind = "u1" if kept.dtype == np.uint8 else "f4"
     return {"type": kind, "shape": list(kept.shape), "data": base64.b64encode(kept.tobytes()).decode("ascii")}
-
-
-def decoded(array: Mapping[str, Any]) -> npt.NDArray[Any]:
-    """What :func:`encoded` was given, in single precision."""
-    return np.frombuffer(base64.b64decode(array["data"]), dtype="<" + array["type"]).reshape(array["shape"])
 
 
 def _row_size(joints: int) -> int:

@@ -1,4 +1,4 @@
-"""The table of the page, complete without any script; scripts sort and filter its lines."""
+"""The table of the page, complete without scripts; DataTables sorts and filters it."""
 
 from __future__ import annotations
 
@@ -10,6 +10,9 @@ from html import escape
 from baselines.evaluation.html.entries import Entry
 from baselines.evaluation.report import NOTHING, number
 
+#: The value for sorting where there is none.
+LAST = 1e300
+
 
 @dataclasses.dataclass(frozen=True)
 class Column:
@@ -17,10 +20,10 @@ class Column:
 
     Args:
         title: Its head.
-        about: What it is in words, shown when the pointer is on the head.
-        value: What it is sorted by: a number, a text, or None for none.
-        scale: What numbers are multiplied by.
-        text: What is shown, if it is not the value.
+        about: A description, shown when the pointer is on the head.
+        value: The value for sorting: a number, a text, or None.
+        scale: Factor of numbers.
+        text: The text of a cell, if it is not the value.
     """
 
     title: str
@@ -33,11 +36,11 @@ class Column:
         """The cell as HTML."""
         value = self.value(entry)
         if isinstance(value, str):
-            return f'<td data-value="{escape(value)}">{escape(value)}</td>'
+            return f"<td>{escape(value)}</td>"
         known = value is not None and math.isfinite(value)
         shown = f"{value}" if isinstance(value, int) else number(value, self.scale)
         shown = self.text(entry) if self.text else shown
-        return f'<td class="number" data-value="{value if known else ""}">{escape(shown)}</td>'
+        return f'<td class="number" data-order="{value if known else LAST}">{escape(shown)}</td>'
 
 
 def _mean(entry: Entry) -> float | None:
@@ -78,23 +81,19 @@ COLUMNS = (
 
 
 def table(all_entries: Sequence[Entry]) -> str:
-    """The table as HTML; the number of a line is that of its entry in the data."""
-    heads = [("policy", "* has privileged information", "name"), ("scenario", "what was tracked", "scenario")]
-    heads += [(column.title, column.about, "number" * (column.title != "status")) for column in COLUMNS]
-    out = ['<table id="results"><thead><tr><th class="pick" scope="col"><span class="hidden">in pictures</span></th>']
-    out += [
-        f'<th scope="col" class="{kind}" aria-sort="none"><button type="button" title="{escape(about)}">'
-        f"{escape(title)}</button></th>"
-        for title, about, kind in heads
-    ]
+    """The table as HTML; the value of a line's checkbox is the number of its entry in the data."""
+    heads = [("policy", "* has privileged information"), ("scenario", "name of the scenario")]
+    heads += [(column.title, column.about) for column in COLUMNS]
+    out = ['<table id="results"><thead><tr><th class="pick" scope="col" aria-label="in the plots"></th>']
+    out += [f'<th scope="col" title="{escape(about)}">{escape(title)}</th>' for title, about in heads]
     out.append("</tr></thead><tbody>")
-    for place, entry in enumerate(all_entries):
+    for number_of, entry in enumerate(all_entries):
         name = escape(entry.policy + " *" * entry.reference)
         out += [
-            f'<tr data-entry="{place}" data-scenario="{escape(entry.scenario)}"><td class="pick">'
-            f'<input type="checkbox" aria-label="{name} in {escape(entry.scenario)}: show in the pictures"></td>',
-            f'<th scope="row" class="name" data-value="{escape(entry.policy)}">{name}</th>',
-            f'<td class="scenario" data-value="{escape(entry.scenario)}">{escape(entry.scenario)}</td>',
+            f'<tr><td class="pick"><input type="checkbox" value="{number_of}" aria-label="{name} in '
+            f'{escape(entry.scenario)}: show in the plots"></td>',
+            f'<th scope="row" class="name">{name}</th>',
+            f"<td>{escape(entry.scenario)}</td>",
             *(column.cell(entry) for column in COLUMNS),
             "</tr>",
         ]

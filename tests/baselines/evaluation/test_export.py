@@ -11,8 +11,9 @@ import pytest
 
 import baselines
 import ikgym
-from baselines import evaluate as command
+from baselines.cli.evaluate import main
 from baselines.evaluate import evaluate
+from baselines.evaluation import run as command
 from baselines.evaluation.export import FORMATS
 from baselines.files import ResultsError
 from ikgym.exceptions import InvalidInputError, UnknownNameError
@@ -140,7 +141,7 @@ def test_resuming_plays_what_is_not_exported_yet_and_overwriting_removes_it(tmp_
     given = {"steps": 3, "out": tmp_path, "plots": False}
     evaluate("varga7-fast", "dls", **given, export="csv")
     played = []
-    monkeypatch.setattr(command, "run", lambda jobs, **_: played.append(len(jobs)) or iter(()))
+    monkeypatch.setattr(command, "run", lambda jobs, *_, **__: played.append(len(jobs)) or iter(()))
     monkeypatch.setattr(command.contextlib, "closing", lambda batches: command.contextlib.nullcontext(batches))
     evaluate("varga7-fast", "dls", **given, export="csv", resume=True)
     evaluate("varga7-fast", "dls", **given, export=["csv", "joint-trajectory"], resume=True)
@@ -158,9 +159,9 @@ def test_faults():
 
 
 def test_faults_on_the_command_line(capsys, tmp_path):
-    assert command.main(["--policies", "dls", "--export", "ros", "--out", str(tmp_path)]) == 2
+    assert main(["--policies", "dls", "--export", "ros", "--out", str(tmp_path)]) == 2
     assert "Available: csv, joint-trajectory." in capsys.readouterr().err
-    assert command.main(["--policies", "dls", "--export", "csv"]) == 2
+    assert main(["--policies", "dls", "--export", "csv"]) == 2
     assert "expected a folder" in capsys.readouterr().err
 
 

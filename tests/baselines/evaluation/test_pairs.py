@@ -10,8 +10,8 @@ import pytest
 import ikgym
 from baselines.evaluate import evaluate
 from baselines.evaluation import report
-from baselines.evaluation.plan import make_plan
 from baselines.evaluation.summary import by_seed, geometric_interval, paired, summarise
+from tests.baselines.evaluation.planning import planned
 from tests.baselines.evaluation.test_report import row
 
 SHORT = {name: ikgym.scenarios.get(name).replace(steps=16) for name in ("panda-ideal", "panda-camera", "panda-bus")}
@@ -80,18 +80,18 @@ def test_the_interval_is_of_the_mean_of_the_logarithms():
 
 
 def test_the_plan_adds_the_ideal_plants_once():
-    jobs = make_plan([SHORT["panda-camera"], SHORT["panda-bus"]], "dls", episodes=2, pairs=True, noise_seeds=2).jobs
+    jobs = planned([SHORT["panda-camera"], SHORT["panda-bus"]], "dls", episodes=2, pairs=True, noise_seeds=2).jobs
     names = [job.scenario.name for job in jobs]
     assert names == ["panda-camera"] * 4 + ["panda-bus"] * 2 + ["panda-camera, ideal plant"] * 2
     assert jobs[-1].scenario.plant.ideal
-    assert [job.seed for job in jobs[-2:]] == [2_000_000, 2_000_001]
+    assert [job.seeds.seed for job in jobs[-2:]] == [2_000_000, 2_000_001]
 
 
 def test_an_ideal_plant_that_is_played_anyway_is_not_added():
     given = [SHORT["panda-camera"], SHORT["panda-ideal"]]
-    jobs = make_plan(given, "dls", pairs=True).jobs
+    jobs = planned(given, "dls", pairs=True).jobs
     assert [job.scenario.name for job in jobs] == ["panda-camera", "panda-ideal"]
-    assert [job.scenario.name for job in make_plan(given[:1], "dls").jobs] == ["panda-camera"]
+    assert [job.scenario.name for job in planned(given[:1], "dls").jobs] == ["panda-camera"]
 
 
 @pytest.mark.parametrize("episodes", [1, 3])

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import logging
 
-from baselines.evaluation.runner import _Line
+from baselines.evaluation.play import _Line
+from tests.baselines.evaluation.planning import planned
 
 
 class Bar:
@@ -26,7 +27,8 @@ class Bar:
 def test_it_says_what_is_compiled_and_that_this_happens_once():
     bar = Bar()
     line = _Line(bar)
-    line.describe("varga7-fast · dls (1/2)")
+    (job,) = planned("varga7-fast", "dls").jobs
+    line.announce(job, 1, 2)
     with line.watching():
         logging.getLogger("ikgym").warning("Compiling the policy dls; this happens once, the result is cached on disk.")
         assert bar.descriptions[-1] == "Compiling the policy dls; this happens once"

@@ -5,16 +5,15 @@ import re
 
 import numpy as np
 import pytest
-from matplotlib.text import Text
 
 import baselines
 import ikgym
+from baselines.episodes import Seeds, rollout
 from baselines.evaluate import evaluate
 from baselines.evaluation import report
+from baselines.evaluation.jobs import Skipped
 from baselines.evaluation.metrics import Row
-from baselines.evaluation.plan import Skipped
 from baselines.evaluation.plots import bands, cost_time, joints, style, tracking
-from baselines.evaluation.runner import play_episodes
 from baselines.evaluation.summary import summarise
 from baselines.evaluation.trajectory_log import trajectory_log
 from baselines.files import ResultsError
@@ -108,10 +107,6 @@ def test_table():
     assert "episodes" not in text
 
 
-def test_no_star_without_a_reference():
-    assert "*" not in report.table([BASE])
-
-
 def test_a_policy_that_ran_into_a_stop_is_marked():
     stopped = row(policy="moore_penrose", parameters={}, steps_at_joint_limit=3)
     text = report.table([BASE, stopped, dataclasses.replace(REFERENCE, steps_at_joint_limit=1)])
@@ -119,11 +114,6 @@ def test_a_policy_that_ran_into_a_stop_is_marked():
     assert report.STOP_NOTE in text
     assert "†" not in report.table([BASE, row(policy="moore_penrose", steps_at_velocity_limit=3)])
     assert summarise([stopped, dataclasses.replace(stopped, seed=1)])[0].steps_at_joint_limit == 6
-
-
-def test_a_task_without_orientation_shows_a_dash():
-    line = report.table([row(orientation_error_max=None)]).split("\n")[4]
-    assert re.split(r"\s{2,}", line)[6] == "–"
 
 
 def test_several_episodes_are_put_together():
@@ -149,12 +139,6 @@ def test_several_episodes_are_judged_by_their_cost_ratio_where_it_is_known():
     assert re.split(r"\s{2,}", text.split("\n")[4])[4] == "2.000"
     assert "Cost ratio over the episodes:" in report.readme(rows, command="c", date=DATE)
     assert "total cost over" in report.table([*rows, row(scenario="varga7-random", seed=10)])
-
-
-def test_what_was_not_timed_shows_dashes():
-    untimed = dict.fromkeys(("time_first_us", "time_p50_us", "time_p99_us", "deadline_misses"))
-    line = report.table([row(**untimed)]).split("\n")[4]
-    assert re.split(r"\s{2,}", line)[8:11] == ["–", "–", "–"]
 
 
 def test_lines_fit_the_width():
@@ -249,12 +233,12 @@ def test_accelerations_are_drawn_where_they_have_limits(tmp_path):
 
 def test_the_log_has_the_accelerations_of_the_steps_from_rest():
     scenario = circle(steps=8)
-    (episode,) = play_episodes(scenario, baselines.make("dls", scenario), [0], 1, timed=True)
-    log = trajectory_log(scenario, 0, episode)
+    episode = rollout(scenario, baselines.make("dls", scenario), 0)
+    log = trajectory_log(scenario, Seeds(0), episode)
     np.testing.assert_allclose(log["qddot"][0], episode.qdot[0] / scenario.dt)
     np.testing.assert_allclose(log["qddot"][1:], np.diff(episode.qdot, axis=0) / scenario.dt)
     np.testing.assert_array_equal(log["acceleration_limit"], scenario.arm.acceleration_limit)
-    assert "qddot" not in trajectory_log(ikgym.scenarios.get("varga7-fast").replace(steps=8), 0, episode)
+    assert "qddot" not in trajectory_log(ikgym.scenarios.get("varga7-fast").replace(steps=8), Seeds(0), episode)
 
 
 def test_a_damaged_course_is_named(tmp_path):
@@ -337,30 +321,12 @@ def test_limits_that_are_near_are_shaded():
     assert bands_of(joints.draw_velocities("v", course()).axes[0]) == []
 
 
-def test_accelerations_and_their_limits():
-    qddot = np.sin(np.linspace(0.0, 6.3, 60))[:, None] * [10.0, 5.0, 20.0]
-    one = course(joints=3, qddot=qddot, acceleration_limit=np.array([10.5, np.inf, 80.0]))
-    figure = joints.draw_accelerations("a", one)
-    first, second, third = figure.axes
-    below, above = bands_of(first)
-    assert (below[1], above[0]) == (-10.5, 10.5)
-    assert bands_of(second) == bands_of(third) == []
-    assert [axes.get_ylabel().split()[-1] for axes in figure.axes] == ["[rad/s²]", "[rad/s²]", "[m/s²]"]
-    np.testing.assert_array_equal(first.get_lines()[0].get_ydata(), qddot[:, 0])
-    assert [text.get_text() for text in figure.legends[0].texts] == ["actual", bands.NAME]
-
-
 def test_a_reference_below_the_errors_of_the_others_is_named():
     good = course(position_error=np.full(60, 1e-13))
     figure = tracking.draw("t", [("dls", course()), ("follow_nominal *", good)])
     (axes,) = (axes for axes in figure.axes if axes.get_ylabel() == "position error [m]")
     assert axes.get_title(loc="right") == "below the axis: follow_nominal *"
     assert axes.get_ylim()[0] > 1e-4
-
-
-def test_errors_of_zero_can_be_drawn():
-    nothing = course(position_error=np.zeros(60), orientation_error=np.zeros(60))
-    tracking.draw("t", [("dls", nothing)]).draw_without_rendering()
 
 
 def test_the_nominal_is_in_sight_even_where_a_policy_has_lost_it():
@@ -385,50 +351,10 @@ def test_the_close_up_is_where_velocities_zigzag():
     assert joints.busiest(qdot[:1]) == slice(0, 1)
 
 
-def test_labels_of_costs_do_not_overlap():
-    rng = np.random.default_rng(3)
-    rows = [
-        row(
-            policy=f"policy_{i}", parameters={}, total_cost=10 ** rng.uniform(6, 9), time_p50_us=10 ** rng.uniform(1, 3)
-        )
-        for i in range(12)
-    ]
-    rows += [row(policy=f"near_{i}", parameters={}, total_cost=1e7, time_p50_us=100.0 + i) for i in range(4)]
-    summaries = summarise(rows)
-    figure = cost_time.draw(
-        "t", summaries, {id(s): s.policy for s in summaries}, {id(s): style.looks(i) for i, s in enumerate(summaries)}
-    )
-    figure.draw_without_rendering()
-    axes = figure.axes[0]
-    renderer = figure.canvas.get_renderer()
-    boxes = [Text.get_window_extent(t, renderer) for t in axes.texts]
-    assert len(boxes) == 16
-    frame = axes.get_window_extent(renderer)
-    for number, box in enumerate(boxes):
-        assert frame.x0 <= box.x0
-        assert box.x1 <= frame.x1
-        assert not any(box.overlaps(other) for other in boxes[:number])
-
-
-@pytest.mark.parametrize(
-    ("value", "text"),
-    [(20.0, "20"), (0.005, "0.005"), (2e7, r"$2 \cdot 10^{7}$"), (1e-5, r"$1 \cdot 10^{-5}$")],
-)
-def test_ticks(value, text):
-    assert cost_time._tick(value) == text
-
-
 def test_one_policy_and_a_cost_of_zero_can_be_drawn():
     summaries = summarise([row(total_cost=0.0)])
     figure = cost_time.draw("t", summaries, {id(summaries[0]): "dls *"}, {id(summaries[0]): style.looks(0)})
     assert style.png(figure) == style.png(figure)
-
-
-def test_what_has_no_time_has_no_place_against_it():
-    summaries = summarise([BASE, row(policy="moore_penrose", time_p50_us=None)])
-    names = {id(s): s.policy for s in summaries}
-    figure = cost_time.draw("t", summaries, names, {id(s): style.looks(i) for i, s in enumerate(summaries)})
-    assert [t.get_text() for t in figure.axes[0].texts] == ["dls"]
 
 
 def test_lines_can_be_told_apart():

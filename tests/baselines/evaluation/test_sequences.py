@@ -13,12 +13,11 @@ import ikgym
 from baselines.episodes import Seeds, rollout, sequences
 from baselines.evaluate import evaluate
 from baselines.evaluation import test_sets
-from baselines.evaluation.plan import make_plan
-from baselines.evaluation.runner import play
-from baselines.evaluation.units import units
+from baselines.evaluation.play import batches, play
 from baselines.policy import Solution, SolverPolicy, statuses
 from ikgym import Plant
 from ikgym.exceptions import InvalidInputError
+from tests.baselines.evaluation.planning import planned
 from tests.comparison import identical
 
 STEPS = 12
@@ -61,47 +60,47 @@ def test_what_does_not_survive_is_cleared():
 
 
 def jobs_of(episodes=7, **options):
-    return make_plan(SAME_ARM, Counting, episodes=episodes, **options).jobs
+    return planned(SAME_ARM, Counting, episodes=episodes, **options).jobs
 
 
 def test_five_episodes_have_one_arm():
     jobs = jobs_of()
-    assert [job.arm_seed for job in jobs] == [400_000] * 5 + [400_001] * 2
-    assert [len(job.before) for job in jobs] == [0, 1, 2, 3, 4, 0, 1]
-    assert jobs[6].before == (2_000_005,)
+    assert [job.seeds.arm_seed for job in jobs] == [400_000] * 5 + [400_001] * 2
+    assert [job.before for job in jobs] == [0, 1, 2, 3, 4, 0, 1]
+    assert jobs[6].before == 1
 
 
 def test_all_ways_to_play_them_are_the_same():
     jobs = [dataclasses.replace(job, timed=False) for job in jobs_of(noise_seeds=2)]
-    (together,) = [unit.jobs for unit in units(jobs)]
-    whole = {one.job.key: one.row.total_cost for one in play(together)}
+    (together,) = batches(jobs)
+    whole = {row.key: row.total_cost for row, _ in play(together)}
     assert len(set(whole.values())) == len(jobs) == 14
-    by_itself = [play([job])[0] for job in (jobs[9], jobs[13])]
-    timed = [play([dataclasses.replace(job, timed=True)])[0] for job in (jobs[9], jobs[0])]
+    by_itself = [play((job,))[0][0] for job in (jobs[9], jobs[13])]
+    timed = [play((dataclasses.replace(job, timed=True),))[0][0] for job in (jobs[9], jobs[0])]
     for one in (*by_itself, *timed):
-        assert one.row.total_cost == whole[one.job.key]
-    assert timed[0].row.time_p50_us is not None
+        assert one.total_cost == whole[one.key]
+    assert timed[0].time_p50_us is not None
 
 
 def test_the_test_set_says_so():
     assert test_sets.SETS["panda-same-arm"].sequence == 5
     assert test_sets.SETS["panda-same-arm"].arm_seed(2_000_007) == 400_001
     assert test_sets.SETS["panda-camera"].arm_seed(2_000_007) is None
-    jobs = make_plan((), "dls", test_sets="panda-same-arm").jobs
+    jobs = planned((), "dls", test_sets="panda-same-arm").jobs
     assert len(jobs) == 65 * 3
-    assert len({job.arm_seed for job in jobs}) == 13
+    assert len({job.seeds.arm_seed for job in jobs}) == 13
 
 
 def test_a_reference_is_told_its_arm():
-    (first, second, *_) = make_plan(SAME_ARM, "told:policy=qp", episodes=2).jobs
+    (first, second, *_) = planned(SAME_ARM, "told:policy=qp", episodes=2).jobs
     assert second.given["arm_seed"] == 400_000
-    assert second.before == ()
+    assert second.before == 0
     assert first.parameters == second.parameters
     assert second.make().drawn.arm.offsets[0, 0] == SAME_ARM.drawn_plant(arm_seed=400_000).arm.offsets[0, 0]
 
 
 def test_a_reference_is_the_same_one_for_every_arm():
-    first, *_, last = make_plan((), "told:policy=dls", test_sets="panda-same-arm").jobs
+    first, *_, last = planned((), "told:policy=dls", test_sets="panda-same-arm").jobs
     assert first.arm_seed != last.arm_seed
     assert "arm_seed" not in last.parameters
     assert last.make().arm_seed == last.arm_seed
@@ -132,7 +131,7 @@ def test_wrapped_environments_play_no_sequences():
         def predict(self, observation, state=None, episode_start=None, deterministic=False):
             return np.zeros(7, dtype=np.float32), state
 
-    wrapped = make_plan(SAME_ARM, Agent(), episodes=2, preview=1, wrap=lambda env: env).jobs[1]
+    wrapped = planned(SAME_ARM, Agent(), episodes=2, preview=1, wrap=lambda env: env).jobs[1]
     assert wrapped.before == job.before
     with pytest.raises(InvalidInputError, match="in sequences of episodes, without wrappers"):
         play([wrapped])
@@ -140,6 +139,6 @@ def test_wrapped_environments_play_no_sequences():
 
 def test_bad_numbers():
     with pytest.raises(InvalidInputError, match="noise_seeds"):
-        make_plan(SAME_ARM, "dls", noise_seeds=0)
+        planned(SAME_ARM, "dls", noise_seeds=0)
     with pytest.raises(InvalidInputError, match="expected no scenarios"):
-        make_plan((), "dls", test_sets="panda-camera", noise_seeds=2)
+        planned((), "dls", test_sets="panda-camera", noise_seeds=2)

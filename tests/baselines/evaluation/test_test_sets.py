@@ -3,11 +3,11 @@ from numpy.testing import assert_allclose
 
 from baselines.evaluate import evaluate
 from baselines.evaluation import test_sets
-from baselines.evaluation.plan import make_plan
 from baselines.fingerprints import set_hash
 from ikgym import cost_kernels, scenarios
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 from ikgym.scenarios import imperfect
+from tests.baselines.evaluation.planning import planned
 
 
 @pytest.mark.parametrize("name", test_sets.names())
@@ -64,14 +64,14 @@ def test_a_set_that_has_drifted_is_refused(monkeypatch, drift):
 
 
 def test_a_frozen_set_is_played_as_it_is():
-    jobs = make_plan((), "dls", test_sets="varga7-random").jobs
+    jobs = planned((), "dls", test_sets="varga7-random").jobs
     assert [job.seed for job in jobs] == list(range(2_000_000, 2_000_064))
     assert {(job.scenario.name, job.scenario.steps, job.test_set) for job in jobs} == {
         ("varga7-random", 1000, test_sets.SETS["varga7-random"].digest)
     }
-    both = make_plan((), ["dls", "follow_nominal"], test_sets=test_sets.names()).jobs
+    both = planned((), ["dls", "follow_nominal"], test_sets=test_sets.names()).jobs
     assert len(both) == 2 * (256 + 32 + 64 + 16 + 2 * 128 + 4 * 64 + 3 * (3 * 64 + 65))
-    assert all(job.test_set is None for job in make_plan("varga7-random", "dls").jobs)
+    assert all(job.test_set is None for job in planned("varga7-random", "dls").jobs)
 
 
 def test_a_frozen_set_from_python():
@@ -93,7 +93,7 @@ def test_a_frozen_set_from_python():
 )
 def test_a_frozen_set_is_not_changed(scenario, options):
     with pytest.raises(InvalidInputError, match="A test set says itself what is played"):
-        make_plan(scenario, "dls", test_sets="varga7-random", **options)
+        planned(scenario, "dls", test_sets="varga7-random", **options)
 
 
 def test_unknown_sets():

@@ -7,7 +7,7 @@ import pytest
 
 import baselines
 import ikgym
-from baselines.evaluation.runner import play_episodes
+from baselines.episodes import rollouts
 from baselines.solvers import arm_size
 from ikgym.trajectories import Sinusoid
 
@@ -63,7 +63,7 @@ SCALE_FREE = [
 
 def path(scenario, policy, parameters):
     made = baselines.make(policy, scenario, **parameters)
-    return play_episodes(scenario, made, [0], made.preview, timed=False)[0].q
+    return rollouts(scenario, made, [0])[0].q
 
 
 @pytest.mark.parametrize(("policy", "parameters"), SCALE_FREE)
@@ -134,7 +134,7 @@ def test_with_the_old_parameters_costs_are_those_of_before(name, policy):
 
     def costs(**parameters):
         made = baselines.make(policy, scenario, **parameters)
-        (episode,) = play_episodes(scenario, made, [0], made.preview, timed=False)
+        (episode,) = rollouts(scenario, made, [0])
         return float(episode.tracking_cost.sum()), float(episode.velocity_cost.sum())
 
     assert costs(**BEFORE[policy]) == pytest.approx(COSTS[name, policy], rel=1e-12)

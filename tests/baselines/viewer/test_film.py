@@ -9,7 +9,7 @@ import sys
 import numpy as np
 import pytest
 
-from baselines.console import main
+from baselines.cli import main
 from baselines.files import ResultsError
 from baselines.viewer import film
 from baselines.viewer.film import checked_width, moments, pictures, write_video

@@ -13,7 +13,7 @@ import urllib.request
 import numpy as np
 import pytest
 
-from baselines.console import main
+from baselines.cli import main
 from baselines.viewer import view
 from baselines.viewer.approach import Pose
 from baselines.viewer.replay import Stage

@@ -1,8 +1,11 @@
+import base64
+
 import numpy as np
 import pytest
 
 import baselines
 import ikgym
+from baselines.episodes import Seeds, rollout
 from baselines.evaluation.html.series import (
     ACCELERATION,
     BUDGET,
@@ -10,19 +13,22 @@ from baselines.evaluation.html.series import (
     FREE,
     STOP,
     VELOCITY,
-    decoded,
     encoded,
     limits,
     thinned,
 )
-from baselines.evaluation.runner import play_episodes
 from baselines.evaluation.trajectory_log import FRAMES, frame_rows, trajectory_log
 from tests.limited import limited
 
 
 def log_of(scenario, seed=0, policy="dls"):
-    (episode,) = play_episodes(scenario, baselines.make(policy, scenario), [seed], 1, timed=True)
-    return trajectory_log(scenario, seed, episode)
+    episode = rollout(scenario, baselines.make(policy, scenario), seed)
+    return trajectory_log(scenario, Seeds(seed), episode)
+
+
+def decoded(array):
+    """The array that was encoded, in single precision."""
+    return np.frombuffer(base64.b64decode(array["data"]), dtype="<" + array["type"]).reshape(array["shape"])
 
 
 @pytest.fixture(scope="module")

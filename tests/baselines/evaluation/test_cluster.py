@@ -8,15 +8,16 @@ import math
 
 import pytest
 
+import ikgym
 from baselines.evaluate import evaluate
-from baselines.evaluation import runner, units
-from baselines.evaluation.plan import make_plan
+from baselines.evaluation import play as playing
 from baselines.evaluation.results import read_rows
 from baselines.workers import TOLERANCE, ClusterError, WorkerError, Workers
+from tests.baselines.evaluation.planning import planned
 from tests.baselines.losing import LosingCluster
 
 STEPS = 5
-FAR = {"cpu": "another one"}
+FAR = {"cpu": "another one", "ikgym": ikgym.__version__}
 
 
 @pytest.fixture
@@ -27,21 +28,20 @@ def pool(monkeypatch):
 
 @pytest.fixture
 def one_by_one(monkeypatch):
-    monkeypatch.setattr(runner, "BLOCK", 1)
+    monkeypatch.setattr(playing, "BLOCK", 1)
 
 
 def on_another_machine(monkeypatch, factor, processor=None):
     """Has workers say that they are another machine, or processor of the same name, and cost more by a factor."""
 
-    def do(unit, plain=runner.do):
-        done = plain(unit)
+    def work(batch, plain=playing.work):
+        results, there = plain(batch)
         worse = [
-            one._replace(row=dataclasses.replace(one.row, machine=FAR, total_cost=factor * one.row.total_cost))
-            for one in done.played
+            (dataclasses.replace(row, machine=FAR, total_cost=factor * row.total_cost), one) for row, one in results
         ]
-        return done._replace(played=worse, processor=processor or done.processor)
+        return worse, processor or there
 
-    monkeypatch.setattr(runner, "do", do)
+    monkeypatch.setattr(playing, "work", work)
 
 
 def play(**options):
@@ -81,21 +81,12 @@ def test_a_unit_that_kills_every_worker_is_named_and_the_others_are_kept(pool, o
 
 
 def test_blocks_of_seeds():
-    jobs = make_plan("varga7-random", "dls", episodes=20).jobs
-    assert [len(unit.jobs) for unit in units.units(jobs, units.BLOCK)] == [1, 8, 8, 3]
-
-
-def test_digests_tell_units_apart():
-    jobs = make_plan("varga7-random", ["dls", "dls:damping=1e-2"], episodes=3, steps=STEPS).jobs
-    changed = dataclasses.replace(jobs[0], scenario=jobs[0].scenario.replace(steps=STEPS + 1))
-    every = [units.Unit((job,)) for job in (*jobs, changed)]
-    assert len({unit.digest for unit in every}) == len(jobs) + 1
-    assert units.Unit((jobs[0],)).digest == every[0].digest
+    jobs = planned("varga7-random", "dls", episodes=20).jobs
+    assert [len(batch) for batch in playing.batches(jobs, playing.BLOCK)] == [1, 8, 8, 3]
 
 
 def test_another_version_of_the_code_is_refused(pool, monkeypatch):
-    done = runner.do
-    monkeypatch.setattr(runner, "do", lambda unit: done(unit)._replace(digest="0" * 24))
+    monkeypatch.setattr(playing, "fingerprint", lambda _: "0" * 12)
     with pytest.raises(WorkerError, match="has played something else than dls in varga7-random: it has ikgym"):
         play(cluster="ray")
 
@@ -125,7 +116,7 @@ def test_costs_of_other_processors_are_held_against_those_of_this_one(pool, monk
 )
 def test_equal_costs(row, far, near, tolerance, fits):
     with contextlib.nullcontext() if fits else pytest.raises(WorkerError, match="total_cost is"):
-        units.compare(*(dataclasses.replace(row, total_cost=cost) for cost in (far, near)), tolerance)
+        playing.compare(*(dataclasses.replace(row, total_cost=cost) for cost in (far, near)), tolerance)
 
 
 def test_nothing_is_overwritten_before_there_is_a_cluster(monkeypatch, tmp_path):
@@ -142,7 +133,7 @@ def test_nothing_is_overwritten_before_there_is_a_cluster(monkeypatch, tmp_path)
 
 @pytest.mark.parametrize(("processor", "fits"), [(None, False), ("without AVX", True)])
 def test_on_processors_of_one_kind_costs_are_the_same(pool, monkeypatch, processor, fits):
-    for name, value in units.describe().items():
+    for name, value in playing.describe().items():
         monkeypatch.setitem(FAR, name, value)
     on_another_machine(monkeypatch, 1.0 + 1e-8, processor)
     with contextlib.nullcontext() if fits else pytest.raises(WorkerError, match="relative difference of at most 0"):

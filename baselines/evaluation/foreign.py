@@ -1,4 +1,4 @@
-"""Policies of others, such as models of Stable-Baselines3: whatever has such a `predict`, as the loop calls it."""
+"""Foreign policies: objects with the `predict` of Stable-Baselines3 that are no :class:`baselines.SolverPolicy`."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from ikgym.scenarios import Preview, Scenario
 from ikgym.spaces import action_space, observation_space
 from ikgym.validation import FloatArray
 
-#: Wraps the environment, as an agent that was trained on a wrapped one needs it.
+#: Wraps the environment, as an agent needs it that was trained in a wrapped one.
 Wrap = Callable[[gym.Env[Any, Any]], gym.Env[Any, Any]]
 
 
 class Predictor(Protocol):
-    """Whatever chooses actions with the signature of Stable-Baselines3."""
+    """An object with the `predict` of Stable-Baselines3."""
 
     def predict(
         self,
@@ -40,15 +40,15 @@ class Predictor(Protocol):
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class ForeignPolicy:
-    """A policy of somebody else. What it does not say of itself is left empty, never guessed.
+    """A foreign policy. What it does not state about itself is left empty, never guessed.
 
     It is called for one arm at a time, with ``deterministic=True``.
 
     Args:
-        name: What messages and rows call it.
-        model: Who chooses the actions.
+        name: The name in messages and rows.
+        model: The object.
         preview: Steps ahead that it is shown, or which ones.
-        wrap: Wraps the environment; None where it plays the environment as it is.
+        wrap: Wraps the environment; None for the environment as it is.
         parameters: Its parameters, as far as they are known.
     """
 
@@ -61,57 +61,57 @@ class ForeignPolicy:
     parameters: Mapping[str, Any] = dataclasses.field(default_factory=dict)
 
     def predict(self, observation: Any, state: Any = None, episode_start: Any = None) -> tuple[npt.NDArray[Any], Any]:
-        """The action for one arm, and what the next call is to be given; an episode_start says that an episode begins.
+        """The action for one arm, and the state for the next call; an episode begins where `episode_start` is given.
 
         Raises:
-            InvalidInputError: The model raises an error, or answers with something else than numbers and a state.
+            InvalidInputError: The model raises an error, or does not return numbers and a state.
         """
         memory, start = (None, True) if state is None else (state[0], episode_start is not None)
         try:
             answer = self.model.predict(observation, state=memory, episode_start=np.array([start]), deterministic=True)
-        except Exception as e:  # whatever the code of somebody else raises
+        except Exception as e:  # whatever the user's code raises
             raise InvalidInputError(f"{self.name}: predict raised {type(e).__name__}: {e}.") from e
         if not isinstance(answer, tuple) or len(answer) != 2:
             raise InvalidInputError(f"{self.name}: expected predict to return (action, state), got {answer!r}.")
         action = np.asarray(answer[0])
         if action.dtype.kind not in "fiub":
             raise InvalidInputError(f"{self.name}: expected an action of numbers, got {answer[0]!r}.")
-        # Models without a memory return None, which is what the first call is told by.
+        # Models without a memory return None, which marks the first call.
         return action, (answer[1],)
 
     def report(self, state: Any) -> Report:
-        """Nothing is known of how an action came about. Shapes (1,)."""
+        """Nothing is known. Shapes (1,)."""
         del state
         return Report(np.array([int(Status.UNKNOWN)]), np.zeros(1, dtype=np.int64))
 
     def diagnostics(self, state: Any) -> dict[str, FloatArray]:
-        """Nothing."""
+        """None."""
         del state
         return {}
 
     def misfit(self, scenario: Scenario) -> str | None:
-        """Why the model does not fit a scenario, as far as it has spaces that tell; None where it does, or may.
+        """Why the spaces of the model do not fit a scenario; None if they do, or if it has none.
 
         Raises:
             InvalidInputError: The preview is not valid, or the environment cannot be wrapped.
         """
         shown: gym.Space[Any]
-        asked: gym.Space[Any]
+        needed: gym.Space[Any]
         if self.wrap is None:
-            shown, asked = observation_space(scenario, self.preview), action_space(scenario)
+            shown, needed = observation_space(scenario, self.preview), action_space(scenario)
         else:
             env, _ = self.environment(scenario)
-            shown, asked = env.observation_space, env.action_space
+            shown, needed = env.observation_space, env.action_space
         for what, own, there in (
             ("observations", getattr(self.model, "observation_space", None), shown),
-            ("actions", getattr(self.model, "action_space", None), asked),
+            ("actions", getattr(self.model, "action_space", None), needed),
         ):
             if isinstance(own, gym.Space) and _shapes(own) != _shapes(there):
                 return f"{self.name} has {what} of the shape {_shapes(own)}, the environment of {_shapes(there)}."
         return None
 
     def environment(self, scenario: Scenario) -> tuple[gym.Env[Any, Any], Recorder]:
-        """The environment with its wrappers, and what keeps what happens in it.
+        """The environment in its wrappers, and the recorder inside of them.
 
         Raises:
             InvalidInputError: The preview is not valid, or the environment cannot be wrapped.
@@ -121,7 +121,7 @@ class ForeignPolicy:
         recorder = Recorder(made)
         try:
             env = self.wrap(recorder)
-        except Exception as e:  # whatever the code of somebody else raises
+        except Exception as e:  # whatever the user's code raises
             raise InvalidInputError(f"wrap: raised {type(e).__name__} on {scenario.name}: {e}.") from e
         if not isinstance(env, gym.Env) or env.unwrapped is not made.unwrapped:
             raise InvalidInputError(f"wrap: expected the environment that it was given in wrappers, got {env!r}.")
@@ -129,7 +129,7 @@ class ForeignPolicy:
 
 
 class Recorder(gym.Wrapper[Any, Any, Any, Any]):
-    """Keeps what happens in an environment in float64, below the wrappers that others put around it.
+    """Records what happens in an environment in float64, inside of other wrappers.
 
     Args:
         env: The environment, as :func:`gymnasium.make` makes it.
@@ -149,10 +149,10 @@ class Recorder(gym.Wrapper[Any, Any, Any, Any]):
         return len(self.rows) == self.steps
 
     def check(self, seed: int) -> None:
-        """Sees to it that wrappers have begun the episode that is to be played.
+        """Checks that the wrappers have begun the episode with this seed, and made no step.
 
         Raises:
-            InvalidInputError: The seed has not arrived, or wrappers have taken steps.
+            InvalidInputError: They have not.
         """
         if self._seeds != [seed] or self.rows:
             raise InvalidInputError(
@@ -164,7 +164,7 @@ class Recorder(gym.Wrapper[Any, Any, Any, Any]):
         """Begins the episode.
 
         Raises:
-            InvalidInputError: Wrappers start elsewhere than the scenario, or break the episode off.
+            InvalidInputError: A wrapper starts elsewhere than the scenario, or resets during the episode.
         """
         if options:
             raise InvalidInputError(f"wrap: expected resets without options, got {options!r}.")
@@ -175,13 +175,13 @@ class Recorder(gym.Wrapper[Any, Any, Any, Any]):
         return self.env.reset(seed=seed)
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
-        """One step, kept."""
+        """Makes one step and records it."""
         result = self.env.step(action)
         seen, info = result[0], result[-1]
         if not self.ended:
             numbers = [info[key] for key in ("tracking_cost", "velocity_cost", "position_error")]
             numbers.append(info.get("orientation_error", math.nan))  # absent where the task has none
-            # Copies: wrappers may write into what they are handed.
+            # Copies: wrappers may write into the arrays that they receive.
             copies = [seen[key].copy() for key in ("q", "qdot", "pose")]
             self.rows.append((*copies, *map(np.asarray, numbers), info["at_limit"].astype(np.float64)))
         return result
@@ -190,30 +190,30 @@ class Recorder(gym.Wrapper[Any, Any, Any, Any]):
 def play_wrapped(
     scenario: Scenario, policy: ForeignPolicy, seed: int | Seeds, *, timed: bool = True, tick: Tick | None = None
 ) -> Episode:
-    """Plays one episode in the wrapped environment; costs and errors are those below the wrappers, in float64.
+    """Plays one episode in the wrapped environment; costs and errors are those inside of the wrappers, in float64.
 
     Args:
-        scenario: What is to be tracked.
-        policy: Who tracks it, with a `wrap`.
-        seed: The reset seed, or what is drawn how, as far as a reset without options can say it.
-        timed: Whether to keep the times of the calls.
-        tick: See :data:`baselines.episodes.Tick`.
+        scenario: The scenario.
+        policy: The policy, with a `wrap`.
+        seed: The reset seed; other seeds cannot be passed through wrappers.
+        timed: Whether the calls are timed.
+        tick: Reports progress.
 
     Raises:
-        InvalidInputError: The environment cannot be wrapped, the episode ends early, or an action is refused.
+        InvalidInputError: The environment cannot be wrapped, the episode ends early, or an action is invalid.
     """
-    draw = Seeds.of(seed)
-    if draw != Seeds(draw.seed):
-        raise InvalidInputError(f"wrap: expected an episode that its reset seed says all of, got {draw}.")
+    seeds = Seeds.of(seed)
+    if seeds != Seeds(seeds.seed):
+        raise InvalidInputError(f"wrap: expected an episode that has no seed but the reset seed, got {seeds}.")
     env, recorder = policy.environment(scenario)
-    seen, _ = env.reset(seed=draw.seed)
-    recorder.check(draw.seed)
+    seen, _ = env.reset(seed=seeds.seed)
+    recorder.check(seeds.seed)
     state, times, over = None, [], False
     while not (recorder.ended or over):
         begin = time.perf_counter_ns()
         action, state = policy.predict(seen, state)
         times.append(time.perf_counter_ns() - begin)
-        check_finite(action, policy, scenario, [draw], len(recorder.rows))
+        check_finite(action, policy, scenario, [seeds], len(recorder.rows))
         seen, _, terminated, truncated, _ = env.step(action)
         over = terminated or truncated
     if not recorder.ended:
@@ -240,7 +240,7 @@ def play_wrapped(
 
 
 def _shapes(space: gym.Space[Any]) -> Any:
-    """The shape of a space, by key where it has parts."""
+    """The shape of a space; of a dictionary, the shape of each part."""
     if isinstance(space, gym.spaces.Dict):
         return {name: _shapes(part) for name, part in sorted(space.spaces.items())}
     return space.shape

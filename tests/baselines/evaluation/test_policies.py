@@ -15,15 +15,16 @@ import pytest
 
 import baselines
 import ikgym
-from baselines.evaluate import evaluate, main
+from baselines.cli.evaluate import main
+from baselines.evaluate import evaluate
 from baselines.evaluation.metrics import TIME_COLUMNS, Row
-from baselines.evaluation.plan import make_plan
 from baselines.evaluation.report import table
 from baselines.evaluation.results import read_rows
 from baselines.files import ResultsError
 from baselines.policy import Problem
 from baselines.solvers.resolved_rate.dls import DampedLeastSquares
 from ikgym.exceptions import InvalidInputError, UnknownNameError
+from tests.baselines.evaluation.planning import planned
 
 ROOT = pathlib.Path(__file__).parents[3]
 HELIX, STEPS = "zhang3-helix", 20
@@ -158,7 +159,7 @@ def test_an_object_with_a_predict_is_scored_as_a_solver_is(solved):
     assert row.status_counts == {"unknown": STEPS}
     assert row.iterations is None
     assert row.time_p50_us > 0
-    assert Row.from_json(row.to_json()) == row
+    assert Row(**Row.nan_restored(row.to_json())) == row
     # One call that does not count, then one a step, with its own memory, begun once.
     assert model.calls[0] == (None, [True], True)
     assert model.calls[1:] == [(k or None, [k == 0], True) for k in range(STEPS)]
@@ -229,7 +230,7 @@ def test_what_others_are_shown():
     assert evaluate("varga7-fast", model, steps=3, preview=7)[0].preview == 7
     assert model.shape[0] == 7
     assert evaluate("varga7-fast", Bare(), steps=3, preview=(2, 9))[0].preview == 9
-    with pytest.raises(InvalidInputError, match=r"'Bare': nobody says how many steps ahead .* Give preview=…"):
+    with pytest.raises(InvalidInputError, match=r"'Bare': the number of steps ahead .* Give preview=…"):
         evaluate("varga7-fast", Bare(), steps=3)
     model.preview = [2, 5]
     assert evaluate("varga7-fast", model, steps=3)[0].preview == 5
@@ -290,9 +291,9 @@ def test_actions_of_solvers_that_are_not_finite_are_named_too():
 @pytest.mark.parametrize(
     ("policy", "message"),
     [
-        (3, "expected a name, 'package.module:Class', a class, or something with the predict"),
+        (3, "expected a name, 'package.module:Class', a class, or an object with the predict"),
         (dict, "expected a class with the predict of Stable-Baselines3"),
-        (here("number"), "something with a predict, or what makes one, got 3"),
+        (here("number"), "an object with a predict, or a class or function that makes one, got 3"),
         (here("nothing"), "has no attribute 'nothing'"),
         ("no_such_module:Policy", "No module named 'no_such_module'"),
         (here("Problem"), "cannot be made: TypeError"),
@@ -442,7 +443,7 @@ def test_others_go_to_worker_processes_if_they_can(solved):
     with pytest.raises(InvalidInputError, match=r"Hidden cannot be sent to worker processes .*: use one worker"):
         evaluate(HELIX, [Hidden(), "dls"], steps=3, workers=2)
     assert len(evaluate(HELIX, Hidden(), steps=3, workers=2)) == 1  # one batch needs no worker
-    job = pickle.loads(pickle.dumps(make_plan(HELIX, here("Borrowed"), steps=3).jobs[0]))
+    job = pickle.loads(pickle.dumps(planned(HELIX, here("Borrowed"), steps=3).jobs[0]))
     assert job.make().name == here("Borrowed")
 
 

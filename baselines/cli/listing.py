@@ -7,10 +7,12 @@ import inspect
 import re
 import textwrap
 from collections.abc import Callable, Sequence
+from typing import Annotated
 
 import numpy as np
+import tyro
 
-from baselines import registry
+from baselines import command, registry
 from ikgym import arms, scenarios
 from ikgym.arms import Arm
 from ikgym.exceptions import UnknownNameError
@@ -19,16 +21,24 @@ from ikgym.validation import FloatArray
 
 
 @dataclasses.dataclass(frozen=True)
+class Names:
+    """Arguments of a list."""
+
+    names: Annotated[tyro.conf.Positional[tuple[str, ...]], tyro.conf.arg(metavar="NAME …")] = ()
+    """Names to show in full, or files: .urdf for arms, .toml for scenarios. The list if left out."""
+
+
+@dataclasses.dataclass(frozen=True)
 class Catalogue:
-    """One of the registries, as it is printed.
+    """A registry for printing.
 
     Args:
-        kind: What its members are.
-        names: Of all of them.
-        head: Of the columns; the last one takes what is left of a line.
-        row: The cells behind the name of a member.
-        full: All about a member.
-        ending: Of files that are shown in full like members; none if empty.
+        kind: The word for a member.
+        names: Gives the names of all members.
+        head: Heads of the columns; the last column fills the line.
+        row: The other cells of a member's line.
+        full: The full description of a member.
+        ending: Suffix of files that are shown in full like members; none if empty.
     """
 
     kind: str
@@ -43,13 +53,27 @@ class Catalogue:
         return name in self.names() or bool(self.ending and name.endswith(self.ending))
 
 
+def main(word: str, catalogue: Catalogue, arguments: Sequence[str]) -> int:
+    """Prints a catalogue, or some of its members in full.
+
+    Args:
+        word: The command.
+        catalogue: The catalogue.
+        arguments: Names, or options.
+    """
+    prog = f"{command.CONSOLE} {word}"
+    options = command.parse(Names, arguments, prog=prog, description=f"Lists the {word}, or shows some in full.")
+    print(shown(catalogue, options.names, command.width()))
+    return 0
+
+
 def shown(catalogue: Catalogue, names: Sequence[str], width: int) -> str:
     """The table of a catalogue, or some of its members in full.
 
     Args:
-        catalogue: What is listed.
-        names: Of those that are shown in full, or files; none for the table.
-        width: Characters that a line may have.
+        catalogue: The catalogue.
+        names: Names or files to show in full; none for the table.
+        width: Characters of a line.
 
     Raises:
         UnknownNameError: There is no such member; the message has the nearest name.
@@ -69,8 +93,8 @@ def aligned(rows: Sequence[Sequence[str]], width: int) -> str:
     """A table whose first row is the head, its last column wrapped to fit.
 
     Args:
-        rows: Cells, as many in each.
-        width: Characters that a line may have.
+        rows: Cells, the same number in each row.
+        width: Characters of a line.
     """
     sizes = [max(len(row[i]) for row in rows) for i in range(len(rows[0]) - 1)]
     start = sum(sizes) + 2 * len(sizes)
@@ -88,7 +112,7 @@ def _arm_row(name: str) -> tuple[str, ...]:
 
 
 def kinds_of_limits(arm: Arm) -> list[str]:
-    """Which kinds of limits an arm has."""
+    """The kinds of limits of an arm."""
     ends = np.concatenate([arm.lower, arm.upper])
     kinds = {"joints": ends, "velocity": arm.velocity_limit, "acceleration": arm.acceleration_limit}
     return [kind for kind, values in kinds.items() if np.isfinite(values).any()]
@@ -129,7 +153,7 @@ def _parts(scenario: Scenario) -> dict[str, object]:
     limit = np.unique(scenario.velocity_limit)
     return {
         "arm": scenario.arm.name,
-        "solvers know": scenario.model.name,
+        "nominal model": scenario.model.name,
         "task": scenario.task.name,
         "trajectory": type(scenario.trajectory).__name__,
         "random": "yes, by the seed" if scenario.random else "no",
@@ -139,7 +163,7 @@ def _parts(scenario: Scenario) -> dict[str, object]:
 
 
 def _path(scenario: Scenario) -> dict[str, object]:
-    """How long a path in space takes, and whether the arm can be there."""
+    """Duration of a path in space, and whether the arm can reach it."""
     if scenario.random or scenario.trajectory.joint_path(np.zeros(1)) is not None:
         return {}
     out: dict[str, object] = {}
@@ -149,10 +173,10 @@ def _path(scenario: Scenario) -> dict[str, object]:
 
 
 def _reach(scenario: Scenario) -> str:
-    """Which poses of a path the arm cannot take."""
+    """The poses of a path that the arm cannot reach."""
     missed = scenarios.gaps(scenario)
     if not missed:
-        return "all poses that were looked at"
+        return "all sampled poses"
     worst = max(missed, key=lambda gap: (gap.distance, gap.angle))
     first, last = (f"{gap.time:.3g} s" for gap in (missed[0], missed[-1]))
     far = f"{worst.distance:.3g} m and {worst.angle:.3g} rad"
@@ -164,7 +188,7 @@ def _policy_row(name: str) -> tuple[str, ...]:
 
 
 def summary(name: str) -> str:
-    """What a policy does, in one sentence."""
+    """The first sentence about a policy."""
     return " ".join(_plain(registry.get(name).__doc__ or "").split("\n\n")[0].split())
 
 
@@ -187,7 +211,7 @@ def _plain(text: str) -> str:
 
 
 def _refilled(text: str, width: int) -> str:
-    """A text whose paragraphs, and items of the form ``name: what it is``, are filled anew where a line is too long."""
+    """A text with its paragraphs and items filled to the width."""
     parts: list[str] = []
     for line in text.splitlines():
         item = re.match(r" *- | {0,4}\w+:( |$)| *\w.*?  |  \w+ = ", line)

@@ -1,0 +1,75 @@
+"""The command ``ikgym``: one module a command, imported when the command line names it."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from collections.abc import Callable, Sequence
+
+from baselines import command
+from ikgym.exceptions import UnknownNameError
+
+#: A summary of each command, and the module with its function ``main``.
+COMMANDS = {
+    "evaluate": ("play policies on scenarios: table, files and plots", "baselines.cli.evaluate"),
+    "train": ("train an agent", "baselines.training.command"),
+    "tune": ("search settings of solvers", "baselines.tune"),
+    "dataset": ("write episodes as a Minari data set", "baselines.dataset"),
+    "reproduce": ("draw the figures of the papers again, and test their claims", "baselines.reproduce"),
+    "leaderboard": ("compare policies on test sets in one table with intervals", "baselines.leaderboard"),
+    "robustness": ("map the cost of policies over two severities of an imperfect plant", "baselines.robustness"),
+    "view": ("show policies side by side in a browser, live and in an episode", "baselines.viewer.view"),
+    "video": ("write an episode as a video", "baselines.viewer.video"),
+    "oracle": ("search best known costs", "baselines.optimum"),
+    "arms": ("list the arms, or show some", "baselines.cli.arms"),
+    "scenarios": ("list the scenarios, or show some", "baselines.cli.scenarios"),
+    "policies": ("list the policies, or show some with their parameters", "baselines.cli.policies"),
+}
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """The command line.
+
+    Args:
+        arguments: The words after ``ikgym``; those of the process if left out.
+
+    Returns:
+        The exit code of the command; 2 after an expected error, 130 after Ctrl-C.
+    """
+    first, *others = (sys.argv[1:] if arguments is None else list(arguments)) or ["--help"]
+    return command.run(lambda: _command(first)(others))
+
+
+def manual() -> str:
+    """The text of ``--help``."""
+    lines = "\n".join(f"  {name:12} {summary}" for name, (summary, _) in COMMANDS.items())
+    return f"""\
+usage: {command.CONSOLE} COMMAND …
+
+Inverse kinematics of redundant arms: a Gymnasium environment, and a benchmark
+in which every solver is a policy.
+
+{lines}
+
+{command.CONSOLE} COMMAND --help says more; {command.CONSOLE} --version prints the version."""
+
+
+def _command(word: str) -> Callable[[Sequence[str]], int]:
+    """The function of a command.
+
+    Raises:
+        UnknownNameError: There is no such command; the message has the nearest name.
+    """
+    if word in ("-h", "--help", "--version"):
+        return lambda _: _print_about(word)
+    if word not in COMMANDS:
+        raise UnknownNameError("command", word, COMMANDS)
+    function: Callable[[Sequence[str]], int] = importlib.import_module(COMMANDS[word][1]).main
+    return function
+
+
+def _print_about(word: str) -> int:
+    import ikgym
+
+    print(ikgym.__version__ if word == "--version" else manual())
+    return 0

@@ -1,0 +1,321 @@
+"""Plays the jobs of an evaluation, in this process or in others: those of one policy in one scenario together."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import functools
+import itertools
+import logging
+import math
+import sys
+from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
+from typing import Any
+
+import llvmlite.binding as llvm
+from threadpoolctl import threadpool_limits
+from tqdm import tqdm
+
+import ikgym
+from baselines.canonical import canonical, jsonable
+from baselines.episodes import Episode, Policy, Seeds, Tick, rollouts, sequences
+from baselines.evaluation.foreign import ForeignPolicy, play_wrapped
+from baselines.evaluation.jobs import Job
+from baselines.evaluation.machine import describe
+from baselines.evaluation.metrics import Row, measure
+from baselines.evaluation.policies import check_picklable
+from baselines.fingerprints import fingerprint
+from baselines.oracle import best_known
+from baselines.oracle.best_known import MEANINGLESS
+from baselines.workers import TOLERANCE, WorkerError, Workers, finished
+from ikgym.compilation import logger
+from ikgym.exceptions import InvalidInputError
+from ikgym.preview import furthest
+from ikgym.scenarios import Preview, Scenario
+
+#: Most episodes that are played side by side: their records are in memory until all of them are finished.
+MOST = 64
+#: The same on a cluster, where small batches are spread better, and cost less if a node is lost.
+BLOCK = 8
+#: Episodes that are played again here for each kind of machine in a cluster, no two of one policy.
+REPLAYED = 3
+
+#: Jobs that are played together.
+Batch = tuple[Job, ...]
+#: The row of each job of a batch, and the record of the episode if the job asks for it.
+Results = list[tuple[Row, Episode | None]]
+
+
+def run(jobs: Sequence[Job], workers: Workers, *, progress: bool) -> Generator[tuple[Batch, Results], None, None]:
+    """Plays jobs in batches, and yields each as soon as it is finished.
+
+    On a cluster nothing is timed: timed jobs are played here, after all others.
+
+    Args:
+        jobs: The jobs.
+        workers: Who plays them.
+        progress: Whether to show a bar on stderr.
+
+    Raises:
+        InvalidInputError: A policy refuses what it is shown, cannot be sent to a worker, or chooses an invalid action.
+        WorkerError: Workers died repeatedly over one batch, or have other costs than this machine.
+        ClusterError: There is no cluster.
+    """
+    away, here = _shared(jobs, workers)
+    with tqdm(
+        total=sum(job.scenario.steps for job in jobs),
+        disable=not progress or not jobs,
+        file=sys.stderr,
+        unit="step",
+        unit_scale=True,
+        dynamic_ncols=True,
+        # A log file has no cursor to go back with.
+        mininterval=0.1 if sys.stderr.isatty() else 10.0,
+    ) as bar:
+        line, done = _Line(bar), 0
+        for batch, results in _elsewhere(away, workers):
+            done += len(batch)
+            line.announce(batch[0], done, len(jobs))
+            bar.update(sum(job.scenario.steps for job in batch))
+            yield batch, results
+        for batch in here:
+            done += len(batch)
+            line.announce(batch[0], done, len(jobs))
+            with line.watching():
+                results = play(batch, line.tick)
+            yield batch, results
+
+
+def play(batch: Batch, tick: Tick | None = None) -> Results:
+    """Plays jobs of one policy in one scenario together; a timed one has to be alone.
+
+    Args:
+        batch: The jobs.
+        tick: Reports progress.
+    """
+    first = batch[0]
+    policy = first.bind()
+    # The matrices of one arm are too small to share out, and threads would blur the times. Environment variables
+    # would be heeded only by libraries that are not loaded yet, and NumPy is.
+    with threadpool_limits(limits=1):
+        if any(job.before for job in batch):
+            episodes = _in_sequence(batch, policy, tick)
+        else:
+            seeds = [job.seeds for job in batch]
+            episodes = play_episodes(first.scenario, policy, seeds, first.preview, timed=first.timed, tick=tick)
+    return [(_row(job, one), one if job.record else None) for job, one in zip(batch, episodes, strict=True)]
+
+
+def play_episodes(
+    scenario: Scenario,
+    policy: Policy,
+    seeds: Sequence[int | Seeds],
+    preview: Preview,
+    *,
+    timed: bool,
+    tick: Tick | None = None,
+) -> list[Episode]:
+    """Plays episodes of a policy, in the wrapped environment if it needs one.
+
+    Args:
+        scenario: The scenario.
+        policy: The policy.
+        seeds: Seeds of the episodes.
+        preview: Steps ahead that the policy is shown.
+        timed: Whether the calls are timed.
+        tick: Reports progress.
+
+    Raises:
+        InvalidInputError: The policy refuses what it is shown, or chooses an invalid action.
+    """
+    if isinstance(policy, ForeignPolicy) and policy.wrap is not None:
+        return [play_wrapped(scenario, policy, one, timed=timed, tick=tick) for one in seeds]
+    return rollouts(scenario, policy, seeds, preview=preview, timed=timed, tick=tick)
+
+
+def batches(jobs: Iterable[Job], most: int = MOST) -> list[Batch]:
+    """Jobs that are played together, in their order.
+
+    Timed jobs are played by themselves, and so are those of a reference that is made for one episode.
+
+    Args:
+        jobs: All jobs.
+        most: Most jobs of a batch.
+    """
+    out: list[Batch] = []
+    for _, alike in itertools.groupby(jobs, _together):
+        left = tuple(alike)
+        size = 1 if left[0].timed else most
+        out += [left[first : first + size] for first in range(0, len(left), size)]
+    return out
+
+
+def _together(job: Job) -> tuple[object, ...]:
+    return job.scenario.name, job.policy, canonical(job.parameters), canonical(jsonable(job.given)), job.timed
+
+
+def _in_sequence(batch: Batch, policy: Policy, tick: Tick | None) -> list[Episode]:
+    """Episodes of arms that play several one after the other; those before a job's are played, too."""
+    first = batch[0]
+    if isinstance(policy, ForeignPolicy) and policy.wrap is not None:
+        raise InvalidInputError(f"wrap: {first.scenario.name} is played in sequences of episodes, without wrappers.")
+    length = max(job.before for job in batch) + 1
+    starts = dict.fromkeys(job.seeds._replace(seed=job.seeds.seed - job.before) for job in batch)
+    chains = [[start._replace(seed=start.seed + k) for k in range(length)] for start in starts]
+    episodes = sequences(first.scenario, policy, chains, preview=first.preview, timed=first.timed, tick=tick)
+    played = {
+        seeds: episode for pair in zip(chains, episodes, strict=True) for seeds, episode in zip(*pair, strict=True)
+    }
+    return [played[job.seeds] for job in batch]
+
+
+def _row(job: Job, episode: Episode) -> Row:
+    return measure(
+        job.scenario,
+        job.policy,
+        job.parameters,
+        job.seeds,
+        episode,
+        machine=describe(),
+        preview=furthest(job.preview),
+        fingerprint=job.fingerprint,
+        test_set=job.test_set,
+        best_known=best_known.cost(job.scenario, job.seeds.seed, job.seeds.arm_seed),
+        ideal=job.ideal,
+    )
+
+
+def _shared(jobs: Sequence[Job], workers: Workers) -> tuple[list[Batch], list[Batch]]:
+    """The batches that workers play, and those that are played here."""
+    if workers.cluster is not None:
+        away = batches((job for job in jobs if not job.timed), BLOCK)
+        return away, batches(job for job in jobs if job.timed)
+    every = batches(jobs)
+    return (every, []) if workers.number > 1 and len(every) > 1 else ([], every)
+
+
+def _elsewhere(away: Sequence[Batch], workers: Workers) -> Iterator[tuple[Batch, Results]]:
+    """The batches that workers play; results from a cluster are checked."""
+    if not away:
+        return
+    check_picklable({batch[0].specification: None for batch in away})
+    check = _ClusterCheck() if workers.cluster is not None else None
+    with contextlib.closing(finished(work, away, workers)) as all_done:
+        for batch, future in all_done:
+            try:
+                results, node = future.result()
+            except WorkerError as e:
+                raise WorkerError(
+                    f"{batch[0].policy} in {batch[0].scenario.name}: {e} If memory is short, try fewer --workers. "
+                    "Finished episodes are kept; continue with --resume."
+                ) from None
+            if check is not None:
+                check.check(batch, results, node)
+            yield batch, results
+
+
+def work(batch: Batch) -> tuple[Results, str]:
+    """Plays a batch in a worker process: rows with the worker's own digest of the scenario, and its processor."""
+    digest = fingerprint(batch[0].scenario)
+    return [(dataclasses.replace(row, fingerprint=digest), one) for row, one in play(batch)], processor()
+
+
+@functools.cache
+def processor() -> str:
+    """What compiled code is made for; the name of a processor is not enough on virtual machines."""
+    return f"{llvm.get_host_cpu_name()} {llvm.get_host_cpu_features().flatten()}"
+
+
+class _ClusterCheck:
+    """Checks what a cluster returns: its nodes may have other versions of the code, and other processors."""
+
+    def __init__(self) -> None:
+        self._here = _kind(describe()), processor()
+        self._replayed: dict[tuple[str, str], set[str]] = {}
+
+    def check(self, batch: Batch, results: Results, node: str) -> None:
+        """Checks the results of a batch, and plays an episode again for each kind of machine.
+
+        Raises:
+            WorkerError: A worker has played something else, or has other costs than this machine.
+        """
+        first, (row, _) = batch[0], results[0]
+        expected = [(job.key, job.fingerprint, ikgym.__version__) for job in batch]
+        if [(one.key, one.fingerprint, one.machine.get("ikgym")) for one, _ in results] != expected:
+            raise WorkerError(
+                f"A worker has played something else than {first.policy} in {first.scenario.name}: it has ikgym "
+                f"{row.machine.get('ikgym')}, here is {ikgym.__version__}. Install the same on all nodes."
+            )
+        kind = _kind(row.machine), node
+        replayed = self._replayed.setdefault(kind, set())
+        if len(replayed) < REPLAYED and first.policy not in replayed:
+            replayed.add(first.policy)
+            ((again, _),) = play((first,))
+            compare(row, again, 0.0 if kind == self._here else TOLERANCE)
+
+
+def compare(there: Row, here: Row, tolerance: float) -> None:
+    """Compares costs of a cluster with those of this machine; those that are not finite have to be equal.
+
+    Raises:
+        WorkerError: They differ.
+    """
+    for name in ("total_cost", "tracking_cost", "velocity_cost"):
+        far, near = getattr(there, name), getattr(here, name)
+        both_nan = math.isnan(far) and math.isnan(near)
+        if not both_nan and not math.isclose(far, near, rel_tol=tolerance, abs_tol=MEANINGLESS if tolerance else 0.0):
+            raise WorkerError(
+                f"{there.policy} in {there.scenario}, seed {there.seed}: {name} is {far!r} on {_kind(there.machine)} "
+                f"and {near!r} here; expected a relative difference of at most {tolerance:g}. Nothing of that batch is "
+                "kept: install the same versions on all nodes."
+            )
+
+
+def _kind(machine: Mapping[str, Any]) -> str:
+    """The properties of a machine that decide about the last bits of a number."""
+    return canonical({name: value for name, value in machine.items() if name != "cores"})
+
+
+class _Line(logging.Handler):
+    """The progress bar, which also shows when kernels are compiled.
+
+    Args:
+        bar: The bar.
+    """
+
+    def __init__(self, bar: Any) -> None:
+        super().__init__()
+        self._bar, self._description, self._compiling = bar, "", False
+
+    def announce(self, job: Job, done: int, total: int) -> None:
+        """Shows which episodes are played, or have been."""
+        self._description = f"{job.scenario.name} · {job.policy} ({done}/{total})"
+        self._bar.set_description(self._description, refresh=False)
+
+    def tick(self, steps: int) -> None:
+        """Moves the bar."""
+        if self._compiling:
+            self._compiling = False
+            self._bar.set_description(self._description, refresh=False)
+        self._bar.update(steps)
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Shows compilation in the bar itself; other messages above it."""
+        text = record.getMessage()
+        if not text.startswith("Compiling "):
+            self._bar.write(text, file=sys.stderr)
+            return
+        self._compiling = True
+        self._bar.set_description(text.partition(",")[0], refresh=True)
+
+    @contextlib.contextmanager
+    def watching(self) -> Iterator[None]:
+        """Receives log messages while episodes are played, if the bar is shown."""
+        if self._bar.disable:
+            yield
+            return
+        logger.addHandler(self)
+        try:
+            yield
+        finally:
+            logger.removeHandler(self)

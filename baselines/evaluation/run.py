@@ -1,0 +1,120 @@
+"""The evaluation as a whole: jobs are planned, played and scored, and files are written."""
+
+from __future__ import annotations
+
+import contextlib
+import datetime
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from baselines.evaluation import report
+from baselines.evaluation.jobs import plan
+from baselines.evaluation.machine import describe
+from baselines.evaluation.options import Options
+from baselines.evaluation.play import run
+from baselines.evaluation.policies import ALL, AnyPolicy
+from baselines.evaluation.results import PAGE, Results, Rows
+from baselines.files import locked, write
+from baselines.workers import Workers
+from ikgym.scenarios import Scenario
+
+
+def evaluate(
+    scenarios: str | Scenario | Iterable[str | Scenario] = (),
+    policies: AnyPolicy | Iterable[AnyPolicy] = ALL,
+    **options: Any,
+) -> Rows:
+    """Plays all policies on all scenarios, and measures them.
+
+    Untimed episodes of one policy in one scenario are played together. Everything but the time columns is the same in
+    each run, however many episodes are timed and whatever the number of workers. A policy that does not suit a
+    scenario is skipped there, and listed in the result.
+
+    Args:
+        scenarios: Scenarios, their names, ``"file.toml"`` or ``"package.module:attribute"``; ``"all"`` stands for all
+            registered scenarios.
+        policies: Names, names with parameters such as ``"dls:damping=1e-2"``, or pairs such as
+            ``("dls", {"damping": 1e-2})``; ``"agent:PATH"`` for an agent in a file; classes and instances of
+            :class:`baselines.SolverPolicy`; any object or class with the `predict` of Stable-Baselines3;
+            ``"package.module:Class"`` for one of those; ``"all"`` stands for all registered policies. A class or
+            function that requires an argument receives the scenario. A policy that is no
+            :class:`baselines.SolverPolicy` is called for one arm at a time, and once more before the first step, which
+            does not count.
+        **options: Fields of :class:`baselines.evaluation.options.Options`: test_sets, episodes, split, steps, preview,
+            wrap, timed, workers, cluster, out, resume, overwrite, plots, report, export, noise_seeds, pairs, progress.
+            More than one of `workers` needs a main module that may be imported, that is with
+            ``if __name__ == "__main__":``.
+
+    Returns:
+        One row an episode, policy by policy within each scenario: a list, whose `skipped` lists the policies that do
+        not suit a scenario.
+
+    Raises:
+        TypeError: There is no such option.
+        UnknownNameError: There is no such scenario, policy, parameter, split, test set, format or cluster.
+        InvalidInputError: A value is out of range; a policy cannot be imported, refuses what it is shown, states no
+            preview, cannot be sent to a worker or chooses an invalid action; no policy suits any scenario; a test set
+            has drifted or is given with options that it defines.
+        ResultsError: `out` cannot be read or written, or its results cannot be continued; the file of an agent cannot
+            be used.
+        WorkerError: Workers died repeatedly over one batch, or have other costs than this machine.
+        ClusterError: There is no cluster.
+        MissingDependencyError: The package of the cluster is not installed.
+    """
+    return carry_out(scenarios, policies, Options(**options))
+
+
+def carry_out(
+    scenarios: str | Scenario | Iterable[str | Scenario],
+    policies: AnyPolicy | Iterable[AnyPolicy],
+    options: Options,
+    *,
+    command: str = "baselines.evaluate.evaluate(…)",
+    show: Callable[[Rows], None] | None = None,
+) -> Rows:
+    """See :func:`evaluate`.
+
+    Args:
+        scenarios: The scenarios.
+        policies: The policies.
+        options: All options.
+        command: The command, as the files state it.
+        show: Called with the rows before plots are drawn, which takes a while.
+    """
+    jobs, skipped = plan(scenarios, policies, options)
+    workers = Workers(options.workers, options.cluster)
+    workers.check()
+    with contextlib.nullcontext() if options.out is None else locked(options.out):
+        results = None if options.out is None else Results(options.out, jobs, describe(), options)
+        left = [job for job in jobs if results is None or not results.done(job)]
+        rows = {} if results is None else {row.key: row for row in results.rows}
+        with contextlib.closing(run(left, workers, progress=options.progress)) as played:
+            for batch, some in played:
+                rows.update({row.key: row for row, _ in some})
+                if results is not None:
+                    results.add(batch, some)
+        out = Rows([rows[job.key] for job in jobs], skipped)
+        if show is not None:
+            show(out)
+        if results is not None:
+            _finish(results, out, options, command)
+        return out
+
+
+def _finish(results: Results, rows: Rows, options: Options, command: str) -> None:
+    """Writes the files that are made from the rows."""
+    pictures = {}
+    if options.plots:
+        # matplotlib is slow to import, and most evaluations from Python draw nothing.
+        from baselines.evaluation.plots import draw
+
+        pictures = draw(results, progress=options.progress)
+    results.save()
+    results.save_csv()
+    now = datetime.datetime.now(datetime.UTC)
+    text = report.readme(results.rows, rows.skipped, command=command, date=now, pictures=pictures)
+    write(results.directory / "README.md", text.encode())
+    if options.report:
+        from baselines.evaluation.html import page
+
+        write(results.directory / PAGE, page(results, rows.skipped, command=command, date=now))

@@ -1,0 +1,270 @@
+"""Policy specifications: policies that are not yet bound to a scenario."""
+
+from __future__ import annotations
+
+import abc
+import dataclasses
+import inspect
+from collections.abc import Mapping
+from typing import Any, cast
+
+from baselines import registry
+from baselines.canonical import jsonable
+from baselines.episodes import Policy, Seeds
+from baselines.evaluation.foreign import ForeignPolicy, Predictor, Wrap
+from baselines.fingerprints import same
+from baselines.policy import Problem, SolverPolicy
+from ikgym.exceptions import InvalidInputError, MissingDependencyError
+from ikgym.preview import offsets
+from ikgym.scenarios import Preview, Scenario
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Specification(abc.ABC):
+    """A policy specification, not yet bound to a scenario.
+
+    Args:
+        name: The name of the policy in rows.
+    """
+
+    name: str
+
+    @property
+    def identifiable(self) -> bool:
+        """Whether name and parameters identify the policy, so that its results can be continued later."""
+        return True
+
+    def given(self, scenario: Scenario, seeds: Seeds) -> dict[str, Any]:
+        """The parameters that the policy is made with for one episode."""
+        del scenario, seeds
+        return {}
+
+    def per_episode(self, scenario: Scenario) -> bool:
+        """Whether the policy is made anew for each episode, as references with privileged information are."""
+        return self.given(scenario, Seeds(0)) != self.given(scenario, Seeds(1))
+
+    @abc.abstractmethod
+    def bind(self, scenario: Scenario, given: Mapping[str, Any], preview: Preview | None) -> Policy:
+        """The policy for a scenario.
+
+        Args:
+            scenario: The scenario.
+            given: The parameters from :meth:`given`.
+            preview: Steps ahead that the policy is shown; its own if None.
+
+        Raises:
+            IkgymError: The policy cannot be made.
+        """
+
+    @abc.abstractmethod
+    def parameters(self, scenario: Scenario, policy: Policy) -> dict[str, Any]:
+        """The parameters of the bound policy that rows state."""
+
+    @abc.abstractmethod
+    def unsuited(self, scenario: Scenario, seeds: Seeds, preview: Preview | None) -> str | None:
+        """The reason why the policy does not suit a scenario; None if it does."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class SolverSpecification(Specification):
+    """A class of policies with its parameters.
+
+    Args:
+        name: The name of the policy in rows.
+        kind: The class, or the reason why a registered policy cannot be imported.
+        chosen: The parameters that the user gives.
+    """
+
+    kind: type[SolverPolicy] | str
+    chosen: Mapping[str, Any]
+
+    def given(self, scenario: Scenario, seeds: Seeds) -> dict[str, Any]:
+        """The user's parameters, and the seeds that a reference needs to know its episode."""
+        return {**self._seeds(scenario, seeds), **self.chosen}
+
+    def bind(self, scenario: Scenario, given: Mapping[str, Any], preview: Preview | None) -> SolverPolicy:
+        """See :meth:`Specification.bind`."""
+        del preview
+        if isinstance(self.kind, str):
+            raise InvalidInputError(self.kind)
+        return self.kind.for_scenario(scenario, **given)
+
+    def parameters(self, scenario: Scenario, policy: Policy) -> dict[str, Any]:
+        """All parameters except the seeds of the episode."""
+        assert isinstance(policy, SolverPolicy)
+        hidden = self._seeds(scenario, Seeds(0, policy.parameters.get("arm_seed"))).keys() - self.chosen.keys()
+        return {name: jsonable(value) for name, value in policy.parameters.items() if name not in hidden}
+
+    def unsuited(self, scenario: Scenario, seeds: Seeds, preview: Preview | None) -> str | None:
+        """See :meth:`Specification.unsuited`. Refused parameters are an error of the user's, not a lack of suitability.
+
+        A policy whose package is not installed suits no scenario.
+        """
+        decisive = () if isinstance(self.kind, str) else self.kind.decisive
+        chosen = {key: self.chosen[key] for key in decisive if key in self.chosen}
+        try:
+            self.bind(scenario, {**self._seeds(scenario, seeds), **chosen}, preview)
+        except (InvalidInputError, MissingDependencyError) as e:
+            return str(e)
+        return None
+
+    def _seeds(self, scenario: Scenario, seeds: Seeds) -> dict[str, Any]:
+        """The seeds that a reference takes as parameters."""
+        if isinstance(self.kind, str) or not self.kind.reference:
+            return {}
+        drawn = {"seed": scenario.random or scenario.plant.random, "arm_seed": seeds.arm_seed is not None}
+        names = self.kind.parameter_names()
+        return {name: getattr(seeds, name) for name, needed in drawn.items() if needed and name in names}
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class InstanceSpecification(Specification):
+    """A policy that is already bound to a scenario.
+
+    Args:
+        name: The name of the policy in rows.
+        policy: The policy.
+    """
+
+    policy: SolverPolicy
+
+    def bind(self, scenario: Scenario, given: Mapping[str, Any], preview: Preview | None) -> SolverPolicy:
+        """The policy itself."""
+        del scenario, given, preview
+        return self.policy
+
+    def parameters(self, scenario: Scenario, policy: Policy) -> dict[str, Any]:
+        """All parameters."""
+        del scenario, policy
+        return {name: jsonable(value) for name, value in self.policy.parameters.items()}
+
+    def unsuited(self, scenario: Scenario, seeds: Seeds, preview: Preview | None) -> str | None:
+        """See :meth:`Specification.unsuited`."""
+        del seeds, preview
+        if self.policy.reference and scenario.random:
+            return f"{self.name} has privileged information on one episode: give its name instead of an instance."
+        mine, there = self.policy.problem, Problem.of(scenario)
+        for field in dataclasses.fields(Problem):
+            if not same(getattr(mine, field.name), getattr(there, field.name)):
+                return f"{self.name} was made for a scenario with another {field.name}."
+        return None
+
+
+class _RefusedError(InvalidInputError):
+    """A class or factory refuses the scenario."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class ForeignSpecification(Specification):
+    """An object with the `predict` of Stable-Baselines3, or a class or factory of such objects.
+
+    Args:
+        name: The name of the policy in rows.
+        model: The object, the class or factory, or its import path ``"package.module:Class"``.
+        chosen: The parameters that a class or factory is called with.
+        wrap: Wraps the environment.
+    """
+
+    model: Any
+    chosen: Mapping[str, Any]
+    wrap: Wrap | None = None
+
+    @property
+    def identifiable(self) -> bool:
+        """Whether it is a class or an import path; two objects of one class may differ."""
+        return isinstance(self.model, (str, type))
+
+    def bind(self, scenario: Scenario, given: Mapping[str, Any], preview: Preview | None) -> Policy:
+        """See :meth:`Specification.bind`.
+
+        Raises:
+            InvalidInputError: It cannot be imported or made, has no `predict`, or does not state its preview.
+        """
+        del given
+        model = registry.load(self.model) if isinstance(self.model, str) else self.model
+        if isinstance(model, type) or not callable(getattr(model, "predict", None)):
+            model = self._call(model, scenario)
+        if isinstance(model, SolverPolicy):
+            if reason := InstanceSpecification(self.name, model).unsuited(scenario, Seeds(0), preview):
+                raise _RefusedError(reason)
+            return model
+        if not callable(getattr(model, "predict", None)):
+            raise InvalidInputError(f"Policy {self.name!r}: expected an object with a predict, got {model!r}.")
+        known = getattr(model, "parameters", None)
+        own = self.chosen or (known if isinstance(known, Mapping) else {})
+        ahead = self._preview(model, preview)
+        return ForeignPolicy(self.name, cast(Predictor, model), ahead, self.wrap, jsonable(own))
+
+    def parameters(self, scenario: Scenario, policy: Policy) -> dict[str, Any]:
+        """The parameters that are known."""
+        del scenario
+        return dict(jsonable(getattr(policy, "parameters")))  # noqa: B009
+
+    def unsuited(self, scenario: Scenario, seeds: Seeds, preview: Preview | None) -> str | None:
+        """See :meth:`Specification.unsuited`."""
+        del seeds
+        try:
+            policy = self.bind(scenario, {}, preview)
+        except _RefusedError as e:
+            return str(e)
+        return policy.misfit(scenario) if isinstance(policy, ForeignPolicy) else None
+
+    def _call(self, factory: Any, scenario: Scenario) -> Any:
+        """The object that a class or factory makes; the scenario is passed if an argument is required."""
+        if not callable(factory):
+            raise InvalidInputError(
+                f"Policy {self.name!r}: expected a class derived from SolverPolicy, an object with a predict, or a "
+                f"class or function that makes one, got {factory!r}."
+            )
+        try:
+            return factory(*([scenario] if _needs_argument(factory, self.chosen) else []), **self.chosen)
+        except InvalidInputError as e:
+            raise _RefusedError(str(e)) from e
+        except Exception as e:  # whatever the user's code raises
+            raise InvalidInputError(f"Policy {self.name!r}: cannot be made: {type(e).__name__}: {e}.") from e
+
+    def _preview(self, model: Any, preview: Preview | None) -> Preview:
+        own = getattr(model, "preview", None) if preview is None else preview
+        if own is None:
+            raise InvalidInputError(
+                f"Policy {self.name!r}: the number of steps ahead that it is shown is unknown. Give preview=…, or give "
+                "the object an attribute preview: a number, or the steps such as (1, 10, 40)."
+            )
+        try:
+            offsets(own)
+        except InvalidInputError as e:
+            raise InvalidInputError(f"Policy {self.name!r}: {e}") from None
+        return tuple(own) if isinstance(own, list) else cast(Preview, own)
+
+
+def shown_preview(policy: Policy, preview: Preview | None) -> Preview:
+    """The steps ahead that a policy is shown.
+
+    Args:
+        policy: The policy.
+        preview: The user's choice; None for that of the policy.
+
+    Raises:
+        InvalidInputError: The chosen steps do not begin with those that a solver needs.
+    """
+    if preview is None or isinstance(policy, ForeignPolicy):
+        return policy.preview
+    if isinstance(preview, int):
+        return preview
+    needed, shown = offsets(policy.preview), offsets(preview)
+    if shown[: len(needed)] != needed or not (isinstance(policy.preview, int) or shown == needed):
+        raise InvalidInputError(f"{policy.name} needs to be shown the steps {needed} ahead, got preview={preview}.")
+    return preview
+
+
+def _needs_argument(factory: Any, given: Mapping[str, Any]) -> bool:
+    """Whether a class or factory cannot be called without an argument."""
+    try:
+        parameters = inspect.signature(factory).parameters.values()
+    except (TypeError, ValueError):  # some that are written in C have no signature
+        return False
+    positional = {inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD}
+    return any(
+        one.kind in positional and one.name not in given and (one.default is one.empty or one.name == "scenario")
+        for one in parameters
+    )
