@@ -17,7 +17,7 @@ COMMANDS = {
     "dataset": ("write episodes as a Minari data set", "baselines.dataset"),
     "reproduce": ("draw the figures of the papers again, and test their claims", "baselines.reproduce"),
     "leaderboard": ("compare policies on test sets in one table with intervals", "baselines.leaderboard"),
-    "robustness": ("map the cost of policies over two severities of an imperfect plant", "baselines.robustness"),
+    "robustness": ("map the cost of policies over severities of an imperfect plant", "baselines.robustness"),
     "view": ("show policies side by side in a browser, live and in an episode", "baselines.viewer.view"),
     "video": ("write an episode as a video", "baselines.viewer.video"),
     "oracle": ("search best known costs", "baselines.optimum"),

@@ -167,7 +167,7 @@ def test_files_are_shown_like_members(tmp_path, monkeypatch, capsys):
     assert re.search(r"^  path takes +3\.5\d* s, the episode 3\.6 s$", text, re.MULTILINE)
     assert re.search(r"^  within reach +not all poses: missed from 1\.\d+ s to 2\.\d+ s, at \(0\.8", text, re.MULTILINE)
     assert main(["scenarios", "panda-line"]) == 0
-    assert re.search(r"^  within reach +all poses that were looked at$", capsys.readouterr().out, re.MULTILINE)
+    assert re.search(r"^  within reach +all sampled poses$", capsys.readouterr().out, re.MULTILINE)
     assert main(["scenarios", "panda-random"]) == 0
     assert "within reach" not in capsys.readouterr().out
 

@@ -154,7 +154,7 @@ def test_resuming_plays_what_is_not_exported_yet_and_overwriting_removes_it(tmp_
 def test_faults():
     with pytest.raises(UnknownNameError, match=r"no format of export 'cvs'\. Did you mean 'csv'\?"):
         evaluate("varga7-fast", "dls", export="cvs")
-    with pytest.raises(InvalidInputError, match="export: expected a folder, `out` or --out"):
+    with pytest.raises(InvalidInputError, match="export: expected a folder for the files, `out` or --out"):
         evaluate("varga7-fast", "dls", export="csv")
 
 

@@ -425,7 +425,7 @@ def test_models_of_stable_baselines3():
     assert (wrapped[0].policy, wrapped[0].preview) == ("PPO", 2)
     with pytest.raises(InvalidInputError, match="PPO has observations of the shape"):
         evaluate(HELIX, flat, steps=STEPS, preview=2)
-    with pytest.raises(InvalidInputError, match="'PPO': nobody says how many steps ahead"):
+    with pytest.raises(InvalidInputError, match="'PPO': the number of steps ahead"):
         evaluate(HELIX, plain, steps=STEPS)
 
 
@@ -444,13 +444,13 @@ def test_others_go_to_worker_processes_if_they_can(solved):
         evaluate(HELIX, [Hidden(), "dls"], steps=3, workers=2)
     assert len(evaluate(HELIX, Hidden(), steps=3, workers=2)) == 1  # one batch needs no worker
     job = pickle.loads(pickle.dumps(planned(HELIX, here("Borrowed"), steps=3).jobs[0]))
-    assert job.make().name == here("Borrowed")
+    assert job.bind().name == here("Borrowed")
 
 
 def test_results_of_an_object_are_never_taken_for_those_of_another(tmp_path):
     options = {"steps": 3, "out": tmp_path, "plots": False}
     evaluate(HELIX, [Borrowed(), here("Borrowed")], **options)
-    with pytest.raises(ResultsError, match="results of the object Borrowed cannot be told from those of another"):
+    with pytest.raises(ResultsError, match="results of the object Borrowed cannot be distinguished from those of another"):
         evaluate(HELIX, Borrowed(damping=0.1), resume=True, **options)
     assert [row.policy for row in read_rows(tmp_path / "results.json")] == ["Borrowed", here("Borrowed")]
     (row,) = evaluate(HELIX, here("Borrowed"), resume=True, **options)

@@ -58,8 +58,9 @@ def test_the_table_sorts_and_filters(browser, folder):
         assert len(names(tab)) == 8
         head = tab.locator("#results thead th", has_text="total cost").first
         orders = []
-        for _ in range(2):
+        for direction in ("ascending", "descending"):
             head.click()
+            tab.wait_for_selector(f"#results th[aria-sort={direction}]")
             cells = "lines => lines.map(line => Number(line.children[6].dataset.order))"
             orders.append(tab.eval_on_selector_all("#results tbody tr", cells))
         assert orders[0] == sorted(orders[0])
