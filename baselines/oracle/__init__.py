@@ -5,12 +5,23 @@
 
 The cost is exactly the environment's, its optimum is sought from many starts, and nobody certifies that there is no
 cheaper path: it is the best known one. What a cost ratio is stated against lies in `baselines/data/best_known.json`,
-and ``python -m baselines.optimum --update`` brings that up to date.
+and ``ikgym oracle --update`` brings that up to date.
 """
 
 from __future__ import annotations
 
-from baselines.oracle.cache import solve
-from baselines.oracle.optimum import Optimum, Search, Start
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from baselines.oracle.cache import solve
+    from baselines.oracle.optimum import Optimum, Search, Start
 
 __all__ = ["Optimum", "Search", "Start", "solve"]
+
+
+def __getattr__(name: str) -> Any:
+    """The public names, imported when first used: best known costs are looked up without the solvers of a search."""
+    if name in __all__:
+        return getattr(importlib.import_module(f"{__name__}.{'cache' if name == 'solve' else 'optimum'}"), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

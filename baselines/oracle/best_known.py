@@ -25,7 +25,7 @@ Key = tuple[str, int]
 #: The records that come with the package.
 DATA = pathlib.Path(__file__).parents[1] / "data" / "best_known.json"
 #: What brings them up to date.
-UPDATE = "python -m baselines.optimum --update"
+UPDATE = "ikgym oracle --update"
 #: A best known cost up to here is rounding: an arm that may move where costs do not count can come to zero, and no
 #: ratio to that means anything.
 MEANINGLESS = 1e-9

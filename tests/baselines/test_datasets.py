@@ -16,7 +16,7 @@ pytest.importorskip("minari", reason='needs Minari: pip install "ikgym[data]"')
 import minari
 
 from baselines import datasets
-from baselines.dataset import main
+from baselines.cli.dataset import main
 from baselines.datasets import write
 from baselines.evaluate import evaluate
 from baselines.files import ResultsError
@@ -99,7 +99,7 @@ def test_the_command(tmp_path, monkeypatch, capsys):
 def test_a_killed_process_is_resumed(tmp_path):
     killed, whole = tmp_path / "killed-v0", tmp_path / "whole-v0"
     arguments = ["--scenario", "varga7-random", "--policy", "dls", "--episodes", "40", "--resume", "--out"]
-    line = [sys.executable, "-m", "baselines.dataset", *arguments, str(killed)]
+    line = [sys.executable, "-m", "baselines.cli", "dataset", *arguments, str(killed)]
     process = subprocess.Popen(line, cwd=ROOT, stderr=subprocess.DEVNULL)
     while process.poll() is None and not list(killed.glob("blocks/*")):
         time.sleep(0.001)

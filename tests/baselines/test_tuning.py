@@ -14,9 +14,9 @@ pytest.importorskip("optuna", reason='needs Optuna: pip install "ikgym[train]"')
 import optuna
 
 from baselines import registry, tuning
+from baselines.cli.tune import main
 from baselines.files import ResultsError
 from baselines.spec import parse_policy
-from baselines.tune import main
 from baselines.tuning import JOURNAL, RANGES, Search
 from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError, UnknownNameError
@@ -105,7 +105,7 @@ def test_a_killed_command_is_resumed_by_several_workers(tmp_path, plays):
     arguments = ["--scenario", "varga7-random", "--policies", "dls", "--episodes", "1", "--trials", "12"]
     arguments += ["--out", str(tmp_path), "--resume", "--workers", "2"]
     journal = tmp_path / JOURNAL
-    process = subprocess.Popen([sys.executable, "-m", "baselines.tune", *arguments], cwd=ROOT)
+    process = subprocess.Popen([sys.executable, "-m", "baselines.cli", "tune", *arguments], cwd=ROOT)
     while process.poll() is None and not (journal.exists() and journal.read_bytes().count(b"settings") > 2):
         time.sleep(0.01)
     process.kill()

@@ -399,7 +399,7 @@ def test_wrappers_that_change_the_episode_are_refused(wrap, message):
 
 
 def test_there_must_be_somebody_to_wrap_for():
-    with pytest.raises(InvalidInputError, match="wrap: expected a policy that it is for"):
+    with pytest.raises(InvalidInputError, match="wrap: expected a policy that uses it"):
         evaluate(HELIX, "dls", steps=STEPS, wrap=flattened)
 
 
@@ -450,7 +450,9 @@ def test_others_go_to_worker_processes_if_they_can(solved):
 def test_results_of_an_object_are_never_taken_for_those_of_another(tmp_path):
     options = {"steps": 3, "out": tmp_path, "plots": False}
     evaluate(HELIX, [Borrowed(), here("Borrowed")], **options)
-    with pytest.raises(ResultsError, match="results of the object Borrowed cannot be distinguished from those of another"):
+    with pytest.raises(
+        ResultsError, match="results of the object Borrowed cannot be distinguished from those of another"
+    ):
         evaluate(HELIX, Borrowed(damping=0.1), resume=True, **options)
     assert [row.policy for row in read_rows(tmp_path / "results.json")] == ["Borrowed", here("Borrowed")]
     (row,) = evaluate(HELIX, here("Borrowed"), resume=True, **options)

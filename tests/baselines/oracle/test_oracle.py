@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 
 import baselines
 import ikgym
-from baselines import optimum as optimum_command
+from baselines.cli import oracle as optimum_command
 from baselines.episodes import rollout
 from baselines.evaluate import evaluate
 from baselines.evaluation import test_sets

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import datetime
 import pathlib
-import sys
 from collections.abc import Sequence
 from typing import Annotated
 
@@ -67,7 +66,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         The exit code: 0, 2 after an expected error, 130 after Ctrl-C.
     """
-    program = command.program("tune", "python -m baselines.tune")
+    program = "ikgym tune"
     return command.run_resumable(Options, arguments, program, manual, _work)
 
 
@@ -87,7 +86,3 @@ def _work(options: Options, text: str) -> None:
         ratio = one["tuned"] / one["default"]
         print(f"{one['spec']}: {ratio:.4g} times the cost of its defaults, {one['tried']} tried: {one['settings']}")
     print(f"\nwritten to {options.out}")
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import pathlib
-import sys
 from collections.abc import Sequence
 from typing import Annotated
 
@@ -59,7 +58,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         The exit code: 0, 2 after an expected error, 130 after Ctrl-C.
     """
-    program = command.program("dataset", "python -m baselines.dataset")
+    program = "ikgym dataset"
     return command.run_resumable(Options, arguments, program, manual, _work)
 
 
@@ -70,7 +69,3 @@ def _work(options: Options, _: str) -> None:
     datasets.write(**{field.name: getattr(options, field.name) for field in dataclasses.fields(options)}, progress=True)
     folder = options.out.resolve()
     print(f'{options.out}: MINARI_DATASETS_PATH={options.out.parent}, minari.load_dataset("{folder.name}")')
-
-
-if __name__ == "__main__":
-    sys.exit(main())

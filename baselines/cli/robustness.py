@@ -25,8 +25,6 @@ from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario, imperfect
 from ikgym.validation import number
 
-#: The name of the command where Python runs its module.
-PROGRAM = "python -m baselines.robustness"
 #: How thoroughly best known costs are searched that are not recorded: on these paths all starts find the same optimum.
 HOW = Search(starts=20, generations=0)
 
@@ -121,7 +119,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         The exit code: 0, 2 after an expected error, 130 after Ctrl-C.
     """
-    return shared.run_resumable(Options, arguments, shared.program("robustness", PROGRAM), manual, _work)
+    return shared.run_resumable(Options, arguments, "ikgym robustness", manual, _work)
 
 
 def _work(options: Options, command: str) -> None:
@@ -161,7 +159,3 @@ def _write(out: pathlib.Path, lines: Sequence[table.Record]) -> None:
     write(out / "map.md", f"{text}\n".encode())
     write(out / "map.png", png(severity_map(lines)))
     print(text)
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

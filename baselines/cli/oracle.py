@@ -1,4 +1,4 @@
-"""The best known costs, from the command line: ``python -m baselines.optimum --help``."""
+"""The best known costs, ``ikgym oracle``."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class Options:
 
 def manual() -> str:
     """The text of ``--help`` above the options."""
-    names, prog = ", ".join(scenario_registry.names()), _program()
+    names, prog = ", ".join(scenario_registry.names()), "ikgym oracle"
     return f"""\
 Finds the cheapest joint paths of whole episodes that are known, from many starts, and keeps their costs as records:
 cost ratio = cost / best known cost. Nobody certifies that there is no cheaper path.
@@ -210,7 +210,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _carry_out(arguments: Sequence[str]) -> int:
     # The numbers of a search are checked as soon as they are read.
-    options = command.parse(Options, arguments, prog=_program(), description=manual())
+    options = command.parse(Options, arguments, prog="ikgym oracle", description=manual())
     kept, wrong = 0, 0
     todo = episodes(options.scenarios, options.test_sets, options.seeds)
     workers = Workers(cluster=options.cluster)
@@ -225,11 +225,3 @@ def _carry_out(arguments: Sequence[str]) -> int:
     if options.update:
         print(f"{kept} of {len(todo)} records are new or better: {best_known.DATA.name}")
     return 1 if wrong else 0
-
-
-def _program() -> str:
-    return command.program("oracle", "python -m baselines.optimum")
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -16,8 +16,6 @@ from baselines.evaluation.run import evaluate
 from baselines.files import write
 from ikgym.exceptions import InvalidInputError
 
-#: The name of the command where Python runs its module.
-PROGRAM = "python -m baselines.leaderboard"
 #: The test set that scores are published on.
 MAIN = "varga7-pose-random"
 
@@ -102,7 +100,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         The exit code: 0, 2 after an expected error, 130 after Ctrl-C.
     """
-    return shared.run_resumable(Options, arguments, shared.program("leaderboard", PROGRAM), manual, _work)
+    return shared.run_resumable(Options, arguments, "ikgym leaderboard", manual, _work)
 
 
 def _work(options: Options, command: str) -> None:
@@ -129,7 +127,3 @@ def _work(options: Options, command: str) -> None:
     for one in rows.skipped:
         print(f"skipped: {one.policy} in {one.scenario}: {one.reason}")
     print(f"\nwritten to {options.out}")
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

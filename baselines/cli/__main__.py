@@ -1,0 +1,5 @@
+"""The command ``ikgym`` as ``python -m baselines.cli``."""
+
+from baselines.cli import main
+
+raise SystemExit(main())
