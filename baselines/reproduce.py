@@ -28,14 +28,13 @@ from baselines.evaluation.machine import describe
 from baselines.evaluation.plots.style import png
 from baselines.files import write
 from baselines.files.locks import locked
-from baselines.papers import PAPERS, get
-from baselines.papers.ledger import ledger
+from baselines.papers import PAPERS, get, ledger
 from baselines.papers.paper import Finding, Paper
 from baselines.papers.runs import Runs
 from ikgym.exceptions import InvalidInputError
 from ikgym.validation import whole_number
 
-#: What the claims of each paper came to, by paper and claim.
+#: The results of testing claims, by paper and claim.
 Findings = dict[str, dict[str, Finding]]
 
 
@@ -51,8 +50,9 @@ def reproduce(
 
     Args:
         papers: Names of papers.
-        figures: Numbers of the figures to draw; all if left out. Claims are tested if it is left out.
-        out: Where files go: ``PAPER/figure-NN.png``, ``PAPER/numbers.json`` and ``papers.md``; nowhere if left out.
+        figures: Numbers of the figures to draw. If left out, all are drawn, and the claims are tested.
+        out: Folder for ``PAPER/figure-NN.png``, ``PAPER/numbers.json``, ``claims.csv`` and ``papers.md``; no files if
+            left out.
         steps: Most steps of an episode, for trials, whose findings mean nothing.
         progress: Whether to show bars and the files written on stderr.
 
@@ -68,33 +68,23 @@ def reproduce(
         whole_number("steps", steps, at_least=1)
     chosen = [get(name) for name in papers]
     numbers = None if figures is None else set(figures)
-    _check_figures(chosen, numbers)
-    folder = None if out is None else pathlib.Path(out)
-    with contextlib.nullcontext() if folder is None else locked(folder):
-        return _reproduced(chosen, numbers, Runs(steps, progress=progress), folder, progress=progress)
-
-
-def _reproduced(
-    chosen: Sequence[Paper], numbers: set[int] | None, runs: Runs, folder: pathlib.Path | None, *, progress: bool
-) -> Findings:
-    findings: Findings = {}
     for paper in chosen:
-        drawn = _draw(paper, runs, numbers, folder, progress=progress)
-        findings[paper.name] = {} if numbers is not None else {c.name: c.test(runs) for c in paper.claims}
-        if folder is not None:
-            _write_numbers(folder / paper.name / "numbers.json", drawn, findings[paper.name])
-    if folder is not None and numbers is None:
-        write(folder / "papers.md", ledger(chosen, findings).encode())
-    return findings
-
-
-def _check_figures(papers: Sequence[Paper], numbers: set[int] | None) -> None:
-    for paper in papers:
         there = [figure.number for figure in paper.figures]
         if missing := (numbers or set()) - set(there):
-            raise InvalidInputError(
-                f"figure: paper {paper.name!r} has no figure {min(missing)} to be drawn again; it has {there}."
-            )
+            raise InvalidInputError(f"figure: paper {paper.name!r} has no figure {min(missing)}; it has {there}.")
+    folder, runs = None if out is None else pathlib.Path(out), Runs(steps, progress=progress)
+    findings: Findings = {}
+    with contextlib.nullcontext() if folder is None else locked(folder):
+        for paper in chosen:
+            drawn = _draw(paper, runs, numbers, folder, progress=progress)
+            findings[paper.name] = {} if numbers is not None else {c.name: c.test(runs) for c in paper.claims}
+            if folder is not None:
+                _write_numbers(folder / paper.name / "numbers.json", drawn, findings[paper.name])
+        if folder is not None and numbers is None:
+            results = ledger.rows(findings)
+            write(folder / "claims.csv", ledger.to_csv(results).encode())
+            write(folder / "papers.md", ledger.markdown(chosen, results).encode())
+    return findings
 
 
 def _draw(
@@ -115,26 +105,24 @@ def _draw(
 
 
 def _write_numbers(file: pathlib.Path, drawn: Mapping[str, Any], findings: Mapping[str, Finding]) -> None:
-    content = {
-        "machine": describe(),
-        "figures": drawn,
-        "claims": {name: finding._asdict() for name, finding in findings.items()},
+    claims = {
+        name: {"verdict": found.verdict, "holds": found.holds, "figures": found.figures, "more": found.more}
+        for name, found in findings.items()
     }
+    content = {"machine": describe(), "figures": drawn, "claims": claims}
     write(file, (json.dumps(jsonable(content), indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode())
 
 
 @dataclasses.dataclass(frozen=True)
 class Options:
-    """What the command line takes."""
+    """Options of the command."""
 
     paper: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME …")] = tuple(PAPERS)
     """Papers: varga, faitli, khan, zhang."""
     figure: Annotated[tuple[int, ...], tyro.conf.arg(metavar="N …")] = ()
-    """Figures to draw, by their numbers in the paper. All of them, and the claims, if left out."""
+    """Figures to draw, by their numbers in the paper. If left out, all are drawn, and the claims are tested."""
     out: Annotated[pathlib.Path, tyro.conf.arg(metavar="DIR")] = pathlib.Path("results/papers")
     """Folder for the files."""
-    ledger: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None
-    """Where the ledger of claims goes besides DIR/papers.md, for example docs/papers.md. Needs all papers."""
     steps: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
     """Most steps of an episode, for trials, whose findings mean nothing."""
 
@@ -143,17 +131,17 @@ def manual() -> str:
     """The text of ``--help`` above the options."""
     prog = _program()
     return f"""\
-Regenerates the experiments of the papers: every figure drawn again from episodes played here, every claim tested.
+Regenerates the experiments of the papers: draws every figure again and tests every claim.
 
 Examples:
   {prog}
   {prog} --paper khan --figure 3 4
-  {prog} --ledger docs/papers.md
 
 Files in the folder of --out:
   PAPER/figure-NN.png  a figure of the paper, with its number there
   PAPER/numbers.json   the numbers behind the figures and the claims
-  papers.md            the ledger: claim by claim, how it was tested, what came out"""
+  claims.csv           claim by claim, the verdict and the figures
+  papers.md            the same as tables, with how each claim was tested"""
 
 
 def _program() -> str:
@@ -164,10 +152,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """The command line.
 
     Args:
-        arguments: What stands behind the command; taken from the process if left out.
+        arguments: The arguments; those of the process if left out.
 
     Returns:
-        The exit code: 0, 2 where something expected went wrong, 130 after Ctrl-C.
+        The exit code: 0, 2 after an expected error, 130 after Ctrl-C.
     """
     given = sys.argv[1:] if arguments is None else list(arguments)
     return command.run(lambda: _carry_out(given))
@@ -175,19 +163,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _carry_out(arguments: Sequence[str]) -> int:
     options = command.parse(Options, arguments, prog=_program(), description=manual())
-    if options.ledger is not None and (set(options.paper) != set(PAPERS) or options.figure or options.steps):
-        raise InvalidInputError("ledger: needs all papers, all figures and whole episodes.")
     findings = reproduce(
-        options.paper,
-        figures=options.figure or None,
-        out=options.out,
-        steps=options.steps,
-        progress=True,
+        options.paper, figures=options.figure or None, out=options.out, steps=options.steps, progress=True
     )
-    if options.ledger is not None:
-        write(options.ledger, ledger([get(name) for name in PAPERS], findings).encode())
-    for paper, of_paper in findings.items():
-        for name, finding in of_paper.items():
-            print(f"{paper:8} {finding.verdict:13} {name}: {finding.evidence}")
+    for row in ledger.rows(findings):
+        print(f"{row['paper']:8} {row['verdict']:13} {row['claim']}: {row['figures']}")
     print(f"\nwritten to {options.out}")
     return 0

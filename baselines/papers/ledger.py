@@ -1,54 +1,67 @@
-"""The ledger: what the papers claim, how it was tested, and what came out."""
+"""The ledger: what the papers claim and what their tests found, as a CSV file and as a table in Markdown."""
 
 from __future__ import annotations
 
+import csv
+import io
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from baselines.papers.paper import Finding, Paper
 
-HEAD = """\
-# The ledger of claims
+#: Fields of the CSV file.
+FIELDS = ("paper", "claim", "verdict", "figures")
 
-Every claim of the four papers that can be checked, with the verdict *reproduced*, *contradicted*, *depends* or *not
-testable*. *Depends* means that it holds in one reading or condition that the text allows and fails in another; the row
-says which. A contradicted claim fails in all of them. It is a result: nothing here was bent to make a paper right.
-Written by
-
-```sh
-python -m baselines.reproduce --ledger docs/papers.md
-```
-
-which draws the papers' figures again besides, in `results/papers`. All figures are those of that run; times are those
-of single calls on the machine that it ran on.
-"""
+Row = Mapping[str, str]
 
 
-def ledger(papers: Sequence[Paper], findings: Mapping[str, Mapping[str, Finding]]) -> str:
-    """The ledger as Markdown.
+def rows(findings: Mapping[str, Mapping[str, Finding]]) -> list[Row]:
+    """One row a claim.
+
+    Args:
+        findings: The results, by paper and claim.
+    """
+    return [
+        dict(zip(FIELDS, (paper, claim, found.verdict, found.text), strict=True))
+        for paper, of_paper in findings.items()
+        for claim, found in of_paper.items()
+    ]
+
+
+def to_csv(results: Iterable[Row]) -> str:
+    """The rows as the text of a CSV file."""
+    out = io.StringIO()
+    writer = csv.DictWriter(out, FIELDS, lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(results)
+    return out.getvalue()
+
+
+def from_csv(text: str) -> list[Row]:
+    """The rows of a CSV file that :func:`to_csv` has written."""
+    return list(csv.DictReader(io.StringIO(text)))
+
+
+def markdown(papers: Sequence[Paper], results: Iterable[Row]) -> str:
+    """The ledger as Markdown: a table for each paper.
 
     Args:
         papers: The papers, in order.
-        findings: What the claims came to, by paper and claim.
+        results: The rows of all their claims.
     """
-    parts = [HEAD]
+    by_claim = {(row["paper"], row["claim"]): row for row in results}
+    parts = []
     for paper in papers:
-        found = findings[paper.name]
-        counts = Counter(finding.verdict for finding in found.values())
+        of_paper = [by_claim[paper.name, claim.name] for claim in paper.claims]
+        counts = Counter(row["verdict"] for row in of_paper)
         parts += [
             f"## {paper.title}\n",
             f"{', '.join(f'{number} {verdict}' for verdict, number in sorted(counts.items()))}.\n",
-            "| claim | where | how it was tested | what came out | verdict |\n|---|---|---|---|---|",
-            *(
-                f"| {c.text} | {c.where} | {c.how} | {_cell(found[c.name].evidence)} | *{found[c.name].verdict}* |"
-                for c in paper.claims
-            ),
-            "\nHow ambiguous places are read:\n",
-            *(f"- {reading}" for reading in paper.readings),
-            "",
+            "| claim | where | test | figures | verdict |\n|---|---|---|---|---|",
         ]
+        for claim, row in zip(paper.claims, of_paper, strict=True):
+            verdict = f"*{row['verdict']}*" + (f": {claim.condition}" if claim.condition else "")
+            cells = (claim.text, claim.where, claim.method, row["figures"], verdict)
+            parts.append(f"| {' | '.join(cells)} |")
+        parts.append("")
     return "\n".join(parts)
-
-
-def _cell(text: str) -> str:
-    return " ".join(text.split()).replace("|", "\\|")

@@ -1,19 +1,25 @@
-"""What a reproduction is made of: figures to draw again, and claims to test."""
+"""The data model of a reproduction: figures to draw again, claims, and the results of their tests."""
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping
+import pathlib
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType, ModuleType
 from typing import Any, Literal, NamedTuple
 
-import numpy as np
 from matplotlib.figure import Figure
 
 from baselines.papers.runs import Runs
-from ikgym.validation import FloatArray
 
-#: *depends*: holds in one reading or condition that the text allows and fails in another; the evidence says which.
+#: *depends*: holds in one reading or condition that the text allows, and fails in another.
 Verdict = Literal["reproduced", "contradicted", "depends", "not testable"]
+
+#: Measured figures by name, with the unit at the end of the name: ``{"largest error [mm]": 1.3}``.
+Figures = Mapping[str, float | Sequence[float]]
+
+_SCALES = {"%": 1e2, "mm": 1e3, "mrad": 1e3, "µm": 1e6, "ms": 1e3}
 
 
 class Drawn(NamedTuple):
@@ -21,7 +27,7 @@ class Drawn(NamedTuple):
 
     Attributes:
         figure: The picture.
-        numbers: What can be said of it in numbers, by name; units stand in the names, as in ``max_error_mm``.
+        numbers: The numbers behind it, by name; units stand in the names, as in ``max_error_mm``.
     """
 
     figure: Figure
@@ -29,46 +35,53 @@ class Drawn(NamedTuple):
 
 
 class Finding(NamedTuple):
-    """What the test of a claim found.
+    """The result of testing a claim.
 
     Attributes:
-        verdict: Whether the claim holds. A contradicted claim is a result; one that depends holds in one reading or
-            condition that the text allows, and fails in another.
-        evidence: The figures that show it, in one line with units.
-        numbers: The same by name, for machines.
+        holds: Whether the claim holds; by reading or condition if the text allows several; None if nothing in the text
+            decides.
+        figures: The figures that decide.
+        more: Further figures, for the file of numbers alone.
     """
 
-    verdict: Verdict
-    evidence: str
-    numbers: dict[str, Any]
+    holds: bool | Mapping[str, bool] | None
+    figures: Figures
+    more: Figures = MappingProxyType({})
+
+    @property
+    def verdict(self) -> Verdict:
+        """The verdict. A claim is contradicted only if it fails in all readings."""
+        if self.holds is None:
+            return "not testable"
+        outcomes = set(map(bool, self.holds.values() if isinstance(self.holds, Mapping) else (self.holds,)))
+        if len(outcomes) > 1:
+            return "depends"
+        return "reproduced" if outcomes == {True} else "contradicted"
+
+    @property
+    def text(self) -> str:
+        """The figures in one line, with units."""
+        return "; ".join(_entry(name, value) for name, value in self.figures.items())
 
 
-def verdict(holds: bool | np.bool_, evidence: str, /, **numbers: Any) -> Finding:
-    """The finding that a claim is reproduced if it holds, and contradicted if not."""
-    return Finding("reproduced" if holds else "contradicted", evidence, numbers)
+def _entry(name: str, value: float | Sequence[float]) -> str:
+    name, _, unit = name.partition("[")
+    values = ", ".join(f"{v:.3g}" for v in (value if isinstance(value, Sequence) else (value,)))
+    return " ".join(filter(None, (name.strip(), values, unit.removesuffix("]"))))
 
 
-def verdict_by_condition(holds: Mapping[str, bool | np.bool_], evidence: str, /, **numbers: Any) -> Finding:
-    """The finding on a claim that was tested in several readings or conditions, all of which the text allows.
+def scaled(values: Figures, unit: str) -> dict[str, float | Sequence[float]]:
+    """Figures in a unit that is convenient to read.
 
     Args:
-        holds: Whether the claim holds, by reading or condition.
-        evidence: See :class:`Finding`; says which reading or condition does what.
-        **numbers: The same by name.
+        values: Figures in SI units or as shares, by name without the unit.
+        unit: For example ``"mm"`` or ``"%"``.
     """
-    if len(set(map(bool, holds.values()))) == 1:
-        return verdict(all(holds.values()), evidence, **numbers)
-    return Finding("depends", evidence, numbers)
-
-
-def rms(values: FloatArray) -> float:
-    """Root mean square, in the unit of the values."""
-    return float(np.sqrt(np.mean(np.square(values))))
-
-
-def roughness(values: FloatArray) -> float:
-    """Root mean square of the second differences, in the unit of the values."""
-    return rms(np.diff(values, 2, axis=0))
+    scale = _SCALES.get(unit, 1.0)
+    return {
+        f"{name} [{unit}]": [scale * v for v in value] if isinstance(value, Sequence) else scale * value
+        for name, value in values.items()
+    }
 
 
 @dataclasses.dataclass(frozen=True)
@@ -77,7 +90,7 @@ class PaperFigure:
 
     Args:
         number: Its number in the paper.
-        title: What it shows.
+        title: Its subject.
         draw: Draws it from episodes.
     """
 
@@ -88,37 +101,47 @@ class PaperFigure:
 
 @dataclasses.dataclass(frozen=True)
 class Claim:
-    """What a paper says that can be tested.
+    """A statement of a paper that can be tested.
 
     Args:
         name: A short name, unique within the paper.
-        text: What is claimed, in one sentence.
-        where: Where it stands, for example ``"section IV, Fig. 6"``.
-        how: How it is tested here.
+        text: The claim in one sentence.
+        where: Its place in the paper, for example ``"section IV, fig. 6"``.
+        method: How it is tested here, with the threshold.
         test: Tests it on episodes.
+        condition: Where the verdict depends: when it holds. Where it is not testable: why not.
     """
 
     name: str
     text: str
     where: str
-    how: str
+    method: str
     test: Callable[[Runs], Finding]
+    condition: str = ""
 
 
 @dataclasses.dataclass(frozen=True)
 class Paper:
-    """A paper and what is reproduced of it.
+    """A paper and its reproduction.
 
     Args:
-        name: What the command line calls it.
-        title: Authors, title and year.
+        name: Its name on the command line.
+        title: Authors, year and subject.
         figures: Its figures.
         claims: Its claims.
-        readings: How places are read where the paper is silent, ambiguous or misprinted, one sentence each.
     """
 
     name: str
     title: str
     figures: tuple[PaperFigure, ...]
     claims: tuple[Claim, ...]
-    readings: tuple[str, ...]
+
+
+def claims_of(module: ModuleType) -> tuple[Claim, ...]:
+    """The claims of ``claims.toml`` beside a module, each tested by the module's function of the same name.
+
+    Args:
+        module: The module, such as :mod:`baselines.papers.varga.claims`.
+    """
+    text = pathlib.Path(str(module.__file__)).with_suffix(".toml").read_text(encoding="utf-8")
+    return tuple(Claim(name, test=vars(module)[name], **record) for name, record in tomllib.loads(text).items())

@@ -1,13 +1,13 @@
-"""Faitli and Tar 2018: the runs that figures and claims share, and what is read from them."""
+"""Faitli and Tar 2018: episodes that figures and claims share, and their Jacobians."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from baselines.episodes import Episode
+from baselines.papers.comparisons import sign_changes
 from baselines.papers.runs import Runs
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
@@ -17,12 +17,13 @@ from ikgym.validation import FloatArray
 STRETCHED, REGULAR, SHOULDER = "faitli3-stretched", "faitli3-regular", "faitli3-shoulder"
 TRAJECTORIES = (STRETCHED, REGULAR, SHOULDER)
 METHOD = "fixed_point"
-#: The share of a path's extent that can be seen in a plot of it: what is below is the width of the line.
-VISIBLE = 0.01
-#: A yank: the largest joint velocity of a run is above this many times the median over time of the fastest joint's.
-YANK = 10.0
 #: Distances of the shoulder axis from straight lines past it, in [m].
 DISTANCES = (0.1, 0.01, 0.001)
+
+
+def short(name: str) -> str:
+    """The name of a trajectory without that of the arm."""
+    return name.removeprefix("faitli3-")
 
 
 def solved(runs: Runs, name: str | Scenario = STRETCHED, **parameters: Any) -> Episode:
@@ -45,7 +46,7 @@ def past_shoulder(runs: Runs, distance: float) -> Scenario:
     x, y, z = scenario.arm.forward(start)[1]
     first, last = (np.concatenate([np.eye(3).ravel(), (x, way, z)]) for way in (y, -y))
     return scenario.replace(
-        name=f"line {1e3 * distance:g} mm from the shoulder axis",
+        name=f"line at {1e3 * distance:g} mm",
         trajectory=StraightLine(first, last, duration=2.0, blend=0.5),
         start=start,
         steps=min(2000, scenario.steps),
@@ -80,15 +81,10 @@ def singular_values(jacobian: FloatArray) -> FloatArray:
     return np.asarray(np.linalg.svd(jacobian, compute_uv=False), dtype=np.float64)
 
 
-def sign_changes(values: FloatArray) -> npt.NDArray[np.intp]:
-    """Numbers of the steps after which values change their sign. Shape (c,)."""
-    return np.flatnonzero(np.diff(np.sign(values)))
-
-
-def real_zeros(jacobian: FloatArray) -> npt.NDArray[np.intp]:
-    """Numbers of the steps after which a real part of an eigenvalue changes its sign."""
+def real_zeros(jacobian: FloatArray) -> list[int]:
+    """Indices of the steps after which the real part of an eigenvalue of J changes its sign."""
     real = np.sort(np.linalg.eigvals(jacobian).real, axis=1)
-    return np.unique(np.concatenate([sign_changes(column) for column in real.T]))
+    return sorted({step for column in real.T for step in sign_changes(column)})
 
 
 def times(scenario: Scenario) -> FloatArray:

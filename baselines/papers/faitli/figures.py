@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 from matplotlib.artist import Artist
 from matplotlib.ticker import MaxNLocator
 
 from baselines.evaluation.plots import style
+from baselines.papers.comparisons import rms, sign_changes
 from baselines.papers.drawing import Curve, Panel, picture
 from baselines.papers.faitli.episodes import (
     SHOULDER,
@@ -15,12 +15,11 @@ from baselines.papers.faitli.episodes import (
     jacobians,
     nominal_joints,
     real_zeros,
-    sign_changes,
     singular_values,
     solved,
     times,
 )
-from baselines.papers.paper import Drawn, PaperFigure, rms
+from baselines.papers.paper import Drawn, PaperFigure
 from baselines.papers.runs import Runs
 from ikgym.validation import FloatArray
 
@@ -112,7 +111,7 @@ def _eigenvalues(runs: Runs) -> Drawn:
     )
 
 
-def _parts(time: FloatArray, jacobian: FloatArray, passes: npt.NDArray[np.intp]) -> list[Curve]:
+def _parts(time: FloatArray, jacobian: FloatArray, passes: list[int]) -> list[Curve]:
     """The real parts by size, and the singular points; the dashed line is the last, as pairs lie upon each other."""
     real = np.sort(np.linalg.eigvals(jacobian).real, axis=1)
     order = {"smallest": 0, "largest": 2, "middle": 1}

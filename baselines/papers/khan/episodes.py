@@ -1,4 +1,4 @@
-"""Khan and Tar 2020: the runs that figures and claims share, and what is read from them."""
+"""Khan and Tar 2020: episodes that figures and claims share, their errors and eigenvalues."""
 
 from __future__ import annotations
 
@@ -7,24 +7,37 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from baselines.episodes import Episode
-from baselines.papers.paper import rms
+from baselines.papers.comparisons import larger, rms
+from baselines.papers.paper import Figures
 from baselines.papers.runs import Runs
+from baselines.status import Status
+from ikgym import Plant
 from ikgym.rotations import rotation_vector
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray
 
 Q1, Q7Q8 = "khan8-q1", "khan8-q7q8"
 METHOD = "abstract_rotation"
-#: The share by which the root mean square of an error has to change to count as a change: above it an error that has
-#: grown is degraded, below it it has remained. The same for all claims of this paper that compare two runs.
-CHANGED = 0.1
+#: Parameters of the method.
+Variant = dict[str, Any]
+
+PATHS = {"q1": Q1, "q7q8": Q7Q8}
+#: Closed loops with inversion under the same wrong model.
+CLOSED_LOOPS = ("moore_penrose", "broyden")
+#: λ_a as printed (5e-4), and a larger one.
+LAMBDAS: dict[str, Variant] = {"as printed": {}, "λ_a = 3e-3": {"lambda_a": 3e-3}}
+#: Standard deviations of joint zeros, axes and measured orientations in [rad], of links and measured positions in [m].
+DEVIATIONS = (1e-3, 1e-2, 1e-1)
+#: Root mean squares of the errors after 1 s, and the largest position error, as :func:`settled_errors` names them.
+POSITION, ANGLE, LARGEST = "rms_position_error_m", "rms_orientation_error_rad", "largest_position_error_m"
+
 #: ℱ with the orientation's nine elements at ½; 𝒲 with the last two joints at 0.01.
-LOOSE: dict[str, Any] = {"task_weights": (0.5,) * 9 + (1.0,) * 3}
-BLOCKED: dict[str, Any] = {"joint_weights": (1.0,) * 6 + (0.01,) * 2}
+LOOSE: Variant = {"task_weights": (0.5,) * 9 + (1.0,) * 3}
+BLOCKED: Variant = {"joint_weights": (1.0,) * 6 + (0.01,) * 2}
 
 
 class Points(NamedTuple):
-    """What came of an episode at its grid points, each after the point's last inner step.
+    """An episode at its grid points, each after the point's last inner step.
 
     Attributes:
         time: s in [s]. Shape (k,).
@@ -99,22 +112,47 @@ def settled_errors(points: Points) -> dict[str, float]:
     }
 
 
-def compare(runs: Runs, name: str, weights: dict[str, Any]) -> tuple[dict[str, float], dict[str, float]]:
-    """The settled errors of the method without weights, and with them."""
-    return settled_errors(at_points(runs, name)), settled_errors(at_points(runs, name, **weights))
+def extent(runs: Runs, name: str) -> float:
+    """Extent of the nominal path, in [m]."""
+    return float(np.linalg.norm(np.ptp(runs.scenario(name).nominal()[:, 9:], axis=0)))
 
 
-def growth(before: dict[str, float], after: dict[str, float]) -> tuple[float, float]:
-    """By what share the root mean squares of position and orientation error have grown."""
-    position, angle = (after[key] / before[key] - 1.0 for key in ("rms_position_error_m", "rms_orientation_error_rad"))
-    return position, angle
+def sound(runs: Runs, scenario: str | Scenario, variant: Variant) -> bool:
+    """Whether no step of a variant of the method diverges or fails."""
+    return bool((runs.play(scenario, METHOD, **variant).status <= int(Status.ITERATION_LIMIT)).all())
 
 
-def in_words(before: dict[str, float], after: dict[str, float]) -> str:
-    """The change of the settled errors, for a line of evidence."""
-    position, angle = "rms_position_error_m", "rms_orientation_error_rad"
-    of_position, of_angle = growth(before, after)
-    return (
-        f"root mean square after 1 s: orientation {before[angle]:.3f} → {after[angle]:.3f} rad ({of_angle:+.0%}), "
-        f"position {1e3 * before[position]:.1f} → {1e3 * after[position]:.1f} mm ({of_position:+.0%})"
+def no_worse(runs: Runs, one: Variant, other: Variant) -> bool:
+    """Whether no step of a variant fails on either path, and neither error is a tenth larger than another's."""
+    return all(
+        sound(runs, path, one)
+        and not any(
+            larger(
+                settled_errors(at_points(runs, path, **one))[key], settled_errors(at_points(runs, path, **other))[key]
+            )
+            for key in (POSITION, ANGLE)
+        )
+        for path in PATHS.values()
     )
+
+
+def errors_of_variants(runs: Runs, *variants: Variant) -> Figures:
+    """The errors of several variants on both paths, in their order."""
+    figures: dict[str, list[float]] = {}
+    for name, path in PATHS.items():
+        errors = [settled_errors(at_points(runs, path, **variant)) for variant in variants]
+        figures[f"{name} [mm]"] = [1e3 * e[POSITION] for e in errors]
+        figures[f"{name} [rad]"] = [e[ANGLE] for e in errors]
+    return figures
+
+
+def three_seconds(runs: Runs) -> Scenario:
+    """The path by joints 7 and 8 to s = 3 s."""
+    scenario = runs.scenario(Q7Q8)
+    return scenario.replace(name=f"{Q7Q8}, 3 s", steps=min(30_500, scenario.steps))
+
+
+def manufactured_arms(path: Scenario, size: float) -> list[Scenario]:
+    """A scenario with two arms whose joint zeros, links and axes differ from the model, by a size in [m] and [rad]."""
+    source = path.replace(arm=path.model, plant=Plant(zero=size, link=size, axis=size))
+    return [path.replace(arm=source.drawn_plant(seed).arm, model=path.model) for seed in range(2)]

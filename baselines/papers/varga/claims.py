@@ -1,115 +1,200 @@
-"""Varga 2021: what is claimed, and how it is tested, with the thresholds."""
+"""Varga 2021: the tests of the claims in ``claims.toml``, each function named after its claim."""
 
 from __future__ import annotations
 
-from baselines.papers.paper import Claim
-from baselines.papers.varga import effort, motion
+import time
 
-CLAIMS = (
-    Claim(
-        "printed step",
-        "The descent with α between 1e-8 and 5e-4 solves the fast task.",
-        "section IV",
-        "`rhc_gradient` on both readings of the arm, α starting anew at 1e-8 in each control step (restart) or kept, "
-        "the warm start as it was (unshifted) or shifted, which the text leaves open: no step blows up",
-        effort.printed_step,
-    ),
-    Claim(
-        "limit reached",
-        "In most of the time the maximal number of 450 steps was reached.",
-        "section IV, fig. 6",
-        "share of control steps with 450 descent steps in the same readings: more than half",
-        effort.limit_reached,
-    ),
-    Claim(
-        "offline only",
-        "Each step takes around 1 s; the method is mainly for offline applications.",
-        "section IV, fig. 6; section VI",
-        "`varga7-fast`, median wall time of a control step, finite differences if not said: longer than the 1 ms of "
-        "the grid; of all its steps until the stop test, and of the first 100 with the 450 steps that the paper has "
-        "in most of them",
-        effort.offline,
-    ),
-    Claim(
-        "time proportional",
-        "The time of a control step is proportional to its steps of the descent.",
-        "section IV, fig. 6",
-        "`varga7-fast`: time per gradient, of which a descent takes one more than steps, in the tenths of the calls "
-        "with the fewest and with the most: less than a tenth apart",
-        effort.time_proportional,
-    ),
-    Claim(
-        "multipliers cost more",
-        "Without Lagrange multipliers and reduced gradient the solution is considerably less complex.",
-        "abstract",
-        "median time of a call of `rhc_lagrange` on `varga7-fast`, with `states`, that is X kept as unknown beside "
-        "q and q̇ as in eq. 3, and with X eliminated, over that of `rhc_gradient`: 1.5 or more",
-        effort.lagrange,
-    ),
-    Claim(
-        "acceptable precision",
-        "A relatively fast motion is tracked with acceptable precision.",
-        "section IV, fig. 2 and 3",
-        "largest errors on `varga7-fast`; acceptable is not said to be what",
-        motion.acceptable,
-    ),
-    Claim(
-        "slow is finer",
-        "A much slower motion is tracked more precisely.",
-        "section IV, fig. 7 and 8",
-        "largest position errors on `varga7-fast` and `varga7-slow`: more is a tenth or more",
-        motion.slow_is_finer,
-    ),
-    Claim(
-        "fast fluctuates",
-        "With the fast motion the joint velocities fluctuate considerably.",
-        "section IV, fig. 5",
-        "`varga7-fast` without its first twentieth, α restarted and kept (up to 1e-4, since it diverges with 5e-4): "
-        "a joint velocity changes by more than a tenth of its peak within a step",
-        motion.fast_fluctuates,
-    ),
-    Claim(
-        "slow fluctuates",
-        "With the slow motion more significant fluctuations of the joint velocities occur.",
-        "section IV, fig. 10",
-        "second differences of the velocities without the first twentieth, absolute and relative, α restarted and "
-        "kept: more is a tenth or more",
-        motion.slow_fluctuates,
-    ),
-    Claim(
-        "other joint paths",
-        "Nominal and actual joint paths differ: the solution is ambiguous, and an optimal one was chosen.",
-        "section IV, fig. 4",
-        "largest distance of the joint coordinates from the nominal ones: more than 0.05 rad or m",
-        motion.other_joints,
-    ),
-    Claim(
-        "velocities bounded",
-        "Penalties for high joint velocities handle singularities better than the pseudoinverse.",
-        "abstract, section III",
-        "peak joint velocity beside that of `moore_penrose`: better is a tenth or more",
-        motion.bounded,
-    ),
-    Claim(
-        "smoothing calms",
-        "Second-order smoothing significantly reduces the fluctuation of the joint velocities.",
-        "section V, fig. 11",
-        "second differences (without the first twentieth) and total variation before and behind `smoothed`, "
-        "Λ = 300 / s, α restarted and kept: significantly is 1.5 times or more",
-        motion.smoother,
-    ),
-    Claim(
-        "smoothing errs",
-        "With smoothed trajectories the tracking error is significantly higher.",
-        "section V, fig. 13 and 14",
-        "largest position errors with and without the wrapper: significantly is 1.5 times or more",
-        motion.smoothing_errs,
-    ),
-    Claim(
-        "skew part determines",
-        "The independent elements of the rotation matrix can be expressed from its skew-symmetric part.",
-        "section III, eq. 7 and 8",
-        "share of the nominal paths beyond 90°, where another rotation has the same skew part: none",
-        motion.skew_determines,
-    ),
+import numpy as np
+
+from baselines.episodes import Episode
+from baselines.papers.comparisons import CONSIDERABLY, above, larger, rms
+from baselines.papers.paper import Finding, scaled
+from baselines.papers.runs import Runs
+from baselines.papers.varga.episodes import (
+    ALPHAS,
+    FAST,
+    KEPT,
+    LITERAL,
+    METHOD,
+    READINGS,
+    SLOW,
+    at_limit,
+    diverged,
+    fast,
+    fluctuation,
+    largest_jump,
+    nominal_angles,
+    nominal_path,
+    slow,
+    smooth,
+    variation,
+    without_start,
 )
+from baselines.papers.varga.interpreted import descend
+from ikgym.validation import FloatArray
+
+
+def _all_readings(runs: Runs) -> dict[str, Episode]:
+    """The episodes of both readings of the arm and all four readings of the descent."""
+    return {
+        ", ".join([arm, *reading.values()]): runs.play(name, METHOD, **reading)
+        for arm, name in (("varga7", FAST), ("literal", LITERAL))
+        for reading in READINGS
+    }
+
+
+def printed_step(runs: Runs) -> Finding:
+    """Share of the steps that diverge with the printed bounds of α, in all readings."""
+    shares = {label: diverged(episode) for label, episode in _all_readings(runs).items()}
+    episode = fast(runs)
+    cost = float((episode.tracking_cost + episode.velocity_cost).sum())
+    more = {"total cost": cost, "largest error [m]": float(episode.position_error.max())}
+    return Finding({label: share == 0.0 for label, share in shares.items()}, scaled(shares, "%"), more)
+
+
+def limit_reached(runs: Runs) -> Finding:
+    """Share of the steps with all 450 iterations, in all readings."""
+    shares = {label: at_limit(episode) for label, episode in _all_readings(runs).items()}
+    return Finding(above(shares, 0.5), scaled(shares, "%"))
+
+
+def offline_only(runs: Runs) -> Finding:
+    """Time of a step with the stop test, with all iterations, and interpreted."""
+    start = Runs(min(runs.steps or 100, 100))
+    episodes = {
+        "with the stop test": fast(runs),
+        "450 iterations": start.play(FAST, METHOD, tolerance=0.0),
+        "analytic gradients": start.play(FAST, METHOD, tolerance=0.0, gradient="analytic"),
+    }
+    times = {label: 1e-9 * float(np.median(episode.time_ns)) for label, episode in episodes.items()}
+    times["in NumPy"] = _interpreted(runs) * 450
+    more = {
+        "share over 1 ms": float((fast(runs).time_ns > 1e6).mean()),
+        "median iterations": float(np.median(fast(runs).iterations)),
+    }
+    return Finding(above(times, 1e-3), scaled(times, "ms"), more)
+
+
+def _interpreted(runs: Runs, iterations: int = 15) -> float:
+    """Time of one iteration of the interpreted descent in [s]."""
+    scenario = runs.scenario(FAST)
+    q, nominal = np.zeros(scenario.joints), scenario.nominal()[1:3]  # the path starts at home
+    times = []
+    for _ in range(3):
+        begin = time.perf_counter()
+        descend(scenario, q, nominal, iterations)
+        times.append(time.perf_counter() - begin)
+    return min(times) / iterations
+
+
+def time_proportional(runs: Runs) -> Finding:
+    """Time per gradient in the calls with the fewest and the most; a descent takes one more than it has iterations."""
+    episode = fast(runs)
+    gradients = episode.iterations + 1.0
+    micros = 1e-3 * episode.time_ns / gradients
+    few, many = np.percentile(gradients, (10, 90))
+    a, b = (float(np.median(micros[part])) for part in (gradients <= few, gradients >= many))
+    more = {"fewest, up to": float(few), "most, from": float(many)}
+    return Finding(not larger(max(a, b), min(a, b)), {"fewest [µs]": a, "most [µs]": b}, more)
+
+
+def multipliers_cost_more(runs: Runs) -> Finding:
+    """Time of `rhc_lagrange` over that of `rhc_gradient`, with the same gradients."""
+    ratios = {}
+    for gradient in ("finite_difference", "analytic"):
+        plain = runs.play(FAST, METHOD, gradient=gradient)
+        for states, label in ((True, "X kept"), (False, "X eliminated")):
+            reduced = runs.play(FAST, "rhc_lagrange", gradient=gradient, states=states)
+            ratio = float(np.median(reduced.time_ns) / np.median(plain.time_ns))
+            ratios[f"{label}, {gradient.replace('_', ' ')}"] = ratio
+    return Finding({label: ratio >= CONSIDERABLY for label, ratio in ratios.items()}, ratios)
+
+
+def acceptable_precision(runs: Runs) -> Finding:
+    """Largest errors on the fast path."""
+    episode = fast(runs)
+    largest = float(episode.position_error.max())
+    extent = float(np.ptp(runs.scenario(FAST).nominal()[:, 3:], axis=0).max())
+    figures = {"[mm]": 1e3 * largest, "of the extent [%]": 100.0 * largest / extent}
+    return Finding(None, {**figures, "[rad]": float(episode.orientation_error.max())})
+
+
+def _largest_error(episode: Episode) -> float:
+    return float(episode.position_error.max())
+
+
+def slow_is_finer(runs: Runs) -> Finding:
+    """Largest position errors on the fast and the slow path."""
+    a, b = _largest_error(fast(runs)), _largest_error(slow(runs))
+    return Finding(larger(a, b), scaled({"fast": a, "slow": b}, "mm"))
+
+
+def fast_fluctuates(runs: Runs) -> Finding:
+    """Largest change of a velocity in one step over the peak, and second differences."""
+    episodes = {name: runs.play(FAST, METHOD, **alpha) for name, alpha in ALPHAS.items()}
+    jumps = {name: largest_jump(episode.qdot) for name, episode in episodes.items()}
+    more = {f"second differences, {name}": fluctuation(episode.qdot) for name, episode in episodes.items()}
+    more["second differences, nominal"] = fluctuation(
+        np.diff(nominal_path(runs, FAST), axis=0) / runs.scenario(FAST).dt
+    )
+    return Finding(above(jumps, 0.1), scaled(jumps, "%"), more)
+
+
+def _fluctuations(qdot: FloatArray) -> dict[str, float]:
+    """Fluctuation of joint velocities in three measures."""
+    velocities = without_start(qdot)
+    differences, size = np.abs(np.diff(velocities, 2, axis=0)), rms(velocities)
+    return {
+        "RMS": rms(differences),
+        "relative RMS": rms(differences) / size,
+        "relative median": float(np.median(differences)) / size,
+    }
+
+
+def slow_fluctuates(runs: Runs) -> Finding:
+    """Second differences on the fast and the slow path, in three measures."""
+    holds, figures = {}, {}
+    for name, alpha in ALPHAS.items():
+        a, b = (_fluctuations(runs.play(path, METHOD, **alpha).qdot) for path in (FAST, SLOW))
+        for measure in a:
+            holds[f"{name}, {measure}"] = larger(b[measure], a[measure])
+            figures[f"{name}, {measure}"] = a[measure], b[measure]
+    return Finding(holds, figures)
+
+
+def other_joint_paths(runs: Runs) -> Finding:
+    """Largest distance of a joint coordinate from its nominal one."""
+    apart = float(np.abs(fast(runs).q - nominal_path(runs, FAST)[1:]).max())
+    return Finding(apart > 0.05, {"[rad or m]": apart})
+
+
+def velocities_bounded(runs: Runs) -> Finding:
+    """Peak joint velocities of the method and of the pseudoinverse."""
+    method, other = (float(np.abs(e.qdot).max()) for e in (fast(runs), runs.play(FAST, "moore_penrose")))
+    return Finding(larger(other, method), {"method [rad/s]": method, "pseudoinverse [rad/s]": other})
+
+
+def smoothing_calms(runs: Runs) -> Finding:
+    """Fluctuation before and after smoothing, by second differences and by total variation."""
+    kept = runs.play(FAST, METHOD, **KEPT), runs.play(FAST, "smoothed", policy=METHOD, options=KEPT)
+    holds, figures = {}, {}
+    for label, (before, after) in {"restarted": (fast(runs), smooth(runs)), "kept": kept}.items():
+        for name, measure in (("second differences", fluctuation), ("variation", variation)):
+            a, b = measure(before.qdot), measure(after.qdot)
+            holds[f"{label}, {name}"] = larger(a, b, CONSIDERABLY)
+            figures[f"{label}, {name}"] = a, b
+    return Finding(holds, figures)
+
+
+def smoothing_errs(runs: Runs) -> Finding:
+    """Largest position errors before and after smoothing."""
+    a, b = _largest_error(fast(runs)), _largest_error(smooth(runs))
+    return Finding(larger(b, a, CONSIDERABLY), scaled({"before": a, "after": b}, "mm"))
+
+
+def skew_part_determines(runs: Runs) -> Finding:
+    """Share of the nominal paths beyond 90°: the skew part is sin θ times the axis, the same for θ and π − θ."""
+    angles = {name: nominal_angles(runs, path) for name, path in (("fast", FAST), ("slow", SLOW))}
+    shares = {name: float((angle > 0.5 * np.pi).mean()) for name, angle in angles.items()}
+    more = {f"largest angle, {name} [rad]": float(angle.max()) for name, angle in angles.items()}
+    return Finding(max(shares.values()) == 0.0, scaled(shares, "%"), more)

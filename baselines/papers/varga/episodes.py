@@ -1,13 +1,14 @@
-"""Varga 2021: the runs that figures and claims share, their readings, and how much their velocities fluctuate."""
+"""Varga 2021: episodes that figures and claims share, and measures of their fluctuation."""
 
 from __future__ import annotations
 
 import itertools
+from typing import Any
 
 import numpy as np
 
 from baselines.episodes import Episode
-from baselines.papers.paper import roughness
+from baselines.papers.comparisons import roughness
 from baselines.papers.runs import Runs
 from baselines.status import Status
 from ikgym.validation import FloatArray
@@ -15,17 +16,17 @@ from ikgym.validation import FloatArray
 FAST, SLOW, LITERAL = "varga7-fast", "varga7-slow", "varga7-literal-fast"
 METHOD = "rhc_gradient"
 
-#: What the text leaves open: where α starts, and whether the warm start is shifted. The first is what figures show.
+#: The text leaves open where α starts and whether the warm start is shifted. Figures show the first reading.
 READINGS = tuple(
     {"alpha_start": alpha_start, "warm_start": warm_start}
     for alpha_start, warm_start in itertools.product(("restart", "kept"), ("unshifted", "shifted"))
 )
 
 #: α kept from period to period, with a bound below the printed one under which nothing diverges.
-KEPT = {"alpha_start": "kept", "alpha_max": 1e-4}
+KEPT: dict[str, Any] = {"alpha_start": "kept", "alpha_max": 1e-4}
 
-#: "significantly", "considerably": one and a half times; "more", "better": a tenth. The same for all claims.
-CONSIDERABLE, MORE = 1.5, 1.1
+#: Both readings of α with which nothing diverges.
+ALPHAS: dict[str, dict[str, Any]] = {"restarted": {}, "kept": KEPT}
 
 
 def fast(runs: Runs) -> Episode:
@@ -49,17 +50,17 @@ def nominal_path(runs: Runs, name: str) -> FloatArray:
 
 
 def diverged(episode: Episode) -> float:
-    """The share of steps that blew up."""
+    """The share of control steps that diverged."""
     return float((episode.status == Status.DIVERGED).mean())
 
 
 def at_limit(episode: Episode) -> float:
-    """The share of steps with all 450 steps of the descent."""
+    """The share of control steps with 450 iterations of the descent."""
     return float((episode.iterations == 450).mean())
 
 
 def without_start(qdot: FloatArray) -> FloatArray:
-    """Joint velocities without the start, whose jump from rest would outweigh all else."""
+    """Joint velocities without the first twentieth, whose jump from rest would outweigh the rest."""
     return qdot[len(qdot) // 20 :]
 
 
@@ -76,3 +77,11 @@ def largest_jump(qdot: FloatArray) -> float:
 def variation(qdot: FloatArray) -> float:
     """Total variation of the joint velocities: the sum of all changes over steps and joints, in [rad/s] and [m/s]."""
     return float(np.abs(np.diff(qdot, axis=0)).sum())
+
+
+def nominal_angles(runs: Runs, name: str) -> FloatArray:
+    """Angles of rotation from the home orientation along the nominal path, in [rad]. Shape (k,)."""
+    rotations, _ = runs.scenario(name).arm.forward(nominal_path(runs, name))
+    skew = 0.5 * (rotations - np.swapaxes(rotations, 1, 2))[:, (0, 0, 1), (1, 2, 2)]
+    sine, cosine = np.linalg.norm(skew, axis=1), 0.5 * (np.trace(rotations, axis1=1, axis2=2) - 1.0)
+    return np.asarray(np.arctan2(sine, cosine))

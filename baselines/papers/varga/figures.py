@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from baselines.episodes import Episode
+from baselines.papers.comparisons import rms, roughness
 from baselines.papers.drawing import Curve, Panel, picture
-from baselines.papers.paper import Drawn, PaperFigure, rms, roughness
+from baselines.papers.paper import Drawn, PaperFigure
 from baselines.papers.runs import Runs
 from baselines.papers.varga.episodes import (
     FAST,
@@ -145,47 +148,38 @@ def _effort(runs: Runs) -> Drawn:
 
 FLUCTUATES = "zoomed in to a domain where considerable fluctuations occur"
 
+
+def _velocities_at_their_worst(title: str, runs: Runs, name: str, episode: Episode) -> Drawn:
+    return _velocities(title, runs, name, episode, busiest(episode.qdot), FLUCTUATES)
+
+
+def _smoothed_velocities(title: str, runs: Runs, name: str, episode: Episode) -> Drawn:
+    part = busiest(fast(runs).qdot)
+    return _velocities(title, runs, name, episode, part, "zoomed in to the domain as in Fig. 5")
+
+
+def _figure(
+    number: int,
+    title: str,
+    draw: Callable[[str, Runs, str, Episode], Drawn],
+    name: str,
+    episode: Callable[[Runs], Episode],
+) -> PaperFigure:
+    return PaperFigure(number, title, lambda runs: draw(title, runs, name, episode(runs)))
+
+
 FIGURES = (
-    PaperFigure(2, "Cartesian tracking, fast", lambda r: _cartesian("Cartesian tracking, fast", r, FAST, fast(r))),
-    PaperFigure(
-        3, "Orientation tracking, fast", lambda r: _orientation("Orientation tracking, fast", r, FAST, fast(r))
-    ),
-    PaperFigure(4, "Joint paths, fast", lambda r: _joints("Joint paths, fast", r, FAST, fast(r))),
-    PaperFigure(
-        5,
-        "Joint velocities, fast",
-        lambda r: _velocities("Joint velocities, fast", r, FAST, fast(r), busiest(fast(r).qdot), FLUCTUATES),
-    ),
+    _figure(2, "Cartesian tracking, fast", _cartesian, FAST, fast),
+    _figure(3, "Orientation tracking, fast", _orientation, FAST, fast),
+    _figure(4, "Joint paths, fast", _joints, FAST, fast),
+    _figure(5, "Joint velocities, fast", _velocities_at_their_worst, FAST, fast),
     PaperFigure(6, "Time, steps and α of the descent, fast", _effort),
-    PaperFigure(7, "Cartesian tracking, slow", lambda r: _cartesian("Cartesian tracking, slow", r, SLOW, slow(r))),
-    PaperFigure(
-        8, "Orientation tracking, slow", lambda r: _orientation("Orientation tracking, slow", r, SLOW, slow(r))
-    ),
-    PaperFigure(9, "Joint paths, slow", lambda r: _joints("Joint paths, slow", r, SLOW, slow(r))),
-    PaperFigure(
-        10,
-        "Joint velocities, slow",
-        lambda r: _velocities("Joint velocities, slow", r, SLOW, slow(r), busiest(slow(r).qdot), FLUCTUATES),
-    ),
-    PaperFigure(
-        11,
-        "Smoothed joint velocities, the same part as figure 5",
-        lambda r: _velocities(
-            "Smoothed joint velocities",
-            r,
-            FAST,
-            smooth(r),
-            busiest(fast(r).qdot),
-            "zoomed in to the domain as in Fig. 5",
-        ),
-    ),
-    PaperFigure(12, "Joint paths, smoothed", lambda r: _joints("Joint paths, smoothed", r, FAST, smooth(r))),
-    PaperFigure(
-        13, "Cartesian tracking, smoothed", lambda r: _cartesian("Cartesian tracking, smoothed", r, FAST, smooth(r))
-    ),
-    PaperFigure(
-        14,
-        "Orientation tracking, smoothed",
-        lambda r: _orientation("Orientation tracking, smoothed", r, FAST, smooth(r)),
-    ),
+    _figure(7, "Cartesian tracking, slow", _cartesian, SLOW, slow),
+    _figure(8, "Orientation tracking, slow", _orientation, SLOW, slow),
+    _figure(9, "Joint paths, slow", _joints, SLOW, slow),
+    _figure(10, "Joint velocities, slow", _velocities_at_their_worst, SLOW, slow),
+    _figure(11, "Smoothed joint velocities", _smoothed_velocities, FAST, smooth),
+    _figure(12, "Joint paths, smoothed", _joints, FAST, smooth),
+    _figure(13, "Cartesian tracking, smoothed", _cartesian, FAST, smooth),
+    _figure(14, "Orientation tracking, smoothed", _orientation, FAST, smooth),
 )

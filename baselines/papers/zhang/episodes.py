@@ -1,16 +1,21 @@
-"""Zhang 2020: the runs that figures and claims share, and what is read from them."""
+"""Zhang 2020: episodes that figures and claims share, their inputs, outputs, Jacobians and λ."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from baselines.episodes import Episode
 from baselines.papers.runs import Runs
+from baselines.policy import Batch
+from baselines.registry import make
+from baselines.solvers.levenberg_marquardt.damping_parameters import typical_link
+from baselines.solvers.levenberg_marquardt.iteration import DampingMemory
 from baselines.solvers.levenberg_marquardt.presets import HelixPredictiveControl
+from baselines.status import Status
 from ikgym.scenarios import Scenario
+from ikgym.trajectories import StraightLine
 from ikgym.validation import FloatArray
 
 HELIX, LINE = "zhang3-helix", "zhang6-lspb"
@@ -69,6 +74,66 @@ def lambdas_used(episode: Episode) -> FloatArray:
     return np.concatenate([[HelixPredictiveControl.damping], episode.diagnostics["lambda"][:-1]])
 
 
-def listed(values: Mapping[str, float], form: str = ".3g", unit: str = "") -> str:
-    """Values by name, in words."""
-    return "; ".join(f"{name}: {value:{form}}{unit}" for name, value in values.items())
+def of_link(runs: Runs, scenario: str, share: float) -> float:
+    """λ in [m²], given as a share of the square of the mean link l."""
+    return share * float(typical_link(runs.scenario(scenario).arm)) ** 2
+
+
+def ramp_errors(runs: Runs, velocity: float, damping: float, horizon: int = 1) -> tuple[FloatArray, FloatArray]:
+    """The error that is left on a straight ramp of example 1's arm, and the same by eq. 10, both in [m].
+
+    Args:
+        runs: Plays the episode.
+        velocity: Way of one period, in [m].
+        damping: λ in [m²].
+        horizon: n.
+    """
+    scenario, q = runs.scenario(HELIX), np.array([0.3, 0.6, 1.0])
+    steps = min(scenario.steps, 400)
+    direction = np.array([1.0, 2.0, -2.0]) / 3.0
+    start = np.concatenate([np.eye(3).ravel(), scenario.arm.forward(q)[1]])
+    # The blends last 20 periods; the ramp ends after the episode.
+    end = start + np.concatenate([np.zeros(9), (steps + 30) * velocity * direction])
+    line = StraightLine(start, end, duration=float(steps + 50), blend=20.0)
+    ramp = scenario.replace(trajectory=line, start=q, initial_pose=None, steps=steps)
+    options: dict[str, Any] = {"one_step": True, "rule": "constant", "damping": damping}
+    if horizon > 1:
+        options["horizon"] = horizon
+    episode = runs.play(ramp, "mfac" if horizon == 1 else "mfapc", **options)
+    u, sigma, _ = np.linalg.svd(jacobians_used(ramp, episode)[-1])
+    formula = u @ np.diag(damping / sigma**2) @ u.T @ (velocity * direction)
+    return ramp.nominal()[-1] - episode.pose[-1], formula
+
+
+def along_the_helix(runs: Runs, policy: str, ahead: int, *, hold: bool = False, **parameters: Any) -> FloatArray:
+    """Inputs of single steps from all states of example 1, the first, singular one left out. Shape (steps - 1, 3).
+
+    Args:
+        runs: Plays the episode.
+        policy: The policy.
+        ahead: Its preview.
+        hold: Whether the first point of the preview is repeated.
+        **parameters: The policy's parameters.
+    """
+    scenario, episode = runs.scenario(HELIX), predictive(runs)
+    nominal, steps = scenario.nominal(preview=ahead), len(episode.q)
+    points = [np.arange(1, steps) + (1 if hold else 1 + j) for j in range(ahead)]
+    q = episode.q[:-1]
+    batch = Batch(
+        q, np.zeros_like(q), episode.pose[:-1], np.stack([nominal[p] for p in points], 1), np.ones((len(q), 1))
+    )
+    solver = make(policy, scenario, one_step=True, rule="constant", **parameters)
+    return solver.solve(batch, solver.memory(len(q))).qdot
+
+
+def unmet_of_the_way(runs: Runs) -> float:
+    """The largest error of example 2's horizon that (40) leaves unmet, as a share of the way of the period ahead."""
+    scenario, episode = runs.scenario(LINE), iterative(runs)
+    policy = make("mfapc_line", scenario)
+    nominal, later = scenario.nominal(preview=policy.preview), np.arange(2, len(episode.q) + 1)
+    q, ahead = episode.q[:-1], np.stack([nominal[later], nominal[later + 1]], axis=1)
+    batch = Batch(q, np.zeros_like(q), episode.pose[:-1], ahead, np.ones((len(q), 1)))
+    solution = policy.solve(batch, policy.memory(len(q)))
+    unmet = solution.status == Status.ITERATION_LIMIT
+    way = np.linalg.norm(scenario.task.error(ahead[unmet, 1], ahead[unmet, 0]), axis=1)
+    return float((DampingMemory(*solution.memory).error[unmet] / way).max())

@@ -7,8 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
+from baselines.papers.comparisons import rms
 from baselines.papers.drawing import Curve, Panel, picture
-from baselines.papers.paper import Drawn, PaperFigure, rms
+from baselines.papers.paper import Drawn, PaperFigure
 from baselines.papers.runs import Runs
 from baselines.papers.zhang.episodes import (
     HELIX,

@@ -1,39 +1,81 @@
-"""What the papers' claims share: verdicts by reading, and episodes of scenarios that are not in the catalogue."""
+"""The data model of reproductions: verdicts, figures in words, the ledger, and the episodes that claims share."""
 
 from __future__ import annotations
+
+import re
 
 import pytest
 
 import ikgym
-from baselines.papers.ledger import ledger
-from baselines.papers.paper import Claim, Finding, Paper, verdict_by_condition
+from baselines.papers import PAPERS, ledger
+from baselines.papers.comparisons import above, below, differ, falls, larger
+from baselines.papers.paper import Claim, Finding, Paper, scaled
 from baselines.papers.runs import Runs
+
+CLAIMS = [pytest.param(claim, id=f"{name}-{claim.name}") for name, paper in PAPERS.items() for claim in paper.claims]
 
 
 @pytest.mark.parametrize(
     ("holds", "wanted"),
     [
-        ((True, True), "reproduced"),
-        ((False, False, False), "contradicted"),
-        ((True, False), "depends"),
-        ((False, True, True), "depends"),
+        (True, "reproduced"),
+        (False, "contradicted"),
+        (None, "not testable"),
+        ({1: True, 2: True}, "reproduced"),
+        ({1: False, 2: False, 3: False}, "contradicted"),
+        ({1: True, 2: False}, "depends"),
+        ({}, "contradicted"),
     ],
 )
 def test_a_claim_is_contradicted_only_if_it_fails_in_all_readings(holds, wanted):
-    finding = verdict_by_condition(dict(enumerate(holds)), "1 m", error_m=1.0)
-    assert finding == Finding(wanted, "1 m", {"error_m": 1.0})
+    assert Finding(holds, {}).verdict == wanted
 
 
-def test_counts_name_what_there_is():
+def test_figures_in_words():
+    figures = {**scaled({"fast": 0.0537, "slow": [1e-3, 2e-3]}, "mm"), "[rad]": 0.25, "steps": 7}
+    assert Finding(True, figures).text == "fast 53.7 mm; slow 1, 2 mm; 0.25 rad; steps 7"
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "wanted"),
+    [
+        (1.0, 0.8, {"a": True}),
+        (0.8, 1.0, {"a": False}),
+        (1.0, 0.95, {}),
+        (2.0, 2.0, {}),
+        (0.0, 0.0, {}),
+        (0.0, 3.0, {"a": False}),
+        (7.08, 1.08, {"a": True}),
+        (1.08, 1.14, {}),
+    ],
+)
+def test_changes_of_less_than_a_tenth_decide_nothing(before, after, wanted):
+    assert falls({"a": (before, after)}) == wanted
+    assert differ(before, after) == differ(after, before) == bool(wanted)
+
+
+def test_thresholds():
+    assert larger(1.1001, 1.0)
+    assert not larger(1.0999, 1.0)
+    assert above({"a": 2.0, "b": 1.0}, 1.0) == {"a": True, "b": False}
+    assert below({"a": 2.0, "b": 1.0}, 2.0) == {"a": False, "b": True}
+
+
+def test_a_ledger_is_read_as_it_was_written():
     def claim(name):
-        return Claim(name, f"{name}.", "fig. 1", "played", lambda runs: Finding("depends", "", {}))
+        return Claim(name, f"{name}.", "fig. 1", "largest, of all", lambda runs: Finding(None, {}), "open")
 
-    paper = Paper("p", "P 2000", (), tuple(map(claim, "abc")), ())
-    found = {n: Finding(v, "1 m", {}) for n, v in zip("abc", ("depends", "reproduced", "depends"), strict=True)}
-    assert "2 depends, 1 reproduced." in ledger([paper], {"p": found})
+    paper = Paper("p", "P 2000", (), tuple(map(claim, "abc")))
+    results = ledger.rows(
+        {"p": {n: Finding(h, {"x [m]": 1.0}) for n, h in zip("abc", (None, True, None), strict=True)}}
+    )
+    assert ledger.from_csv(ledger.to_csv(results)) == results
+    text = ledger.markdown([paper], results)
+    assert "2 not testable, 1 reproduced." in text
+    assert "| a. | fig. 1 | largest, of all | x 1 m | *not testable*: open |" in text
 
 
-def test_runs_tell_scenarios_by_their_content():
+def test_episodes_are_identified_by_the_content_of_their_scenarios():
     runs = Runs(steps=5)
     scenario = ikgym.scenarios.get("faitli3-regular")
     slower = scenario.replace(dt=5e-4)
@@ -42,3 +84,16 @@ def test_runs_tell_scenarios_by_their_content():
     assert runs.play(scenario, "dls") is one
     assert runs.play(slower, "dls") is not one
     assert len(one.q) == 5
+
+
+@pytest.mark.parametrize("claim", CLAIMS)
+def test_words_of_claims_fit_a_table(claim):
+    for text in (claim.text, claim.where, claim.method):
+        assert text.strip() == text != ""
+        assert not re.search(r"[|\n]", text + claim.condition)
+
+
+@pytest.mark.parametrize("name", PAPERS)
+def test_claims_differ(name):
+    assert PAPERS[name].name == name
+    assert len({claim.text for claim in PAPERS[name].claims}) == len(PAPERS[name].claims)

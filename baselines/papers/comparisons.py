@@ -1,0 +1,61 @@
+"""Comparisons and thresholds that all claims share: like claims have like thresholds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from ikgym.validation import FloatArray
+
+#: "More", "smaller", "degraded": a tenth. "Significantly", "considerably": one and a half times.
+MORE, CONSIDERABLY = 1.1, 1.5
+#: Results are the same where they are apart by less than this share. It is also the width of a line in a plot: the
+#: share of a path's extent below which an error is not visible.
+SAME = 0.01
+#: A yank is a joint velocity above this many times the median over time of the fastest joint's.
+YANK = 10.0
+
+
+def larger(value: float, than: float, by: float = MORE) -> bool:
+    """Whether a value is larger than another by a factor, a tenth more if left out."""
+    return bool(value >= by * than)
+
+
+def differ(one: float, other: float) -> bool:
+    """Whether one of two values is larger than the other by a tenth or more."""
+    return one != other and (larger(one, other) or larger(other, one))
+
+
+def above(values: Mapping[str, float], limit: float) -> dict[str, bool]:
+    """Whether values are above a limit, by condition."""
+    return {name: bool(value > limit) for name, value in values.items()}
+
+
+def below(values: Mapping[str, float], limit: float) -> dict[str, bool]:
+    """Whether values are below a limit, by condition."""
+    return {name: bool(value < limit) for name, value in values.items()}
+
+
+def falls(pairs: Mapping[str, tuple[float, float]]) -> dict[str, bool]:
+    """Whether a value falls, in the conditions in which it changes by a tenth or more.
+
+    Args:
+        pairs: The value before and after, by condition.
+    """
+    return {name: after < before for name, (before, after) in pairs.items() if differ(before, after)}
+
+
+def rms(values: FloatArray) -> float:
+    """Root mean square, in the unit of the values."""
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+def roughness(values: FloatArray) -> float:
+    """Root mean square of the second differences, in the unit of the values."""
+    return rms(np.diff(values, 2, axis=0))
+
+
+def sign_changes(values: FloatArray) -> list[int]:
+    """Indices of the values after which the sign changes. Values of shape (k,)."""
+    return list(map(int, np.flatnonzero(np.diff(np.sign(values)))))

@@ -1,0 +1,397 @@
+"""Khan and Tar 2020: the tests of the claims in ``claims.toml``, each function named after its claim.
+
+One short function a claim: 35 of them in one file, so that each is found by the name of its claim.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from baselines.papers.comparisons import SAME, YANK, differ, larger, rms
+from baselines.papers.faitli.episodes import STRETCHED, TRAJECTORIES, short, singular_places
+from baselines.papers.khan.episodes import (
+    ANGLE,
+    BLOCKED,
+    CLOSED_LOOPS,
+    DEVIATIONS,
+    LAMBDAS,
+    LARGEST,
+    LOOSE,
+    METHOD,
+    PATHS,
+    POSITION,
+    Q1,
+    Q7Q8,
+    Variant,
+    at_points,
+    errors_of_variants,
+    extent,
+    manufactured_arms,
+    no_worse,
+    points_of,
+    settled_errors,
+    sound,
+    spectra,
+    three_seconds,
+    turned,
+)
+from baselines.papers.khan.section_2 import PLANAR, SIGNS, best, distortions, one_sign, planar_signs, turning
+from baselines.papers.paper import Figures, Finding, scaled
+from baselines.papers.runs import Runs
+from ikgym import Plant
+from ikgym.validation import FloatArray
+
+Errors = dict[str, float]
+
+
+def _weighted(runs: Runs, name: str, weights: Variant) -> tuple[Errors, Errors]:
+    """The settled errors of the method without weights, and with them."""
+    return settled_errors(at_points(runs, name)), settled_errors(at_points(runs, name, **weights))
+
+
+def _before_and_after(before: Errors, after: Errors) -> Figures:
+    return {
+        "position [mm]": (1e3 * before[POSITION], 1e3 * after[POSITION]),
+        "orientation [rad]": (before[ANGLE], after[ANGLE]),
+    }
+
+
+def level_path(runs: Runs) -> Finding:
+    """Variation of the height, and lean of the axis of rotation, along the nominal path."""
+    nominal = runs.scenario(Q1).nominal()
+    height, lean = float(np.ptp(nominal[:, 11])), float(np.abs(turned(nominal)[:, :2]).max())
+    actual = at_points(runs, Q1)
+    more = {"X₃, actual [m]": float(np.ptp(actual.settled(actual.pose[:, 11])))}
+    return Finding(height < 1e-12 and lean < 1e-12, {"X₃ [m]": height, "lean [rad]": lean}, more)
+
+
+def _steps_until(errors: FloatArray, level: float) -> float:
+    """Inner steps until an error is below a level for the first time, NaN if it never is."""
+    below = np.flatnonzero(errors < level)
+    return float(below[0] + 1) if len(below) else float("nan")
+
+
+def initial_position_error_relaxes(runs: Runs) -> Finding:
+    """Inner steps to half and to a tenth of the initial position error."""
+    scenario, episode = runs.scenario(Q1), runs.play(Q1, METHOD)
+    first = scenario.nominal()[0, 9:] - scenario.arm.forward(np.zeros(scenario.joints))[1]
+    initial = float(np.linalg.norm(first))
+    half, tenth = (_steps_until(episode.position_error, share * initial) for share in (0.5, 0.1))
+    reached = 0.0 if np.isnan(tenth) else float(scenario.points()[int(tenth)] * scenario.dt)
+    return Finding(0.0 < reached < 0.1, {"[s]": reached}, {"initial [m]": initial, "half": half, "tenth": tenth})
+
+
+def small_orientation_error(runs: Runs) -> Finding:
+    """Orientation errors on both paths, and the first peak."""
+    angle = runs.play(Q1, METHOD).orientation_error
+    peak = int(angle.argmax())
+    half = _steps_until(angle[peak:], 0.5 * angle[peak])
+    errors = [settled_errors(at_points(runs, name)) for name in PATHS]
+    figures = {"RMS [rad]": [e[ANGLE] for e in errors], "largest [rad]": [e[f"largest_{ANGLE[4:]}"] for e in errors]}
+    return Finding(None, figures, {"peak [rad]": float(angle[peak]), "steps to peak": peak + 1, "to half of it": half})
+
+
+def sixty_inner_steps(runs: Runs) -> Finding:
+    """Position errors at points 10 and 100, with 60 and with 10 inner steps at the first points."""
+    scenario = runs.scenario(Q1)
+    few = at_points(runs, scenario.replace(iterations_per_point=(10,), steps=min(scenario.steps, 1000)))
+    many = at_points(runs, Q1)
+    at = [min(k, len(many.time), len(few.time)) - 1 for k in (10, 100)]
+    a, b = few.position_error[at], many.position_error[at]
+    return Finding(bool((b < a).all()), {"with 10 [m]": a.tolist(), "with 60 [m]": b.tolist()})
+
+
+def f_weights_orientation_down(runs: Runs) -> Finding:
+    """Orientation error without and with ℱ."""
+    before, after = _weighted(runs, Q1, LOOSE)
+    return Finding(larger(after[ANGLE], before[ANGLE]), _before_and_after(before, after))
+
+
+def f_couples(runs: Runs) -> Finding:
+    """Position error without and with ℱ."""
+    before, after = _weighted(runs, Q1, LOOSE)
+    return Finding(differ(after[POSITION], before[POSITION]), {"[mm]": (1e3 * before[POSITION], 1e3 * after[POSITION])})
+
+
+def subtle_differences(runs: Runs) -> Finding:
+    """Distance of the joint coordinates without and with ℱ."""
+    apart = np.abs(at_points(runs, Q1).q - at_points(runs, Q1, **LOOSE).q).max(axis=0)
+    motion = float(np.ptp(at_points(runs, Q1).q, axis=0).max())
+    return Finding(None, {"[rad]": float(apart.max()), "of [rad]": motion}, {"each joint [rad]": apart.tolist()})
+
+
+def _blocked(runs: Runs, name: str) -> Finding:
+    """Ranges of joints 7 and 8, without and with 𝒲."""
+    free, held = (np.ptp(at_points(runs, name, **w).q[:, 6:], axis=0) for w in ({}, BLOCKED))
+    return Finding(bool((held < 0.1 * free).all()), {"without [rad]": free.tolist(), "with [rad]": held.tolist()})
+
+
+def w_blocks_joints(runs: Runs) -> Finding:
+    """On the path by joint 1."""
+    return _blocked(runs, Q1)
+
+
+def w_keeps_precision(runs: Runs) -> Finding:
+    """Beside the run without 𝒲, and beside the path's extent."""
+    before, after = _weighted(runs, Q1, BLOCKED)
+    share = after[LARGEST] / extent(runs, Q1)
+    holds = {
+        "beside the run without W": not any(larger(after[key], before[key]) for key in (POSITION, ANGLE)),
+        "beside the extent": share < SAME,
+    }
+    return Finding(holds, {**_before_and_after(before, after), "of the extent [%]": 100.0 * share})
+
+
+def general_path(runs: Runs) -> Finding:
+    """Ranges of the nominal coordinates, and whether the axis of the rotation from home changes."""
+    nominal = runs.scenario(Q7Q8).nominal()
+    ranges, vectors = np.ptp(nominal[:, 9:], axis=0), turned(nominal)
+    rank = np.linalg.svd(vectors, compute_uv=False)
+    largest = float(np.linalg.norm(vectors, axis=1).max())
+    holds = bool((ranges > 0.0).all()) and rank[1] > 1e-6 * rank[0]
+    return Finding(holds, {"[m]": ranges.tolist(), "rotation [rad]": largest})
+
+
+def acceptable_solutions(runs: Runs) -> Finding:
+    """Errors on the path by joints 7 and 8."""
+    errors = settled_errors(at_points(runs, Q7Q8))
+    figures = {"RMS [mm]": 1e3 * errors[POSITION], "[rad]": errors[ANGLE], "largest [mm]": 1e3 * errors[LARGEST]}
+    more = {"of the extent [%]": 100.0 * errors[LARGEST] / extent(runs, Q7Q8)}
+    return Finding(None, figures, {**more, "largest [rad]": errors["largest_orientation_error_rad"]})
+
+
+def w_degrades_q7_and_q8(runs: Runs) -> Finding:
+    """Errors without and with 𝒲."""
+    before, after = _weighted(runs, Q7Q8, BLOCKED)
+    holds = all(larger(after[key], before[key]) for key in (POSITION, ANGLE))
+    return Finding(holds, _before_and_after(before, after))
+
+
+def w_reduces_q7_and_q8(runs: Runs) -> Finding:
+    """On the path by joints 7 and 8."""
+    return _blocked(runs, Q7Q8)
+
+
+def stable_and_convergent(runs: Runs) -> Finding:
+    """On the path the error must not grow; with the target held, it must go on falling."""
+    points, scenario = at_points(runs, Q7Q8, **BLOCKED), runs.scenario(Q7Q8)
+    held = runs.play(scenario.replace(iterations_per_point=(scenario.steps,)), METHOD, **BLOCKED)
+    at = [min(k, scenario.steps) - 1 for k in (1_000, 10_000, 100_000)]
+    position, angle = held.position_error[at], held.orientation_error[at]
+    falls = bool((np.diff(position) <= 0.0).all() and (np.diff(angle) <= 0.0).all())
+    calm = falls and bool(points.position_error[-1] <= points.position_error[0])
+    figures = {"[mm]": (1e3 * position).tolist(), "[rad]": angle.tolist()}
+    return Finding(sound(runs, Q7Q8, BLOCKED) and calm, figures)
+
+
+def smallest_eigenvalue(runs: Runs) -> Finding:
+    """Smallest real parts along the path."""
+    least = spectra(runs, Q7Q8, **BLOCKED)[:, 0]
+    size = float(np.median(np.abs(least)))
+    holds = 1e-15 < size < 1e-13 and bool(least.min() < 0.0 < least.max())
+    return Finding(holds, {"median size [m²]": size}, {"range [m²]": [float(least.min()), float(least.max())]})
+
+
+def largest_eigenvalue(runs: Runs) -> Finding:
+    """Largest real parts along the path."""
+    most = spectra(runs, Q7Q8, **BLOCKED)[:, -1]
+    return Finding(None, {"[m²]": [float(most.min()), float(most.max())]})
+
+
+def delicate_by_the_zero(runs: Runs) -> Finding:
+    """Eigenvalues that vanish at every point say nothing of the path: rank 6 of 8 leaves two of them."""
+    real = np.concatenate([spectra(runs, Q1), spectra(runs, Q7Q8, **BLOCKED)])
+    vanishing = (np.abs(real) < 1e-9).sum(axis=1)
+    slowest = 1.0 / (5e-4 * real[:, 2].min())
+    more = {"third smallest [m²]": float(real[:, 2].min()), "largest [m²]": float(real[:, -1].max())}
+    figures = {"vanishing": [int(vanishing.min()), int(vanishing.max())], "slowest decay [steps]": slowest}
+    return Finding(not bool((vanishing == 2).all()), figures, more)
+
+
+CONTRACTION: Variant = {"deformation": "contraction"}
+NONE: Variant = {"counter_rotation": "none"}
+TASK: Variant = {"counter_rotation": "task"}
+
+
+def counter_rotation(runs: Runs) -> Finding:
+    """Whether anything gets worse without 𝒩, in either reading and with either iteration."""
+    figures = errors_of_variants(runs, {}, TASK, NONE, CONTRACTION, {**CONTRACTION, **NONE})
+    pairs = {"8×8": (NONE, {}), "12×12": (NONE, TASK), "eq. 2.9": ({**CONTRACTION, **NONE}, CONTRACTION)}
+    return Finding({name: not no_worse(runs, *pair) for name, pair in pairs.items()}, figures)
+
+
+def twelve_dimensions(runs: Runs) -> Finding:
+    """Errors with 𝒩 in the task's 12 dimensions and in joint space."""
+    return Finding(None, errors_of_variants(runs, TASK, {}))
+
+
+def dinevas_iteration(runs: Runs) -> Finding:
+    """Errors with eq. 2.9 and with eq. 3.16."""
+    return Finding(no_worse(runs, CONTRACTION, {}), errors_of_variants(runs, CONTRACTION, {}))
+
+
+def j_prev_a(runs: Runs) -> Finding:
+    """Errors with J̃ held during a point, and with J̃ of each inner step."""
+    held: Variant = {"jacobian": "point"}
+    return Finding(no_worse(runs, held, {}), errors_of_variants(runs, held, {}))
+
+
+def _compensates(runs: Runs, key: str, unit: str) -> Finding:
+    """Errors beside those of the exact arm that is driven by the model's joint coordinates."""
+    holds: dict[str, bool] = {}
+    figures: dict[str, list[float]] = {}
+    for name, path in PATHS.items():
+        scenario = runs.scenario(path)
+        longer = scenario.replace(iterations_per_point=(60,) * 10 + (50,), steps=600 + 5 * max(scenario.steps - 600, 0))
+        errors = {
+            "uncorrected": at_points(runs, scenario, "follow_nominal"),
+            "as printed": at_points(runs, scenario),
+            "50 inner steps": at_points(runs, longer),
+            "λ_a = 3e-3": at_points(runs, scenario, **LAMBDAS["λ_a = 3e-3"]),
+        }
+        uncorrected, *corrected = (settled_errors(points)[key] for points in errors.values())
+        holds |= {f"{name}, {how}": e < uncorrected for how, e in zip(list(errors)[1:], corrected, strict=True)}
+        figures[name] = [uncorrected, *corrected]
+    return Finding(holds, scaled(figures, unit))
+
+
+def compensates_position(runs: Runs) -> Finding:
+    """Position errors."""
+    return _compensates(runs, POSITION, "mm")
+
+
+def compensates_orientation(runs: Runs) -> Finding:
+    """Orientation errors."""
+    return _compensates(runs, ANGLE, "rad")
+
+
+def precise_model(runs: Runs) -> Finding:
+    """Errors with an exact model beside those with the approximate one."""
+    figures: dict[str, Any] = {}
+    holds = True
+    for name, path in PATHS.items():
+        scenario = runs.scenario(path)
+        exact = scenario.replace(arm=scenario.model, model=scenario.model)
+        precise, other = (
+            settled_errors(points_of(exact, runs.play(exact, METHOD))),
+            settled_errors(at_points(runs, path)),
+        )
+        holds &= sound(runs, exact, {}) and not any(larger(precise[key], other[key]) for key in (POSITION, ANGLE))
+        figures |= {f"{name} [mm]": (1e3 * precise[POSITION], 1e3 * other[POSITION])}
+        figures |= {f"{name} [rad]": (precise[ANGLE], other[ANGLE])}
+    return Finding(holds, figures)
+
+
+def no_inversion(runs: Runs) -> Finding:
+    """Counted by hand in eq. 3.16 and the listing of AdaptiveDeform: products and norms only."""
+    del runs
+    factorisations = 0
+    return Finding(factorisations == 0, {"factorisations": factorisations, "Jacobians": 1, "measured poses": 1})
+
+
+def no_exploration(runs: Runs) -> Finding:
+    """Measured poses of a step, counted by hand: each of the three policies sees one observation a step."""
+    poses = dict.fromkeys((METHOD, *CLOSED_LOOPS), 1)
+    errors = {name: settled_errors(at_points(runs, Q7Q8, name))[POSITION] for name in poses}
+    return Finding(all(poses[name] > poses[METHOD] for name in CLOSED_LOOPS), poses, scaled(errors, "mm"))
+
+
+def less_hectic(runs: Runs) -> Finding:
+    """Peak joint velocities and travel beside two closed loops."""
+    peaks, more = {}, {}
+    for name in (METHOD, *CLOSED_LOOPS):
+        episode = runs.play(Q7Q8, name)
+        peaks[name] = float(np.abs(episode.qdot).max())
+        more[f"{name}, after point 10 [rad/s]"] = float(np.abs(episode.qdot[600:]).max(initial=0.0))
+        more[f"{name}, travel [rad]"] = float(np.abs(np.diff(episode.q, axis=0)).sum())
+    return Finding(all(peaks[METHOD] < peaks[name] for name in CLOSED_LOOPS), scaled(peaks, "rad/s"), more)
+
+
+def compensates_manufacturing(runs: Runs) -> Finding:
+    """As the claims on compensation, with arms that differ from the model by errors of several sizes."""
+    path, holds, figures = three_seconds(runs), {}, {}
+    for size in DEVIATIONS:
+        arms = manufactured_arms(path, size)
+        left = [settled_errors(at_points(runs, arm, "follow_nominal"))[POSITION] for arm in arms]
+        figures[f"{1e3 * size:g} mm: uncorrected"] = left
+        for how, variant in LAMBDAS.items():
+            mine = [settled_errors(at_points(runs, arm, **variant))[POSITION] for arm in arms]
+            holds[f"{1e3 * size:g} mm, {how}"] = all(a < b for a, b in zip(mine, left, strict=True))
+            figures[f"{1e3 * size:g} mm: {how}"] = mine
+    return Finding(holds, scaled(figures, "mm"))
+
+
+def needs_precise_measurement(runs: Runs) -> Finding:
+    """Whether an error grows with noise in the measured pose."""
+    path, holds, figures = three_seconds(runs), {}, {}
+    plants = (Plant(), *(Plant(pose_noise=size, pose_rotation_noise=size) for size in DEVIATIONS))
+    for how, variant in LAMBDAS.items():
+        exact, *noisy = (settled_errors(at_points(runs, path.replace(plant=plant), **variant)) for plant in plants)
+        for size, errors in zip(DEVIATIONS, noisy, strict=True):
+            holds[f"{1e3 * size:g} mm, {how}"] = any(larger(errors[key], exact[key]) for key in (POSITION, ANGLE))
+        figures[f"{how} [mm]"] = [1e3 * errors[POSITION] for errors in (exact, *noisy)]
+        figures[f"{how} [rad]"] = [errors[ANGLE] for errors in (exact, *noisy)]
+    return Finding(holds, figures)
+
+
+def stagnation(runs: Runs) -> Finding:
+    """Mean speed of the joint that inversion moves fastest, in the steps in which inversion yanks."""
+    figures = {}
+    for scenario in singular_places(runs):
+        method, inversion = (np.abs(runs.play(scenario, p).qdot) for p in ("fixed_point", "moore_penrose"))
+        joint = int(inversion.max(axis=0).argmax())
+        yanked = inversion[:, joint] > YANK * np.median(inversion.max(axis=1))
+        if yanked.any():
+            speeds = [float(qdot[yanked, joint].mean()) for qdot in (inversion, method)]
+            figures[f"{short(scenario.name)}, q{joint + 1}"] = speeds
+    holds = bool(figures) and all(YANK * method < inversion for inversion, method in figures.values())
+    stretched = {p: float(np.abs(runs.play(STRETCHED, p).qdot).max()) for p in ("fixed_point", "moore_penrose")}
+    return Finding(holds, scaled(figures, "rad/s"), stretched)
+
+
+def damping_distorts(runs: Runs) -> Finding:
+    """Errors away from singular points."""
+    policies = ("moore_penrose", "dls", "fixed_point")
+    errors = {policy: rms(runs.play(TRAJECTORIES[1], policy).position_error) for policy in policies}
+    return Finding(errors["dls"] > errors["moore_penrose"], scaled(errors, "µm"))
+
+
+def distortion(runs: Runs) -> Finding:
+    """Exponents of μ and λ_min in the relative distortion of the nominal velocities."""
+    mu, least, relative = distortions(runs)
+    design = np.stack([np.ones_like(mu), np.log(mu), np.log(least)], axis=1)
+    _, of_mu, of_least = np.linalg.lstsq(design, np.log(relative), rcond=None)[0]
+    holds = bool(abs(of_mu - 1.0) < 0.2 and abs(of_least + 1.0) < 0.2)
+    quantiles = np.quantile(relative * least / mu, (0.05, 0.95)).tolist()
+    return Finding(holds, {"μ": float(of_mu), "λ_min": float(of_least)}, {"distortion λ_min/μ": quantiles})
+
+
+def two_joints(runs: Runs) -> Finding:
+    """Share of all configurations with the real parts of both eigenvalues of one sign."""
+    positive, negative = planar_signs(runs)
+    return Finding(max(positive, negative) < 1.0, scaled({"positive": positive, "negative": negative}, "%"))
+
+
+def sign_works_for_two_joints(runs: Runs) -> Finding:
+    """The best run over A of both readings of σ, and without σ, on two paths of the planar arm."""
+    bent = {t: best(runs, runs.scenario(PLANAR), t) for t in (*SIGNS, "none")}
+    wide = {t: best(runs, turning(runs), t) for t in (*SIGNS, "none")}
+    wrong = {t: best(runs, runs.scenario(PLANAR), t, values=(-1.0,)) for t in SIGNS}
+    figures: dict[str, Any] = {"bent [mm]": [1e3 * one.error for one in bent.values()]}
+    figures["turning [mm]"] = [1e3 * one.error for one in wide.values()]
+    more = {f"A, {name}": [one.a for one in tried.values()] for name, tried in (("bent", bent), ("turning", wide))}
+    more["A = -1 [m]"] = [one.error for one in wrong.values()]
+    return Finding({reading: bent[reading].success for reading in SIGNS}, figures, more)
+
+
+def sign_variant(runs: Runs) -> Finding:
+    """The best run over A of both readings of σ, with 3 joints."""
+    holds, figures, more = {}, {}, {}
+    for scenario in (*map(runs.scenario, TRAJECTORIES), one_sign(runs)):
+        tried = [best(runs, scenario, t) for t in SIGNS]
+        holds[short(scenario.name)] = not any(one.success for one in tried)
+        figures[short(scenario.name)] = [one.error for one in tried]
+        more[f"A, {short(scenario.name)}"] = [one.a for one in tried]
+    return Finding(holds, scaled(figures, "mm"), more)

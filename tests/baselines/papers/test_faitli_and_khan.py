@@ -1,0 +1,58 @@
+"""Faitli and Khan: yanks near the shoulder axis, which both speak of, and one threshold for like claims."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from baselines.papers.comparisons import YANK
+from baselines.papers.faitli import claims as faitli
+from baselines.papers.faitli.episodes import past_shoulder, solved, speeds, yank
+from baselines.papers.khan import claims as khan
+from baselines.papers.khan.episodes import ANGLE, LARGEST, POSITION
+from baselines.papers.runs import Runs
+
+
+@pytest.mark.parametrize("distance", [0.1, 0.001])
+def test_a_line_passes_the_axis_at_its_distance(distance):
+    positions = past_shoulder(Runs(), distance).nominal()
+    np.testing.assert_allclose(np.linalg.norm(positions[:, :2], axis=1).min(), distance, rtol=0.2)
+    speed = np.linalg.norm(np.diff(positions, axis=0), axis=1) / 1e-3
+    assert 0.85 < speed.max() < 0.95
+
+
+def test_inversion_yanks_one_millimetre_from_the_axis_and_the_fixed_point_does_not():
+    runs = Runs()
+    line = past_shoulder(runs, 0.001)
+    inversion, method = runs.play(line, "moore_penrose"), solved(runs, line)
+    assert speeds(inversion).max() > 500.0
+    assert yank(inversion) > 10.0 * YANK
+    assert speeds(method).max() < 2.0
+    assert yank(method) < 2.0
+    assert method.position_error.max() < 2e-3
+
+
+@pytest.mark.slow
+def test_both_claims_on_yanks_name_the_same_places():
+    runs = Runs()
+    yanks, stagnation = faitli.no_yanks(runs), khan.stagnation(runs)
+    assert yanks.verdict == stagnation.verdict == "reproduced"
+    yanked = {name for name, (inversion, _) in yanks.figures.items() if inversion > YANK}
+    assert {name.partition(", ")[0] for name in stagnation.figures} == yanked
+    assert len(yanked) == 3
+
+
+@pytest.mark.parametrize("growth", [0.05, 0.27, 0.3])
+@pytest.mark.parametrize(("largest", "visible"), [(9.0, True), (1e-9, False)])
+def test_a_degraded_error_has_not_remained(monkeypatch, growth, largest, visible):
+    """An error of 9 m is visible on this path, and one of 1 nm is not."""
+    before = {POSITION: 0.04, ANGLE: 0.1, LARGEST: largest}
+    after = {key: (1.0 + growth) * value for key, value in before.items()}
+    monkeypatch.setattr(khan, "_weighted", lambda *_: (before, after))
+    degraded, runs = growth > 0.1, Runs(steps=60)
+    for claim in (khan.f_weights_orientation_down, khan.f_couples, khan.w_degrades_q7_and_q8):
+        assert claim(runs).verdict == ("reproduced" if degraded else "contradicted")
+    assert khan.w_keeps_precision(runs).holds == {
+        "beside the run without W": not degraded,
+        "beside the extent": not visible,
+    }

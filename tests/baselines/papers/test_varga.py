@@ -1,0 +1,120 @@
+"""Varga: the readings in which claims on the descent are tested, the measures of fluctuation, and the skew part."""
+
+from __future__ import annotations
+
+import types
+
+import numpy as np
+import pytest
+
+import baselines
+import ikgym
+from baselines.papers.runs import Runs
+from baselines.papers.varga import claims
+from baselines.papers.varga.episodes import fluctuation, largest_jump, nominal_angles, variation
+from baselines.papers.varga.figures import busiest
+from baselines.papers.varga.interpreted import descend
+from baselines.status import Status
+
+
+class MadeUp:
+    """Runs with made-up episodes, which diverge or reach the limit in some readings."""
+
+    def __init__(self, bad):
+        self.bad, self.played = bad, set()
+
+    def play(self, scenario, policy, /, **parameters):
+        key = scenario, parameters.get("alpha_start", "restart"), parameters.get("warm_start", "unshifted")
+        self.played.add(key)
+        one = np.ones(10)
+        return types.SimpleNamespace(
+            status=np.full(10, int(Status.DIVERGED if key in self.bad else Status.CONVERGED)),
+            iterations=np.full(10, 450 if key in self.bad else 58),
+            tracking_cost=one,
+            velocity_cost=one,
+            position_error=one,
+        )
+
+
+ALL = {
+    (scenario, alpha, warm)
+    for scenario in ("varga7-fast", "varga7-literal-fast")
+    for alpha in ("restart", "kept")
+    for warm in ("unshifted", "shifted")
+}
+ONE = {("varga7-fast", "restart", "shifted")}
+
+
+@pytest.mark.parametrize(
+    ("bad", "printed", "limit"),
+    [(set(), "reproduced", "contradicted"), (ONE, "depends", "depends"), (ALL, "contradicted", "reproduced")],
+)
+def test_the_descent_is_tested_in_all_readings(bad, printed, limit):
+    for claim, wanted in ((claims.printed_step, printed), (claims.limit_reached, limit)):
+        runs = MadeUp(bad)
+        finding = claim(runs)
+        assert runs.played == ALL
+        assert finding.verdict == wanted
+        assert sorted(np.ravel(list(finding.figures.values()))) == [0.0] * (8 - len(bad)) + [100.0] * len(bad)
+
+
+@pytest.mark.parametrize(("late", "wanted"), [(1.0, "reproduced"), (1.3, "contradicted"), (0.7, "contradicted")])
+def test_time_is_proportional_if_a_gradient_takes_the_same_in_long_calls(late, wanted):
+    iterations = np.arange(50, 150)
+    time_ns = 1e4 * (iterations + 1) * np.where(iterations > 120, late, 1.0)
+    runs = types.SimpleNamespace(play=lambda *_, **__: types.SimpleNamespace(iterations=iterations, time_ns=time_ns))
+    assert claims.time_proportional(runs).verdict == wanted
+
+
+@pytest.mark.parametrize("name", ["varga7-fast", "varga7-literal-slow"])
+def test_the_interpreted_descent_is_that_of_rhc_gradient(name):
+    scenario = ikgym.scenarios.get(name)
+    q, nominal = scenario.nominal_joint_path()[200], scenario.nominal()[201:203]
+    policy = baselines.make("rhc_gradient", scenario, tolerance=0.0, iterations=60)
+    observation, _ = ikgym.RedundantIKEnv(scenario, preview=2).reset(options={"q": q})
+    _, state = policy.predict({**observation, "nominal": nominal})
+    plan = state[2][0]
+    assert 0.1 < abs(plan).max() < 20.0
+    np.testing.assert_allclose(descend(scenario, q, nominal, 60), plan, rtol=1e-6, atol=1e-9)
+
+
+def ramp(steps=400):
+    """Seven velocities that grow evenly, from a jump at the start."""
+    qdot = np.outer(1.0 + 1e-3 * np.arange(steps), np.ones(7))
+    qdot[:3] = [[0.0] * 7, [9.0] * 7, [0.0] * 7]
+    return qdot
+
+
+def test_fluctuation_leaves_out_the_start():
+    qdot = ramp()
+    assert fluctuation(qdot) < 1e-12
+    assert largest_jump(qdot) == pytest.approx(1e-3 / 9.0)
+    qdot[200, 3] += 2.0
+    assert largest_jump(qdot) == pytest.approx(2.001 / 9.0)
+    assert fluctuation(qdot) == pytest.approx(np.sqrt((4 + 16 + 4) / (378 * 7)), rel=1e-6)
+
+
+def test_variation_is_the_sum_of_all_changes():
+    qdot = np.zeros((5, 7))
+    qdot[2, 0], qdot[3:, 6] = 3.0, -1.0
+    assert variation(qdot) == 7.0
+
+
+def test_a_close_up_shows_the_fluctuations_and_not_the_start():
+    qdot = ramp()
+    qdot[300:310:2] += 0.1
+    part = busiest(qdot)
+    assert part.stop - part.start == 150
+    assert 20 <= part.start <= 299
+    assert part.stop >= 309
+
+
+def test_the_fast_path_is_beyond_90_degrees_most_of_the_time():
+    finding = claims.skew_part_determines(Runs())
+    assert finding.verdict == "contradicted"
+    assert finding.figures["fast [%]"] == pytest.approx(81.4, abs=0.1)
+    assert finding.figures["slow [%]"] == 0.0
+    scenario = ikgym.scenarios.get("varga7-slow")
+    rotations, _ = scenario.arm.forward(scenario.nominal_joint_path())
+    wanted = [np.linalg.norm(ikgym.rotations.rotation_vector(r)) for r in rotations]
+    np.testing.assert_allclose(nominal_angles(Runs(), "varga7-slow"), wanted, atol=1e-9)
