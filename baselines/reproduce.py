@@ -18,7 +18,7 @@ import dataclasses
 import json
 import pathlib
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Annotated, Any
+from typing import Annotated
 
 import tyro
 
@@ -76,10 +76,10 @@ def reproduce(
     findings: Findings = {}
     with contextlib.nullcontext() if folder is None else locked(folder):
         for paper in chosen:
-            drawn = _draw(paper, runs, numbers, folder, progress=progress)
+            _draw(paper, runs, numbers, folder, progress=progress)
             findings[paper.name] = {} if numbers is not None else {c.name: c.test(runs) for c in paper.claims}
-            if folder is not None:
-                _write_numbers(folder / paper.name / "numbers.json", drawn, findings[paper.name])
+            if folder is not None and numbers is None:
+                _write_numbers(folder / paper.name / "numbers.json", findings[paper.name])
         if folder is not None and numbers is None:
             results = ledger.rows(findings)
             write(folder / "claims.csv", ledger.to_csv(results).encode())
@@ -87,30 +87,24 @@ def reproduce(
     return findings
 
 
-def _draw(
-    paper: Paper, runs: Runs, numbers: set[int] | None, folder: pathlib.Path | None, *, progress: bool
-) -> dict[str, Any]:
-    drawn = {}
+def _draw(paper: Paper, runs: Runs, numbers: set[int] | None, folder: pathlib.Path | None, *, progress: bool) -> None:
     for figure in paper.figures:
-        if numbers is not None and figure.number not in numbers:
-            continue
-        picture, values = figure.draw(runs)
-        drawn[f"figure {figure.number}"] = {"title": figure.title, **values}
-        if folder is not None:
-            file = folder / paper.name / f"figure-{figure.number:02d}.png"
-            write(file, png(picture))
-            if progress:
-                print(f"{file}: {figure.title}", file=sys.stderr)
-    return drawn
+        if numbers is None or figure.number in numbers:
+            picture = figure.draw(runs)
+            if folder is not None:
+                file = folder / paper.name / f"figure-{figure.number:02d}.png"
+                write(file, png(picture))
+                if progress:
+                    print(f"{file}: {figure.title}", file=sys.stderr)
 
 
-def _write_numbers(file: pathlib.Path, drawn: Mapping[str, Any], findings: Mapping[str, Finding]) -> None:
+def _write_numbers(file: pathlib.Path, findings: Mapping[str, Finding]) -> None:
     claims = {
         name: {"verdict": found.verdict, "holds": found.holds, "figures": found.figures, "more": found.more}
         for name, found in findings.items()
     }
-    content = {"machine": describe(), "figures": drawn, "claims": claims}
-    write(file, (json.dumps(jsonable(content), indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode())
+    content = jsonable({"machine": describe(), "claims": claims})
+    write(file, (json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode())
 
 
 @dataclasses.dataclass(frozen=True)
@@ -139,7 +133,7 @@ Examples:
 
 Files in the folder of --out:
   PAPER/figure-NN.png  a figure of the paper, with its number there
-  PAPER/numbers.json   the numbers behind the figures and the claims
+  PAPER/numbers.json   the numbers behind the claims
   claims.csv           claim by claim, the verdict and the figures
   papers.md            the same as tables, with how each claim was tested"""
 

@@ -1,4 +1,4 @@
-"""Pictures of panels one above the other, which is what all figures of the papers are."""
+"""Pictures of panels in rows, as all figures of the papers are."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ class Curve(NamedTuple):
         name: Stands in the legend; curves of the same name in a picture share colour and entry.
         x: Abscissae. Shape (k,).
         y: Ordinates. Shape (k,).
-        dashed: For what is nominal.
-        dots: For single points instead of a line.
+        dashed: Whether the line is dashed, as nominal curves are.
+        dots: Whether there are single points instead of a line.
     """
 
     name: str
@@ -36,7 +36,7 @@ class Panel(NamedTuple):
 
     Attributes:
         ylabel: With the unit.
-        curves: What is drawn.
+        curves: The curves.
         xlabel: With the unit; the lowest panel has one at least.
         log: Whether the ordinate is logarithmic.
         title: Stands above the panel.
@@ -47,6 +47,30 @@ class Panel(NamedTuple):
     xlabel: str = "time [s]"
     log: bool = False
     title: str = ""
+
+
+def compared(
+    labels: Sequence[str],
+    x: FloatArray,
+    actual: FloatArray,
+    nominal: FloatArray,
+    names: tuple[str, str] = ("actual", "nominal"),
+    xlabel: str = "time [s]",
+) -> list[Panel]:
+    """A panel for each coordinate, with its actual and its nominal course.
+
+    Args:
+        labels: Labels of the ordinates, with the units.
+        x: Abscissae. Shape (k,).
+        actual: Actual coordinates. Shape (k, m).
+        nominal: Nominal ones. Shape (k, m).
+        names: Names of both in the legend.
+        xlabel: Label of the abscissa.
+    """
+    return [
+        Panel(label, [Curve(names[0], x, actual[:, i]), Curve(names[1], x, nominal[:, i], dashed=True)], xlabel)
+        for i, label in enumerate(labels)
+    ]
 
 
 def picture(title: str, panels: Sequence[Panel], *, columns: int = 1, height: float = 2.1) -> Figure:
@@ -96,5 +120,5 @@ def picture(title: str, panels: Sequence[Panel], *, columns: int = 1, height: fl
 
 
 def _drawable(values: FloatArray, *, log: bool) -> FloatArray:
-    """What is not above 0 has no place on a logarithmic axis."""
+    """Values with NaN for those that a logarithmic axis cannot show."""
     return np.where(values > 0.0, values, np.nan) if log else values

@@ -7,7 +7,7 @@ import pathlib
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType, ModuleType
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 from matplotlib.figure import Figure
 
@@ -20,18 +20,6 @@ Verdict = Literal["reproduced", "contradicted", "depends", "not testable"]
 Figures = Mapping[str, float | Sequence[float]]
 
 _SCALES = {"%": 1e2, "mm": 1e3, "mrad": 1e3, "µm": 1e6, "ms": 1e3}
-
-
-class Drawn(NamedTuple):
-    """A figure drawn again.
-
-    Attributes:
-        figure: The picture.
-        numbers: The numbers behind it, by name; units stand in the names, as in ``max_error_mm``.
-    """
-
-    figure: Figure
-    numbers: dict[str, Any]
 
 
 class Finding(NamedTuple):
@@ -96,7 +84,7 @@ class PaperFigure:
 
     number: int
     title: str
-    draw: Callable[[Runs], Drawn]
+    draw: Callable[[Runs], Figure]
 
 
 @dataclasses.dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Zhang 2020: the figures."""
+"""Zhang 2020: figures 2 to 4 of example 1, and 6 to 9 of example 2."""
 
 from __future__ import annotations
 
@@ -7,9 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from baselines.papers.comparisons import rms
-from baselines.papers.drawing import Curve, Panel, picture
-from baselines.papers.paper import Drawn, PaperFigure
+from baselines.papers.drawing import Curve, Panel, compared, picture
+from baselines.papers.paper import PaperFigure
 from baselines.papers.runs import Runs
 from baselines.papers.zhang.episodes import (
     HELIX,
@@ -19,155 +18,100 @@ from baselines.papers.zhang.episodes import (
     lambdas_used,
     outputs,
     predictive,
-    settled_from,
 )
 from ikgym.validation import FloatArray
 
-AXES, TURNS = ("x", "y", "z"), ("α", "β", "γ")
+AXES = ("x", "y", "z")
+NAMES = ("x, α", "y, β", "z, γ")
 BEGINNING = 25  # samples of a close-up
 
 
-def _samples(count: int) -> FloatArray:
-    return np.arange(1.0, count + 1.0)
+def _samples(values: FloatArray) -> FloatArray:
+    return np.arange(1.0, len(values) + 1.0)
 
 
-def _stack(title: str, rows: Sequence[tuple[str, Sequence[Curve]]], *, columns: int = 1, height: float = 1.9) -> Figure:
+def _stack(title: str, panels: Sequence[Panel], *, columns: int = 1, height: float = 1.9) -> Figure:
     """Panels over the sample k, which stands below the lowest."""
-    last = len(rows) - columns
-    panels = [Panel(label, curves, "sample k" if i >= last else "") for i, (label, curves) in enumerate(rows)]
-    return picture(title, panels, columns=columns, height=height)
+    last = len(panels) - columns
+    labelled = [panel._replace(xlabel="sample k" if i >= last else "") for i, panel in enumerate(panels)]
+    return picture(title, labelled, columns=columns, height=height)
 
 
-def _with_start(title: str, rows: Sequence[tuple[str, Sequence[Curve]]], *, height: float = 1.9) -> Figure:
+def _with_start(title: str, panels: Sequence[Panel], *, height: float = 1.9) -> Figure:
     """Panels over the whole run on the left, over its first samples on the right."""
     both = []
-    for label, curves in rows:
-        both += [(label, curves), (label, [c._replace(x=c.x[:BEGINNING], y=c.y[:BEGINNING]) for c in curves])]
+    for panel in panels:
+        both += [panel, panel._replace(curves=[c._replace(x=c.x[:BEGINNING], y=c.y[:BEGINNING]) for c in panel.curves])]
     return _stack(f"{title}: whole run, left, and the first samples, right", both, columns=2, height=height)
 
 
-def _tracking(runs: Runs) -> Drawn:
+def _tracking(runs: Runs) -> Figure:
     scenario, episode = runs.scenario(HELIX), predictive(runs)
-    real, nominal = outputs(scenario, episode), scenario.nominal()
-    k = _samples(len(real))
-    rows = [
-        (f"{name} [m]", [Curve("actual", k, real[:, i]), Curve("desired", k, nominal[:, i], dashed=True)])
-        for i, name in enumerate(AXES)
-    ]
-    start = settled_from(episode)
-    return Drawn(
-        _with_start("Example 1, tracking of the helix", rows),
-        {
-            "largest_error_m": float(episode.position_error.max()),
-            f"largest_error_after_k_{start}_m": float(episode.position_error[start:].max()),
-            "rms_error_m": rms(episode.position_error),
-        },
-    )
+    actual, nominal = outputs(scenario, episode), scenario.nominal()
+    panels = compared([f"{name} [m]" for name in AXES], _samples(actual), actual, nominal, ("actual", "desired"))
+    return _with_start("Example 1, tracking of the helix", panels)
 
 
-def _inputs(runs: Runs) -> Drawn:
+def _inputs(runs: Runs) -> Figure:
     episode = predictive(runs)
-    k, lambdas = _samples(len(episode.q)), lambdas_used(episode)
-    rows = [(f"$q_{i + 1}$ [rad]", [Curve("MFAPC", k, episode.q[:, i])]) for i in range(3)]
-    rows.append(("λ [m²]", [Curve("MFAPC", k, lambdas)]))
-    return Drawn(
-        _with_start("Example 1, control inputs and λ", rows, height=1.6),
-        {
-            "largest_lambda_m2": float(lambdas.max()),
-            "sample_of_the_largest_lambda": int(lambdas.argmax()) + 1,
-            "last_lambda_m2": float(lambdas[-1]),
-            "largest_shift_rad": float(np.abs(episode.qdot).max()),
-        },
-    )
+    values = {f"$q_{i + 1}$ [rad]": episode.q[:, i] for i in range(3)} | {"λ [m²]": lambdas_used(episode)}
+    panels = [Panel(label, [Curve("MFAPC", _samples(y), y)]) for label, y in values.items()]
+    return _with_start("Example 1, control inputs and λ", panels, height=1.6)
 
 
-def _elements(runs: Runs) -> Drawn:
-    episode = predictive(runs)
-    jacobians = jacobians_used(runs.scenario(HELIX), episode)
-    k = _samples(len(jacobians))
-    names = [f"$\\phi_{{i{j + 1}}}$" for j in range(3)]
-    rows = [
-        (f"row i = {i + 1} [m/rad]", [Curve(name, k, jacobians[:, i, j]) for j, name in enumerate(names)])
+def _elements(runs: Runs) -> Figure:
+    jacobians = jacobians_used(runs.scenario(HELIX), predictive(runs))
+    k, names = _samples(jacobians), [f"$\\phi_{{i{j + 1}}}$" for j in range(3)]
+    panels = [
+        Panel(f"row i = {i + 1} [m/rad]", [Curve(name, k, jacobians[:, i, j]) for j, name in enumerate(names)])
         for i in range(3)
     ]
-    sigma = np.linalg.svd(jacobians, compute_uv=False)
-    return Drawn(
-        _with_start("Example 1, elements $\\phi_{ij}$ of J(k)", rows),
-        {
-            "largest_element_m_per_rad": float(np.abs(jacobians).max()),
-            "smallest_singular_value_m_per_rad": float(sigma.min()),
-            "smallest_singular_value_settled_m_per_rad": float(sigma[settled_from(episode) :].min()),
-        },
-    )
+    return _with_start("Example 1, elements $\\phi_{ij}$ of J(k)", panels)
 
 
-def _line_tracking(runs: Runs) -> Drawn:
+def _line_tracking(runs: Runs) -> Figure:
     scenario, episode = runs.scenario(LINE), iterative(runs)
-    real, nominal = outputs(scenario, episode), scenario.nominal()
-    k = _samples(len(real))
-    turns = [scenario.task.error(poses, nominal[0])[:, 3:] for poses in (real, nominal)]
-    names = [f"{axis}, {turn}" for axis, turn in zip(AXES, TURNS, strict=True)]
-    rows = []
-    for label, ours, wanted in (
-        ("position [m]", real[:, 9:], nominal[:, 9:]),
-        ("rotation from the start [rad]", turns[0], turns[1]),
+    actual, nominal = outputs(scenario, episode), scenario.nominal()
+    turn, nominal_turn = (scenario.task.error(poses, nominal[0])[:, 3:] for poses in (actual, nominal))
+    k, panels = _samples(actual), []
+    for label, ours, desired in (
+        ("position [m]", actual[:, 9:], nominal[:, 9:]),
+        ("rotation from the start [rad]", turn, nominal_turn),
     ):
-        curves = [Curve(f"{name} actual", k, ours[:, i]) for i, name in enumerate(names)]
-        curves += [Curve(f"{name} desired", k, wanted[:, i], dashed=True) for i, name in enumerate(names)]
-        rows.append((label, curves))
-    return Drawn(
-        _stack("Example 2: tracking of (a) position, above, and (b) orientation, below", rows, height=2.6),
-        {
-            "way_m": float(np.linalg.norm(nominal[-1, 9:] - nominal[0, 9:])),
-            "turn_rad": float(np.linalg.norm(turns[1][-1])),
-        },
-    )
+        curves = [Curve(f"{name} actual", k, ours[:, i]) for i, name in enumerate(NAMES)]
+        curves += [Curve(f"{name} desired", k, desired[:, i], dashed=True) for i, name in enumerate(NAMES)]
+        panels.append(Panel(label, curves))
+    return _stack("Example 2: tracking of (a) position, above, and (b) orientation, below", panels, height=2.6)
 
 
-def _line_errors(runs: Runs) -> Drawn:
+def _line_errors(runs: Runs) -> Figure:
     scenario, episode = runs.scenario(LINE), iterative(runs)
-    real, nominal = outputs(scenario, episode), scenario.nominal()
-    same = scenario.task.error(nominal, real)
-    printed = scenario.task.error(nominal[1:], real[:-1])
-    names = [f"{axis}, {turn}" for axis, turn in zip(AXES, TURNS, strict=True)]
-    rows: list[tuple[str, list[Curve]]] = []
-    for first, unit in ((0, "[m]"), (3, "[rad]")):
-        for label, error in (("y*(k+1) − y(k)", printed), ("y*(k) − y(k)", same)):
-            k = _samples(len(error))
-            rows.append((f"{label} {unit}", [Curve(name, k, error[:, first + i]) for i, name in enumerate(names)]))
-    return Drawn(
-        _stack("Example 2: tracking error of (a) position, above, and (b) orientation, below", rows, columns=2),
-        {
-            "largest_position_error_m": float(episode.position_error.max()),
-            "largest_orientation_error_rad": float(episode.orientation_error.max()),
-            "largest_position_error_as_printed_m": float(np.linalg.norm(printed[:, :3], axis=1).max()),
-            "largest_orientation_error_as_printed_rad": float(np.linalg.norm(printed[:, 3:], axis=1).max()),
-        },
-    )
-
-
-def _line_joints(runs: Runs) -> Drawn:
-    episode = iterative(runs)
-    k = _samples(len(episode.q))
-    rows = [(f"$q_{i + 1}$ [rad]", [Curve("measured", k, episode.q[:, i])]) for i in range(episode.q.shape[1])]
-    goal = np.array([np.pi / 4, np.pi / 6, 0.0, 0.0, -np.pi / 4, 0.0])
-    return Drawn(
-        _stack("Example 2: measured joint angles", rows, columns=2, height=1.6),
-        {
-            "largest_velocity_rad_per_s": float(np.abs(episode.qdot).max()),
-            "distance_from_the_joint_angles_of_B_rad": float(np.abs(episode.q[-1] - goal).max()),
-        },
-    )
-
-
-def _iterations(runs: Runs) -> Drawn:
-    counts = {
-        "until all n = 2 points are met (40)": iterative(runs).iterations,
-        "until the first point is met (16)": iterative(runs, stop="first_point").iterations,
+    actual, nominal = outputs(scenario, episode), scenario.nominal()
+    errors = {
+        "y*(k+1) − y(k)": scenario.task.error(nominal[1:], actual[:-1]),
+        "y*(k) − y(k)": scenario.task.error(nominal, actual),
     }
-    rows = [("iterations [1]", [Curve(n, _samples(len(c)), c.astype(float), dots=True) for n, c in counts.items()])]
-    numbers = {n: {"mean": float(c.mean()), "largest": int(c.max())} for n, c in counts.items()}
-    return Drawn(_stack("Example 2: iteration count", rows, height=2.8), numbers)
+    panels = [
+        Panel(f"{label} {unit}", [Curve(name, _samples(e), e[:, first + i]) for i, name in enumerate(NAMES)])
+        for first, unit in ((0, "[m]"), (3, "[rad]"))
+        for label, e in errors.items()
+    ]
+    return _stack("Example 2: tracking error of (a) position, above, and (b) orientation, below", panels, columns=2)
+
+
+def _line_joints(runs: Runs) -> Figure:
+    q = iterative(runs).q
+    panels = [Panel(f"$q_{i + 1}$ [rad]", [Curve("measured", _samples(q), q[:, i])]) for i in range(q.shape[1])]
+    return _stack("Example 2: measured joint angles", panels, columns=2, height=1.6)
+
+
+def _iterations(runs: Runs) -> Figure:
+    counts = {
+        "until all n = 2 points are met (40)": iterative(runs).iterations.astype(np.float64),
+        "until the first point is met (16)": iterative(runs, stop="first_point").iterations.astype(np.float64),
+    }
+    curves = [Curve(name, _samples(c), c, dots=True) for name, c in counts.items()]
+    return _stack("Example 2: iteration count", [Panel("iterations [1]", curves)], height=2.8)
 
 
 FIGURES = (
