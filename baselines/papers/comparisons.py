@@ -8,8 +8,9 @@ import numpy as np
 
 from ikgym.validation import FloatArray
 
-#: "More", "smaller", "degraded": a tenth. "Significantly", "considerably": one and a half times.
-MORE, CONSIDERABLY = 1.1, 1.5
+#: "More", "smaller", "degraded": apart by a tenth of the larger value. "Significantly", "considerably": one and a half
+#: times.
+MORE, CONSIDERABLY = 1.0 / 0.9, 1.5
 #: Results are the same where they are apart by less than this share. It is also the width of a line in a plot: the
 #: share of a path's extent below which an error is not visible.
 SAME = 0.01
@@ -18,12 +19,12 @@ YANK = 10.0
 
 
 def larger(value: float, than: float, by: float = MORE) -> bool:
-    """Whether a value is larger than another by a factor, a tenth more if left out."""
+    """Whether a value is larger than another by a factor; if left out, by a tenth of the larger value."""
     return bool(value >= by * than)
 
 
 def differ(one: float, other: float) -> bool:
-    """Whether one of two values is larger than the other by a tenth or more."""
+    """Whether two values are apart by a tenth of the larger one or more."""
     return one != other and (larger(one, other) or larger(other, one))
 
 
@@ -44,6 +45,11 @@ def falls(pairs: Mapping[str, tuple[float, float]]) -> dict[str, bool]:
         pairs: The value before and after, by condition.
     """
     return {name: after < before for name, (before, after) in pairs.items() if differ(before, after)}
+
+
+def extent(path: FloatArray) -> float:
+    """Length of the diagonal of the box around a path of shape (k, m)."""
+    return float(np.linalg.norm(np.ptp(path, axis=0)))
 
 
 def rms(values: FloatArray) -> float:

@@ -57,11 +57,11 @@ def markdown(papers: Sequence[Paper], results: Iterable[Row]) -> str:
         parts += [
             f"## {paper.title}\n",
             f"{', '.join(f'{number} {verdict}' for verdict, number in sorted(counts.items()))}.\n",
-            "| claim | where | test | figures | verdict |\n|---|---|---|---|---|",
+            "| claim | test | figures | verdict |\n|---|---|---|---|",
         ]
         for claim, row in zip(paper.claims, of_paper, strict=True):
             verdict = f"*{row['verdict']}*" + (f": {claim.condition}" if claim.condition else "")
-            cells = (claim.text, claim.where, claim.method, row["figures"], verdict)
+            cells = (f"{claim.text} ({claim.where})", claim.method, row["figures"], verdict)
             parts.append(f"| {' | '.join(cells)} |")
         parts.append("")
     return "\n".join(parts)

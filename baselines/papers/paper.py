@@ -54,8 +54,12 @@ class Finding(NamedTuple):
 
 def _entry(name: str, value: float | Sequence[float]) -> str:
     name, _, unit = name.partition("[")
-    values = ", ".join(f"{v:.3g}" for v in (value if isinstance(value, Sequence) else (value,)))
+    values = ", ".join(map(_number, value if isinstance(value, Sequence) else (value,)))
     return " ".join(filter(None, (name.strip(), values, unit.removesuffix("]"))))
+
+
+def _number(value: float) -> str:
+    return f"{value:.0f}" if 1e3 <= abs(value) < 1e6 else f"{value:.3g}"
 
 
 def scaled(values: Figures, unit: str) -> dict[str, float | Sequence[float]]:

@@ -74,7 +74,7 @@ def test_help_of_each_command(word, capsys):
         (["reproduce", "--paper", "vagra"], "There is no paper 'vagra'. Did you mean 'varga'?"),
         (["reproduce", "--figure", "-1"], "paper 'varga' has no figure -1"),
         (["reproduce", "--steps", "0"], "steps: expected a whole number of at least 1, got 0."),
-        (["reproduce", "--paper", "khan", "--ledger", "x.md"], "ledger: needs all papers"),
+        (["reproduce", "--paper", "khan", "--figure", "1"], "has no figure 1"),
         (["train", "ppo", "--preset", "smok", "--out", "x"], "There is no preset 'smok'. Did you mean 'smoke'?"),
     ],
 )

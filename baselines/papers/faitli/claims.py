@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from baselines.episodes import Episode
-from baselines.papers.comparisons import SAME, YANK, rms, sign_changes
+from baselines.papers.comparisons import SAME, YANK, extent, rms, sign_changes
 from baselines.papers.faitli.episodes import (
     REGULAR,
     SHOULDER,
@@ -29,11 +29,6 @@ from baselines.status import Status
 from ikgym.validation import FloatArray
 
 
-def _extent(runs: Runs, name: str) -> float:
-    """Extent of the nominal path, in [m]."""
-    return float(np.linalg.norm(np.ptp(runs.scenario(name).nominal(), axis=0)))
-
-
 def _largest_error(episode: Episode) -> float:
     return float(episode.position_error.max())
 
@@ -41,7 +36,7 @@ def _largest_error(episode: Episode) -> float:
 def accurate_tracking(runs: Runs) -> Finding:
     """Largest error as a share of the path's extent."""
     errors = {short(name): _largest_error(solved(runs, name)) for name in TRAJECTORIES}
-    shares = {short(name): errors[short(name)] / _extent(runs, name) for name in TRAJECTORIES}
+    shares = {short(name): errors[short(name)] / extent(runs.scenario(name).nominal()) for name in TRAJECTORIES}
     return Finding(max(shares.values()) < SAME, scaled(shares, "%"), scaled(errors, "mm"))
 
 
@@ -53,7 +48,7 @@ def accurate_in_singularities(runs: Runs) -> Finding:
         scenario, error = runs.scenario(name), solved(runs, name).position_error
         smallest = singular_values(jacobians(scenario, nominal_joints(scenario)))[:, -1]
         near = smallest < np.quantile(smallest, 0.25)
-        shares[short(name)] = float(error[near].max()) / _extent(runs, name)
+        shares[short(name)] = float(error[near].max()) / extent(runs.scenario(name).nominal())
         more |= {f"{short(name)}, RMS near [m]": rms(error[near]), f"{short(name)}, elsewhere [m]": rms(error[~near])}
     more |= {f"largest, {n} iterations [m]": _largest_error(solved(runs, iterations=n)) for n in (1, 10, 100)}
     return Finding(max(shares.values()) < SAME, scaled(shares, "%"), more)
@@ -136,7 +131,7 @@ def a_decides_convergence(runs: Runs) -> Finding:
     errors = {a: _largest_error(solved(runs, REGULAR, a=a)) for a in (0.1, -0.1, -1.0, -2.0, -3.0)}
     good = {a: e for a, e in errors.items() if -bound < a < 0.0}
     bad = {a: e for a, e in errors.items() if a not in good}
-    figures = scaled({f"A = {a:g}:": error for a, error in errors.items()}, "mm")
+    figures = scaled({"": list(errors.values())}, "mm")
     return Finding(min(bad.values()) > max(good.values()), figures, {"bound": bound})
 
 

@@ -9,29 +9,25 @@ from typing import Any
 
 import numpy as np
 
-from baselines.papers.comparisons import SAME, YANK, differ, larger, rms
+from baselines.papers.comparisons import SAME, YANK, differ, extent, larger, rms
 from baselines.papers.faitli.episodes import STRETCHED, TRAJECTORIES, short, singular_places
 from baselines.papers.khan.episodes import (
-    ANGLE,
     BLOCKED,
     CLOSED_LOOPS,
     DEVIATIONS,
     LAMBDAS,
-    LARGEST,
     LOOSE,
     METHOD,
     PATHS,
-    POSITION,
     Q1,
     Q7Q8,
+    Errors,
     Variant,
     at_points,
+    errors,
     errors_of_variants,
-    extent,
     manufactured_arms,
     no_worse,
-    points_of,
-    settled_errors,
     sound,
     spectra,
     three_seconds,
@@ -43,18 +39,16 @@ from baselines.papers.runs import Runs
 from ikgym import Plant
 from ikgym.validation import FloatArray
 
-Errors = dict[str, float]
-
 
 def _weighted(runs: Runs, name: str, weights: Variant) -> tuple[Errors, Errors]:
     """The settled errors of the method without weights, and with them."""
-    return settled_errors(at_points(runs, name)), settled_errors(at_points(runs, name, **weights))
+    return errors(runs, name), errors(runs, name, **weights)
 
 
 def _before_and_after(before: Errors, after: Errors) -> Figures:
     return {
-        "position [mm]": (1e3 * before[POSITION], 1e3 * after[POSITION]),
-        "orientation [rad]": (before[ANGLE], after[ANGLE]),
+        "position [mm]": (1e3 * before.position, 1e3 * after.position),
+        "orientation [rad]": (before.angle, after.angle),
     }
 
 
@@ -88,8 +82,8 @@ def small_orientation_error(runs: Runs) -> Finding:
     angle = runs.play(Q1, METHOD).orientation_error
     peak = int(angle.argmax())
     half = _steps_until(angle[peak:], 0.5 * angle[peak])
-    errors = [settled_errors(at_points(runs, name)) for name in PATHS]
-    figures = {"RMS [rad]": [e[ANGLE] for e in errors], "largest [rad]": [e[f"largest_{ANGLE[4:]}"] for e in errors]}
+    settled = [errors(runs, path) for path in PATHS.values()]
+    figures = {"RMS [rad]": [e.angle for e in settled], "largest [rad]": [e.largest_angle for e in settled]}
     return Finding(None, figures, {"peak [rad]": float(angle[peak]), "steps to peak": peak + 1, "to half of it": half})
 
 
@@ -106,13 +100,13 @@ def sixty_inner_steps(runs: Runs) -> Finding:
 def f_weights_orientation_down(runs: Runs) -> Finding:
     """Orientation error without and with ℱ."""
     before, after = _weighted(runs, Q1, LOOSE)
-    return Finding(larger(after[ANGLE], before[ANGLE]), _before_and_after(before, after))
+    return Finding(larger(after.angle, before.angle), _before_and_after(before, after))
 
 
 def f_couples(runs: Runs) -> Finding:
     """Position error without and with ℱ."""
     before, after = _weighted(runs, Q1, LOOSE)
-    return Finding(differ(after[POSITION], before[POSITION]), {"[mm]": (1e3 * before[POSITION], 1e3 * after[POSITION])})
+    return Finding(differ(after.position, before.position), {"[mm]": (1e3 * before.position, 1e3 * after.position)})
 
 
 def subtle_differences(runs: Runs) -> Finding:
@@ -136,9 +130,9 @@ def w_blocks_joints(runs: Runs) -> Finding:
 def w_keeps_precision(runs: Runs) -> Finding:
     """Beside the run without 𝒲, and beside the path's extent."""
     before, after = _weighted(runs, Q1, BLOCKED)
-    share = after[LARGEST] / extent(runs, Q1)
+    share = after.largest_position / extent(runs.scenario(Q1).nominal()[:, 9:])
     holds = {
-        "beside the run without W": not any(larger(after[key], before[key]) for key in (POSITION, ANGLE)),
+        "beside the run without W": not after.worse(before),
         "beside the extent": share < SAME,
     }
     return Finding(holds, {**_before_and_after(before, after), "of the extent [%]": 100.0 * share})
@@ -156,16 +150,20 @@ def general_path(runs: Runs) -> Finding:
 
 def acceptable_solutions(runs: Runs) -> Finding:
     """Errors on the path by joints 7 and 8."""
-    errors = settled_errors(at_points(runs, Q7Q8))
-    figures = {"RMS [mm]": 1e3 * errors[POSITION], "[rad]": errors[ANGLE], "largest [mm]": 1e3 * errors[LARGEST]}
-    more = {"of the extent [%]": 100.0 * errors[LARGEST] / extent(runs, Q7Q8)}
-    return Finding(None, figures, {**more, "largest [rad]": errors["largest_orientation_error_rad"]})
+    settled = errors(runs, Q7Q8)
+    figures = {
+        "RMS [mm]": 1e3 * settled.position,
+        "[rad]": settled.angle,
+        "largest [mm]": 1e3 * settled.largest_position,
+    }
+    share = settled.largest_position / extent(runs.scenario(Q7Q8).nominal()[:, 9:])
+    return Finding(None, figures, {"of the extent [%]": 100.0 * share, "largest [rad]": settled.largest_angle})
 
 
 def w_degrades_q7_and_q8(runs: Runs) -> Finding:
     """Errors without and with 𝒲."""
     before, after = _weighted(runs, Q7Q8, BLOCKED)
-    holds = all(larger(after[key], before[key]) for key in (POSITION, ANGLE))
+    holds = larger(after.position, before.position) and larger(after.angle, before.angle)
     return Finding(holds, _before_and_after(before, after))
 
 
@@ -238,33 +236,33 @@ def j_prev_a(runs: Runs) -> Finding:
     return Finding(no_worse(runs, held, {}), errors_of_variants(runs, held, {}))
 
 
-def _compensates(runs: Runs, key: str, unit: str) -> Finding:
+def _compensates(runs: Runs, error: str, unit: str) -> Finding:
     """Errors beside those of the exact arm that is driven by the model's joint coordinates."""
     holds: dict[str, bool] = {}
     figures: dict[str, list[float]] = {}
     for name, path in PATHS.items():
         scenario = runs.scenario(path)
         longer = scenario.replace(iterations_per_point=(60,) * 10 + (50,), steps=600 + 5 * max(scenario.steps - 600, 0))
-        errors = {
-            "uncorrected": at_points(runs, scenario, "follow_nominal"),
-            "as printed": at_points(runs, scenario),
-            "50 inner steps": at_points(runs, longer),
-            "λ_a = 3e-3": at_points(runs, scenario, **LAMBDAS["λ_a = 3e-3"]),
+        runs_of = {
+            "uncorrected": errors(runs, scenario, "follow_nominal"),
+            "as printed": errors(runs, scenario),
+            "50 inner steps": errors(runs, longer),
+            "λ_a = 3e-3": errors(runs, scenario, **LAMBDAS["λ_a = 3e-3"]),
         }
-        uncorrected, *corrected = (settled_errors(points)[key] for points in errors.values())
-        holds |= {f"{name}, {how}": e < uncorrected for how, e in zip(list(errors)[1:], corrected, strict=True)}
+        uncorrected, *corrected = (getattr(e, error) for e in runs_of.values())
+        holds |= {f"{name}, {how}": e < uncorrected for how, e in zip(list(runs_of)[1:], corrected, strict=True)}
         figures[name] = [uncorrected, *corrected]
     return Finding(holds, scaled(figures, unit))
 
 
 def compensates_position(runs: Runs) -> Finding:
     """Position errors."""
-    return _compensates(runs, POSITION, "mm")
+    return _compensates(runs, "position", "mm")
 
 
 def compensates_orientation(runs: Runs) -> Finding:
     """Orientation errors."""
-    return _compensates(runs, ANGLE, "rad")
+    return _compensates(runs, "angle", "rad")
 
 
 def precise_model(runs: Runs) -> Finding:
@@ -274,13 +272,10 @@ def precise_model(runs: Runs) -> Finding:
     for name, path in PATHS.items():
         scenario = runs.scenario(path)
         exact = scenario.replace(arm=scenario.model, model=scenario.model)
-        precise, other = (
-            settled_errors(points_of(exact, runs.play(exact, METHOD))),
-            settled_errors(at_points(runs, path)),
-        )
-        holds &= sound(runs, exact, {}) and not any(larger(precise[key], other[key]) for key in (POSITION, ANGLE))
-        figures |= {f"{name} [mm]": (1e3 * precise[POSITION], 1e3 * other[POSITION])}
-        figures |= {f"{name} [rad]": (precise[ANGLE], other[ANGLE])}
+        precise, other = errors(runs, exact), errors(runs, path)
+        holds &= sound(runs, exact, {}) and not precise.worse(other)
+        figures[f"{name} [mm]"] = 1e3 * precise.position, 1e3 * other.position
+        figures[f"{name} [rad]"] = precise.angle, other.angle
     return Finding(holds, figures)
 
 
@@ -294,8 +289,8 @@ def no_inversion(runs: Runs) -> Finding:
 def no_exploration(runs: Runs) -> Finding:
     """Measured poses of a step, counted by hand: each of the three policies sees one observation a step."""
     poses = dict.fromkeys((METHOD, *CLOSED_LOOPS), 1)
-    errors = {name: settled_errors(at_points(runs, Q7Q8, name))[POSITION] for name in poses}
-    return Finding(all(poses[name] > poses[METHOD] for name in CLOSED_LOOPS), poses, scaled(errors, "mm"))
+    positions = {name: errors(runs, Q7Q8, name).position for name in poses}
+    return Finding(all(poses[name] > poses[METHOD] for name in CLOSED_LOOPS), poses, scaled(positions, "mm"))
 
 
 def less_hectic(runs: Runs) -> Finding:
@@ -314,25 +309,25 @@ def compensates_manufacturing(runs: Runs) -> Finding:
     path, holds, figures = three_seconds(runs), {}, {}
     for size in DEVIATIONS:
         arms = manufactured_arms(path, size)
-        left = [settled_errors(at_points(runs, arm, "follow_nominal"))[POSITION] for arm in arms]
-        figures[f"{1e3 * size:g} mm: uncorrected"] = left
+        left = [errors(runs, arm, "follow_nominal").position for arm in arms]
+        figures[f"{1e3 * size:g}:"] = [*left]
         for how, variant in LAMBDAS.items():
-            mine = [settled_errors(at_points(runs, arm, **variant))[POSITION] for arm in arms]
+            mine = [errors(runs, arm, **variant).position for arm in arms]
             holds[f"{1e3 * size:g} mm, {how}"] = all(a < b for a, b in zip(mine, left, strict=True))
-            figures[f"{1e3 * size:g} mm: {how}"] = mine
+            figures[f"{1e3 * size:g}:"] += mine
     return Finding(holds, scaled(figures, "mm"))
 
 
 def needs_precise_measurement(runs: Runs) -> Finding:
     """Whether an error grows with noise in the measured pose."""
-    path, holds, figures = three_seconds(runs), {}, {}
+    path, figures = three_seconds(runs), {}
+    holds: dict[str, bool] = {}
     plants = (Plant(), *(Plant(pose_noise=size, pose_rotation_noise=size) for size in DEVIATIONS))
     for how, variant in LAMBDAS.items():
-        exact, *noisy = (settled_errors(at_points(runs, path.replace(plant=plant), **variant)) for plant in plants)
-        for size, errors in zip(DEVIATIONS, noisy, strict=True):
-            holds[f"{1e3 * size:g} mm, {how}"] = any(larger(errors[key], exact[key]) for key in (POSITION, ANGLE))
-        figures[f"{how} [mm]"] = [1e3 * errors[POSITION] for errors in (exact, *noisy)]
-        figures[f"{how} [rad]"] = [errors[ANGLE] for errors in (exact, *noisy)]
+        exact, *noisy = settled = [errors(runs, path.replace(plant=plant), **variant) for plant in plants]
+        holds |= {f"{1e3 * size:g} mm, {how}": e.worse(exact) for size, e in zip(DEVIATIONS, noisy, strict=True)}
+        figures[f"{how} [mm]"] = [1e3 * e.position for e in settled]
+        figures[f"{how} [rad]"] = [e.angle for e in settled]
     return Finding(holds, figures)
 
 

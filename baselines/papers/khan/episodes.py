@@ -6,7 +6,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from baselines.episodes import Episode
 from baselines.papers.comparisons import larger, rms
 from baselines.papers.paper import Figures
 from baselines.papers.runs import Runs
@@ -28,9 +27,6 @@ CLOSED_LOOPS = ("moore_penrose", "broyden")
 LAMBDAS: dict[str, Variant] = {"as printed": {}, "λ_a = 3e-3": {"lambda_a": 3e-3}}
 #: Standard deviations of joint zeros, axes and measured orientations in [rad], of links and measured positions in [m].
 DEVIATIONS = (1e-3, 1e-2, 1e-1)
-#: Root mean squares of the errors after 1 s, and the largest position error, as :func:`settled_errors` names them.
-POSITION, ANGLE, LARGEST = "rms_position_error_m", "rms_orientation_error_rad", "largest_position_error_m"
-
 #: ℱ with the orientation's nine elements at ½; 𝒲 with the last two joints at 0.01.
 LOOSE: Variant = {"task_weights": (0.5,) * 9 + (1.0,) * 3}
 BLOCKED: Variant = {"joint_weights": (1.0,) * 6 + (0.01,) * 2}
@@ -64,16 +60,11 @@ class Points(NamedTuple):
 
 
 def at_points(runs: Runs, name: str | Scenario, policy: str = METHOD, **parameters: Any) -> Points:
-    """The episode of a policy, seen at the grid points."""
-    return points_of(runs.scenario(name), runs.play(name, policy, **parameters))
-
-
-def points_of(scenario: Scenario, episode: Episode) -> Points:
-    """An episode, seen at the grid points of its scenario."""
+    """The episode of a policy at the grid points of the scenario."""
+    scenario, episode = runs.scenario(name), runs.play(name, policy, **parameters)
     last = scenario.counted()[1:]
-    time = scenario.points()[1:][last] * scenario.dt
     return Points(
-        np.asarray(time, dtype=np.float64),
+        np.asarray(scenario.points()[1:][last] * scenario.dt, dtype=np.float64),
         scenario.nominal()[1:][last],
         episode.pose[last],
         episode.position_error[last],
@@ -81,6 +72,33 @@ def points_of(scenario: Scenario, episode: Episode) -> Points:
         episode.q[last],
         {name: values[last] for name, values in episode.diagnostics.items()},
     )
+
+
+class Errors(NamedTuple):
+    """Errors at the grid points after 1 s.
+
+    Attributes:
+        position: Root mean square in [m].
+        angle: Root mean square of the orientation error in [rad].
+        largest_position: The largest one in [m].
+        largest_angle: The largest one in [rad].
+    """
+
+    position: float
+    angle: float
+    largest_position: float
+    largest_angle: float
+
+    def worse(self, than: Errors) -> bool:
+        """Whether either root mean square is a tenth larger than another's."""
+        return larger(self.position, than.position) or larger(self.angle, than.angle)
+
+
+def errors(runs: Runs, name: str | Scenario, policy: str = METHOD, **parameters: Any) -> Errors:
+    """The errors of a policy."""
+    points = at_points(runs, name, policy, **parameters)
+    position, angle = points.settled(points.position_error), points.settled(points.orientation_error)
+    return Errors(rms(position), rms(angle), float(position.max()), float(angle.max()))
 
 
 def spectra(runs: Runs, name: str, **parameters: Any) -> FloatArray:
@@ -101,22 +119,6 @@ def turned(pose: FloatArray) -> FloatArray:
     return np.array([rotation_vector(rotation) for rotation in pose[:, :9].reshape(-1, 3, 3)])
 
 
-def settled_errors(points: Points) -> dict[str, float]:
-    """The settled errors in numbers."""
-    position, angle = points.settled(points.position_error), points.settled(points.orientation_error)
-    return {
-        "rms_position_error_m": rms(position),
-        "largest_position_error_m": float(position.max()),
-        "rms_orientation_error_rad": rms(angle),
-        "largest_orientation_error_rad": float(angle.max()),
-    }
-
-
-def extent(runs: Runs, name: str) -> float:
-    """Extent of the nominal path, in [m]."""
-    return float(np.linalg.norm(np.ptp(runs.scenario(name).nominal()[:, 9:], axis=0)))
-
-
 def sound(runs: Runs, scenario: str | Scenario, variant: Variant) -> bool:
     """Whether no step of a variant of the method diverges or fails."""
     return bool((runs.play(scenario, METHOD, **variant).status <= int(Status.ITERATION_LIMIT)).all())
@@ -125,13 +127,7 @@ def sound(runs: Runs, scenario: str | Scenario, variant: Variant) -> bool:
 def no_worse(runs: Runs, one: Variant, other: Variant) -> bool:
     """Whether no step of a variant fails on either path, and neither error is a tenth larger than another's."""
     return all(
-        sound(runs, path, one)
-        and not any(
-            larger(
-                settled_errors(at_points(runs, path, **one))[key], settled_errors(at_points(runs, path, **other))[key]
-            )
-            for key in (POSITION, ANGLE)
-        )
+        sound(runs, path, one) and not errors(runs, path, **one).worse(errors(runs, path, **other))
         for path in PATHS.values()
     )
 
@@ -140,9 +136,9 @@ def errors_of_variants(runs: Runs, *variants: Variant) -> Figures:
     """The errors of several variants on both paths, in their order."""
     figures: dict[str, list[float]] = {}
     for name, path in PATHS.items():
-        errors = [settled_errors(at_points(runs, path, **variant)) for variant in variants]
-        figures[f"{name} [mm]"] = [1e3 * e[POSITION] for e in errors]
-        figures[f"{name} [rad]"] = [e[ANGLE] for e in errors]
+        of_path = [errors(runs, path, **variant) for variant in variants]
+        figures[f"{name} [mm]"] = [1e3 * e.position for e in of_path]
+        figures[f"{name} [rad]"] = [e.angle for e in of_path]
     return figures
 
 

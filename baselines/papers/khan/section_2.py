@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from baselines.papers.comparisons import SAME
+from baselines.papers.comparisons import SAME, extent
 from baselines.papers.faitli.episodes import REGULAR, TRAJECTORIES, jacobians, nominal_joints
 from baselines.papers.runs import Runs
 from baselines.status import Status
@@ -48,13 +48,13 @@ def best(runs: Runs, scenario: Scenario, transformation: str, values: Sequence[f
     given: dict[str, Any] = {"transformation": transformation, "iterations": 10 if counted.all() else 1}
     if scenario.arm.joints == 2:
         given["components"] = (0, 1)
-    extent = float(np.linalg.norm(np.ptp(scenario.nominal(), axis=0)))
+    visible = SAME * extent(scenario.nominal())
     tried = []
     for a in values:
         episode = runs.play(scenario, "fixed_point", a=a, **given)
         error = float(episode.position_error[counted].max())
         diverged = bool((episode.status == int(Status.DIVERGED)).any())
-        tried.append(Best(error, a, not diverged and error < SAME * extent))
+        tried.append(Best(error, a, not diverged and error < visible))
     return min(tried, key=lambda one: (not one.success, one.error))
 
 

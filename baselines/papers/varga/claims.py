@@ -8,7 +8,7 @@ import numpy as np
 
 from baselines.episodes import Episode
 from baselines.papers.comparisons import CONSIDERABLY, above, larger, rms
-from baselines.papers.paper import Finding, scaled
+from baselines.papers.paper import Figures, Finding, scaled
 from baselines.papers.runs import Runs
 from baselines.papers.varga.episodes import (
     ALPHAS,
@@ -43,19 +43,25 @@ def _all_readings(runs: Runs) -> dict[str, Episode]:
     }
 
 
+def _by_arm(shares: dict[str, float]) -> Figures:
+    """Shares by the reading of the arm; α restarted, unshifted and shifted, then α kept."""
+    arms = ("varga7", "literal")
+    return scaled({arm: [share for label, share in shares.items() if label.startswith(arm)] for arm in arms}, "%")
+
+
 def printed_step(runs: Runs) -> Finding:
     """Share of the steps that diverge with the printed bounds of α, in all readings."""
     shares = {label: diverged(episode) for label, episode in _all_readings(runs).items()}
     episode = fast(runs)
     cost = float((episode.tracking_cost + episode.velocity_cost).sum())
     more = {"total cost": cost, "largest error [m]": float(episode.position_error.max())}
-    return Finding({label: share == 0.0 for label, share in shares.items()}, scaled(shares, "%"), more)
+    return Finding({label: share == 0.0 for label, share in shares.items()}, _by_arm(shares), more)
 
 
 def limit_reached(runs: Runs) -> Finding:
     """Share of the steps with all 450 iterations, in all readings."""
     shares = {label: at_limit(episode) for label, episode in _all_readings(runs).items()}
-    return Finding(above(shares, 0.5), scaled(shares, "%"))
+    return Finding(above(shares, 0.5), _by_arm(shares))
 
 
 def offline_only(runs: Runs) -> Finding:
@@ -153,12 +159,13 @@ def _fluctuations(qdot: FloatArray) -> dict[str, float]:
 
 def slow_fluctuates(runs: Runs) -> Finding:
     """Second differences on the fast and the slow path, in three measures."""
-    holds, figures = {}, {}
+    holds: dict[str, bool] = {}
+    figures: dict[str, list[float]] = {}
     for name, alpha in ALPHAS.items():
         a, b = (_fluctuations(runs.play(path, METHOD, **alpha).qdot) for path in (FAST, SLOW))
         for measure in a:
             holds[f"{name}, {measure}"] = larger(b[measure], a[measure])
-            figures[f"{name}, {measure}"] = a[measure], b[measure]
+            figures.setdefault(measure, []).extend((a[measure], b[measure]))
     return Finding(holds, figures)
 
 
@@ -177,12 +184,13 @@ def velocities_bounded(runs: Runs) -> Finding:
 def smoothing_calms(runs: Runs) -> Finding:
     """Fluctuation before and after smoothing, by second differences and by total variation."""
     kept = runs.play(FAST, METHOD, **KEPT), runs.play(FAST, "smoothed", policy=METHOD, options=KEPT)
-    holds, figures = {}, {}
+    holds: dict[str, bool] = {}
+    figures: dict[str, list[float]] = {}
     for label, (before, after) in {"restarted": (fast(runs), smooth(runs)), "kept": kept}.items():
         for name, measure in (("second differences", fluctuation), ("variation", variation)):
             a, b = measure(before.qdot), measure(after.qdot)
             holds[f"{label}, {name}"] = larger(a, b, CONSIDERABLY)
-            figures[f"{label}, {name}"] = a, b
+            figures.setdefault(name, []).extend((a, b))
     return Finding(holds, figures)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from baselines.episodes import Episode
-from baselines.papers.comparisons import SAME, above, below, falls, larger, rms, roughness
+from baselines.papers.comparisons import SAME, above, below, extent, falls, larger, rms, roughness
 from baselines.papers.paper import Finding, scaled
 from baselines.papers.runs import Runs
 from baselines.papers.zhang.episodes import (
@@ -45,7 +45,9 @@ from baselines.papers.zhang.targets import (
 from baselines.solvers.levenberg_marquardt.damping_parameters import typical_link
 from baselines.status import Status
 from ikgym import Plant
+from ikgym.arms import Arm
 from ikgym.rotations import rodrigues, rotation_vector
+from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray
 
 Pairs = dict[str, tuple[float, float]]
@@ -93,9 +95,9 @@ def static_error(runs: Runs) -> Finding:
     more: dict[str, float] = {}
     for damping in (0.2, 2.0, 20.0):
         error, formula = ramp_errors(runs, 1e-3, damping)
-        apart[f"λ = {damping:g}:"] = float(np.linalg.norm(error - formula) / np.linalg.norm(formula))
+        apart[f"λ = {damping:g}"] = float(np.linalg.norm(error - formula) / np.linalg.norm(formula))
         more[f"λ = {damping:g} [m]"] = float(np.linalg.norm(error))
-    return Finding(max(apart.values()) < SAME, scaled(apart, "%"), more)
+    return Finding(max(apart.values()) < SAME, scaled({"": list(apart.values())}, "%"), more)
 
 
 def no_static_error(runs: Runs) -> Finding:
@@ -143,9 +145,9 @@ def fastest_without_damping(runs: Runs) -> Finding:
             samples.append(float(np.where(outside.any(axis=0), last, 0).mean()))
             overshoots.append(float(np.percentile(beyond.max(axis=0), 95)))
         holds[f"{shift:g} rad"] = samples[0] == min(samples) and overshoots[0] < SAME
-        figures |= {f"{shift:g} rad:": samples, f"overshoot, {shift:g} rad [%]": 100.0 * overshoots[0]}
-        more[f"overshoot, {shift:g} rad"] = overshoots
-    return Finding(holds, figures, more)
+        figures[f"{shift:g} rad:"] = samples
+        more[f"{shift:g} rad"] = overshoots
+    return Finding(holds, figures | {"overshoot [%]": [100.0 * of[0] for of in more.values()]}, more)
 
 
 def robustness_on_plants(runs: Runs) -> Finding:
@@ -169,26 +171,32 @@ def robustness_on_plants(runs: Runs) -> Finding:
 
 
 def model_free(runs: Runs) -> Finding:
-    """Error with the exact model and on the worst of three arms, by example, calibration and controller."""
+    """Error with the exact model and on the worst of three arms for each calibration, by example and controller."""
     calibrations = {"fine": (5e-4, 3e-4), "coarse": (1e-2, 1e-2)}
     controllers: dict[str, dict[str, Any]] = {
         "(5)": {"one_step": True, "rule": "constant", "damping": 0.0},
         "(11)–(17)": {},
     }
-    holds, figures, more = {}, {}, {}
-    for (place, path), (which, (zero, link)) in itertools.product(
-        (("helix", HELIX), ("line", LINE)), calibrations.items()
+    holds: dict[str, bool] = {}
+    figures: dict[str, list[float]] = {}
+    more: dict[str, list[float]] = {}
+    for (place, path), (controller, options) in itertools.product(
+        (("helix", HELIX), ("line", LINE)), controllers.items()
     ):
-        scenario = runs.scenario(path)
-        source = scenario.replace(plant=Plant(zero=zero, link=link, axis=zero))
-        arms = [scenario.arm, *(source.drawn_plant(seed).arm for seed in range(3))]
-        for controller, options in controllers.items():
-            episodes = [runs.play(scenario.replace(arm=arm, model=scenario.model), "mfac", **options) for arm in arms]
-            exact, *wrong = (rms(episode.position_error[settled_from(episode) :]) for episode in episodes)
-            name = f"{place}, {which}, {controller}"
-            holds[name] = not larger(max(wrong), exact)
-            figures[name] = exact, max(wrong)
-            more[f"{name}, all [m]"] = wrong
+        scenario, name = runs.scenario(path), f"{place}, {controller}"
+
+        def error(arm: Arm, scenario: Scenario = scenario, options: dict[str, Any] = options) -> float:
+            episode = runs.play(scenario.replace(arm=arm, model=scenario.model), "mfac", **options)
+            return rms(episode.position_error[settled_from(episode) :])
+
+        exact = error(scenario.arm)
+        figures[name] = [exact]
+        for which, (zero, link) in calibrations.items():
+            source = scenario.replace(plant=Plant(zero=zero, link=link, axis=zero))
+            wrong = [error(source.drawn_plant(seed).arm) for seed in range(3)]
+            holds[f"{name}, {which}"] = not larger(max(wrong), exact)
+            figures[name].append(max(wrong))
+            more[f"{name}, {which} [m]"] = wrong
     return Finding(holds, scaled(figures, "mm"), more)
 
 
@@ -287,8 +295,8 @@ def one_formula(runs: Runs) -> Finding:
             left, made = left - jacobian @ step, made + step
         stacked = np.linalg.solve(whole.T @ whole + damping * np.eye(3 * n), whole.T @ np.tile(error, n))  # (21)
         total = stacked.reshape(n, 3).sum(axis=0)
-        apart[f"λ = {damping:g}:"] = float(np.linalg.norm(total - made) / np.linalg.norm(made))
-    return Finding(below(apart, SAME), scaled(apart, "%"))
+        apart[f"λ = {damping:g}"] = float(np.linalg.norm(total - made) / np.linalg.norm(made))
+    return Finding(below(apart, SAME), scaled({"": list(apart.values())}, "%"))
 
 
 def one_point(runs: Runs) -> Finding:
@@ -313,8 +321,8 @@ def held_points(runs: Runs) -> Finding:
         one = along_the_helix(runs, "mfac", 1, damping=damping)
         held = along_the_helix(runs, "mfapc", 5, hold=True, horizon=5, damping=damping)
         shares = np.linalg.norm(held - one, axis=1) / np.linalg.norm(one, axis=1)
-        apart[f"λ = {damping:g}:"] = float(np.median(shares))
-    return Finding(below(apart, SAME), scaled(apart, "%"))
+        apart[f"λ = {damping:g}"] = float(np.median(shares))
+    return Finding(below(apart, SAME), scaled({"": list(apart.values())}, "%"))
 
 
 def closer_tracking(runs: Runs) -> Finding:
@@ -420,9 +428,8 @@ def excellent(runs: Runs) -> Finding:
     """Largest errors as shares of the path's extent and, on the line, of the whole turn."""
     line, nominal = iterative(runs), runs.scenario(LINE).nominal()
     ways = runs.scenario(LINE).task.error(nominal[-1], nominal[0])
-    round_trip = float(np.linalg.norm(np.ptp(runs.scenario(HELIX).nominal(), axis=0)))
     shares = {
-        "helix": _settled_error(predictive(runs)) / round_trip,
+        "helix": _settled_error(predictive(runs)) / extent(runs.scenario(HELIX).nominal()),
         "line": float(line.position_error.max() / np.linalg.norm(ways[:3])),
         "turn": float(line.orientation_error.max() / np.linalg.norm(ways[3:])),
     }

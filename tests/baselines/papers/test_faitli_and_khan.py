@@ -9,7 +9,7 @@ from baselines.papers.comparisons import YANK
 from baselines.papers.faitli import claims as faitli
 from baselines.papers.faitli.episodes import past_shoulder, solved, speeds, yank
 from baselines.papers.khan import claims as khan
-from baselines.papers.khan.episodes import ANGLE, LARGEST, POSITION
+from baselines.papers.khan.episodes import Errors
 from baselines.papers.runs import Runs
 
 
@@ -46,8 +46,8 @@ def test_both_claims_on_yanks_name_the_same_places():
 @pytest.mark.parametrize(("largest", "visible"), [(9.0, True), (1e-9, False)])
 def test_a_degraded_error_has_not_remained(monkeypatch, growth, largest, visible):
     """An error of 9 m is visible on this path, and one of 1 nm is not."""
-    before = {POSITION: 0.04, ANGLE: 0.1, LARGEST: largest}
-    after = {key: (1.0 + growth) * value for key, value in before.items()}
+    before = Errors(0.04, 0.1, largest, 0.2)
+    after = Errors(*((1.0 + growth) * error for error in before))
     monkeypatch.setattr(khan, "_weighted", lambda *_: (before, after))
     degraded, runs = growth > 0.1, Runs(steps=60)
     for claim in (khan.f_weights_orientation_down, khan.f_couples, khan.w_degrades_q7_and_q8):

@@ -55,8 +55,8 @@ def test_changes_of_less_than_a_tenth_decide_nothing(before, after, wanted):
 
 
 def test_thresholds():
-    assert larger(1.1001, 1.0)
-    assert not larger(1.0999, 1.0)
+    assert larger(1.0, 0.899)
+    assert not larger(1.0, 0.901)
     assert above({"a": 2.0, "b": 1.0}, 1.0) == {"a": True, "b": False}
     assert below({"a": 2.0, "b": 1.0}, 2.0) == {"a": False, "b": True}
 
@@ -72,7 +72,7 @@ def test_a_ledger_is_read_as_it_was_written():
     assert ledger.from_csv(ledger.to_csv(results)) == results
     text = ledger.markdown([paper], results)
     assert "2 not testable, 1 reproduced." in text
-    assert "| a. | fig. 1 | largest, of all | x 1 m | *not testable*: open |" in text
+    assert "| a. (fig. 1) | largest, of all | x 1 m | *not testable*: open |" in text
 
 
 def test_episodes_are_identified_by_the_content_of_their_scenarios():

@@ -32,15 +32,6 @@ REMEDY = "`ikgym reproduce` and `python -m docs.paper_pages results/papers` writ
 papers = pytest.mark.parametrize("name", PAPERS)
 
 
-def strict(text):
-    """JSON as the standard has it, without NaN and infinity."""
-
-    def refuse(constant):
-        raise AssertionError(f"{constant} is no JSON")
-
-    return json.loads(text, parse_constant=refuse)
-
-
 def test_all_papers_and_figures_are_there():
     assert {name: [f.number for f in paper.figures] for name, paper in PAPERS.items()} == FIGURES
 
@@ -68,13 +59,9 @@ def test_a_short_run_draws_and_tests_everything(name, numbers, tmp_path, monkeyp
         assert 1000 <= width <= 2000
         assert 300 <= height <= 3000
         assert len(content) > 8000, f"figure {figure.number} seems to be empty"
-    written = strict((tmp_path / name / "numbers.json").read_text())
-    assert list(written["figures"]) == [f"figure {number}" for number in numbers]
-    assert all(len(values) > 1 for values in written["figures"].values())
     results = ledger.rows({name: found})
-    assert {claim: values["verdict"] for claim, values in written["claims"].items()} == {
-        row["claim"]: row["verdict"] for row in results
-    }
+    claims = json.loads((tmp_path / name / "numbers.json").read_text(), parse_constant=pytest.fail)["claims"]
+    assert {claim: v["verdict"] for claim, v in claims.items()} == {row["claim"]: row["verdict"] for row in results}
     assert ledger.from_csv((tmp_path / "claims.csv").read_text()) == results
     assert (tmp_path / "papers.md").read_text() == ledger.markdown([paper], results)
 
@@ -90,10 +77,7 @@ class TestCommandLine:
         )
         assert code == 0
         files = sorted(p.relative_to(tmp_path / "new").as_posix() for p in (tmp_path / "new").rglob("*.*"))
-        assert files == ["zhang/figure-03.png", "zhang/figure-09.png", "zhang/numbers.json"]
-        numbers = strict((tmp_path / "new" / "zhang" / "numbers.json").read_text())
-        assert set(numbers["figures"]) == {"figure 3", "figure 9"}
-        assert numbers["claims"] == {}
+        assert files == ["zhang/figure-03.png", "zhang/figure-09.png"]
         assert "figure-09.png: Iteration count" in err
         assert str(tmp_path / "new") in out
 
@@ -141,13 +125,6 @@ def test_the_ledger_has_these_claims(name):
         assert verdict in VERDICTS
         assert (claim.condition != "") == (verdict in ("depends", "not testable")), claim.name
         assert figures or verdict == "not testable"
-
-
-def test_the_page_has_the_tables_of_the_ledger():
-    results = ledger.from_csv((DOCS / "results" / "papers.csv").read_text(encoding="utf-8"))
-    page = (DOCS / "papers.md").read_text(encoding="utf-8")
-    assert ledger.markdown(list(PAPERS.values()), results) in page, REMEDY
-    assert len(page.split()) < 4500
 
 
 NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
