@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import pathlib
+import re
+
 import numpy as np
 import pytest
 
@@ -11,6 +14,7 @@ from baselines.papers.faitli.episodes import past_shoulder, solved, speeds, yank
 from baselines.papers.khan import claims as khan
 from baselines.papers.khan.episodes import Errors
 from baselines.papers.runs import Runs
+from baselines.solvers import fixed_point, resolved_rate
 
 
 @pytest.mark.parametrize("distance", [0.1, 0.001])
@@ -40,6 +44,18 @@ def test_both_claims_on_yanks_name_the_same_places():
     yanked = {name for name, (inversion, _) in yanks.figures.items() if inversion > YANK}
     assert {name.partition(", ")[0] for name in stagnation.figures} == yanked
     assert len(yanked) == 3
+
+
+def test_both_methods_do_without_factorisations():
+    """The claims on this count operations by hand."""
+    decomposed = {
+        package.__name__: sum(
+            re.search(r"\b(linalg|cholesky|ldl|inv|pinv|qr|svd|factorise)\b", file.read_text()) is not None
+            for file in pathlib.Path(package.__path__[0]).glob("*.py")
+        )
+        for package in (fixed_point, resolved_rate)
+    }
+    assert decomposed[fixed_point.__name__] == 0 < decomposed[resolved_rate.__name__]
 
 
 @pytest.mark.parametrize("growth", [0.05, 0.27, 0.3])
