@@ -79,7 +79,7 @@ def _cached(function: Any, **options: Any) -> Any:
         cache.save_overload = _forgiving(cache.save_overload, cache.flush, function)
     file = getattr(cache, "_cache_file", None)
     if hasattr(file, "_source_stamp"):
-        file._source_stamp = _stamp(function.__module__)  # type: ignore[union-attr]
+        file._source_stamp = _stamp(function.__module__) + _stamp_of_globals(function)  # type: ignore[union-attr]
     return compiled
 
 
@@ -117,6 +117,14 @@ def _stamp(module: str) -> str:
             _stamps[origin] = _stamp(origin)  # imported, and so complete
             digest.update(_stamps[origin].encode())
     return digest.hexdigest()
+
+
+def _stamp_of_globals(function: Any) -> str:
+    """Stamps of what a function with globals of its own may reach; nothing for others, which their module covers."""
+    if function.__globals__ is vars(sys.modules[function.__module__]):
+        return ""
+    origins = {_origin(value) for value in function.__globals__.values()} - {""}
+    return "".join(_stamp(origin) for origin in sorted(origins))
 
 
 def _origin(value: object) -> str:

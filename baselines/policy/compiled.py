@@ -1,98 +1,109 @@
-"""Solvers whose whole step is one compiled call: check, solution, cut to the velocity limit, and the next memory.
-
-Of the 23 µs that `predict` of `dls` took in an episode the solution took 2; the rest were checks, small arrays, and
-calls between the parts.
-"""
+"""Solvers whose step is one compiled kernel."""
 
 from __future__ import annotations
 
 import abc
 import functools
-from typing import Any, ClassVar
+from collections.abc import Callable
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from baselines.policy.observations import Parts, not_finite
-from baselines.policy.problem import Batch, Memory, Solution
-from baselines.policy.solver import SolverPolicy
-from baselines.policy_kernels import REFUSED, parts_of
+from baselines.policy.problem import Batch, Memory, Problem, Solution
+from baselines.policy.solver import SolverPolicy, compiled_classes
+from baselines.policy_kernels import REFUSED, NoMemory, entry, model_block, parts_of
 from ikgym.outcome import OBSERVED
+from ikgym.validation import FloatArray
 
 
 class CompiledPolicy(SolverPolicy, abc.ABC):
-    """Base of solvers that are one kernel, called with flat arguments, which numba takes apart the fastest.
+    """Base of solvers that are one kernel, ``step(model, numbers, seen, memory, answer)``.
 
-        kernel(*constants, checking, q, qdot, pose, nominal, remaining, *memory, action, answer)
-
-    The observations and the actions are flat, whatever the number of rows, but for the nominal coordinates of shape
-    (B p, m): :func:`as_rows` gives them their shapes. ``answer`` is one block, for :func:`answer_parts`. The kernel
-    begins with ``if checking and not all_finite(…): return REFUSED``, turns the memory into the next one in place, and
-    ends with ``return cut_rows(…)``. It does not change the observations.
+    The kernel is given the :class:`Model`, the named tuple of :meth:`numbers`, the observations as :class:`Seen`, and
+    the memory as the named tuple of :meth:`memory`; it turns the memory into the next one in place and fills in the
+    :class:`Answer`. Checks, batches, threads and the cut to the velocity limit are dealt with here.
     """
 
     sees_extras: ClassVar[bool] = False
+    #: The kernel.
+    step: ClassVar[Callable[..., None]]
 
     @abc.abstractmethod
-    def kernel(self) -> Any:
-        """The kernel, see the class."""
+    def numbers(self) -> NamedTuple:
+        """The parameters as the kernel takes them: a named tuple of numbers and arrays."""
 
-    @abc.abstractmethod
-    def constants(self) -> tuple[Any, ...]:
-        """The arguments of the kernel that never change: numbers and arrays."""
+    def memory(self, rows: int) -> Memory:
+        """See :meth:`SolverPolicy.memory`; nothing."""
+        del rows
+        return NoMemory()
 
     def solve(self, batch: Batch, memory: Memory) -> Solution:
         """See :meth:`SolverPolicy.solve`."""
         rows, n = batch.q.shape
-        kernel, constants = self._call
-        action, answer, kept = _blank(rows, n, memory)
-        kernel(*constants, False, *_flat(batch), *kept, action, answer)
+        _, answer, kept, _ = self._call(_flat(batch), rows, memory, False)
         qdot, status, iterations = parts_of(answer, rows, n)
-        return Solution(qdot, self._named(tuple(kept)), status, iterations)
+        return Solution(qdot, self._named(kept), status, iterations)
 
     def act(self, batch: Batch, memory: Memory) -> tuple[npt.NDArray[np.float32], Memory]:
         """See :meth:`SolverPolicy.act`; in one call of the kernel, unless threads share out the rows."""
-        rows = len(batch.q)
-        if not self._undivided(rows):
+        if not self._undivided(len(batch.q)):
             return super().act(batch, memory)
-        action, after = self._ask(_flat(batch), rows, memory, False)
+        action, after = self._step(_flat(batch), len(batch.q), memory, False)
         return action.reshape(batch.q.shape), after
 
     def _answer(self, parts: Parts, single: bool, memory: Memory) -> tuple[npt.NDArray[np.float32], Memory]:
         """See :meth:`SolverPolicy._answer`; in one call of the kernel, unless threads share out the rows."""
-        rows = 1 if single else len(parts[0])
+        if single:
+            return self._step(parts, 1, memory, True)
+        rows = len(parts[0])
         if not self._undivided(rows):
             return super()._answer(parts, single, memory)
-        if single:
-            return self._ask(parts, 1, memory, True)
-        action, after = self._ask(_flat(parts), rows, memory, True)
+        action, after = self._step(_flat(parts), rows, memory, True)
         return action.reshape(parts[0].shape), after
 
-    def _ask(self, parts: Parts, rows: int, memory: Memory, checking: bool) -> tuple[Any, Memory]:
-        """Calls the kernel: actions, flat, and the state for the next call."""
-        kernel, constants = self._call
-        n = self.problem.model.joints
-        action, answer, kept = _blank(rows, n, memory)
-        code = kernel(*constants, checking, *parts, *kept, action, answer)
+    def _step(self, parts: Parts, rows: int, memory: Memory, checking: bool) -> tuple[Any, Memory]:
+        """Actions, flat, and the state for the next call."""
+        action, answer, kept, code = self._call(parts, rows, memory, checking)
         if code:
             if code == REFUSED:
                 raise not_finite()
-            kept = self._without_lost(kept, parts_of(answer, rows, n)[0])
+            kept = self._without_lost(kept, parts_of(answer, rows, self.problem.model.joints)[0])
         return action, (answer[:rows], answer[rows : 2 * rows], *kept)
 
+    def _call(self, parts: Parts, rows: int, memory: Memory, checking: bool) -> tuple[Any, Any, Memory, int]:
+        """Calls the kernel: actions, flat, the block of the answer, the next memory, and what the call returns."""
+        call, block, numbers, n = self._kernel
+        action, answer = np.empty(rows * n, np.float32), np.empty(rows * (n + 2), np.int64)
+        kept = tuple([array.copy() for array in memory])
+        return action, answer, kept, call(block, numbers, checking, parts, kept, action, answer)
+
     @functools.cached_property
-    def _call(self) -> tuple[Any, tuple[Any, ...]]:
-        """The kernel, and what it is called with at each step."""
-        return self.kernel(), self.constants()
+    def _kernel(self) -> tuple[Any, FloatArray, tuple[Any, ...], int]:
+        """The compiled call, its arguments that never change, and the number of joints."""
+        numbers, n, m = self.numbers(), self.problem.model.joints, self.problem.task.size
+        call = _entry(type(self).step, type(numbers), type(self._example))
+        if type(self) not in compiled_classes:
+            with self._first_call():
+                self.__dict__["_kernel"] = call, _block(self.problem), tuple(numbers), n
+                self._call((*np.empty((3, 0)), np.empty((0, m)), np.empty(0)), 0, tuple(self.memory(0)), False)
+        return call, _block(self.problem), tuple(numbers), n
 
 
-def _blank(rows: int, n: int, memory: Memory) -> tuple[Any, Any, Any]:
-    """Flat actions and the answer, to be written, and a memory to be changed."""
-    return np.empty(rows * n, np.float32), np.empty(rows * (n + 2), np.int64), [array.copy() for array in memory]
+#: One compiled call for each kernel and the types of its arguments.
+_entry = functools.cache(entry)
+
+
+@functools.lru_cache(64)  # problems are frozen, and shared by many policies
+def _block(problem: Problem) -> FloatArray:
+    model = problem.model
+    limits = problem.velocity_limit, model.lower, model.upper, problem.largest_qdot
+    return model_block(model.chain, problem.task.kind, problem.dt, *limits)
 
 
 def _flat(parts: Parts) -> Parts:
-    """The arrays of a batch as kernels take them."""
+    """The arrays of a batch as :func:`entry` takes them."""
     q, qdot, pose, nominal, remaining = parts[: len(OBSERVED)]
     return (
         q.reshape(-1),

@@ -145,7 +145,7 @@ def _floats(observation: Observation) -> Parts:
         arrays: Parts = _parts(observation)
         for array in arrays:
             if not (type(array) is np.ndarray and array.dtype is _FLOAT and array.flags.carray):
-                return [_as_floats(part) for part in arrays]
+                return tuple([_as_floats(part) for part in arrays])
         return arrays
     except (KeyError, IndexError, TypeError, ValueError) as e:
         keys = sorted(observation) if isinstance(observation, Mapping) else type(observation).__name__

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import abc
+import contextlib
 import dataclasses
 import functools
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -25,7 +26,7 @@ from ikgym.simulator import Observation
 from ikgym.validation import FloatArray, Frozen
 
 #: Policies that have solved something in this process, and so are compiled.
-_compiled: set[type] = set()
+compiled_classes: set[type] = set()
 
 #: Which threads work on a share of a batch. What they call in turn shares out no further: threads of one pool that
 #: wait for others of it wait forever.
@@ -152,7 +153,9 @@ class SolverPolicy(Frozen, abc.ABC):
         parts, rows, single = self._read(observation)
         if self.sees_extras:
             parts = *parts, *self._read.extras(observation, rows, single)
-        return self._answer(parts, single, self._recall(state, episode_start, rows))
+        action, after = self._answer(parts, single, self._recall(state, episode_start, rows))
+        self._last[0] = after
+        return action, after
 
     def act(self, batch: Batch, memory: Memory) -> tuple[npt.NDArray[np.float32], Memory]:
         """What `predict` does with observations that are known to be good, as policies around other ones may know.
@@ -219,10 +222,18 @@ class SolverPolicy(Frozen, abc.ABC):
         starting = None if episode_start is None else states.truth_values(episode_start, rows)
         if state is None:
             return self.memory(rows)
-        memory = states.checked_memory(self.name, state, self._signature(rows), rows)
+        if state is self._last[0] and len(state[0]) == rows:
+            memory = remembered(state)
+        else:
+            memory = states.checked_memory(self.name, state, self._signature(rows), rows)
         if starting is None or not starting.any():
             return memory
         return self.restarted(memory, np.broadcast_to(starting, (rows,)))
+
+    @functools.cached_property
+    def _last(self) -> list[Memory | None]:
+        """The last state that was returned, which needs no check when it comes back."""
+        return [None]
 
     @functools.cached_property
     def _signature(self) -> Callable[[int], states.Signature]:
@@ -235,8 +246,16 @@ class SolverPolicy(Frozen, abc.ABC):
         return self.memory(1)
 
     def _undivided(self, rows: int) -> bool:
-        """Whether so many rows are solved in one call, by a policy that is compiled."""
-        return type(self) in _compiled and (rows < 2 * self.grain or getattr(_sharing, "now", False))
+        """Whether so many rows are solved in one call, not by several threads."""
+        return rows < 2 * self.grain or getattr(_sharing, "now", False)
+
+    @classmethod
+    @contextlib.contextmanager
+    def _first_call(cls) -> Iterator[None]:
+        """Announces the compilation that the first call of a class does."""
+        compiled_classes.add(cls)
+        with announced(f"the policy {cls.name}"):
+            yield
 
     def _named(self, memory: Memory) -> Memory:
         """The memory as the named tuple that :meth:`memory` gives, where it gives one."""
@@ -247,11 +266,9 @@ class SolverPolicy(Frozen, abc.ABC):
         """The solution of all rows; where they are many, several threads share them out."""
         policy, rows = type(self), len(batch.q)
         memory = self._named(memory)
-        if policy not in _compiled:  # the first solve has to compile
-            with announced(f"the policy {policy.name}"):
-                solution = self.solve(batch, memory)
-            _compiled.add(policy)
-            return solution
+        if policy not in compiled_classes:  # the first solve has to compile
+            with self._first_call():
+                return self.solve(batch, memory)
         if self._undivided(rows):
             return self.solve(batch, memory)
         parts: dict[int, Solution] = {}

@@ -461,7 +461,7 @@ def test_arrays_stay_read_only_in_copies(name):
 
 
 def test_long_compilation_of_a_policy_is_announced(monkeypatch, caplog):
-    monkeypatch.setattr("baselines.policy.solver._compiled", set())
+    monkeypatch.setattr("baselines.policy.solver.compiled_classes", set())
     monkeypatch.setattr(ikgym.compilation.announced.__wrapped__, "__defaults__", (0.01,))
 
     class Slow(Broken):

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from baselines.policy import Memory
-from baselines.policy_kernels import REFUSED, all_finite, answer_parts, as_rows
-from baselines.solvers.arm_task import arm_task_of, pose_arrays, task_shift
-from baselines.solvers.resolved_rate.base import APPLIED, NominalMemory, answered
+from baselines.solvers.arm_task import task_shift
+from baselines.solvers.resolved_rate.base import APPLIED, NominalMemory, finish
 from baselines.solvers.resolved_rate.dls import DampedLeastSquares, damped_rows
 from ikgym import task_kernels
-from ikgym.jit import inlined, kernel
+from ikgym.jit import kernel
 from ikgym.kinematics import forward_and_jacobian
 from ikgym.validation import FloatArray, known_name, number
 
@@ -37,6 +36,99 @@ class BroydenMemory(NamedTuple):
     learnt: FloatArray
     q: FloatArray
     pose: FloatArray
+
+
+class BroydenNumbers(NamedTuple):
+    """The parameters of :class:`Broyden` as its kernel takes them.
+
+    Attributes:
+        gain: Share of the present error that is taken back in one step.
+        scaling: Whether joints beyond their velocity limits slow down all others.
+        damping: λ.
+        motion: ε.
+        correcting: Whether a correction of the model's Jacobian is learnt, or the Jacobian itself.
+    """
+
+    gain: float
+    scaling: bool
+    damping: float
+    motion: float
+    correcting: bool
+
+
+@kernel
+def broyden_step(model, numbers, seen, memory, answer):
+    """One step of :class:`Broyden`; see :class:`CompiledPolicy` for the arguments."""
+    q, pose, nominal = seen.q, seen.pose, seen.nominal
+    before, known, _, q_before, pose_before = memory
+    estimate = learn_rows(model, numbers, q, pose, memory)
+    error, shift = np.empty(estimate.shape[1]), np.empty(estimate.shape[:2])
+    for row in range(q.shape[0]):
+        present = before[row] if known[row] else pose[row]
+        task_shift(model.kind, numbers.gain, pose[row], nominal[row, 0], present, error, shift[row])
+    damped_rows(estimate, shift, numbers.damping, answer.qdot)
+    answer.status[:] = APPLIED
+    finish(model, numbers.scaling, answer)
+    for row in range(q.shape[0]):
+        answer.iterations[row] = known[row]
+        known[row] = True
+        for i in range(before.shape[1]):
+            before[row, i], pose_before[row, i] = nominal[row, 0, i], pose[row, i]
+        for j in range(q.shape[1]):
+            q_before[row, j] = q[row, j]
+
+
+@kernel
+def learn_rows(model, numbers, q, pose, memory):
+    """Estimates B of the Jacobian, row by row.
+
+    Args:
+        model: The :class:`Model`.
+        numbers: The :class:`BroydenNumbers`.
+        q: Joint coordinates in [rad] or [m]. Shape (B, n).
+        pose: Measured task coordinates. Shape (B, m).
+        memory: The :class:`BroydenMemory`; only what is learnt is changed, in place.
+
+    Returns:
+        B, of shape (B, e, n).
+    """
+    chain, kind, correcting = model.chain, model.kind, numbers.correcting
+    _, had, corrections, q_before, pose_before = memory
+    estimate = np.empty(corrections.shape)
+    e, n = estimate.shape[1], estimate.shape[2]
+    rotation, position, geometric = np.empty((3, 3)), np.empty(3), np.empty((6, n))
+    error, moved, jacobian = np.empty(e), np.empty(n), np.zeros((e, n))
+    for row in range(q.shape[0]):
+        known, learnt = had[row], corrections[row]
+        if correcting or not known:
+            forward_and_jacobian(chain, q[row], rotation, position, geometric)
+            task_kernels.jacobian(kind, rotation, geometric, jacobian)
+        if not correcting:
+            for a in range(e):
+                for k in range(n):
+                    learnt[a, k] = learnt[a, k] if known else jacobian[a, k]
+                    jacobian[a, k] = 0.0
+        if known:
+            square = numbers.motion * numbers.motion
+            for k in range(n):
+                moved[k] = q[row, k] - q_before[row, k]
+                square += moved[k] * moved[k]
+            task_kernels.error(kind, pose[row], pose_before[row], error)  # Δy
+            _learn(jacobian, moved, square, error, learnt)
+        for a in range(e):
+            for k in range(n):
+                estimate[row, a, k] = jacobian[a, k] + learnt[a, k]
+    return estimate
+
+
+@kernel
+def _learn(jacobian, moved, square, error, learnt):
+    """Broyden's formula for one row: shapes (e, n), (n,), a number, (e,), which is overwritten, and (e, n)."""
+    for a in range(error.shape[0]):
+        for k in range(moved.shape[0]):
+            error[a] -= (jacobian[a, k] + learnt[a, k]) * moved[k]
+        for k in range(moved.shape[0]):
+            learnt[a, k] += error[a] * moved[k] / square
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -75,6 +167,7 @@ class Broyden(DampedLeastSquares):
     motion: float = 1e-6
 
     name: ClassVar[str] = "broyden"
+    step = broyden_step
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -89,101 +182,6 @@ class Broyden(DampedLeastSquares):
         q, pose = np.zeros((rows, n)), np.zeros((rows, task.size))
         return BroydenMemory(before.nominal, before.known, learnt, q, pose)
 
-    def kernel(self) -> Any:
-        """See :meth:`CompiledPolicy.kernel`; iterations are 0 where nothing has been measured before, 1 later."""
-        return broyden_rows
-
-    def numbers(self) -> tuple[Any, ...]:
-        """See :meth:`ResolvedRate.numbers`."""
-        return self.damping, self.motion, self.learns == "correction"
-
-
-@kernel
-def broyden_rows(
-    arm_task,
-    gain,
-    scaling,
-    damping,
-    motion,
-    correcting,
-    checking,
-    q,
-    qdot_before,
-    pose,
-    nominal,
-    remaining,
-    before,
-    known,
-    learnt,
-    q_before,
-    pose_before,
-    action,
-    answer,
-):
-    """One step of :class:`Broyden`; see :class:`CompiledPolicy` for the arguments."""
-    if checking and not all_finite(q, qdot_before, pose, nominal, remaining):
-        return REFUSED
-    q, pose, nominal = as_rows(int(arm_task[0]), q, pose, nominal)
-    qdot, status, iterations = answer_parts(answer, q.shape[0], q.shape[1])
-    target = nominal[:, 0].copy()
-    estimate, shift = np.empty(learnt.shape), np.empty(learnt.shape[:2])
-    memory = before, known, learnt, q_before, pose_before
-    learn_rows(arm_task, (gain, motion, correcting), (q, pose, target), memory, estimate, shift)
-    damped_rows(estimate, shift, damping, qdot)
-    status[:] = APPLIED
-    code = answered(arm_task, scaling, (qdot, status, iterations), action)
-    for row in range(q.shape[0]):
-        iterations[row] = known[row]
-    before[:], known[:], q_before[:], pose_before[:] = target, True, q, pose
-    return code
-
-
-@kernel
-def learn_rows(arm_task, rule, observed, memory, estimate, shift):
-    """Estimates of the Jacobian and the task shifts asked for, row by row.
-
-    Args:
-        arm_task: The model of the arm and the task, a plain :class:`ArmTask`.
-        rule: The share of the present error to take back, ε, and whether a correction of the model's Jacobian is
-            learnt, or the Jacobian itself.
-        observed: A plain :class:`Observed` with X^N(k+1).
-        memory: A plain :class:`BroydenMemory`; what is learnt is changed in place.
-        estimate: Receives B. Shape (B, e, n).
-        shift: Receives the task shifts. Shape (B, e).
-    """
-    gain, motion, correcting = rule
-    (chain, kind), (q, pose, target), before = arm_task_of(arm_task), observed, BroydenMemory(*memory)
-    e, n = estimate.shape[1], estimate.shape[2]
-    rotation, position, geometric, _ = pose_arrays(n, pose.shape[1])
-    error, moved, jacobian = np.empty(e), np.empty(n), np.zeros((e, n))
-    for row in range(q.shape[0]):
-        known, learnt = before.known[row], before.learnt[row]
-        if correcting or not known:
-            forward_and_jacobian(chain, q[row], rotation, position, geometric)
-            task_kernels.jacobian(kind, rotation, geometric, jacobian)
-        if not correcting:
-            if not known:
-                learnt[:] = jacobian
-            jacobian[:] = 0.0
-        if known:
-            square = motion * motion
-            for k in range(n):
-                moved[k] = q[row, k] - before.q[row, k]
-                square += moved[k] * moved[k]
-            task_kernels.error(kind, pose[row], before.pose[row], error)  # Δy
-            _learn(jacobian, moved, square, error, learnt)
-        for a in range(e):
-            for k in range(n):
-                estimate[row, a, k] = jacobian[a, k] + learnt[a, k]
-        present = before.nominal[row] if known else pose[row]
-        task_shift(kind, gain, pose[row], target[row], present, error, shift[row])
-
-
-@inlined
-def _learn(jacobian, moved, square, error, learnt):
-    """Broyden's formula for one row: shapes (e, n), (n,), a number, (e,), which is overwritten, and (e, n)."""
-    for a in range(error.shape[0]):
-        for k in range(moved.shape[0]):
-            error[a] -= (jacobian[a, k] + learnt[a, k]) * moved[k]
-        for k in range(moved.shape[0]):
-            learnt[a, k] += error[a] * moved[k] / square
+    def numbers(self) -> BroydenNumbers:  # type: ignore[override]  # of another kernel
+        """See :meth:`CompiledPolicy.numbers`; iterations are 0 where nothing has been measured before, 1 later."""
+        return BroydenNumbers(self.gain, self.scales, self.damping, self.motion, self.learns == "correction")

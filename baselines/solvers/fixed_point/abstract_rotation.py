@@ -6,13 +6,14 @@ import dataclasses
 import functools
 import math
 from collections.abc import Sequence
-from typing import Any, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from baselines.policy import Batch, Memory, Problem, Solution, SolverPolicy
+from baselines.policy import Memory, Problem
+from baselines.policy.compiled import CompiledPolicy
 from baselines.solvers.arm_size import jacobian_bound
-from baselines.solvers.arm_task import arm_task_of, plain_arm_task, pose_arrays
+from baselines.solvers.arm_task import pose_arrays
 from baselines.solvers.fixed_point.rotations import adaptive_deform, plane, turn
 from baselines.solvers.linear_algebra import dot, transposed_product
 from baselines.status import Status
@@ -63,15 +64,15 @@ class RotationMemory(NamedTuple):
     held: FloatArray
 
 
-class RotationRule(NamedTuple):
-    """What the parameters of the policy say to the kernel.
+class RotationNumbers(NamedTuple):
+    """The parameters of :class:`AbstractRotation` as its kernel takes them.
 
     Attributes:
         task_weights: The diagonal of ℱ. Shape (m,).
         joint_weights: The diagonal of 𝒲. Shape (n,).
         counter_rotation: One of the numbers in COUNTER_ROTATIONS.
         deformation: One of the numbers in DEFORMATIONS.
-        numbers: R_a, λ_a, ``epsa`` and ``q_pp_max``.
+        rule: R_a, λ_a, ``epsa`` and ``q_pp_max``.
         tolerance: ‖xᴺ - f‖ up to which the iteration has converged.
     """
 
@@ -79,12 +80,87 @@ class RotationRule(NamedTuple):
     joint_weights: FloatArray
     counter_rotation: int
     deformation: int
-    numbers: tuple[float, float, float, float]
+    rule: tuple[float, float, float, float]
     tolerance: float
 
 
+@kernel
+def rotation_step(model, numbers, seen, memory, answer):
+    """One inner iteration, row by row; see :class:`CompiledPolicy` for the arguments."""
+    chain, kind, dt = model.chain, model.kind, model.dt
+    task_weights, joint_weights, counter_rotation, deformation, rule, tolerance = numbers
+    q, pose, nominal, (direction, angles, point, held) = seen.q, seen.pose, seen.nominal, memory
+    goals, status, iterations = answer
+    n, m, turned = q.shape[1], pose.shape[1], direction.shape[1]
+    rotation, position, geometric, _ = pose_arrays(n, m)
+    jacobian, error, extended = np.empty((m, n)), np.empty(m), np.empty((3, n + 1))
+    h, actual, desired, e_a, e_b = np.empty(n), np.empty(n), np.empty(n), np.empty(turned), np.empty(turned)
+    missing, seen, wanted = np.empty(m), np.empty(m), np.empty(m)
+    for row in range(q.shape[0]):
+        target, goal = nominal[row, 0], goals[row]
+        forward_and_jacobian(chain, _configuration(q[row], target, point, held, row), rotation, position, geometric)
+        # The method knows no other error than a difference of coordinates.
+        task_kernels.coordinate_jacobian(kind, rotation, geometric, jacobian)
+        for i in range(m):
+            error[i] = target[i] - pose[row, i]
+            missing[i] = task_weights[i] * error[i]
+            seen[i] = task_weights[i] * pose[row, i]
+            wanted[i] = task_weights[i] * target[i]
+        angles[row, 0] = 0.0
+        if counter_rotation == _TASK:
+            angles[row, 0] = _turn_back(missing, direction[row], e_a, e_b, seen, wanted)
+        transposed_product(jacobian, missing, h)
+        transposed_product(jacobian, seen, actual)
+        transposed_product(jacobian, wanted, desired)
+        if counter_rotation == _JOINTS:
+            angles[row, 0] = _turn_back(h, direction[row], e_a, e_b, actual, desired)
+        for i in range(turned):
+            direction[row, i] = missing[i] if counter_rotation == _TASK else h[i]
+        for j in range(n):
+            actual[j] *= joint_weights[j]
+            desired[j] *= joint_weights[j]
+        for j in range(n):
+            goal[j] = q[row, j]
+        status[row] = _CONVERGED if math.sqrt(dot(error, error)) <= tolerance else _LIMIT
+        if deformation == _CONTRACTION:
+            angles[row, 1] = math.nan
+            for j in range(n):
+                goal[j] += rule[1] * (desired[j] - actual[j])
+        else:
+            angles[row, 1] = adaptive_deform(actual, q[row], desired, rule, extended, goal)
+            if math.isnan(angles[row, 1]):
+                status[row] = _NO_ROTATION
+        iterations[row] = 1
+        for j in range(n):
+            goal[j] = (goal[j] - q[row, j]) / dt
+
+
+@kernel
+def _configuration(q, target, point, held, row):
+    """Where the Jacobian is worked out: at q, or where the arm was when the target last changed."""
+    if held.shape[1] == 0:
+        return q
+    for i in range(target.shape[0]):
+        if target[i] != point[row, i]:
+            for k in range(target.shape[0]):
+                point[row, k] = target[k]
+            for k in range(q.shape[0]):
+                held[row, k] = q[k]
+            break
+    return held[row]
+
+
+@kernel
+def _turn_back(now, last, e_a, e_b, actual, desired):
+    """Applies the 𝒩 that turns a vector into its last direction, and returns the angle."""
+    angle = plane(now, last, e_a, e_b)
+    turn(e_a, e_b, angle, actual)
+    turn(e_a, e_b, angle, desired)
+    return angle
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
-class AbstractRotation(SolverPolicy):
+class AbstractRotation(CompiledPolicy):
     """Turns q by a share of the rotation that leads from what is measured to what is wanted (eq. 3.16, section 4.1).
 
     One call is one inner iteration, and the arm moves: with the Jacobian J̃ = ∂f/∂q of the model at q and the measured
@@ -150,6 +226,7 @@ class AbstractRotation(SolverPolicy):
     _weights: tuple[FloatArray, FloatArray] = dataclasses.field(init=False, repr=False)
 
     name: ClassVar[str] = "abstract_rotation"
+    step = rotation_step
 
     def __post_init__(self) -> None:
         if self.lambda_a is None:
@@ -185,97 +262,11 @@ class AbstractRotation(SolverPolicy):
         """The angles of both rotations in [rad], see :class:`Angles`, as ``angle_counter_rotation`` and so on."""
         return {f"angle_{name}": angle for name, angle in self.angles(state)._asdict().items()}
 
-    def solve(self, batch: Batch, memory: Memory) -> Solution:
-        """See :meth:`SolverPolicy.solve`."""
-        rows, n = batch.q.shape
-        kept = RotationMemory(*(array.copy() for array in memory))
-        goal, status = np.empty((rows, n)), np.empty(rows, dtype=np.int64)
-        observed = batch.q, batch.pose, np.ascontiguousarray(batch.nominal[:, 0])
-        turn_rows(plain_arm_task(self.problem), self._rule, observed, tuple(kept), goal, status)
-        qdot = (goal - batch.q) / self.problem.dt
-        return Solution(qdot, kept, status, np.ones(rows, dtype=np.int64))
-
-    @functools.cached_property
-    def _rule(self) -> tuple[Any, ...]:
-        """A plain :class:`RotationRule`."""
+    def numbers(self) -> RotationNumbers:
+        """See :meth:`CompiledPolicy.numbers`."""
         kinds = COUNTER_ROTATIONS[self.counter_rotation], DEFORMATIONS[self.deformation]
-        return *self._weights, *kinds, (self.r_a, self.lambda_a, self.epsa, self.q_pp_max), self.tolerance
-
-
-@kernel
-def turn_rows(arm_task, rule, observed, memory, goal, status):
-    """One inner iteration, row by row.
-
-    Args:
-        arm_task: The model of the arm and the task, a plain :class:`ArmTask`.
-        rule: A plain :class:`RotationRule`.
-        observed: A plain :class:`Observed` with f and xᴺ.
-        memory: A plain :class:`RotationMemory`, overwritten.
-        goal: Receives the next joint coordinates. Shape (B, n).
-        status: Receives values of :class:`Status`. Shape (B,).
-    """
-    (chain, kind), method, (q, pose, target) = arm_task_of(arm_task), RotationRule(*rule), observed
-    direction, angles, point, held = memory
-    n, m, turned = q.shape[1], pose.shape[1], direction.shape[1]
-    rotation, position, geometric, _ = pose_arrays(n, m)
-    jacobian, error, extended = np.empty((m, n)), np.empty(m), np.empty((3, n + 1))
-    h, actual, desired, e_a, e_b = np.empty(n), np.empty(n), np.empty(n), np.empty(turned), np.empty(turned)
-    missing, seen, wanted = np.empty(m), np.empty(m), np.empty(m)
-    for row in range(q.shape[0]):
-        forward_and_jacobian(
-            chain, _configuration(q[row], target[row], point, held, row), rotation, position, geometric
-        )
-        # The method knows no other error than a difference of coordinates.
-        task_kernels.coordinate_jacobian(kind, rotation, geometric, jacobian)
-        for i in range(m):
-            error[i] = target[row, i] - pose[row, i]
-            missing[i] = method.task_weights[i] * error[i]
-            seen[i] = method.task_weights[i] * pose[row, i]
-            wanted[i] = method.task_weights[i] * target[row, i]
-        angles[row, 0] = 0.0
-        if method.counter_rotation == _TASK:
-            angles[row, 0] = _turn_back(missing, direction[row], e_a, e_b, seen, wanted)
-        transposed_product(jacobian, missing, h)
-        transposed_product(jacobian, seen, actual)
-        transposed_product(jacobian, wanted, desired)
-        if method.counter_rotation == _JOINTS:
-            angles[row, 0] = _turn_back(h, direction[row], e_a, e_b, actual, desired)
-        direction[row] = missing if method.counter_rotation == _TASK else h
-        for j in range(n):
-            actual[j] *= method.joint_weights[j]
-            desired[j] *= method.joint_weights[j]
-        goal[row] = q[row]
-        status[row] = _CONVERGED if math.sqrt(dot(error, error)) <= method.tolerance else _LIMIT
-        if method.deformation == _CONTRACTION:
-            angles[row, 1] = math.nan
-            for j in range(n):
-                goal[row, j] += method.numbers[1] * (desired[j] - actual[j])
-        else:
-            angles[row, 1] = adaptive_deform(actual, q[row], desired, method.numbers, extended, goal[row])
-            if math.isnan(angles[row, 1]):
-                status[row] = _NO_ROTATION
-
-
-@kernel
-def _configuration(q, target, point, held, row):
-    """Where the Jacobian is worked out: at q, or where the arm was when the target last changed."""
-    if held.shape[1] == 0:
-        return q
-    for i in range(target.shape[0]):
-        if target[i] != point[row, i]:
-            point[row] = target
-            held[row] = q
-            break
-    return held[row]
-
-
-@kernel
-def _turn_back(now, last, e_a, e_b, actual, desired):
-    """Applies the 𝒩 that turns a vector into its last direction, and returns the angle."""
-    angle = plane(now, last, e_a, e_b)
-    turn(e_a, e_b, angle, actual)
-    turn(e_a, e_b, angle, desired)
-    return angle
+        rule = self.r_a, self.lambda_a, self.epsa, self.q_pp_max
+        return RotationNumbers(*self._weights, *kinds, rule, self.tolerance)  # type: ignore[arg-type]  # λ_a is known
 
 
 def _share(problem: Problem) -> float:

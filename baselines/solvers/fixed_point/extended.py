@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 from typing import ClassVar
 
-from baselines.policy import Batch
 from baselines.solvers.arm_size import jacobian_bound
 from baselines.solvers.fixed_point.fixed_point import FixedPoint
 from baselines.solvers.references.privileged_path import PrivilegedPath
@@ -77,8 +76,8 @@ class FixedPointExtended(PrivilegedPath, FixedPoint):
         object.__setattr__(self, "_points", read_only(branch.forward(path[:, :link])[1]))
         super().__post_init__()
 
-    def _extension(self, batch: Batch) -> tuple[Chain, FloatArray]:
-        return self._branch.chain, self._points[self.next_rows(batch)]
+    def _extension(self) -> tuple[Chain, FloatArray]:
+        return self._branch.chain, self._points
 
     def _jacobian_bound(self) -> float:
         return super()._jacobian_bound() + jacobian_bound(self._branch, None)

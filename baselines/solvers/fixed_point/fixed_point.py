@@ -3,48 +3,32 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 import math
 from collections.abc import Sequence
-from typing import Any, ClassVar, NamedTuple
+from typing import ClassVar
 
 import numpy as np
 
-from baselines.policy import Batch, Memory, Solution, SolverPolicy
+from baselines.policy import Memory
+from baselines.policy.compiled import CompiledPolicy
 from baselines.solvers.arm_size import error_weights, jacobian_bound, length, radian
-from baselines.solvers.arm_task import plain_arm_task
 from baselines.solvers.fixed_point.contraction import Contraction, contraction
-from baselines.solvers.fixed_point.iteration import TRANSFORMATIONS, iterate_rows
+from baselines.solvers.fixed_point.iteration import (
+    TRANSFORMATIONS,
+    FixedPointMemory,
+    FixedPointNumbers,
+    fixed_point_step,
+)
 from ikgym.exceptions import InvalidInputError
 from ikgym.kinematics import Chain
-from ikgym.validation import FloatArray, known_name, number, whole_number
+from ikgym.validation import FloatArray, known_name, number, read_only, whole_number
 
 # The length in [m] of the paper's arm, to which its A belongs; on a shorter one it grows with 1/length².
 PAPERS_LENGTH = 1.3
 
 
-class DirectionMemory(NamedTuple):
-    """What the transformation ``"sign"`` remembers of the last iteration of the step before.
-
-    Attributes:
-        direction: f - x, zero where there was none. Shape (B, n).
-    """
-
-    direction: FloatArray
-
-
-class GrowthMemory(NamedTuple):
-    """What the transformation ``"sign_by_growth"`` remembers of the last iteration of the step before.
-
-    Attributes:
-        sign_and_length: σ and ‖f - x‖, infinite where there was none. Shape (B, 2).
-    """
-
-    sign_and_length: FloatArray
-
-
 @dataclasses.dataclass(frozen=True, eq=False)
-class FixedPoint(SolverPolicy):
+class FixedPoint(CompiledPolicy):
     """Iterates q ← q + [F(A ‖h‖ + ξ*) - ξ*] h/‖h‖ with h = Jᵀ (f(q) - x), whose fixed point solves the task (eq. 1).
 
     F is any function with an attractive fixed point ξ*, see :func:`contraction.contraction`. In the affine
@@ -99,6 +83,7 @@ class FixedPoint(SolverPolicy):
     function: Contraction = dataclasses.field(init=False, repr=False)
 
     name: ClassVar[str] = "fixed_point"
+    step = fixed_point_step
 
     def __post_init__(self) -> None:
         known_name("transformation", self.transformation, TRANSFORMATIONS)
@@ -112,40 +97,26 @@ class FixedPoint(SolverPolicy):
         number("tolerance", self.tolerance, at_least=0.0)
 
     def memory(self, rows: int) -> Memory:
-        """A :class:`DirectionMemory` or :class:`GrowthMemory` without a step before; else nothing."""
+        """A :class:`FixedPointMemory` without a step before."""
         if self.transformation == "sign_by_growth":
-            return GrowthMemory(np.tile([1.0, np.inf], (rows, 1)))
-        zeros = np.zeros((rows, self.problem.model.joints))
-        return DirectionMemory(zeros) if self.transformation == "sign" else ()
+            return FixedPointMemory(np.tile([1.0, np.inf], (rows, 1)))
+        return FixedPointMemory(np.zeros((rows, self.problem.model.joints if self.transformation == "sign" else 0)))
 
-    def solve(self, batch: Batch, memory: Memory) -> Solution:
-        """See :meth:`SolverPolicy.solve`."""
-        problem = self.problem
-        rows = len(batch.q)
-        q, status = batch.q.copy(), np.empty(rows, dtype=np.int64)
-        previous = memory[0].copy() if memory else np.empty((rows, 0))
-        branch, points = self._extension(batch)
-        iterate_rows(
-            plain_arm_task(problem),
-            (tuple(branch), points),
-            self._method,
-            np.ascontiguousarray(batch.nominal[:, 0]),
-            previous,
-            q,
-            status,
+    def numbers(self) -> FixedPointNumbers:
+        """See :meth:`CompiledPolicy.numbers`."""
+        branch, points = self._extension()
+        return FixedPointNumbers(
+            TRANSFORMATIONS[self.transformation],
+            tuple(self.function),
+            self.a,  # type: ignore[arg-type]  # known by now
+            self.iterations,
+            self.tolerance,
+            self.problem.velocity_limit * self.problem.dt,
+            np.array(self.components or range(self.problem.model.joints)),
+            error_weights(self.problem.task, self._metres),
+            tuple(branch),
+            points,
         )
-        return Solution(
-            (q - batch.q) / problem.dt, (previous,) if memory else (), status, np.full(rows, self.iterations)
-        )
-
-    @functools.cached_property
-    def _method(self) -> tuple[Any, ...]:
-        """A plain :class:`FixedPointRule`."""
-        longest = self.problem.velocity_limit * self.problem.dt
-        components = np.array(self.components or range(self.problem.model.joints))
-        weights = error_weights(self.problem.task, self._metres)
-        numbers = self.a, self.iterations, self.tolerance, longest, components, weights
-        return TRANSFORMATIONS[self.transformation], tuple(self.function), *numbers
 
     def _checked_components(self) -> tuple[int, ...] | None:
         size, joints = self.problem.task.error_size, self.problem.model.joints
@@ -179,9 +150,9 @@ class FixedPoint(SolverPolicy):
         """ℓ; 1 m where nothing is weighed."""
         return 1.0 if self.length is None else self.length
 
-    def _extension(self, batch: Batch) -> tuple[Chain, FloatArray]:
-        """What x is extended by: the chain to another point of the arm, and its nominal position; here nothing."""
-        return self.problem.model.chain, np.empty((len(batch.q), 0))
+    def _extension(self) -> tuple[Chain, FloatArray]:
+        """The chain to another point that x is extended by, and its nominal positions; here nothing."""
+        return self.problem.model.chain, read_only(np.empty((0, 3)))
 
     def _jacobian_bound(self) -> float:
         """A number that ‖W J‖² does not exceed, with prismatic joints at home."""

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from baselines.solvers.arm_task import arm_task_of, pose_arrays
+from baselines.solvers.arm_task import pose_arrays
 from baselines.solvers.fixed_point.contraction import Contraction, evaluate
 from baselines.solvers.linear_algebra import dot
 from baselines.status import Status
@@ -23,66 +23,70 @@ _TRANSPOSE, _SIGN, _BY_GROWTH = (TRANSFORMATIONS[name] for name in ("transpose",
 _CONVERGED, _LIMIT, _DIVERGED = int(Status.CONVERGED), int(Status.ITERATION_LIMIT), int(Status.DIVERGED)
 
 
-class FixedPointRule(NamedTuple):
-    """What the parameters of the policy say to the kernel.
+class FixedPointMemory(NamedTuple):
+    """What the sign variants remember of the last iteration of the step before.
+
+    Attributes:
+        previous: With ``"sign"`` f - x, zero where there was none; with ``"sign_by_growth"`` σ and ‖f - x‖, infinite
+            where there was none; else of no columns. Shape (B, n), (B, 2) or (B, 0).
+    """
+
+    previous: FloatArray
+
+
+class FixedPointNumbers(NamedTuple):
+    """The parameters of :class:`FixedPoint` as its kernel takes them.
 
     Attributes:
         transformation: One of the numbers in TRANSFORMATIONS.
-        function: F.
+        function: F, a plain :class:`Contraction`.
         a: A.
         iterations: How many are made.
         tolerance: ‖f - x‖ up to which they have converged.
         longest: How far the joints can go in one step, in [rad] or [m]. Shape (n,).
         components: Which component of f - x corrects each joint where there is no Jacobian. Shape (n,).
         weights: What the squares of the components of f - x count where there is one. Shape (e,).
+        branch: The plain :class:`Chain` to the point of the arm that x is extended by.
+        points: Where that point should be at each step of the episode, in [m]. Of no rows if x is not extended, else of
+            shape (steps + 1, 3).
     """
 
     transformation: int
-    function: Contraction
+    function: tuple[Any, ...]
     a: float
     iterations: int
     tolerance: float
     longest: FloatArray
     components: npt.NDArray[np.int64]
     weights: FloatArray
-
-
-class Extension(NamedTuple):
-    """What x is extended by: a point of the arm, and where it should be.
-
-    Attributes:
-        chain: The chain to the point.
-        points: Where it should be, in [m]; of no columns if x is not extended. Shape (B, 3 or 0).
-    """
-
-    chain: Chain
+    branch: tuple[Any, ...]
     points: FloatArray
 
 
 @kernel
-def iterate_rows(arm_task, extension, method, target, previous, q, status):
-    """The iterations of one step, row by row.
-
-    Args:
-        arm_task: The model of the arm and the task, a plain :class:`ArmTask`.
-        extension: A plain :class:`Extension`.
-        method: A plain :class:`FixedPointRule`.
-        target: x. Shape (B, m).
-        previous: With a sign variant, what it remembers; overwritten. Shape (B, n), (B, 2) or (B, 0).
-        q: Joint coordinates, changed in place. Shape (B, n).
-        status: Receives values of :class:`Status`. Shape (B,).
-    """
-    (chain, kind), chain_to_point, points = arm_task_of(arm_task), Chain(*extension[0]), extension[1]
-    transformation, numbers, a, iterations, tolerance, longest, components, weights = method
-    function = Contraction(*numbers)
-    n, m, joints = q.shape[1], target.shape[1], chain_to_point.axes.shape[0]
+def fixed_point_step(model, numbers, seen, memory, answer):
+    """The iterations of one step, row by row; see :class:`CompiledPolicy` for the arguments."""
+    chain, kind, dt, chain_to_point, points = model.chain, model.kind, model.dt, Chain(*numbers.branch), numbers.points
+    function, transformation, a, iterations = (
+        Contraction(*numbers.function),
+        numbers.transformation,
+        numbers.a,
+        numbers.iterations,
+    )
+    tolerance, longest, components, weights = numbers.tolerance, numbers.longest, numbers.components, numbers.weights
+    starts, nominal, remaining, previous = seen.q, seen.nominal, seen.remaining, memory.previous
+    q, status, made = answer
+    n, m, joints = q.shape[1], nominal.shape[2], chain_to_point.axes.shape[0]
     e = task_kernels.error_size(kind, m)
     rotation, position, geometric, pose = pose_arrays(n, m)
     error, jacobian, partial = np.empty(e), np.empty((e, n)), np.empty((6, joints))
-    h, start, weighted, missing = np.empty(n), np.empty(n), np.empty(e), np.empty(3)
+    h, weighted, missing = np.empty(n), np.empty(e), np.empty(3)
     for row in range(q.shape[0]):
-        here = q[row]
-        start[:] = here
+        start, here, target = starts[row], q[row], nominal[row, 0]
+        for j in range(n):
+            here[j] = start[j]
+        made[row] = iterations
+        at = min(max(points.shape[0] - int(remaining[row]), 0), points.shape[0] - 1)
         first = residual = 0.0
         for step in range(iterations + 1):
             last = step == iterations
@@ -92,7 +96,7 @@ def iterate_rows(arm_task, extension, method, target, previous, q, status):
                 forward_and_jacobian(chain, here, rotation, position, geometric)
                 task_kernels.jacobian(kind, rotation, geometric, jacobian)
             task_kernels.coordinates(kind, rotation, position, pose)
-            task_kernels.error(kind, target[row], pose, error)
+            task_kernels.error(kind, target, pose, error)
             square = dot(error, error)
             h[:] = 0.0
             if transformation == _TRANSPOSE:
@@ -102,13 +106,13 @@ def iterate_rows(arm_task, extension, method, target, previous, q, status):
             else:
                 for j in range(n):
                     h[j] = -error[components[j]]
-            if points.shape[1] > 0:
+            if points.shape[0] > 0:
                 if last:
                     forward(chain_to_point, here[:joints], rotation, position)
                 else:
                     forward_and_jacobian(chain_to_point, here[:joints], rotation, position, partial)
                 for i in range(3):
-                    missing[i] = points[row, i] - position[i]
+                    missing[i] = points[at, i] - position[i]
                 square += dot(missing, missing)
                 _add_transposed(partial[:3], missing, h)
             residual = math.sqrt(square)
@@ -127,8 +131,9 @@ def iterate_rows(arm_task, extension, method, target, previous, q, status):
             for j in range(n):
                 if not abs(here[j] - start[j]) <= longest[j]:
                     status[row] = _DIVERGED
+        for j in range(n):
+            here[j] = ((start[j] if status[row] == _DIVERGED else here[j]) - start[j]) / dt
         if status[row] == _DIVERGED:
-            here[:] = start
             if transformation == _SIGN:
                 previous[row] = 0.0
             elif transformation == _BY_GROWTH:

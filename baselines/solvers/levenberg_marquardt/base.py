@@ -8,15 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from baselines.policy import Batch, Memory, Solution, SolverPolicy
+from baselines.policy import Memory
+from baselines.policy.compiled import CompiledPolicy
 from baselines.solvers.levenberg_marquardt.damping_parameters import checked_parameters, damping_law, truth
 from baselines.solvers.levenberg_marquardt.damping_rules import DampingLaw
-from baselines.solvers.levenberg_marquardt.iteration import DampingMemory, Iterates, IterationLimits
+from baselines.solvers.levenberg_marquardt.iteration import DampingMemory, IterationNumbers
 from ikgym.validation import FloatArray, number, whole_number
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class DampedIteration(SolverPolicy, abc.ABC):
+class DampedIteration(CompiledPolicy, abc.ABC):
     """Base of :class:`mfac.ModelFreeAdaptiveControl` and its predictive sibling: λ and when to stop.
 
     A number that is left out takes its default from the rule, scaled by the length l of the model's typical link: λ
@@ -93,13 +94,24 @@ class DampedIteration(SolverPolicy, abc.ABC):
         """The rank of a Jacobian that has lost nothing; with redundant coordinates it is that of a rigid motion."""
         return min(self.problem.task.error_size, self.problem.model.joints, 6)
 
-    @property
-    def limits(self) -> IterationLimits:
-        """When the iteration stops, as the kernels see it."""
+    def numbers(self) -> IterationNumbers:
+        """See :meth:`CompiledPolicy.numbers`."""
         problem = self.problem
-        longest = problem.dt * problem.velocity_limit
-        size, rank = problem.task.error_size, self.rank
-        return IterationLimits(size, rank, longest, self.tolerance, self.iterations, self.one_step)
+        return IterationNumbers(
+            tuple(self.law),
+            problem.task.error_size,
+            self.rank,
+            problem.dt * problem.velocity_limit,
+            self.tolerance,
+            self.iterations,
+            bool(self.one_step),
+            bool(self.carry),
+            *self._horizon(),
+        )
+
+    def _horizon(self) -> tuple[int, bool, bool]:
+        """The last three of :class:`IterationNumbers`."""
+        return 1, False, False
 
     def memory(self, rows: int) -> Memory:
         """A :class:`DampingMemory` without a step before."""
@@ -107,25 +119,4 @@ class DampedIteration(SolverPolicy, abc.ABC):
 
     def diagnostics(self, state: Memory) -> dict[str, FloatArray]:
         """The remembered λ as ``lambda``, of shape (B,): of the last iteration, or what a stepped law made of it."""
-        _status, _iterations, *memory = state
-        return {"lambda": DampingMemory(*memory).damping}
-
-    def solve(self, batch: Batch, memory: Memory) -> Solution:
-        """See :meth:`SolverPolicy.solve`."""
-        rows = len(batch.q)
-        before = DampingMemory(*(memory if self.carry else self.memory(rows)))
-        kept = DampingMemory(before.damping.copy(), before.error.copy())
-        found = Iterates(batch.q.copy(), np.empty(rows, dtype=np.int64), np.empty(rows, dtype=np.int64))
-        # Plain tuples, see :mod:`baselines.solvers.arm_task`.
-        self.iterate(batch, tuple(kept), tuple(found))
-        return Solution((found.q - batch.q) / self.problem.dt, kept, found.status, found.iterations)
-
-    @abc.abstractmethod
-    def iterate(self, batch: Batch, memory: Memory, found: Memory) -> None:
-        """Runs the iteration on all rows.
-
-        Args:
-            batch: The observations.
-            memory: A plain :class:`DampingMemory`, changed in place.
-            found: Plain :class:`Iterates`, changed in place.
-        """
+        return {"lambda": DampingMemory(*self.memory_of(state)).damping}

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from baselines.status import Status
 from ikgym.jit import kernel
@@ -18,24 +17,34 @@ DEFICIENT, DIVERGED = int(Status.RANK_DEFICIENT), int(Status.DIVERGED)
 RANK_TOLERANCE = 1e-12
 
 
-class IterationLimits(NamedTuple):
-    """When an iteration stops, and what it may do until then.
+class IterationNumbers(NamedTuple):
+    """The parameters of an iteration as its kernel takes them.
 
     Attributes:
+        law: A plain :class:`DampingLaw`.
         size: Components of the error, e.
         rank: The rank that J has where nothing is lost.
         longest: Way of each joint in one period at the velocity limit, in [rad] or [m]. Shape (n,).
         tolerance: δ.
         most: N_up.
         one_step: Whether the controller is applied once to the measured pose instead.
+        carry: Whether λ is kept from period to period.
+        horizon: n, the points of the horizon; 1 without prediction.
+        predicted: Whether the Jacobians follow the predicted path (56).
+        whole_horizon: Whether the error of the whole horizon is tested (40), or that of the first point only.
     """
 
+    law: tuple[Any, ...]
     size: int
     rank: int
     longest: FloatArray
     tolerance: float
     most: int
     one_step: bool
+    carry: bool
+    horizon: int
+    predicted: bool
+    whole_horizon: bool
 
 
 class DampingMemory(NamedTuple):
@@ -48,20 +57,6 @@ class DampingMemory(NamedTuple):
 
     damping: FloatArray
     error: FloatArray
-
-
-class Iterates(NamedTuple):
-    """What a kernel answers, in place.
-
-    Attributes:
-        q: q(k); holds q(k-1) before. Shape (B, n).
-        status: Values of :class:`Status`. Shape (B,).
-        iterations: Iterations made. Shape (B,).
-    """
-
-    q: FloatArray
-    status: npt.NDArray[np.int64]
-    iterations: npt.NDArray[np.int64]
 
 
 @kernel
@@ -79,3 +74,30 @@ def stop_run_away(here, start, longest, status):
         excess = max(excess, abs(here[k] - start[k]) - longest[k])
     if status[0] != CONVERGED and excess > 0.0:
         status[0] = DIVERGED
+
+
+@kernel
+def begin(rule, carry, row, memory):
+    """Begins a period of one arm with the λ of a rule, unless it is carried on."""
+    if not carry:
+        memory.damping[row], memory.error[row] = rule.damping, np.inf
+
+
+@kernel
+def finish(dt, rule, row, start, status, memory, here):
+    """Turns joint coordinates into joint velocities, and begins anew where the iteration has diverged.
+
+    Args:
+        dt: Δt in [s].
+        rule: The :class:`DampingLaw`.
+        row: Which arm.
+        start: Joint coordinates at the start of the period, in [rad] or [m]. Shape (n,).
+        status: The status of the row.
+        memory: The :class:`DampingMemory`, changed in place.
+        here: Joint coordinates at its end; become joint velocities in [rad/s] or [m/s]. Shape (n,).
+    """
+    diverged = status == DIVERGED
+    for k in range(here.shape[0]):
+        here[k] = ((start[k] if diverged else here[k]) - start[k]) / dt
+    if diverged:
+        memory.damping[row], memory.error[row] = rule.damping, np.inf

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from typing import Any, ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from baselines.policy_kernels import REFUSED, all_finite, cut_rows
-from baselines.solvers.arm_task import period_of
 from baselines.solvers.quadratic_program.box_minimum import box_minimum
 from baselines.solvers.quadratic_program.limits import limits_with_braking
 from baselines.solvers.quadratic_program.program import (
@@ -22,7 +20,7 @@ from baselines.solvers.quadratic_program.program import (
     motion_weight,
 )
 from baselines.solvers.quadratic_program.velocity_box import velocity_box
-from baselines.solvers.resolved_rate.base import APPLIED, TaskFeedback, asked_apart
+from baselines.solvers.resolved_rate.base import APPLIED, TaskFeedback, task_motion
 from baselines.status import Status
 from ikgym.arms.limits import middle
 from ikgym.exceptions import InvalidInputError
@@ -31,6 +29,63 @@ from ikgym.limit_kernels import CHANGE, FASTEST
 from ikgym.validation import FloatArray, as_given, number, per_joint, read_only
 
 LIMIT, SATURATED = int(Status.ITERATION_LIMIT), int(Status.SATURATED)
+
+
+class QuadraticProgramNumbers(NamedTuple):
+    """The parameters of :class:`QuadraticProgram` as its kernel takes them.
+
+    Attributes:
+        gain: Share of the present error that is taken back in one step.
+        damping: Weight of the joint motion as a share of that of the task.
+        lm_damping: How much that grows with the error.
+        braking_share: Share of the acceleration limit that the feedback reckons with; 0 if it does not.
+        scaling: Whether the task shift is scaled.
+        pull: How strongly the joints are led to a posture, in [1/s], and the posture. Shape (2, n).
+        limits: See :func:`limits_with_braking`. Shape (5, n).
+    """
+
+    gain: float
+    damping: float
+    lm_damping: float
+    braking_share: float
+    scaling: bool
+    pull: FloatArray
+    limits: FloatArray
+
+
+@kernel
+def qp_step(model, numbers, seen, memory, answer):
+    """One step of :class:`QuadraticProgram`; see :class:`CompiledPolicy` for the arguments."""
+    jacobian, motion, error = task_motion(model.chain, model.kind, seen, memory)
+    gain, damping, lm_damping, braking_share, scaling, pull, limits = numbers
+    (q, last), dt = (seen.q, seen.qdot), model.dt
+    qdot, status, iterations = answer
+    n, size = q.shape[1], q.shape[1] + scaling
+    hessian, linear, lower, upper = np.empty((size, size)), np.empty(size), np.zeros(size), np.zeros(size)
+    preferred, x = np.empty(n), np.empty(size)
+    for row in range(q.shape[0]):
+        velocity_box(limits, dt, q[row], last[row], lower, upper)
+        for j in range(n):
+            preferred[j] = pull[0, j] * (pull[1, j] - q[row, j])
+        jac, shift, missing = jacobian[row], motion[row], error[row]
+        jac *= dt
+        missing *= gain
+        weight = motion_weight(jac, missing, damping, lm_damping, limits[FASTEST])
+        weight *= SCALING_WEIGHT if scaling else 1.0
+        curvature(jac, weight, hessian)
+        if braking_share > 0.0:
+            missing *= feedback_share(hessian, jac, missing, braking_share * limits[CHANGE])
+        shift += missing
+        if scaling:
+            upper[n] = goal_to_scale(jac, shift, weight, preferred, hessian, linear)
+        else:
+            goal(jac, shift, weight, preferred, linear)
+        iterations[row], found = box_minimum(hessian, linear, lower, upper, x)
+        for j in range(n):
+            qdot[row, j] = x[j]
+        status[row] = APPLIED if found else LIMIT
+        if found and held_back(jac, shift, weight, preferred, qdot[row], lower, upper):
+            status[row] = SATURATED
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -84,6 +139,7 @@ class QuadraticProgram(TaskFeedback):
     _pull: FloatArray = dataclasses.field(init=False, repr=False)
 
     name: ClassVar[str] = "qp"
+    step = qp_step
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -118,67 +174,10 @@ class QuadraticProgram(TaskFeedback):
         """Whether the feedback is made smaller far from the reference."""
         return self.braking_share > 0.0 and bool(np.isfinite(self.problem.model.acceleration_limit).any())
 
-    def kernel(self) -> Any:
-        """See :meth:`CompiledPolicy.kernel`."""
-        return qp_rows
-
-    def numbers(self) -> tuple[Any, ...]:
-        """See :meth:`TaskFeedback.numbers`."""
+    def numbers(self) -> QuadraticProgramNumbers:
+        """See :meth:`CompiledPolicy.numbers`."""
         share = self.braking_share if self._brakes else 0.0
-        return self.damping, self.lm_damping, share, self.task_scaling, self._pull, limits_with_braking(self.problem)
-
-
-@kernel
-def qp_rows(
-    arm_task,
-    gain,
-    damping,
-    lm_damping,
-    braking_share,
-    scaling,
-    pull,
-    limits,
-    checking,
-    q,
-    qdot_before,
-    pose,
-    nominal,
-    remaining,
-    before,
-    known,
-    action,
-    answer,
-):
-    """One step of :class:`QuadraticProgram`; see :class:`CompiledPolicy` for the arguments."""
-    if checking and not all_finite(q, qdot_before, pose, nominal, remaining):
-        return REFUSED
-    q, jacobian, motion, error, (qdot, status, iterations) = asked_apart(
-        arm_task, q, pose, nominal, before, known, answer
-    )
-    dt, action_scale = period_of(arm_task)
-    n, size = q.shape[1], q.shape[1] + scaling
-    hessian, linear, lower, upper = np.empty((size, size)), np.empty(size), np.zeros(size), np.zeros(size)
-    preferred, x = np.empty(n), np.empty(size)
-    for row in range(q.shape[0]):
-        velocity_box(limits, dt, q[row], qdot_before[row * n : (row + 1) * n], lower, upper)
-        for j in range(n):
-            preferred[j] = pull[0, j] * (pull[1, j] - q[row, j])
-        jac, shift, missing = jacobian[row], motion[row], error[row]
-        jac *= dt
-        missing *= gain
-        weight = motion_weight(jac, missing, damping, lm_damping, limits[FASTEST])
-        weight *= SCALING_WEIGHT if scaling else 1.0
-        curvature(jac, weight, hessian)
-        if braking_share > 0.0:
-            missing *= feedback_share(hessian, jac, missing, braking_share * limits[CHANGE])
-        shift += missing
-        if scaling:
-            upper[n] = goal_to_scale(jac, shift, weight, preferred, hessian, linear)
-        else:
-            goal(jac, shift, weight, preferred, linear)
-        iterations[row], found = box_minimum(hessian, linear, lower, upper, x)
-        qdot[row] = x[:n]
-        status[row] = APPLIED if found else LIMIT
-        if found and held_back(jac, shift, weight, preferred, qdot[row], lower, upper):
-            status[row] = SATURATED
-    return cut_rows(qdot, action_scale, action.reshape(qdot.shape), status)
+        limits = limits_with_braking(self.problem)
+        return QuadraticProgramNumbers(
+            self.gain, self.damping, self.lm_damping, share, self.task_scaling, self._pull, limits
+        )

@@ -3,98 +3,22 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any, ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from baselines.policy_kernels import REFUSED, all_finite, cut_rows
-from baselines.solvers.arm_task import period_of
 from baselines.solvers.linear_algebra import inverted, singular_values
 from baselines.solvers.quadratic_program.limits import limits_with_braking
 from baselines.solvers.quadratic_program.velocity_box import velocity_box
-from baselines.solvers.resolved_rate.base import APPLIED, TaskFeedback, asked
+from baselines.solvers.resolved_rate.base import APPLIED, TaskFeedback, add_feedback, task_motion
 from baselines.status import Status
 from ikgym.jit import kernel
-from ikgym.validation import number
+from ikgym.validation import FloatArray, number
 
 SATURATED = int(Status.SATURATED)
 NONE = -1
 # Singular values below this share of the length of J, all of its elements together, are rounding.
 ROUNDING = 1e-12
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class SaturationInNullSpace(TaskFeedback):
-    """The smallest joint velocity that makes the task velocity; joints beyond their limits are set to them, one by one.
-
-    Each time the joint that would have to be slowed down the most is set to its bound, and what it makes is taken off
-    the task for the others: q̇ = q̇_N + (J W)⁺ (ẋ − J q̇_N). Where too few joints are left, the task velocity is scaled
-    down instead, by the largest factor that was met on the way: the basic algorithm at velocity level (Flacco, De Luca
-    and Khatib 2012, algorithm 1; 2015, section III), with the bounds of :func:`velocity_box`. It keeps the direction of
-    the task velocity, and need not find the largest factor, unlike :class:`QuadraticProgram` with `task_scaling`. The
-    status is ``saturated`` where the task velocity was scaled down.
-
-    The pseudoinverse is damped, since the arm would stop in every singularity; that is no part of the source. A task
-    that has lost rank in all joints is scaled only where it loses more.
-
-    Args:
-        problem: What the policy is told of the scenario, limits of the model among it.
-        gain: Share of the present error that is taken back in one step; see :class:`TaskFeedback`.
-        damping: Added to the squared singular values of J, as a share of the mean of ‖J_j‖² over the joints j. Smaller
-            squares count as lost rank. At least 0; then those below rounding do, and are left out.
-
-    Raises:
-        InvalidInputError: A number is out of its range.
-    """
-
-    damping: float = 3e-5
-
-    name: ClassVar[str] = "sns"
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        object.__setattr__(self, "damping", number("damping", self.damping, at_least=0.0))
-
-    def kernel(self) -> Any:
-        """See :meth:`CompiledPolicy.kernel`."""
-        return sns_rows
-
-    def numbers(self) -> tuple[Any, ...]:
-        """See :meth:`TaskFeedback.numbers`."""
-        return self.damping, limits_with_braking(self.problem)
-
-
-@kernel
-def sns_rows(
-    arm_task,
-    gain,
-    damping,
-    limits,
-    checking,
-    q,
-    qdot_before,
-    pose,
-    nominal,
-    remaining,
-    before,
-    known,
-    action,
-    answer,
-):
-    """One step of :class:`SaturationInNullSpace`; see :class:`CompiledPolicy` for the arguments."""
-    if checking and not all_finite(q, qdot_before, pose, nominal, remaining):
-        return REFUSED
-    q, jacobian, shift, (qdot, status, iterations) = asked(arm_task, gain, q, pose, nominal, before, known, answer)
-    dt, action_scale = period_of(arm_task)
-    n = q.shape[1]
-    lower, upper = np.empty(n), np.empty(n)
-    for row in range(q.shape[0]):
-        velocity_box(limits, dt, q[row], qdot_before[row * n : (row + 1) * n], lower, upper)
-        jac = jacobian[row]
-        jac *= dt
-        iterations[row], scaled = saturate(jac, shift[row], damping, lower, upper, qdot[row])
-        status[row] = SATURATED if scaled else APPLIED
-    return cut_rows(qdot, action_scale, action.reshape(qdot.shape), status)
 
 
 @kernel
@@ -188,3 +112,70 @@ def scaling(along, base, lower, upper):
     if critical == NONE:
         return 1.0, NONE
     return (most if least <= most else 0.0), critical
+
+
+class SaturationNumbers(NamedTuple):
+    """The parameters of :class:`SaturationInNullSpace` as its kernel takes them.
+
+    Attributes:
+        gain: Share of the present error that is taken back in one step.
+        damping: See :class:`SaturationInNullSpace`.
+        limits: See :func:`limits_with_braking`. Shape (5, n).
+    """
+
+    gain: float
+    damping: float
+    limits: FloatArray
+
+
+@kernel
+def sns_step(model, numbers, seen, memory, answer):
+    """One step of :class:`SaturationInNullSpace`; see :class:`CompiledPolicy` for the arguments."""
+    jacobian, shift, error = task_motion(model.chain, model.kind, seen, memory)
+    add_feedback(numbers.gain, error, shift)
+    (q, last), (qdot, status, iterations), limits, dt = (seen.q, seen.qdot), answer, numbers.limits, model.dt
+    lower, upper = np.empty(q.shape[1]), np.empty(q.shape[1])
+    for row in range(q.shape[0]):
+        velocity_box(limits, dt, q[row], last[row], lower, upper)
+        jac = jacobian[row]
+        jac *= dt
+        iterations[row], scaled = saturate(jac, shift[row], numbers.damping, lower, upper, qdot[row])
+        status[row] = SATURATED if scaled else APPLIED
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class SaturationInNullSpace(TaskFeedback):
+    """The smallest joint velocity that makes the task velocity; joints beyond their limits are set to them, one by one.
+
+    Each time the joint that would have to be slowed down the most is set to its bound, and what it makes is taken off
+    the task for the others: q̇ = q̇_N + (J W)⁺ (ẋ − J q̇_N). Where too few joints are left, the task velocity is scaled
+    down instead, by the largest factor that was met on the way: the basic algorithm at velocity level (Flacco, De Luca
+    and Khatib 2012, algorithm 1; 2015, section III), with the bounds of :func:`velocity_box`. It keeps the direction of
+    the task velocity, and need not find the largest factor, unlike :class:`QuadraticProgram` with `task_scaling`. The
+    status is ``saturated`` where the task velocity was scaled down.
+
+    The pseudoinverse is damped, since the arm would stop in every singularity; that is no part of the source. A task
+    that has lost rank in all joints is scaled only where it loses more.
+
+    Args:
+        problem: What the policy is told of the scenario, limits of the model among it.
+        gain: Share of the present error that is taken back in one step; see :class:`TaskFeedback`.
+        damping: Added to the squared singular values of J, as a share of the mean of ‖J_j‖² over the joints j. Smaller
+            squares count as lost rank. At least 0; then those below rounding do, and are left out.
+
+    Raises:
+        InvalidInputError: A number is out of its range.
+    """
+
+    damping: float = 3e-5
+
+    name: ClassVar[str] = "sns"
+    step = sns_step
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "damping", number("damping", self.damping, at_least=0.0))
+
+    def numbers(self) -> SaturationNumbers:
+        """See :meth:`CompiledPolicy.numbers`."""
+        return SaturationNumbers(self.gain, self.damping, limits_with_braking(self.problem))

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
 from baselines.policy import Memory
 from baselines.policy.compiled import CompiledPolicy
-from baselines.solvers.arm_task import plain_arm_task
 from baselines.solvers.receding_horizon.newton.grid import offsets
-from baselines.solvers.receding_horizon.newton.receding import HorizonMemory, plan_rows
-from baselines.solvers.receding_horizon.newton.settings import PlanSettings, plain_settings
+from baselines.solvers.receding_horizon.newton.receding import HorizonMemory, plan_step
+from baselines.solvers.receding_horizon.newton.settings import PlanNumbers, PlanSettings, plain_settings
 from ikgym.exceptions import InvalidInputError
 from ikgym.preview import FARTHEST
 from ikgym.validation import FloatArray, number, whole_number
@@ -94,12 +93,12 @@ class RecedingHorizon(CompiledPolicy):
     tolerance: float = 1e-7
 
     name: ClassVar[str] = "rhc"
+    step = plan_step
     grain: ClassVar[int] = 1
 
     #: Steps from now to the knots. Shape (K,).
     offsets: npt.NDArray[np.int64] = dataclasses.field(init=False, repr=False)
-    #: The arguments of the kernel that never change.
-    _constants: tuple[Any, ...] = dataclasses.field(init=False, repr=False)
+    _numbers: PlanNumbers = dataclasses.field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         if whole_number("horizon", self.horizon, at_least=2) > FARTHEST:
@@ -138,8 +137,8 @@ class RecedingHorizon(CompiledPolicy):
             rate_weight,
             problem.dt * model.acceleration_limit if self.interior_point else np.zeros(0),
         )
-        blocks = plain_arm_task(problem), model.chain.prismatic, *plain_settings(problem.cost.parameters, settings)
-        object.__setattr__(self, "_constants", blocks)
+        numbers = PlanNumbers(model.chain.prismatic, *plain_settings(problem.cost.parameters, settings))
+        object.__setattr__(self, "_numbers", numbers)
 
     @property
     def interior_point(self) -> bool:
@@ -161,13 +160,9 @@ class RecedingHorizon(CompiledPolicy):
         """Steps from now to the knots. Shape (K,)."""
         return offsets(self.horizon - 1, self.move_blocks)
 
-    def kernel(self) -> Any:
-        """See :meth:`CompiledPolicy.kernel`."""
-        return plan_rows
-
-    def constants(self) -> tuple[Any, ...]:
-        """See :meth:`CompiledPolicy.constants`."""
-        return self._constants
+    def numbers(self) -> PlanNumbers:
+        """See :meth:`CompiledPolicy.numbers`."""
+        return self._numbers
 
     def plan(self, state: Memory) -> FloatArray:
         """The plan behind a state that `predict` returned: joint coordinates at the knots :attr:`offsets` ahead.

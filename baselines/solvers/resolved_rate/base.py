@@ -4,27 +4,18 @@ from __future__ import annotations
 
 import abc
 import dataclasses
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from baselines.policy import Memory
 from baselines.policy.compiled import CompiledPolicy
-from baselines.policy_kernels import answer_parts, as_rows, cut_rows, scale_rows
-from baselines.solvers.arm_task import (
-    add_feedback,
-    arm_task_of,
-    joint_limits_of,
-    motion_and_error,
-    period_of,
-    plain_arm_task,
-    pose_arrays,
-)
+from baselines.policy_kernels import scale_rows
 from baselines.status import Status
 from ikgym import task_kernels
 from ikgym.exceptions import InvalidInputError
-from ikgym.jit import inlined
+from ikgym.jit import kernel, uncounted
 from ikgym.kinematics import forward_and_jacobian
 from ikgym.validation import FloatArray, known_name, number
 
@@ -85,14 +76,6 @@ class TaskFeedback(CompiledPolicy, abc.ABC):
         """A :class:`NominalMemory` without a step before."""
         return NominalMemory(np.zeros((rows, self.problem.task.size)), np.zeros(rows, dtype=np.bool_))
 
-    def constants(self) -> tuple[Any, ...]:
-        """See :meth:`CompiledPolicy.constants`: arm and task, and the gain, then the numbers of the formula."""
-        return plain_arm_task(self.problem), self.gain, *self.numbers()
-
-    @abc.abstractmethod
-    def numbers(self) -> tuple[Any, ...]:
-        """What the formula needs to know besides."""
-
     @property
     def full_rank(self) -> int:
         """The rank that the task Jacobian has where nothing is lost: redundant coordinates add none."""
@@ -123,94 +106,64 @@ class ResolvedRate(TaskFeedback, abc.ABC):
         super().__post_init__()
         known_name("saturation", self.saturation, SATURATIONS)
 
-    def constants(self) -> tuple[Any, ...]:
-        """See :meth:`TaskFeedback.constants`; behind the gain, whether all joints are slowed down alike."""
-        arm_task, gain, *numbers = super().constants()
-        return arm_task, gain, self.saturation == "scale", *numbers
-
-    @abc.abstractmethod
-    def invert(self, jacobian: FloatArray, shift: FloatArray) -> tuple[FloatArray, npt.NDArray[np.int64]]:
-        """The joint shifts for task shifts.
-
-        Args:
-            jacobian: Task Jacobians. Shape (B, e, n).
-            shift: Task shifts. Shape (B, e).
-
-        Returns:
-            Joint shifts in [rad] or [m], of shape (B, n), and values of :class:`Status`, of shape (B,).
-        """
+    @property
+    def scales(self) -> bool:
+        """Whether joints beyond their velocity limits slow down all others."""
+        return self.saturation == "scale"
 
 
-@inlined
-def asked(arm_task, gain, q, pose, nominal, before, known, answer):
-    """Begins a kernel of one iteration: what is asked for, and where the answer goes.
+@kernel
+def task_motion(chain, kind, seen, memory):
+    """Task Jacobians, the motion of the reference, and the present errors; the reference is remembered.
 
     Args:
-        arm_task: See :func:`plain_arm_task`.
-        gain: Share of the present error to take back.
-        q: Joint coordinates in [rad] or [m]. Shape (B n,).
-        pose: Measured task coordinates. Shape (B m,).
-        nominal: Nominal task coordinates ahead. Shape (B p, m).
-        before: X^N(k), where known; becomes X^N(k+1). Shape (B, m).
-        known: Whether there was a step before; becomes True. Shape (B,).
-        answer: See :class:`CompiledPolicy`.
+        chain: The model of the arm.
+        kind: The kind of task coordinates.
+        seen: The observations, a :class:`Seen`.
+        memory: The :class:`NominalMemory`, turned into the next one in place.
 
     Returns:
-        Joint coordinates (B, n), task Jacobians (B, e, n), the task shifts asked for (B, e), and the answer's parts:
-        joint shifts (B, n), status and iterations (B,), to be filled in.
+        J (B, e, n), X^N(k+1) - X^N(k) and X^N(k) - x(k), both of shape (B, e).
     """
-    q, jacobian, shift, error, parts = asked_apart(arm_task, q, pose, nominal, before, known, answer)
-    for row in range(shift.shape[0]):
-        add_feedback(gain, error[row], shift[row])
-    return q, jacobian, shift, parts
-
-
-@inlined
-def asked_apart(arm_task, q, pose, nominal, before, known, answer):
-    """The same with X^N(k+1) - X^N(k) and X^N(k) - x(k) in place of the task shifts, of shapes (B, e)."""
-    chain, kind = arm_task_of(arm_task)
-    q, pose, nominal = as_rows(int(arm_task[0]), q, pose, nominal)
+    q, pose, nominal, before, known = seen.q, seen.pose, seen.nominal, memory.nominal, memory.known
     rows, n = q.shape
     size = task_kernels.error_size(kind, pose.shape[1])
     jacobian, motion, error = np.empty((rows, size, n)), np.empty((rows, size)), np.empty((rows, size))
-    rotation, position, geometric, _ = pose_arrays(n, pose.shape[1])
+    rotation, position, geometric = np.empty((3, 3)), np.empty(3), np.empty((6, n))
     for row in range(rows):
         forward_and_jacobian(chain, q[row], rotation, position, geometric)
         task_kernels.jacobian(kind, rotation, geometric, jacobian[row])
-        present = before[row] if known[row] else pose[row]
-        motion_and_error(kind, pose[row], nominal[row, 0], present, motion[row], error[row])
-        before[row] = nominal[row, 0]
+        present, target = before[row] if known[row] else pose[row], nominal[row, 0]
+        task_kernels.error(kind, target, present, motion[row])
+        task_kernels.error(kind, present, pose[row], error[row])
+        for i in range(target.shape[0]):
+            before[row, i] = target[i]
         known[row] = True
-    return q, jacobian, motion, error, answer_parts(answer, rows, n)
+    return jacobian, motion, error
 
 
-@inlined
-def answered(arm_task, scaling, answer, action):
-    """Ends a kernel of one iteration: joint shifts become velocities and actions.
+@uncounted
+def add_feedback(gain, error, shift):
+    """Adds a share of the errors to task shifts, both of shape (B, e)."""
+    for row in range(shift.shape[0]):
+        for i in range(shift.shape[1]):
+            shift[row, i] += gain * error[row, i]
 
-    Args:
-        arm_task: See :func:`plain_arm_task`.
-        scaling: Whether joints beyond their velocity limits slow down all others, see :func:`scale_rows`.
-        answer: Joint shifts (B, n), which become joint velocities; status, and iterations, which become 1. Shape (B,).
-        action: Receives the actions. Shape (B n,).
-    """
-    (dt, limit), (qdot, status, iterations) = period_of(arm_task), answer
+
+@uncounted
+def finish(model, scaling, answer):
+    """Turns joint shifts into velocities, slowed down alike where ``scaling``; one iteration was made."""
+    qdot, iterations = answer.qdot, answer.iterations
     for row in range(qdot.shape[0]):
         iterations[row] = 1
         for j in range(qdot.shape[1]):
-            qdot[row, j] /= dt
+            qdot[row, j] /= model.dt
     if scaling:
-        scale_rows(qdot, joint_limits_of(arm_task)[2], status)
-    return cut_rows(qdot, limit, action.reshape(qdot.shape), status)
+        scale_rows(qdot, model.largest, answer.status)
 
 
-@inlined
+@uncounted
 def say_deficient(deficient, status):
     """Statuses of rows by whether the Jacobian had lost rank. Shapes (B,)."""
     for row in range(status.shape[0]):
         status[row] = DEFICIENT if deficient[row] else APPLIED
-
-
-def status_of(rank_deficient: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
-    """Statuses of rows by whether the Jacobian had lost rank. Shapes (B,)."""
-    return np.where(rank_deficient, DEFICIENT, APPLIED)

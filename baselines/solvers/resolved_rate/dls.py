@@ -3,18 +3,56 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any, ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from baselines.policy import statuses
-from baselines.policy_kernels import REFUSED, all_finite
 from baselines.solvers.linear_algebra import damped_gram, transposed_product
-from baselines.solvers.resolved_rate.base import APPLIED, ResolvedRate, answered, asked
+from baselines.solvers.resolved_rate.base import APPLIED, ResolvedRate, add_feedback, finish, task_motion
 from ikgym.jit import kernel
 from ikgym.linear_algebra import cholesky, cholesky_solve
-from ikgym.validation import FloatArray, number
+from ikgym.validation import number
+
+
+class DampedNumbers(NamedTuple):
+    """The parameters of :class:`DampedLeastSquares` as its kernel takes them.
+
+    Attributes:
+        gain: Share of the present error that is taken back in one step.
+        scaling: Whether joints beyond their velocity limits slow down all others.
+        damping: λ.
+    """
+
+    gain: float
+    scaling: bool
+    damping: float
+
+
+@kernel
+def damped_rows(jacobian, shift, damping, out):
+    """Δq = Jᵀ (J Jᵀ + λ I)⁻¹ Δx, row by row: shapes (B, e, n), (B, e), a number, (B, n)."""
+    e = jacobian.shape[1]
+    gram, rhs = np.empty((e, e)), np.empty(e)
+    for row in range(jacobian.shape[0]):
+        damped_gram(jacobian[row], damping, gram)
+        # Positive definite by the damping; if rounding says otherwise the damping is too small to count.
+        if not cholesky(gram):
+            out[row] = np.nan
+            continue
+        for a in range(e):
+            rhs[a] = shift[row, a]
+        cholesky_solve(gram, rhs)
+        transposed_product(jacobian[row], rhs, out[row])
+
+
+@kernel
+def dls_step(model, numbers, seen, memory, answer):
+    """One step of :class:`DampedLeastSquares`; see :class:`CompiledPolicy` for the arguments."""
+    jacobian, shift, error = task_motion(model.chain, model.kind, seen, memory)
+    add_feedback(numbers.gain, error, shift)
+    damped_rows(jacobian, shift, numbers.damping, answer.qdot)
+    answer.status[:] = APPLIED
+    finish(model, numbers.scaling, answer)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -37,64 +75,12 @@ class DampedLeastSquares(ResolvedRate):
     damping: float = 1e-3
 
     name: ClassVar[str] = "dls"
+    step = dls_step
 
     def __post_init__(self) -> None:
         super().__post_init__()
         object.__setattr__(self, "damping", number("damping", self.damping, above=0.0))
 
-    def kernel(self) -> Any:
-        """See :meth:`CompiledPolicy.kernel`."""
-        return dls_rows
-
-    def numbers(self) -> tuple[Any, ...]:
-        """See :meth:`ResolvedRate.numbers`."""
-        return (self.damping,)
-
-    def invert(self, jacobian: FloatArray, shift: FloatArray) -> tuple[FloatArray, npt.NDArray[np.int64]]:
-        """See :meth:`ResolvedRate.invert`."""
-        out = np.empty((len(jacobian), jacobian.shape[2]))
-        damped_rows(jacobian, shift, self.damping, out)
-        return out, statuses(len(out))
-
-
-@kernel
-def dls_rows(
-    arm_task,
-    gain,
-    scaling,
-    damping,
-    checking,
-    q,
-    qdot_before,
-    pose,
-    nominal,
-    remaining,
-    before,
-    known,
-    action,
-    answer,
-):
-    """One step of :class:`DampedLeastSquares`; see :class:`CompiledPolicy` for the arguments."""
-    if checking and not all_finite(q, qdot_before, pose, nominal, remaining):
-        return REFUSED
-    q, jacobian, shift, parts = asked(arm_task, gain, q, pose, nominal, before, known, answer)
-    qdot, status, _ = parts
-    status[:] = APPLIED
-    damped_rows(jacobian, shift, damping, qdot)
-    return answered(arm_task, scaling, parts, action)
-
-
-@kernel
-def damped_rows(jacobian, shift, damping, out):
-    """Δq = Jᵀ (J Jᵀ + λ I)⁻¹ Δx, row by row: shapes (B, e, n), (B, e), a number, (B, n)."""
-    e = jacobian.shape[1]
-    gram, rhs = np.empty((e, e)), np.empty(e)
-    for row in range(jacobian.shape[0]):
-        damped_gram(jacobian[row], damping, gram)
-        # Positive definite by the damping; if rounding says otherwise the damping is too small to count.
-        if not cholesky(gram):
-            out[row] = np.nan
-            continue
-        rhs[:] = shift[row]
-        cholesky_solve(gram, rhs)
-        transposed_product(jacobian[row], rhs, out[row])
+    def numbers(self) -> DampedNumbers:
+        """See :meth:`CompiledPolicy.numbers`."""
+        return DampedNumbers(self.gain, self.scales, self.damping)

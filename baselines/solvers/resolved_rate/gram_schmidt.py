@@ -3,103 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any, ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from baselines.policy_kernels import REFUSED, all_finite
 from baselines.solvers.linear_algebra import dot
-from baselines.solvers.resolved_rate.base import ResolvedRate, answered, asked, say_deficient, status_of
+from baselines.solvers.resolved_rate.base import ResolvedRate, add_feedback, finish, say_deficient, task_motion
 from ikgym.exceptions import InvalidInputError
 from ikgym.jit import kernel
-from ikgym.validation import FloatArray, number
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class GramSchmidt(ResolvedRate):
-    """A solution without a cost function, by Gram–Schmidt orthonormalisation: a RECONSTRUCTION.
-
-    Khan 2020 (section 2, its reference 44) names a method that avoids the minimisation of any cost function by the
-    Gram–Schmidt algorithm. The original text is not at hand; what follows is this project's reading of that sentence.
-
-    The rows of J are orthonormalised one after another, the longest remainder first. A row a with the remainder
-    ρ u (u of unit length) asks for Δx_a; what the rows before it have given is taken off, and the rest,
-    divided by ρ, is given along u. So Δq lies in the span of the rows and makes Δx: without truncation and with
-    full rank it is the Moore–Penrose solution, although no sum of squares was minimised. (Orthonormalised columns
-    would make Δx too, but with joints that stand still.)
-
-    Rows whose remainder is too short are left out: their coordinates are not tracked, those kept are tracked
-    exactly, unlike with the pseudoinverse, which spreads what cannot be made over all coordinates. The status then
-    says ``rank_deficient``, and joint velocities jump where a row leaves or comes back. A task with redundant
-    coordinates has at most six rows kept; which ones may change from step to step.
-
-    Args:
-        problem: What the policy is told of the scenario.
-        gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
-        saturation: What is done about joint velocities beyond their limits; see :class:`ResolvedRate`.
-        truncation: Rows whose remainder is shorter than this share of the longest row are left out. At least 0 and
-            below 1. Rows of positions and of orientations are compared as they are, in [m] and [1].
-
-    Raises:
-        InvalidInputError: The gain or the truncation is out of its range.
-    """
-
-    truncation: float = 1e-3
-
-    name: ClassVar[str] = "gram_schmidt"
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        object.__setattr__(self, "truncation", number("truncation", self.truncation, at_least=0.0))
-        if self.truncation >= 1.0:
-            raise InvalidInputError(
-                f"truncation: expected a number of at least 0 and below 1, got {self.truncation:g}."
-            )
-
-    def kernel(self) -> Any:
-        """See :meth:`CompiledPolicy.kernel`."""
-        return gram_schmidt_rows
-
-    def numbers(self) -> tuple[Any, ...]:
-        """See :meth:`ResolvedRate.numbers`."""
-        return self.truncation, self.full_rank
-
-    def invert(self, jacobian: FloatArray, shift: FloatArray) -> tuple[FloatArray, npt.NDArray[np.int64]]:
-        """See :meth:`ResolvedRate.invert`."""
-        rows, _, n = jacobian.shape
-        out, deficient = np.empty((rows, n)), np.empty(rows, dtype=np.bool_)
-        orthonormal_rows(jacobian, shift, self.truncation, self.full_rank, out, deficient)
-        return out, status_of(deficient)
-
-
-@kernel
-def gram_schmidt_rows(
-    arm_task,
-    gain,
-    scaling,
-    truncation,
-    full_rank,
-    checking,
-    q,
-    qdot_before,
-    pose,
-    nominal,
-    remaining,
-    before,
-    known,
-    action,
-    answer,
-):
-    """One step of :class:`GramSchmidt`; see :class:`CompiledPolicy` for the arguments."""
-    if checking and not all_finite(q, qdot_before, pose, nominal, remaining):
-        return REFUSED
-    q, jacobian, shift, parts = asked(arm_task, gain, q, pose, nominal, before, known, answer)
-    qdot, status, _ = parts
-    deficient = np.empty(q.shape[0], np.bool_)
-    orthonormal_rows(jacobian, shift, truncation, full_rank, qdot, deficient)
-    say_deficient(deficient, status)
-    return answered(arm_task, scaling, parts, action)
+from ikgym.validation import number
 
 
 @kernel
@@ -118,9 +30,10 @@ def orthonormal_rows(jacobian, shift, truncation, full_rank, out, deficient):
     basis, given = np.empty((full_rank, n)), np.empty(full_rank)
     rest, wanted, free = np.empty((e, n)), np.empty(e), np.empty(e, dtype=np.bool_)
     for row in range(jacobian.shape[0]):
-        rest[:] = jacobian[row]
-        wanted[:] = shift[row]
-        free[:] = True
+        for a in range(e):
+            wanted[a], free[a] = shift[row, a], True
+            for k in range(n):
+                rest[a, k] = jacobian[row, a, k]
         out[row] = 0.0
         shortest = 0.0
         rank = 0
@@ -159,3 +72,77 @@ def _take_off(rest, wanted, a, unit, given):
     for k in range(unit.shape[0]):
         rest[a, k] -= part * unit[k]
     wanted[a] -= part * given
+
+
+class GramSchmidtNumbers(NamedTuple):
+    """The parameters of :class:`GramSchmidt` as its kernel takes them.
+
+    Attributes:
+        gain: Share of the present error that is taken back in one step.
+        scaling: Whether joints beyond their velocity limits slow down all others.
+        truncation: Rows whose remainder is shorter than this share of the longest row are left out.
+        full_rank: The rank that J has where nothing is lost.
+    """
+
+    gain: float
+    scaling: bool
+    truncation: float
+    full_rank: int
+
+
+@kernel
+def gram_schmidt_step(model, numbers, seen, memory, answer):
+    """One step of :class:`GramSchmidt`; see :class:`CompiledPolicy` for the arguments."""
+    jacobian, shift, error = task_motion(model.chain, model.kind, seen, memory)
+    add_feedback(numbers.gain, error, shift)
+    deficient = np.empty(shift.shape[0], np.bool_)
+    orthonormal_rows(jacobian, shift, numbers.truncation, numbers.full_rank, answer.qdot, deficient)
+    say_deficient(deficient, answer.status)
+    finish(model, numbers.scaling, answer)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class GramSchmidt(ResolvedRate):
+    """A solution without a cost function, by Gram–Schmidt orthonormalisation: a RECONSTRUCTION.
+
+    Khan 2020 (section 2, its reference 44) names a method that avoids the minimisation of any cost function by the
+    Gram–Schmidt algorithm. The original text is not at hand; what follows is this project's reading of that sentence.
+
+    The rows of J are orthonormalised one after another, the longest remainder first. A row a with the remainder
+    ρ u (u of unit length) asks for Δx_a; what the rows before it have given is taken off, and the rest,
+    divided by ρ, is given along u. So Δq lies in the span of the rows and makes Δx: without truncation and with
+    full rank it is the Moore–Penrose solution, although no sum of squares was minimised. (Orthonormalised columns
+    would make Δx too, but with joints that stand still.)
+
+    Rows whose remainder is too short are left out: their coordinates are not tracked, those kept are tracked
+    exactly, unlike with the pseudoinverse, which spreads what cannot be made over all coordinates. The status then
+    says ``rank_deficient``, and joint velocities jump where a row leaves or comes back. A task with redundant
+    coordinates has at most six rows kept; which ones may change from step to step.
+
+    Args:
+        problem: What the policy is told of the scenario.
+        gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
+        saturation: What is done about joint velocities beyond their limits; see :class:`ResolvedRate`.
+        truncation: Rows whose remainder is shorter than this share of the longest row are left out. At least 0 and
+            below 1. Rows of positions and of orientations are compared as they are, in [m] and [1].
+
+    Raises:
+        InvalidInputError: The gain or the truncation is out of its range.
+    """
+
+    truncation: float = 1e-3
+
+    name: ClassVar[str] = "gram_schmidt"
+    step = gram_schmidt_step
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "truncation", number("truncation", self.truncation, at_least=0.0))
+        if self.truncation >= 1.0:
+            raise InvalidInputError(
+                f"truncation: expected a number of at least 0 and below 1, got {self.truncation:g}."
+            )
+
+    def numbers(self) -> GramSchmidtNumbers:
+        """See :meth:`CompiledPolicy.numbers`."""
+        return GramSchmidtNumbers(self.gain, self.scales, self.truncation, self.full_rank)

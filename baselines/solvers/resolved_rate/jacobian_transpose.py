@@ -3,112 +3,21 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any, ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from baselines.policy_kernels import REFUSED, all_finite
 from baselines.solvers.arm_size import error_weights, radian
 from baselines.solvers.resolved_rate.base import (
     APPLIED,
     ResolvedRate,
-    answered,
-    asked,
+    add_feedback,
+    finish,
     say_deficient,
-    status_of,
+    task_motion,
 )
 from ikgym.jit import kernel
 from ikgym.validation import FloatArray, number, read_only
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class JacobianTranspose(ResolvedRate):
-    """Goes down the gradient of ½ ‖W (Δx − J Δq)‖²: Δq = α Jᵀ W² Δx, with the α that goes furthest down.
-
-    W weighs position and orientation against each other: 1 for positions, a length ℓ for orientations. The direction
-    is that of Wolovich and Elliott 1984 and of Balestrino, De Maria and Sciavicco 1984; the step
-    α = ΔxᵀJJᵀΔx / ‖JJᵀΔx‖² is the one that Buss 2004 prints, here of W J and W Δx. In one step an arm makes all of Δx
-    only where W J has equal singular values; elsewhere it lags behind, the more so the more they differ, and what is
-    missing comes back through the measured error.
-
-    Joint velocities are not bounded: where Δx lies along a direction that is nearly lost, with a singular value σ,
-    the step is Δx / σ like that of the pseudoinverse. Where JᵀΔx is 0 the arm stands still; the status then says
-    ``rank_deficient``, unless the task has more coordinates than the arm can move at once, where JᵀΔx is 0 at the
-    best fit too.
-
-    Args:
-        problem: What the policy is told of the scenario.
-        gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
-        saturation: What is done about joint velocities beyond their limits; see :class:`ResolvedRate`.
-        rank_tolerance: ‖JᵀΔx‖ below this share of ‖J‖ ‖Δx‖ (Frobenius, weighed) counts as zero. At least 0.
-        length: ℓ, what 1 rad counts as, or 1 in a rotation matrix, in [m]. Above 0. If left out, chosen for the model,
-            see :func:`baselines.solvers.arm_size.radian`.
-
-    Raises:
-        InvalidInputError: The gain, the tolerance or the length is out of its range.
-    """
-
-    rank_tolerance: float = 1e-12
-    length: float | None = None
-
-    _weights: FloatArray = dataclasses.field(init=False, repr=False)
-
-    name: ClassVar[str] = "jacobian_transpose"
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        object.__setattr__(self, "rank_tolerance", number("rank_tolerance", self.rank_tolerance, at_least=0.0))
-        length = radian(self.problem.model) if self.length is None else number("length", self.length, above=0.0)
-        object.__setattr__(self, "length", length)
-        object.__setattr__(self, "_weights", read_only(error_weights(self.problem.task, length)))
-
-    def kernel(self) -> Any:
-        """See :meth:`CompiledPolicy.kernel`."""
-        return jacobian_transpose_rows
-
-    def numbers(self) -> tuple[Any, ...]:
-        """See :meth:`ResolvedRate.numbers`."""
-        return self.rank_tolerance, self.full_rank, self._weights
-
-    def invert(self, jacobian: FloatArray, shift: FloatArray) -> tuple[FloatArray, npt.NDArray[np.int64]]:
-        """See :meth:`ResolvedRate.invert`."""
-        rows, size, n = jacobian.shape
-        out, stuck = np.empty((rows, n)), np.empty(rows, dtype=np.bool_)
-        transpose_rows(jacobian, shift, self._weights, self.rank_tolerance, out, stuck)
-        return out, status_of(stuck & (size == self.full_rank))
-
-
-@kernel
-def jacobian_transpose_rows(
-    arm_task,
-    gain,
-    scaling,
-    tolerance,
-    full_rank,
-    weights,
-    checking,
-    q,
-    qdot_before,
-    pose,
-    nominal,
-    remaining,
-    before,
-    known,
-    action,
-    answer,
-):
-    """One step of :class:`JacobianTranspose`; see :class:`CompiledPolicy` for the arguments."""
-    if checking and not all_finite(q, qdot_before, pose, nominal, remaining):
-        return REFUSED
-    q, jacobian, shift, parts = asked(arm_task, gain, q, pose, nominal, before, known, answer)
-    qdot, status, _ = parts
-    stuck = np.empty(q.shape[0], np.bool_)
-    transpose_rows(jacobian, shift, weights, tolerance, qdot, stuck)
-    say_deficient(stuck, status)
-    if shift.shape[1] != full_rank:
-        status[:] = APPLIED
-    return answered(arm_task, scaling, parts, action)
 
 
 @kernel
@@ -144,3 +53,81 @@ def transpose_rows(jacobian, shift, weights, tolerance, out, stuck):
         alpha = 0.0 if none else squared / length
         for k in range(n):
             dq[k] *= alpha
+
+
+class TransposeNumbers(NamedTuple):
+    """The parameters of :class:`JacobianTranspose` as its kernel takes them.
+
+    Attributes:
+        gain: Share of the present error that is taken back in one step.
+        scaling: Whether joints beyond their velocity limits slow down all others.
+        tolerance: ‖JᵀΔx‖ below this share of ‖J‖ ‖Δx‖ counts as zero.
+        full_rank: The rank that J has where nothing is lost.
+        weights: The diagonal of W². Shape (e,).
+    """
+
+    gain: float
+    scaling: bool
+    tolerance: float
+    full_rank: int
+    weights: FloatArray
+
+
+@kernel
+def transpose_step(model, numbers, seen, memory, answer):
+    """One step of :class:`JacobianTranspose`; see :class:`CompiledPolicy` for the arguments."""
+    jacobian, shift, error = task_motion(model.chain, model.kind, seen, memory)
+    add_feedback(numbers.gain, error, shift)
+    stuck = np.empty(shift.shape[0], np.bool_)
+    transpose_rows(jacobian, shift, numbers.weights, numbers.tolerance, answer.qdot, stuck)
+    say_deficient(stuck, answer.status)
+    if shift.shape[1] != numbers.full_rank:
+        answer.status[:] = APPLIED
+    finish(model, numbers.scaling, answer)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class JacobianTranspose(ResolvedRate):
+    """Goes down the gradient of ½ ‖W (Δx − J Δq)‖²: Δq = α Jᵀ W² Δx, with the α that goes furthest down.
+
+    W weighs position and orientation against each other: 1 for positions, a length ℓ for orientations. The direction
+    is that of Wolovich and Elliott 1984 and of Balestrino, De Maria and Sciavicco 1984; the step
+    α = ΔxᵀJJᵀΔx / ‖JJᵀΔx‖² is the one that Buss 2004 prints, here of W J and W Δx. In one step an arm makes all of Δx
+    only where W J has equal singular values; elsewhere it lags behind, the more so the more they differ, and what is
+    missing comes back through the measured error.
+
+    Joint velocities are not bounded: where Δx lies along a direction that is nearly lost, with a singular value σ,
+    the step is Δx / σ like that of the pseudoinverse. Where JᵀΔx is 0 the arm stands still; the status then says
+    ``rank_deficient``, unless the task has more coordinates than the arm can move at once, where JᵀΔx is 0 at the
+    best fit too.
+
+    Args:
+        problem: What the policy is told of the scenario.
+        gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
+        saturation: What is done about joint velocities beyond their limits; see :class:`ResolvedRate`.
+        rank_tolerance: ‖JᵀΔx‖ below this share of ‖J‖ ‖Δx‖ (Frobenius, weighed) counts as zero. At least 0.
+        length: ℓ, what 1 rad counts as, or 1 in a rotation matrix, in [m]. Above 0. If left out, chosen for the model,
+            see :func:`baselines.solvers.arm_size.radian`.
+
+    Raises:
+        InvalidInputError: The gain, the tolerance or the length is out of its range.
+    """
+
+    rank_tolerance: float = 1e-12
+    length: float | None = None
+
+    _weights: FloatArray = dataclasses.field(init=False, repr=False)
+
+    name: ClassVar[str] = "jacobian_transpose"
+    step = transpose_step
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "rank_tolerance", number("rank_tolerance", self.rank_tolerance, at_least=0.0))
+        length = radian(self.problem.model) if self.length is None else number("length", self.length, above=0.0)
+        object.__setattr__(self, "length", length)
+        object.__setattr__(self, "_weights", read_only(error_weights(self.problem.task, length)))
+
+    def numbers(self) -> TransposeNumbers:
+        """See :meth:`CompiledPolicy.numbers`."""
+        return TransposeNumbers(self.gain, self.scales, self.rank_tolerance, self.full_rank, self._weights)

@@ -3,17 +3,48 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any, ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from baselines.policy_kernels import REFUSED, all_finite
 from baselines.solvers.linear_algebra import pseudoinverse_rows
-from baselines.solvers.resolved_rate.base import ResolvedRate, answered, asked, say_deficient, status_of
+from baselines.solvers.resolved_rate.base import ResolvedRate, add_feedback, finish, say_deficient, task_motion
 from ikgym.exceptions import InvalidInputError
 from ikgym.jit import kernel
-from ikgym.validation import FloatArray, number
+from ikgym.validation import FloatArray, number, read_only
+
+
+class PseudoinverseNumbers(NamedTuple):
+    """The parameters of :class:`MoorePenrose` and its relatives as their kernel takes them.
+
+    Attributes:
+        gain: Share of the present error that is taken back in one step.
+        scaling: Whether joints beyond their velocity limits slow down all others.
+        tolerance: Singular values below this share of the largest count as zero.
+        full_rank: The rank that J has where nothing is lost.
+        root: By which the columns of J are divided: the roots of the joints' weights. Shape (n,).
+    """
+
+    gain: float
+    scaling: bool
+    tolerance: float
+    full_rank: int
+    root: FloatArray
+
+
+@kernel
+def pseudoinverse_step(model, numbers, seen, memory, answer):
+    """One step by the pseudoinverse, see :class:`CompiledPolicy` for the arguments."""
+    jacobian, shift, error = task_motion(model.chain, model.kind, seen, memory)
+    add_feedback(numbers.gain, error, shift)
+    root, qdot = numbers.root, answer.qdot
+    deficient = np.empty(qdot.shape[0], np.bool_)
+    pseudoinverse_rows(jacobian / root, shift, numbers.tolerance, numbers.full_rank, qdot, deficient)
+    say_deficient(deficient, answer.status)
+    for row in range(qdot.shape[0]):
+        for j in range(qdot.shape[1]):
+            qdot[row, j] /= root[j]
+    finish(model, numbers.scaling, answer)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -37,6 +68,7 @@ class MoorePenrose(ResolvedRate):
     rank_tolerance: float = 1e-12
 
     name: ClassVar[str] = "moore_penrose"
+    step = pseudoinverse_step
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -44,50 +76,7 @@ class MoorePenrose(ResolvedRate):
         if self.rank_tolerance >= 1.0:
             raise InvalidInputError(f"rank_tolerance: expected a number below 1, got {self.rank_tolerance:g}.")
 
-    def kernel(self) -> Any:
-        """See :meth:`CompiledPolicy.kernel`."""
-        return pseudoinverse_step_rows
-
-    def numbers(self) -> tuple[Any, ...]:
-        """See :meth:`ResolvedRate.numbers`."""
-        return self.rank_tolerance, self.full_rank, np.ones(self.problem.model.joints)
-
-    def invert(self, jacobian: FloatArray, shift: FloatArray) -> tuple[FloatArray, npt.NDArray[np.int64]]:
-        """See :meth:`ResolvedRate.invert`."""
-        rows, _, n = jacobian.shape
-        out, deficient = np.empty((rows, n)), np.empty(rows, dtype=np.bool_)
-        pseudoinverse_rows(jacobian, shift, self.rank_tolerance, self.full_rank, out, deficient)
-        return out, status_of(deficient)
-
-
-@kernel
-def pseudoinverse_step_rows(
-    arm_task,
-    gain,
-    scaling,
-    tolerance,
-    full_rank,
-    root,
-    checking,
-    q,
-    qdot_before,
-    pose,
-    nominal,
-    remaining,
-    before,
-    known,
-    action,
-    answer,
-):
-    """One step by the pseudoinverse, the columns of J divided by ``root`` (n,); else see :class:`CompiledPolicy`."""
-    if checking and not all_finite(q, qdot_before, pose, nominal, remaining):
-        return REFUSED
-    q, jacobian, shift, parts = asked(arm_task, gain, q, pose, nominal, before, known, answer)
-    qdot, status, _ = parts
-    deficient = np.empty(q.shape[0], np.bool_)
-    pseudoinverse_rows(jacobian / root, shift, tolerance, full_rank, qdot, deficient)
-    say_deficient(deficient, status)
-    for row in range(q.shape[0]):
-        for j in range(q.shape[1]):
-            qdot[row, j] /= root[j]
-    return answered(arm_task, scaling, parts, action)
+    def numbers(self) -> NamedTuple:
+        """See :meth:`CompiledPolicy.numbers`."""
+        root = read_only(np.ones(self.problem.model.joints))
+        return PseudoinverseNumbers(self.gain, self.scales, self.rank_tolerance, self.full_rank, root)

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from typing import Any, ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from baselines.policy_kernels import REFUSED, all_finite
-from baselines.solvers.arm_task import arm_task_of, plain_arm_task
 from baselines.solvers.linear_algebra import pseudoinverse_rows
-from baselines.solvers.resolved_rate.base import APPLIED, answered, asked, say_deficient
+from baselines.solvers.resolved_rate.base import APPLIED, add_feedback, finish, say_deficient, task_motion
 from baselines.solvers.resolved_rate.dls import damped_rows
 from baselines.solvers.resolved_rate.moore_penrose import MoorePenrose
 from ikgym.arms import Arm
@@ -24,6 +21,158 @@ from ikgym.linear_algebra import cholesky, cholesky_solve
 from ikgym.validation import FloatArray, as_given, known_name, number, per_joint, read_only
 
 OBJECTIVES = ("posture", "joint_centring", "manipulability")
+
+
+@kernel
+def task_rows(jacobian, velocity, out):
+    """J q̇ row by row: shapes (B, e, n), (B, n), (B, e)."""
+    for row in range(jacobian.shape[0]):
+        for a in range(jacobian.shape[1]):
+            total = 0.0
+            for k in range(jacobian.shape[2]):
+                total += jacobian[row, a, k] * velocity[row, k]
+            out[row, a] = total
+
+
+@kernel
+def manipulability_rows(chain, q, lines, out):
+    """∂w/∂q row by row, w = √det(J Jᵀ) of the first ``lines`` (3 or 6) rows of the geometric Jacobian.
+
+    ∂w/∂q_i = w tr(∂J/∂q_i J⁺), and the columns of J depend on the joints before them and on those behind:
+    ∂J_j/∂q_i is (ω_i × v_j, ω_i × ω_j) for i ≤ j, and (ω_j × v_i, 0) for i > j.
+
+    Args:
+        chain: The model of the arm.
+        q: Joint coordinates. Shape (B, n).
+        lines: Number of rows.
+        out: Receives the gradients; 0 where J has no full rank. Shape (B, n).
+    """
+    n = q.shape[1]
+    rotation, position, jacobian = np.empty((3, 3)), np.empty(3), np.empty((6, n))
+    gram, dual, column, turned = np.empty((lines, lines)), np.empty((n, lines)), np.empty(lines), np.empty(6)
+    for row in range(q.shape[0]):
+        out[row] = 0.0
+        forward_and_jacobian(chain, q[row], rotation, position, jacobian)
+        for a in range(lines):
+            for b in range(a + 1):
+                gram[a, b] = 0.0
+                for k in range(n):
+                    gram[a, b] += jacobian[a, k] * jacobian[b, k]
+        if not cholesky(gram):
+            continue
+        w = 1.0
+        for a in range(lines):
+            w *= gram[a, a]
+        for j in range(n):
+            for a in range(lines):
+                column[a] = jacobian[a, j]
+            cholesky_solve(gram, column)
+            for a in range(lines):
+                dual[j, a] = column[a]  # a row of J⁺
+        for i in range(n):
+            for j in range(n):
+                turned[3:] = 0.0
+                if i <= j:
+                    _cross(jacobian[3:, i], jacobian[:3, j], turned[:3])
+                    _cross(jacobian[3:, i], jacobian[3:, j], turned[3:])
+                else:
+                    _cross(jacobian[3:, j], jacobian[:3, i], turned[:3])
+                for a in range(lines):
+                    out[row, i] += w * turned[a] * dual[j, a]
+
+
+@kernel
+def _cross(x, y, out):
+    out[0] = x[1] * y[2] - x[2] * y[1]
+    out[1] = x[2] * y[0] - x[0] * y[2]
+    out[2] = x[0] * y[1] - x[1] * y[0]
+
+
+class NullSpaceNumbers(NamedTuple):
+    """The parameters of :class:`NullSpace` as its kernel takes them.
+
+    Attributes:
+        gain: Share of the present error that is taken back in one step.
+        scaling: Whether joints beyond their velocity limits slow down all others.
+        tolerance: Singular values below this share of the largest count as zero.
+        full_rank: The rank that J has where nothing is lost.
+        damping: λ; 0 for the pseudoinverse.
+        lines: Rows of the Jacobian whose manipulability is to grow; 0 for none.
+        secondary_gain: K Δt.
+        reach: The third power of the arm's reach, in [m³].
+        joint_gain: How strongly each joint is led to its goal. Shape (n,).
+        goal: Where the joints are led to, in [rad] or [m]. Shape (n,).
+    """
+
+    gain: float
+    scaling: bool
+    tolerance: float
+    full_rank: int
+    damping: float
+    lines: int
+    secondary_gain: float
+    reach: float
+    joint_gain: FloatArray
+    goal: FloatArray
+
+
+@kernel
+def null_space_step(model, numbers, seen, memory, answer):
+    """One step of :class:`NullSpace`; see :class:`CompiledPolicy` for the arguments."""
+    jacobian, shift, error = task_motion(model.chain, model.kind, seen, memory)
+    add_feedback(numbers.gain, error, shift)
+    move_rows(model.chain, numbers, seen.q, jacobian, shift, answer.qdot, answer.status)
+    finish(model, numbers.scaling, answer)
+
+
+@kernel
+def move_rows(chain, numbers, q, jacobian, shift, out, status):
+    """J⁺ Δx + (I - J⁺ J) Δt z row by row.
+
+    Args:
+        chain: The model of the arm.
+        numbers: The :class:`NullSpaceNumbers`.
+        q: Joint coordinates in [rad] or [m]. Shape (B, n).
+        jacobian: Task Jacobians. Shape (B, e, n).
+        shift: Task shifts. Shape (B, e).
+        out: Receives the joint shifts. Shape (B, n).
+        status: Receives values of :class:`Status`. Shape (B,).
+    """
+    tolerance, full_rank = numbers.tolerance, numbers.full_rank
+    aim, disturbance, deficient = np.empty(q.shape), np.empty(shift.shape), np.empty(q.shape[0], np.bool_)
+    objective_rows(chain, numbers, q, aim)
+    aim *= numbers.secondary_gain
+    task_rows(jacobian, aim, disturbance)
+    if numbers.damping == 0.0:  # with one pseudoinverse
+        pseudoinverse_rows(jacobian, shift - disturbance, tolerance, full_rank, out, deficient)
+        out += aim
+        say_deficient(deficient, status)
+        return
+    taken_off = np.empty(q.shape)
+    damped_rows(jacobian, shift, numbers.damping, out)
+    pseudoinverse_rows(jacobian, disturbance, tolerance, full_rank, taken_off, deficient)
+    out += aim - taken_off
+    status[:] = APPLIED
+
+
+@kernel
+def objective_rows(chain, numbers, q, out):
+    """The secondary objective's z / K row by row.
+
+    Args:
+        chain: The model of the arm.
+        numbers: The :class:`NullSpaceNumbers`.
+        q: Joint coordinates in [rad] or [m]. Shape (B, n).
+        out: Receives z / K. Shape (B, n).
+    """
+    joint_gain, goal = numbers.joint_gain, numbers.goal
+    if numbers.lines > 0:
+        manipulability_rows(chain, q, numbers.lines, out)
+        out /= numbers.reach
+        return
+    for row in range(q.shape[0]):
+        for j in range(q.shape[1]):
+            out[row, j] = joint_gain[j] * (goal[j] - q[row, j])
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -71,6 +220,7 @@ class NullSpace(MoorePenrose):
     _joint_gain: FloatArray = dataclasses.field(init=False, repr=False)
 
     name: ClassVar[str] = "null_space"
+    step = null_space_step
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -91,37 +241,23 @@ class NullSpace(MoorePenrose):
         }.items():
             object.__setattr__(self, field, value)
 
-    def kernel(self) -> Any:
-        """See :meth:`CompiledPolicy.kernel`."""
-        return null_space_rows
-
-    def numbers(self) -> tuple[Any, ...]:
-        """See :meth:`ResolvedRate.numbers`."""
+    def numbers(self) -> NullSpaceNumbers:
+        """See :meth:`CompiledPolicy.numbers`."""
         lines = 0
         if self.objective == "manipulability":
             lines = 6 if self.problem.task.has_orientation else 3
-        reach = self.problem.model.reach(np.zeros(self.problem.model.joints)) ** 3
-        secondary = lines, self.problem.dt * self.secondary_gain, reach, self._joint_gain, self._target
-        return self.rank_tolerance, self.full_rank, self.damping, *secondary
-
-    def move(self, q: FloatArray, jacobian: FloatArray, shift: FloatArray) -> tuple[FloatArray, npt.NDArray[np.int64]]:
-        """The joint shifts for task shifts, and their statuses.
-
-        Args:
-            q: Joint coordinates in [rad] or [m]. Shape (B, n).
-            jacobian: Task Jacobians. Shape (B, e, n).
-            shift: Task shifts. Shape (B, e).
-        """
-        out, status = np.empty_like(q), np.empty(len(q), dtype=np.int64)
-        move_rows(plain_arm_task(self.problem), self.numbers(), q, (jacobian, shift), out, status)
-        return out, status
-
-    def objective_gradient(self, q: FloatArray) -> FloatArray:
-        """The secondary objective's z / K, at joint coordinates in [rad] or [m]. Shapes (B, n)."""
-        out = np.empty_like(q)
-        lines, _, reach, gain, target = self.numbers()[3:]
-        objective_rows(plain_arm_task(self.problem), (lines, reach, gain, target), q, out)
-        return out
+        return NullSpaceNumbers(
+            self.gain,
+            self.scales,
+            self.rank_tolerance,
+            self.full_rank,
+            self.damping,
+            lines,
+            self.problem.dt * self.secondary_gain,
+            self.problem.model.reach(np.zeros(self.problem.model.joints)) ** 3,
+            self._joint_gain,
+            self._target,
+        )
 
 
 def _centre(model: Arm) -> tuple[FloatArray, FloatArray]:
@@ -135,151 +271,3 @@ def _centre(model: Arm) -> tuple[FloatArray, FloatArray]:
     gains, span = np.zeros(model.joints), (model.upper - model.lower)[limited]
     gains[limited] = (span.min() / span) ** 2
     return target, gains
-
-
-@kernel
-def null_space_rows(
-    arm_task,
-    gain,
-    scaling,
-    rank_tolerance,
-    full_rank,
-    damping,
-    lines,
-    secondary_gain,
-    reach,
-    joint_gain,
-    goal,
-    checking,
-    q,
-    qdot_before,
-    pose,
-    nominal,
-    remaining,
-    before,
-    known,
-    action,
-    answer,
-):
-    """One step of :class:`NullSpace`; see :class:`CompiledPolicy` for the arguments."""
-    if checking and not all_finite(q, qdot_before, pose, nominal, remaining):
-        return REFUSED
-    q, jacobian, shift, parts = asked(arm_task, gain, q, pose, nominal, before, known, answer)
-    qdot, status, _ = parts
-    rule = rank_tolerance, full_rank, damping, lines, secondary_gain, reach, joint_gain, goal
-    move_rows(arm_task, rule, q, (jacobian, shift), qdot, status)
-    return answered(arm_task, scaling, parts, action)
-
-
-@kernel
-def move_rows(arm_task, rule, q, wanted, out, status):
-    """J⁺ Δx + (I - J⁺ J) Δt z row by row.
-
-    Args:
-        arm_task: See :func:`plain_arm_task`.
-        rule: What :meth:`NullSpace.numbers` says.
-        q: Joint coordinates in [rad] or [m]. Shape (B, n).
-        wanted: Task Jacobians (B, e, n) and task shifts (B, e).
-        out: Receives the joint shifts. Shape (B, n).
-        status: Receives values of :class:`Status`. Shape (B,).
-    """
-    rank_tolerance, full_rank, damping, lines, secondary_gain, reach, joint_gain, goal = rule
-    jacobian, shift = wanted
-    aim, disturbance, deficient = np.empty(q.shape), np.empty(shift.shape), np.empty(q.shape[0], np.bool_)
-    objective_rows(arm_task, (lines, reach, joint_gain, goal), q, aim)
-    aim *= secondary_gain
-    task_rows(jacobian, aim, disturbance)
-    if damping == 0.0:  # with one pseudoinverse
-        pseudoinverse_rows(jacobian, shift - disturbance, rank_tolerance, full_rank, out, deficient)
-        out += aim
-        say_deficient(deficient, status)
-        return
-    taken_off = np.empty(q.shape)
-    damped_rows(jacobian, shift, damping, out)
-    pseudoinverse_rows(jacobian, disturbance, rank_tolerance, full_rank, taken_off, deficient)
-    out += aim - taken_off
-    status[:] = APPLIED
-
-
-@kernel
-def objective_rows(arm_task, objective, q, out):
-    """The secondary objective's z / K row by row.
-
-    Args:
-        arm_task: See :func:`plain_arm_task`.
-        objective: Rows of the Jacobian whose manipulability is to grow, 0 for none; the third power of the reach; gains
-            and goals of the joints, of shape (n,).
-        q: Joint coordinates in [rad] or [m]. Shape (B, n).
-        out: Receives z / K. Shape (B, n).
-    """
-    lines, reach, joint_gain, goal = objective
-    if lines > 0:
-        manipulability_rows(arm_task_of(arm_task).chain, q, lines, out)
-        out /= reach
-        return
-    for row in range(q.shape[0]):
-        for j in range(q.shape[1]):
-            out[row, j] = joint_gain[j] * (goal[j] - q[row, j])
-
-
-@kernel
-def task_rows(jacobian, velocity, out):
-    """J q̇ row by row: shapes (B, e, n), (B, n), (B, e)."""
-    for row in range(jacobian.shape[0]):
-        for a in range(jacobian.shape[1]):
-            total = 0.0
-            for k in range(jacobian.shape[2]):
-                total += jacobian[row, a, k] * velocity[row, k]
-            out[row, a] = total
-
-
-@kernel
-def manipulability_rows(chain, q, lines, out):
-    """∂w/∂q row by row, w = √det(J Jᵀ) of the first ``lines`` (3 or 6) rows of the geometric Jacobian.
-
-    ∂w/∂q_i = w tr(∂J/∂q_i J⁺), and the columns of J depend on the joints before them and on those behind:
-    ∂J_j/∂q_i is (ω_i × v_j, ω_i × ω_j) for i ≤ j, and (ω_j × v_i, 0) for i > j.
-
-    Args:
-        chain: The model of the arm.
-        q: Joint coordinates. Shape (B, n).
-        lines: Number of rows.
-        out: Receives the gradients; 0 where J has no full rank. Shape (B, n).
-    """
-    n = q.shape[1]
-    rotation, position, jacobian = np.empty((3, 3)), np.empty(3), np.empty((6, n))
-    gram, dual, column, turned = np.empty((lines, lines)), np.empty((n, lines)), np.empty(lines), np.empty(6)
-    for row in range(q.shape[0]):
-        out[row] = 0.0
-        forward_and_jacobian(chain, q[row], rotation, position, jacobian)
-        for a in range(lines):
-            for b in range(a + 1):
-                gram[a, b] = 0.0
-                for k in range(n):
-                    gram[a, b] += jacobian[a, k] * jacobian[b, k]
-        if not cholesky(gram):
-            continue
-        w = 1.0
-        for a in range(lines):
-            w *= gram[a, a]
-        for j in range(n):
-            column[:] = jacobian[:lines, j]
-            cholesky_solve(gram, column)
-            dual[j] = column  # a row of J⁺
-        for i in range(n):
-            for j in range(n):
-                turned[3:] = 0.0
-                if i <= j:
-                    _cross(jacobian[3:, i], jacobian[:3, j], turned[:3])
-                    _cross(jacobian[3:, i], jacobian[3:, j], turned[3:])
-                else:
-                    _cross(jacobian[3:, j], jacobian[:3, i], turned[:3])
-                for a in range(lines):
-                    out[row, i] += w * turned[a] * dual[j, a]
-
-
-@kernel
-def _cross(x, y, out):
-    out[0] = x[1] * y[2] - x[2] * y[1]
-    out[1] = x[2] * y[0] - x[0] * y[2]
-    out[2] = x[0] * y[1] - x[1] * y[0]

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
-import numpy.typing as npt
 
-from baselines.solvers.linear_algebra import pseudoinverse_rows
-from baselines.solvers.resolved_rate.base import ResolvedRate, status_of
-from baselines.solvers.resolved_rate.moore_penrose import pseudoinverse_step_rows
+from baselines.solvers.resolved_rate.base import ResolvedRate
+from baselines.solvers.resolved_rate.moore_penrose import PseudoinverseNumbers, pseudoinverse_step
 from ikgym.exceptions import InvalidInputError
-from ikgym.validation import FloatArray, number
+from ikgym.validation import number, read_only
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -38,6 +36,7 @@ class TruncatedSVD(ResolvedRate):
     threshold: float = 3e-3
 
     name: ClassVar[str] = "truncated_svd"
+    step = pseudoinverse_step
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -45,17 +44,7 @@ class TruncatedSVD(ResolvedRate):
         if self.threshold >= 1.0:
             raise InvalidInputError(f"threshold: expected a number of at least 0 and below 1, got {self.threshold:g}.")
 
-    def kernel(self) -> Any:
-        """See :meth:`CompiledPolicy.kernel`."""
-        return pseudoinverse_step_rows
-
-    def numbers(self) -> tuple[Any, ...]:
-        """See :meth:`ResolvedRate.numbers`."""
-        return self.threshold, self.full_rank, np.ones(self.problem.model.joints)
-
-    def invert(self, jacobian: FloatArray, shift: FloatArray) -> tuple[FloatArray, npt.NDArray[np.int64]]:
-        """See :meth:`ResolvedRate.invert`."""
-        rows, _, n = jacobian.shape
-        out, deficient = np.empty((rows, n)), np.empty(rows, dtype=np.bool_)
-        pseudoinverse_rows(jacobian, shift, self.threshold, self.full_rank, out, deficient)
-        return out, status_of(deficient)
+    def numbers(self) -> PseudoinverseNumbers:
+        """See :meth:`CompiledPolicy.numbers`."""
+        root = read_only(np.ones(self.problem.model.joints))
+        return PseudoinverseNumbers(self.gain, self.scales, self.threshold, self.full_rank, root)

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
-import numpy.typing as npt
 
 from baselines.policy import Problem
-from baselines.solvers.resolved_rate.moore_penrose import MoorePenrose
+from baselines.solvers.resolved_rate.moore_penrose import MoorePenrose, PseudoinverseNumbers
 from ikgym.exceptions import InvalidInputError
 from ikgym.validation import FloatArray, as_given, per_joint, read_only
 
@@ -51,14 +50,9 @@ class WeightedPseudoinverse(MoorePenrose):
         object.__setattr__(self, "weights", as_given(given, weights))
         object.__setattr__(self, "_root", read_only(np.sqrt(weights)))
 
-    def numbers(self) -> tuple[Any, ...]:
-        """See :meth:`ResolvedRate.numbers`."""
-        return self.rank_tolerance, self.full_rank, self._root
-
-    def invert(self, jacobian: FloatArray, shift: FloatArray) -> tuple[FloatArray, npt.NDArray[np.int64]]:
-        """See :meth:`ResolvedRate.invert`."""
-        step, status = super().invert(jacobian / self._root, shift)
-        return step / self._root, status
+    def numbers(self) -> PseudoinverseNumbers:
+        """See :meth:`CompiledPolicy.numbers`."""
+        return PseudoinverseNumbers(self.gain, self.scales, self.rank_tolerance, self.full_rank, self._root)
 
 
 def _by_velocity(problem: Problem) -> float | tuple[float, ...]:

@@ -8,8 +8,6 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from baselines.policy_kernels import REFUSED, all_finite, answer_parts, as_rows, cut_rows
-from baselines.solvers.arm_task import arm_task_of, joint_limits_of, period_of
 from baselines.solvers.receding_horizon.newton.grid import cut, first_knots
 from baselines.solvers.receding_horizon.newton.interior_point.minimise import minimise_path
 from baselines.solvers.receding_horizon.newton.minimise import CONVERGED, NewtonSettings
@@ -61,77 +59,22 @@ class HorizonMemory(NamedTuple):
 PERIODS, CANDIDATE_STEPS, TRIED, FAR = range(4)
 
 
-class Observations(NamedTuple):
-    """What is seen of B arms, and what lies ahead of them.
-
-    Attributes:
-        q: Joint coordinates in [rad] or [m]. Shape (B, n).
-        qdot: Joint velocities last applied, in [rad/s] or [m/s]. Shape (B, n).
-        nominal: Nominal task coordinates 1, 2, … steps ahead. Shape (B, p, m).
-        remaining: Steps left. Shape (B,).
-    """
-
-    q: npt.NDArray[np.float64]
-    qdot: npt.NDArray[np.float64]
-    nominal: npt.NDArray[np.float64]
-    remaining: npt.NDArray[np.float64]
-
-
-class Answers(NamedTuple):
-    """What B arms are to do.
-
-    Attributes:
-        qdot: Joint velocities in [rad/s] or [m/s]. Shape (B, n).
-        status: Values of :class:`Status`. Shape (B,).
-        iterations: Newton steps made. Shape (B,).
-    """
-
-    qdot: npt.NDArray[np.float64]
-    status: npt.NDArray[np.int64]
-    iterations: npt.NDArray[np.int64]
-
-
 @kernel
-def plan_rows(
-    arm_task,
-    prismatic,
-    numbers,
-    integers,
-    checking,
-    q,
-    qdot_before,
-    pose,
-    nominal,
-    remaining,
-    plans,
-    counts,
-    action,
-    answer,
-):
-    """Plans one period for each of B arms.
+def plan_step(model, numbers, seen, memory, answer):
+    """Plans one period for each of B arms; see :class:`CompiledPolicy` for the arguments.
 
-    The arguments are arm and task (see :func:`plain_arm_task`), which joints are prismatic, cost and settings (see
-    :func:`plain_settings`), then those of :class:`CompiledPolicy` with the memory of :class:`HorizonMemory`. The
-    iterations are the Newton steps made, those of initial guesses and candidates among them.
+    The iterations are the Newton steps made, those of initial guesses and candidates among them.
     """
-    if checking and not all_finite(q, qdot_before, pose, nominal, remaining):
-        return REFUSED
-    (dt, action_scale), (lower, upper, velocity_limit) = period_of(arm_task), joint_limits_of(arm_task)
-    n = action_scale.shape[0]
-    q, pose, nominal = as_rows(n, q, pose, nominal)
-    qdot, status, iterations = answer_parts(answer, q.shape[0], n)
-    observations = Observations(q, qdot_before.reshape(q.shape), nominal, remaining)
-    (offsets, axes, _, tool, tool_rotation), kind = arm_task_of(arm_task)
-    chain = Chain(offsets, axes, prismatic, tool, tool_rotation)  # read-only, as others have compiled for
-    cost, settings = settings_of(numbers, integers)
-    data = ProblemData(chain, kind, cost, dt, lower, upper, velocity_limit)
-    knots = settings.at.shape[0]
+    chain, kind = model.chain, model.kind
+    # Read-only, as others have compiled for.
+    chain = Chain(chain.offsets, chain.axes, numbers.prismatic, chain.tool, chain.tool_rotation)
+    cost, settings = settings_of(numbers.numbers, numbers.integers)
+    data = ProblemData(chain, kind, cost, model.dt, model.lower, model.upper, model.largest)
+    knots, n, plans = settings.at.shape[0], model.unit.shape[0], memory.plans
     workspace = plan_workspace(
-        kind, nominal.shape[2], knots, n, plans.shape[2] // knots - n, settings.change_limit.shape[0] > 0
+        kind, seen.nominal.shape[2], knots, n, plans.shape[2] // knots - n, settings.change_limit.shape[0] > 0
     )
-    memory, answers = HorizonMemory(plans, counts), Answers(qdot, status, iterations)
-    plan_batch(data, settings, observations, memory, answers, workspace)
-    return cut_rows(qdot, action_scale, action.reshape(qdot.shape), status)
+    plan_batch(data, settings, seen, memory, answer, workspace)
 
 
 @uncounted
@@ -141,9 +84,9 @@ def plan_batch(data, settings, observations, memory, answers, workspace):
     Args:
         data: The :class:`ProblemData`.
         settings: :class:`settings.PlanSettings`.
-        observations: The :class:`Observations`.
+        observations: A :class:`Seen`.
         memory: The :class:`HorizonMemory`, turned into the next one in place.
-        answers: Receives the :class:`Answers`.
+        answers: Receives the :class:`Answer`.
         workspace: A :class:`plan.PlanWorkspace`.
     """
     plans, counts = memory

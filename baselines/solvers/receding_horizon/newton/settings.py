@@ -49,6 +49,20 @@ class PlanSettings(NamedTuple):
     change_limit: Floats
 
 
+class PlanNumbers(NamedTuple):
+    """The parameters as the kernel of a step takes them.
+
+    Attributes:
+        prismatic: Which joints are prismatic. Shape (n,).
+        numbers: See :func:`plain_settings`.
+        integers: See :func:`plain_settings`.
+    """
+
+    prismatic: npt.NDArray[np.bool_]
+    numbers: Floats
+    integers: Integers
+
+
 def plain_settings(cost: CostParameters, settings: PlanSettings) -> tuple[Floats, Integers]:
     """The numbers and the whole numbers of cost and settings, each as one read-only block, for :func:`settings_of`.
 

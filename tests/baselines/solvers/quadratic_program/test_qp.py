@@ -214,12 +214,12 @@ def test_the_null_space_leads_to_a_posture():
 
 def test_where_the_joints_are_led_to():
     home = circle().arm.home
-    assert baselines.make("qp", circle()).numbers()[4].tolist() == [[1.0] * 7, home.tolist()]
+    assert baselines.make("qp", circle()).numbers().pull.tolist() == [[1.0] * 7, home.tolist()]
     homeless = limited()  # limits of both sides in joints 0, 1, 2, 4 and 6
-    gains, middle = baselines.make("qp", homeless, secondary_gain=3.0).numbers()[4]
+    gains, middle = baselines.make("qp", homeless, secondary_gain=3.0).numbers().pull
     assert gains.tolist() == [3.0, 3.0, 3.0, 0.0, 3.0, 0.0, 3.0]
     np.testing.assert_array_equal(middle[gains > 0], 0.0)
-    assert baselines.make("qp", homeless, posture=0.5).numbers()[4].tolist() == [[1.0] * 7, [0.5] * 7]
+    assert baselines.make("qp", homeless, posture=0.5).numbers().pull.tolist() == [[1.0] * 7, [0.5] * 7]
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ import ikgym
 from baselines.episodes import rollout
 from baselines.status import Status
 from ikgym.exceptions import InvalidInputError
+from tests.baselines.solvers.resolved_rate.inverting import invert
 from tests.every_scenario import ONE_OF_EACH
 
 NAMES = ONE_OF_EACH
@@ -28,7 +29,7 @@ def jacobians(scenario, rows=20):
 def test_moore_penrose_is_the_pseudoinverse(name):
     scenario = ikgym.scenarios.get(name)
     jacobian, shift = jacobians(scenario)
-    step, status = baselines.make("moore_penrose", scenario).invert(jacobian, shift)
+    step, status = invert(baselines.make("moore_penrose", scenario), jacobian, shift)
     for j, dx, dq, s in zip(jacobian, shift, step, status, strict=True):
         rank = np.linalg.matrix_rank(j, tol=1e-12 * np.linalg.norm(j, 2))
         wanted = np.linalg.pinv(j, rcond=1e-12) @ dx
@@ -53,7 +54,7 @@ def test_dls_minimises_the_damped_squares(name, damping):
     """As least squares of the augmented system [J; √λ I] Δq = [Δx; 0], which squares no condition number."""
     scenario = ikgym.scenarios.get(name)
     jacobian, shift = jacobians(scenario)
-    step, _ = baselines.make("dls", scenario, damping=damping).invert(jacobian, shift)
+    step, _ = invert(baselines.make("dls", scenario, damping=damping), jacobian, shift)
     for j, dx, dq in zip(jacobian, shift, step, strict=True):
         augmented = np.vstack([j, damping**0.5 * np.eye(scenario.joints)])
         wanted = np.linalg.lstsq(augmented, np.concatenate([dx, np.zeros(scenario.joints)]), rcond=None)[0]

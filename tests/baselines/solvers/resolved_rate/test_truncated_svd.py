@@ -9,6 +9,7 @@ import baselines
 import ikgym
 from baselines.status import Status
 from ikgym.exceptions import InvalidInputError
+from tests.baselines.solvers.resolved_rate.inverting import invert
 from tests.baselines.solvers.resolved_rate.test_base import jacobians
 from tests.every_scenario import ONE_OF_EACH
 
@@ -18,7 +19,7 @@ from tests.every_scenario import ONE_OF_EACH
 def test_leaves_out_the_small_singular_values(name, threshold):
     scenario = ikgym.scenarios.get(name)
     jacobian, shift = jacobians(scenario)
-    step, status = baselines.make("truncated_svd", scenario, threshold=threshold).invert(jacobian, shift)
+    step, status = invert(baselines.make("truncated_svd", scenario, threshold=threshold), jacobian, shift)
     full = min(scenario.task.error_size, scenario.joints, 6)
     for j, dx, dq, s in zip(jacobian, shift, step, status, strict=True):
         u, sigma, vt = np.linalg.svd(j, full_matrices=False)
@@ -31,7 +32,7 @@ def test_leaves_out_the_small_singular_values(name, threshold):
 
 def test_both_statuses_occur():
     scenario = ikgym.scenarios.get("varga7-fast")
-    _, status = baselines.make("truncated_svd", scenario, threshold=0.02).invert(*jacobians(scenario))
+    _, status = invert(baselines.make("truncated_svd", scenario, threshold=0.02), *jacobians(scenario))
     assert set(status) == {Status.APPLIED, Status.RANK_DEFICIENT}
 
 

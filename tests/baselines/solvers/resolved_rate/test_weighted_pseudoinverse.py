@@ -10,6 +10,7 @@ import ikgym
 from baselines.status import Status
 from ikgym.exceptions import InvalidInputError
 from tests.baselines.solvers.quadratic_program.paths import circle
+from tests.baselines.solvers.resolved_rate.inverting import invert
 from tests.baselines.solvers.resolved_rate.test_base import jacobians
 from tests.every_scenario import ONE_OF_EACH
 from tests.limited import limited
@@ -24,7 +25,7 @@ def test_is_the_formula(name):
     scenario = ikgym.scenarios.get(name)
     jacobian, shift = jacobians(scenario)
     weights = np.linspace(0.5, 4.0, scenario.joints)
-    step, status = weighted(scenario, weights=tuple(weights)).invert(jacobian, shift)
+    step, status = invert(weighted(scenario, weights=tuple(weights)), jacobian, shift)
     inverse = np.diag(1.0 / weights)
     for j, dx, dq, s in zip(jacobian, shift, step, status, strict=True):
         # The formula squares the condition number; what it is off by is bounded with it.
@@ -43,7 +44,7 @@ def test_minimises_the_weighted_squares_under_the_task():
     scenario = ikgym.scenarios.get("varga7-fast")
     jacobian, shift = jacobians(scenario)
     weights = np.array([7.0, 1.0, 3.0, 0.1, 1.0, 2.0, 5.0])
-    step, _ = weighted(scenario, weights=list(weights)).invert(jacobian, shift)
+    step, _ = invert(weighted(scenario, weights=list(weights)), jacobian, shift)
     for j, dx, dq in zip(jacobian[:-1], shift, step, strict=False):
         np.testing.assert_allclose(j @ dq, dx, atol=1e-9)
         null = np.linalg.svd(j)[2][-1]
@@ -54,8 +55,8 @@ def test_minimises_the_weighted_squares_under_the_task():
 def test_equal_weights_are_moore_penrose(one):
     scenario = ikgym.scenarios.get("varga7-fast")
     jacobian, shift = jacobians(scenario)
-    plain, _ = baselines.make("moore_penrose", scenario).invert(jacobian, shift)
-    same, _ = weighted(scenario, weights=one).invert(jacobian, shift)
+    plain, _ = invert(baselines.make("moore_penrose", scenario), jacobian, shift)
+    same, _ = invert(weighted(scenario, weights=one), jacobian, shift)
     np.testing.assert_allclose(same, plain, rtol=1e-9, atol=1e-15)
 
 
@@ -65,8 +66,8 @@ def test_a_heavy_joint_moves_little():
     jacobian, shift = jacobian[:-1], shift[:-1]
     weights = np.ones(7)
     weights[3] = 1e8
-    plain, _ = weighted(scenario).invert(jacobian, shift)
-    heavy, _ = weighted(scenario, weights=tuple(weights)).invert(jacobian, shift)
+    plain, _ = invert(weighted(scenario), jacobian, shift)
+    heavy, _ = invert(weighted(scenario, weights=tuple(weights)), jacobian, shift)
     assert (abs(heavy[:, 3]) < 1e-3 * abs(plain[:, 3])).all()
 
 
