@@ -13,7 +13,8 @@ from baselines.status import Status
 from ikgym.jit import kernel
 from ikgym.kinematics import Chain
 
-Floats, Ints = npt.NDArray[np.float64], npt.NDArray[np.int64]
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
 
 _SATURATED, _DIVERGED = int(Status.SATURATED), int(Status.DIVERGED)
 
@@ -157,7 +158,8 @@ def entry(step: Any, numbers: type, memory: type) -> Any:
     Returns:
         ``call(block, numbers, checking, seen, memory, action, answer)`` with plain tuples and flat arrays, whatever the
         number of rows, but for the reference coordinates of shape (B p, m). The memory becomes the next one in place.
-        It returns REFUSED for observations that are not finite, else what :func:`cut_rows` does.
+        It returns REFUSED for observations that are not finite, else what :func:`cut_rows` does; with an ``action`` of
+        no elements nothing is cut.
     """
     python = getattr(step, "py_func", step)
     scope = {**globals(), "step": step, "Numbers": numbers, "Memory": memory}
@@ -177,6 +179,8 @@ def _call(block, numbers, checking, seen, memory, action, answer):
     shown = Seen(q.reshape(rows, n), qdot.reshape(rows, n), pose.reshape(rows, m), ahead, remaining)
     out = Answer(*_parts_of(answer, rows, n))
     step(model, Numbers(*numbers), shown, Memory(*memory), out)  # type: ignore[name-defined]  # noqa: F821
+    if action.shape[0] == 0:
+        return False
     return cut_rows(out.qdot, model.unit, action.reshape(rows, n), out.status)
 
 
