@@ -69,7 +69,6 @@ def test_a_wrapper_of_a_few_lines(name):
     [
         ({"policy": "oracle"}, "got the reference 'oracle'"),
         ({"policy": "smoothed"}, "made from others 'smoothed'"),
-        ({"policy": "agent_alone"}, "made from others 'agent_alone'"),
         ({"options": 3}, "parameters of dls by name, got 3"),
         ({"options": {"damping": -1.0}}, "damping: expected"),
     ],
