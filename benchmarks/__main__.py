@@ -10,20 +10,17 @@ import sys
 
 import tyro
 
-from benchmarks import collection, defaults, environments, growth, horizons, kernels, policies, poses, report
+from benchmarks import environments, horizons, kernels, policies, poses, report
 from benchmarks.effort import FULL, QUICK, Effort
 from benchmarks.table import Column, Table
 
 SECTIONS = {
     "start": lambda effort: [_import_table(effort)],
     "environments": environments.tables,
-    "collection": collection.tables,
     "kinematics": kernels.tables,
     "poses": poses.tables,
     "policies": policies.tables,
     "horizons": horizons.tables,
-    "growth": growth.tables,
-    "defaults": defaults.tables,
 }
 
 
@@ -32,7 +29,7 @@ class Command:
     """Measures speed beside other environments, libraries and solvers."""
 
     out: pathlib.Path = pathlib.Path("results/bench")
-    """The folder that receives bench.json and README.md."""
+    """The folder for README.md, the report."""
     quick: bool = False
     """Everything once and small, to see that it runs."""
     sections: tuple[str, ...] = tuple(SECTIONS)

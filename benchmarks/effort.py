@@ -18,12 +18,7 @@ class Effort:
         states: States at which they are compared.
         solves: Turns of each solver at each of these states.
         lead: Steps before each of these states, in which solvers warm up, outside the clock.
-        grid: The horizon HL where it does not grow itself.
-        episodes: Episodes an arm on which defaults are compared.
         poses: Poses whose inverse kinematics is measured.
-        growth: Horizons HL along which growth is measured.
-        joints: Numbers of joints n along which growth is measured.
-        batches: Numbers of rows B along which growth is measured.
     """
 
     rounds: int = 15
@@ -34,12 +29,7 @@ class Effort:
     states: int = 5
     solves: int = 7
     lead: int = 3
-    grid: int = 30
-    episodes: int = 24
     poses: int = 10_000
-    growth: tuple[int, ...] = (10, 20, 50, 100, 200, 400)
-    joints: tuple[int, ...] = (3, 5, 7, 10, 14)
-    batches: tuple[int, ...] = (1, 4, 16, 64, 256, 1024)
 
 
 FULL = Effort()
@@ -53,10 +43,5 @@ QUICK = Effort(
     states=1,
     solves=1,
     lead=1,
-    grid=3,
-    episodes=1,
     poses=3,
-    growth=(3, 4),
-    joints=(3, 4),
-    batches=(1, 2),
 )

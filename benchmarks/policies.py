@@ -7,15 +7,11 @@ from collections.abc import Callable
 
 import gymnasium as gym
 import numpy as np
-from numba import njit
 
 import baselines
-import ikgym
-from baselines.policy import Batch, Memory
-from baselines.solvers.linear_algebra import damped_step
+from baselines.policy import Memory
 from benchmarks.effort import FULL, Effort
 from benchmarks.table import Column, Table
-from benchmarks.timing import medians
 
 #: Policies by scenario and label.
 POLICIES: dict[str, dict[str, tuple[str, dict[str, object]]]] = {
@@ -48,8 +44,8 @@ BESIDE = "dls", "rhc, HL = 3, one iteration", "rhc, HL = 3", "rhc_foresight"
 
 
 def tables(effort: Effort = FULL) -> list[Table]:
-    """Times of `predict` in its scenarios, beside `dls`, and of the iteration that most solvers share."""
-    return [*(_predicting(scenario, effort) for scenario in POLICIES), _beside(effort), _iterations(effort)]
+    """Times of `predict` by scenario, and interleaved with `dls`."""
+    return [*(_predicting(scenario, effort) for scenario in POLICIES), _beside(effort)]
 
 
 def predict_times(scenario: str = "varga7-fast", steps: int = FULL.steps) -> dict[str, tuple[float, float, float]]:
@@ -63,40 +59,6 @@ def predict_times(scenario: str = "varga7-fast", steps: int = FULL.steps) -> dic
 def stretches(steps: int = 5, scenario: str = "varga7-fast") -> dict[str, Callable[[], object]]:
     """So many calls of `predict` by each policy of :data:`BESIDE`, again and again the same ones of its own episode."""
     return {label: _stretch(scenario, *POLICIES[scenario][label], steps) for label in BESIDE}
-
-
-def damped_iterations(rows: int = 100, iterations: int = 100) -> dict[str, tuple[Callable[[], object], int]]:
-    """Damped least squares with 7 joints and 6 components of the error, again and again inside the compiled kernel.
-
-    Args:
-        rows: Arms, each with its own target.
-        iterations: Most iterations made for each of them.
-
-    Returns:
-        Calls by name, with how many iterations each makes.
-    """
-    calls = {f"Jacobian, error of {task}, damped step": _iterating(task, rows, iterations) for task in ("skew", "pose")}
-    rng, rounds = np.random.default_rng(0), rows * iterations
-    scratch = rng.normal(size=(6, 7)), rng.normal(size=6), 1e-3, np.empty((6, 6)), np.empty(6), np.empty(7)
-    return {**calls, "damped step alone": (lambda: _steps(rounds, *scratch), rounds)}
-
-
-def _iterating(task: str, rows: int, iterations: int) -> tuple[Callable[[], object], int]:
-    scenario = ikgym.scenarios.get("varga7-fast").replace(task=ikgym.tasks.get(task))
-    policy = baselines.make("mfac", scenario, rule="constant", damping=1e-3, tolerance=0.0, iterations=iterations)
-    rng = np.random.default_rng(0)
-    q = rng.uniform(-1.0, 1.0, (rows, scenario.joints))
-    goal = q + rng.uniform(-0.3, 0.3, q.shape)
-    here, there = (scenario.task.coordinates(*scenario.model.forward(p)) for p in (q, goal))
-    batch = Batch(q, np.zeros_like(q), here, there[:, None], np.ones((rows, 1)))
-    memory = policy.memory(rows)
-    return lambda: policy.solve(batch, memory), int(policy.solve(batch, memory).iterations.sum())
-
-
-@njit
-def _steps(rounds, jacobian, error, damping, gram, x, out):
-    for _ in range(rounds):
-        damped_step(jacobian, error, damping, gram, x, out)
 
 
 def _predicting(scenario: str, effort: Effort) -> Table:
@@ -140,18 +102,6 @@ def _stretch(scenario: str, name: str, kwargs: dict[str, object], steps: int) ->
         action, state = policy.predict(observation, state)
         observation, *_ = env.step(action)
     return lambda: [policy.predict(*one) for one in seen[-steps:]]
-
-
-def _iterations(effort: Effort) -> Table:
-    calls = damped_iterations(iterations=100 if effort is FULL else effort.steps)
-    times = medians({name: call for name, (call, _) in calls.items()}, effort.rounds, effort.seconds)
-    return Table(
-        "damped_iteration",
-        "One iteration of damped least squares, 7 joints",
-        "Inside the compiled kernel, 100 arms on the way to random targets, medians.",
-        (Column("iteration_us", "per iteration", "µs"),),
-        {name: (1e6 * t / calls[name][1],) for name, t in times.items()},
-    )
 
 
 def _episode(scenario: str, name: str, kwargs: dict[str, object], steps: int) -> tuple[float, float, float]:

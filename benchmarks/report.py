@@ -1,9 +1,8 @@
-"""The report of a run: what was measured, on what, as JSON and as a page."""
+"""The report of a run as a page of Markdown: tables, machine and versions."""
 
 from __future__ import annotations
 
 import importlib.metadata
-import json
 import pathlib
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -12,7 +11,7 @@ from baselines.evaluation.machine import describe
 from baselines.files import write
 from benchmarks.table import Table
 
-#: Whose versions matter to a figure besides those of :func:`baselines.evaluation.machine.describe`.
+#: Libraries whose versions are stated, besides those of :func:`baselines.evaluation.machine.describe`.
 LIBRARIES = ("gymnasium", "mujoco", "envpool", "pin", "casadi", "crocoddyl", "stable-baselines3", "torch")
 
 
@@ -22,7 +21,7 @@ def conditions() -> dict[str, Any]:
 
 
 def save(directory: pathlib.Path, tables: Sequence[Table], given: Mapping[str, Any]) -> None:
-    """Writes `bench.json` and `README.md`.
+    """Writes `README.md`.
 
     Args:
         directory: The folder; made if it is not there.
@@ -30,10 +29,6 @@ def save(directory: pathlib.Path, tables: Sequence[Table], given: Mapping[str, A
         given: Machine, versions, command and date.
     """
     directory.mkdir(parents=True, exist_ok=True)
-    document = {"conditions": dict(given), "tables": [table.as_json() for table in tables]}
-    write(
-        directory / "bench.json", (json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode()
-    )
     write(directory / "README.md", page(tables, given).encode())
 
 

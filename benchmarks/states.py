@@ -6,7 +6,6 @@ import gymnasium as gym
 import numpy as np
 
 import baselines
-from ikgym.arms import Arm
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray
 
@@ -38,23 +37,3 @@ def along(scenario: Scenario, preview: int, count: int, lead: int) -> list[list[
         action, state = policy.predict(observation, state)
         observation, *_ = env.step(action)
     return [episode[max(end - lead, 0) : end + 1] for end in ends]
-
-
-def rows_along(scenario: Scenario, preview: int, rows: int, lead: int) -> list[Observation]:
-    """The same for a batch of arms, each on its own way: the ``lead + 1`` observations behind the 50th step."""
-    policy = baselines.make("rhc", scenario, horizon=preview + 1)
-    envs = gym.make_vec("RedundantIK-v0", num_envs=rows, scenario=scenario, preview=preview)
-    observation, _ = envs.reset(seed=0)
-    out, state = [], None
-    for _ in range(50 + lead):
-        out.append({key: np.array(value) for key, value in observation.items()})
-        action, state = policy.predict(observation, state)
-        observation, *_ = envs.step(action)
-    return out[49:]
-
-
-def chain(joints: int) -> Arm:
-    """An arm of n links of 0.3 m, whose joints turn about z, y and x in turn."""
-    offsets = np.tile([0.0, 0.0, 0.3], (joints, 1))
-    axes = np.eye(3)[[2, 1, 0] * joints][:joints]
-    return Arm(f"chain{joints}", offsets, axes, tool=np.array([0.1, 0.0, 0.3]))

@@ -1,20 +1,19 @@
-"""A table of figures with their units: as text, as Markdown and for JSON."""
+"""A table of figures with their units: as text and as Markdown."""
 
 from __future__ import annotations
 
 import dataclasses
-from typing import Any
 
 from baselines.evaluation.report import number
 
 
 @dataclasses.dataclass(frozen=True)
 class Column:
-    """What stands below one another.
+    """A column of a table.
 
     Args:
-        key: Its name in JSON.
-        title: Its head in print.
+        key: Its name.
+        title: Its head.
         unit: Of its figures, empty for pure numbers.
     """
 
@@ -33,7 +32,7 @@ class Table:
     """Figures that were measured in one interleaved run, and so can be compared.
 
     Args:
-        key: The table's name in JSON.
+        key: The table's name.
         title: What was measured.
         conditions: How, in sentences.
         columns: The figures' names and units.
@@ -71,20 +70,6 @@ class Table:
         return "\n".join(
             [f"## {self.title}", "", self.conditions, "", head, ruler, *rows, *([""] if notes else []), *notes]
         )
-
-    def as_json(self) -> dict[str, Any]:
-        """For `json.dumps`."""
-        return {
-            "key": self.key,
-            "title": self.title,
-            "conditions": self.conditions,
-            "columns": [dataclasses.asdict(column) for column in self.columns],
-            "rows": [
-                {"name": name, **{c.key: v for c, v in zip(self.columns, row, strict=True)}}
-                for name, row in self.rows.items()
-            ],
-            "skipped": list(self.skipped),
-        }
 
 
 def _left_out(why: str) -> str:

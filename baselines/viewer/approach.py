@@ -1,4 +1,4 @@
-"""The reference of arms whose target is moved by hand: on the straight way to it, no faster than allowed."""
+"""The reference of arms that follow a dragged target: on a straight line to it, at limited speed."""
 
 from __future__ import annotations
 
@@ -17,27 +17,16 @@ class Pose(NamedTuple):
     rotation: FloatArray
     position: FloatArray
 
-    @classmethod
-    def at(cls, position: npt.ArrayLike, wxyz: npt.ArrayLike) -> Pose:
-        """The pose of a position in [m] and a unit quaternion (w, x, y, z)."""
-        w, x, y, z = np.asarray(wxyz, dtype=np.float64)
-        rotation = np.array([
-            [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
-            [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
-            [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
-        ])  # fmt: skip
-        return cls(rotation, np.array(position, dtype=np.float64))
-
 
 class Approach:
-    """A reference pose that goes to its target in a straight line, about one axis, with constant speeds.
+    """A reference pose that moves to its target in a straight line and about one axis, at constant speeds.
 
-    Position and orientation arrive together. The slower of them is as fast as it may be.
+    Position and orientation arrive together; the slower of them moves at its limit.
 
     Args:
-        start: Where the reference is.
-        shift: Most distance in one step, in [m].
-        turn: Most angle in one step, in [rad].
+        start: The pose of the reference.
+        shift: Largest distance of one step, in [m].
+        turn: Largest angle of one step, in [rad].
     """
 
     def __init__(self, start: Pose, shift: float, turn: float) -> None:
@@ -46,7 +35,7 @@ class Approach:
 
     @property
     def pose(self) -> Pose:
-        """Where the reference is now."""
+        """The pose of the reference now."""
         (rotation,), (position,) = self.ahead([0])
         return Pose(rotation, position)
 
@@ -55,7 +44,7 @@ class Approach:
         self._begin(pose, pose)
 
     def aim(self, target: Pose) -> None:
-        """Goes to another target from now on."""
+        """Sets another target."""
         self._begin(self.pose, target)
 
     def advance(self) -> None:
@@ -63,7 +52,7 @@ class Approach:
         self._made += 1
 
     def ahead(self, steps: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Where the reference will be.
+        """Future poses of the reference.
 
         Args:
             steps: Steps from now. Shape (p,).
@@ -82,5 +71,5 @@ class Approach:
         vector = rotation_vector(np.ascontiguousarray(target.rotation @ start.rotation.T))
         self._angle = float(np.linalg.norm(vector))
         self._axis = vector / self._angle if self._angle else np.array([0.0, 0.0, 1.0])
-        # At least one step, in which nothing moves where the reference is there already.
+        # At least one step, also if the reference is at the target already.
         self._steps = max(float(np.linalg.norm(self._way)) / self._shift, self._angle / self._turn, 1.0)

@@ -1,4 +1,4 @@
-"""A video of an episode: one picture a policy, all at the same moment."""
+"""A video of an episode: one picture for each policy, all at the same time."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from ikgym.validation import number, whole_number
 
 Picture = npt.NDArray[np.uint8]
 
-# The narrowest and widest pictures of one policy in [px]: letters can be read, and video players take them.
+# Smallest and largest width of the picture of one policy in [px].
 NARROWEST, WIDEST = 480, 3840
-# A video takes even sizes, and pictures are half as high as wide.
+# Widths are multiples of it: a video takes even sizes, and pictures are half as high as wide.
 STEP = 4
 
 
 def columns(policies: int) -> int:
-    """How many pictures of policies stand beside each other."""
+    """Number of pictures side by side."""
     return 1 if policies == 1 else 2
 
 
@@ -34,7 +34,7 @@ def moments(stage: Stage, fps: float, speed: float) -> npt.NDArray[np.int64]:
     """The steps that are drawn, from the start to the end of the episode.
 
     Args:
-        stage: What policies are shown on.
+        stage: The episode.
         fps: Pictures a second.
         speed: Seconds of the episode in one second of the video.
 
@@ -55,8 +55,8 @@ def pictures(
     """Draws an episode.
 
     Args:
-        stage: What policies are shown on.
-        replays: What they did.
+        stage: The episode.
+        replays: The replays of the policies.
         steps: Which steps are drawn, rising.
         width: Of one policy's picture in [px]; the renderer's own if left out.
 
@@ -84,7 +84,7 @@ def checked_width(width: int) -> int:
 
 
 def check_ffmpeg() -> None:
-    """Sees to it that there is what writes videos: moviepy, and the program ffmpeg, which comes with it.
+    """Checks that moviepy and the program ffmpeg, which comes with it, are installed.
 
     Raises:
         ModuleNotFoundError: moviepy is not installed.

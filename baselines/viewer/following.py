@@ -1,4 +1,4 @@
-"""Policies that follow a target moved by hand, without an environment."""
+"""Policies that follow a dragged target, without an environment."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from ikgym.validation import FloatArray
 
 
 class Follower:
-    """One policy and its arm, which makes what the policy asks for within the limits: q(k+1) = q(k) + Δt q̇(k).
+    """One policy and its arm, which moves as commanded within the limits: q(k+1) = q(k) + Δt q̇(k).
 
-    The arm is the scenario's, the policy's model is its own; sensors measure what is, and drives do what they are told.
+    The policy keeps its own model of the arm; sensors and drives are ideal.
 
     Args:
-        scenario: What the policy was made for.
+        scenario: The scenario of the policy.
         policy: The policy.
-        q: Where the arm begins, in [rad] or [m]. Shape (n,).
+        q: Joint coordinates at the start, in [rad] or [m]. Shape (n,).
     """
 
     def __init__(self, scenario: Scenario, policy: SolverPolicy, q: FloatArray) -> None:
@@ -37,18 +37,15 @@ class Follower:
         self.place(q)
 
     def place(self, q: FloatArray) -> None:
-        """Puts the arm at a posture, at rest, and clears what the policy remembers. Shape (n,)."""
+        """Puts the arm at rest at a posture of shape (n,), and clears the memory of the policy."""
         self._controller.reset()
         self.q = np.array(q, dtype=np.float64)
         self.status = Status.UNKNOWN.label
 
     def step(self, approach: Approach) -> None:
-        """Makes one step towards where the reference will be behind it.
-
-        A policy that refuses what it is shown stands still, and its status says why.
-        """
+        """Makes one step. An arm whose policy raises an error stands still, and its status has the message."""
         task, arm = self._scenario.task, self._scenario.arm
-        # Just the rows that the policy looks at, which may be few and far ahead.
+        # Only the previewed steps, which may be few and far ahead.
         reference = task.coordinates(*approach.ahead(self._ahead))
         try:
             qdot = self._controller.step(self.q, arm.forward(self.q), reference)
@@ -66,13 +63,11 @@ class Follower:
 
 
 def followers(stage: Stage, policies: Sequence[str]) -> list[Follower | None]:
-    """Who follows a target that nobody knew before: None for policies with privileged information on an episode.
-
-    Nor can those follow that are no :class:`baselines.SolverPolicy`, as they are shown an environment.
+    """The followers of policies; None for those with privileged information, and those that need an environment.
 
     Args:
-        stage: What they are shown on.
-        policies: Their names, all of which have played the episode.
+        stage: The episode.
+        policies: Their names.
     """
     return [_follower(stage, policy) for policy in policies]
 

@@ -1,7 +1,8 @@
-"""The controls beside the scene, and what is said in them."""
+"""The panel beside the scene: controls and readings."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -13,18 +14,18 @@ from baselines.viewer.session import Mode, Session, Shown
 from ikgym.arms import Arm
 from ikgym.validation import FloatArray
 
-#: Runs what a browser asked for, between two pictures.
+#: Queues a request of a browser.
 Later = Callable[[Callable[[], object]], object]
 
-#: Seconds shown in one second.
+#: Seconds of the episode per second.
 SPEEDS = (0.02, 0.05, 0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 50.0)
 
 # Digits behind the point of a slider's value.
 DIGITS = 4
 
 LEGEND = (
-    "Drag the target, or a joint; *Play* goes back to the episode. A joint is yellow near a limit, red at it. "
-    "The ball at the tool goes from red (singular) to green by its manipulability."
+    "Drag the target, or move a joint; *Play* returns to the episode. A joint is yellow near a limit and red at it. "
+    "The ball at the tool shows the manipulability, from red (singular) to green."
 )
 
 
@@ -32,21 +33,19 @@ class Panel:
     """Sliders, buttons and readings.
 
     Args:
-        server: Of viser.
-        session: What they act on.
-        later: Takes what is to be done to the session.
-        put_apart: Puts the arms beside each other, or in one place.
+        server: The server of viser.
+        session: The session that they control.
+        later: Queues a request.
     """
 
-    def __init__(self, server: Any, session: Session, later: Later, put_apart: Callable[[bool], None]) -> None:
+    def __init__(self, server: Any, session: Session, later: Later) -> None:
         self._session, gui = session, server.gui
         scenario = session.stage.scenario
-        gui.add_markdown(f"**{scenario.name}**, seed {session.stage.seed}\n\n{LEGEND}")
+        gui.add_markdown(f"**{escaped(scenario.name)}**, seed {session.stage.seed}\n\n{LEGEND}")
         with gui.add_folder("Episode"):
             self._play = gui.add_button("Play")
             self._time = gui.add_slider("time [s]", 0.0, session.duration, session.duration / 1000.0, 0.0)
             speed = gui.add_dropdown("speed", tuple(f"{s:g}" for s in SPEEDS), initial_value="1")
-            apart = gui.add_checkbox("side by side", initial_value=True)
         with gui.add_folder("Now"):
             self._readings = gui.add_markdown("")
         with gui.add_folder("Joints"):
@@ -54,11 +53,10 @@ class Panel:
         self._play.on_click(lambda _: later(session.toggle))
         _on_user([self._time], later, session.scrub)
         _on_user([speed], later, lambda chosen: setattr(session, "speed", float(chosen)))
-        _on_user([apart], later, put_apart)
         _on_user(self._joints, later, lambda *q: session.place(np.array(q)))
 
     def show(self, shown: Sequence[Shown]) -> None:
-        """Says what is to be seen; the sliders of the joints show those of the first policy."""
+        """Shows readings, and the joints of the first policy on the sliders."""
         session = self._session
         self._readings.content = readings(session, shown)
         self._play.label = "Pause" if session.playing else "Play"
@@ -70,7 +68,7 @@ class Panel:
 
 
 def readings(session: Session, shown: Sequence[Shown]) -> str:
-    """What is said of each policy, as Markdown."""
+    """The readings of each policy, as Markdown."""
     arm = session.stage.scenario.arm
     moment = f"t = {session.time:.3f} s" if session.mode is Mode.PLAY else session.mode.value
     if session.mode is Mode.FOLLOW and session.kept < 0.95:
@@ -79,28 +77,33 @@ def readings(session: Session, shown: Sequence[Shown]) -> str:
 
 
 def _said(arm: Arm, one: Shown) -> list[str]:
-    """A head and a list of what is known."""
+    """A heading and a list."""
     reading, errors = one.reading, []
     if np.isfinite(one.position_error):
         errors.append(f"{1e3 * one.position_error:.3g} mm")
     if np.isfinite(one.orientation_error):
         errors.append(f"{1e3 * one.orientation_error:.3g} mrad")
     known = one.status != Status.UNKNOWN.label
-    said = [f"**{one.policy}**{f': {one.status}' if known else ''}\n"]
+    said = [f"**{escaped(one.policy)}**{f': {escaped(one.status)}' if known else ''}\n"]
     if errors:
         said.append(f"- error {', '.join(errors)}")
     said.append(f"- manipulability {reading.manipulability:.3g}, {reading.share:.0%} of the largest found")
     joint = int(np.argmin(reading.margins))
     if np.isfinite(reading.margins[joint]):
         unit = "m" if arm.prismatic[joint] else "rad"
-        said.append(f"- {arm.joint_names[joint]} is {reading.margins[joint]:.3g} {unit} from its limit")
+        said.append(f"- {escaped(arm.joint_names[joint])} is {reading.margins[joint]:.3g} {unit} from its limit")
     if np.isfinite(one.cost):
         said.append(f"- cost so far {one.cost:.4g}")
     return said
 
 
+def escaped(text: str) -> str:
+    """A name as Markdown shows it letter by letter: viser would run what stands in braces."""
+    return re.sub(r"([\\`*_{}\[\]<>&#|~!])", r"\\\1", " ".join(text.split()))
+
+
 def _sliders(gui: Any, arm: Arm, start: FloatArray) -> list[Any]:
-    """One slider a joint, within its limits; farther where the start is."""
+    """One slider a joint, from limit to limit and at least to the start."""
     low, high = slider_range(arm)
     low, high = np.minimum(low, start), np.maximum(high, start)
     units = ["m" if prismatic else "rad" for prismatic in arm.prismatic]
@@ -113,16 +116,13 @@ def _sliders(gui: Any, arm: Arm, start: FloatArray) -> list[Any]:
 
 
 def _set(control: Any, value: float) -> None:
-    """Shows a value, if it looks different: viser sends it in any case, and slow browsers take back what users do."""
+    """Shows a value if it differs: viser sends it in any case, and slow browsers would undo what users do."""
     if control.value != (shown := round(value, DIGITS)):
         control.value = shown
 
 
 def _on_user(controls: Sequence[Any], later: Later, then: Callable[..., object]) -> None:
-    """Hands over the values of controls when somebody has moved one of them, not when the program has.
-
-    They are read at once: before the session takes them, the program may show others.
-    """
+    """Queues a request with the values of controls when a user, not the program, has moved one of them."""
 
     def moved(event: Any) -> None:
         if event.client is not None:

@@ -1,4 +1,4 @@
-"""What the viewer says of a posture: its manipulability, how far the joints are from their limits, and the colours."""
+"""Readings of a posture: manipulability, distances from the joint limits, and colours."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ FREE, NEAR, AT = (150, 150, 150), (230, 159, 0), (213, 94, 0)
 
 # A joint is near a limit within this share of its range, or this distance in [rad] or [m] where that is less.
 NEAR_SHARE, NEAR_MOST = 0.05, 0.1
-# Distance in [rad] or [m] that rounding leaves between a joint and the limit that it stands at.
+# Distance in [rad] or [m] below which a joint is at its limit.
 TOUCHING = 1e-9
-# Postures that say what manipulability an arm can have.
+# Random postures whose largest manipulability is the scale.
 POSTURES = 512
 
 
 class Reading(NamedTuple):
-    """What is said of a posture.
+    """The readings of a posture.
 
     Attributes:
         manipulability: Yoshikawa's w = √det(J Jᵀ), of the linear rows where the task has no orientation.
@@ -40,11 +40,11 @@ class Reading(NamedTuple):
 
 
 class Reader:
-    """Reads postures of one arm.
+    """Computes the readings of one arm.
 
     Args:
-        arm: The arm that moves.
-        task: Says which rows of the Jacobian count.
+        arm: The arm.
+        task: The task, which selects rows of the Jacobian.
     """
 
     def __init__(self, arm: Arm, task: Task) -> None:
@@ -57,12 +57,12 @@ class Reader:
     def manipulability(self, q: FloatArray) -> FloatArray:
         """√det(J Jᵀ) of postures, of shape (..., n) in [rad] or [m]. Shape (...)."""
         jacobian = self._arm.jacobian(q)[..., : self._rows, :]
-        # The product of the singular values; the root of a determinant loses half of the digits.
+        # The product of the singular values: the root of a determinant would lose half of the digits.
         values: FloatArray = np.linalg.svd(jacobian, compute_uv=False).prod(axis=-1)
         return values
 
     def read(self, q: FloatArray) -> Reading:
-        """What is said of a posture, of shape (n,) in [rad] or [m]."""
+        """The readings of a posture of shape (n,) in [rad] or [m]."""
         margins = np.minimum(q - self._arm.lower, self._arm.upper - q)
         colours = map(_colour, margins.tolist(), self._near.tolist())
         found = float(self.manipulability(q))
@@ -70,7 +70,7 @@ class Reader:
 
 
 def slider_range(arm: Arm) -> tuple[FloatArray, FloatArray]:
-    """What joints are moved between by hand: their limits, a turn either way or half the reach where there is none.
+    """The range of the sliders: the joint limits; half a turn either way, or half the reach, without limits.
 
     Returns:
         Lowest and highest joint coordinates in [rad] or [m], each of shape (n,).

@@ -1,4 +1,4 @@
-"""Episodes as they are shown: the joint motion from the start, with errors and costs, and the reference path."""
+"""Episodes to be shown: joint motion, errors and costs of each policy, and the path of the reference."""
 
 from __future__ import annotations
 
@@ -12,21 +12,26 @@ from tqdm import tqdm
 
 import baselines
 from baselines.viewer.approach import Pose
-from baselines.viewer.bodies import size
 from ikgym import scenarios
+from ikgym.arms import Arm
 from ikgym.arms.inverse import LENGTH_OF_RADIAN
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
 from ikgym.simulator import Simulator
 from ikgym.validation import FloatArray, whole_number
 
-# Speed where a scenario's own reference stands still, in lengths of the arm per second.
+# Speed of the reference if the scenario's own stands still, in lengths of the arm per second.
 SLOW = 0.1
+
+
+def size(arm: Arm) -> float:
+    """The length in [m] that the picture of an arm is scaled by: its reach, 1 if it has none."""
+    return arm.reach(np.zeros(arm.joints)) or 1.0
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Replay:
-    """One episode of one policy; row 0 is the start, row k what came of step k.
+    """One episode of one policy; row 0 is the start, row k the state after step k.
 
     Args:
         policy: The name of the policy.
@@ -34,8 +39,8 @@ class Replay:
         q: True joint coordinates in [rad] or [m]. Shape (steps + 1, n).
         position_error: In [m]. Shape (steps + 1,).
         orientation_error: In [rad], NaN where the task has no orientation. Shape (steps + 1,).
-        cost: What the steps until then have cost together. Shape (steps + 1,).
-        statuses: Values of :class:`baselines.Status`, that of the first step at the start. Shape (steps + 1,).
+        cost: Accumulated cost. Shape (steps + 1,).
+        statuses: Values of :class:`baselines.Status`; row 0 repeats the first step. Shape (steps + 1,).
     """
 
     policy: str
@@ -49,18 +54,18 @@ class Replay:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Stage:
-    """What policies are shown on.
+    """An episode that policies are shown in.
 
     Args:
-        scenario: What they track, with the steps that are shown.
+        scenario: The scenario, cut to the steps that are shown.
         seed: The reset seed.
-        start: Where the arm begins, in [rad] or [m]. Shape (n,).
-        rotations: Orientations of the reference, one a step; those of the tool at the start where the task has none.
+        start: Joint coordinates at the start, in [rad] or [m]. Shape (n,).
+        rotations: Orientations of the reference; those of the tool at the start if the task has none.
             Shape (steps + 1, 3, 3).
         path: Positions of the reference in [m]. Shape (steps + 1, 3).
         errors: Errors of position in [m] and of orientation in [rad] at the start.
-        pace: How far a reference goes in a step that follows a target: in [m] as far as the scenario's own does on
-            average in a whole episode, and in [rad] what counts as much for :meth:`ikgym.arms.Arm.inverse`.
+        pace: Largest motion of the reference in one step towards a dragged target: in [m] the mean of the scenario's
+            own reference, in [rad] the angle that :meth:`ikgym.arms.Arm.inverse` weighs equally.
     """
 
     scenario: Scenario
@@ -96,12 +101,12 @@ class Stage:
         return cls(found, seed, start, _rotations(found, seed, start), simulator.nominal_positions(0), errors, pace)
 
     def pose(self, step: int) -> Pose:
-        """Where the reference is after so many steps."""
+        """The pose of the reference after a number of steps."""
         return Pose(self.rotations[step], self.path[step])
 
 
 def _pace(scenario: Scenario, seed: int) -> tuple[float, float]:
-    """How far a reference goes in a step, on average; and the angle that counts as much for an inverse kinematics."""
+    """See :class:`Stage`."""
     whole, points = size(scenario.arm), scenario.points()
     path = scenario.frames(scenario.episode(seed), int(points[-1]) + 1)[points, -3:]
     shift = float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum()) / scenario.steps
@@ -129,17 +134,7 @@ def named(policies: Sequence[str]) -> tuple[str, ...]:
 
 
 def play_all(stage: Stage, policies: Sequence[str], *, progress: bool = False) -> list[Replay]:
-    """Plays the episode with each policy.
-
-    Args:
-        stage: What policies are shown on.
-        policies: Their names, as the command line takes them.
-        progress: Whether to show a bar on stderr.
-
-    Raises:
-        UnknownNameError: There is no such policy or parameter.
-        InvalidInputError: A policy does not suit the scenario, or a parameter is refused.
-    """
+    """Plays the episode with each policy, see :func:`play`; with a bar on stderr if asked for."""
     bar = tqdm(policies, disable=not progress, file=sys.stderr, unit="policy", dynamic_ncols=True)
     return [play(stage, policy) for policy in bar]
 

@@ -9,22 +9,22 @@ import numpy as np
 
 from baselines.evaluation.plots.style import COLOURS
 from baselines.viewer.approach import Pose
-from baselines.viewer.bodies import size
+from baselines.viewer.arms import Cylinders, DrawnArm
 from baselines.viewer.readings import Colour
+from baselines.viewer.replay import size
 from baselines.viewer.session import Mode, Session, Shown
-from baselines.viewer.solids import Shape, Solids, segments
 from ikgym.rendering.style import GREEN, PALE_GREEN, stride, thinned
 from ikgym.rotations import quaternion
 from ikgym.validation import FloatArray
 
-#: What makes the arm that stands in a frame of a name, in a colour.
-Shaper = Callable[[str, Colour], Shape]
+#: Adds an arm to the scene, by the name of the frame of its base and its colour.
+DrawArm = Callable[[str, Colour], DrawnArm]
 
 # Distances and sizes, as shares of the arm's reach.
 APART, TARGET, AXES, AXES_RADIUS, BALL, BELOW = 1.1, 0.16, 0.09, 0.004, 0.012, 0.08
-# How far the camera is from one arm, and how much farther for each other one; how high what it looks at is.
+# Distance of the camera from one arm, further distance for each other one, and height of the point it looks at.
 FAR, FARTHER, LOOKED_AT = 1.4, 1.0, 0.3
-# Vertical field of view of the camera in [rad], and by which part of half of what it sees the panel moves the middle.
+# Vertical field of view of the camera in [rad], and the share of half of it by which the panel shifts the centre.
 VIEW, BESIDE = 0.7, 0.4
 
 
@@ -32,22 +32,25 @@ class Scene:
     """The arms of a session.
 
     Args:
-        server: Of viser.
-        session: What is shown.
-        shaper: Makes the arms; cylinders if left out.
+        server: The server of viser.
+        session: The session.
+        draw: Adds an arm; cylinders if left out.
     """
 
-    def __init__(self, server: Any, session: Session, shaper: Shaper | None = None) -> None:
+    def __init__(self, server: Any, session: Session, draw: DrawArm | None = None) -> None:
         self._server, self._session = server, session
         arm, whole = session.stage.scenario.arm, size(session.stage.scenario.arm)
         self._size = whole
-        make = shaper or (lambda root, colour: Solids(server, root, arm, colour))
+        make = draw or (lambda root, colour: Cylinders(server, root, arm, colour))
         server.scene.set_up_direction("+z")
         count = len(session.replays)
         server.scene.add_grid(
             "/floor", width=(count + 1) * 2 * whole, height=(count + 1) * 2 * whole, cell_size=whole / 4
         )
-        self._roots = [server.scene.add_frame(_root(i), show_axes=False) for i in range(count)]
+        self._roots = [
+            server.scene.add_frame(_root(i), show_axes=False, position=(0.0, -APART * whole * i, 0.0))
+            for i in range(count)
+        ]
         self._arms = [make(f"{_root(i)}/arm", colour(i)) for i in range(count)]
         self._references = [self._reference(i) for i in range(count)]
         self._paths = [self._path(i) for i in range(count)]
@@ -58,26 +61,20 @@ class Scene:
             disable_rotations=not session.stage.scenario.task.has_orientation,
         )
         self._target_at: Pose | None = None
-        self.put_apart(apart=True)
         self.show(session.shown())
-
-    def put_apart(self, *, apart: bool) -> None:
-        """Puts the arms beside each other, or all of them in one place."""
-        for i, root in enumerate(self._roots):
-            root.position = (0.0, -APART * self._size * i * apart, 0.0)
 
     def look(self, camera: Any) -> None:
         """Turns the camera of a browser to the arms."""
         others = len(self._roots) - 1
         far = (FAR + FARTHER * others) * self._size
-        # The panel is on the right: what is looked at lies beside the middle of the arms.
+        # The panel covers the right: the camera looks at a point beside the middle of the arms.
         middle = -0.5 * APART * others * self._size + BESIDE * far * np.tan(0.5 * VIEW)
         camera.fov = VIEW
         camera.position = (0.9 * far, middle + 0.3 * far, (0.3 + LOOKED_AT) * far)
         camera.look_at = (0.0, middle, LOOKED_AT * self._size)
 
     def show(self, shown: Sequence[Shown]) -> None:
-        """Moves the arms, and the reference where it is."""
+        """Moves the arms and the reference."""
         playing = self._session.mode is Mode.PLAY
         reference = self._session.reference
         for i, one in enumerate(shown):
@@ -91,7 +88,7 @@ class Scene:
         self._show_target(reference)
 
     def _show_target(self, reference: Pose) -> None:
-        """Moves the target with the reference; just when this has moved, or it would be taken out of a user's hand."""
+        """Moves the target with the reference if this has moved: otherwise a user may be dragging it."""
         if self._session.mode is Mode.FOLLOW:
             self._target_at = None  # it is where it has been dragged
         elif self._target_at is None or not all(map(np.array_equal, self._target_at, reference)):
@@ -116,14 +113,19 @@ class Scene:
         add, root = self._server.scene.add_line_segments, _root(i)
         self._server.scene.add_label(f"{root}/name", replay.policy, position=(0.0, 0.0, -BELOW * self._size))
         return [
-            add(f"{root}/nominal", segments(thinned(stage.path, step)), colors=_rgb(PALE_GREEN), line_width=5.0),
-            add(f"{root}/actual", segments(tool), colors=colour(i), line_width=2.0),
+            add(f"{root}/nominal", _segments(thinned(stage.path, step)), colors=_rgb(PALE_GREEN), line_width=5.0),
+            add(f"{root}/actual", _segments(tool), colors=colour(i), line_width=2.0),
         ]
 
 
 def colour(number: int) -> Colour:
     """The colour of a policy, as plots have it."""
     return _rgb(COLOURS[number % len(COLOURS)])
+
+
+def _segments(points: FloatArray) -> FloatArray:
+    """A curve as viser takes it: points of shape (k, 3) as segments of shape (k - 1, 2, 3)."""
+    return np.stack([points[:-1], points[1:]], axis=1)
 
 
 def _move(handle: Any, pose: Pose) -> None:

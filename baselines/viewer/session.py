@@ -1,4 +1,4 @@
-"""What the viewer shows, moment by moment, without a server: postures by hand, a target to follow, an episode."""
+"""The state of the viewer, without a server: joints moved by hand, a target to follow, or an episode."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from ikgym.validation import FloatArray
 
 #: The status of a policy that cannot follow a target.
 PLAYS_ONLY = "plays the episode only"
-# Wall time in [s] that policies may take before the next picture is due.
+# Wall time in [s] that policies may take per update of the scene.
 BUDGET = 0.05
 
 
 class Mode(enum.Enum):
-    """What moves the arms."""
+    """The source of motion."""
 
     HAND = "joints by hand"
     FOLLOW = "following the target"
@@ -31,15 +31,15 @@ class Mode(enum.Enum):
 
 
 class Shown(NamedTuple):
-    """One policy's arm at a moment.
+    """The arm of one policy at one time.
 
     Attributes:
         policy: The name of the policy.
         q: Joint coordinates in [rad] or [m]. Shape (n,).
-        position_error: Distance from the reference in [m], NaN where the arm follows none.
-        orientation_error: Angle in [rad], NaN as well where the task has no orientation.
-        cost: What the episode has cost so far, NaN outside of it.
-        status: How the last step of the policy went.
+        position_error: Distance from the reference in [m], NaN without one.
+        orientation_error: Angle in [rad], NaN also if the task has no orientation.
+        cost: Accumulated cost of the episode, NaN outside of it.
+        status: Status of the policy's last step.
         reading: Manipulability and limits.
     """
 
@@ -53,12 +53,12 @@ class Shown(NamedTuple):
 
 
 class Session:
-    """The state behind the picture.
+    """The state of the viewer.
 
     Args:
-        stage: What policies are shown on.
-        replays: The episode, as each policy played it.
-        followers: Who follows a target, None for policies that cannot; in the same order.
+        stage: The episode.
+        replays: The replays of the policies.
+        followers: Their followers, None for policies that cannot follow a target.
     """
 
     def __init__(self, stage: Stage, replays: Sequence[Replay], followers: Sequence[Follower | None]) -> None:
@@ -68,22 +68,22 @@ class Session:
         self._q = [replay.q[0] for replay in self.replays]
         self.duration = float(self.replays[0].times[-1])
         self.mode, self.playing, self.time, self.speed = Mode.PLAY, False, 0.0, 1.0
-        #: Which share of the speed asked for the policies keep up with.
+        #: Share of real time that the policies reach while they follow the target.
         self.kept = 1.0
         self._due = 0.0
 
     @property
     def step(self) -> int:
-        """Which step of the episode is shown."""
+        """The step of the episode that is shown."""
         return min(round(self.time / self.stage.scenario.dt), self.stage.scenario.steps)
 
     @property
     def reference(self) -> Pose:
-        """Where the tool is to be."""
+        """The pose of the reference."""
         return self.stage.pose(self.step) if self.mode is Mode.PLAY else self._approach.pose
 
     def place(self, q: FloatArray) -> None:
-        """Puts all arms at a posture, and the target where their tool is.
+        """Puts all arms at a posture, and the target at their tool.
 
         Args:
             q: Joint coordinates in [rad] or [m]; cut to the limits. Shape (n,).
@@ -99,7 +99,7 @@ class Session:
         self._approach.aim(target)
 
     def toggle(self) -> None:
-        """Plays the episode, from the start where it had ended or was not shown, or pauses it."""
+        """Plays or pauses the episode; it starts again if it has ended or was not shown."""
         if self.mode is not Mode.PLAY or self.time >= self.duration:
             self.time, self.playing = 0.0, False
         self.mode, self.playing = Mode.PLAY, not self.playing
@@ -110,7 +110,7 @@ class Session:
         self.time = float(np.clip(moment, 0.0, self.duration))
 
     def advance(self, seconds: float) -> None:
-        """Lets time pass.
+        """Advances the time.
 
         Args:
             seconds: Since the last call, in [s].
@@ -122,11 +122,11 @@ class Session:
             self.playing = self.time < self.duration
 
     def shown(self) -> list[Shown]:
-        """What is to be seen of each policy now."""
+        """The arm of each policy now."""
         return [self._shown(number) for number in range(len(self.replays))]
 
     def _leave(self, mode: Mode, reference: Pose, postures: Sequence[FloatArray]) -> None:
-        """Leaves the mode that was, for arms that stand at postures."""
+        """Changes the mode, with the arms at the given postures."""
         self.mode, self.playing, self._due, self.kept = mode, False, 0.0, 1.0
         self._approach.place(reference)
         self._q = list(postures)
@@ -135,7 +135,7 @@ class Session:
                 follower.place(posture)
 
     def _follow(self, seconds: float) -> None:
-        """Makes the steps that are due, as many as there is time for."""
+        """Makes the steps that are due, within the budget of time."""
         self._due += seconds / self.stage.scenario.dt
         due, made, end = int(self._due), 0, time.perf_counter() + BUDGET
         while made < due and time.perf_counter() < end:

@@ -1,4 +1,4 @@
-"""The command ``ikgym video``: an episode as a film for papers and talks, policies side by side."""
+"""The command ``ikgym video``: an episode as a video, policies side by side."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from ikgym.exceptions import InvalidInputError
 
 @dataclasses.dataclass(frozen=True)
 class Options:
-    """What the command line takes."""
+    """Options of the command."""
 
     out: Annotated[pathlib.Path, tyro.conf.arg(metavar="FILE.mp4")]
     """The file to write."""
@@ -31,7 +31,7 @@ class Options:
     seed: Annotated[int, tyro.conf.arg(metavar="N")] = 0
     """Reset seed of the episode."""
     steps: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
-    """Most steps of the episode. The scenario's own number if left out."""
+    """Number of steps; all of the scenario if left out."""
     fps: Annotated[float, tyro.conf.arg(metavar="N")] = 30.0
     """Pictures in one second of the video."""
     speed: Annotated[float, tyro.conf.arg(metavar="X")] = 1.0
@@ -44,7 +44,7 @@ def manual() -> str:
     """The text of ``--help`` above the options."""
     prog = _program()
     return f"""\
-Draws an episode as an H.264 video: the arm, the paths and the errors over time, several policies at the same moment.
+Draws an episode as an H.264 video: the arm, the paths and the errors over time, several policies at the same time.
 Needs pip install "ikgym[video]".
 
 Examples:
@@ -56,10 +56,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """The command line.
 
     Args:
-        arguments: What stands behind the command; taken from the process if left out.
+        arguments: The arguments of the command; taken from the process if left out.
 
     Returns:
-        The exit code: 0, 2 where something expected went wrong, 130 after Ctrl-C.
+        The exit code: 0, 2 after an expected error, 130 after Ctrl-C.
     """
     arguments = sys.argv[1:] if arguments is None else list(arguments)
     return command.run(lambda: _film(command.parse(Options, arguments, prog=_program(), description=manual())))
@@ -67,7 +67,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _film(options: Options) -> int:
     command.find_own_modules()
-    check_ffmpeg()  # what is missing is said before episodes are played
+    check_ffmpeg()  # before episodes are played
     if options.out.suffix != ".mp4":
         raise InvalidInputError(f"out: expected a file that ends in .mp4, got {str(options.out)!r}.")
     width, names = checked_width(options.width), named(options.policy)

@@ -21,32 +21,31 @@ from ikgym.exceptions import InvalidInputError
 
 @dataclasses.dataclass(frozen=True)
 class Options:
-    """What the command line takes."""
+    """Options of the command."""
 
     scenario: Annotated[str, tyro.conf.arg(metavar="NAME")] = "varga7-fast"
     """Name of a scenario, FILE.toml or MODULE:ATTRIBUTE."""
     policy: Annotated[tuple[str, ...], tyro.conf.arg(metavar="POLICY …")] = ("dls",)
-    """Policies that are shown side by side, as evaluate takes them."""
+    """Policies side by side, as evaluate takes them."""
     seed: Annotated[int, tyro.conf.arg(metavar="N")] = 0
     """Reset seed of the episode."""
     steps: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
-    """Most steps of the episode. The scenario's own number if left out."""
+    """Number of steps; all of the scenario if left out."""
     urdf: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None
-    """A URDF file of the arm, whose meshes are shown. Cylinders if left out, unless the arm was read from such a
-    file that has meshes."""
+    """A URDF file of the arm with meshes. If left out, the file that the arm was read from, else cylinders."""
     host: Annotated[str, tyro.conf.arg(metavar="HOST")] = "127.0.0.1"
-    """Address to listen on; 0.0.0.0 lets other machines in, who may then move the arms."""
+    """Address to listen on; with 0.0.0.0, users of other machines can connect and move the arms."""
     port: Annotated[int, tyro.conf.arg(metavar="PORT")] = 8080
-    """Port to listen on; 0 for one that is free."""
+    """Port to listen on; 0 for a free one."""
 
 
 def manual() -> str:
     """The text of ``--help`` above the options."""
     prog = _program()
     return f"""\
-Shows policies side by side in a browser: the episode, played, scrubbed, slowly or fast; and arms that follow a target
-that you drag, each by its own policy, called as on a real arm: no drives, sensors or other imperfections of the
-scenario's plant. Joints are moved by sliders within their limits. Needs pip install "ikgym[view]".
+Shows policies side by side in a browser: a replay of the episode at any speed, and arms that follow a target that you
+drag, each with its own policy, without the imperfections of the scenario's plant. Sliders move the joints within their
+limits. Needs pip install "ikgym[view]".
 
 Examples:
   {prog} --scenario panda-circle --policy dls rhc
@@ -55,10 +54,10 @@ Examples:
 
 
 def session_of(stage: Stage, policies: Sequence[str], *, progress: bool = False) -> Session:
-    """What is shown of policies.
+    """The session that shows policies in an episode.
 
     Args:
-        stage: What they are shown on.
+        stage: The episode.
         policies: Their names, as the command line takes them.
         progress: Whether to show a bar on stderr while they play the episode.
 
@@ -74,26 +73,26 @@ def main(arguments: Sequence[str] | None = None, stop: threading.Event | None = 
     """The command line.
 
     Args:
-        arguments: What stands behind the command; taken from the process if left out.
-        stop: Ends the viewer when it is set; only Ctrl-C does if left out.
+        arguments: The arguments of the command; taken from the process if left out.
+        stop: Ends the viewer when it is set; Ctrl-C always does.
 
     Returns:
-        The exit code: 0, 2 where something expected went wrong, 130 after Ctrl-C.
+        The exit code: 0, 2 after an expected error, 130 after Ctrl-C.
     """
     arguments = sys.argv[1:] if arguments is None else list(arguments)
 
     def work() -> int:
         options = command.parse(Options, arguments, prog=_program(), description=manual())
         command.find_own_modules()
-        # What is missing is said before episodes are played.
+        # Before episodes are played: extras may be missing, or the port taken.
         from baselines.viewer.server import Viewer, free_port, serving
 
         port = free_port(options.host, options.port)
         stage = Stage.of(options.scenario, options.seed, options.steps)
-        shaper = shaper_of(stage, options.urdf)
+        draw = meshes(stage, options.urdf)
         session = session_of(stage, options.policy, progress=True)
         with serving(options.host, port) as server:
-            viewer = Viewer(server, session, shaper)
+            viewer = Viewer(server, session, draw)
             print(f"http://{server.get_host()}:{server.get_port()}  (Ctrl-C ends it)", flush=True)
             viewer.run(threading.Event() if stop is None else stop)
         return 0
@@ -101,21 +100,21 @@ def main(arguments: Sequence[str] | None = None, stop: threading.Event | None = 
     return command.run(work)
 
 
-def shaper_of(stage: Stage, file: pathlib.Path | None) -> Any:
-    """Who makes the arms from meshes; None where they are cylinders.
+def meshes(stage: Stage, file: pathlib.Path | None) -> Any:
+    """Draws arms with the meshes of a URDF file; None for cylinders.
 
     Args:
-        stage: What policies are shown on.
+        stage: The episode.
         file: A URDF file of the arm; the one that the arm was read from if left out.
 
     Raises:
-        InvalidInputError: The file that was given is not of the arm.
+        InvalidInputError: The given file is not of the arm.
     """
     arm = stage.scenario.arm
     source = arm.urdf.file if file is None and arm.urdf is not None else file
     if source is None:
         return None
-    from baselines.viewer.meshes import Meshes, read_urdf
+    from baselines.viewer.arms import Meshes, read_urdf
 
     try:
         read_urdf(source, arm)
@@ -124,7 +123,7 @@ def shaper_of(stage: Stage, file: pathlib.Path | None) -> Any:
             raise
         print(f"Cylinders are shown: {e}", file=sys.stderr)
         return None
-    # Each arm in the scene moves a model of its own.
+    # Each arm in the scene moves its own model.
     return lambda server: lambda root, _: Meshes(server, root, read_urdf(source, arm), arm)
 
 

@@ -10,7 +10,7 @@ import pytest
 import baselines
 import ikgym
 from baselines.policy import Problem
-from benchmarks import defaults, effort, environments, horizon_solvers, horizons, kernels, policies, states, timing
+from benchmarks import effort, environments, horizon_solvers, horizons, kernels, policies, states, timing
 from benchmarks.rivals.numpy_horizon import Horizon, plan_cost
 
 
@@ -67,12 +67,6 @@ def test_policies_are_those_of_their_scenarios():
             assert baselines.make(name, scenario, **parameters).name == name
 
 
-def test_iterations_are_counted_as_made():
-    for call, iterations in policies.damped_iterations(rows=2, iterations=3).values():
-        call()
-        assert iterations == 6
-
-
 def test_states_lead_to_one_another():
     scenario = ikgym.scenarios.get("varga7-fast").replace(steps=30)
     for seen in states.along(scenario, preview=4, count=2, lead=3):
@@ -81,20 +75,6 @@ def test_states_lead_to_one_another():
             assert before["remaining"] - after["remaining"] == 1
             np.testing.assert_allclose(before["q"] + scenario.dt * after["qdot"], after["q"], atol=1e-12)
             np.testing.assert_array_equal(before["nominal"][1:], after["nominal"][:-1])
-
-
-def test_rows_are_each_on_their_own_way():
-    seen = states.rows_along(ikgym.scenarios.get("varga7-random"), preview=2, rows=3, lead=1)
-    assert len(seen) == 2
-    assert seen[0]["q"].shape == (3, 7)
-    assert len(np.unique(seen[-1]["q"][:, 0])) == 3
-
-
-@pytest.mark.parametrize("joints", [3, 14])
-def test_chains_have_as_many_joints_as_they_say(joints):
-    arm = states.chain(joints)
-    assert arm.joints == joints
-    assert arm.forward(np.zeros(joints))[1] == pytest.approx([0.1, 0.0, 0.3 * (joints + 1)])
 
 
 def test_costs_of_solvers_are_those_of_their_plans():
@@ -127,22 +107,3 @@ def test_nobody_is_below_the_best():
         keys = [column.key for column in table.columns]
         excesses = [row[keys.index("worst_excess")] for row in table.rows.values()]
         assert min(value for value in excesses if value is not None) == 0.0
-
-
-def test_defaults_are_compared_on_motions_within_the_limits():
-    """All arms, those without limits of their own included; the certificate is that the path can be followed."""
-    for arm in defaults.ARMS:
-        which = defaults.scenario(arm, 30)
-        path = which.nominal_joint_path(seed=0)
-        assert (np.abs(np.diff(path, axis=0)) <= which.dt * which.largest_qdot + 1e-12).all()
-        assert ((path >= which.arm.lower) & (path <= which.arm.upper)).all()
-
-
-def test_tables_of_defaults_say_what_changed_and_what_is_best(monkeypatch):
-    monkeypatch.setattr(defaults, "ARMS", {"panda": 1e-3})
-    changes, *grids = defaults.tables(effort.QUICK)
-    assert set(changes.rows) == {f"{policy}, panda" for policy in defaults.BEFORE}
-    for *_, before, after, ratio in changes.rows.values():
-        assert ratio == pytest.approx(after / before)
-    for grid in grids:
-        assert [min(row) for row in grid.rows.values()] == [1.0]

@@ -1,4 +1,4 @@
-"""What is said of a posture."""
+"""Readings of a posture."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import ikgym
-from baselines.viewer.readings import AT, FREE, NEAR, Reader, share_colour, slider_range
+from baselines.viewer.readings import AT, FREE, NEAR, Reader, slider_range
 
 
 @pytest.fixture(scope="module")
@@ -28,12 +28,6 @@ def test_manipulability_is_the_root_of_the_determinant(panda, reader):
     assert 0.1 < reading.share <= 1.0
 
 
-def test_only_linear_rows_count_where_the_task_has_no_orientation(panda):
-    linear = panda.jacobian(panda.home)[:3]
-    found = Reader(panda, ikgym.tasks.get("position")).read(panda.home).manipulability
-    assert found == pytest.approx(np.sqrt(np.linalg.det(linear @ linear.T)), rel=1e-9)
-
-
 def test_a_stretched_arm_is_singular():
     arm = ikgym.arms.get("planar2")
     reader = Reader(arm, ikgym.tasks.get("position"))
@@ -49,13 +43,6 @@ def test_joints_are_coloured_by_their_limits(panda, reader):
     np.testing.assert_allclose(reading.margins[[1, 3]], [0.0, 0.05], atol=1e-12)
 
 
-def test_joints_without_limits_are_free():
-    arm = ikgym.arms.get("varga7")
-    reading = Reader(arm, ikgym.tasks.get("skew")).read(np.full(7, 40.0))
-    assert np.isinf(reading.margins).all()
-    assert set(reading.colours) == {FREE}
-
-
 def test_sliders_go_as_far_as_the_limits(panda):
     low, high = slider_range(panda)
     np.testing.assert_array_equal([low, high], [panda.lower, panda.upper])
@@ -65,8 +52,3 @@ def test_sliders_go_as_far_as_the_limits(panda):
     np.testing.assert_array_equal(high[~slide], np.pi)
     np.testing.assert_allclose(high[slide], 0.5 * arm.reach(np.zeros(7)))
     np.testing.assert_array_equal(low, -high)
-
-
-def test_colours_of_manipulability():
-    assert share_colour(0.0) == AT
-    assert share_colour(2.0) == (0, 158, 115)

@@ -7,7 +7,7 @@ import pytest
 
 from baselines.viewer import session as sessions
 from baselines.viewer.approach import Pose
-from baselines.viewer.panel import readings
+from baselines.viewer.panel import escaped, readings
 from baselines.viewer.replay import Stage
 from baselines.viewer.session import PLAYS_ONLY, Mode
 from baselines.viewer.view import session_of
@@ -127,7 +127,7 @@ def test_readings_name_policies_errors_and_limits(session):
     assert f"error {1e3 * one.position_error:.3g} mm, {1e3 * one.orientation_error:.3g} mrad" in text
     nearest = int(np.argmin(one.reading.margins))
     name = session.stage.scenario.arm.joint_names[nearest]
-    assert f"{name} is {one.reading.margins[nearest]:.3g} rad from its limit" in text
+    assert f"{escaped(name)} is {one.reading.margins[nearest]:.3g} rad from its limit" in text
     assert "cost so far" in text
 
 
@@ -140,3 +140,7 @@ def test_privileged_information_plays_only():
     np.testing.assert_array_equal(reference.q, session.stage.start)
     assert np.abs(solver.q - session.stage.start).max() > 0.0
     assert "from its limit" not in readings(session, session.shown())  # an arm without limits
+
+
+def test_names_are_shown_letter_by_letter():
+    assert escaped("rhc:options={'a': 1}\n<b>_x*") == "rhc:options=\\{'a': 1\\} \\<b\\>\\_x\\*"

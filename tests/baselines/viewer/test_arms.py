@@ -1,4 +1,4 @@
-"""Meshes of a URDF file, if it is of the arm."""
+"""Arms in the scene: cylinders where the kinematics are, and meshes of a URDF file that is of the arm."""
 
 from __future__ import annotations
 
@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 
 import ikgym
-from baselines.viewer.readings import AT, NEAR, Reader, share_colour
-from baselines.viewer.replay import Stage
-from baselines.viewer.view import shaper_of
+from baselines.viewer.readings import AT, FREE, Reader, share_colour
+from baselines.viewer.replay import Stage, size
+from baselines.viewer.view import meshes
 from ikgym.exceptions import InvalidInputError
 from ikgym.trajectories import Sinusoid
 
 pytest.importorskip("yourdfpy")
 trimesh = pytest.importorskip("trimesh")
-pytest.importorskip("viser")
-meshes = pytest.importorskip("baselines.viewer.meshes")
+transforms = pytest.importorskip("viser.transforms")
+arms = pytest.importorskip("baselines.viewer.arms")
 
 JOINTS = ("shoulder", "elbow")
 
@@ -44,70 +44,68 @@ def urdf(folder, length=1.0, joints=JOINTS, shape='<mesh filename="link.stl"/>')
     return file
 
 
-@pytest.fixture
-def shown(arm, server, tmp_path):
-    """The arm in viser's scene, at a posture."""
-    made = meshes.Meshes(server, "/root", meshes.read_urdf(urdf(tmp_path), arm), arm)
-
-    def show(*q):
-        made.show(np.array(q), Reader(arm, ikgym.tasks.get("position")).read(np.array(q)))
-        return made
-
-    return show
+def chained(poses):
+    """The last of poses that are each seen from the one before."""
+    out = transforms.SE3.identity()
+    for position, wxyz in poses:
+        out = out @ transforms.SE3.from_rotation_and_translation(transforms.SO3(np.asarray(wxyz)), np.asarray(position))
+    return out
 
 
-def seen(made):
-    """The handles of the meshes that are seen, each with whether it has the colours of its file."""
-    assert all(mesh._own.visible != mesh._plain.visible for mesh in made._meshes)
-    return [(mesh._own, True) if mesh._own.visible else (mesh._plain, False) for mesh in made._meshes]
+@pytest.mark.parametrize("name", ikgym.arms.names())
+def test_frames_of_joints_are_those_of_the_arm(name):
+    arm = ikgym.arms.get(name)
+    low, high = np.maximum(arm.lower, -3.0), np.minimum(arm.upper, 3.0)
+    q = np.random.default_rng(0).uniform(low, high)
+    frames = list(zip(*arms.joint_frames(arm, q), strict=True))
+    for joint, point in enumerate(arm.joint_points(q)[:, 1]):
+        found = chained(frames[: joint + 1])
+        np.testing.assert_allclose(found.translation(), point, atol=1e-12 * size(arm))
+    np.testing.assert_allclose(found @ arm.tool, arm.forward(q)[1], atol=1e-12 * size(arm))
 
 
-def test_meshes_move_with_the_arm(arm, shown):
-    made, q = shown(0.3, 0.5), np.array([0.3, 0.5])
-    (first, own), (last, own_as_well) = seen(made)
-    assert own
-    assert own_as_well
+def read(arm, q):
+    return Reader(arm, ikgym.tasks.get("position")).read(q)
+
+
+def test_cylinders_have_the_colours_of_the_readings(arm, server):
+    made = arms.Cylinders(server, "/root", arm, FREE)
+    made.show(np.array([0.3, 1.0]), read(arm, np.array([0.3, 1.0])))
+    assert [tuple(joint.color) for joint in made._joints] == [FREE, AT]
+    assert tuple(made._tool.color) != share_colour(0.0)
+    made.show(np.zeros(2), read(arm, np.zeros(2)))
+    assert tuple(made._tool.color) == share_colour(0.0)
+
+
+def test_meshes_move_with_the_arm(arm, server, tmp_path):
+    made, q = arms.Meshes(server, "/root", arms.read_urdf(urdf(tmp_path), arm), arm), np.array([0.3, 0.5])
+    made.show(q, read(arm, q))
+    first, last = made._meshes.values()
     np.testing.assert_allclose([first.position, last.position], arm.joint_points(q)[:, 1], atol=1e-6)
     np.testing.assert_allclose(last.wxyz, [np.cos(0.4), 0.0, 0.0, np.sin(0.4)], atol=1e-6)
     np.testing.assert_allclose(made._tool.position, arm.forward(q)[1], atol=1e-6)
 
 
-@pytest.mark.parametrize(("elbow", "colour"), [(0.99, NEAR), (1.0, AT)])
-def test_what_a_joint_near_its_limit_moves_has_the_colour_of_the_limit(shown, elbow, colour):
-    (_, first_own), (handle, own) = seen(shown(0.3, elbow))
-    assert first_own
-    assert not own
-    assert tuple(handle.color) == colour
-    np.testing.assert_allclose(handle.wxyz, [np.cos((0.3 + elbow) / 2), 0.0, 0.0, np.sin((0.3 + elbow) / 2)], atol=1e-6)
-    np.testing.assert_allclose(np.ptp(handle.vertices, axis=0), [1.0, 0.1, 0.1], atol=1e-6)
-    assert [own for _, own in seen(shown(0.3, 0.5))] == [True, True]
-
-
-def test_the_ball_at_the_tool_says_how_manipulable_the_arm_is(shown):
-    assert tuple(shown(0.3, 0.0)._tool.color) == share_colour(0.0)
-    assert tuple(shown(0.3, 0.8)._tool.color) != share_colour(0.0)
-
-
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"length": 1.1}, "moves otherwise than arm 'two'"),
+        ({"length": 1.1}, "moves differently from arm 'two'"),
         ({"joints": ("shoulder", "wrist")}, "has no joint 'elbow' of arm 'two'; it has shoulder, wrist"),
         ({"shape": ""}, "has no visible shapes"),
     ],
 )
 def test_other_files_are_refused(arm, tmp_path, changes, message):
     with pytest.raises(InvalidInputError, match=message):
-        meshes.read_urdf(urdf(tmp_path, **changes), arm)
+        arms.read_urdf(urdf(tmp_path, **changes), arm)
 
 
 def test_files_that_cannot_be_read(arm, tmp_path):
     with pytest.raises(InvalidInputError, match="expected a file"):
-        meshes.read_urdf(tmp_path / "nowhere.urdf", arm)
+        arms.read_urdf(tmp_path / "nowhere.urdf", arm)
     broken = tmp_path / "broken.urdf"
     broken.write_text("<robot")
     with pytest.raises(InvalidInputError, match="cannot be read"):
-        meshes.read_urdf(broken, arm)
+        arms.read_urdf(broken, arm)
 
 
 @pytest.fixture
@@ -124,11 +122,10 @@ def stage(tmp_path):
 
 
 def test_an_arm_from_a_file_with_meshes_is_shown_with_them(stage, server):
-    made = shaper_of(stage(), None)(server)("/root", AT)
-    assert isinstance(made, meshes.Meshes)
-    assert len(made._meshes) == 2
+    made = meshes(stage(), None)(server)("/root", AT)
+    assert isinstance(made, arms.Meshes)
 
 
 def test_an_arm_from_a_file_without_meshes_is_shown_as_cylinders(stage, capsys):
-    assert shaper_of(stage(shape=""), None) is None
+    assert meshes(stage(shape=""), None) is None
     assert "Cylinders are shown: urdf:" in capsys.readouterr().err
