@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import queue
 import socket
@@ -22,6 +23,8 @@ from ikgym.exceptions import InvalidInputError
 
 # Updates of the scene and of the readings per second.
 PICTURES, READINGS = 30.0, 5.0
+# Longest wait in [s] for a thread of the server to end.
+PATIENCE = 5.0
 
 
 @contextlib.contextmanager
@@ -35,11 +38,27 @@ def serving(host: str, port: int) -> Iterator[Any]:
     Raises:
         InvalidInputError: It cannot listen there.
     """
+    others = set(threading.enumerate())
     server = viser.ViserServer(host, free_port(host, port), label="ikgym view", verbose=False)
+    own = [thread for thread in threading.enumerate() if thread.daemon and thread not in others]
     try:
         yield server
     finally:
         server.stop()
+        for thread in own:
+            thread.join(PATIENCE)
+        loop = server.get_event_loop()
+        if not (loop.is_running() or loop.is_closed()):
+            loop.run_until_complete(_cancel_others())
+            loop.close()
+
+
+async def _cancel_others() -> None:
+    """Ends the tasks that viser leaves in its loop; Python would complain about them when it collects the loop."""
+    others = asyncio.all_tasks() - {asyncio.current_task()}
+    for task in others:
+        task.cancel()
+    await asyncio.gather(*others, return_exceptions=True)
 
 
 class Viewer:
