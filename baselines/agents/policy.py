@@ -174,7 +174,7 @@ def agent_at(path: str | os.PathLike[str], digits: str | None, kinds: Sequence[t
     if not isinstance(path, (str, os.PathLike)) or not os.fspath(path):
         raise ResultsError(f"path: expected the file of an agent, got {path!r}.")
     agent = load_agent(pathlib.Path(os.path.expanduser(path)), kinds)  # noqa: PTH111  # never raises, unlike Path's
-    if digits is not None and digits != agent.digits:
+    if digits is not None and not (isinstance(digits, str) and digits == agent.digits):
         raise InvalidInputError(f"hash: expected {agent.digits}, the hash of {path}, got {digits!r}.")
     return agent
 
