@@ -26,8 +26,7 @@ from baselines import command
 from baselines.canonical import jsonable
 from baselines.evaluation.machine import describe
 from baselines.evaluation.plots.style import png
-from baselines.files import write
-from baselines.files.locks import locked
+from baselines.files import locked, write
 from baselines.papers import PAPERS, get, ledger
 from baselines.papers.paper import Finding, Paper
 from baselines.papers.runs import Runs

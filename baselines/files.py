@@ -105,20 +105,6 @@ def _required(field: dataclasses.Field[Any]) -> bool:
     return field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
 
 
-def read_bytes(file: pathlib.Path, most: int) -> bytes:
-    """All bytes of a file that has no more than `most`.
-
-    Raises:
-        OSError: It cannot be read.
-        ValueError: It has more.
-    """
-    with file.open("rb") as stream:
-        size = os.fstat(stream.fileno()).st_size
-        if size > most:
-            raise ValueError(f"it is too large: expected at most {most} bytes, got {size}")
-        return stream.read(size)
-
-
 @contextlib.contextmanager
 def reading(file: pathlib.Path, advice: str = "") -> Iterator[None]:
     """Turns errors while a file is read into one that names the file.
