@@ -19,17 +19,14 @@ from tests.baselines.losing import LosingCluster
 
 FAR = Workers(cluster="ray")
 EVALUATE = (
-    *("baselines.evaluate", "--scenarios", "varga7-random", "--episodes", "400", "--no-plots", "--workers", "2"),
+    *("evaluate", "--scenarios", "varga7-random", "--episodes", "400", "--no-plots", "--workers", "2"),
     *("--policies", "rhc:horizon=100,starts=1"),
 )
 # Segments enough that nobody is done before it is stopped.
 TRAIN = (
-    *("baselines.training.command", "ppo", "--preset", "smoke", "--segments", "100000", "--evaluate-every", "100000"),
+    *("train", "apg", "--preset", "smoke", "--segments", "100000", "--evaluate-every", "100000"),
     *("--seeds", "0", "1", "--workers", "2", "--out"),
 )
-# `baselines.training.command` has no main of its own: train.py calls it.
-MAIN = "import sys; from {module} import main; sys.exit(main(sys.argv[1:]))"
-
 needs_proc = pytest.mark.skipif(not pathlib.Path("/proc/self/stat").exists(), reason="looks processes up in /proc")
 
 
@@ -151,11 +148,10 @@ def test_fewer_cores(monkeypatch):
     ("command", "end"), [(EVALUATE, signal.SIGTERM), (TRAIN, signal.SIGKILL)], ids=["evaluate", "train"]
 )
 def test_workers_of_commands_end_with_them(tmp_path, command, end):
-    module, *options = command
-    if options[-1] == "--out":
-        pytest.importorskip("stable_baselines3")
-        options.append(str(tmp_path))
-    line = [sys.executable, "-c", MAIN.format(module=module), *options]
+    if command[0] == "train":
+        pytest.importorskip("torch")
+    out = [str(tmp_path)] if command[-1] == "--out" else []
+    line = [sys.executable, "-m", "baselines.cli", *command, *out]
     with subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as parent:
         try:
             assert wait_for(lambda: len(descendants(parent.pid)) == 2, 60.0)
