@@ -168,7 +168,7 @@ def entry(step: Any, numbers: type, memory: type) -> Any:
     return kernel(call)
 
 
-def _call(block, numbers, checking, seen, memory, action, answer):
+def _call(block: Any, numbers: Any, checking: Any, seen: Any, memory: Any, action: Any, answer: Any) -> Any:
     """See :func:`entry`, which gives each solver a copy with its own ``step``, ``Numbers`` and ``Memory``."""
     q, qdot, pose, nominal, remaining = seen
     if checking and not all_finite(q, qdot, pose, nominal, remaining):

@@ -167,10 +167,12 @@ def test_what_is_ones_own_is_evaluated_by_one_command_each(tmp_path, monkeypatch
     assert "mine:Proportional" in printed
     assert "mine: 20 steps" in printed
     # A URDF file: the arm's name goes, and the amplitudes are as many as the joints.
-    text = own["mine.toml"].replace('arm = "puma560"\n', "").replace('task = "pose"', 'task = "position"')
+    text = re.sub("arm = .*\n", "", own["mine.toml"]).replace('task = "pose"', 'task = "position"')
     text = re.sub(r"\[(0.4|2.0), .*\]", lambda match: f"[{match[1]}, {match[1]}]", text)
     text = re.sub(r"= \[(\S+), (\S+)\]", r"= [\1, \2, \1]", text)
-    (tmp_path / "mine-urdf.toml").write_text(text + own["mine-urdf.toml"], encoding="utf-8")
+    (tmp_path / "mine-urdf.toml").write_text(
+        text + '[arm]\nurdf = "arm.urdf"\nbase = "base_link"\ntip = "tool0"\n', encoding="utf-8"
+    )
     (tmp_path / "arm.urdf").write_text(ARM, encoding="utf-8")
     assert main(["evaluate", "--scenarios", "mine-urdf.toml", "--policies", "dls", "--steps", "20"]) == 0
     assert "dls" in capsys.readouterr().out

@@ -34,7 +34,7 @@ def test_it_holds_every_module_and_all_data(content):
     assert {file for file in content if not file.endswith(".py")} <= {file for file in content if file.endswith(DATA)}
     for file in (
         "best_known.json",
-        "tuned/varga7-random.json",
+        "ranges.toml",
         "agents/agent_alone.safetensors",
         "agents/agent_memory.safetensors",
     ):

@@ -6,6 +6,7 @@ import pytest
 
 import baselines
 import ikgym
+from baselines.agents.policy import LearnedPolicy
 from baselines.episodes import rollout, rollouts
 from baselines.registry import get
 from baselines.status import Status
@@ -37,7 +38,7 @@ def test_together_as_alone(name, on):
         policy = made(name, scenario)
     except InvalidInputError:
         # Agents suit arms of their size, and rivals know no skew coordinates.
-        assert issubclass(get(name), Wrapper) or get(name).rival
+        assert issubclass(get(name), LearnedPolicy | Wrapper) or get(name).rival
         return
     together = rollouts(scenario, policy, SEEDS)
     for seed, episode in zip(SEEDS, together, strict=True):

@@ -96,14 +96,14 @@ def test_a_reference_is_told_its_arm():
     assert second.given["arm_seed"] == 400_000
     assert second.before == 0
     assert first.parameters == second.parameters
-    assert second.make().drawn.arm.offsets[0, 0] == SAME_ARM.drawn_plant(arm_seed=400_000).arm.offsets[0, 0]
+    assert second.bind().drawn.arm.offsets[0, 0] == SAME_ARM.drawn_plant(arm_seed=400_000).arm.offsets[0, 0]
 
 
 def test_a_reference_is_the_same_one_for_every_arm():
     first, *_, last = planned((), "told:policy=dls", test_sets="panda-same-arm").jobs
-    assert first.arm_seed != last.arm_seed
+    assert first.seeds.arm_seed != last.seeds.arm_seed
     assert "arm_seed" not in last.parameters
-    assert last.make().arm_seed == last.arm_seed
+    assert last.bind().arm_seed == last.seeds.arm_seed
 
 
 def test_other_noise_on_the_same_path_with_the_same_arm():

@@ -65,7 +65,7 @@ def test_a_set_that_has_drifted_is_refused(monkeypatch, drift):
 
 def test_a_frozen_set_is_played_as_it_is():
     jobs = planned((), "dls", test_sets="varga7-random").jobs
-    assert [job.seed for job in jobs] == list(range(2_000_000, 2_000_064))
+    assert [job.seeds.seed for job in jobs] == list(range(2_000_000, 2_000_064))
     assert {(job.scenario.name, job.scenario.steps, job.test_set) for job in jobs} == {
         ("varga7-random", 1000, test_sets.SETS["varga7-random"].digest)
     }
@@ -92,7 +92,7 @@ def test_a_frozen_set_from_python():
     ],
 )
 def test_a_frozen_set_is_not_changed(scenario, options):
-    with pytest.raises(InvalidInputError, match="A test set says itself what is played"):
+    with pytest.raises(InvalidInputError, match="A test set defines what is played"):
         planned(scenario, "dls", test_sets="varga7-random", **options)
 
 

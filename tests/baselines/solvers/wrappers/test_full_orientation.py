@@ -78,27 +78,9 @@ def test_arms_that_turn_back_at_90_degrees_go_on():
     assert (skew > 30.0 * resolved).all()
 
 
-@pytest.mark.parametrize(
-    ("over", "policy", "options"),
-    [
-        ("dls:damping=1e-2,gain=0.3", "dls", DLS),
-        # Sees further than the agent, and more of what lies between.
-        ("rhc:horizon=30,iterations=1", "rhc", {"horizon": 30, "iterations": 1}),
-    ],
-)
-def test_agents_that_know_whole_poses_play_skew_coordinates(tmp_path, over, policy, options):
-    scenario = scenarios.get("varga7-random").replace(steps=150)
-    file = write_agent(tmp_path / "a.safetensors", with_poses(scenario), over, zero=True, null_space=1e-2)
-    seeds = scenarios.seeds("train", 4)
-    agent = rollouts(scenario, baselines.make("agent", scenario, path=file), seeds)
-    alone = rollouts(scenario, baselines.make("full_orientation", scenario, policy=policy, options=options), seeds)
-    for a, b in zip(agent, alone, strict=True):
-        np.testing.assert_array_equal(a.q, b.q)
-
-
-def test_batches_of_such_agents_are_single_calls(tmp_path):
+def test_batches_of_agents_that_know_whole_poses_are_single_calls(tmp_path):
     scenario = scenarios.get("varga7-random").replace(steps=40)
-    file = write_agent(tmp_path / "a.safetensors", with_poses(scenario), "dls", null_space=1e-2)
+    file = write_agent(tmp_path / "a.safetensors", with_poses(scenario))
     policy, seeds = baselines.make("agent", scenario, path=file), scenarios.seeds("train", 3)
     for seed, together in zip(seeds, rollouts(scenario, policy, seeds), strict=True):
         np.testing.assert_array_equal(rollout(scenario, policy, seed).q, together.q)
@@ -115,7 +97,6 @@ def test_other_tasks_are_refused(name):
     [
         ({"policy": "oracle"}, "the reference 'oracle'"),
         ({"policy": "smoothed"}, "made from others 'smoothed'"),
-        ({"policy": "agent"}, "made from others 'agent'"),
         ({"options": 3}, "parameters of dls by name"),
     ],
 )
