@@ -10,8 +10,8 @@ import numpy.typing as npt
 from baselines.policy import Memory, Report, SolverPolicy
 from ikgym.arms.limits import limit_rows
 from ikgym.exceptions import InvalidInputError
-from ikgym.limit_kernels import applied
-from ikgym.preview import furthest
+from ikgym.kernels.limits import applied
+from ikgym.scenarios.preview import furthest
 from ikgym.validation import FloatArray, float_array, whole_number
 
 #: Task coordinates, or rotation and position.

@@ -14,9 +14,9 @@ from gymnasium.utils import seeding
 
 from baselines.policy import Report
 from ikgym.exceptions import InvalidInputError
-from ikgym.outcome import observation
+from ikgym.kernels.outcome import observation
+from ikgym.kernels.simulation import Outcome
 from ikgym.scenarios import Preview, Scenario
-from ikgym.simulation import Outcome
 from ikgym.simulator import Simulator
 from ikgym.validation import FloatArray
 

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from baselines.canonical import canonical, jsonable
-from ikgym import cost_kernels
 from ikgym.arms import Arm
+from ikgym.kernels import cost as cost_kernels
 from ikgym.plant import Plant
 from ikgym.scenarios import Scenario
 
@@ -23,7 +23,7 @@ def fingerprint(scenario: Scenario) -> str:
     """Twelve digits that differ where two scenarios would give different results.
 
     Covers all that a scenario is made of but its name and its source, and the version of the cost,
-    :data:`ikgym.cost_kernels.COST_VERSION`.
+    :data:`ikgym.kernels.cost.COST_VERSION`.
     """
     parts = {
         f.name: getattr(scenario, f.name) for f in dataclasses.fields(scenario) if f.name not in {"name", "source"}

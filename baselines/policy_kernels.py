@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.status import Status
-from ikgym.jit import kernel
-from ikgym.kinematics import Chain
+from ikgym.kernels.jit import kernel
+from ikgym.kernels.kinematics import Chain
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -46,7 +46,7 @@ class Model(NamedTuple):
 
     Attributes:
         chain: The model of the arm.
-        kind: The kind of task coordinates, one of those of :mod:`ikgym.task_kernels`.
+        kind: The kind of task coordinates, one of those of :mod:`ikgym.kernels.tasks`.
         dt: Δt in [s].
         unit: What an action of 1 means, in [rad/s] or [m/s]. Shape (n,).
         lower: Least joint coordinates in [rad] or [m]. Shape (n,).

@@ -12,7 +12,7 @@ import ikgym
 from benchmarks.effort import FULL, Effort
 from benchmarks.table import Column, Table
 from benchmarks.timing import medians
-from ikgym.kinematics import forward_and_jacobian
+from ikgym.kernels.kinematics import forward_and_jacobian
 
 LOOP = 1000
 

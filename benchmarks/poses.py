@@ -12,7 +12,7 @@ from benchmarks.effort import FULL, Effort
 from benchmarks.pose_solvers import MET, OURS, REFERENCE, RIVALS, Solve
 from benchmarks.table import Column, Table
 from ikgym.arms import Arm
-from ikgym.rotations import geodesic_angle
+from ikgym.kernels.rotations import geodesic_angle
 from ikgym.validation import BoolArray, FloatArray
 
 ARMS = ("panda", "iiwa14")

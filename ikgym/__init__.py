@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import gymnasium as gym
 
-from ikgym import arms, exceptions, problems, rl, rotations, scenarios, tasks, trajectories
+from ikgym import arms, exceptions, problems, rl, scenarios, tasks, trajectories
 from ikgym.arms import Arm
 from ikgym.cost import TrackingCost
 from ikgym.env import RedundantIKEnv
 from ikgym.exceptions import IkgymError
+from ikgym.kernels import rotations
 from ikgym.plant import Plant
 from ikgym.scenarios import Scenario
 from ikgym.vector_env import RedundantIKVectorEnv

@@ -8,9 +8,9 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
-from ikgym import cost_kernels
-from ikgym.cost_kernels import CostParameters
 from ikgym.exceptions import InvalidInputError
+from ikgym.kernels import cost as cost_kernels
+from ikgym.kernels.cost import CostParameters
 from ikgym.validation import LARGEST, SMALLEST, FloatArray, Frozen, float_array, number
 
 #: The exponents of the cost do not exceed it.

@@ -12,9 +12,9 @@ from gymnasium.envs.registration import EnvSpec
 
 from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError, ResetNeededError
+from ikgym.kernels.outcome import OBSERVED as OBSERVED
+from ikgym.kernels.outcome import Observation, observation
 from ikgym.options import checked_distance, checked_options
-from ikgym.outcome import OBSERVED as OBSERVED
-from ikgym.outcome import Observation, observation
 from ikgym.scenarios import Preview, Scenario
 from ikgym.scenarios.entering import has_joint_path
 from ikgym.simulator import Simulator

@@ -9,22 +9,22 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ikgym import simulation
 from ikgym.arms.limits import limit_rows
-from ikgym.compilation import announced
 from ikgym.exceptions import InvalidInputError
+from ikgym.kernels import simulation
+from ikgym.kernels.compilation import announced
+from ikgym.kernels.outcome import OBSERVED, Outcome, more_size, observation, outcome, size
+from ikgym.kernels.outcome import Observation as Observation
+from ikgym.kernels.simulation import Constants, State
 from ikgym.memory import afford, of_rows
-from ikgym.nominal_frames import MEMORY, NominalFrames
-from ikgym.outcome import OBSERVED, Outcome, more_size, observation, outcome, size
-from ikgym.outcome import Observation as Observation
 from ikgym.parallel import in_chunks
 from ikgym.plant import step as plant_step
 from ikgym.plant.rows import PlantRows, checked_arm_seeds
-from ikgym.preview import FARTHEST as FARTHEST
-from ikgym.preview import Preview, offsets
 from ikgym.scenarios import Scenario
 from ikgym.scenarios.entering import checked_starts, checked_steps, on_path
-from ikgym.simulation import Constants, State
+from ikgym.scenarios.nominal_frames import MEMORY, NominalFrames
+from ikgym.scenarios.preview import FARTHEST as FARTHEST
+from ikgym.scenarios.preview import Preview, offsets
 from ikgym.trajectories import Trajectory
 from ikgym.validation import FloatArray, shortened, whole_number
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from gymnasium import spaces
 
-from ikgym.preview import Preview, offsets
-from ikgym.random_numbers import CUT
+from ikgym.kernels.random_numbers import CUT
 from ikgym.scenarios import Scenario
+from ikgym.scenarios.preview import Preview, offsets
 from ikgym.validation import FloatArray
 
 # Rounding of sums over an episode and of products of rotations must not leave the box.

@@ -7,8 +7,8 @@ import dataclasses
 import numpy as np
 import numpy.typing as npt
 
-from ikgym import task_kernels
 from ikgym.exceptions import InvalidInputError
+from ikgym.kernels import tasks as task_kernels
 from ikgym.registry import Registry
 from ikgym.validation import FloatArray, Frozen, float_array
 
@@ -66,7 +66,7 @@ class Task(Frozen):
             ``nominal - coordinates``, but for the task ``pose`` the position error in [m], then the rotation
             vector of R* Rᵀ in [rad] (Zhang 2020, eq. 51-54), and for the task ``axis`` the position error, then
             the two components across z* of the rotation vector that takes z to z* by the shortest way, in [rad].
-            Its length is the angle between the axes; see :mod:`ikgym.axis_kernels`. Shape (..., e).
+            Its length is the angle between the axes; see :mod:`ikgym.kernels.axes`. Shape (..., e).
 
         Raises:
             InvalidInputError: A shape is wrong, or a number not finite.

@@ -17,8 +17,8 @@ from gymnasium.vector.utils import batch_space
 from ikgym import scenarios
 from ikgym.env import OPTIONS, RedundantIKEnv, limited
 from ikgym.exceptions import InvalidInputError, ResetNeededError
+from ikgym.kernels.outcome import Observation, Outcome, observation
 from ikgym.options import checked_distance, checked_mask, checked_mode, checked_options, checked_seeds
-from ikgym.outcome import Observation, Outcome, observation
 from ikgym.rows import ArmRow
 from ikgym.scenarios import Preview, Scenario
 from ikgym.scenarios.entering import has_joint_path

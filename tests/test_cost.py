@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ikgym import TrackingCost, cost_kernels
+from ikgym import TrackingCost
 from ikgym.exceptions import InvalidInputError
+from ikgym.kernels import cost as cost_kernels
 
 COSTS = [
     TrackingCost(),

@@ -17,7 +17,7 @@ from stable_baselines3.common.env_checker import check_env as sb3_check_env
 import ikgym
 from ikgym.env import OBSERVED, REPORTED
 from ikgym.exceptions import InvalidInputError, ResetNeededError, UnknownNameError
-from ikgym.outcome import SOMETIMES
+from ikgym.kernels.outcome import SOMETIMES
 from tests.comparison import identical
 from tests.every_scenario import every_scenario
 from tests.spawning import random_env

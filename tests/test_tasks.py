@@ -7,8 +7,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import ikgym
-from ikgym.axis_kernels import SINGULAR
 from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.kernels.axes import SINGULAR
 
 STEP = 1e-6
 TOLERANCE = 2e-8  # of central differences, relative to an arm's reach

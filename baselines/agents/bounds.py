@@ -10,7 +10,7 @@ import numpy as np
 from baselines.policy import Batch, Problem
 from baselines.solvers.quadratic_program.limits import limits_with_braking
 from baselines.solvers.quadratic_program.velocity_box import velocity_box
-from ikgym.jit import kernel
+from ikgym.kernels.jit import kernel
 from ikgym.validation import FloatArray
 
 

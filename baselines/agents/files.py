@@ -16,9 +16,9 @@ from baselines.agents.processing import NetworkLike, Processing
 from baselines.canonical import canonical
 from baselines.files import ResultsError, reading, write
 from baselines.fingerprints import arm_fingerprint, fingerprint
-from ikgym import cost_kernels
 from ikgym.exceptions import InvalidInputError
 from ikgym.files import read_user_file
+from ikgym.kernels import cost as cost_kernels
 from ikgym.scenarios import Scenario
 
 #: The version of the format.

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ikgym.exceptions import InvalidInputError
-from ikgym.jit import kernel
+from ikgym.kernels.jit import kernel
 from ikgym.validation import Frozen, known_name
 
 Singles = npt.NDArray[np.float32]

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ikgym.exceptions import InvalidInputError
-from ikgym.preview import offsets as checked_offsets
+from ikgym.scenarios.preview import offsets as checked_offsets
 from ikgym.validation import Frozen, known_names
 
 

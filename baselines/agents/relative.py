@@ -14,8 +14,8 @@ from baselines.agents.network import Network, forward_rows
 from baselines.agents.processing import Processing, check_offsets
 from baselines.policy import Batch, Problem
 from ikgym.exceptions import InvalidInputError
-from ikgym.jit import kernel
-from ikgym.outcome import OBSERVED
+from ikgym.kernels.jit import kernel
+from ikgym.kernels.outcome import OBSERVED
 from ikgym.rl.feature_kernels import observe_rows
 from ikgym.rl.twists import shown_joints, twist_size
 from ikgym.validation import FloatArray, known_name, number

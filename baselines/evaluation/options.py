@@ -12,8 +12,8 @@ from baselines.evaluation.export import formats
 from baselines.evaluation.foreign import Wrap
 from baselines.workers import Workers
 from ikgym.exceptions import InvalidInputError
-from ikgym.preview import offsets
 from ikgym.scenarios import Preview
+from ikgym.scenarios.preview import offsets
 from ikgym.validation import whole_number
 
 

@@ -28,10 +28,10 @@ from baselines.fingerprints import fingerprint
 from baselines.oracle import best_known
 from baselines.oracle.best_known import MEANINGLESS
 from baselines.workers import TOLERANCE, WorkerError, Workers, finished
-from ikgym.compilation import logger
 from ikgym.exceptions import InvalidInputError
-from ikgym.preview import furthest
+from ikgym.kernels.compilation import logger
 from ikgym.scenarios import Preview, Scenario
+from ikgym.scenarios.preview import furthest
 
 #: Most episodes that are played side by side: their records are in memory until all of them are finished.
 MOST = 64

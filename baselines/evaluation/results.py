@@ -24,8 +24,8 @@ from baselines.evaluation.metrics import Row
 from baselines.evaluation.options import Options
 from baselines.evaluation.trajectory_log import trajectory_log
 from baselines.files import ResultsError, check_flags, from_json, read_arrays, read_json, reading, write, write_json
-from ikgym.preview import furthest
 from ikgym.scenarios import SPLITS
+from ikgym.scenarios.preview import furthest
 
 #: The columns of results.csv, which are the keys of a row in results.json.
 COLUMNS = tuple(field.name for field in dataclasses.fields(Row))

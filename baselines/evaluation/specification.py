@@ -15,8 +15,8 @@ from baselines.evaluation.foreign import ForeignPolicy, Predictor, Wrap
 from baselines.fingerprints import same
 from baselines.policy import Problem, SolverPolicy
 from ikgym.exceptions import InvalidInputError, MissingDependencyError
-from ikgym.preview import offsets
 from ikgym.scenarios import Preview, Scenario
+from ikgym.scenarios.preview import offsets
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -23,7 +23,7 @@ from baselines.evaluation.summary import Summary, by_seed, summarise, times
 from baselines.oracle import best_known
 from baselines.spec import parse_policy
 from ikgym.exceptions import InvalidInputError
-from ikgym.preview import furthest
+from ikgym.scenarios.preview import furthest
 from ikgym.validation import FloatArray
 
 #: One line of a table: the name of each column and its value.

@@ -15,10 +15,10 @@ from baselines.solvers.receding_horizon.newton.grid import Grid
 from baselines.solvers.receding_horizon.newton.workspace import PathProblem
 from baselines.solvers.receding_horizon.problem_data import ProblemData
 from ikgym.exceptions import InvalidInputError
-from ikgym.outcome import observation
+from ikgym.kernels.outcome import observation
+from ikgym.kernels.simulation import Outcome
 from ikgym.plant import Plant
 from ikgym.scenarios import Scenario
-from ikgym.simulation import Outcome
 from ikgym.validation import FloatArray, whole_number
 
 # Knots at the beginning that a coarse grid has, too: an arm that starts far off its trajectory gets there in a few.

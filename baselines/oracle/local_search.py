@@ -17,8 +17,8 @@ from baselines.solvers.receding_horizon.newton.interior_point.excess import cost
 from baselines.solvers.receding_horizon.newton.interior_point.minimise import LEFT, minimise_path
 from baselines.solvers.receding_horizon.newton.minimise import NewtonSettings
 from baselines.solvers.receding_horizon.newton.workspace import knot_workspace, newton_workspace
-from ikgym import task_kernels
-from ikgym.jit import inlined, kernel
+from ikgym.kernels import tasks as task_kernels
+from ikgym.kernels.jit import inlined, kernel
 
 # Newton steps of a branch, and the relative precision that ends them before.
 STEPS, PRECISION = 50, 1e-4

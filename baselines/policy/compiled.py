@@ -14,7 +14,7 @@ from baselines.policy.observations import Parts, not_finite
 from baselines.policy.problem import Batch, Memory, Problem, Solution
 from baselines.policy.solver import SolverPolicy, compiled_classes
 from baselines.policy_kernels import REFUSED, NoMemory, entry, model_block, parts_of
-from ikgym.outcome import OBSERVED
+from ikgym.kernels.outcome import OBSERVED
 from ikgym.validation import FloatArray
 
 

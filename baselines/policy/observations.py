@@ -11,9 +11,9 @@ import numpy.typing as npt
 
 from baselines.policy.problem import Batch, Problem
 from ikgym.exceptions import InvalidInputError
-from ikgym.outcome import OBSERVED, SOMETIMES
-from ikgym.preview import furthest
+from ikgym.kernels.outcome import OBSERVED, SOMETIMES
 from ikgym.scenarios import Preview
+from ikgym.scenarios.preview import furthest
 from ikgym.simulator import Observation
 from ikgym.validation import FloatArray
 

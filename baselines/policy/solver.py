@@ -18,8 +18,8 @@ from baselines.policy.observations import ObservationReader, Parts, as_batch, no
 from baselines.policy.problem import Batch, Memory, Problem, Solution
 from baselines.policy.state import REPORTED, Report, joined, pack, remembered, replace_rows
 from baselines.policy_kernels import all_finite, cut_rows
-from ikgym.compilation import announced
-from ikgym.outcome import OBSERVED
+from ikgym.kernels.compilation import announced
+from ikgym.kernels.outcome import OBSERVED
 from ikgym.parallel import in_chunks
 from ikgym.scenarios import Preview, Scenario
 from ikgym.simulator import Observation

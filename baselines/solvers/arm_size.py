@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from ikgym import task_kernels
 from ikgym.arms import Arm
+from ikgym.kernels import tasks as task_kernels
 from ikgym.tasks import Task
 from ikgym.validation import FloatArray
 

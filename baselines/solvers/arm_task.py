@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ikgym import task_kernels
-from ikgym.jit import inlined, kernel
+from ikgym.kernels import tasks as task_kernels
+from ikgym.kernels.jit import inlined, kernel
 
 
 @inlined

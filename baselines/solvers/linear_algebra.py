@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from ikgym.jit import inlined, kernel
+from ikgym.kernels.jit import inlined, kernel
 
 # Pivots below this share of the largest diagonal element are rounding: J has lost rank, or nearly so, and λ is too
 # small to count. Singular values tell which; solving on would amplify the rounding.

@@ -19,8 +19,8 @@ from baselines.agents.relative import Relative
 from baselines.policy import Problem
 from baselines.training.networks import runtime
 from ikgym.exceptions import InvalidInputError
-from ikgym.preview import offsets
 from ikgym.sb3 import LearningVecEnv
+from ikgym.scenarios.preview import offsets
 
 #: Observations for which the actions of model and agent are compared, and the largest difference.
 _COMPARED, _NEAR = 64, 1e-4

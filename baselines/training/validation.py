@@ -28,9 +28,9 @@ from baselines.fingerprints import fingerprint
 from baselines.policy import Problem
 from baselines.spec import parse_policy
 from ikgym import scenarios, tasks
-from ikgym.outcome import observation
+from ikgym.kernels.outcome import observation
+from ikgym.kernels.simulation import Outcome
 from ikgym.scenarios import Preview, Scenario
-from ikgym.simulation import Outcome
 from ikgym.validation import FloatArray
 
 #: The file of the reference costs, the policy that they are of, and the scenario, tasks and number of episodes.

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ikgym.rotations import rodrigues, rotation_vector
+from ikgym.kernels.rotations import rodrigues, rotation_vector
 from ikgym.validation import FloatArray
 
 

@@ -14,7 +14,7 @@ from baselines.viewer.readings import FREE, Colour, Reading, share_colour
 from baselines.viewer.replay import size
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
-from ikgym.rotations import quaternion
+from ikgym.kernels.rotations import quaternion
 from ikgym.validation import FloatArray
 
 # Radii and half a length, as shares of the arm's reach.

@@ -14,9 +14,9 @@ from baselines.status import Status
 from baselines.viewer.approach import Approach
 from baselines.viewer.replay import Stage
 from ikgym.exceptions import InvalidInputError
-from ikgym.preview import offsets
-from ikgym.rotations import geodesic_angle
+from ikgym.kernels.rotations import geodesic_angle
 from ikgym.scenarios import Scenario
+from ikgym.scenarios.preview import offsets
 from ikgym.validation import FloatArray
 
 

@@ -13,8 +13,8 @@ from baselines.viewer.arms import Cylinders, DrawnArm
 from baselines.viewer.readings import Colour
 from baselines.viewer.replay import size
 from baselines.viewer.session import Mode, Session, Shown
+from ikgym.kernels.rotations import quaternion
 from ikgym.rendering.style import GREEN, PALE_GREEN, stride, thinned
-from ikgym.rotations import quaternion
 from ikgym.validation import FloatArray
 
 #: Adds an arm to the scene, by the name of the frame of its base and its colour.

@@ -7,7 +7,7 @@ from typing import Any
 import casadi
 
 from ikgym.arms import Arm
-from ikgym.axis_kernels import SINGULAR
+from ikgym.kernels.axes import SINGULAR
 
 
 def forward(arm: Arm, q: Any) -> tuple[Any, Any]:

@@ -17,9 +17,10 @@ import numpy as np
 
 from baselines.policy import Problem
 from benchmarks.rivals.numpy_horizon import Horizon, Plan, plan_cost
-from ikgym import cost_kernels, task_kernels
-from ikgym.jit import kernel
-from ikgym.kinematics import forward, forward_and_jacobian
+from ikgym.kernels import cost as cost_kernels
+from ikgym.kernels import tasks as task_kernels
+from ikgym.kernels.jit import kernel
+from ikgym.kernels.kinematics import forward, forward_and_jacobian
 from ikgym.validation import FloatArray
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from baselines.policy import Problem
 from ikgym.arms import Arm
-from ikgym.axis_kernels import SINGULAR
+from ikgym.kernels.axes import SINGULAR
 from ikgym.validation import FloatArray
 
 

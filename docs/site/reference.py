@@ -21,7 +21,7 @@ PAGES: dict[str, dict[str, tuple[str, ...]]] = {
         "ikgym.trajectories.paths": (),
         "ikgym.scenarios": (),
         "ikgym.problems": (),
-        "ikgym.rotations": (),
+        "ikgym.kernels.rotations": (),
         "ikgym.exceptions": (),
         "ikgym.sb3": (),
     },

@@ -11,10 +11,10 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ikgym import kinematics
 from ikgym.arms import checks
 from ikgym.exceptions import InvalidInputError
-from ikgym.kinematics import Chain
+from ikgym.kernels import kinematics
+from ikgym.kernels.kinematics import Chain
 from ikgym.validation import LARGEST, FloatArray, Frozen, float_array, frozen_array, rotation_matrix, shortened
 
 

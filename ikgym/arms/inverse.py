@@ -15,10 +15,10 @@ import numpy as np
 import numpy.typing as npt
 
 from ikgym import parallel
-from ikgym.compilation import announced
 from ikgym.exceptions import InvalidInputError
-from ikgym.inverse_kinematics import Ranges, Settings, inverse_rows
-from ikgym.kinematics import Chain
+from ikgym.kernels.compilation import announced
+from ikgym.kernels.inverse_kinematics import Ranges, Settings, inverse_rows
+from ikgym.kernels.kinematics import Chain
 from ikgym.validation import BoolArray, FloatArray, float_array, number, rotation_matrices, whole_number
 
 # 1 rad weighs as much as this share of the arm's length; shares from 0.1 to 0.8 differ by less than a fifth.

@@ -49,7 +49,7 @@ def middle(arm: Arm) -> tuple[npt.NDArray[np.bool_], FloatArray]:
 
 
 def limit_rows(arm: Arm, fastest: FloatArray, dt: float) -> FloatArray:
-    """The limits of an arm as kernels take them, see :mod:`ikgym.limit_kernels`.
+    """The limits of an arm as kernels take them, see :mod:`ikgym.kernels.limits`.
 
     Args:
         arm: The arm.

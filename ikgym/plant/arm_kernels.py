@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ikgym.jit import inlined, kernel
-from ikgym.random_numbers import normal, share, stream
+from ikgym.kernels.jit import inlined, kernel
+from ikgym.kernels.random_numbers import normal, share, stream
 
 Floats = npt.NDArray[np.float64]
 
@@ -45,7 +45,7 @@ class Spread(NamedTuple):
 
 
 class Arms(NamedTuple):
-    """N drawn arms, as :class:`ikgym.kinematics.Chain` has them: each without its payload, then with it.
+    """N drawn arms, as :class:`ikgym.kernels.kinematics.Chain` has them: each without its payload, then with it.
 
     Attributes:
         offsets: Shape (N, 2, n, 3).

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ikgym.jit import inlined
-from ikgym.random_numbers import uniform
+from ikgym.kernels.jit import inlined
+from ikgym.kernels.random_numbers import uniform
 
 
 @inlined

@@ -11,9 +11,9 @@ import numpy as np
 
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
+from ikgym.kernels.random_numbers import CUT
 from ikgym.plant import checks, severity
 from ikgym.plant.checks import Drawn, PerJoint
-from ikgym.random_numbers import CUT
 from ikgym.validation import LARGEST, FloatArray, Frozen, number, per_joint, shortened, whole_number
 
 #: What is one number for all joints, or one a joint; and which of them may be negative.

@@ -10,14 +10,14 @@ import numpy.typing as npt
 
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
-from ikgym.kinematics import Chain
+from ikgym.kernels.kinematics import Chain
+from ikgym.kernels.random_numbers import stream
 from ikgym.plant.arm_kernels import ARM_STREAMS
 from ikgym.plant.checks import PerJoint
 from ikgym.plant.draw import Draws, arm_key, episode_key
 from ikgym.plant.plant import Plant
 from ikgym.plant.sensor_kernels import STREAMS
 from ikgym.plant.step import Drives, PlantState, Sensors
-from ikgym.random_numbers import stream
 from ikgym.validation import FloatArray, whole_number
 
 # Numbers of the streams that other noises of an episode come from: more than there are effects.

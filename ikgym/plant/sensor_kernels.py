@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from ikgym import task_kernels
-from ikgym.jit import inlined, kernel
-from ikgym.random_numbers import normal, share
+from ikgym.kernels import tasks as task_kernels
+from ikgym.kernels.jit import inlined, kernel
+from ikgym.kernels.random_numbers import normal, share
 
 # The streams of the key of an episode's noises. The first is the key itself.
 NOISE, Q_NOISE, POSITION, ROTATION, MISSING = range(5)

@@ -7,13 +7,13 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ikgym.jit import inlined, kernel, uncounted
-from ikgym.kinematics import Chain, forward
-from ikgym.limit_kernels import FASTEST, LOWER, SLACK, UPPER, driven, stopped, within
-from ikgym.outcome import more_parts, parts, size
+from ikgym.kernels.jit import inlined, kernel, uncounted
+from ikgym.kernels.kinematics import Chain, forward
+from ikgym.kernels.limits import FASTEST, LOWER, SLACK, UPPER, driven, stopped, within
+from ikgym.kernels.outcome import more_parts, parts, size
+from ikgym.kernels.simulation import Floats, Integers, commanded, show_row
 from ikgym.plant.drive_kernels import counter_of, disturbed, engaged, filtered, remembered
 from ikgym.plant.sensor_kernels import NOISE, measure_pose, measure_q
-from ikgym.simulation import Floats, Integers, commanded, show_row
 
 _parts, _more_parts, _size = inlined(parts), inlined(more_parts), inlined(size)
 
@@ -78,15 +78,15 @@ class PlantState(NamedTuple):
 
 @kernel
 def step(constants, cost, drives, sensors, arms, state, plant, numbers, active, moving, start, stop):
-    """Moves rows, and observes them, as :func:`ikgym.simulation.step` does.
+    """Moves rows, and observes them, as :func:`ikgym.kernels.simulation.step` does.
 
     Args:
-        constants: A :class:`ikgym.simulation.Constants`.
-        cost: A :class:`ikgym.cost_kernels.CostParameters`.
+        constants: A :class:`ikgym.kernels.simulation.Constants`.
+        cost: A :class:`ikgym.kernels.cost.CostParameters`.
         drives: A :class:`Drives`.
         sensors: A :class:`Sensors`.
         arms: The rows' own, an :class:`Arms`.
-        state: A :class:`ikgym.simulation.State`, changed in place.
+        state: A :class:`ikgym.kernels.simulation.State`, changed in place.
         plant: A :class:`PlantState`, changed in place.
         numbers: The block of an outcome, written in place.
         active: The rows that are meant. Shape (N,).

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from ikgym import task_kernels
-from ikgym.jit import kernel
-from ikgym.kinematics import forward_and_jacobian
+from ikgym.kernels import tasks as task_kernels
+from ikgym.kernels.jit import kernel
+from ikgym.kernels.kinematics import forward_and_jacobian
 from ikgym.rl.twists import is_turned, turn, twist, twist_size
 
 #: Added to the speed of the reference, in [m/s], [rad/s] or [1/s], since a reference at rest has no scale.
@@ -32,7 +32,7 @@ def mean_twists(kind, dt, offsets, nominal, error, out):
     """The mean velocities between reference poses ahead.
 
     Args:
-        kind: Of task coordinates, see :mod:`ikgym.task_kernels`.
+        kind: Of task coordinates, see :mod:`ikgym.kernels.tasks`.
         dt: Δt in [s].
         offsets: Shape (p,).
         nominal: Reference task coordinates at the offsets. Shape (p, m).
@@ -152,7 +152,7 @@ def along_joints(kind, chain, metres, q, due, rotation, position, jacobians, out
 
     Args:
         kind: Of task coordinates.
-        chain: The arm's model, see :class:`ikgym.kinematics.Chain`.
+        chain: The arm's model, see :class:`ikgym.kernels.kinematics.Chain`.
         metres: Weight of 1 rad, see :func:`radian`.
         q: Joint coordinates in [rad] or [m]. Shape (n,).
         due: As :func:`command_unit` gives it. Shape (w,).
@@ -182,7 +182,7 @@ def seen_jacobian(kind, chain, q, joints, rotation, position, out):
 
     Args:
         kind: Of task coordinates; not skew ones, which are no twists.
-        chain: The arm's model, see :class:`ikgym.kinematics.Chain`.
+        chain: The arm's model, see :class:`ikgym.kernels.kinematics.Chain`.
         q: Joint coordinates in [rad] or [m]. Shape (n,).
         joints: Scratch. Shape (n,).
         rotation: Scratch. Shape (3, 3).
@@ -201,7 +201,7 @@ def observe_rows(kind, chain, dt, offsets, furthest, q, qdot, pose, nominal, rem
 
     Args:
         kind: Of task coordinates.
-        chain: The arm's model, see :class:`ikgym.kinematics.Chain`.
+        chain: The arm's model, see :class:`ikgym.kernels.kinematics.Chain`.
         dt: Δt in [s].
         offsets: Steps ahead at which the reference is shown. Shape (p,).
         furthest: Bound of |v̂|.

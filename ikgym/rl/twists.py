@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-from ikgym import task_kernels
-from ikgym.axis_kernels import across
-from ikgym.jit import inlined, kernel
+from ikgym.kernels import tasks as task_kernels
+from ikgym.kernels.axes import across
+from ikgym.kernels.jit import inlined, kernel
 
 
 @inlined
@@ -44,7 +44,7 @@ def twist(kind, nominal, coordinates, error, out):
     """The motion from one pose to another.
 
     Args:
-        kind: Of task coordinates, see :mod:`ikgym.task_kernels`.
+        kind: Of task coordinates, see :mod:`ikgym.kernels.tasks`.
         nominal: The other one's coordinates. Shape (m,).
         coordinates: Those of the first. Shape (m,).
         error: Scratch. Shape (6,).

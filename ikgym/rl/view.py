@@ -10,7 +10,7 @@ import numpy.typing as npt
 from gymnasium import spaces
 
 from ikgym.exceptions import InvalidInputError
-from ikgym.outcome import Observation
+from ikgym.kernels.outcome import Observation
 from ikgym.rl.feature_kernels import CONTEXT, FASTEST, MOST, observe_rows, unit_rows
 from ikgym.rl.twists import is_turned, shown_joints, twist_size
 from ikgym.scenarios import Scenario

@@ -8,7 +8,7 @@ import gymnasium as gym
 import numpy as np
 from gymnasium.utils import RecordConstructorArgs
 
-from ikgym.outcome import Observation
+from ikgym.kernels.outcome import Observation
 from ikgym.rl.stages import FeatureStage, HistoryStage, LogStage, Stage, UnitStage, checked_actions, one_row
 from ikgym.rl.view import FURTHEST, Features
 

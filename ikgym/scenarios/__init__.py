@@ -17,10 +17,10 @@ from collections.abc import Callable
 
 from ikgym import problems
 from ikgym.exceptions import InvalidInputError
-from ikgym.preview import Preview
 from ikgym.registry import Registry
 from ikgym.scenarios import files
 from ikgym.scenarios.importing import imported
+from ikgym.scenarios.preview import Preview
 from ikgym.scenarios.reachability import Gap, gaps
 from ikgym.scenarios.scenario import Scenario
 from ikgym.trajectories import PublishedPath

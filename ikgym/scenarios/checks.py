@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from ikgym import task_kernels
 from ikgym.arms import Arm
 from ikgym.cost import TrackingCost
 from ikgym.exceptions import InvalidInputError
+from ikgym.kernels import tasks as task_kernels
 from ikgym.memory import afford, gib
 from ikgym.plant import Plant
 from ikgym.tasks import Task

@@ -10,9 +10,9 @@ from gymnasium.utils import seeding
 
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
-from ikgym.preview import Preview, furthest
+from ikgym.kernels.simulation import nominal_rows
 from ikgym.scenarios import checks
-from ikgym.simulation import nominal_rows
+from ikgym.scenarios.preview import Preview, furthest
 from ikgym.tasks import Task
 from ikgym.trajectories import Trajectory, frames_of
 from ikgym.validation import FloatArray

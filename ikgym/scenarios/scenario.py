@@ -15,7 +15,7 @@ from ikgym.arms import Arm
 from ikgym.arms.limits import farthest, velocity_scale
 from ikgym.cost import TrackingCost
 from ikgym.exceptions import InvalidInputError
-from ikgym.kinematics import Chain
+from ikgym.kernels.kinematics import Chain
 from ikgym.plant import DrawnPlant, Plant
 from ikgym.plant.draw import Draws, arm_key, episode_key
 from ikgym.scenarios import checks, files, starts

@@ -6,7 +6,7 @@ import numpy as np
 
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
-from ikgym.rotations import geodesic_angle
+from ikgym.kernels.rotations import geodesic_angle
 from ikgym.validation import FloatArray, read_only
 
 

@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ikgym.exceptions import InvalidInputError
-from ikgym.splines import CubicSpline
 from ikgym.trajectories.paths import Path
+from ikgym.trajectories.splines import CubicSpline
 from ikgym.validation import LARGEST, FloatArray, Frozen, float_array, frozen_array, read_only, rotation_matrix
 
 # Quaternions of files are rounded: so far may their length be from 1.

@@ -8,7 +8,7 @@ import numpy as np
 
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
-from ikgym.rotations import rodrigues, rotation_vector
+from ikgym.kernels.rotations import rodrigues, rotation_vector
 from ikgym.trajectories.trajectory import Trajectory
 from ikgym.validation import LARGEST, SMALLEST, FloatArray, frozen_array, number, rotation_matrix
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
-from ikgym.splines import CubicSpline
 from ikgym.trajectories.orientations import aligned_quaternions, matrices
+from ikgym.trajectories.splines import CubicSpline
 from ikgym.trajectories.trajectory import Trajectory
 from ikgym.validation import LARGEST, FloatArray, frozen_array
 

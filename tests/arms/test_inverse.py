@@ -5,8 +5,8 @@ from ikgym import arms
 from ikgym.arms import Arm
 from ikgym.arms.inverse import LENGTH_OF_RADIAN
 from ikgym.exceptions import InvalidInputError
-from ikgym.inverse_kinematics import Ranges, Work, _step
-from ikgym.rotations import geodesic_angle
+from ikgym.kernels.inverse_kinematics import Ranges, Work, _step
+from ikgym.kernels.rotations import geodesic_angle
 from tests.arms.drawing import postures
 
 EVERY = arms.names()

@@ -2,7 +2,7 @@ import pickle
 
 import ikgym
 from baselines.fingerprints import episode_hash, fingerprint, same, set_hash
-from ikgym import cost_kernels
+from ikgym.kernels import cost as cost_kernels
 
 
 def fast():

@@ -26,7 +26,7 @@ from baselines.status import Status
 from baselines.wrapper import Wrapper
 from ikgym import parallel
 from ikgym.exceptions import InvalidInputError, UnknownNameError
-from ikgym.outcome import OBSERVED
+from ikgym.kernels.outcome import OBSERVED
 from ikgym.plant import DrawnPlant
 from ikgym.plant.draw import Draws
 from ikgym.plant.rows import PlantRows
@@ -462,7 +462,7 @@ def test_arrays_stay_read_only_in_copies(name):
 
 def test_long_compilation_of_a_policy_is_announced(monkeypatch, caplog):
     monkeypatch.setattr("baselines.policy.solver.compiled_classes", set())
-    monkeypatch.setattr(ikgym.compilation.announced.__wrapped__, "__defaults__", (0.01,))
+    monkeypatch.setattr(ikgym.kernels.compilation.announced.__wrapped__, "__defaults__", (0.01,))
 
     class Slow(Broken):
         name = "slow"

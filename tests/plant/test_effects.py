@@ -7,7 +7,7 @@ import pytest
 
 import ikgym
 from ikgym import Plant
-from ikgym.rotations import geodesic_angle
+from ikgym.kernels.rotations import geodesic_angle
 from tests.comparison import identical
 from tests.limited import limited
 from tests.plant.effects import ALL, panda

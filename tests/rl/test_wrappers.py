@@ -123,7 +123,7 @@ def test_what_joints_can_do_is_their_column_of_the_jacobian_times_what_is_due(na
         jacobian = scenario.task.jacobian(rotation, jacobian)
     due, n = features[:6].reshape(2, 3), scenario.joints
     if turned:
-        due = due @ ikgym.rotations.rodrigues(scenario.model.chain.axes[0], seen["q"][0]).T
+        due = due @ ikgym.kernels.rotations.rodrigues(scenario.model.chain.axes[0], seen["q"][0]).T
     unit = radian(scenario.model.chain)
     products = np.concatenate([jacobian[:3].T @ due[0] / unit**2, jacobian[3:].T @ due[1]]).clip(-MOST, MOST)
     assert np.allclose(features[7 : 7 + 2 * n], products, atol=1e-6)

@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.solvers.linear_algebra import damped_gram, ldl, ldl_scaled_inverse
-from ikgym.jit import inlined, kernel
+from ikgym.kernels.jit import inlined, kernel
 from ikgym.rl.feature_kernels import seen_jacobian
 from ikgym.rl.twists import is_turned, twist_size
 

@@ -7,7 +7,7 @@ import numpy as np
 from baselines.agents.bilinear.damped_kernels import held_rows
 from baselines.agents.bilinear.rates import metric_rows, rate_rows
 from baselines.agents.network import forward_rows
-from ikgym.jit import inlined, kernel
+from ikgym.kernels.jit import inlined, kernel
 from ikgym.rl.feature_kernels import context_rows, mean_twists
 from ikgym.rl.twists import is_turned, turn, turn_gradient, twist, twist_size
 

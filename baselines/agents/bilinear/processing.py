@@ -13,9 +13,9 @@ from baselines.agents.bilinear.kernels import law_rows
 from baselines.agents.network import Network
 from baselines.agents.processing import Processing, check_offsets
 from baselines.policy import Batch, Problem
-from ikgym import task_kernels
 from ikgym.exceptions import InvalidInputError
-from ikgym.outcome import OBSERVED
+from ikgym.kernels import tasks as task_kernels
+from ikgym.kernels.outcome import OBSERVED
 from ikgym.rl.twists import shown_joints, twist_size
 from ikgym.validation import FloatArray, number
 

@@ -19,10 +19,10 @@ import math
 import numpy as np
 
 from baselines.solvers.linear_algebra import damped_step
-from ikgym import task_kernels
-from ikgym.jit import kernel
-from ikgym.kinematics import forward_and_jacobian
-from ikgym.limit_kernels import within
+from ikgym.kernels import tasks as task_kernels
+from ikgym.kernels.jit import kernel
+from ikgym.kernels.kinematics import forward_and_jacobian
+from ikgym.kernels.limits import within
 from ikgym.rl.feature_kernels import CONTEXT
 from ikgym.rl.twists import shown_joints, twist, twist_size
 

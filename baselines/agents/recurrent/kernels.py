@@ -10,9 +10,9 @@ from baselines.agents.recurrent.network import step_network
 from baselines.solvers.adaptive.calibrated import absorb
 from baselines.solvers.adaptive.chain_parameters import changed_chain, parameter_twists
 from baselines.solvers.adaptive.deviation import deviation_between
-from ikgym import task_kernels
-from ikgym.jit import kernel
-from ikgym.kinematics import forward
+from ikgym.kernels import tasks as task_kernels
+from ikgym.kernels.jit import kernel
+from ikgym.kernels.kinematics import forward
 
 #: Number of features: the six components of the innovation; its components of position and orientation along the
 #: change by a payload; the logarithms of its mean square and of the expected mean square, of position and orientation

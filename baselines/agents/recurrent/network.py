@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from baselines.agents.network import Singles, check_tensors, multiply_add
 from ikgym.exceptions import InvalidInputError
-from ikgym.jit import inlined, kernel
+from ikgym.kernels.jit import inlined, kernel
 from ikgym.validation import Frozen
 
 #: The parts of a layer: from its inputs and from its own state to reset gate, update gate and candidate.

@@ -21,8 +21,8 @@ from baselines.solvers.adaptive.corrected import Corrected
 from baselines.solvers.adaptive.measurements import Measurement
 from baselines.spec import parse_policy
 from baselines.wrapper import policies_in
-from ikgym import task_kernels
 from ikgym.exceptions import InvalidInputError
+from ikgym.kernels import tasks as task_kernels
 from ikgym.validation import FloatArray, flag
 
 #: The agent that comes with the package.

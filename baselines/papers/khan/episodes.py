@@ -11,7 +11,7 @@ from baselines.papers.paper import Figures
 from baselines.papers.runs import Runs
 from baselines.status import Status
 from ikgym import Plant
-from ikgym.rotations import rotation_vector
+from ikgym.kernels.rotations import rotation_vector
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray
 

@@ -46,7 +46,7 @@ from baselines.solvers.levenberg_marquardt.damping_parameters import typical_lin
 from baselines.status import Status
 from ikgym import Plant
 from ikgym.arms import Arm
-from ikgym.rotations import rodrigues, rotation_vector
+from ikgym.kernels.rotations import rodrigues, rotation_vector
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray
 

@@ -12,9 +12,9 @@ from baselines.policy import Memory
 from baselines.solvers.arm_task import task_shift
 from baselines.solvers.resolved_rate.base import APPLIED, NominalMemory, finish
 from baselines.solvers.resolved_rate.dls import DampedLeastSquares, damped_rows
-from ikgym import task_kernels
-from ikgym.jit import kernel
-from ikgym.kinematics import forward_and_jacobian
+from ikgym.kernels import tasks as task_kernels
+from ikgym.kernels.jit import kernel
+from ikgym.kernels.kinematics import forward_and_jacobian
 from ikgym.validation import FloatArray, known_name, number
 
 LEARNS = ("correction", "jacobian")

@@ -14,10 +14,10 @@ from baselines.solvers.adaptive.corrected import Corrected
 from baselines.solvers.adaptive.deviation import deviation_between
 from baselines.solvers.adaptive.kalman import gain_of
 from baselines.solvers.adaptive.measurements import Measurement
-from ikgym import task_kernels
 from ikgym.exceptions import InvalidInputError
-from ikgym.jit import kernel
-from ikgym.kinematics import forward
+from ikgym.kernels import tasks as task_kernels
+from ikgym.kernels.jit import kernel
+from ikgym.kernels.kinematics import forward
 from ikgym.validation import FloatArray, number
 
 #: Second derivatives of a pose by joint zeros and tilts: those of an arm of some 1 m, in [1/m] and [1/rad].

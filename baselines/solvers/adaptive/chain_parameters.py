@@ -11,9 +11,9 @@ import math
 
 import numpy as np
 
-from ikgym.axis_kernels import across
-from ikgym.jit import inlined, kernel
-from ikgym.kinematics import Chain
+from ikgym.kernels.axes import across
+from ikgym.kernels.jit import inlined, kernel
+from ikgym.kernels.kinematics import Chain
 
 
 @kernel

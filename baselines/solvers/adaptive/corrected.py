@@ -13,9 +13,9 @@ from baselines.policy import Batch, Memory, Solution
 from baselines.solvers.adaptive.deviation import SIZE, add_deviation
 from baselines.solvers.adaptive.measurements import Measurement, nothing_measured, recall
 from baselines.wrapper import NamedWrapper
-from ikgym.jit import kernel
-from ikgym.preview import furthest
-from ikgym.task_kernels import pose_rows
+from ikgym.kernels.jit import kernel
+from ikgym.kernels.tasks import pose_rows
+from ikgym.scenarios.preview import furthest
 from ikgym.validation import FloatArray, number, whole_number
 
 

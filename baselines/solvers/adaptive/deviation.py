@@ -11,11 +11,11 @@ import math
 
 import numpy as np
 
-from ikgym import task_kernels
-from ikgym.axis_kernels import across
-from ikgym.jit import inlined, kernel
-from ikgym.rotations import rodrigues, rotation_vector
-from ikgym.task_kernels import AXIS, MATRIX, POSE, POSITION, SKEW
+from ikgym.kernels import tasks as task_kernels
+from ikgym.kernels.axes import across
+from ikgym.kernels.jit import inlined, kernel
+from ikgym.kernels.rotations import rodrigues, rotation_vector
+from ikgym.kernels.tasks import AXIS, MATRIX, POSE, POSITION, SKEW
 
 SIZE = 6
 
@@ -44,7 +44,7 @@ def add_deviation(kind, deviation, sign, coordinates, out):
     """Moves task coordinates by a deviation, or back.
 
     Args:
-        kind: Of task coordinates, see :mod:`ikgym.task_kernels`.
+        kind: Of task coordinates, see :mod:`ikgym.kernels.tasks`.
         deviation: Shape (6,).
         sign: 1 to move them, -1 to move them back.
         coordinates: Shape (p, m).

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ikgym.jit import inlined, kernel
+from ikgym.kernels.jit import inlined, kernel
 from ikgym.validation import BoolArray, FloatArray, IntArray
 
 #: How much of a residual stays from step to step: what drifts, such as a bias, is no sign of a delay.

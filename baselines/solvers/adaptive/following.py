@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from baselines.solvers.adaptive.drives import mixture
-from ikgym.jit import kernel
-from ikgym.limit_kernels import applied
+from ikgym.kernels.jit import kernel
+from ikgym.kernels.limits import applied
 from ikgym.validation import FloatArray
 
 #: What share of the largest acceleration is spent to take back an error.
@@ -39,7 +39,7 @@ def move_rows(limits, dt, wanted, q, qdot):
     """Moves arms that have limits, but no delay and no lag.
 
     Args:
-        limits: See :func:`ikgym.limit_kernels.applied`; shape (0, n) where there are none.
+        limits: See :func:`ikgym.kernels.limits.applied`; shape (0, n) where there are none.
         dt: Δt in [s].
         wanted: Joint velocities in [rad/s] or [m/s]. Shape (B, n).
         q: Joint coordinates in [rad] or [m], changed in place. Shape (B, n).

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ikgym.jit import kernel
+from ikgym.kernels.jit import kernel
 
 
 @kernel

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.policy import Batch
-from ikgym.jit import kernel
+from ikgym.kernels.jit import kernel
 from ikgym.validation import FloatArray
 
 

@@ -12,9 +12,9 @@ from baselines.policy import Batch
 from baselines.solvers.adaptive.corrected import Corrected
 from baselines.solvers.adaptive.deviation import SIZE, missing_deviation, move_deviation
 from baselines.solvers.adaptive.measurements import Measurement
-from ikgym import task_kernels
-from ikgym.jit import kernel
-from ikgym.kinematics import forward
+from ikgym.kernels import tasks as task_kernels
+from ikgym.kernels.jit import kernel
+from ikgym.kernels.kinematics import forward
 from ikgym.validation import FloatArray, number
 
 

@@ -16,8 +16,8 @@ from baselines.solvers.adaptive.following import Servo, follow_rows, move_rows
 from baselines.wrapper import NamedWrapper
 from ikgym.arms.limits import limit_rows
 from ikgym.exceptions import InvalidInputError
-from ikgym.preview import furthest, offsets
-from ikgym.task_kernels import pose_rows
+from ikgym.kernels.tasks import pose_rows
+from ikgym.scenarios.preview import furthest, offsets
 from ikgym.validation import FloatArray, number, whole_number
 
 #: By how much neighbouring lags differ.

@@ -17,10 +17,11 @@ from baselines.solvers.arm_task import pose_arrays
 from baselines.solvers.fixed_point.rotations import adaptive_deform, plane, turn
 from baselines.solvers.linear_algebra import dot, transposed_product
 from baselines.status import Status
-from ikgym import arms, task_kernels, tasks
+from ikgym import arms, tasks
 from ikgym.exceptions import InvalidInputError
-from ikgym.jit import kernel
-from ikgym.kinematics import forward_and_jacobian
+from ikgym.kernels import tasks as task_kernels
+from ikgym.kernels.jit import kernel
+from ikgym.kernels.kinematics import forward_and_jacobian
 from ikgym.validation import FloatArray, as_given, known_name, number, per_joint
 
 #: What 𝒩 turns, with the numbers that the kernel knows.

@@ -6,7 +6,7 @@ import math
 from typing import NamedTuple
 
 from ikgym.exceptions import InvalidInputError
-from ikgym.jit import kernel
+from ikgym.kernels.jit import kernel
 from ikgym.validation import known_name, number
 
 #: The families by name, with their numbers in the kernel.

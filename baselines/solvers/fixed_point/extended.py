@@ -10,7 +10,7 @@ from baselines.solvers.fixed_point.fixed_point import FixedPoint
 from baselines.solvers.references.privileged_path import PrivilegedPath
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
-from ikgym.kinematics import Chain
+from ikgym.kernels.kinematics import Chain
 from ikgym.validation import FloatArray, frozen_array, read_only, whole_number
 
 

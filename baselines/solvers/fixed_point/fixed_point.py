@@ -20,7 +20,7 @@ from baselines.solvers.fixed_point.iteration import (
     fixed_point_step,
 )
 from ikgym.exceptions import InvalidInputError
-from ikgym.kinematics import Chain
+from ikgym.kernels.kinematics import Chain
 from ikgym.validation import FloatArray, known_name, number, read_only, whole_number
 
 # The length in [m] of the paper's arm, to which its A belongs; on a shorter one it grows with 1/length².

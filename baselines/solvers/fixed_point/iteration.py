@@ -12,9 +12,9 @@ from baselines.solvers.arm_task import pose_arrays
 from baselines.solvers.fixed_point.contraction import Contraction, evaluate
 from baselines.solvers.linear_algebra import dot
 from baselines.status import Status
-from ikgym import task_kernels
-from ikgym.jit import kernel
-from ikgym.kinematics import Chain, forward, forward_and_jacobian
+from ikgym.kernels import tasks as task_kernels
+from ikgym.kernels.jit import kernel
+from ikgym.kernels.kinematics import Chain, forward, forward_and_jacobian
 from ikgym.validation import FloatArray
 
 #: What is done to f(q) - x before it is added to q, with the numbers that the kernel knows.

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from baselines.solvers.linear_algebra import dot
-from ikgym.jit import kernel
+from ikgym.kernels.jit import kernel
 
 # A unit vector this close to another one, or to its opposite, spans no plane with it: what is left is rounding.
 PARALLEL = 1e-15

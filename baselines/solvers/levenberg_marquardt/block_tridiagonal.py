@@ -11,7 +11,7 @@ apart, which is the shortcut (38).
 from __future__ import annotations
 
 from baselines.solvers.linear_algebra import damped_gram, ldl, ldl_scaled_inverse, ldl_solve, transposed_product
-from ikgym.jit import inlined, kernel
+from ikgym.kernels.jit import inlined, kernel
 
 
 @kernel

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from baselines.solvers.linear_algebra import orthogonal_columns
-from ikgym.jit import inlined, kernel
+from ikgym.kernels.jit import inlined, kernel
 from ikgym.validation import FloatArray
 
 LOOKUP, PROPORTIONAL, STEPPED = 0, 1, 2

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from baselines.status import Status
-from ikgym.jit import kernel
+from ikgym.kernels.jit import kernel
 from ikgym.validation import FloatArray
 
 CONVERGED, APPLIED, LIMIT = int(Status.CONVERGED), int(Status.APPLIED), int(Status.ITERATION_LIMIT)

@@ -29,9 +29,9 @@ from baselines.solvers.levenberg_marquardt.iteration import (
     stop_run_away,
 )
 from baselines.solvers.linear_algebra import dot, pseudoinverse_rows
-from ikgym import task_kernels
-from ikgym.jit import kernel
-from ikgym.kinematics import forward, forward_and_jacobian
+from ikgym.kernels import tasks as task_kernels
+from ikgym.kernels.jit import kernel
+from ikgym.kernels.kinematics import forward, forward_and_jacobian
 from ikgym.validation import known_name, whole_number
 
 JACOBIANS = ("predicted", "constant")

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ikgym.jit import inlined, kernel
-from ikgym.linear_algebra import cholesky, cholesky_solve
+from ikgym.kernels.jit import inlined, kernel
+from ikgym.kernels.linear_algebra import cholesky, cholesky_solve
 
 # Where a variable is: free, or at its lower or upper bound. One that is kept was released by rounding alone, and stays
 # at its bound until the others have moved.

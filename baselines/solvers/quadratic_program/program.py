@@ -8,8 +8,8 @@ import numpy as np
 
 from baselines.solvers.linear_algebra import transposed_product
 from baselines.solvers.quadratic_program.velocity_box import braking_speed
-from ikgym.jit import kernel
-from ikgym.linear_algebra import cholesky, cholesky_solve
+from ikgym.kernels.jit import kernel
+from ikgym.kernels.linear_algebra import cholesky, cholesky_solve
 
 # What a task shift of another length weighs beside one of another direction, and joint motion beside that.
 SCALING_WEIGHT = 1e-2

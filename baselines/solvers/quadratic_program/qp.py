@@ -24,8 +24,8 @@ from baselines.solvers.resolved_rate.base import APPLIED, TaskFeedback, task_mot
 from baselines.status import Status
 from ikgym.arms.limits import middle
 from ikgym.exceptions import InvalidInputError
-from ikgym.jit import kernel
-from ikgym.limit_kernels import CHANGE, FASTEST
+from ikgym.kernels.jit import kernel
+from ikgym.kernels.limits import CHANGE, FASTEST
 from ikgym.validation import FloatArray, as_given, number, per_joint, read_only
 
 LIMIT, SATURATED = int(Status.ITERATION_LIMIT), int(Status.SATURATED)

@@ -12,7 +12,7 @@ from baselines.solvers.quadratic_program.limits import limits_with_braking
 from baselines.solvers.quadratic_program.velocity_box import velocity_box
 from baselines.solvers.resolved_rate.base import APPLIED, TaskFeedback, add_feedback, task_motion
 from baselines.status import Status
-from ikgym.jit import kernel
+from ikgym.kernels.jit import kernel
 from ikgym.validation import FloatArray, number
 
 SATURATED = int(Status.SATURATED)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from ikgym.jit import inlined, kernel
-from ikgym.limit_kernels import CHANGE, FASTEST, LOWER, UPPER
+from ikgym.kernels.jit import inlined, kernel
+from ikgym.kernels.limits import CHANGE, FASTEST, LOWER, UPPER
 
 # The row behind those of an arm's limits, see :func:`baselines.solvers.quadratic_program.limits.limits_with_braking`.
 BRAKING = CHANGE + 1

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.status import Status
-from ikgym.jit import kernel
+from ikgym.kernels.jit import kernel
 
 _CONVERGED, _LIMIT, DIVERGED = int(Status.CONVERGED), int(Status.ITERATION_LIMIT), int(Status.DIVERGED)
 GOES_ON = -1

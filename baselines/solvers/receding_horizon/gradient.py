@@ -23,7 +23,7 @@ from baselines.solvers.receding_horizon.descent import (
 from baselines.solvers.receding_horizon.horizon import analytic_gradient, difference_gradient
 from baselines.solvers.receding_horizon.problem_data import ProblemData
 from ikgym.exceptions import InvalidInputError
-from ikgym.jit import kernel
+from ikgym.kernels.jit import kernel
 from ikgym.validation import FloatArray, known_name, number, whole_number
 
 GRADIENTS = ("finite_difference", "analytic")

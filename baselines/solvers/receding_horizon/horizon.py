@@ -10,9 +10,10 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ikgym import cost_kernels, task_kernels
-from ikgym.jit import kernel
-from ikgym.kinematics import forward, forward_and_jacobian
+from ikgym.kernels import cost as cost_kernels
+from ikgym.kernels import tasks as task_kernels
+from ikgym.kernels.jit import kernel
+from ikgym.kernels.kinematics import forward, forward_and_jacobian
 
 Floats = npt.NDArray[np.float64]
 

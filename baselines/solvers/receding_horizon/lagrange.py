@@ -30,7 +30,7 @@ from baselines.solvers.receding_horizon.task_constraints import (
     task_system,
 )
 from ikgym.exceptions import InvalidInputError
-from ikgym.jit import kernel
+from ikgym.kernels.jit import kernel
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy.typing as npt
 from numpy import float64
 
-from ikgym.cost_kernels import CostParameters
-from ikgym.kinematics import Chain
+from ikgym.kernels.cost import CostParameters
+from ikgym.kernels.kinematics import Chain
 
 
 class ProblemData(NamedTuple):
@@ -16,7 +16,7 @@ class ProblemData(NamedTuple):
 
     Attributes:
         chain: The model of the arm.
-        kind: The kind of task coordinates, see :mod:`ikgym.task_kernels`.
+        kind: The kind of task coordinates, see :mod:`ikgym.kernels.tasks`.
         cost: The cost's parameters.
         dt: Δt in [s].
         lower: Least joint coordinates in [rad] or [m], -inf where there is no limit. Shape (n,).

@@ -14,7 +14,7 @@ from baselines.solvers.receding_horizon.newton.grid import offsets
 from baselines.solvers.receding_horizon.newton.receding import HorizonMemory, plan_step
 from baselines.solvers.receding_horizon.newton.settings import PlanNumbers, PlanSettings, plain_settings
 from ikgym.exceptions import InvalidInputError
-from ikgym.preview import FARTHEST
+from ikgym.scenarios.preview import FARTHEST
 from ikgym.validation import FloatArray, number, whole_number
 
 # What the kernel's counters and random numbers can hold.

@@ -13,9 +13,10 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.solvers.receding_horizon.horizon import frame_workspace, gradient_workspace, linearise
-from ikgym import cost_kernels, task_kernels
-from ikgym.jit import kernel
-from ikgym.kinematics import forward, forward_and_jacobian
+from ikgym.kernels import cost as cost_kernels
+from ikgym.kernels import tasks as task_kernels
+from ikgym.kernels.jit import kernel
+from ikgym.kernels.kinematics import forward, forward_and_jacobian
 
 Floats = npt.NDArray[np.float64]
 

@@ -12,8 +12,8 @@ from baselines import registry
 from baselines.policy import Batch, Memory, Problem, Solution
 from baselines.wrapper import NamedWrapper
 from ikgym.exceptions import InvalidInputError
-from ikgym.preview import furthest
 from ikgym.scenarios import Preview, Scenario
+from ikgym.scenarios.preview import furthest
 from ikgym.validation import FloatArray, whole_number
 
 if TYPE_CHECKING:

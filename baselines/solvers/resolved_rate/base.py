@@ -13,10 +13,10 @@ from baselines.policy import Memory
 from baselines.policy.compiled import CompiledPolicy
 from baselines.policy_kernels import scale_rows
 from baselines.status import Status
-from ikgym import task_kernels
 from ikgym.exceptions import InvalidInputError
-from ikgym.jit import kernel, uncounted
-from ikgym.kinematics import forward_and_jacobian
+from ikgym.kernels import tasks as task_kernels
+from ikgym.kernels.jit import kernel, uncounted
+from ikgym.kernels.kinematics import forward_and_jacobian
 from ikgym.validation import FloatArray, known_name, number
 
 APPLIED, DEFICIENT = int(Status.APPLIED), int(Status.RANK_DEFICIENT)

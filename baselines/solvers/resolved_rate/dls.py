@@ -9,8 +9,8 @@ import numpy as np
 
 from baselines.solvers.linear_algebra import damped_gram, transposed_product
 from baselines.solvers.resolved_rate.base import APPLIED, ResolvedRate, add_feedback, finish, task_motion
-from ikgym.jit import kernel
-from ikgym.linear_algebra import cholesky, cholesky_solve
+from ikgym.kernels.jit import kernel
+from ikgym.kernels.linear_algebra import cholesky, cholesky_solve
 from ikgym.validation import number
 
 

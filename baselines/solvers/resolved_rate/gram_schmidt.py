@@ -10,7 +10,7 @@ import numpy as np
 from baselines.solvers.linear_algebra import dot
 from baselines.solvers.resolved_rate.base import ResolvedRate, add_feedback, finish, say_deficient, task_motion
 from ikgym.exceptions import InvalidInputError
-from ikgym.jit import kernel
+from ikgym.kernels.jit import kernel
 from ikgym.validation import number
 
 

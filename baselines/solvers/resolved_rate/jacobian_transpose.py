@@ -16,7 +16,7 @@ from baselines.solvers.resolved_rate.base import (
     say_deficient,
     task_motion,
 )
-from ikgym.jit import kernel
+from ikgym.kernels.jit import kernel
 from ikgym.validation import FloatArray, number, read_only
 
 

@@ -15,9 +15,9 @@ from baselines.solvers.resolved_rate.moore_penrose import MoorePenrose
 from ikgym.arms import Arm
 from ikgym.arms.limits import middle
 from ikgym.exceptions import InvalidInputError
-from ikgym.jit import kernel
-from ikgym.kinematics import forward_and_jacobian
-from ikgym.linear_algebra import cholesky, cholesky_solve
+from ikgym.kernels.jit import kernel
+from ikgym.kernels.kinematics import forward_and_jacobian
+from ikgym.kernels.linear_algebra import cholesky, cholesky_solve
 from ikgym.validation import FloatArray, as_given, known_name, number, per_joint, read_only
 
 OBJECTIVES = ("posture", "joint_centring", "manipulability")

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from ikgym.arms import Arm
-from ikgym.rotations import quaternion
+from ikgym.kernels.rotations import quaternion
 from ikgym.validation import FloatArray
 
 BASE, TIP = "base", "tool"

@@ -8,7 +8,7 @@ from typing import ClassVar
 from baselines.policy import Batch, Memory, Problem, Solution
 from baselines.solvers.wrappers import orientation
 from baselines.wrapper import NamedWrapper
-from ikgym.preview import furthest
+from ikgym.scenarios.preview import furthest
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -9,10 +9,11 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.policy import Batch, Problem
-from ikgym import task_kernels, tasks
+from ikgym import tasks
 from ikgym.exceptions import InvalidInputError
-from ikgym.jit import inlined, kernel
-from ikgym.kinematics import forward
+from ikgym.kernels import tasks as task_kernels
+from ikgym.kernels.jit import inlined, kernel
+from ikgym.kernels.kinematics import forward
 from ikgym.validation import FloatArray
 
 

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from baselines.policy import Batch, Memory, Solution
 from baselines.wrapper import NamedWrapper
 from ikgym.exceptions import InvalidInputError
-from ikgym.task_kernels import pose_rows
+from ikgym.kernels.tasks import pose_rows
 from ikgym.validation import FloatArray, known_name, number
 
 FEEDBACKS = ("calculated", "measured")

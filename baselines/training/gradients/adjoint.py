@@ -15,11 +15,12 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.training.gradients.segment import commanded
-from ikgym import cost_kernels, task_kernels
-from ikgym.cost_kernels import P_X_INSIDE
-from ikgym.jit import inlined, kernel, uncounted
-from ikgym.kinematics import forward_and_jacobian
-from ikgym.limit_kernels import CHANGE, FASTEST, LOWER, UPPER, within
+from ikgym.kernels import cost as cost_kernels
+from ikgym.kernels import tasks as task_kernels
+from ikgym.kernels.cost import P_X_INSIDE
+from ikgym.kernels.jit import inlined, kernel, uncounted
+from ikgym.kernels.kinematics import forward_and_jacobian
+from ikgym.kernels.limits import CHANGE, FASTEST, LOWER, UPPER, within
 from ikgym.rl.twists import (
     error_gradient,
     error_kind,
@@ -55,8 +56,8 @@ class Place(NamedTuple):
         position: Of the tool point in [m]. Shape (3,).
         pose: Task coordinates. Shape (m,).
         geometric: Geometric Jacobian. Shape (6, n).
-        task_jacobian: That of :func:`ikgym.task_kernels.jacobian`, in its first rows. Shape (at least e, n).
-        jacobian: That of :func:`ikgym.task_kernels.error_jacobian`. Shape (at least e, n).
+        task_jacobian: That of :func:`ikgym.kernels.tasks.jacobian`, in its first rows. Shape (at least e, n).
+        jacobian: That of :func:`ikgym.kernels.tasks.error_jacobian`. Shape (at least e, n).
     """
 
     rotation: Floats
@@ -175,7 +176,7 @@ def through_law(output, j, by_asked, due, speed, dt, into, by_due):
 
 @inlined
 def unlimited(limits, velocity_limit, j, asked, move, by, dt):
-    """Propagates the gradients of joint ``j`` back through the limits of :func:`ikgym.simulation.step`.
+    """Propagates the gradients of joint ``j`` back through the limits of :func:`ikgym.kernels.simulation.step`.
 
     Args:
         limits: Shape (4, n), or (0, n).

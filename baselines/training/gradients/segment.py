@@ -8,12 +8,13 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ikgym import cost_kernels, task_kernels
 from ikgym.arms.limits import limit_rows
-from ikgym.cost_kernels import CostParameters
-from ikgym.jit import inlined, kernel
-from ikgym.kinematics import Chain, forward
-from ikgym.limit_kernels import LOWER, UPPER, driven, stopped, within
+from ikgym.kernels import cost as cost_kernels
+from ikgym.kernels import tasks as task_kernels
+from ikgym.kernels.cost import CostParameters
+from ikgym.kernels.jit import inlined, kernel
+from ikgym.kernels.kinematics import Chain, forward
+from ikgym.kernels.limits import LOWER, UPPER, driven, stopped, within
 from ikgym.rl.twists import is_turned, turn, twist, twist_size
 from ikgym.scenarios import Scenario
 
@@ -25,7 +26,7 @@ class Task(NamedTuple):
 
     Attributes:
         chain: The arm.
-        kind: Of task coordinates, see :mod:`ikgym.task_kernels`.
+        kind: Of task coordinates, see :mod:`ikgym.kernels.tasks`.
         error_size: e.
         dt: Δt in [s].
         velocity_limit: What an action of 1 means, in [rad/s] or [m/s]. Shape (n,).

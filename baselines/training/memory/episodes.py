@@ -15,10 +15,10 @@ from baselines.agents.recurrent.kernels import linearise
 from baselines.agents.recurrent.processing import Recurrent
 from baselines.episodes import play
 from ikgym.exceptions import InvalidInputError
-from ikgym.jit import kernel
+from ikgym.kernels.jit import kernel
+from ikgym.kernels.simulation import Outcome
 from ikgym.plant import Plant
 from ikgym.scenarios import Scenario
-from ikgym.simulation import Outcome
 from ikgym.validation import FloatArray
 
 #: Steps from one measurement to the next, such as those of cameras of 60 and 30 Hz.

@@ -16,8 +16,8 @@ from baselines.training.memory.rewards import explored, surrogate
 from baselines.training.methods import SegmentMetrics
 from baselines.training.randomness import episode_seed, sequence
 from baselines.training.trainers.actor_only import ActorTrainer
-from ikgym import task_kernels
 from ikgym.exceptions import InvalidInputError
+from ikgym.kernels import tasks as task_kernels
 from ikgym.scenarios import Scenario
 
 

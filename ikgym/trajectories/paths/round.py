@@ -8,8 +8,8 @@ import math
 
 import numpy as np
 
-from ikgym.splines import ArcLength
 from ikgym.trajectories.paths.path import Path, settle_placement
+from ikgym.trajectories.splines import ArcLength
 from ikgym.validation import LARGEST, SMALLEST, FloatArray, number, signed
 
 

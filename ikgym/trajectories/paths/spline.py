@@ -8,8 +8,8 @@ import functools
 import numpy as np
 
 from ikgym.exceptions import InvalidInputError
-from ikgym.splines import ArcLength, CubicSpline
 from ikgym.trajectories.paths.path import Path, points_of
+from ikgym.trajectories.splines import ArcLength, CubicSpline
 from ikgym.validation import FloatArray
 
 # Pieces of each interval for its length, and for its largest curvature and its least speed.

@@ -24,8 +24,8 @@ from baselines.evaluation.play import MOST, batches, play
 from baselines.evaluation.results import COLUMNS, Results, read_rows
 from baselines.files import ResultsError, write
 from baselines.spec import parse_policy
-from ikgym import cost_kernels
 from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.kernels import cost as cost_kernels
 from tests.baselines.evaluation.planning import planned
 
 ROOT = pathlib.Path(__file__).parents[3]

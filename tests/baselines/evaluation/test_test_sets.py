@@ -4,8 +4,9 @@ from numpy.testing import assert_allclose
 from baselines.evaluate import evaluate
 from baselines.evaluation import test_sets
 from baselines.fingerprints import set_hash
-from ikgym import cost_kernels, scenarios
+from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.kernels import cost as cost_kernels
 from ikgym.scenarios import imperfect
 from tests.baselines.evaluation.planning import planned
 

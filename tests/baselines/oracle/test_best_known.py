@@ -13,7 +13,7 @@ from baselines.files import ResultsError
 from baselines.oracle import best_known
 from baselines.oracle.best_known import MARGIN, Record, beaten, cost, episode_hash, lookup, read, record
 from baselines.oracle.stripped import stripped
-from ikgym import cost_kernels
+from ikgym.kernels import cost as cost_kernels
 from ikgym.plant import Plant
 
 NAME = "varga7-fast"

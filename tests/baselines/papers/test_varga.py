@@ -116,5 +116,5 @@ def test_the_fast_path_is_beyond_90_degrees_most_of_the_time():
     assert finding.figures["slow [%]"] == 0.0
     scenario = ikgym.scenarios.get("varga7-slow")
     rotations, _ = scenario.arm.forward(scenario.nominal_joint_path())
-    wanted = [np.linalg.norm(ikgym.rotations.rotation_vector(r)) for r in rotations]
+    wanted = [np.linalg.norm(ikgym.kernels.rotations.rotation_vector(r)) for r in rotations]
     np.testing.assert_allclose(nominal_angles(Runs(), "varga7-slow"), wanted, atol=1e-9)

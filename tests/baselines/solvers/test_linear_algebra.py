@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from baselines.solvers.linear_algebra import orthogonal_columns
-from ikgym.linear_algebra import cholesky, cholesky_solve
+from ikgym.kernels.linear_algebra import cholesky, cholesky_solve
 
 
 @pytest.mark.parametrize("m", [1, 3, 6, 12])

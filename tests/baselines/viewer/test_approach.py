@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from baselines.viewer.approach import Approach, Pose
-from ikgym.rotations import geodesic_angle, rodrigues
+from ikgym.kernels.rotations import geodesic_angle, rodrigues
 
 SHIFT, TURN = 0.01, 0.05
 START = Pose(np.eye(3), np.array([0.1, 0.2, 0.3]))

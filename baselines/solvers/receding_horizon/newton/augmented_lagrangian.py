@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ikgym.jit import inlined
+from ikgym.kernels.jit import inlined
 
 
 class AugmentedTerm(NamedTuple):

@@ -19,10 +19,11 @@ from baselines.solvers.receding_horizon.newton.terms import (
     velocity_limit_term,
 )
 from baselines.solvers.receding_horizon.newton.workspace import joints_at
-from ikgym import cost_kernels, task_kernels
-from ikgym.cost_kernels import P_X_INSIDE
-from ikgym.jit import inlined, uncounted
-from ikgym.kinematics import forward, forward_and_jacobian
+from ikgym.kernels import cost as cost_kernels
+from ikgym.kernels import tasks as task_kernels
+from ikgym.kernels.cost import P_X_INSIDE
+from ikgym.kernels.jit import inlined, uncounted
+from ikgym.kernels.kinematics import forward, forward_and_jacobian
 
 # All loops take their arrays out of the tuples first: numba counts references at each access, which costs more than the
 # kinematics do.

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ikgym.jit import inlined, kernel, uncounted
+from ikgym.kernels.jit import inlined, kernel, uncounted
 
 Floats = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]

@@ -7,9 +7,9 @@ import math
 import numpy as np
 
 from baselines.solvers.linear_algebra import damped_step, dot
-from ikgym import task_kernels
-from ikgym.jit import inlined, kernel, uncounted
-from ikgym.kinematics import forward_and_jacobian
+from ikgym.kernels import tasks as task_kernels
+from ikgym.kernels.jit import inlined, kernel, uncounted
+from ikgym.kernels.kinematics import forward_and_jacobian
 
 # Damped steps that bring the arm from one knot to the next.
 CORRECTIONS = 2

@@ -9,7 +9,7 @@ import numpy as np
 from baselines.solvers.receding_horizon.newton.cost import linearise, merit
 from baselines.solvers.receding_horizon.newton.newton_step import newton_step
 from baselines.solvers.receding_horizon.newton.pentadiagonal import pentadiagonal_step
-from ikgym.jit import inlined, uncounted
+from ikgym.kernels.jit import inlined, uncounted
 
 CONVERGED, RAN_OUT, STALLED = 0, 1, 2
 # A decrease counts if it is this share of what the gradient promises (Armijo).

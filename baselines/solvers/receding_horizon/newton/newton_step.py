@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from baselines.solvers.linear_algebra import inverse_of_factor
-from ikgym.jit import inlined, uncounted
-from ikgym.linear_algebra import cholesky
+from ikgym.kernels.jit import inlined, uncounted
+from ikgym.kernels.linear_algebra import cholesky
 
 
 @uncounted

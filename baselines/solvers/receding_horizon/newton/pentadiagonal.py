@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from baselines.solvers.linear_algebra import inverse_of_factor
 from baselines.solvers.receding_horizon.newton.newton_step import multiply, pivot_of
-from ikgym.jit import inlined, uncounted
-from ikgym.linear_algebra import cholesky
+from ikgym.kernels.jit import inlined, uncounted
+from ikgym.kernels.linear_algebra import cholesky
 
 
 @uncounted

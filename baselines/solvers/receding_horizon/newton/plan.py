@@ -13,7 +13,7 @@ from baselines.solvers.receding_horizon.newton.interior_point.excess import cost
 from baselines.solvers.receding_horizon.newton.interior_point.minimise import minimise_path
 from baselines.solvers.receding_horizon.newton.minimise import NewtonSettings
 from baselines.solvers.receding_horizon.newton.workspace import NewtonWorkspace, newton_workspace
-from ikgym.jit import inlined, kernel, uncounted
+from ikgym.kernels.jit import inlined, kernel, uncounted
 
 Floats = npt.NDArray[np.float64]
 

@@ -7,7 +7,7 @@ is the step that has passed.
 
 from __future__ import annotations
 
-from ikgym.jit import inlined, uncounted
+from ikgym.kernels.jit import inlined, uncounted
 
 
 @inlined

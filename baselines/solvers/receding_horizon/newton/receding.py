@@ -26,8 +26,8 @@ from baselines.solvers.receding_horizon.newton.settings import settings_of
 from baselines.solvers.receding_horizon.newton.workspace import PathProblem
 from baselines.solvers.receding_horizon.problem_data import ProblemData
 from baselines.status import Status
-from ikgym.jit import inlined, kernel, uncounted
-from ikgym.kinematics import Chain
+from ikgym.kernels.jit import inlined, kernel, uncounted
+from ikgym.kernels.kinematics import Chain
 
 _CONVERGED, _LIMIT, _SATURATED = int(Status.CONVERGED), int(Status.ITERATION_LIMIT), int(Status.SATURATED)
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from ikgym import task_kernels
-from ikgym.axis_kernels import across
-from ikgym.jit import inlined, uncounted
+from ikgym.kernels import tasks as task_kernels
+from ikgym.kernels.axes import across
+from ikgym.kernels.jit import inlined, uncounted
 
 
 @uncounted

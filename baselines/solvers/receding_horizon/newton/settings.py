@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ikgym.cost_kernels import CostParameters
-from ikgym.jit import inlined
+from ikgym.kernels.cost import CostParameters
+from ikgym.kernels.jit import inlined
 
 Floats = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]

@@ -9,9 +9,9 @@ import math
 from typing import NamedTuple
 
 from baselines.solvers.receding_horizon.newton.augmented_lagrangian import augmented_term
-from ikgym import cost_kernels
-from ikgym.cost_kernels import P_X_INSIDE
-from ikgym.jit import inlined
+from ikgym.kernels import cost as cost_kernels
+from ikgym.kernels.cost import P_X_INSIDE
+from ikgym.kernels.jit import inlined
 
 # ρ of a kink, in units of its steepness over Δ: the larger, the fewer updates of λ and the harder for Newton.
 KINK_PENALTY = 100.0

@@ -9,8 +9,8 @@ import numpy.typing as npt
 
 from baselines.solvers.receding_horizon.newton.grid import Grid
 from baselines.solvers.receding_horizon.problem_data import ProblemData
-from ikgym import task_kernels
-from ikgym.jit import inlined, kernel
+from ikgym.kernels import tasks as task_kernels
+from ikgym.kernels.jit import inlined, kernel
 
 Floats = npt.NDArray[np.float64]
 

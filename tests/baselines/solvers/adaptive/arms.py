@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import ikgym
-from ikgym.rotations import rodrigues
+from ikgym.kernels.rotations import rodrigues
 
 PANDA = ikgym.arms.get("panda")
 

@@ -7,8 +7,8 @@ import pytest
 
 import ikgym
 from baselines.solvers.adaptive.chain_parameters import changed_chain, parameter_twists
-from ikgym.kinematics import forward
-from ikgym.rotations import rotation_vector
+from ikgym.kernels.kinematics import forward
+from ikgym.kernels.rotations import rotation_vector
 
 STEP = 1e-6
 

@@ -7,7 +7,7 @@ import pytest
 
 import ikgym
 from baselines.solvers.adaptive.deviation import add_deviation, deviation_between, missing_deviation, move_deviation
-from ikgym.rotations import rodrigues
+from ikgym.kernels.rotations import rodrigues
 
 TASKS = ikgym.tasks.names()
 

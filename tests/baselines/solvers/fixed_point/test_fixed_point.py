@@ -13,7 +13,7 @@ from baselines.solvers.arm_size import error_weights, jacobian_bound
 from baselines.solvers.fixed_point.contraction import contraction, evaluate
 from baselines.status import Status
 from ikgym.exceptions import InvalidInputError, UnknownNameError
-from ikgym.outcome import OBSERVED
+from ikgym.kernels.outcome import OBSERVED
 from tests.comparison import identical
 from tests.every_scenario import ONE_OF_EACH
 

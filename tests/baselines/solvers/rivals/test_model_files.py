@@ -9,7 +9,7 @@ import pytest
 
 import ikgym
 from baselines.solvers.rivals.model_files import TIP, mjcf, roll_pitch_yaw, urdf
-from ikgym.rotations import rodrigues
+from ikgym.kernels.rotations import rodrigues
 from tests.limited import limited
 
 ARMS = [*map(ikgym.arms.get, ("panda", "iiwa14", "tiago", "gen3", "varga7", "puma560", "panda-3")), limited().arm]

@@ -16,7 +16,7 @@ from baselines.solvers.rivals.base import Rival, turned
 from baselines.solvers.rivals.task_program import TaskProgram
 from baselines.status import Status
 from ikgym.exceptions import InvalidInputError, MissingDependencyError, UnknownNameError
-from ikgym.rotations import rodrigues
+from ikgym.kernels.rotations import rodrigues
 from tests.baselines.making import circle, made, usual
 
 RIVALS = [name for name in baselines.names() if get(name).rival]

@@ -12,7 +12,7 @@ from baselines.solvers.wrappers import orientation
 from baselines.solvers.wrappers.orientation import resolve_one
 from ikgym import scenarios, tasks
 from ikgym.exceptions import InvalidInputError, UnknownNameError
-from ikgym.rotations import rodrigues
+from ikgym.kernels.rotations import rodrigues
 from tests.baselines.random_agents import write_agent
 
 DLS = {"damping": 1e-2, "gain": 0.3}

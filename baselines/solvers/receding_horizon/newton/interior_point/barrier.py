@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from ikgym.jit import inlined
+from ikgym.kernels.jit import inlined
 
 # A multiplier stays within this factor of what the barrier's gradient says (Wächter and Biegler 2006, eq. 16).
 TRUSTED = 1e4

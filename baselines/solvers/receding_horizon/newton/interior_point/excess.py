@@ -6,7 +6,7 @@ import numpy as np
 
 from baselines.solvers.receding_horizon.newton.cost import true_cost
 from baselines.solvers.receding_horizon.newton.interior_point.merit import change_steps
-from ikgym.jit import uncounted
+from ikgym.kernels.jit import uncounted
 
 
 @uncounted

@@ -15,10 +15,11 @@ from baselines.solvers.receding_horizon.newton.rate import add_rate_cost, rate_c
 from baselines.solvers.receding_horizon.newton.second_order import second_order
 from baselines.solvers.receding_horizon.newton.terms import velocity_cost, velocity_derivatives
 from baselines.solvers.receding_horizon.newton.workspace import BEYOND, CURVATURE, GRADIENT, MULTIPLIER, joints_at
-from ikgym import cost_kernels, task_kernels
-from ikgym.cost_kernels import P_X_INSIDE
-from ikgym.jit import inlined, uncounted
-from ikgym.kinematics import forward_and_jacobian
+from ikgym.kernels import cost as cost_kernels
+from ikgym.kernels import tasks as task_kernels
+from ikgym.kernels.cost import P_X_INSIDE
+from ikgym.kernels.jit import inlined, uncounted
+from ikgym.kernels.kinematics import forward_and_jacobian
 
 # How multipliers come about: from the gradients of the barriers, as they are, or by a step of this length at most.
 ANEW, KEPT = -1.0, 0.0

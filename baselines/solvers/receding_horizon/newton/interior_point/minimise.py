@@ -22,7 +22,7 @@ from baselines.solvers.receding_horizon.newton.minimise import (
     scalar_product,
 )
 from baselines.solvers.receding_horizon.newton.workspace import BARRIER_SIZE, BEYOND
-from ikgym.jit import inlined, uncounted
+from ikgym.kernels.jit import inlined, uncounted
 
 # μ at the beginning, and w of the limits, in units of the cost for each knot, or of this where that is less. Where the
 # path leaves limits μ is larger by how much it does, up to a bound: else the barrier function has a kink in its way.

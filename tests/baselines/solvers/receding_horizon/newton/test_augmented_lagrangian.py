@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from baselines.solvers.receding_horizon.newton.augmented_lagrangian import augmented_term
-from ikgym.jit import kernel
+from ikgym.kernels.jit import kernel
 
 LOW, HIGH = -0.7, 1.2
 

@@ -14,9 +14,10 @@ from baselines.solvers.receding_horizon.newton.minimise import CONVERGED, RAN_OU
 from baselines.solvers.receding_horizon.newton.newton_step import newton_step
 from baselines.solvers.receding_horizon.newton.workspace import PathProblem, newton_workspace
 from baselines.solvers.receding_horizon.problem_data import ProblemData
-from ikgym import TrackingCost, task_kernels
+from ikgym import TrackingCost
 from ikgym.arms import Arm
-from ikgym.linear_algebra import cholesky
+from ikgym.kernels import tasks as task_kernels
+from ikgym.kernels.linear_algebra import cholesky
 from tests.baselines.solvers.receding_horizon.newton.problems import grid_of, place
 from tests.baselines.solvers.receding_horizon.newton.test_cost import dense
 

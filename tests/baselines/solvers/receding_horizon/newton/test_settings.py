@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from baselines.solvers.receding_horizon.newton.settings import PlanSettings, plain_settings, settings_of
-from ikgym.cost_kernels import CostParameters
+from ikgym.kernels.cost import CostParameters
 
 
 @njit

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import interpolate
 
-from ikgym.splines import ArcLength, CubicSpline
+from ikgym.trajectories.splines import ArcLength, CubicSpline
 
 RNG = np.random.default_rng(0)
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from ikgym.jit import kernel
+from ikgym.kernels.jit import kernel
 
 
 @kernel

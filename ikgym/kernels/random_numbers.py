@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ikgym.jit import inlined, kernel
+from ikgym.kernels.jit import inlined, kernel
 
 #: Normal numbers are cut at so many standard deviations, which one in five hundred million exceeds.
 CUT = 6.0

@@ -14,11 +14,11 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ikgym.jit import kernel
-from ikgym.kinematics import Chain, forward, forward_and_jacobian
-from ikgym.linear_algebra import cholesky, cholesky_solve
-from ikgym.random_numbers import uniform
-from ikgym.rotations import quaternion_of, vector_factor
+from ikgym.kernels.jit import kernel
+from ikgym.kernels.kinematics import Chain, forward, forward_and_jacobian
+from ikgym.kernels.linear_algebra import cholesky, cholesky_solve
+from ikgym.kernels.random_numbers import uniform
+from ikgym.kernels.rotations import quaternion_of, vector_factor
 
 # λ / |e|², the steps that a start is worth, and when it is given up: where PATIENCE steps in a row have not made |e|²
 # smaller by the factor PROGRESS. From 0.05 to 0.2 and from 3 to 9 times differ by less than a fifth, on random poses of
@@ -111,10 +111,10 @@ def inverse_rows(
 ):
     """Joint coordinates for N poses, each worked out by itself.
 
-    The first arguments are a :class:`ikgym.kinematics.Chain`, :class:`Ranges` and :class:`Settings`. ``rotation``
-    (N, 3, 3), of shape (N, 0, 0) where orientations do not matter, and ``position`` (N, 3) in [m] are the poses of the
-    tool in the base frame, ``start`` (N, n) is where to begin, within the limits. ``q`` (N, n) receives the joint
-    coordinates, the nearest that were found where the pose is not met, and ``converged`` (N,) whether it is.
+    The first arguments are a :class:`ikgym.kernels.kinematics.Chain`, :class:`Ranges` and :class:`Settings`.
+    ``rotation`` (N, 3, 3), of shape (N, 0, 0) where orientations do not matter, and ``position`` (N, 3) in [m] are the
+    poses of the tool in the base frame, ``start`` (N, n) is where to begin, within the limits. ``q`` (N, n) receives
+    the joint coordinates, the nearest that were found where the pose is not met, and ``converged`` (N,) whether it is.
     """
     chain = Chain(offsets, axes, prismatic, tool, tool_rotation)
     ranges = Ranges(lower, upper, first, last)

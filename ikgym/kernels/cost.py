@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ikgym.jit import inlined, kernel
+from ikgym.kernels.jit import inlined, kernel
 
 
 class CostParameters(NamedTuple):

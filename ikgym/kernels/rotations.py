@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from ikgym.jit import inlined, kernel
+from ikgym.kernels.jit import inlined, kernel
 
 
 @kernel

@@ -10,10 +10,10 @@ import math
 
 import numpy as np
 
-from ikgym.axis_kernels import across, direction_error, direction_error_jacobian
-from ikgym.jit import inlined, kernel
-from ikgym.kinematics import forward
-from ikgym.rotations import quaternion_of, vector_factor
+from ikgym.kernels.axes import across, direction_error, direction_error_jacobian
+from ikgym.kernels.jit import inlined, kernel
+from ikgym.kernels.kinematics import forward
+from ikgym.kernels.rotations import quaternion_of, vector_factor
 
 POSITION, SKEW, MATRIX, POSE, AXIS = 0, 1, 2, 3, 4
 
@@ -81,7 +81,7 @@ def error(kind, nominal, coordinates, out):
         coordinates: Coordinates. Shape (m,).
         out: Receives the error. Shape (e,): the difference of the coordinates, but for POSE the position
             error in [m], then the rotation vector of R* Rᵀ in [rad] (Zhang 2020, eq. 51-54), and for AXIS the
-            position error, then that of the direction, see :func:`ikgym.axis_kernels.direction_error`.
+            position error, then that of the direction, see :func:`ikgym.kernels.axes.direction_error`.
     """
     if kind == POSE:
         for i in range(3):
@@ -223,7 +223,7 @@ def pose_rows(chain, kind, q, out):
     """Task coordinates of a chain, row by row.
 
     Args:
-        chain: The arm, see :class:`ikgym.kinematics.Chain`.
+        chain: The arm, see :class:`ikgym.kernels.kinematics.Chain`.
         kind: Of task coordinates.
         q: Joint coordinates in [rad] or [m]. Shape (B, n).
         out: Receives the task coordinates. Shape (B, m).

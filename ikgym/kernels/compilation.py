@@ -7,7 +7,7 @@ import logging
 import threading
 from collections.abc import Iterator
 
-from ikgym import jit
+from ikgym.kernels import jit
 
 logger = logging.getLogger("ikgym")
 

@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ikgym.jit import inlined, kernel
-from ikgym.rotations import rodrigues
+from ikgym.kernels.jit import inlined, kernel
+from ikgym.kernels.rotations import rodrigues
 
 
 class Chain(NamedTuple):

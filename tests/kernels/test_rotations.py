@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
-from ikgym import rotations
-from ikgym.rotations import geodesic_angle, quaternion, rodrigues, rotation_vector
+from ikgym.kernels import rotations
+from ikgym.kernels.rotations import geodesic_angle, quaternion, rodrigues, rotation_vector
 
 # Along and between the coordinate axes, with both signs, and nearly along one.
 AXES = [

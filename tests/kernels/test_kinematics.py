@@ -2,9 +2,10 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from ikgym import arms, kinematics
+from ikgym import arms
 from ikgym.exceptions import InvalidInputError
-from ikgym.rotations import rotation_vector
+from ikgym.kernels import kinematics
+from ikgym.kernels.rotations import rotation_vector
 from tests.pinocchio_models import model_of, tool_state
 
 # All arms are of a few metres: rounding of some ten additions and products stays far below.

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ikgym.jit import inlined, kernel
+from ikgym.kernels.jit import inlined, kernel
 
 # The rows of an arm's limits, see :func:`ikgym.arms.limits.limit_rows`.
 LOWER, UPPER, FASTEST, CHANGE = range(4)

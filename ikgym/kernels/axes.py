@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 
-from ikgym.jit import inlined, kernel
+from ikgym.kernels.jit import inlined, kernel
 
 #: The desired axis at which the two directions are not continuous.
 SINGULAR = (6.0 / 11.0, 6.0 / 11.0, 7.0 / 11.0)

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 import ikgym
-from ikgym import compilation, parallel, scenarios
+from ikgym import parallel, scenarios
 from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.kernels import compilation
+from ikgym.kernels.random_numbers import uniform as _uniform
 from ikgym.plant import Plant
-from ikgym.random_numbers import uniform as _uniform
 from tests.every_scenario import every_scenario
 
 

@@ -12,15 +12,16 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ikgym import cost_kernels, task_kernels
-from ikgym.axis_kernels import angle_between
-from ikgym.cost_kernels import CostParameters
-from ikgym.jit import inlined, kernel, uncounted
-from ikgym.kinematics import Chain, forward
-from ikgym.limit_kernels import LOWER, SLACK, UPPER, driven, stopped
-from ikgym.outcome import Outcome as Outcome
-from ikgym.outcome import parts
-from ikgym.rotations import geodesic_angle
+from ikgym.kernels import cost as cost_kernels
+from ikgym.kernels import tasks as task_kernels
+from ikgym.kernels.axes import angle_between
+from ikgym.kernels.cost import CostParameters
+from ikgym.kernels.jit import inlined, kernel, uncounted
+from ikgym.kernels.kinematics import Chain, forward
+from ikgym.kernels.limits import LOWER, SLACK, UPPER, driven, stopped
+from ikgym.kernels.outcome import Outcome as Outcome
+from ikgym.kernels.outcome import parts
+from ikgym.kernels.rotations import geodesic_angle
 
 Floats = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
@@ -31,7 +32,7 @@ class Constants(NamedTuple):
     """What is the same in all rows and at all times.
 
     Attributes:
-        kind: The kind of task coordinates, see :mod:`ikgym.task_kernels`.
+        kind: The kind of task coordinates, see :mod:`ikgym.kernels.tasks`.
         dt: Δt in [s].
         velocity_limit: What an action of 1 means, in [rad/s] or [m/s]. Shape (n,).
         steps: Steps of an episode.
@@ -61,7 +62,7 @@ class State(NamedTuple):
         q: Joint coordinates in [rad] or [m]. Shape (N, n).
         qdot: Joint velocities last applied, in [rad/s] or [m/s]. Shape (N, n).
         step: Steps made in the episode. Shape (N,).
-        frames: Nominal frames of the rows' episodes, or those that are near, see :mod:`ikgym.task_kernels`; shared
+        frames: Nominal frames of the rows' episodes, or those that are near, see :mod:`ikgym.kernels.tasks`; shared
             where the first length is 1. Shape (N or 1, points, 12 or 3).
         scratch: What a call of the kernel works with: a frame, nominal task coordinates and their error, at its
             first row. Shape (N, 12 + m + e).

@@ -16,15 +16,15 @@ import numba.core.dispatcher
 import numpy as np
 import pytest
 
-from ikgym import compilation, jit
-from ikgym.jit import kernel, uncounted
+from ikgym.kernels import compilation, jit
+from ikgym.kernels.jit import kernel, uncounted
 
 CALLEE = "from {jit}\nSCALE = {scale}\n@kernel\ndef scaled(x):\n    return SCALE * x\n"
 CALLER = (
     "from {jit}\nfrom constants import SHIFT\nfrom callee import scaled\n"
     "@kernel\ndef f(x):\n    return scaled(x) + SHIFT\n"
 )
-OURS = "ikgym.jit import kernel"
+OURS = "ikgym.kernels.jit import kernel"
 NUMBAS = "numba import njit\nkernel = njit(cache=True)"
 
 
@@ -62,7 +62,7 @@ def test_a_change_of_how_kernels_are_compiled_is_noticed(tmp_path, monkeypatch):
 
     def stamp():
         monkeypatch.setattr(jit, "_stamps", {})
-        return jit._stamp("ikgym.rotations")
+        return jit._stamp("ikgym.kernels.rotations")
 
     before, changed = stamp(), tmp_path / "jit.py"
     assert stamp() == before
@@ -130,7 +130,7 @@ def test_what_an_uncounted_kernel_calls_may_allocate(no_folder):
 
 CACHE = """
 import sys
-from ikgym.jit import kept_on_disk
+from ikgym.kernels.jit import kept_on_disk
 if sys.argv[1:] == ["full"]:
     import resource, signal
     signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
@@ -144,7 +144,7 @@ def with_cache(folder, *arguments):
     """What a fresh process prints."""
     (folder / "callee.py").write_text(CALLEE.format(jit=OURS, scale=2.0))
     (folder / "run.py").write_text(CACHE)
-    sources = {"PYTHONPATH": str(pathlib.Path(jit.__file__).parents[1]), "PYTHONDONTWRITEBYTECODE": "1"}
+    sources = {"PYTHONPATH": str(pathlib.Path(jit.__file__).parents[2]), "PYTHONDONTWRITEBYTECODE": "1"}
     line = [sys.executable, "run.py", *arguments]
     done = subprocess.run(line, cwd=folder, env={**os.environ, **sources}, capture_output=True, text=True, check=False)
     return done.stdout.strip(), done.stderr

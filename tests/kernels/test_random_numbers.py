@@ -6,7 +6,7 @@ import statistics
 
 import numpy as np
 
-from ikgym.random_numbers import CUT, normal, share, stream, uniform
+from ikgym.kernels.random_numbers import CUT, normal, share, stream, uniform
 
 KEY = np.uint64(12345)
 NUMBERS = 20_000
@@ -29,7 +29,7 @@ def test_normal_numbers_are_the_inverse_of_their_distribution():
 
 def test_they_are_cut(monkeypatch):
     """One in five hundred million is: the distribution itself is asked, with shares that hardly ever come."""
-    import ikgym.random_numbers as module
+    import ikgym.kernels.random_numbers as module
 
     for share_below, wanted in ((0.0, -CUT), (1e-12, -CUT), (1 - 1e-12, CUT), (2e-9, NORMAL.inv_cdf(2e-9))):
         monkeypatch.setattr(module, "uniform", lambda key, counter, s=share_below: 2.0 * s - 1.0)
