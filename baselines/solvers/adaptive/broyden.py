@@ -9,15 +9,14 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.policy import Memory
+from baselines.policy.parameters import choice, parameter
 from baselines.solvers.arm_task import task_shift
 from baselines.solvers.resolved_rate.base import APPLIED, NominalMemory, finish
 from baselines.solvers.resolved_rate.dls import DampedLeastSquares, damped_rows
 from ikgym.kernels import tasks as task_kernels
 from ikgym.kernels.jit import kernel
 from ikgym.kernels.kinematics import forward_and_jacobian
-from ikgym.validation import FloatArray, known_name, number
-
-LEARNS = ("correction", "jacobian")
+from ikgym.validation import FloatArray, number
 
 
 class BroydenMemory(NamedTuple):
@@ -163,16 +162,11 @@ class Broyden(DampedLeastSquares):
         UnknownNameError: There is no such thing to learn.
     """
 
-    learns: str = "correction"
-    motion: float = 1e-6
+    learns: str = parameter("correction", choice, available=("correction", "jacobian"))
+    motion: float = parameter(1e-6, number, above=0.0)
 
     name: ClassVar[str] = "broyden"
     step = broyden_step
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        known_name("thing to learn", self.learns, LEARNS)
-        object.__setattr__(self, "motion", number("motion", self.motion, above=0.0))
 
     def memory(self, rows: int) -> Memory:
         """A :class:`BroydenMemory` without a step before."""

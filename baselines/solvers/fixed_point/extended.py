@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from typing import ClassVar
 
+from baselines.policy.parameters import checked, parameter
 from baselines.solvers.arm_size import jacobian_bound
 from baselines.solvers.fixed_point.fixed_point import FixedPoint
 from baselines.solvers.references.privileged_path import PrivilegedPath
@@ -46,7 +47,7 @@ class FixedPointExtended(PrivilegedPath, FixedPoint):
     """
 
     seed: int | None = None
-    link: int = 2
+    link: int = parameter(2, whole_number, at_least=1)
     path: FloatArray = dataclasses.field(kw_only=True)
     _branch: Arm = dataclasses.field(init=False, repr=False)
     _points: FloatArray = dataclasses.field(init=False, repr=False)
@@ -59,8 +60,7 @@ class FixedPointExtended(PrivilegedPath, FixedPoint):
                 f"transformation: a longer x needs the transposed Jacobian, expected 'transpose', got "
                 f"{self.transformation!r}."
             )
-        model = self.problem.model
-        link = whole_number("link", self.link, at_least=1)
+        model, link = self.problem.model, checked(self)["link"]
         if link >= model.joints:
             raise InvalidInputError(f"link: expected at most {model.joints - 1} for arm {model.name!r}, got {link}.")
         branch = Arm(
@@ -71,9 +71,7 @@ class FixedPointExtended(PrivilegedPath, FixedPoint):
             tool=model.offsets[link],
         )
         path = frozen_array("path", self.path, (None, model.joints))
-        object.__setattr__(self, "path", path)
-        object.__setattr__(self, "_branch", branch)
-        object.__setattr__(self, "_points", read_only(branch.forward(path[:, :link])[1]))
+        self._settle(path=path, _branch=branch, _points=read_only(branch.forward(path[:, :link])[1]))
         super().__post_init__()
 
     def _extension(self) -> tuple[Chain, FloatArray]:

@@ -11,8 +11,9 @@ import numpy as np
 
 from baselines.policy import Memory
 from baselines.policy.compiled import CompiledPolicy
+from baselines.policy.parameters import choice, parameter
 from baselines.solvers.arm_size import error_weights, jacobian_bound, length, radian
-from baselines.solvers.fixed_point.contraction import Contraction, contraction
+from baselines.solvers.fixed_point.contraction import FAMILIES, Contraction, contraction
 from baselines.solvers.fixed_point.iteration import (
     TRANSFORMATIONS,
     FixedPointMemory,
@@ -21,7 +22,7 @@ from baselines.solvers.fixed_point.iteration import (
 )
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.kinematics import Chain
-from ikgym.validation import FloatArray, known_name, number, read_only, whole_number
+from ikgym.validation import FloatArray, number, read_only, whole_number
 
 # The length in [m] of the paper's arm, to which its A belongs; on a shorter one it grows with 1/length².
 PAPERS_LENGTH = 1.3
@@ -70,15 +71,15 @@ class FixedPoint(CompiledPolicy):
         UnknownNameError: There is no such transformation or family.
     """
 
-    transformation: str = "transpose"
-    family: str = "affine"
-    slope: float = 0.5
-    a: float | None = None
-    d: float = 0.3
-    iterations: int = 10
-    tolerance: float = 1e-6
+    transformation: str = parameter("transpose", choice, available=TRANSFORMATIONS)
+    family: str = parameter("affine", choice, available=FAMILIES)
+    slope: float = parameter(0.5, number, above=-1.0, below=1.0)
+    a: float | None = parameter(None, number)
+    d: float = parameter(0.3, number)
+    iterations: int = parameter(10, whole_number, at_least=1)
+    tolerance: float = parameter(1e-6, number, at_least=0.0)
     components: Sequence[int] | None = None
-    length: float | None = None
+    length: float | None = parameter(None, number, above=0.0)
     #: F.
     function: Contraction = dataclasses.field(init=False, repr=False)
 
@@ -86,15 +87,12 @@ class FixedPoint(CompiledPolicy):
     step = fixed_point_step
 
     def __post_init__(self) -> None:
-        known_name("transformation", self.transformation, TRANSFORMATIONS)
-        object.__setattr__(self, "components", self._checked_components())
-        object.__setattr__(self, "length", self._checked_length())
-        object.__setattr__(self, "function", contraction(self.family, self.slope, self.d))
-        object.__setattr__(self, "a", self._contracting() if self.a is None else number("a", self.a))
+        super().__post_init__()
+        self._settle(components=self._checked_components(), length=self._checked_length())
+        self._settle(function=contraction(self.family, self.slope, self.d))
+        self._settle(a=self._contracting() if self.a is None else self.a)
         if self.a == 0.0:
             raise InvalidInputError("a: expected a number other than 0, got 0: nothing would move.")
-        whole_number("iterations", self.iterations, at_least=1)
-        number("tolerance", self.tolerance, at_least=0.0)
 
     def memory(self, rows: int) -> Memory:
         """A :class:`FixedPointMemory` without a step before."""
@@ -140,7 +138,7 @@ class FixedPoint(CompiledPolicy):
 
     def _checked_length(self) -> float | None:
         if self.transformation == "transpose":
-            return radian(self.problem.model) if self.length is None else number("length", self.length, above=0.0)
+            return radian(self.problem.model) if self.length is None else self.length
         if self.length is not None:
             raise InvalidInputError("length: expected none but with transformation 'transpose', which weighs errors.")
         return None

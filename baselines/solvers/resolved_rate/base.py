@@ -11,16 +11,16 @@ import numpy.typing as npt
 
 from baselines.policy import Memory
 from baselines.policy.compiled import CompiledPolicy
+from baselines.policy.parameters import choice, parameter
 from baselines.policy_kernels import scale_rows
 from baselines.status import Status
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels import tasks as task_kernels
 from ikgym.kernels.jit import kernel, uncounted
 from ikgym.kernels.kinematics import forward_and_jacobian
-from ikgym.validation import FloatArray, known_name, number
+from ikgym.validation import FloatArray, number
 
 APPLIED, DEFICIENT = int(Status.APPLIED), int(Status.RANK_DEFICIENT)
-SATURATIONS = ("clip", "scale")
 
 
 class NominalMemory(NamedTuple):
@@ -53,24 +53,17 @@ class TaskFeedback(CompiledPolicy, abc.ABC):
         InvalidInputError: The gain is not between 0 and 2.
     """
 
-    gain: float = 1.0
+    gain: float = parameter(1.0, number, above=0.0, below=2.0)
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "gain", number("gain", self.gain, above=0.0))
-        if self.gain >= 2.0:
-            raise InvalidInputError(f"gain: expected a number above 0 and below 2, got {self.gain:g}.")
-
-    def checked_secondary_gain(self, gain: float) -> float:
-        """The gain of a secondary objective in [1/s].
+    def check_secondary_gain(self, gain: float) -> None:
+        """Checks the gain of a secondary objective in [1/s] against the time step.
 
         Raises:
-            InvalidInputError: It is not at least 0 and below 2/Δt.
+            InvalidInputError: It is not below 2/Δt.
         """
-        checked = number("secondary_gain", gain, at_least=0.0)
-        if checked * self.problem.dt >= 2.0:
+        if gain * self.problem.dt >= 2.0:
             limit = 2.0 / self.problem.dt
-            raise InvalidInputError(f"secondary_gain: expected a number below 2/Δt = {limit:g}, got {checked:g}.")
-        return checked
+            raise InvalidInputError(f"secondary_gain: expected a number below 2/Δt = {limit:g}, got {gain:g}.")
 
     def memory(self, rows: int) -> Memory:
         """A :class:`NominalMemory` without a step before."""
@@ -100,11 +93,7 @@ class ResolvedRate(TaskFeedback, abc.ABC):
         UnknownNameError: There is no such saturation.
     """
 
-    saturation: str = "clip"
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        known_name("saturation", self.saturation, SATURATIONS)
+    saturation: str = parameter("clip", choice, available=("clip", "scale"))
 
     @property
     def scales(self) -> bool:

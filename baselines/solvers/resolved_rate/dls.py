@@ -7,6 +7,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from baselines.policy.parameters import parameter
 from baselines.solvers.linear_algebra import damped_gram, transposed_product
 from baselines.solvers.resolved_rate.base import APPLIED, ResolvedRate, add_feedback, finish, task_motion
 from ikgym.kernels.jit import kernel
@@ -72,14 +73,10 @@ class DampedLeastSquares(ResolvedRate):
         InvalidInputError: The gain or the damping is out of its range.
     """
 
-    damping: float = 1e-3
+    damping: float = parameter(1e-3, number, above=0.0)
 
     name: ClassVar[str] = "dls"
     step = dls_step
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        object.__setattr__(self, "damping", number("damping", self.damping, above=0.0))
 
     def numbers(self) -> DampedNumbers:
         """See :meth:`CompiledPolicy.numbers`."""

@@ -7,9 +7,9 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from baselines.policy.parameters import parameter
 from baselines.solvers.linear_algebra import dot
 from baselines.solvers.resolved_rate.base import ResolvedRate, add_feedback, finish, say_deficient, task_motion
-from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.jit import kernel
 from ikgym.validation import number
 
@@ -130,18 +130,10 @@ class GramSchmidt(ResolvedRate):
         InvalidInputError: The gain or the truncation is out of its range.
     """
 
-    truncation: float = 1e-3
+    truncation: float = parameter(1e-3, number, at_least=0.0, below=1.0)
 
     name: ClassVar[str] = "gram_schmidt"
     step = gram_schmidt_step
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        object.__setattr__(self, "truncation", number("truncation", self.truncation, at_least=0.0))
-        if self.truncation >= 1.0:
-            raise InvalidInputError(
-                f"truncation: expected a number of at least 0 and below 1, got {self.truncation:g}."
-            )
 
     def numbers(self) -> GramSchmidtNumbers:
         """See :meth:`CompiledPolicy.numbers`."""

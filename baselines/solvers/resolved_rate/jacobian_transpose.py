@@ -7,6 +7,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from baselines.policy.parameters import parameter
 from baselines.solvers.arm_size import error_weights, radian
 from baselines.solvers.resolved_rate.base import (
     APPLIED,
@@ -113,8 +114,8 @@ class JacobianTranspose(ResolvedRate):
         InvalidInputError: The gain, the tolerance or the length is out of its range.
     """
 
-    rank_tolerance: float = 1e-12
-    length: float | None = None
+    rank_tolerance: float = parameter(1e-12, number, at_least=0.0)
+    length: float | None = parameter(None, number, above=0.0)
 
     _weights: FloatArray = dataclasses.field(init=False, repr=False)
 
@@ -123,10 +124,8 @@ class JacobianTranspose(ResolvedRate):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        object.__setattr__(self, "rank_tolerance", number("rank_tolerance", self.rank_tolerance, at_least=0.0))
-        length = radian(self.problem.model) if self.length is None else number("length", self.length, above=0.0)
-        object.__setattr__(self, "length", length)
-        object.__setattr__(self, "_weights", read_only(error_weights(self.problem.task, length)))
+        length = radian(self.problem.model) if self.length is None else self.length
+        self._settle(length=length, _weights=read_only(error_weights(self.problem.task, length)))
 
     def numbers(self) -> TransposeNumbers:
         """See :meth:`CompiledPolicy.numbers`."""

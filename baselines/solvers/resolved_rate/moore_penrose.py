@@ -7,9 +7,9 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from baselines.policy.parameters import parameter
 from baselines.solvers.linear_algebra import pseudoinverse_rows
 from baselines.solvers.resolved_rate.base import ResolvedRate, add_feedback, finish, say_deficient, task_motion
-from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.jit import kernel
 from ikgym.validation import FloatArray, number, read_only
 
@@ -65,16 +65,10 @@ class MoorePenrose(ResolvedRate):
         InvalidInputError: The gain or the tolerance is out of its range.
     """
 
-    rank_tolerance: float = 1e-12
+    rank_tolerance: float = parameter(1e-12, number, at_least=0.0, below=1.0)
 
     name: ClassVar[str] = "moore_penrose"
     step = pseudoinverse_step
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        object.__setattr__(self, "rank_tolerance", number("rank_tolerance", self.rank_tolerance, at_least=0.0))
-        if self.rank_tolerance >= 1.0:
-            raise InvalidInputError(f"rank_tolerance: expected a number below 1, got {self.rank_tolerance:g}.")
 
     def numbers(self) -> NamedTuple:
         """See :meth:`CompiledPolicy.numbers`."""

@@ -8,6 +8,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from baselines.policy.parameters import choice, parameter
 from baselines.solvers.linear_algebra import pseudoinverse_rows
 from baselines.solvers.resolved_rate.base import APPLIED, add_feedback, finish, say_deficient, task_motion
 from baselines.solvers.resolved_rate.dls import damped_rows
@@ -18,7 +19,7 @@ from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.jit import kernel
 from ikgym.kernels.kinematics import forward_and_jacobian
 from ikgym.kernels.linear_algebra import cholesky, cholesky_solve
-from ikgym.validation import FloatArray, as_given, known_name, number, per_joint, read_only
+from ikgym.validation import FloatArray, as_given, number, per_joint, read_only
 
 OBJECTIVES = ("posture", "joint_centring", "manipulability")
 
@@ -212,10 +213,10 @@ class NullSpace(MoorePenrose):
         UnknownNameError: There is no such objective.
     """
 
-    objective: str | None = None
-    secondary_gain: float = 1.0
+    objective: str | None = parameter(None, choice, available=OBJECTIVES)
+    secondary_gain: float = parameter(1.0, number, at_least=0.0)
     posture: float | Sequence[float] | None = None
-    damping: float = 1e-3
+    damping: float = parameter(1e-3, number, at_least=0.0)
     _target: FloatArray = dataclasses.field(init=False, repr=False)
     _joint_gain: FloatArray = dataclasses.field(init=False, repr=False)
 
@@ -227,19 +228,12 @@ class NullSpace(MoorePenrose):
         model = self.problem.model
         default = "joint_centring" if self.posture is None and middle(model)[0].any() else "posture"
         objective = default if self.objective is None else self.objective
-        known_name("objective", objective, OBJECTIVES)
         given = 0.0 if self.posture is None else self.posture
         posture = per_joint("posture", given, model.joints)
         target, gains = _centre(model) if objective == "joint_centring" else (posture, np.ones(model.joints))
-        for field, value in {
-            "objective": objective,
-            "secondary_gain": self.checked_secondary_gain(self.secondary_gain),
-            "posture": as_given(given, posture),
-            "damping": number("damping", self.damping, at_least=0.0),
-            "_target": read_only(target),
-            "_joint_gain": read_only(gains),
-        }.items():
-            object.__setattr__(self, field, value)
+        self.check_secondary_gain(self.secondary_gain)
+        self._settle(objective=objective, posture=as_given(given, posture))
+        self._settle(_target=read_only(target), _joint_gain=read_only(gains))
 
     def numbers(self) -> NullSpaceNumbers:
         """See :meth:`CompiledPolicy.numbers`."""

@@ -47,8 +47,7 @@ class WeightedPseudoinverse(MoorePenrose):
         weights = per_joint("weights", given, self.problem.model.joints)
         if not (weights > 0.0).all():
             raise InvalidInputError(f"weights: expected numbers above 0, got {weights.tolist()}.")
-        object.__setattr__(self, "weights", as_given(given, weights))
-        object.__setattr__(self, "_root", read_only(np.sqrt(weights)))
+        self._settle(weights=as_given(given, weights), _root=read_only(np.sqrt(weights)))
 
     def numbers(self) -> PseudoinverseNumbers:
         """See :meth:`CompiledPolicy.numbers`."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import abc
 import dataclasses
 
+from baselines.policy.parameters import parameter
 from baselines.solvers.rivals.base import Rival
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 from ikgym.validation import number
@@ -37,25 +38,20 @@ class TaskProgram(Rival, abc.ABC):
         MissingDependencyError: The package, or `qpsolvers`, is not installed.
     """
 
-    gain: float = 1.0
-    position_cost: float = 1.0
-    orientation_cost: float = 1.0
-    lm_damping: float = 1.0
-    posture_cost: float = 1e-3
-    posture_rate: float = 1.0
-    damping: float = 1e-12
-    limit_gain: float = 0.5
+    gain: float = parameter(1.0, number, above=0.0, at_most=1.0)
+    position_cost: float = parameter(1.0, number, above=0.0)
+    orientation_cost: float = parameter(1.0, number, at_least=0.0)
+    lm_damping: float = parameter(1.0, number, at_least=0.0)
+    posture_cost: float = parameter(1e-3, number, at_least=0.0)
+    posture_rate: float = parameter(1.0, number, at_least=0.0)
+    damping: float = parameter(1e-12, number, at_least=0.0)
+    limit_gain: float = parameter(0.5, number, above=0.0, at_most=1.0)
     solver: str = "daqp"
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for name in ("gain", "limit_gain", "position_cost"):
-            object.__setattr__(self, name, number(name, getattr(self, name), above=0.0))
-        for name in ("orientation_cost", "lm_damping", "posture_cost", "posture_rate", "damping"):
-            object.__setattr__(self, name, number(name, getattr(self, name), at_least=0.0))
-        for name, share in {"gain": self.gain, "limit_gain": self.limit_gain, "posture_rate · Δt": self.share}.items():
-            if share > 1.0:
-                raise InvalidInputError(f"{name}: expected at most 1, got {share:g}.")
+        if self.share > 1.0:
+            raise InvalidInputError(f"posture_rate · Δt: expected at most 1, got {self.share:g}.")
         known = self.imported("qpsolvers").available_solvers
         if self.solver not in known:
             raise UnknownNameError("solver of quadratic programs", self.solver, tuple(known))
