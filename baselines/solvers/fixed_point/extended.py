@@ -8,7 +8,7 @@ from typing import ClassVar
 from baselines.policy.parameters import checked, parameter
 from baselines.solvers.arm_size import jacobian_bound
 from baselines.solvers.fixed_point.fixed_point import FixedPoint
-from baselines.solvers.references.privileged_path import PrivilegedPath
+from baselines.solvers.references.follow_nominal import PrivilegedPath
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.kinematics import Chain
@@ -26,8 +26,7 @@ class FixedPointExtended(PrivilegedPath, FixedPoint):
     Args:
         problem: What the policy is told of the scenario.
         transformation: ``"transpose"``; nothing else fits a longer x.
-        family: See :class:`FixedPoint`, like all up to the tolerance.
-        slope: The factor in F.
+        slope: The factor in F; see :class:`FixedPoint`, like all up to the tolerance.
         a: A; if left out, chosen for the longer Jacobian as there for J: -0.815 on the paper's arm, of whose A = -1
             the bound is not sure. With -1 it converges on its trajectories, too, and comes nearer.
         d: D.
@@ -43,7 +42,7 @@ class FixedPointExtended(PrivilegedPath, FixedPoint):
     Raises:
         InvalidInputError: A parameter is out of its range, or the scenario has no joint path, or is random and there
             is no seed.
-        UnknownNameError: There is no such transformation or family.
+        UnknownNameError: There is no such transformation.
     """
 
     seed: int | None = None

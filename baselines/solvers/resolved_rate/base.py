@@ -11,8 +11,7 @@ import numpy.typing as npt
 
 from baselines.policy import Memory
 from baselines.policy.compiled import CompiledPolicy
-from baselines.policy.parameters import choice, parameter
-from baselines.policy_kernels import scale_rows
+from baselines.policy.parameters import parameter
 from baselines.status import Status
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels import tasks as task_kernels
@@ -79,26 +78,9 @@ class TaskFeedback(CompiledPolicy, abc.ABC):
 class ResolvedRate(TaskFeedback, abc.ABC):
     """Follows the nominal motion of the next step, and takes back a share of the present error; see the base.
 
-    The task shift is turned into ``q̇ Δt`` with the task Jacobian of the model at q(k), by a subclass.
-
-    Args:
-        problem: What the policy is told of the scenario.
-        gain: Share of the present error that is taken back in one step; see :class:`TaskFeedback`.
-        saturation: What is done about joint velocities beyond their limits: ``clip`` cuts each joint to its own,
-            ``scale`` slows down all of them alike, which keeps the direction of the task velocity. That is not the
-            default, since a single slow joint, such as the torso of TIAGo, holds up all others then.
-
-    Raises:
-        InvalidInputError: The gain is not between 0 and 2.
-        UnknownNameError: There is no such saturation.
+    The task shift is turned into ``q̇ Δt`` with the task Jacobian of the model at q(k), by a subclass. Joint velocities
+    beyond their limits are cut joint by joint.
     """
-
-    saturation: str = parameter("clip", choice, available=("clip", "scale"))
-
-    @property
-    def scales(self) -> bool:
-        """Whether joints beyond their velocity limits slow down all others."""
-        return self.saturation == "scale"
 
 
 @kernel
@@ -140,15 +122,13 @@ def add_feedback(gain, error, shift):
 
 
 @uncounted
-def finish(model, scaling, answer):
-    """Turns joint shifts into velocities, slowed down alike where ``scaling``; one iteration was made."""
+def finish(model, answer):
+    """Turns joint shifts into velocities; one iteration was made."""
     qdot, iterations = answer.qdot, answer.iterations
     for row in range(qdot.shape[0]):
         iterations[row] = 1
         for j in range(qdot.shape[1]):
             qdot[row, j] /= model.dt
-    if scaling:
-        scale_rows(qdot, model.largest, answer.status)
 
 
 @uncounted

@@ -20,12 +20,10 @@ class DampedNumbers(NamedTuple):
 
     Attributes:
         gain: Share of the present error that is taken back in one step.
-        scaling: Whether joints beyond their velocity limits slow down all others.
         damping: λ.
     """
 
     gain: float
-    scaling: bool
     damping: float
 
 
@@ -53,7 +51,7 @@ def dls_step(model, numbers, seen, memory, answer):
     add_feedback(numbers.gain, error, shift)
     damped_rows(jacobian, shift, numbers.damping, answer.qdot)
     answer.status[:] = APPLIED
-    finish(model, numbers.scaling, answer)
+    finish(model, answer)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -66,7 +64,6 @@ class DampedLeastSquares(ResolvedRate):
     Args:
         problem: What the policy is told of the scenario.
         gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
-        saturation: What is done about joint velocities beyond their limits; see :class:`ResolvedRate`.
         damping: λ, added to J Jᵀ as it is, not squared. In the square of the Jacobian's units, [m²] and [1]. Above 0.
 
     Raises:
@@ -80,4 +77,4 @@ class DampedLeastSquares(ResolvedRate):
 
     def numbers(self) -> DampedNumbers:
         """See :meth:`CompiledPolicy.numbers`."""
-        return DampedNumbers(self.gain, self.scales, self.damping)
+        return DampedNumbers(self.gain, self.damping)

@@ -79,13 +79,11 @@ class GramSchmidtNumbers(NamedTuple):
 
     Attributes:
         gain: Share of the present error that is taken back in one step.
-        scaling: Whether joints beyond their velocity limits slow down all others.
         truncation: Rows whose remainder is shorter than this share of the longest row are left out.
         full_rank: The rank that J has where nothing is lost.
     """
 
     gain: float
-    scaling: bool
     truncation: float
     full_rank: int
 
@@ -98,7 +96,7 @@ def gram_schmidt_step(model, numbers, seen, memory, answer):
     deficient = np.empty(shift.shape[0], np.bool_)
     orthonormal_rows(jacobian, shift, numbers.truncation, numbers.full_rank, answer.qdot, deficient)
     say_deficient(deficient, answer.status)
-    finish(model, numbers.scaling, answer)
+    finish(model, answer)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -122,7 +120,6 @@ class GramSchmidt(ResolvedRate):
     Args:
         problem: What the policy is told of the scenario.
         gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
-        saturation: What is done about joint velocities beyond their limits; see :class:`ResolvedRate`.
         truncation: Rows whose remainder is shorter than this share of the longest row are left out. At least 0 and
             below 1. Rows of positions and of orientations are compared as they are, in [m] and [1].
 
@@ -137,4 +134,4 @@ class GramSchmidt(ResolvedRate):
 
     def numbers(self) -> GramSchmidtNumbers:
         """See :meth:`CompiledPolicy.numbers`."""
-        return GramSchmidtNumbers(self.gain, self.scales, self.truncation, self.full_rank)
+        return GramSchmidtNumbers(self.gain, self.truncation, self.full_rank)

@@ -61,14 +61,12 @@ class TransposeNumbers(NamedTuple):
 
     Attributes:
         gain: Share of the present error that is taken back in one step.
-        scaling: Whether joints beyond their velocity limits slow down all others.
         tolerance: ‖JᵀΔx‖ below this share of ‖J‖ ‖Δx‖ counts as zero.
         full_rank: The rank that J has where nothing is lost.
         weights: The diagonal of W². Shape (e,).
     """
 
     gain: float
-    scaling: bool
     tolerance: float
     full_rank: int
     weights: FloatArray
@@ -84,7 +82,7 @@ def transpose_step(model, numbers, seen, memory, answer):
     say_deficient(stuck, answer.status)
     if shift.shape[1] != numbers.full_rank:
         answer.status[:] = APPLIED
-    finish(model, numbers.scaling, answer)
+    finish(model, answer)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -105,7 +103,6 @@ class JacobianTranspose(ResolvedRate):
     Args:
         problem: What the policy is told of the scenario.
         gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
-        saturation: What is done about joint velocities beyond their limits; see :class:`ResolvedRate`.
         rank_tolerance: ‖JᵀΔx‖ below this share of ‖J‖ ‖Δx‖ (Frobenius, weighed) counts as zero. At least 0.
         length: ℓ, what 1 rad counts as, or 1 in a rotation matrix, in [m]. Above 0. If left out, chosen for the model,
             see :func:`baselines.solvers.arm_size.radian`.
@@ -129,4 +126,4 @@ class JacobianTranspose(ResolvedRate):
 
     def numbers(self) -> TransposeNumbers:
         """See :meth:`CompiledPolicy.numbers`."""
-        return TransposeNumbers(self.gain, self.scales, self.rank_tolerance, self.full_rank, self._weights)
+        return TransposeNumbers(self.gain, self.rank_tolerance, self.full_rank, self._weights)

@@ -19,14 +19,12 @@ class PseudoinverseNumbers(NamedTuple):
 
     Attributes:
         gain: Share of the present error that is taken back in one step.
-        scaling: Whether joints beyond their velocity limits slow down all others.
         tolerance: Singular values below this share of the largest count as zero.
         full_rank: The rank that J has where nothing is lost.
         root: By which the columns of J are divided: the roots of the joints' weights. Shape (n,).
     """
 
     gain: float
-    scaling: bool
     tolerance: float
     full_rank: int
     root: FloatArray
@@ -44,7 +42,7 @@ def pseudoinverse_step(model, numbers, seen, memory, answer):
     for row in range(qdot.shape[0]):
         for j in range(qdot.shape[1]):
             qdot[row, j] /= root[j]
-    finish(model, numbers.scaling, answer)
+    finish(model, answer)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -58,7 +56,6 @@ class MoorePenrose(ResolvedRate):
     Args:
         problem: What the policy is told of the scenario.
         gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
-        saturation: What is done about joint velocities beyond their limits; see :class:`ResolvedRate`.
         rank_tolerance: Singular values below this share of the largest count as zero. At least 0, below 1.
 
     Raises:
@@ -73,4 +70,4 @@ class MoorePenrose(ResolvedRate):
     def numbers(self) -> NamedTuple:
         """See :meth:`CompiledPolicy.numbers`."""
         root = read_only(np.ones(self.problem.model.joints))
-        return PseudoinverseNumbers(self.gain, self.scales, self.rank_tolerance, self.full_rank, root)
+        return PseudoinverseNumbers(self.gain, self.rank_tolerance, self.full_rank, root)

@@ -94,7 +94,6 @@ class NullSpaceNumbers(NamedTuple):
 
     Attributes:
         gain: Share of the present error that is taken back in one step.
-        scaling: Whether joints beyond their velocity limits slow down all others.
         tolerance: Singular values below this share of the largest count as zero.
         full_rank: The rank that J has where nothing is lost.
         damping: λ; 0 for the pseudoinverse.
@@ -106,7 +105,6 @@ class NullSpaceNumbers(NamedTuple):
     """
 
     gain: float
-    scaling: bool
     tolerance: float
     full_rank: int
     damping: float
@@ -123,7 +121,7 @@ def null_space_step(model, numbers, seen, memory, answer):
     jacobian, shift, error = task_motion(model.chain, model.kind, seen, memory)
     add_feedback(numbers.gain, error, shift)
     move_rows(model.chain, numbers, seen.q, jacobian, shift, answer.qdot, answer.status)
-    finish(model, numbers.scaling, answer)
+    finish(model, answer)
 
 
 @kernel
@@ -199,7 +197,6 @@ class NullSpace(MoorePenrose):
     Args:
         problem: What the policy is told of the scenario.
         gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
-        saturation: What is done about joint velocities beyond their limits; see :class:`ResolvedRate`.
         rank_tolerance: Singular values below this share of the largest count as zero. At least 0.
         objective: One of ``posture``, ``joint_centring`` and ``manipulability``. If left out, ``joint_centring`` where
             the model has joint limits and no posture is given, else ``posture``.
@@ -242,7 +239,6 @@ class NullSpace(MoorePenrose):
             lines = 6 if self.problem.task.has_orientation else 3
         return NullSpaceNumbers(
             self.gain,
-            self.scales,
             self.rank_tolerance,
             self.full_rank,
             self.damping,

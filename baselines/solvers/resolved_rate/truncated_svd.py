@@ -25,7 +25,6 @@ class TruncatedSVD(ResolvedRate):
     Args:
         problem: What the policy is told of the scenario.
         gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
-        saturation: What is done about joint velocities beyond their limits; see :class:`ResolvedRate`.
         threshold: Singular values of the task Jacobian below this share of the largest are left out. Between 0
             and 1.
 
@@ -41,4 +40,4 @@ class TruncatedSVD(ResolvedRate):
     def numbers(self) -> PseudoinverseNumbers:
         """See :meth:`CompiledPolicy.numbers`."""
         root = read_only(np.ones(self.problem.model.joints))
-        return PseudoinverseNumbers(self.gain, self.scales, self.threshold, self.full_rank, root)
+        return PseudoinverseNumbers(self.gain, self.threshold, self.full_rank, root)
