@@ -17,11 +17,9 @@ from ikgym.arms import Arm
 from ikgym.arms.limits import middle
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.jit import kernel
-from ikgym.kernels.kinematics import forward_and_jacobian
-from ikgym.kernels.linear_algebra import cholesky, cholesky_solve
 from ikgym.validation import FloatArray, as_given, number, per_joint, read_only
 
-OBJECTIVES = ("posture", "joint_centring", "manipulability")
+OBJECTIVES = ("posture", "joint_centring")
 
 
 @kernel
@@ -35,60 +33,6 @@ def task_rows(jacobian, velocity, out):
             out[row, a] = total
 
 
-@kernel
-def manipulability_rows(chain, q, lines, out):
-    """∂w/∂q row by row, w = √det(J Jᵀ) of the first ``lines`` (3 or 6) rows of the geometric Jacobian.
-
-    ∂w/∂q_i = w tr(∂J/∂q_i J⁺), and the columns of J depend on the joints before them and on those behind:
-    ∂J_j/∂q_i is (ω_i × v_j, ω_i × ω_j) for i ≤ j, and (ω_j × v_i, 0) for i > j.
-
-    Args:
-        chain: The model of the arm.
-        q: Joint coordinates. Shape (B, n).
-        lines: Number of rows.
-        out: Receives the gradients; 0 where J has no full rank. Shape (B, n).
-    """
-    n = q.shape[1]
-    rotation, position, jacobian = np.empty((3, 3)), np.empty(3), np.empty((6, n))
-    gram, dual, column, turned = np.empty((lines, lines)), np.empty((n, lines)), np.empty(lines), np.empty(6)
-    for row in range(q.shape[0]):
-        out[row] = 0.0
-        forward_and_jacobian(chain, q[row], rotation, position, jacobian)
-        for a in range(lines):
-            for b in range(a + 1):
-                gram[a, b] = 0.0
-                for k in range(n):
-                    gram[a, b] += jacobian[a, k] * jacobian[b, k]
-        if not cholesky(gram):
-            continue
-        w = 1.0
-        for a in range(lines):
-            w *= gram[a, a]
-        for j in range(n):
-            for a in range(lines):
-                column[a] = jacobian[a, j]
-            cholesky_solve(gram, column)
-            for a in range(lines):
-                dual[j, a] = column[a]  # a row of J⁺
-        for i in range(n):
-            for j in range(n):
-                turned[3:] = 0.0
-                if i <= j:
-                    _cross(jacobian[3:, i], jacobian[:3, j], turned[:3])
-                    _cross(jacobian[3:, i], jacobian[3:, j], turned[3:])
-                else:
-                    _cross(jacobian[3:, j], jacobian[:3, i], turned[:3])
-                for a in range(lines):
-                    out[row, i] += w * turned[a] * dual[j, a]
-
-
-@kernel
-def _cross(x, y, out):
-    out[0] = x[1] * y[2] - x[2] * y[1]
-    out[1] = x[2] * y[0] - x[0] * y[2]
-    out[2] = x[0] * y[1] - x[1] * y[0]
-
-
 class NullSpaceNumbers(NamedTuple):
     """The parameters of :class:`NullSpace` as its kernel takes them.
 
@@ -97,9 +41,7 @@ class NullSpaceNumbers(NamedTuple):
         tolerance: Singular values below this share of the largest count as zero.
         full_rank: The rank that J has where nothing is lost.
         damping: λ; 0 for the pseudoinverse.
-        lines: Rows of the Jacobian whose manipulability is to grow; 0 for none.
         secondary_gain: K Δt.
-        reach: The third power of the arm's reach, in [m³].
         joint_gain: How strongly each joint is led to its goal. Shape (n,).
         goal: Where the joints are led to, in [rad] or [m]. Shape (n,).
     """
@@ -108,9 +50,7 @@ class NullSpaceNumbers(NamedTuple):
     tolerance: float
     full_rank: int
     damping: float
-    lines: int
     secondary_gain: float
-    reach: float
     joint_gain: FloatArray
     goal: FloatArray
 
@@ -120,16 +60,15 @@ def null_space_step(model, numbers, seen, memory, answer):
     """One step of :class:`NullSpace`; see :class:`CompiledPolicy` for the arguments."""
     jacobian, shift, error = task_motion(model.chain, model.kind, seen, memory)
     add_feedback(numbers.gain, error, shift)
-    move_rows(model.chain, numbers, seen.q, jacobian, shift, answer.qdot, answer.status)
+    move_rows(numbers, seen.q, jacobian, shift, answer.qdot, answer.status)
     finish(model, answer)
 
 
 @kernel
-def move_rows(chain, numbers, q, jacobian, shift, out, status):
+def move_rows(numbers, q, jacobian, shift, out, status):
     """J⁺ Δx + (I - J⁺ J) Δt z row by row.
 
     Args:
-        chain: The model of the arm.
         numbers: The :class:`NullSpaceNumbers`.
         q: Joint coordinates in [rad] or [m]. Shape (B, n).
         jacobian: Task Jacobians. Shape (B, e, n).
@@ -139,7 +78,7 @@ def move_rows(chain, numbers, q, jacobian, shift, out, status):
     """
     tolerance, full_rank = numbers.tolerance, numbers.full_rank
     aim, disturbance, deficient = np.empty(q.shape), np.empty(shift.shape), np.empty(q.shape[0], np.bool_)
-    objective_rows(chain, numbers, q, aim)
+    objective_rows(numbers, q, aim)
     aim *= numbers.secondary_gain
     task_rows(jacobian, aim, disturbance)
     if numbers.damping == 0.0:  # with one pseudoinverse
@@ -155,20 +94,15 @@ def move_rows(chain, numbers, q, jacobian, shift, out, status):
 
 
 @kernel
-def objective_rows(chain, numbers, q, out):
+def objective_rows(numbers, q, out):
     """The secondary objective's z / K row by row.
 
     Args:
-        chain: The model of the arm.
         numbers: The :class:`NullSpaceNumbers`.
         q: Joint coordinates in [rad] or [m]. Shape (B, n).
         out: Receives z / K. Shape (B, n).
     """
     joint_gain, goal = numbers.joint_gain, numbers.goal
-    if numbers.lines > 0:
-        manipulability_rows(chain, q, numbers.lines, out)
-        out /= numbers.reach
-        return
     for row in range(q.shape[0]):
         for j in range(q.shape[1]):
             out[row, j] = joint_gain[j] * (goal[j] - q[row, j])
@@ -185,10 +119,6 @@ class NullSpace(MoorePenrose):
     - ``joint_centring``: z = K (r_min / r)² (q_middle − q), joint by joint, with the ranges r between the limits
       and the smallest of them r_min; that is Liégeois's gradient, scaled so that K is the gain of the joint with
       the smallest range. Joints without two finite limits are left alone.
-    - ``manipulability``: z = K ∂(w / ℓᵏ)/∂q, Yoshikawa's w = √det(J Jᵀ) of the geometric Jacobian (of its linear
-      rows where the task has no orientation), made free of units with the arm's reach ℓ in [m], without the strokes
-      of prismatic joints; k = 3 for the three linear rows. The gradient is exact. In a singular pose, where w has a
-      kink, z is 0.
 
     The first part is Moore–Penrose, or damped least squares if there is a damping. J⁺ in the second part is never
     damped, or the task would be disturbed. An arm without redundancy is moved by the secondary objective in singular
@@ -198,9 +128,9 @@ class NullSpace(MoorePenrose):
         problem: What the policy is told of the scenario.
         gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
         rank_tolerance: Singular values below this share of the largest count as zero. At least 0.
-        objective: One of ``posture``, ``joint_centring`` and ``manipulability``. If left out, ``joint_centring`` where
+        objective: ``posture`` or ``joint_centring``. If left out, ``joint_centring`` where
             the model has joint limits and no posture is given, else ``posture``.
-        secondary_gain: K in [1/s], at least 0 and below 2/Δt; for the manipulability in [rad²/s] or [m²/s].
+        secondary_gain: K in [1/s], at least 0 and below 2/Δt.
         posture: q_posture in [rad] or [m], 0 if left out; one number, or one a joint. For ``posture`` only.
         damping: λ of the first part, as in :class:`DampedLeastSquares`; 0 stands for Moore–Penrose.
 
@@ -234,17 +164,12 @@ class NullSpace(MoorePenrose):
 
     def numbers(self) -> NullSpaceNumbers:
         """See :meth:`CompiledPolicy.numbers`."""
-        lines = 0
-        if self.objective == "manipulability":
-            lines = 6 if self.problem.task.has_orientation else 3
         return NullSpaceNumbers(
             self.gain,
             self.rank_tolerance,
             self.full_rank,
             self.damping,
-            lines,
             self.problem.dt * self.secondary_gain,
-            self.problem.model.reach(np.zeros(self.problem.model.joints)) ** 3,
             self._joint_gain,
             self._target,
         )

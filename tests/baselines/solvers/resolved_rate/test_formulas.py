@@ -41,14 +41,14 @@ def invert(policy, jacobian, shift):
 def move(policy, q, jacobian, shift):
     """The same of `null_space`, at joint coordinates (B, n)."""
     out, status = np.empty_like(q), np.empty(len(q), dtype=np.int64)
-    move_rows(policy.problem.model.chain, policy.numbers(), q, jacobian, shift, out, status)
+    move_rows(policy.numbers(), q, jacobian, shift, out, status)
     return out, status
 
 
 def objective_gradient(policy, q):
     """Its secondary objective's z / K, of shape (B, n)."""
     out = np.empty_like(q)
-    objective_rows(policy.problem.model.chain, policy.numbers(), q, out)
+    objective_rows(policy.numbers(), q, out)
     return out
 
 
