@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from baselines import registry
 from baselines.policy import Batch, Memory, Problem, Solution, SolverPolicy
-from baselines.policy.state import pack, remembered, replace_rows
+from baselines.policy.arguments import pack, remembered, replace_rows
 from baselines.spec import PolicySpec, parse_policy
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Preview

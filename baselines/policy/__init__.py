@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from baselines.policy.arguments import Report
 from baselines.policy.problem import Batch, Memory, Problem, Solution
 from baselines.policy.solver import SolverPolicy
-from baselines.policy.state import Report
 from baselines.status import Status, statuses
 from ikgym.simulator import Observation
 

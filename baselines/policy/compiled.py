@@ -10,7 +10,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from baselines.policy.observations import Parts, not_finite
+from baselines.policy.arguments import Parts, not_finite
 from baselines.policy.problem import Batch, Memory, Problem, Solution
 from baselines.policy.solver import SolverPolicy, compiled_classes
 from baselines.policy_kernels import REFUSED, NoMemory, entry, model_block, parts_of

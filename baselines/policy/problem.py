@@ -14,7 +14,7 @@ from ikgym.scenarios import Scenario
 from ikgym.tasks import Task
 from ikgym.validation import FloatArray, Frozen, frozen_array
 
-#: Arrays with a leading axis of B: what a policy remembers, or a whole state, see :mod:`baselines.policy.state`.
+#: Arrays with a leading axis of B: what a policy remembers, or a whole state, see :mod:`baselines.policy.arguments`.
 Memory = tuple[npt.NDArray[Any], ...]
 
 

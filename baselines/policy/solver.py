@@ -13,11 +13,25 @@ from typing import Any, ClassVar, Self
 import numpy as np
 import numpy.typing as npt
 
-from baselines.policy import state as states
-from baselines.policy.observations import ObservationReader, Parts, as_batch, not_finite, taken
+from baselines.policy.arguments import (
+    REPORTED,
+    ObservationReader,
+    Parts,
+    Report,
+    Signature,
+    as_batch,
+    checked_memory,
+    joined,
+    not_finite,
+    pack,
+    remembered,
+    replace_rows,
+    signature,
+    taken,
+    truth_values,
+)
 from baselines.policy.parameters import checked
 from baselines.policy.problem import Batch, Memory, Problem, Solution
-from baselines.policy.state import REPORTED, Report, joined, pack, remembered, replace_rows
 from baselines.policy_kernels import all_finite, cut_rows
 from ikgym.kernels.compilation import announced
 from ikgym.kernels.outcome import OBSERVED
@@ -224,13 +238,13 @@ class SolverPolicy(Frozen, abc.ABC):
         return replace_rows(memory, self.memory(len(lost)), lost) if memory else memory
 
     def _recall(self, state: Memory | None, episode_start: npt.ArrayLike | None, rows: int) -> Memory:
-        starting = None if episode_start is None else states.truth_values(episode_start, rows)
+        starting = None if episode_start is None else truth_values(episode_start, rows)
         if state is None:
             return self.memory(rows)
         if state is self._last[0] and len(state[0]) == rows:
             memory = remembered(state)
         else:
-            memory = states.checked_memory(self.name, state, self._signature(rows), rows)
+            memory = checked_memory(self.name, state, self._signature(rows), rows)
         if starting is None or not starting.any():
             return memory
         return self.restarted(memory, np.broadcast_to(starting, (rows,)))
@@ -241,9 +255,9 @@ class SolverPolicy(Frozen, abc.ABC):
         return [None]
 
     @functools.cached_property
-    def _signature(self) -> Callable[[int], states.Signature]:
+    def _signature(self) -> Callable[[int], Signature]:
         """What the memory of so many rows is; kept, since `predict` is called with as many again and again."""
-        return functools.lru_cache(16)(functools.partial(states.signature, self._example))
+        return functools.lru_cache(16)(functools.partial(signature, self._example))
 
     @functools.cached_property
     def _example(self) -> Memory:

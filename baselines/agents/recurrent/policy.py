@@ -17,8 +17,7 @@ from baselines.agents.recurrent.kernels import remember_rows
 from baselines.agents.recurrent.network import GatedNetwork
 from baselines.agents.recurrent.processing import Recurrent
 from baselines.policy import Batch
-from baselines.solvers.adaptive.corrected import Corrected
-from baselines.solvers.adaptive.measurements import Measurement
+from baselines.solvers.adaptive.corrected import Corrected, Measurement
 from baselines.spec import parse_policy
 from baselines.wrapper import policies_in
 from ikgym.exceptions import InvalidInputError

@@ -42,7 +42,7 @@ from baselines.papers.zhang.targets import (
     rank_correlation,
     sugihara,
 )
-from baselines.solvers.levenberg_marquardt.damping_parameters import typical_link
+from baselines.solvers.levenberg_marquardt.damping import typical_link
 from baselines.status import Status
 from ikgym import Plant
 from ikgym.arms import Arm

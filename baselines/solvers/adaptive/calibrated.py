@@ -11,9 +11,8 @@ import numpy.typing as npt
 from baselines.policy import Batch
 from baselines.policy.parameters import parameter
 from baselines.solvers.adaptive.chain_parameters import changed_chain, parameter_twists
-from baselines.solvers.adaptive.corrected import Corrected
+from baselines.solvers.adaptive.corrected import Corrected, Measurement
 from baselines.solvers.adaptive.deviation import deviation_between
-from baselines.solvers.adaptive.measurements import Measurement
 from ikgym.kernels import tasks as task_kernels
 from ikgym.kernels.jit import kernel
 from ikgym.kernels.kinematics import forward

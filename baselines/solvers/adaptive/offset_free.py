@@ -10,9 +10,8 @@ import numpy.typing as npt
 
 from baselines.policy import Batch
 from baselines.policy.parameters import parameter
-from baselines.solvers.adaptive.corrected import Corrected
+from baselines.solvers.adaptive.corrected import Corrected, Measurement
 from baselines.solvers.adaptive.deviation import SIZE, missing_deviation, move_deviation
-from baselines.solvers.adaptive.measurements import Measurement
 from ikgym.kernels import tasks as task_kernels
 from ikgym.kernels.jit import kernel
 from ikgym.kernels.kinematics import forward

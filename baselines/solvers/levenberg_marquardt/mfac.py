@@ -8,24 +8,24 @@ from typing import ClassVar
 import numpy as np
 
 from baselines.solvers.arm_task import pose_arrays
-from baselines.solvers.levenberg_marquardt.base import DampedIteration
-from baselines.solvers.levenberg_marquardt.damping_rules import (
-    DampingLaw,
-    condition_number,
-    condition_scratch,
-    damping_next,
-    damping_now,
-)
-from baselines.solvers.levenberg_marquardt.iteration import (
+from baselines.solvers.levenberg_marquardt.base import (
     APPLIED,
     CONVERGED,
     DEFICIENT,
     DIVERGED,
     LIMIT,
     RANK_TOLERANCE,
+    DampedIteration,
     begin,
     finish,
     stop_run_away,
+)
+from baselines.solvers.levenberg_marquardt.damping import (
+    DampingLaw,
+    condition_number,
+    condition_scratch,
+    damping_next,
+    damping_now,
 )
 from baselines.solvers.linear_algebra import damped_step, dot, pseudoinverse_rows
 from ikgym.kernels import tasks as task_kernels

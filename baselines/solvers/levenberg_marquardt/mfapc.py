@@ -9,25 +9,25 @@ import numpy as np
 
 from baselines.policy.parameters import choice, parameter
 from baselines.solvers.arm_task import pose_arrays
-from baselines.solvers.levenberg_marquardt.base import DampedIteration
-from baselines.solvers.levenberg_marquardt.block_tridiagonal import damped_horizon_step
-from baselines.solvers.levenberg_marquardt.damping_rules import (
-    DampingLaw,
-    condition_number,
-    condition_scratch,
-    damping_next,
-    damping_now,
-)
-from baselines.solvers.levenberg_marquardt.iteration import (
+from baselines.solvers.levenberg_marquardt.base import (
     APPLIED,
     CONVERGED,
     DEFICIENT,
     DIVERGED,
     LIMIT,
     RANK_TOLERANCE,
+    DampedIteration,
     begin,
     finish,
     stop_run_away,
+)
+from baselines.solvers.levenberg_marquardt.block_tridiagonal import damped_horizon_step
+from baselines.solvers.levenberg_marquardt.damping import (
+    DampingLaw,
+    condition_number,
+    condition_scratch,
+    damping_next,
+    damping_now,
 )
 from baselines.solvers.linear_algebra import dot, pseudoinverse_rows
 from ikgym.kernels import tasks as task_kernels

@@ -8,8 +8,8 @@ import pytest
 import ikgym
 from baselines.policy import Batch
 from baselines.solvers.adaptive.chain_parameters import changed_chain, parameter_twists
+from baselines.solvers.adaptive.corrected import nothing_measured, recall
 from baselines.solvers.adaptive.deviation import add_deviation, deviation_between, missing_deviation, move_deviation
-from baselines.solvers.adaptive.measurements import nothing_measured, recall
 from ikgym.kernels.kinematics import forward
 from ikgym.kernels.rotations import rodrigues, rotation_vector
 

@@ -7,8 +7,13 @@ import pytest
 
 import baselines
 import ikgym
-from baselines.solvers.levenberg_marquardt.damping_parameters import typical_link
-from baselines.solvers.levenberg_marquardt.damping_rules import RULES, condition_number, damping_next, damping_now
+from baselines.solvers.levenberg_marquardt.damping import (
+    RULES,
+    condition_number,
+    damping_next,
+    damping_now,
+    typical_link,
+)
 
 
 def law(rule, **numbers):

@@ -9,7 +9,7 @@ import ikgym
 from baselines.agents.recurrent.kernels import describe as describe_row
 from baselines.agents.recurrent.network import step_network
 from baselines.policy import Batch, Problem
-from baselines.solvers.adaptive.measurements import Measurement
+from baselines.solvers.adaptive.corrected import Measurement
 from baselines.training.memory.episodes import draw_plant, joined, measure, taken
 from baselines.training.memory.filter import Gated, describe, errors, loss
 from tests.baselines.agents.recurrent.recurrent_agents import PROCESSING, SIZES, made
