@@ -66,8 +66,10 @@ class SB3Trainer(Trainer):
         model.set_random_seed(int(sequence(self._seed, number).generate_state(1)[0]))
         self._envs.seed(episode_seed(self._seed, number, config.n_envs))
         target = config.total_timesteps * (number + 1) // config.segments
+        self._log.values.clear()
         if model.num_timesteps < target:
             model.learn(target - model.num_timesteps, reset_num_timesteps=False)
+            model.logger.dump()  # metrics of the last update, which Stable-Baselines3 keeps for the next rollout
         return {name: float(value) for name, value in self._log.values.items() if isinstance(value, (int, float))}
 
     def agent(self, training: dict[str, Any] | None = None) -> AgentFile:
