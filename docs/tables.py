@@ -101,8 +101,11 @@ def policies() -> list[tuple[str, ...]]:
     rows = [("policy", "what it does", "parameters and defaults")]
     for name in baselines.names():
         policy = get(name)
-        parameters = ", ".join(_parameter(policy.__dataclass_fields__[p]) for p in policy.parameter_names())
-        rows.append((f"`{name}`" + (" (reference)" if policy.reference else ""), summary(name), parameters))
+        parameters = [_parameter(policy.__dataclass_fields__[p]) for p in policy.parameter_names()]
+        if base := next((other for other in baselines.names() if get(other) in policy.__mro__[1:]), None):
+            shared = {_parameter(get(base).__dataclass_fields__[p]) for p in get(base).parameter_names()}
+            parameters = [f"those of `{base}`", *(one for one in parameters if one not in shared)]
+        rows.append((f"`{name}`" + (" (reference)" if policy.reference else ""), summary(name), ", ".join(parameters)))
     return rows
 
 
