@@ -57,8 +57,8 @@ _places: dict[str, str] = {
     "abstract_rotation": f"{_SOLVERS}.fixed_point.abstract_rotation:AbstractRotation",
     "agent_alone": "baselines.agents.policy:AgentAlone",
     "fixed_point_extended": f"{_SOLVERS}.fixed_point.extended:FixedPointExtended",
-    "pink": f"{_SOLVERS}.rivals.pink:Pink",
-    "mink": f"{_SOLVERS}.rivals.mink:Mink",
+    "pink": f"{_SOLVERS}.rivals.task_program:Pink",
+    "mink": f"{_SOLVERS}.rivals.task_program:Mink",
     "follow_nominal": f"{_SOLVERS}.references.follow_nominal:FollowNominal",
     "oracle": "baselines.oracle.policy:Oracle",
 }

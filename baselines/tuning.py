@@ -2,9 +2,9 @@
 
 A file of ranges has a table a solver, called by its specification, with one line a parameter:
 
-    [dls]
+    [null_space]
     gain = { low = 0.003, high = 1.5, log = true }     # a float; an integer if both ends are integers
-    saturation = { choices = ["clip", "scale"] }
+    objective = { choices = ["posture", "manipulability"] }
 
 A parameter with a dot is a key of a parameter that is a table itself: ``"options.gain"``. One with ``when = { rule =
 ["chan"] }`` is varied only if a parameter above it has one of these values.

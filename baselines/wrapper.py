@@ -150,6 +150,7 @@ class NamedWrapper(Wrapper, abc.ABC):
     nests: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         kind = registry.get(self.policy)
         wrapped = issubclass(kind, Wrapper) and not self.nests
         if kind.reference or wrapped:

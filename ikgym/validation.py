@@ -94,13 +94,14 @@ def number(
     above: float | None = None,
     at_least: float | None = None,
     at_most: float | None = None,
+    below: float | None = None,
 ) -> float:
     """A finite number within its bounds.
 
     Raises:
         InvalidInputError: The value is no finite number, or outside the bounds.
     """
-    bound = _range(above, at_least, at_most)
+    bound = _range(above, at_least, at_most, below)
     if isinstance(value, bool) or not isinstance(value, (int, float, np.integer, np.floating)):
         raise InvalidInputError(f"{name}: expected a finite number{bound}, got {shortened(value)}.")
     try:
@@ -112,6 +113,7 @@ def number(
         or (above is not None and not out > above)
         or (at_least is not None and not out >= at_least)
         or (at_most is not None and not out <= at_most)
+        or (below is not None and not out < below)
     ):
         raise InvalidInputError(f"{name}: expected a finite number{bound}, got {out!r}.")
     return out
@@ -238,8 +240,10 @@ def _fits(shape: tuple[int, ...], wanted: tuple[int | None, ...]) -> bool:
     return len(shape) == len(wanted) and all(w is None or n == w for n, w in zip(shape, wanted, strict=True))
 
 
-def _range(above: float | None, at_least: float | None, at_most: float | None) -> str:
+def _range(above: float | None, at_least: float | None, at_most: float | None, below: float | None) -> str:
     """The allowed numbers, in words."""
+    if below is not None:
+        return f"{_range(above, at_least, at_most, None)} and below {below:g}"
     if above is not None:
         return f" above {above:g}" + ("" if at_most is None else f" and of at most {at_most:g}")
     if at_least is None:

@@ -19,7 +19,7 @@ from baselines.agents.relative import Relative
 from baselines.files import ResultsError
 from baselines.fingerprints import arm_fingerprint
 from baselines.policy import Batch, Memory, Problem, Solution, SolverPolicy, statuses
-from baselines.solvers.wrappers import orientation
+from baselines.solvers.wrappers import full_orientation
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Preview
 from ikgym.validation import flag
@@ -35,7 +35,7 @@ class LearnedPolicy(SolverPolicy):
     It plays every scenario of its arm whose features have the shape of those that it was trained on. Its preview is a
     tuple of steps ahead; observations that show 1, 2, … up to the furthest of them are accepted, too. An agent trained
     on whole poses also plays scenarios that show skew coordinates: their orientation is resolved by
-    :func:`baselines.solvers.wrappers.orientation.resolve_orientation`, which needs all steps up to the furthest.
+    :func:`baselines.solvers.wrappers.full_orientation.resolve_orientation`, which needs all steps up to the furthest.
     """
 
     #: The agent in the file.
@@ -55,7 +55,7 @@ class LearnedPolicy(SolverPolicy):
             InvalidInputError: The scenario does not fit the agent.
         """
         skew = (file.about["task"]["name"], self.problem.task.name) == ("pose", "skew")
-        seen = orientation.full_problem(self.problem) if skew else self.problem
+        seen = full_orientation.full_problem(self.problem) if skew else self.problem
         check_scenario(file, seen, any_arm=any_arm)
         try:
             needed = file.processing.size(seen), file.processing.outputs(seen)  # type: ignore[attr-defined]
@@ -87,13 +87,13 @@ class LearnedPolicy(SolverPolicy):
 
     def memory(self, rows: int) -> Memory:
         """That of the orientation where its ambiguity is resolved."""
-        return orientation.start_memory(rows) if self._resolves else ()
+        return full_orientation.start_memory(rows) if self._resolves else ()
 
     def solve(self, batch: Batch, memory: Memory) -> Solution:
         """See :meth:`SolverPolicy.solve`."""
         if self._resolves:
-            assert isinstance(memory, orientation.OrientationMemory)
-            batch, memory = orientation.resolve_orientation(self.problem, batch, memory)
+            assert isinstance(memory, full_orientation.OrientationMemory)
+            batch, memory = full_orientation.resolve_orientation(self.problem, batch, memory)
             batch = batch._replace(nominal=batch.nominal.take(np.array(self._offsets) - 1, axis=1))
         processing, network = self.file.processing, self.file.network
         assert isinstance(processing, (Bilinear, Relative))

@@ -12,7 +12,7 @@ from baselines.oracle.cache import solve
 from baselines.oracle.optimum import Search
 from baselines.oracle.stripped import NOTE, strips
 from baselines.policy import Batch, Memory, Problem, Solution, statuses
-from baselines.solvers.references.privileged_path import PrivilegedPath
+from baselines.solvers.references.follow_nominal import PrivilegedPath
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray, whole_number

@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from baselines.policy import state as states
 from baselines.policy.observations import ObservationReader, Parts, as_batch, not_finite, taken
+from baselines.policy.parameters import checked
 from baselines.policy.problem import Batch, Memory, Problem, Solution
 from baselines.policy.state import REPORTED, Report, joined, pack, remembered, replace_rows
 from baselines.policy_kernels import all_finite, cut_rows
@@ -66,6 +67,10 @@ class SolverPolicy(Frozen, abc.ABC):
     nameless: ClassVar[str | None] = None
     #: Parameters without which nobody can tell whether the policy suits a scenario.
     decisive: ClassVar[tuple[str, ...]] = ()
+
+    def __post_init__(self) -> None:
+        """Checks the parameters that :func:`baselines.policy.parameters.parameter` declares with a range."""
+        self._settle(**checked(self))
 
     def __init_subclass__(cls, **options: Any) -> None:
         """A policy that gives itself no name, nor has one of its base, is called by its class."""

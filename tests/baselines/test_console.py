@@ -141,7 +141,7 @@ def test_a_policy_is_shown_with_its_parameters(capsys):
     text = capsys.readouterr().out
     assert "Minimises" in text
     assert "    damping: λ, added to J Jᵀ as it is" in text
-    assert text.endswith("Defaults:\n  gain = 1.0\n  saturation = 'clip'\n  damping = 0.001\n")
+    assert text.endswith("Defaults:\n  gain = 1.0\n  damping = 0.001\n")
 
 
 def test_an_arm_and_a_scenario_are_shown(capsys):

@@ -57,7 +57,7 @@ def test_parameters_of_any_type_are_taken_or_refused_in_one_line(name):
         ("mfapc", {"stop": np.array(["a", "b"])}),
         ("null_space", {"objective": {}}),
         ("rhc_gradient", {"gradient": ["analytic"]}),
-        ("broyden", {"learns": set()}),
+        ("smoothed", {"feedback": set()}),
     ],
 )
 def test_a_choice_that_is_no_text_is_unknown(name, parameters):

@@ -5,6 +5,10 @@ from __future__ import annotations
 import copy
 import dataclasses
 import functools
+import os
+import pickle
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Mapping
@@ -18,10 +22,11 @@ from stable_baselines3.common.vec_env import DummyVecEnv
 
 import baselines
 import ikgym
-from baselines.agents.policy import AgentAlone
 from baselines.policy import Batch, Problem, Solution, SolverPolicy, statuses
 from baselines.policy.compiled import CompiledPolicy
+from baselines.policy.parameters import checks
 from baselines.registry import get
+from baselines.solvers.references.follow_nominal import PrivilegedPath
 from baselines.status import Status
 from baselines.wrapper import Wrapper
 from ikgym import parallel
@@ -31,15 +36,22 @@ from ikgym.plant import DrawnPlant
 from ikgym.plant.draw import Draws
 from ikgym.plant.rows import PlantRows
 from ikgym.simulator import Simulator
+from ikgym.validation import number, whole_number
 from tests.baselines.making import made, usual
 from tests.comparison import identical
-from tests.every_scenario import ONE_OF_EACH
 
 STEPS = 6
 
-
 #: A task that no scenario of the catalogue has.
 AXIS = ikgym.scenarios.get("zhang6-lspb").replace(name="zhang6-axis", task=ikgym.tasks.get("axis"))
+
+#: One scenario for each number of joints, task, and kind of limits.
+SCENARIOS = (
+    *("varga7-fast", "planar2-bent", "zhang3-helix", "zhang6-lspb", "khan8-q7q8"),
+    *("panda-circle", "tiago-raster", "iiwa14-random", AXIS.name),
+)
+every_policy = pytest.mark.parametrize("name", baselines.names())
+every_contender = pytest.mark.parametrize("name", [name for name in baselines.names() if not get(name).reference])
 
 
 @functools.cache
@@ -47,42 +59,19 @@ def scenario(name):
     return (AXIS if name == AXIS.name else ikgym.scenarios.get(name)).replace(steps=STEPS)
 
 
-# Policies that are handed the nominal joint path: they need a seed on random scenarios, and suit no Cartesian one.
-HANDED_THE_PATH = {"follow_nominal", "fixed_point_extended", "oracle"}
-
-# Pairs that do not suit for another reason: the smoothing of 300 1/s is unstable at a sample time of 1 s; with 2 joints
-# the tool is the end of link 2.
-UNSUITED = {("smoothed", "zhang3-helix"), ("fixed_point_extended", "planar2-bent")}
-
-
 @functools.cache
 def policy_for(name, on):
     """The policy on a shortened scenario, or None where it does not suit; one for all tests, as policies are frozen."""
-    seed = {"seed": 1} if name in HANDED_THE_PATH and scenario(on).random else {}
+    seed = {"seed": 1} if issubclass(get(name), PrivilegedPath) and scenario(on).random else {}
     try:
         return made(name, scenario(on), **seed)
     except InvalidInputError:
-        if get(name).rival:
-            assert on != usual(name)
-            return None
-        # An agent suits the arms of its size, and only skew coordinates have an ambiguity to resolve.
-        suits = name != "full_orientation" or scenario(on).task.name == "skew"
-        if suits and not (issubclass(get(name), AgentAlone) or (name, on) in UNSUITED):
-            assert name in HANDED_THE_PATH
-            assert scenario(on).nominal_joint_path(1) is None
         return None
 
 
-PAIRS = [(name, on) for name in baselines.names() for on in [*ONE_OF_EACH, AXIS.name]]
-contract = pytest.mark.parametrize(("name", "on"), PAIRS)
-
-#: One scenario for each number of joints, task and kind of limits: all that the order in which rows are worked off can
-#: depend on.
-SHAPES = {
-    *("varga7-fast", "planar2-bent", "zhang3-helix", "zhang6-lspb", "khan8-q7q8"),
-    *("panda-circle", "tiago-raster", "iiwa14-random", AXIS.name),
-}
-by_rows = pytest.mark.parametrize(("name", "on"), [pair for pair in PAIRS if pair[1] in SHAPES])
+@every_policy
+def test_a_policy_suits_its_usual_scenario(name):
+    assert policy_for(name, usual(name)) is not None
 
 
 def observations(on, preview, rows):
@@ -105,32 +94,39 @@ def row(observation, i):
     return {key: value[i] for key, value in observation.items()}
 
 
-@by_rows
+@pytest.mark.parametrize("on", SCENARIOS)
+@every_policy
 def test_batch_equals_single_calls_and_memory_goes_by_rows(name, on):
     policy = policy_for(name, on)
     if policy is None:
         return
-    rows = 3
+    rows, box = 3, ikgym.RedundantIKEnv(scenario(on)).action_space
     states, batched = [None] * rows, None
     for k, observation in enumerate(observations(on, policy.preview, rows)):
         # Row 1 begins a new episode at every other step, row 2 at the third.
         start = np.array([k == 0, k % 2 == 0, k in (0, 2)])
-        action, batched = policy.predict(observation, state=batched, episode_start=start)
-        assert action.dtype == np.float32
+        before, kept = copy.deepcopy(observation), copy.deepcopy(batched)
+        action, after = policy.predict(observation, state=batched, episode_start=start)
+        again, same = policy.predict(observation, batched, start, deterministic=False)
+        assert identical(action, again)
+        assert identical(after, same)
+        assert identical(observation, before)
+        assert batched is None or identical(batched, kept)
+        batched, report = after, policy.report(after)
+        assert {*report.status} <= {*Status}
+        assert (report.iterations >= 0).all()
         for i in range(rows):
             single, states[i] = policy.predict(
                 row(observation, i), state=None if start[i] else states[i], episode_start=np.array([False])
             )
+            assert single in box
             assert identical(single, action[i])
             assert all(identical(a[0], b[i]) for a, b in zip(states[i], batched, strict=True))
 
 
-@by_rows
-def test_rows_that_are_shared_out_to_threads_are_the_same(monkeypatch, name, on):
-    policy = policy_for(name, on)
-    if policy is None:
-        return
-    threads, solve = set(), type(policy).solve
+@every_policy
+def test_rows_that_are_shared_out_to_threads_are_the_same(monkeypatch, name):
+    policy, threads, solve = policy_for(name, usual(name)), set(), get(name).solve
 
     def watched(self, batch, memory):
         threads.add(threading.get_ident())
@@ -139,7 +135,7 @@ def test_rows_that_are_shared_out_to_threads_are_the_same(monkeypatch, name, on)
     monkeypatch.setattr(type(policy), "solve", watched)
     monkeypatch.setattr(parallel, "cores", lambda: 2)
     whole, shared = None, None
-    for k, observation in enumerate(observations(on, policy.preview, 5)):
+    for k, observation in enumerate(observations(usual(name), policy.preview, 5)):
         start = np.array([k == 0, k == 2, False, False, k == 1])
         monkeypatch.setattr(type(policy), "grain", 100)
         expected, whole = policy.predict(observation, whole, start)
@@ -150,19 +146,11 @@ def test_rows_that_are_shared_out_to_threads_are_the_same(monkeypatch, name, on)
     assert len(threads) > 1
 
 
-# Solvers whose memory has no names yet.
-UNNAMED = {
-    *("moore_penrose", "dls", "jacobian_transpose", "weighted_pseudoinverse", "null_space", "truncated_svd"),
-    *("gram_schmidt", "broyden", "abstract_rotation", "mfac", "mfapc"),
-    *("rhc_gradient", "rhc_lagrange", "rhc", "rhc_foresight"),
-}
-
-
-@pytest.mark.parametrize("name", baselines.names())
-def test_memory_is_a_named_tuple(name, monkeypatch):
-    policy = made(name, scenario(usual(name)))
+@every_policy
+def test_memory_has_names_and_what_is_returned_is_fresh(name, monkeypatch):
+    policy = policy_for(name, usual(name))
     own = policy.own_memory(1) if isinstance(policy, Wrapper) else policy.memory(1)
-    assert name in UNNAMED or own == () or hasattr(own, "_fields")
+    assert own == () or hasattr(own, "_fields")
     handed, solve = [], type(policy).solve
 
     def watched(self, batch, memory):
@@ -170,20 +158,32 @@ def test_memory_is_a_named_tuple(name, monkeypatch):
         return solve(self, batch, memory)
 
     monkeypatch.setattr(type(policy), "solve", watched)
-    state = None
+    state, returned = None, []
     for observation in observations(usual(name), policy.preview, 2):
-        _, state = policy.predict(observation, state, np.array([False, True]))
+        action, state = policy.predict(observation, state, np.array([False, True]))
+        returned += [action, *state[2:], *observation.values()]
         # The state is flat, and its memory has the names that `memory` gives it.
         assert type(state) is tuple
         assert type(policy.memory_of(state)) is type(policy.memory(1))
         assert identical(tuple(policy.memory_of(state)), state[2:])
     if isinstance(policy, CompiledPolicy):  # which calls its kernel with the memory's parts instead
         policy.solve(Batch(*[observation[key] for key in OBSERVED]), policy.memory_of(state))
+        for k, array in enumerate(returned):
+            assert not any(np.shares_memory(array, other) for other in returned[k + 1 :])
     assert {type(memory) for memory in handed} == {type(policy.memory(1))}
 
 
+@every_policy
+def test_no_rows_are_a_batch(name):
+    policy = policy_for(name, usual(name))
+    nothing = {key: value[:0] for key, value in next(observations(usual(name), policy.preview, 1)).items()}
+    action, state = policy.predict(nothing)
+    assert action.shape == (0, policy.problem.model.joints)
+    assert all(len(array) == 0 for array in policy.predict(nothing, state)[1])
+
+
 @pytest.mark.parametrize("feedback", ["calculated", "measured"])
-@pytest.mark.parametrize("name", [name for name in baselines.names() if not get(name).reference])
+@every_contender
 def test_any_policy_inside_smoothed(name, feedback):
     """At its first step, the inner policy sees what it would see alone; its state is found in the wrapper's."""
     short = scenario(usual(name))
@@ -206,60 +206,29 @@ def test_any_policy_inside_smoothed(name, feedback):
                 assert identical(inner_state, alone.predict(observation)[1])
 
 
-#: Policies with a tolerance that something is tested against; all others cannot know whether they have converged.
-TESTED = {
-    "mfac",
-    "mfapc",
-    "fixed_point",
-    "fixed_point_extended",
-    "abstract_rotation",
-    "rhc",
-    "rhc_foresight",
-    "rhc_gradient",
-    "rhc_lagrange",
-    "smoothed",  # around `rhc_gradient`
-    *("offset_free", "calibrated"),  # around `rhc`
-}
+def converges(policy):
+    """Whether anything is tested against a tolerance: all other policies cannot know whether they have converged."""
+    return "tolerance" in policy.parameters or (isinstance(policy, Wrapper) and converges(policy.inner))
 
 
-@pytest.mark.parametrize("name", sorted({*baselines.names()} - TESTED))
+@every_policy
 def test_only_those_with_a_tolerance_say_that_they_have_converged(name):
     """A formula was applied, on its path or meters away from it."""
     on = usual(name) if get(name).rival else "varga7-random"
     policy = policy_for(name, on)
+    if policy is None or converges(policy):
+        return
     on_path = next(observations(on, policy.preview, 1))
     for observation in (on_path, {**on_path, "nominal": on_path["nominal"] + 1.0}):
         _, state = policy.predict(observation)
         assert policy.report(state).status[0] > Status.CONVERGED
 
 
-@contract
-def test_actions_are_in_the_box_and_deterministic_changes_nothing(name, on):
-    policy = policy_for(name, on)
-    if policy is None:
-        return
-    space = ikgym.RedundantIKEnv(scenario(on)).action_space
-    state = None
-    for observation in observations(on, policy.preview, 1):
-        before = {key: value.copy() for key, value in observation.items()}
-        kept = None if state is None else tuple(array.copy() for array in state)
-        action, next_state = policy.predict(row(observation, 0), state=state, deterministic=True)
-        again, same = policy.predict(row(observation, 0), state=state, deterministic=False)
-        assert action in space
-        assert identical(action, again)
-        assert identical(next_state, same)
-        assert identical(observation, before)
-        assert state is None or identical(state, kept)
-        report = policy.report(next_state)
-        assert report.status[0] in set(Status)
-        assert report.iterations[0] >= 0
-        state = next_state
-
-
-@contract
+@pytest.mark.parametrize("on", ["varga7-fast", "khan8-q7q8", "panda-circle"])
+@every_contender
 def test_a_policy_is_told_the_model_and_never_the_arm(name, on):
     policy = policy_for.__wrapped__(name, on)  # a new one: what it compiles when it is asked is a maze of numba's
-    if policy is None or policy.reference:
+    if policy is None:
         return
     assert {f.name for f in dataclasses.fields(Problem)} == {"model", "task", "cost", "dt", "velocity_limit"}
     assert policy.problem.model is scenario(on).model
@@ -285,10 +254,10 @@ def reachable(thing, seen=None):
     return seen.values()
 
 
-@pytest.mark.parametrize("name", [name for name in baselines.names() if not get(name).reference])
-@pytest.mark.parametrize("on", ["khan8-q1", "khan8-q7q8"])
-def test_the_exact_arm_changes_no_answer(name, on):
+@every_contender
+def test_the_exact_arm_changes_no_answer(name):
     """Same observations, same model, another arm behind the scenario: a policy that saw it would answer otherwise."""
+    on = "khan8-q7q8"
     exact = scenario(on)
     if policy_for(name, on) is None:
         return
@@ -302,7 +271,7 @@ def test_the_exact_arm_changes_no_answer(name, on):
         states = [state for _, state in answers]
 
 
-@pytest.mark.parametrize("name", [name for name in baselines.names() if not get(name).reference])
+@every_contender
 def test_the_true_plant_changes_no_answer(monkeypatch, name):
     """Same observations, same model, another plant behind the scenario, which nobody may ask for what it draws."""
     on = "iiwa14-random" if policy_for(name, "iiwa14-random") else usual(name)
@@ -337,9 +306,9 @@ def test_the_guard_of_the_plant_would_notice():
     assert any(isinstance(thing, DrawnPlant) for thing in reachable(Told.for_scenario(told)))
 
 
-@pytest.mark.parametrize("name", baselines.names())
+@every_policy
 def test_works_inside_evaluate_policy_with_several_environments(name):
-    short = ikgym.scenarios.get(usual(name)).replace(steps=40)
+    short = ikgym.scenarios.get(usual(name)).replace(steps=12)
     policy = made(name, short)
 
     def make():
@@ -347,21 +316,147 @@ def test_works_inside_evaluate_policy_with_several_environments(name):
 
     several, lengths = evaluate_policy(policy, DummyVecEnv([make] * 3), 6, return_episode_rewards=True)
     alone, _ = evaluate_policy(policy, make(), 1, return_episode_rewards=True)
-    assert lengths == [40] * 6
+    assert lengths == [12] * 6
     # A memory that were not cleared would show in the second episodes.
     assert set(several) == set(alone)
 
 
-@pytest.mark.parametrize("name", baselines.names())
-def test_policies_are_frozen_and_say_their_parameters(name):
-    policy = made(name, usual(name))
+@every_policy
+def test_policies_are_frozen_copied_and_say_their_parameters(name):
+    policy = policy_for(name, usual(name))
     assert policy.name == name
     assert set(policy.parameters) == set(policy.parameter_names())
     for parameter in policy.parameters:
         with pytest.raises(dataclasses.FrozenInstanceError):
             setattr(policy, parameter, 0)
-    again = baselines.make(name, usual(name), **policy.parameters)
+    again = baselines.make(name, scenario(usual(name)), **policy.parameters)
     assert again.parameters == policy.parameters
+    first = row(next(observations(usual(name), policy.preview, 1)), 0)
+    for other in (copy.deepcopy(policy), pickle.loads(pickle.dumps(policy))):
+        arrays = [other.problem.velocity_limit, other.problem.model.offsets]
+        arrays += [value for value in vars(other).values() if isinstance(value, np.ndarray)]
+        assert not any(array.flags.writeable for array in arrays)
+        assert identical(other.predict(first)[0], policy.predict(first)[0])
+
+
+def bad_values(check):
+    """Values that the check of a parameter refuses, by what it says itself."""
+    if check.func in (number, whole_number):
+        yield from ("x", np.nan, None, True)
+        yield from (check.keywords[bound] for bound in ("above", "below") if bound in check.keywords)
+        yield from (check.keywords["at_least"] - 1,) if "at_least" in check.keywords else ()
+        yield from (check.keywords["at_most"] + 1,) if "at_most" in check.keywords else ()
+        yield from (1.5,) if check.func is whole_number else (np.inf,)
+    else:  # one of several words, or a truth value
+        yield from ("nothing like it", 1, None)
+
+
+@every_policy
+def test_parameters_out_of_their_range_are_refused_by_name(name):
+    for parameter, check in checks(get(name)).items():
+        for value in bad_values(check):
+            if value is None and "None" in get(name).__dataclass_fields__[parameter].type:
+                continue
+            with pytest.raises(
+                (InvalidInputError, UnknownNameError), match=f"{parameter}.*(expected|Available|Did you mean)"
+            ):
+                made(name, scenario(usual(name)), **{parameter: value})
+
+
+#: What depends on more than one number, by scenario: refused with the name of the first parameter and these words.
+REFUSED = {
+    "varga7-fast": [
+        ("qp", {"secondary_gain": 2000.0}, "expected a number below 2/Δt = 2000, got 2000"),
+        ("qp", {"posture": [0.0, 1.0]}, r"expected shape \(7,\), got \(2,\)"),
+        ("null_space", {"secondary_gain": 2000.0}, "expected a number below 2/Δt = 2000"),
+        ("null_space", {"objective": "joint_centring"}, "expected an arm with joint limits, 'varga7' has none"),
+        ("null_space", {"posture": (1.0, 2.0)}, r"expected shape \(7,\), got \(2,\)"),
+        ("weighted_pseudoinverse", {"weights": 0.0}, "expected numbers above 0"),
+        ("weighted_pseudoinverse", {"weights": (1.0, 2.0)}, r"expected shape \(7,\), got \(2,\)"),
+        ("weighted_pseudoinverse", {"weights": "heavy"}, "expected an array of real numbers"),
+        ("smoothed", {"relaxation": 2000.0}, "explicit Euler is stable below 2/Δt = 2000, got 2000"),
+        ("smoothed", {"policy": "rhc_gradent"}, "Did you mean 'rhc_gradient'"),
+        ("smoothed", {"policy": "follow_nominal"}, "expected one that acts on what it sees, got the reference"),
+        ("smoothed", {"options": 5}, "expected the parameters of rhc_gradient by name, got 5"),
+        ("predicted", {"delay": 13}, "expected a guess of at most longest_delay = 12 steps, got 13"),
+        ("predicted", {"bandwidth": 5.0}, "expected a guess of at least lowest_bandwidth = 8 Hz, got 5"),
+        ("full_orientation", {"policy": "smoothed"}, "got the policy that is made from others 'smoothed'"),
+        ("mfac", {"rule": "sugihra"}, "Did you mean 'sugihara'"),
+        ("mfac", {"growth": 2.0, "rule": "constant"}, "the damping rule 'constant' has only damping; got 2.0"),
+        ("mfac", {"damping": -1.0}, "expected a finite number of at least 0"),
+        ("mfac", {"growth": 0.5}, "expected a finite number of at least 1"),
+        ("mfac", {"threshold": 0.0, "rule": "threshold"}, "expected a finite number above 0"),
+        ("mfac", {"condition_bounds": (2, 1), "rule": "condition"}, "expected ascending numbers above 0"),
+        ("mfac", {"dampings": (0, 1), "rule": "condition"}, "expected 1 x 4 numbers.* got 1 x 2"),
+        ("mfac", {"dampings": (-1, 1), "rule": "condition"}, "expected rows of numbers of at least 0"),
+        ("fixed_point", {"slope": 0.0}, "expected a number between -1 and 1 other than 0"),
+        ("fixed_point", {"a": 0.0}, "expected a number other than 0"),
+        ("follow_nominal", {"seed": "x"}, "expected a whole number of at least 0"),
+    ],
+    "varga7-random": [
+        ("follow_nominal", {}, "a seed says which episode"),
+        ("fixed_point_extended", {}, "a seed says which episode"),
+    ],
+    "zhang3-helix": [
+        ("follow_nominal", {}, "'zhang3-helix' is given in Cartesian space"),
+        ("smoothed", {}, "stable below 2/Δt = 2, got 300"),
+    ],
+    "faitli3-regular": [
+        ("fixed_point", {"components": (0, 1, 2)}, "expected none with transformation 'transpose'"),
+        ("fixed_point", {"components": (0, 1), "transformation": "none"}, "expected 3 different numbers below 3"),
+        ("fixed_point", {"length": 1.0, "transformation": "none"}, "expected none but with transformation 'transpose'"),
+        ("fixed_point_extended", {"link": 3}, "expected at most 2"),
+        ("fixed_point_extended", {"transformation": "none"}, "a longer x needs the transposed Jacobian"),
+        ("full_orientation", {}, "expected the task 'skew'"),
+    ],
+    "khan8-q1": [
+        ("abstract_rotation", {"task_weights": 0.0}, "expected numbers above 0 and at most 1, got 0.0"),
+        ("abstract_rotation", {"task_weights": (1.0,) * 8}, r"expected shape \(12,\), got \(8,\)"),
+        ("abstract_rotation", {"joint_weights": (1.0,) * 7 + (1.5,)}, "expected numbers above 0 and at most 1"),
+        ("fixed_point", {"transformation": "none"}, "needs as many components of the error as joints"),
+    ],
+    "zhang6-lspb": [
+        ("pink", {"posture_rate": 1e4}, "expected at most 1"),
+        ("pink", {"solver": "dapq"}, "Did you mean 'daqp'"),
+        ("full_orientation", {}, "expected the task 'skew'"),
+    ],
+}
+
+
+@pytest.mark.parametrize("on", REFUSED)
+def test_what_does_not_suit_is_refused(on):
+    for name, parameters, words in REFUSED[on]:
+        parameter = next(iter(parameters), "")
+        with pytest.raises((InvalidInputError, UnknownNameError), match=f"{parameter}.*{words}"):
+            made(name, scenario(on), **parameters)
+
+
+def test_plain_python_answers_as_the_compiled_kernels_do():
+    """All compiled solvers of one step, two steps long; the receding horizons are tested beside their kernels."""
+    names = [n for n in baselines.names() if issubclass(get(n), CompiledPolicy) and "receding" not in get(n).__module__]
+    code = f"""
+import numpy as np, baselines, ikgym
+from tests.baselines.test_policies import usual
+for name in {names}:
+    scenario = ikgym.scenarios.get(usual(name)).replace(steps=3)
+    policy, state = baselines.make(name, scenario), None
+    env = ikgym.RedundantIKEnv(scenario, preview=policy.preview)
+    observation, _ = env.reset(seed=0)
+    for _ in range(2):
+        action, state = policy.predict(observation, state)
+        observation = env.step(action)[0]
+    print(name, *action.tolist())
+"""
+    answers = []
+    for disabled in ("0", "1"):
+        environment = {**os.environ, "NUMBA_DISABLE_JIT": disabled, "MPLBACKEND": "Agg"}
+        done = subprocess.run(
+            [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False
+        )
+        assert done.returncode == 0, done.stderr
+        answers.append([line.split() for line in done.stdout.splitlines()])
+    for (name, *compiled), (_, *plain) in zip(*answers, strict=True):
+        np.testing.assert_allclose(np.array(compiled, float), np.array(plain, float), atol=1e-5, err_msg=name)
 
 
 def test_unknown_names():
@@ -449,17 +544,6 @@ def test_what_exceeds_the_velocity_limit_is_said():
     assert abs(action[0]).max() == 1.0
 
 
-@pytest.mark.parametrize("name", baselines.names())
-def test_arrays_stay_read_only_in_copies(name):
-    short = scenario(usual(name))
-    for policy in (made(name, short), copy.deepcopy(made(name, short))):
-        arrays = [policy.problem.velocity_limit, policy.problem.model.offsets]
-        arrays += [value for value in vars(policy).values() if isinstance(value, np.ndarray)]
-        assert not any(array.flags.writeable for array in arrays)
-        (first, *_) = observations(usual(name), policy.preview, 1)
-        assert policy.predict(row(first, 0))[0].shape == (policy.problem.model.joints,)
-
-
 def test_long_compilation_of_a_policy_is_announced(monkeypatch, caplog):
     monkeypatch.setattr("baselines.policy.solver.compiled_classes", set())
     monkeypatch.setattr(ikgym.kernels.compilation.announced.__wrapped__, "__defaults__", (0.01,))
@@ -519,13 +603,3 @@ class TestFollowNominal:
                 action, _ = policy.predict(observation)
                 observation, *_, info = env.step(action)
                 assert info["position_error"] < 1e-8  # what float32 actions leave
-
-    def test_is_marked_and_needs_a_joint_path_and_a_seed(self):
-        assert baselines.make("follow_nominal", "varga7-fast").reference
-        assert not baselines.make("dls", "varga7-fast").reference
-        with pytest.raises(InvalidInputError, match="'zhang3-helix' is given in Cartesian space"):
-            baselines.make("follow_nominal", "zhang3-helix")
-        with pytest.raises(InvalidInputError, match="a seed says which episode"):
-            baselines.make("follow_nominal", "varga7-random")
-        with pytest.raises(InvalidInputError, match="seed: expected a whole number"):
-            baselines.make("follow_nominal", "varga7-random", seed="x")

@@ -78,13 +78,6 @@ def test_what_cannot_be_inside(parameters, message):
         Halved(PROBLEM, **parameters)
 
 
-def test_unknown_names_inside():
-    with pytest.raises(UnknownNameError, match="no policy 'dlss'"):
-        Halved(PROBLEM, policy="dlss")
-    with pytest.raises(UnknownNameError, match="no parameter of dls 'dampng'"):
-        Halved(PROBLEM, options={"dampng": 1.0})
-
-
 def test_policies_that_a_spec_names():
     def names(spec):
         return [kind.name for kind in policies_in(spec)]

@@ -9,15 +9,14 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.policy import Memory
+from baselines.policy.parameters import parameter
 from baselines.solvers.arm_task import task_shift
 from baselines.solvers.resolved_rate.base import APPLIED, NominalMemory, finish
 from baselines.solvers.resolved_rate.dls import DampedLeastSquares, damped_rows
 from ikgym.kernels import tasks as task_kernels
 from ikgym.kernels.jit import kernel
 from ikgym.kernels.kinematics import forward_and_jacobian
-from ikgym.validation import FloatArray, known_name, number
-
-LEARNS = ("correction", "jacobian")
+from ikgym.validation import FloatArray, number
 
 
 class BroydenMemory(NamedTuple):
@@ -26,7 +25,7 @@ class BroydenMemory(NamedTuple):
     Attributes:
         nominal: X^N(k), see :class:`baselines.solvers.resolved_rate.base.NominalMemory`. Shape (B, m).
         known: Whether there was a step before. Shape (B,).
-        learnt: The correction of the Jacobian or the Jacobian. Shape (B, e, n).
+        learnt: The correction of the Jacobian. Shape (B, e, n).
         q: Joint coordinates in [rad] or [m]. Shape (B, n).
         pose: Measured task coordinates. Shape (B, m).
     """
@@ -43,17 +42,13 @@ class BroydenNumbers(NamedTuple):
 
     Attributes:
         gain: Share of the present error that is taken back in one step.
-        scaling: Whether joints beyond their velocity limits slow down all others.
         damping: λ.
         motion: ε.
-        correcting: Whether a correction of the model's Jacobian is learnt, or the Jacobian itself.
     """
 
     gain: float
-    scaling: bool
     damping: float
     motion: float
-    correcting: bool
 
 
 @kernel
@@ -68,7 +63,7 @@ def broyden_step(model, numbers, seen, memory, answer):
         task_shift(model.kind, numbers.gain, pose[row], nominal[row, 0], present, error, shift[row])
     damped_rows(estimate, shift, numbers.damping, answer.qdot)
     answer.status[:] = APPLIED
-    finish(model, numbers.scaling, answer)
+    finish(model, answer)
     for row in range(q.shape[0]):
         answer.iterations[row] = known[row]
         known[row] = True
@@ -92,7 +87,7 @@ def learn_rows(model, numbers, q, pose, memory):
     Returns:
         B, of shape (B, e, n).
     """
-    chain, kind, correcting = model.chain, model.kind, numbers.correcting
+    chain, kind = model.chain, model.kind
     _, had, corrections, q_before, pose_before = memory
     estimate = np.empty(corrections.shape)
     e, n = estimate.shape[1], estimate.shape[2]
@@ -100,14 +95,8 @@ def learn_rows(model, numbers, q, pose, memory):
     error, moved, jacobian = np.empty(e), np.empty(n), np.zeros((e, n))
     for row in range(q.shape[0]):
         known, learnt = had[row], corrections[row]
-        if correcting or not known:
-            forward_and_jacobian(chain, q[row], rotation, position, geometric)
-            task_kernels.jacobian(kind, rotation, geometric, jacobian)
-        if not correcting:
-            for a in range(e):
-                for k in range(n):
-                    learnt[a, k] = learnt[a, k] if known else jacobian[a, k]
-                    jacobian[a, k] = 0.0
+        forward_and_jacobian(chain, q[row], rotation, position, geometric)
+        task_kernels.jacobian(kind, rotation, geometric, jacobian)
         if known:
             square = numbers.motion * numbers.motion
             for k in range(n):
@@ -141,38 +130,25 @@ class Broyden(DampedLeastSquares):
     Δy is the change of position and the rotation vector from the pose before to the present one, in the base
     frame as the Jacobian is.
 
-    A rank-one formula learns along the motion only; across it B stays what it was:
-
-    - ``learns="jacobian"`` is Broyden's method as it stands: B starts as the model's Jacobian, and the model is not
-      asked again before the next episode. It holds where the arm stays near the start, and is lost on a long
-      way or after a singular start: joint velocities then saturate, and errors grow to the arm's size.
-    - ``learns="correction"`` adds to the model's Jacobian at q, asked at each step, a correction that starts at 0;
-      the formula acts on their sum. It is the default.
+    A rank-one formula learns along the motion only; across it B stays what it was. So what is learnt is a correction,
+    from 0, of the model's Jacobian at q; the formula acts on their sum. Broyden's method as it stands, where B only
+    starts as the model's Jacobian, is lost on a long way or after a singular start.
 
     Args:
         problem: What the policy is told of the scenario.
         gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
-        saturation: What is done about joint velocities beyond their limits; see :class:`ResolvedRate`.
         damping: λ, see :class:`DampedLeastSquares`.
-        learns: ``"correction"`` or ``"jacobian"``.
         motion: ε, the length of a joint shift from which half is learnt, in [rad] or [m]; shorter ones say little,
             and a joint shift of 0 nothing. Above 0.
 
     Raises:
         InvalidInputError: The gain, the damping or ε is out of its range.
-        UnknownNameError: There is no such thing to learn.
     """
 
-    learns: str = "correction"
-    motion: float = 1e-6
+    motion: float = parameter(1e-6, number, above=0.0)
 
     name: ClassVar[str] = "broyden"
     step = broyden_step
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        known_name("thing to learn", self.learns, LEARNS)
-        object.__setattr__(self, "motion", number("motion", self.motion, above=0.0))
 
     def memory(self, rows: int) -> Memory:
         """A :class:`BroydenMemory` without a step before."""
@@ -184,4 +160,4 @@ class Broyden(DampedLeastSquares):
 
     def numbers(self) -> BroydenNumbers:  # type: ignore[override]  # of another kernel
         """See :meth:`CompiledPolicy.numbers`; iterations are 0 where nothing has been measured before, 1 later."""
-        return BroydenNumbers(self.gain, self.scales, self.damping, self.motion, self.learns == "correction")
+        return BroydenNumbers(self.gain, self.damping, self.motion)

@@ -9,16 +9,15 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.policy import Batch
+from baselines.policy.parameters import parameter
 from baselines.solvers.adaptive.chain_parameters import changed_chain, parameter_twists
 from baselines.solvers.adaptive.corrected import Corrected
 from baselines.solvers.adaptive.deviation import deviation_between
-from baselines.solvers.adaptive.kalman import gain_of
 from baselines.solvers.adaptive.measurements import Measurement
-from ikgym.exceptions import InvalidInputError
 from ikgym.kernels import tasks as task_kernels
 from ikgym.kernels.jit import kernel
 from ikgym.kernels.kinematics import forward
-from ikgym.validation import FloatArray, number
+from ikgym.validation import FloatArray, flag, number
 
 #: Second derivatives of a pose by joint zeros and tilts: those of an arm of some 1 m, in [1/m] and [1/rad].
 CURVATURE = 1.0
@@ -84,28 +83,17 @@ class Calibrated(Corrected):
         InvalidInputError: The base policy is a reference, or it refuses its parameters; a number is out of its range.
     """
 
-    zero: float = 5e-4
-    link: float = 3e-4
-    axis: float = 5e-4
-    pose_noise: float = 3e-4
-    pose_rotation_noise: float = 5e-4
-    walk: float = 0.0
-    jump: float = 1e-3
-    start: float | None = None
-    keep: bool = False
+    zero: float = parameter(5e-4, number, at_least=0.0)
+    link: float = parameter(3e-4, number, at_least=0.0)
+    axis: float = parameter(5e-4, number, at_least=0.0)
+    pose_noise: float = parameter(3e-4, number, above=0.0)
+    pose_rotation_noise: float = parameter(5e-4, number, above=0.0)
+    walk: float = parameter(0.0, number, at_least=0.0)
+    jump: float = parameter(1e-3, number, at_least=0.0)
+    start: float | None = parameter(None, number, above=0.0)
+    keep: bool = parameter(False, flag)
 
     name: ClassVar[str] = "calibrated"
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        for name in ("zero", "link", "axis", "walk", "jump"):
-            object.__setattr__(self, name, number(name, getattr(self, name), at_least=0.0))
-        for name in ("pose_noise", "pose_rotation_noise"):
-            object.__setattr__(self, name, number(name, getattr(self, name), above=0.0))
-        if self.start is not None:
-            object.__setattr__(self, "start", number("start", self.start, above=0.0))
-        if not isinstance(self.keep, bool):
-            raise InvalidInputError(f"keep: expected True or False, got {self.keep!r}.")
 
     def own_memory(self, rows: int) -> CalibrationMemory:
         """See :meth:`Wrapper.own_memory`."""
@@ -249,3 +237,33 @@ def absorb(sensitivity, error, variances, change, covariance):
             change[i] += gain[i] * missing
         surprise += missing * missing / variance
     return surprise
+
+
+@kernel
+def gain_of(row, variance, curvature, covariance, gain):
+    """The Kalman gain for one number, y = h · x + noise, by which the covariance shrinks.
+
+    Args:
+        row: h. Shape (p,).
+        variance: Of the noise, above 0.
+        curvature: By which share of its variance h · x is off where h is a derivative: the second order adds the noise
+            that a second derivative of this size leaves. 0 where y is linear in x.
+        covariance: Of x, changed in place. Shape (p, p).
+        gain: Receives what x has to change by for each unit by which y is beyond h · x. Shape (p,).
+
+    Returns:
+        The variance of y.
+    """
+    p, spread = row.shape[0], 0.0
+    for i in range(p):
+        gain[i] = 0.0
+        for j in range(p):
+            gain[i] += covariance[i, j] * row[j]
+        spread += row[i] * gain[i]
+    total = spread + variance + (curvature * spread) ** 2
+    for i in range(p):
+        for j in range(p):
+            covariance[i, j] -= gain[i] * gain[j] / total
+    for i in range(p):
+        gain[i] /= total
+    return total

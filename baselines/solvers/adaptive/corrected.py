@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from baselines.policy import Batch, Memory, Solution
+from baselines.policy.parameters import parameter
 from baselines.solvers.adaptive.deviation import SIZE, add_deviation
 from baselines.solvers.adaptive.measurements import Measurement, nothing_measured, recall
 from baselines.wrapper import NamedWrapper
@@ -45,13 +46,8 @@ class Corrected(NamedWrapper, abc.ABC):
     """
 
     policy: str = "rhc_foresight"
-    history: int = 64
-    blend: float = 0.01
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        object.__setattr__(self, "history", whole_number("history", self.history, at_least=1))
-        object.__setattr__(self, "blend", number("blend", self.blend, at_least=0.0))
+    history: int = parameter(64, whole_number, at_least=1)
+    blend: float = parameter(0.01, number, at_least=0.0)
 
     @abc.abstractmethod
     def learn(self, batch: Batch, measured: Measurement, own: Any, out: FloatArray, old: FloatArray) -> Any:

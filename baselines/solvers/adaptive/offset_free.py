@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.policy import Batch
+from baselines.policy.parameters import parameter
 from baselines.solvers.adaptive.corrected import Corrected
 from baselines.solvers.adaptive.deviation import SIZE, missing_deviation, move_deviation
 from baselines.solvers.adaptive.measurements import Measurement
@@ -62,13 +63,9 @@ class OffsetFree(Corrected):
             of its range.
     """
 
-    gain: float = 0.05
+    gain: float = parameter(0.05, number, above=0.0, at_most=1.0)
 
     name: ClassVar[str] = "offset_free"
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        object.__setattr__(self, "gain", number("gain", self.gain, above=0.0, at_most=1.0))
 
     def own_memory(self, rows: int) -> OffsetMemory:
         """See :meth:`Wrapper.own_memory`."""

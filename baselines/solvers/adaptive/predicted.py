@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.policy import Batch, Memory, Solution
+from baselines.policy.parameters import parameter
 from baselines.solvers.adaptive.drives import Hypotheses, PredictedMemory, identify_rows, past_rows, start_memory
 from baselines.solvers.adaptive.following import Servo, follow_rows, move_rows
 from baselines.wrapper import NamedWrapper
@@ -18,7 +19,7 @@ from ikgym.arms.limits import limit_rows
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.tasks import pose_rows
 from ikgym.scenarios.preview import furthest, offsets
-from ikgym.validation import FloatArray, number, whole_number
+from ikgym.validation import FloatArray, flag, number, whole_number
 
 #: By how much neighbouring lags differ.
 RATIO = 1.23
@@ -63,35 +64,27 @@ class Predicted(NamedWrapper):
         InvalidInputError: A number is out of its range, or the policy is a reference.
     """
 
-    delay: int = 7
-    bandwidth: float | None = 14.0
-    identify: bool = True
-    longest_delay: int = 12
-    lowest_bandwidth: float = 8.0
-    gain: float = 0.06
-    oldest: int = 0
+    delay: int = parameter(7, whole_number, at_least=0)
+    bandwidth: float | None = parameter(14.0, number, above=0.0)
+    identify: bool = parameter(True, flag)
+    longest_delay: int = parameter(12, whole_number, at_least=0)
+    lowest_bandwidth: float = parameter(8.0, number, above=0.0)
+    gain: float = parameter(0.06, number, above=0.0, at_most=1.0)
+    oldest: int = parameter(0, whole_number, at_least=0)
 
     name: ClassVar[str] = "predicted"
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not isinstance(self.identify, (bool, np.bool_)):
-            raise InvalidInputError(f"identify: expected True or False, got {self.identify!r}.")
-        for name in ("delay", "longest_delay", "oldest"):
-            whole_number(name, getattr(self, name), at_least=0)
-        lowest = number("lowest_bandwidth", self.lowest_bandwidth, above=0.0)
+        lowest = self.lowest_bandwidth
         if self.identify and self.delay > self.longest_delay:
             raise InvalidInputError(
                 f"delay: expected a guess of at most longest_delay = {self.longest_delay} steps, got {self.delay}."
             )
-        if self.bandwidth is not None:
-            guess = number("bandwidth", self.bandwidth, above=0.0)
-            if self.identify and guess < lowest:
-                raise InvalidInputError(
-                    f"bandwidth: expected a guess of at least lowest_bandwidth = {lowest:g} Hz, got {guess:g}."
-                )
-        if number("gain", self.gain, above=0.0) > 1.0:
-            raise InvalidInputError(f"gain: expected a number above 0 and of at most 1, got {self.gain:g}.")
+        if self.identify and self.bandwidth is not None and self.bandwidth < lowest:
+            raise InvalidInputError(
+                f"bandwidth: expected a guess of at least lowest_bandwidth = {lowest:g} Hz, got {self.bandwidth:g}."
+            )
 
     @property
     def preview(self) -> int:

@@ -12,6 +12,7 @@ import numpy as np
 
 from baselines.policy import Memory, Problem
 from baselines.policy.compiled import CompiledPolicy
+from baselines.policy.parameters import choice, parameter
 from baselines.solvers.arm_size import jacobian_bound
 from baselines.solvers.arm_task import pose_arrays
 from baselines.solvers.fixed_point.rotations import adaptive_deform, plane, turn
@@ -22,14 +23,12 @@ from ikgym.exceptions import InvalidInputError
 from ikgym.kernels import tasks as task_kernels
 from ikgym.kernels.jit import kernel
 from ikgym.kernels.kinematics import forward_and_jacobian
-from ikgym.validation import FloatArray, as_given, known_name, number, per_joint
+from ikgym.validation import FloatArray, as_given, number, per_joint
 
 #: What 𝒩 turns, with the numbers that the kernel knows.
 COUNTER_ROTATIONS = {"none": 0, "joints": 1, "task": 2}
 #: What makes the next joint coordinates of what is measured and wanted.
 DEFORMATIONS = {"rotation": 0, "contraction": 1}
-#: When the model's Jacobian is worked out anew.
-JACOBIANS = ("step", "point")
 #: The paper's λ_a, and what it belongs to.
 PAPERS_SHARE, PAPERS_MODEL, PAPERS_TASK = 5e-4, "khan8_approximate", "matrix"
 _JOINTS, _TASK, _CONTRACTION = COUNTER_ROTATIONS["joints"], COUNTER_ROTATIONS["task"], DEFORMATIONS["contraction"]
@@ -214,35 +213,29 @@ class AbstractRotation(CompiledPolicy):
         UnknownNameError: There is no such counter-rotation, deformation or Jacobian.
     """
 
-    r_a: float = 100.0
-    lambda_a: float | None = None
-    epsa: float = 1e-12
-    q_pp_max: float = 1e3
+    r_a: float = parameter(100.0, number, above=0.0)
+    lambda_a: float | None = parameter(None, number, above=0.0)
+    epsa: float = parameter(1e-12, number, above=0.0)
+    q_pp_max: float = parameter(1e3, number, above=0.0)
     task_weights: float | Sequence[float] = 1.0
     joint_weights: float | Sequence[float] = 1.0
-    counter_rotation: str = "joints"
-    deformation: str = "rotation"
-    jacobian: str = "step"
-    tolerance: float = 1e-3
+    counter_rotation: str = parameter("joints", choice, available=COUNTER_ROTATIONS)
+    deformation: str = parameter("rotation", choice, available=DEFORMATIONS)
+    jacobian: str = parameter("step", choice, available=("step", "point"))
+    tolerance: float = parameter(1e-3, number, at_least=0.0)
     _weights: tuple[FloatArray, FloatArray] = dataclasses.field(init=False, repr=False)
 
     name: ClassVar[str] = "abstract_rotation"
     step = rotation_step
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if self.lambda_a is None:
-            object.__setattr__(self, "lambda_a", _share(self.problem))
-        for name in ("r_a", "lambda_a", "epsa", "q_pp_max"):
-            object.__setattr__(self, name, number(name, getattr(self, name), above=0.0))
-        object.__setattr__(self, "tolerance", number("tolerance", self.tolerance, at_least=0.0))
+            self._settle(lambda_a=_share(self.problem))
         sizes = {"task_weights": self.problem.task.size, "joint_weights": self.problem.model.joints}
         weights = tuple(_checked_weights(name, getattr(self, name), size) for name, size in sizes.items())
-        object.__setattr__(self, "_weights", weights)
-        for name, array in zip(sizes, weights, strict=True):
-            object.__setattr__(self, name, as_given(getattr(self, name), array))
-        known_name("counter_rotation", self.counter_rotation, COUNTER_ROTATIONS)
-        known_name("deformation", self.deformation, DEFORMATIONS)
-        known_name("jacobian", self.jacobian, JACOBIANS)
+        plain = {name: as_given(getattr(self, name), array) for name, array in zip(sizes, weights, strict=True)}
+        self._settle(_weights=weights, **plain)
 
     def memory(self, rows: int) -> Memory:
         """A :class:`RotationMemory` without a step before."""

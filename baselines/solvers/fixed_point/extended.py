@@ -5,9 +5,10 @@ from __future__ import annotations
 import dataclasses
 from typing import ClassVar
 
+from baselines.policy.parameters import checked, parameter
 from baselines.solvers.arm_size import jacobian_bound
 from baselines.solvers.fixed_point.fixed_point import FixedPoint
-from baselines.solvers.references.privileged_path import PrivilegedPath
+from baselines.solvers.references.follow_nominal import PrivilegedPath
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.kinematics import Chain
@@ -25,8 +26,7 @@ class FixedPointExtended(PrivilegedPath, FixedPoint):
     Args:
         problem: What the policy is told of the scenario.
         transformation: ``"transpose"``; nothing else fits a longer x.
-        family: See :class:`FixedPoint`, like all up to the tolerance.
-        slope: The factor in F.
+        slope: The factor in F; see :class:`FixedPoint`, like all up to the tolerance.
         a: A; if left out, chosen for the longer Jacobian as there for J: -0.815 on the paper's arm, of whose A = -1
             the bound is not sure. With -1 it converges on its trajectories, too, and comes nearer.
         d: D.
@@ -42,11 +42,11 @@ class FixedPointExtended(PrivilegedPath, FixedPoint):
     Raises:
         InvalidInputError: A parameter is out of its range, or the scenario has no joint path, or is random and there
             is no seed.
-        UnknownNameError: There is no such transformation or family.
+        UnknownNameError: There is no such transformation.
     """
 
     seed: int | None = None
-    link: int = 2
+    link: int = parameter(2, whole_number, at_least=1)
     path: FloatArray = dataclasses.field(kw_only=True)
     _branch: Arm = dataclasses.field(init=False, repr=False)
     _points: FloatArray = dataclasses.field(init=False, repr=False)
@@ -59,8 +59,7 @@ class FixedPointExtended(PrivilegedPath, FixedPoint):
                 f"transformation: a longer x needs the transposed Jacobian, expected 'transpose', got "
                 f"{self.transformation!r}."
             )
-        model = self.problem.model
-        link = whole_number("link", self.link, at_least=1)
+        model, link = self.problem.model, checked(self)["link"]
         if link >= model.joints:
             raise InvalidInputError(f"link: expected at most {model.joints - 1} for arm {model.name!r}, got {link}.")
         branch = Arm(
@@ -71,9 +70,7 @@ class FixedPointExtended(PrivilegedPath, FixedPoint):
             tool=model.offsets[link],
         )
         path = frozen_array("path", self.path, (None, model.joints))
-        object.__setattr__(self, "path", path)
-        object.__setattr__(self, "_branch", branch)
-        object.__setattr__(self, "_points", read_only(branch.forward(path[:, :link])[1]))
+        self._settle(path=path, _branch=branch, _points=read_only(branch.forward(path[:, :link])[1]))
         super().__post_init__()
 
     def _extension(self) -> tuple[Chain, FloatArray]:

@@ -11,17 +11,18 @@ import numpy as np
 
 from baselines.policy import Memory
 from baselines.policy.compiled import CompiledPolicy
+from baselines.policy.parameters import choice, parameter
 from baselines.solvers.arm_size import error_weights, jacobian_bound, length, radian
-from baselines.solvers.fixed_point.contraction import Contraction, contraction
 from baselines.solvers.fixed_point.iteration import (
     TRANSFORMATIONS,
+    Contraction,
     FixedPointMemory,
     FixedPointNumbers,
     fixed_point_step,
 )
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.kinematics import Chain
-from ikgym.validation import FloatArray, known_name, number, read_only, whole_number
+from ikgym.validation import FloatArray, number, read_only, whole_number
 
 # The length in [m] of the paper's arm, to which its A belongs; on a shorter one it grows with 1/length².
 PAPERS_LENGTH = 1.3
@@ -31,10 +32,9 @@ PAPERS_LENGTH = 1.3
 class FixedPoint(CompiledPolicy):
     """Iterates q ← q + [F(A ‖h‖ + ξ*) - ξ*] h/‖h‖ with h = Jᵀ (f(q) - x), whose fixed point solves the task (eq. 1).
 
-    F is any function with an attractive fixed point ξ*, see :func:`contraction.contraction`. In the affine
-    family D cancels, and the paper's F(ξ) = ξ/2 + D makes the step q + (A/2) Jᵀ (f(q) - x): the transposed Jacobian.
-    In the sigmoid family D does not cancel, and the length of a step is bounded. Around a solution the error of q is
-    multiplied by I + F'(ξ*) A JᵀJ (Khan 2020, eq. 2.6): it contracts for -2/σ_max² < F'(ξ*) A < 0, that is for
+    F is a function with an attractive fixed point ξ*, here the paper's F(ξ) = slope · ξ + D. D cancels, and ξ/2 + D
+    makes the step q + (A/2) Jᵀ (f(q) - x): the transposed Jacobian. Around a solution the error of q is multiplied by
+    I + F'(ξ*) A JᵀJ (Khan 2020, eq. 2.6): it contracts for -2/σ_max² < F'(ξ*) A < 0, that is for
     |A| < 4/σ_max² in the paper, in all directions in which J has rank. In the others nothing moves, which is the
     method's good behaviour at singularities, and why it leaves a path there that goes on along them.
 
@@ -52,7 +52,6 @@ class FixedPoint(CompiledPolicy):
             the one-dimensional case of his 𝒩: σ = -1 where f - x points away from the one before. The other reading,
             ``"sign_by_growth"``: σ changes where the step before has led further away, so that ‖f - x‖ has grown.
             All but the first use no Jacobian, and need a component of the error for each joint.
-        family: The family of F, ``"affine"`` or ``"sigmoid"``.
         slope: The factor in F; ½ in the paper.
         a: A, negative with a rising F and ``"transpose"``. If left out, the paper's -1 where 2/σ_max² allows it, and
             -2/(|F'(ξ*)| ‖W J‖²) where it may not, from a bound of ‖W J‖² by the lengths of the links, with prismatic
@@ -67,18 +66,17 @@ class FixedPoint(CompiledPolicy):
 
     Raises:
         InvalidInputError: A parameter is out of its range, or the transformation does not suit the task.
-        UnknownNameError: There is no such transformation or family.
+        UnknownNameError: There is no such transformation.
     """
 
-    transformation: str = "transpose"
-    family: str = "affine"
-    slope: float = 0.5
-    a: float | None = None
-    d: float = 0.3
-    iterations: int = 10
-    tolerance: float = 1e-6
+    transformation: str = parameter("transpose", choice, available=TRANSFORMATIONS)
+    slope: float = parameter(0.5, number, above=-1.0, below=1.0)
+    a: float | None = parameter(None, number)
+    d: float = parameter(0.3, number)
+    iterations: int = parameter(10, whole_number, at_least=1)
+    tolerance: float = parameter(1e-6, number, at_least=0.0)
     components: Sequence[int] | None = None
-    length: float | None = None
+    length: float | None = parameter(None, number, above=0.0)
     #: F.
     function: Contraction = dataclasses.field(init=False, repr=False)
 
@@ -86,15 +84,14 @@ class FixedPoint(CompiledPolicy):
     step = fixed_point_step
 
     def __post_init__(self) -> None:
-        known_name("transformation", self.transformation, TRANSFORMATIONS)
-        object.__setattr__(self, "components", self._checked_components())
-        object.__setattr__(self, "length", self._checked_length())
-        object.__setattr__(self, "function", contraction(self.family, self.slope, self.d))
-        object.__setattr__(self, "a", self._contracting() if self.a is None else number("a", self.a))
+        super().__post_init__()
+        self._settle(components=self._checked_components(), length=self._checked_length())
+        if self.slope == 0.0:
+            raise InvalidInputError("slope: expected a number between -1 and 1 other than 0, got 0.")
+        self._settle(function=Contraction(self.slope, self.d, self.d / (1.0 - self.slope)))
+        self._settle(a=self._contracting() if self.a is None else self.a)
         if self.a == 0.0:
             raise InvalidInputError("a: expected a number other than 0, got 0: nothing would move.")
-        whole_number("iterations", self.iterations, at_least=1)
-        number("tolerance", self.tolerance, at_least=0.0)
 
     def memory(self, rows: int) -> Memory:
         """A :class:`FixedPointMemory` without a step before."""
@@ -140,7 +137,7 @@ class FixedPoint(CompiledPolicy):
 
     def _checked_length(self) -> float | None:
         if self.transformation == "transpose":
-            return radian(self.problem.model) if self.length is None else number("length", self.length, above=0.0)
+            return radian(self.problem.model) if self.length is None else self.length
         if self.length is not None:
             raise InvalidInputError("length: expected none but with transformation 'transpose', which weighs errors.")
         return None
@@ -163,5 +160,5 @@ class FixedPoint(CompiledPolicy):
         papers = 1.0
         if self.transformation == "transpose":  # an arm without length has nothing but turns
             papers = max(1.0, (PAPERS_LENGTH / (length(self.problem.model) or PAPERS_LENGTH)) ** 2)
-        size = min(papers, 2.0 / (abs(self.function.derivative) * self._jacobian_bound()))
-        return -math.copysign(size, self.function.derivative)
+        size = min(papers, 2.0 / (abs(self.slope) * self._jacobian_bound()))
+        return -math.copysign(size, self.slope)

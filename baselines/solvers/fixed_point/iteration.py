@@ -9,7 +9,6 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.solvers.arm_task import pose_arrays
-from baselines.solvers.fixed_point.contraction import Contraction, evaluate
 from baselines.solvers.linear_algebra import dot
 from baselines.status import Status
 from ikgym.kernels import tasks as task_kernels
@@ -21,6 +20,20 @@ from ikgym.validation import FloatArray
 TRANSFORMATIONS = {"transpose": 0, "none": 1, "sign": 2, "sign_by_growth": 3}
 _TRANSPOSE, _SIGN, _BY_GROWTH = (TRANSFORMATIONS[name] for name in ("transpose", "sign", "sign_by_growth"))
 _CONVERGED, _LIMIT, _DIVERGED = int(Status.CONVERGED), int(Status.ITERATION_LIMIT), int(Status.DIVERGED)
+
+
+class Contraction(NamedTuple):
+    """F(ξ) = slope · ξ + D with its fixed point ξ* (Faitli 2018, section 2.2, with the slope ½).
+
+    Attributes:
+        slope: Of an absolute value below 1, not 0.
+        d: D, the shift.
+        fixed_point: ξ*.
+    """
+
+    slope: float
+    d: float
+    fixed_point: float
 
 
 class FixedPointMemory(NamedTuple):
@@ -67,13 +80,9 @@ class FixedPointNumbers(NamedTuple):
 def fixed_point_step(model, numbers, seen, memory, answer):
     """The iterations of one step, row by row; see :class:`CompiledPolicy` for the arguments."""
     chain, kind, dt, chain_to_point, points = model.chain, model.kind, model.dt, Chain(*numbers.branch), numbers.points
-    function, transformation, a, iterations = (
-        Contraction(*numbers.function),
-        numbers.transformation,
-        numbers.a,
-        numbers.iterations,
-    )
-    tolerance, longest, components, weights = numbers.tolerance, numbers.longest, numbers.components, numbers.weights
+    function, transformation, a = Contraction(*numbers.function), numbers.transformation, numbers.a
+    iterations, tolerance, longest = numbers.iterations, numbers.tolerance, numbers.longest
+    components, weights = numbers.components, numbers.weights
     starts, nominal, remaining, previous = seen.q, seen.nominal, seen.remaining, memory.previous
     q, status, made = answer
     n, m, joints = q.shape[1], nominal.shape[2], chain_to_point.axes.shape[0]
@@ -146,7 +155,7 @@ def _contract(function, a, h, q):
     norm = math.sqrt(dot(h, h))
     if norm == 0.0:
         return
-    amount = evaluate(function, a * norm + function.fixed_point) - function.fixed_point
+    amount = function.slope * (a * norm + function.fixed_point) + function.d - function.fixed_point
     for j in range(q.shape[0]):
         q[j] += amount * (h[j] / norm)
 

@@ -10,10 +10,11 @@ import numpy as np
 
 from baselines.policy import Memory
 from baselines.policy.compiled import CompiledPolicy
-from baselines.solvers.levenberg_marquardt.damping_parameters import checked_parameters, damping_law, truth
+from baselines.policy.parameters import parameter
+from baselines.solvers.levenberg_marquardt.damping_parameters import checked_parameters, damping_law
 from baselines.solvers.levenberg_marquardt.damping_rules import DampingLaw
 from baselines.solvers.levenberg_marquardt.iteration import DampingMemory, IterationNumbers
-from ikgym.validation import FloatArray, number, whole_number
+from ikgym.validation import FloatArray, flag, number, whole_number
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -74,20 +75,16 @@ class DampedIteration(CompiledPolicy, abc.ABC):
     error_bounds: tuple[float, ...] | None = None
     condition_bounds: tuple[float, ...] | None = None
     dampings: tuple[Any, ...] | None = None
-    tolerance: float = 1e-10
-    iterations: int = 500
-    one_step: bool = False
+    tolerance: float = parameter(1e-10, number, at_least=0.0)
+    iterations: int = parameter(500, whole_number, at_least=1)
+    one_step: bool = parameter(False, flag)
     law: DampingLaw = dataclasses.field(init=False, repr=False)
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         given = {name: getattr(self, name) for name in self.parameter_names()}
         checked = checked_parameters(self.rule, given, self.problem.model)
-        for name, value in checked.items():
-            object.__setattr__(self, name, value)
-        number("tolerance", self.tolerance, at_least=0.0)
-        whole_number("iterations", self.iterations, at_least=1)
-        truth("one_step", self.one_step)
-        object.__setattr__(self, "law", damping_law(self.rule, checked))
+        self._settle(**checked, law=damping_law(self.rule, checked))
 
     @property
     def rank(self) -> int:
@@ -104,7 +101,7 @@ class DampedIteration(CompiledPolicy, abc.ABC):
             problem.dt * problem.velocity_limit,
             self.tolerance,
             self.iterations,
-            bool(self.one_step),
+            self.one_step,
             bool(self.carry),
             *self._horizon(),
         )

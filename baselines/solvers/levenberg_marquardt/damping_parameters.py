@@ -10,7 +10,7 @@ import numpy as np
 from baselines.solvers.levenberg_marquardt.damping_rules import LENGTH_POWERS, RULES, DampingLaw
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
-from ikgym.validation import float_array, frozen_array, known_name, number
+from ikgym.validation import flag, float_array, frozen_array, known_name, number
 
 
 def checked_parameters(rule: str, given: Mapping[str, Any], arm: Arm) -> dict[str, Any]:
@@ -80,17 +80,6 @@ def _scaled(value: Any, factor: float) -> Any:
     return value if isinstance(value, bool) or factor == 1.0 else value * factor
 
 
-def truth(name: str, value: Any) -> bool:
-    """A truth value.
-
-    Raises:
-        InvalidInputError: It is none.
-    """
-    if not isinstance(value, (bool, np.bool_)):
-        raise InvalidInputError(f"{name}: expected True or False, got {value!r}.")
-    return bool(value)
-
-
 def _bounds(name: str, value: Any) -> tuple[float, ...]:
     bounds = float_array(name, value, (None,))
     if (bounds <= 0.0).any() or (np.diff(bounds) <= 0.0).any():
@@ -110,8 +99,8 @@ _CHECKS: dict[str, Callable[[str, Any], Any]] = {
     "growth": lambda name, value: number(name, value, at_least=1.0),
     "decay": lambda name, value: number(name, value, at_least=1.0),
     "threshold": lambda name, value: number(name, value, above=0.0),
-    "restart": truth,
-    "carry": truth,
+    "restart": flag,
+    "carry": flag,
     "weight": lambda name, value: number(name, value, above=0.0),
     "error_bounds": _bounds,
     "condition_bounds": _bounds,

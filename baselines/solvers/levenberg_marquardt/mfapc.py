@@ -7,6 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from baselines.policy.parameters import choice, parameter
 from baselines.solvers.arm_task import pose_arrays
 from baselines.solvers.levenberg_marquardt.base import DampedIteration
 from baselines.solvers.levenberg_marquardt.block_tridiagonal import damped_horizon_step
@@ -32,10 +33,7 @@ from baselines.solvers.linear_algebra import dot, pseudoinverse_rows
 from ikgym.kernels import tasks as task_kernels
 from ikgym.kernels.jit import kernel
 from ikgym.kernels.kinematics import forward, forward_and_jacobian
-from ikgym.validation import known_name, whole_number
-
-JACOBIANS = ("predicted", "constant")
-STOPS = ("horizon", "first_point")
+from ikgym.validation import whole_number
 
 
 @kernel
@@ -178,18 +176,12 @@ class ModelFreeAdaptivePredictiveControl(DampedIteration):
 
     rule: str = "condition"
     iterations: int = 10
-    horizon: int = 2
-    jacobians: str = "predicted"
-    stop: str = "horizon"
+    horizon: int = parameter(2, whole_number, at_least=1)
+    jacobians: str = parameter("predicted", choice, available=("predicted", "constant"))
+    stop: str = parameter("horizon", choice, available=("horizon", "first_point"))
 
     name: ClassVar[str] = "mfapc"
     step = mfapc_step
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        whole_number("horizon", self.horizon, at_least=1)
-        for kind, value, available in (("jacobians", self.jacobians, JACOBIANS), ("stop", self.stop, STOPS)):
-            known_name(f"choice of {kind}", value, available)
 
     @property
     def preview(self) -> int:

@@ -8,8 +8,8 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from baselines.policy.parameters import parameter
 from baselines.solvers.quadratic_program.box_minimum import box_minimum
-from baselines.solvers.quadratic_program.limits import limits_with_braking
 from baselines.solvers.quadratic_program.program import (
     SCALING_WEIGHT,
     curvature,
@@ -19,14 +19,13 @@ from baselines.solvers.quadratic_program.program import (
     held_back,
     motion_weight,
 )
-from baselines.solvers.quadratic_program.velocity_box import velocity_box
+from baselines.solvers.quadratic_program.velocity_box import limits_with_braking, velocity_box
 from baselines.solvers.resolved_rate.base import APPLIED, TaskFeedback, task_motion
 from baselines.status import Status
 from ikgym.arms.limits import middle
-from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.jit import kernel
 from ikgym.kernels.limits import CHANGE, FASTEST
-from ikgym.validation import FloatArray, as_given, number, per_joint, read_only
+from ikgym.validation import FloatArray, as_given, flag, number, per_joint, read_only
 
 LIMIT, SATURATED = int(Status.ITERATION_LIMIT), int(Status.SATURATED)
 
@@ -130,12 +129,12 @@ class QuadraticProgram(TaskFeedback):
         InvalidInputError: A number is out of its range.
     """
 
-    damping: float = 3e-5
-    lm_damping: float = 1e-5
-    secondary_gain: float = 1.0
+    damping: float = parameter(3e-5, number, above=0.0)
+    lm_damping: float = parameter(1e-5, number, at_least=0.0)
+    secondary_gain: float = parameter(1.0, number, at_least=0.0)
     posture: float | Sequence[float] | None = None
-    braking_share: float = 0.5
-    task_scaling: bool = False
+    braking_share: float = parameter(0.5, number, at_least=0.0, at_most=1.0)
+    task_scaling: bool = parameter(False, flag)
     _pull: FloatArray = dataclasses.field(init=False, repr=False)
 
     name: ClassVar[str] = "qp"
@@ -143,18 +142,9 @@ class QuadraticProgram(TaskFeedback):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not isinstance(self.task_scaling, (bool, np.bool_)):
-            raise InvalidInputError(f"task_scaling: expected True or False, got {self.task_scaling!r}.")
-        for field, value in {
-            "damping": number("damping", self.damping, above=0.0),
-            "lm_damping": number("lm_damping", self.lm_damping, at_least=0.0),
-            "secondary_gain": self.checked_secondary_gain(self.secondary_gain),
-            "braking_share": number("braking_share", self.braking_share, at_least=0.0, at_most=1.0),
-            "task_scaling": bool(self.task_scaling),
-        }.items():
-            object.__setattr__(self, field, value)
+        self.check_secondary_gain(self.secondary_gain)
         target, gains = self._posture()
-        object.__setattr__(self, "_pull", read_only(np.array([gains, target])))
+        self._settle(_pull=read_only(np.array([gains, target])))
 
     def _posture(self) -> tuple[FloatArray, FloatArray]:
         """Where the joints are led to, and how strongly in [1/s]. Shapes (n,)."""

@@ -7,9 +7,9 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from baselines.policy.parameters import parameter
 from baselines.solvers.linear_algebra import inverted, singular_values
-from baselines.solvers.quadratic_program.limits import limits_with_braking
-from baselines.solvers.quadratic_program.velocity_box import velocity_box
+from baselines.solvers.quadratic_program.velocity_box import limits_with_braking, velocity_box
 from baselines.solvers.resolved_rate.base import APPLIED, TaskFeedback, add_feedback, task_motion
 from baselines.status import Status
 from ikgym.kernels.jit import kernel
@@ -167,14 +167,10 @@ class SaturationInNullSpace(TaskFeedback):
         InvalidInputError: A number is out of its range.
     """
 
-    damping: float = 3e-5
+    damping: float = parameter(3e-5, number, at_least=0.0)
 
     name: ClassVar[str] = "sns"
     step = sns_step
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        object.__setattr__(self, "damping", number("damping", self.damping, at_least=0.0))
 
     def numbers(self) -> SaturationNumbers:
         """See :meth:`CompiledPolicy.numbers`."""

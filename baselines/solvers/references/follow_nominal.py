@@ -2,14 +2,52 @@
 
 from __future__ import annotations
 
+import abc
 import dataclasses
-from typing import ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
+import numpy.typing as npt
 
-from baselines.policy import Batch, Memory, Solution, statuses
-from baselines.solvers.references.privileged_path import PrivilegedPath
-from ikgym.validation import FloatArray, frozen_array
+from baselines.policy import Batch, Memory, Problem, Solution, SolverPolicy, statuses
+from ikgym.exceptions import InvalidInputError
+from ikgym.scenarios import Scenario
+from ikgym.validation import FloatArray, frozen_array, whole_number
+
+
+class PrivilegedPath(SolverPolicy, abc.ABC):
+    """Base of policies with the fields ``seed``, which episode of a random scenario is played, and ``path``.
+
+    The path is privileged information: joint coordinates, one row a step, in [rad] or [m]. Shape (steps + 1, n).
+    """
+
+    seed: int | None
+    path: FloatArray
+
+    reference: ClassVar[bool] = True
+
+    @classmethod
+    def for_scenario(cls, scenario: Scenario, **parameters: Any) -> Self:
+        """See :meth:`SolverPolicy.for_scenario`; unlike others this policy is given the nominal joint path.
+
+        Raises:
+            InvalidInputError: The scenario has no joint path, or is random and there is no seed.
+        """
+        seed = parameters.get("seed")
+        if seed is not None:
+            parameters["seed"] = whole_number("seed", seed, at_least=0)
+        path = scenario.nominal_joint_path(seed)
+        if path is None:
+            raise InvalidInputError(
+                f"{cls.name} needs a nominal joint path; scenario {scenario.name!r} is given in Cartesian space."
+            )
+        return cls(Problem.of(scenario), path=path, **parameters)  # type: ignore[call-arg]  # a field of subclasses
+
+    def next_rows(self, batch: Batch) -> npt.NDArray[np.int64]:
+        """The rows of the path that belong to the end of the step. Shape (B,)."""
+        last = len(self.path) - 1
+        rows: npt.NDArray[np.int64] = np.clip(last + 1 - batch.remaining[:, 0].astype(np.int64), 0, last)
+        return rows
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

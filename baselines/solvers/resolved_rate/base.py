@@ -11,16 +11,15 @@ import numpy.typing as npt
 
 from baselines.policy import Memory
 from baselines.policy.compiled import CompiledPolicy
-from baselines.policy_kernels import scale_rows
+from baselines.policy.parameters import parameter
 from baselines.status import Status
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels import tasks as task_kernels
 from ikgym.kernels.jit import kernel, uncounted
 from ikgym.kernels.kinematics import forward_and_jacobian
-from ikgym.validation import FloatArray, known_name, number
+from ikgym.validation import FloatArray, number
 
 APPLIED, DEFICIENT = int(Status.APPLIED), int(Status.RANK_DEFICIENT)
-SATURATIONS = ("clip", "scale")
 
 
 class NominalMemory(NamedTuple):
@@ -53,24 +52,17 @@ class TaskFeedback(CompiledPolicy, abc.ABC):
         InvalidInputError: The gain is not between 0 and 2.
     """
 
-    gain: float = 1.0
+    gain: float = parameter(1.0, number, above=0.0, below=2.0)
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "gain", number("gain", self.gain, above=0.0))
-        if self.gain >= 2.0:
-            raise InvalidInputError(f"gain: expected a number above 0 and below 2, got {self.gain:g}.")
-
-    def checked_secondary_gain(self, gain: float) -> float:
-        """The gain of a secondary objective in [1/s].
+    def check_secondary_gain(self, gain: float) -> None:
+        """Checks the gain of a secondary objective in [1/s] against the time step.
 
         Raises:
-            InvalidInputError: It is not at least 0 and below 2/Δt.
+            InvalidInputError: It is not below 2/Δt.
         """
-        checked = number("secondary_gain", gain, at_least=0.0)
-        if checked * self.problem.dt >= 2.0:
+        if gain * self.problem.dt >= 2.0:
             limit = 2.0 / self.problem.dt
-            raise InvalidInputError(f"secondary_gain: expected a number below 2/Δt = {limit:g}, got {checked:g}.")
-        return checked
+            raise InvalidInputError(f"secondary_gain: expected a number below 2/Δt = {limit:g}, got {gain:g}.")
 
     def memory(self, rows: int) -> Memory:
         """A :class:`NominalMemory` without a step before."""
@@ -86,30 +78,9 @@ class TaskFeedback(CompiledPolicy, abc.ABC):
 class ResolvedRate(TaskFeedback, abc.ABC):
     """Follows the nominal motion of the next step, and takes back a share of the present error; see the base.
 
-    The task shift is turned into ``q̇ Δt`` with the task Jacobian of the model at q(k), by a subclass.
-
-    Args:
-        problem: What the policy is told of the scenario.
-        gain: Share of the present error that is taken back in one step; see :class:`TaskFeedback`.
-        saturation: What is done about joint velocities beyond their limits: ``clip`` cuts each joint to its own,
-            ``scale`` slows down all of them alike, which keeps the direction of the task velocity. That is not the
-            default, since a single slow joint, such as the torso of TIAGo, holds up all others then.
-
-    Raises:
-        InvalidInputError: The gain is not between 0 and 2.
-        UnknownNameError: There is no such saturation.
+    The task shift is turned into ``q̇ Δt`` with the task Jacobian of the model at q(k), by a subclass. Joint velocities
+    beyond their limits are cut joint by joint.
     """
-
-    saturation: str = "clip"
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        known_name("saturation", self.saturation, SATURATIONS)
-
-    @property
-    def scales(self) -> bool:
-        """Whether joints beyond their velocity limits slow down all others."""
-        return self.saturation == "scale"
 
 
 @kernel
@@ -151,15 +122,13 @@ def add_feedback(gain, error, shift):
 
 
 @uncounted
-def finish(model, scaling, answer):
-    """Turns joint shifts into velocities, slowed down alike where ``scaling``; one iteration was made."""
+def finish(model, answer):
+    """Turns joint shifts into velocities; one iteration was made."""
     qdot, iterations = answer.qdot, answer.iterations
     for row in range(qdot.shape[0]):
         iterations[row] = 1
         for j in range(qdot.shape[1]):
             qdot[row, j] /= model.dt
-    if scaling:
-        scale_rows(qdot, model.largest, answer.status)
 
 
 @uncounted

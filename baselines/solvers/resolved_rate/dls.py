@@ -7,6 +7,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from baselines.policy.parameters import parameter
 from baselines.solvers.linear_algebra import damped_gram, transposed_product
 from baselines.solvers.resolved_rate.base import APPLIED, ResolvedRate, add_feedback, finish, task_motion
 from ikgym.kernels.jit import kernel
@@ -19,12 +20,10 @@ class DampedNumbers(NamedTuple):
 
     Attributes:
         gain: Share of the present error that is taken back in one step.
-        scaling: Whether joints beyond their velocity limits slow down all others.
         damping: λ.
     """
 
     gain: float
-    scaling: bool
     damping: float
 
 
@@ -52,7 +51,7 @@ def dls_step(model, numbers, seen, memory, answer):
     add_feedback(numbers.gain, error, shift)
     damped_rows(jacobian, shift, numbers.damping, answer.qdot)
     answer.status[:] = APPLIED
-    finish(model, numbers.scaling, answer)
+    finish(model, answer)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -65,22 +64,17 @@ class DampedLeastSquares(ResolvedRate):
     Args:
         problem: What the policy is told of the scenario.
         gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
-        saturation: What is done about joint velocities beyond their limits; see :class:`ResolvedRate`.
         damping: λ, added to J Jᵀ as it is, not squared. In the square of the Jacobian's units, [m²] and [1]. Above 0.
 
     Raises:
         InvalidInputError: The gain or the damping is out of its range.
     """
 
-    damping: float = 1e-3
+    damping: float = parameter(1e-3, number, above=0.0)
 
     name: ClassVar[str] = "dls"
     step = dls_step
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        object.__setattr__(self, "damping", number("damping", self.damping, above=0.0))
-
     def numbers(self) -> DampedNumbers:
         """See :meth:`CompiledPolicy.numbers`."""
-        return DampedNumbers(self.gain, self.scales, self.damping)
+        return DampedNumbers(self.gain, self.damping)

@@ -7,9 +7,9 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from baselines.policy.parameters import parameter
 from baselines.solvers.linear_algebra import dot
 from baselines.solvers.resolved_rate.base import ResolvedRate, add_feedback, finish, say_deficient, task_motion
-from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.jit import kernel
 from ikgym.validation import number
 
@@ -79,13 +79,11 @@ class GramSchmidtNumbers(NamedTuple):
 
     Attributes:
         gain: Share of the present error that is taken back in one step.
-        scaling: Whether joints beyond their velocity limits slow down all others.
         truncation: Rows whose remainder is shorter than this share of the longest row are left out.
         full_rank: The rank that J has where nothing is lost.
     """
 
     gain: float
-    scaling: bool
     truncation: float
     full_rank: int
 
@@ -98,7 +96,7 @@ def gram_schmidt_step(model, numbers, seen, memory, answer):
     deficient = np.empty(shift.shape[0], np.bool_)
     orthonormal_rows(jacobian, shift, numbers.truncation, numbers.full_rank, answer.qdot, deficient)
     say_deficient(deficient, answer.status)
-    finish(model, numbers.scaling, answer)
+    finish(model, answer)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -122,7 +120,6 @@ class GramSchmidt(ResolvedRate):
     Args:
         problem: What the policy is told of the scenario.
         gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
-        saturation: What is done about joint velocities beyond their limits; see :class:`ResolvedRate`.
         truncation: Rows whose remainder is shorter than this share of the longest row are left out. At least 0 and
             below 1. Rows of positions and of orientations are compared as they are, in [m] and [1].
 
@@ -130,19 +127,11 @@ class GramSchmidt(ResolvedRate):
         InvalidInputError: The gain or the truncation is out of its range.
     """
 
-    truncation: float = 1e-3
+    truncation: float = parameter(1e-3, number, at_least=0.0, below=1.0)
 
     name: ClassVar[str] = "gram_schmidt"
     step = gram_schmidt_step
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        object.__setattr__(self, "truncation", number("truncation", self.truncation, at_least=0.0))
-        if self.truncation >= 1.0:
-            raise InvalidInputError(
-                f"truncation: expected a number of at least 0 and below 1, got {self.truncation:g}."
-            )
-
     def numbers(self) -> GramSchmidtNumbers:
         """See :meth:`CompiledPolicy.numbers`."""
-        return GramSchmidtNumbers(self.gain, self.scales, self.truncation, self.full_rank)
+        return GramSchmidtNumbers(self.gain, self.truncation, self.full_rank)

@@ -7,6 +7,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from baselines.policy.parameters import parameter
 from baselines.solvers.arm_size import error_weights, radian
 from baselines.solvers.resolved_rate.base import (
     APPLIED,
@@ -60,14 +61,12 @@ class TransposeNumbers(NamedTuple):
 
     Attributes:
         gain: Share of the present error that is taken back in one step.
-        scaling: Whether joints beyond their velocity limits slow down all others.
         tolerance: ‖JᵀΔx‖ below this share of ‖J‖ ‖Δx‖ counts as zero.
         full_rank: The rank that J has where nothing is lost.
         weights: The diagonal of W². Shape (e,).
     """
 
     gain: float
-    scaling: bool
     tolerance: float
     full_rank: int
     weights: FloatArray
@@ -83,7 +82,7 @@ def transpose_step(model, numbers, seen, memory, answer):
     say_deficient(stuck, answer.status)
     if shift.shape[1] != numbers.full_rank:
         answer.status[:] = APPLIED
-    finish(model, numbers.scaling, answer)
+    finish(model, answer)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -104,7 +103,6 @@ class JacobianTranspose(ResolvedRate):
     Args:
         problem: What the policy is told of the scenario.
         gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
-        saturation: What is done about joint velocities beyond their limits; see :class:`ResolvedRate`.
         rank_tolerance: ‖JᵀΔx‖ below this share of ‖J‖ ‖Δx‖ (Frobenius, weighed) counts as zero. At least 0.
         length: ℓ, what 1 rad counts as, or 1 in a rotation matrix, in [m]. Above 0. If left out, chosen for the model,
             see :func:`baselines.solvers.arm_size.radian`.
@@ -113,8 +111,8 @@ class JacobianTranspose(ResolvedRate):
         InvalidInputError: The gain, the tolerance or the length is out of its range.
     """
 
-    rank_tolerance: float = 1e-12
-    length: float | None = None
+    rank_tolerance: float = parameter(1e-12, number, at_least=0.0)
+    length: float | None = parameter(None, number, above=0.0)
 
     _weights: FloatArray = dataclasses.field(init=False, repr=False)
 
@@ -123,11 +121,9 @@ class JacobianTranspose(ResolvedRate):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        object.__setattr__(self, "rank_tolerance", number("rank_tolerance", self.rank_tolerance, at_least=0.0))
-        length = radian(self.problem.model) if self.length is None else number("length", self.length, above=0.0)
-        object.__setattr__(self, "length", length)
-        object.__setattr__(self, "_weights", read_only(error_weights(self.problem.task, length)))
+        length = radian(self.problem.model) if self.length is None else self.length
+        self._settle(length=length, _weights=read_only(error_weights(self.problem.task, length)))
 
     def numbers(self) -> TransposeNumbers:
         """See :meth:`CompiledPolicy.numbers`."""
-        return TransposeNumbers(self.gain, self.scales, self.rank_tolerance, self.full_rank, self._weights)
+        return TransposeNumbers(self.gain, self.rank_tolerance, self.full_rank, self._weights)

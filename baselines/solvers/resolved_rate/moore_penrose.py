@@ -7,9 +7,9 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from baselines.policy.parameters import parameter
 from baselines.solvers.linear_algebra import pseudoinverse_rows
 from baselines.solvers.resolved_rate.base import ResolvedRate, add_feedback, finish, say_deficient, task_motion
-from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.jit import kernel
 from ikgym.validation import FloatArray, number, read_only
 
@@ -19,14 +19,12 @@ class PseudoinverseNumbers(NamedTuple):
 
     Attributes:
         gain: Share of the present error that is taken back in one step.
-        scaling: Whether joints beyond their velocity limits slow down all others.
         tolerance: Singular values below this share of the largest count as zero.
         full_rank: The rank that J has where nothing is lost.
         root: By which the columns of J are divided: the roots of the joints' weights. Shape (n,).
     """
 
     gain: float
-    scaling: bool
     tolerance: float
     full_rank: int
     root: FloatArray
@@ -44,7 +42,7 @@ def pseudoinverse_step(model, numbers, seen, memory, answer):
     for row in range(qdot.shape[0]):
         for j in range(qdot.shape[1]):
             qdot[row, j] /= root[j]
-    finish(model, numbers.scaling, answer)
+    finish(model, answer)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -58,25 +56,18 @@ class MoorePenrose(ResolvedRate):
     Args:
         problem: What the policy is told of the scenario.
         gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
-        saturation: What is done about joint velocities beyond their limits; see :class:`ResolvedRate`.
         rank_tolerance: Singular values below this share of the largest count as zero. At least 0, below 1.
 
     Raises:
         InvalidInputError: The gain or the tolerance is out of its range.
     """
 
-    rank_tolerance: float = 1e-12
+    rank_tolerance: float = parameter(1e-12, number, at_least=0.0, below=1.0)
 
     name: ClassVar[str] = "moore_penrose"
     step = pseudoinverse_step
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        object.__setattr__(self, "rank_tolerance", number("rank_tolerance", self.rank_tolerance, at_least=0.0))
-        if self.rank_tolerance >= 1.0:
-            raise InvalidInputError(f"rank_tolerance: expected a number below 1, got {self.rank_tolerance:g}.")
-
     def numbers(self) -> NamedTuple:
         """See :meth:`CompiledPolicy.numbers`."""
         root = read_only(np.ones(self.problem.model.joints))
-        return PseudoinverseNumbers(self.gain, self.scales, self.rank_tolerance, self.full_rank, root)
+        return PseudoinverseNumbers(self.gain, self.rank_tolerance, self.full_rank, root)

@@ -8,6 +8,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from baselines.policy.parameters import choice, parameter
 from baselines.solvers.linear_algebra import pseudoinverse_rows
 from baselines.solvers.resolved_rate.base import APPLIED, add_feedback, finish, say_deficient, task_motion
 from baselines.solvers.resolved_rate.dls import damped_rows
@@ -18,7 +19,7 @@ from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.jit import kernel
 from ikgym.kernels.kinematics import forward_and_jacobian
 from ikgym.kernels.linear_algebra import cholesky, cholesky_solve
-from ikgym.validation import FloatArray, as_given, known_name, number, per_joint, read_only
+from ikgym.validation import FloatArray, as_given, number, per_joint, read_only
 
 OBJECTIVES = ("posture", "joint_centring", "manipulability")
 
@@ -93,7 +94,6 @@ class NullSpaceNumbers(NamedTuple):
 
     Attributes:
         gain: Share of the present error that is taken back in one step.
-        scaling: Whether joints beyond their velocity limits slow down all others.
         tolerance: Singular values below this share of the largest count as zero.
         full_rank: The rank that J has where nothing is lost.
         damping: λ; 0 for the pseudoinverse.
@@ -105,7 +105,6 @@ class NullSpaceNumbers(NamedTuple):
     """
 
     gain: float
-    scaling: bool
     tolerance: float
     full_rank: int
     damping: float
@@ -122,7 +121,7 @@ def null_space_step(model, numbers, seen, memory, answer):
     jacobian, shift, error = task_motion(model.chain, model.kind, seen, memory)
     add_feedback(numbers.gain, error, shift)
     move_rows(model.chain, numbers, seen.q, jacobian, shift, answer.qdot, answer.status)
-    finish(model, numbers.scaling, answer)
+    finish(model, answer)
 
 
 @kernel
@@ -198,7 +197,6 @@ class NullSpace(MoorePenrose):
     Args:
         problem: What the policy is told of the scenario.
         gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
-        saturation: What is done about joint velocities beyond their limits; see :class:`ResolvedRate`.
         rank_tolerance: Singular values below this share of the largest count as zero. At least 0.
         objective: One of ``posture``, ``joint_centring`` and ``manipulability``. If left out, ``joint_centring`` where
             the model has joint limits and no posture is given, else ``posture``.
@@ -212,10 +210,10 @@ class NullSpace(MoorePenrose):
         UnknownNameError: There is no such objective.
     """
 
-    objective: str | None = None
-    secondary_gain: float = 1.0
+    objective: str | None = parameter(None, choice, available=OBJECTIVES)
+    secondary_gain: float = parameter(1.0, number, at_least=0.0)
     posture: float | Sequence[float] | None = None
-    damping: float = 1e-3
+    damping: float = parameter(1e-3, number, at_least=0.0)
     _target: FloatArray = dataclasses.field(init=False, repr=False)
     _joint_gain: FloatArray = dataclasses.field(init=False, repr=False)
 
@@ -227,19 +225,12 @@ class NullSpace(MoorePenrose):
         model = self.problem.model
         default = "joint_centring" if self.posture is None and middle(model)[0].any() else "posture"
         objective = default if self.objective is None else self.objective
-        known_name("objective", objective, OBJECTIVES)
         given = 0.0 if self.posture is None else self.posture
         posture = per_joint("posture", given, model.joints)
         target, gains = _centre(model) if objective == "joint_centring" else (posture, np.ones(model.joints))
-        for field, value in {
-            "objective": objective,
-            "secondary_gain": self.checked_secondary_gain(self.secondary_gain),
-            "posture": as_given(given, posture),
-            "damping": number("damping", self.damping, at_least=0.0),
-            "_target": read_only(target),
-            "_joint_gain": read_only(gains),
-        }.items():
-            object.__setattr__(self, field, value)
+        self.check_secondary_gain(self.secondary_gain)
+        self._settle(objective=objective, posture=as_given(given, posture))
+        self._settle(_target=read_only(target), _joint_gain=read_only(gains))
 
     def numbers(self) -> NullSpaceNumbers:
         """See :meth:`CompiledPolicy.numbers`."""
@@ -248,7 +239,6 @@ class NullSpace(MoorePenrose):
             lines = 6 if self.problem.task.has_orientation else 3
         return NullSpaceNumbers(
             self.gain,
-            self.scales,
             self.rank_tolerance,
             self.full_rank,
             self.damping,

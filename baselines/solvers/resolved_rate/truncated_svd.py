@@ -7,9 +7,9 @@ from typing import ClassVar
 
 import numpy as np
 
+from baselines.policy.parameters import parameter
 from baselines.solvers.resolved_rate.base import ResolvedRate
 from baselines.solvers.resolved_rate.moore_penrose import PseudoinverseNumbers, pseudoinverse_step
-from ikgym.exceptions import InvalidInputError
 from ikgym.validation import number, read_only
 
 
@@ -25,7 +25,6 @@ class TruncatedSVD(ResolvedRate):
     Args:
         problem: What the policy is told of the scenario.
         gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
-        saturation: What is done about joint velocities beyond their limits; see :class:`ResolvedRate`.
         threshold: Singular values of the task Jacobian below this share of the largest are left out. Between 0
             and 1.
 
@@ -33,18 +32,12 @@ class TruncatedSVD(ResolvedRate):
         InvalidInputError: The gain or the threshold is out of its range.
     """
 
-    threshold: float = 3e-3
+    threshold: float = parameter(3e-3, number, at_least=0.0, below=1.0)
 
     name: ClassVar[str] = "truncated_svd"
     step = pseudoinverse_step
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        object.__setattr__(self, "threshold", number("threshold", self.threshold, at_least=0.0))
-        if self.threshold >= 1.0:
-            raise InvalidInputError(f"threshold: expected a number of at least 0 and below 1, got {self.threshold:g}.")
-
     def numbers(self) -> PseudoinverseNumbers:
         """See :meth:`CompiledPolicy.numbers`."""
         root = read_only(np.ones(self.problem.model.joints))
-        return PseudoinverseNumbers(self.gain, self.scales, self.threshold, self.full_rank, root)
+        return PseudoinverseNumbers(self.gain, self.threshold, self.full_rank, root)

@@ -25,7 +25,6 @@ class WeightedPseudoinverse(MoorePenrose):
     Args:
         problem: What the policy is told of the scenario.
         gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
-        saturation: What is done about joint velocities beyond their limits; see :class:`ResolvedRate`.
         rank_tolerance: Singular values below this share of the largest count as zero. At least 0.
         weights: w, above 0; only their ratios count. One number, or one a joint; between revolute and prismatic
             joints it holds a unit, [m²] per [rad²]. If left out, 1 / v² of the largest joint velocities v where the
@@ -47,12 +46,11 @@ class WeightedPseudoinverse(MoorePenrose):
         weights = per_joint("weights", given, self.problem.model.joints)
         if not (weights > 0.0).all():
             raise InvalidInputError(f"weights: expected numbers above 0, got {weights.tolist()}.")
-        object.__setattr__(self, "weights", as_given(given, weights))
-        object.__setattr__(self, "_root", read_only(np.sqrt(weights)))
+        self._settle(weights=as_given(given, weights), _root=read_only(np.sqrt(weights)))
 
     def numbers(self) -> PseudoinverseNumbers:
         """See :meth:`CompiledPolicy.numbers`."""
-        return PseudoinverseNumbers(self.gain, self.scales, self.rank_tolerance, self.full_rank, self._root)
+        return PseudoinverseNumbers(self.gain, self.rank_tolerance, self.full_rank, self._root)
 
 
 def _by_velocity(problem: Problem) -> float | tuple[float, ...]:

@@ -98,6 +98,7 @@ class Rival(SolverPolicy, abc.ABC):
     tasks: ClassVar[tuple[str, ...]] = (*WHOLE_POSES, "position", "axis")
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if self.problem.task.name not in self.tasks:
             raise InvalidInputError(
                 f"{self.name}: expected a scenario of the task {' or '.join(map(repr, self.tasks))}, "

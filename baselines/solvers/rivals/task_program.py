@@ -1,13 +1,18 @@
-"""What Pink and mink have in common: weighted tasks under limits, one quadratic program a step."""
+"""Pink and mink: weighted tasks under limits, one quadratic program a step."""
 
 from __future__ import annotations
 
 import abc
 import dataclasses
+from typing import Any, ClassVar
 
-from baselines.solvers.rivals.base import Rival
+import numpy as np
+
+from baselines.policy.parameters import parameter
+from baselines.solvers.rivals.base import Rival, Seen, Step
+from baselines.solvers.rivals.model_files import TIP, joint_name, mjcf, urdf
 from ikgym.exceptions import InvalidInputError, UnknownNameError
-from ikgym.validation import number
+from ikgym.validation import FloatArray, number
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -37,25 +42,20 @@ class TaskProgram(Rival, abc.ABC):
         MissingDependencyError: The package, or `qpsolvers`, is not installed.
     """
 
-    gain: float = 1.0
-    position_cost: float = 1.0
-    orientation_cost: float = 1.0
-    lm_damping: float = 1.0
-    posture_cost: float = 1e-3
-    posture_rate: float = 1.0
-    damping: float = 1e-12
-    limit_gain: float = 0.5
+    gain: float = parameter(1.0, number, above=0.0, at_most=1.0)
+    position_cost: float = parameter(1.0, number, above=0.0)
+    orientation_cost: float = parameter(1.0, number, at_least=0.0)
+    lm_damping: float = parameter(1.0, number, at_least=0.0)
+    posture_cost: float = parameter(1e-3, number, at_least=0.0)
+    posture_rate: float = parameter(1.0, number, at_least=0.0)
+    damping: float = parameter(1e-12, number, at_least=0.0)
+    limit_gain: float = parameter(0.5, number, above=0.0, at_most=1.0)
     solver: str = "daqp"
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for name in ("gain", "limit_gain", "position_cost"):
-            object.__setattr__(self, name, number(name, getattr(self, name), above=0.0))
-        for name in ("orientation_cost", "lm_damping", "posture_cost", "posture_rate", "damping"):
-            object.__setattr__(self, name, number(name, getattr(self, name), at_least=0.0))
-        for name, share in {"gain": self.gain, "limit_gain": self.limit_gain, "posture_rate · Δt": self.share}.items():
-            if share > 1.0:
-                raise InvalidInputError(f"{name}: expected at most 1, got {share:g}.")
+        if self.share > 1.0:
+            raise InvalidInputError(f"posture_rate · Δt: expected at most 1, got {self.share:g}.")
         known = self.imported("qpsolvers").available_solvers
         if self.solver not in known:
             raise UnknownNameError("solver of quadratic programs", self.solver, tuple(known))
@@ -70,3 +70,92 @@ class TaskProgram(Rival, abc.ABC):
     def share(self) -> float:
         """Of the way to the posture that is asked for in one step."""
         return self.posture_rate * self.problem.dt
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Pink(TaskProgram):
+    """Pink (Caron et al., `pin-pink`): weighted tasks under limits; for the parameters see :class:`TaskProgram`.
+
+    The model is handed over as URDF. Limits are those of position, velocity and, where all joints have them,
+    acceleration with the braking distance that it needs (`AccelerationLimit`). quadprog is the solver of its README;
+    it keeps limits to rounding, where DAQP keeps them to 1e-6 rad a step.
+    """
+
+    solver: str = "quadprog"
+
+    name: ClassVar[str] = "pink"
+    package: ClassVar[str] = "pink"
+    distribution: ClassVar[str] = "pin-pink"
+
+    def make_step(self) -> Step:
+        """See :meth:`Rival.make_step`."""
+        pink, pinocchio = self.imported(), self.imported("pinocchio")
+        model = pinocchio.buildModelFromXML(urdf(self.model))
+        configuration = pink.Configuration(model, model.createData(), np.zeros(model.nq))
+        frame = pink.tasks.FrameTask(TIP, *self.frame_costs, lm_damping=self.lm_damping, gain=self.gain)
+        posture = [pink.tasks.PostureTask(self.posture_cost, gain=self.share)] if self.posture_cost else []
+        tasks = [frame, *posture]
+        limits = [pink.limits.ConfigurationLimit(model, self.limit_gain), pink.limits.VelocityLimit(model)]
+        acceleration = self._acceleration(pink, model)
+        limits += acceleration
+        dt, options = self.problem.dt, {"solver": self.solver, "damping": self.damping, "safety_break": False}
+
+        def step(seen: Seen) -> FloatArray | None:
+            configuration.update(seen.q)
+            frame.set_target(pinocchio.SE3(*seen.target))
+            for task in posture:
+                task.set_target(seen.start)
+            for limit in acceleration:
+                limit.set_last_integration(seen.qdot, dt)
+            try:
+                found: FloatArray = pink.solve_ik(configuration, tasks, dt, limits=limits, **options)
+            except pink.exceptions.NoSolutionFound:
+                return None
+            return found
+
+        return step
+
+    def _acceleration(self, pink: Any, model: Any) -> list[Any]:
+        limit = np.array(self.problem.model.acceleration_limit)
+        return [pink.limits.AccelerationLimit(model, limit)] if np.isfinite(limit).all() else []
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Mink(TaskProgram):
+    """mink (Zakka, on MuJoCo): weighted tasks under limits; for the parameters see :class:`TaskProgram`.
+
+    The model is handed over as MJCF. Limits are those of position and velocity; it has none of acceleration.
+    """
+
+    limit_gain: float = 0.95
+
+    name: ClassVar[str] = "mink"
+    package: ClassVar[str] = "mink"
+    distribution: ClassVar[str] = "mink"
+
+    def make_step(self) -> Step:
+        """See :meth:`Rival.make_step`."""
+        mink, mujoco = self.imported(), self.imported("mujoco")
+        model = mujoco.MjModel.from_xml_string(mjcf(self.model))
+        configuration = mink.Configuration(model)
+        frame = mink.FrameTask(TIP, "body", *self.frame_costs, gain=self.gain, lm_damping=self.lm_damping)
+        posture = [mink.PostureTask(model, self.posture_cost, gain=self.share)] if self.posture_cost else []
+        tasks = [frame, *posture]
+        speeds = {joint_name(i): limit for i, limit in enumerate(self.model.velocity_limit) if np.isfinite(limit)}
+        limits = [mink.ConfigurationLimit(model, self.limit_gain), mink.VelocityLimit(model, speeds)]
+        dt, options = self.problem.dt, {"solver": self.solver, "damping": self.damping}
+        pose = np.eye(4)
+
+        def step(seen: Seen) -> FloatArray | None:
+            configuration.update(seen.q)
+            pose[:3, :3], pose[:3, 3] = seen.target
+            for task in posture:
+                task.set_target(seen.start)
+            frame.set_target(mink.SE3.from_matrix(pose))
+            try:
+                found: FloatArray = mink.solve_ik(configuration, tasks, dt, limits=limits, **options)
+            except mink.NoSolutionFound:
+                return None
+            return found
+
+        return step

@@ -9,12 +9,11 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.policy import Batch, Memory, Solution
+from baselines.policy.parameters import choice, parameter
 from baselines.wrapper import NamedWrapper
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.tasks import pose_rows
-from ikgym.validation import FloatArray, known_name, number
-
-FEEDBACKS = ("calculated", "measured")
+from ikgym.validation import FloatArray, number
 
 
 class SmoothedMemory(NamedTuple):
@@ -67,20 +66,18 @@ class Smoothed(NamedWrapper):
     """
 
     policy: str = "rhc_gradient"
-    relaxation: float = 300.0
-    feedback: str = "calculated"
+    relaxation: float = parameter(300.0, number, above=0.0)
+    feedback: str = parameter("calculated", choice, available=("calculated", "measured"))
 
     name: ClassVar[str] = "smoothed"
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        relaxation = number("relaxation", self.relaxation, above=0.0)
-        if relaxation * self.problem.dt >= 2.0:
+        if self.relaxation * self.problem.dt >= 2.0:
+            most = 2.0 / self.problem.dt
             raise InvalidInputError(
-                f"relaxation: explicit Euler is stable below 2/Δt = {2.0 / self.problem.dt:g}, got {relaxation:g}."
+                f"relaxation: explicit Euler is stable below 2/Δt = {most:g}, got {self.relaxation:g}."
             )
-        known_name("feedback", self.feedback, FEEDBACKS)
-        object.__setattr__(self, "relaxation", relaxation)
 
     def own_memory(self, rows: int) -> SmoothedMemory:
         """See :meth:`Wrapper.own_memory`."""

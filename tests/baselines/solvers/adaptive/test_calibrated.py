@@ -8,7 +8,6 @@ import pytest
 import baselines
 from baselines.solvers.adaptive.calibrated import PAUSE
 from baselines.solvers.adaptive.chain_parameters import parameter_twists
-from ikgym.exceptions import InvalidInputError
 from tests.baselines.solvers.adaptive.arms import PANDA, noisy, observed, path, perturbed, scenario
 from tests.baselines.solvers.adaptive.test_corrected import deviation_of, true_deviation
 from tests.comparison import identical
@@ -72,8 +71,6 @@ def test_a_start_on_the_reference_is_the_best_measurement():
         _, state = policy.predict(seen)
         missing.append(np.abs(deviation_of(policy, state, q) - true_deviation(arm, zeros, q)).max())
     assert missing[1] < 1e-5 < 1e-4 < missing[0]
-    with pytest.raises(InvalidInputError, match="start"):
-        baselines.make("calibrated", on, start=0.0)
 
 
 @pytest.mark.parametrize("keep", [True, False])
@@ -133,12 +130,3 @@ def test_a_payload_is_noticed(jump, within):
         _, state = policy.predict(noisy(on, observed(on, arm, loaded, posture), rng, 3e-4), state)
     left = np.abs(deviation_of(policy, state, q[-1]) - true_deviation(arm, loaded, q[-1])).max()
     assert (left < 5e-4) == within
-
-
-def test_the_walk_of_the_joint_zeros():
-    (arm, zeros), q = perturbed(8), path(9, 200)
-    policies = [baselines.make("calibrated", scenario(), policy="dls", walk=walk, jump=0.0) for walk in (0.0, 1e-3)]
-    still, walking = (
-        policy.split(policy.memory_of(learnt(policy, arm, zeros, q)))[0].covariance[0] for policy in policies
-    )
-    assert (np.diag(walking)[:7] > np.diag(still)[:7]).all()

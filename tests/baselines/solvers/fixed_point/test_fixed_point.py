@@ -8,12 +8,9 @@ import pytest
 
 import baselines
 import ikgym
-from baselines.policy import Batch
 from baselines.solvers.arm_size import error_weights, jacobian_bound
-from baselines.solvers.fixed_point.contraction import contraction, evaluate
 from baselines.status import Status
-from ikgym.exceptions import InvalidInputError, UnknownNameError
-from ikgym.kernels.outcome import OBSERVED
+from ikgym.exceptions import InvalidInputError
 from tests.comparison import identical
 from tests.every_scenario import ONE_OF_EACH
 
@@ -42,8 +39,8 @@ def stepped(policy, observation, state=None):
     return observation["q"] + action * problem.velocity_limit * problem.dt, state, policy.report(state).status[0]
 
 
-def printed(scenario, q, target, iterations, a, function, transformation, last=None):
-    """Eq. 1 in plain NumPy."""
+def printed(scenario, q, target, iterations, a, transformation, last=None):
+    """Eq. 1 in plain NumPy, with F(ξ) = 0.4 ξ + 0.2."""
     for _ in range(iterations):
         rotation, position, geometric = scenario.model.forward_and_jacobian(q)
         error = -scenario.task.error(target, scenario.task.coordinates(rotation, position))
@@ -57,13 +54,11 @@ def printed(scenario, q, target, iterations, a, function, transformation, last=N
             h = last[0] * error
         elif transformation == "sign":
             h, last = (-error if last is not None and error @ last < 0 else error), error
-        xi = function.fixed_point
-        norm = np.linalg.norm(h)
-        q = q + (evaluate.py_func(function, a * norm + xi) - xi) * h / norm
+        norm, fixed_point = np.linalg.norm(h), 0.2 / (1.0 - 0.4)
+        q = q + (0.4 * (a * norm + fixed_point) + 0.2 - fixed_point) * h / norm
     return q
 
 
-@pytest.mark.parametrize("family", ["affine", "sigmoid"])
 @pytest.mark.parametrize(
     ("name", "transformation"),
     [
@@ -77,16 +72,15 @@ def printed(scenario, q, target, iterations, a, function, transformation, last=N
         ("zhang6-lspb", "none"),
     ],
 )
-def test_is_equation_1(name, transformation, family):
+def test_is_equation_1(name, transformation):
     scenario = ikgym.scenarios.get(name)
-    given = {"transformation": transformation, "family": family, "iterations": 5, "d": 0.2, "slope": 0.4, "a": -0.004}
+    given = {"transformation": transformation, "iterations": 5, "d": 0.2, "slope": 0.4, "a": -0.004}
     if transformation == "transpose":
         given["length"] = 1.0  # nothing is weighed in the paper
     policy = baselines.make("fixed_point", name, **given)
     observation = away(np.linspace(0.2, 0.7, scenario.joints), name=name)
     q, _, _ = stepped(policy, observation)
-    function = contraction(family, 0.4, 0.2)
-    wanted = printed(scenario, observation["q"], observation["nominal"][0], 5, -0.004, function, transformation)
+    wanted = printed(scenario, observation["q"], observation["nominal"][0], 5, -0.004, transformation)
     np.testing.assert_allclose(q - observation["q"], wanted - observation["q"], rtol=1e-5, atol=1e-12)
 
 
@@ -99,40 +93,11 @@ def test_with_the_papers_function_a_step_is_that_of_the_transposed_jacobian():
         np.testing.assert_allclose(q - Q, wanted, rtol=1e-6)
 
 
-def test_d_cancels_in_the_affine_family_and_in_no_other():
+def test_d_cancels():
     observation = away(by=0.01)
-
-    def step(family, d):
-        return stepped(baselines.make("fixed_point", REGULAR, family=family, d=d), observation)[0] - Q
-
-    for d in (-5.0, 0.0, 0.3, 40.0):
-        np.testing.assert_allclose(step("affine", d), step("affine", 0.3), rtol=1e-6, atol=1e-13)
-    assert abs(step("sigmoid", 0.0) - step("sigmoid", 1.0)).max() > 0.1 * abs(step("sigmoid", 0.0)).max()
-
-
-@pytest.mark.parametrize("family", ["affine", "sigmoid"])
-@pytest.mark.parametrize("slope", [0.5, 0.9, 0.01, -0.5, -0.9])
-@pytest.mark.parametrize("d", [0.0, 1e-9, 0.3, -2.0, 5.0])
-def test_contractions_have_the_fixed_point_and_the_slope_that_they_say(family, slope, d):
-    function = contraction(family, slope, d)
-    xi = function.fixed_point
-    assert evaluate(function, xi) == pytest.approx(xi, abs=1e-13)
-    central = (evaluate(function, xi + 1e-5) - evaluate(function, xi - 1e-5)) / 2e-5
-    assert function.derivative == pytest.approx(central, abs=1e-8)
-    assert abs(function.derivative) < 1.0
-    start = 0.7
-    for _ in range(400):
-        start = evaluate(function, start)
-    assert start == pytest.approx(xi, abs=1e-12)
-
-
-def test_the_sigmoid_bounds_a_step():
-    """|F| is at most artanh(slope)."""
-    policy = baselines.make("fixed_point", REGULAR, family="sigmoid", iterations=1, a=-1e4, d=0.0)
-    far = {**observed(REGULAR, Q), "nominal": np.full((1, 3), 1e3)}
-    batch = Batch(*(np.asarray(far[name])[None] for name in OBSERVED))
-    solution = policy.solve(batch, policy.memory(1))
-    assert np.linalg.norm(solution.qdot) * 1e-3 <= np.arctanh(0.5) + 1e-12
+    steps = [stepped(baselines.make("fixed_point", REGULAR, d=d), observation)[0] - Q for d in (0.3, -5.0, 0.0, 40.0)]
+    for step in steps[1:]:
+        np.testing.assert_allclose(step, steps[0], rtol=1e-6, atol=1e-13)
 
 
 @pytest.mark.parametrize("q", [Q, np.array([0.3, -0.2, 0.9]), np.array([-1.0, 0.9, -1.2])])
@@ -164,12 +129,11 @@ def test_a_blow_up_is_no_number_and_no_convergence():
 
 
 @pytest.mark.parametrize("transformation", ["transpose", "none", "sign"])
-@pytest.mark.parametrize("family", ["affine", "sigmoid"])
-def test_at_the_solution_nothing_moves(transformation, family):
+def test_at_the_solution_nothing_moves(transformation):
     """‖h‖ = 0 exactly; and where h is no larger than rounding the step is not, either."""
     observation = observed(REGULAR, Q)
     observation["nominal"] = observation["pose"][None]
-    policy = baselines.make("fixed_point", REGULAR, transformation=transformation, family=family)
+    policy = baselines.make("fixed_point", REGULAR, transformation=transformation)
     q, _, status = stepped(policy, observation)
     assert status == Status.CONVERGED
     np.testing.assert_array_equal(q, Q)
@@ -282,15 +246,6 @@ class TestExtended:
         wanted = -0.25 * central.T @ (both(Q) - both(target))
         np.testing.assert_allclose(q - Q, wanted, rtol=1e-6, atol=1e-10)
 
-    def test_is_a_reference_that_plays_its_seed(self):
-        policy = baselines.make("fixed_point_extended", "varga7-random", seed=3, link=5)
-        assert policy.reference
-        assert policy.parameters["seed"] == 3
-        assert not baselines.make("fixed_point", REGULAR).reference
-        other = baselines.make("fixed_point_extended", "varga7-random", seed=4, link=5)
-        observation = gym.make("RedundantIK-v0", scenario="varga7-random", preview=1).reset(seed=3)[0]
-        assert not identical(policy.predict(observation)[0], other.predict(observation)[0])
-
     def test_the_tool_in_its_place_is_not_enough(self):
         """The elbow on the other side: nothing is wrong with x, and yet nothing has converged."""
         scenario = ikgym.scenarios.get(REGULAR)
@@ -314,52 +269,48 @@ class TestExtended:
             longer = np.vstack([arm.jacobian(q)[:3], np.transpose(step)])
             assert np.linalg.norm(longer) ** 2 <= policy._jacobian_bound() + 1e-6
 
-    @pytest.mark.parametrize(
-        ("name", "change", "message"),
-        [
-            (REGULAR, {"link": 3}, "link: expected at most 2 for arm 'faitli3', got 3"),
-            (REGULAR, {"link": 0}, "link: expected a whole number of at least 1"),
-            (REGULAR, {"transformation": "none"}, "transformation: a longer x needs the transposed Jacobian"),
-            ("zhang3-helix", {}, "scenario 'zhang3-helix' is given in Cartesian space"),
-            ("varga7-random", {}, "a seed says which episode"),
-            ("varga7-random", {"seed": -1}, "seed: expected a whole number of at least 0"),
-        ],
+
+BENT = "planar2-bent"
+
+
+def test_the_sign_by_growth_changes_where_the_error_has_grown():
+    """With the wrong A the first step leads away, and from then on σ = -1; remembered from step to step."""
+    policy = baselines.make(
+        "fixed_point", BENT, transformation="sign_by_growth", a=-0.1, iterations=1, components=(0, 1)
     )
-    def test_bad_parameters(self, name, change, message):
-        with pytest.raises(InvalidInputError, match=message):
-            baselines.make("fixed_point_extended", name, **change)
+    wrong = baselines.make("fixed_point", BENT, transformation="none", a=-0.1, iterations=1, components=(0, 1))
+    observation, state, signs = away(np.array([1.2, 0.8]), name=BENT), None, []
+    for _ in range(4):
+        astray = stepped(wrong, observation)[0] - observation["q"]
+        q, state, _ = stepped(policy, observation, state)
+        signs.append(np.sign((q - observation["q"]) @ astray))
+        observation = {**observed(BENT, q), "nominal": observation["nominal"]}
+    assert signs == [1, -1, -1, -1]
+    assert identical(policy.predict(observation, state, np.array([True]))[0], policy.predict(observation)[0])
 
 
-@pytest.mark.parametrize(
-    ("change", "error", "message"),
-    [
-        ({"transformation": "transposed"}, UnknownNameError, "Did you mean 'transpose'"),
-        ({"family": "sigmoidal"}, UnknownNameError, "Did you mean 'sigmoid'"),
-        ({"slope": 1.0}, InvalidInputError, "slope: expected a number between -1 and 1 other than 0, got 1"),
-        ({"slope": 0.0}, InvalidInputError, "slope: expected a number between -1 and 1 other than 0, got 0"),
-        ({"slope": np.nan}, InvalidInputError, "slope: expected a finite number"),
-        ({"a": 0.0}, InvalidInputError, "a: expected a number other than 0"),
-        ({"a": "x"}, InvalidInputError, "a: expected a finite number"),
-        ({"d": np.inf}, InvalidInputError, "d: expected a finite number"),
-        ({"iterations": 0}, InvalidInputError, "iterations: expected a whole number of at least 1"),
-        ({"tolerance": -1.0}, InvalidInputError, "tolerance: expected a finite number of at least 0"),
-        ({"components": (0, 1, 2)}, InvalidInputError, "components: expected none with transformation 'transpose'"),
-        (
-            {"components": (0, 1), **NONE},
-            InvalidInputError,
-            r"components: expected 3 different numbers below 3.*\(0, 1\)",
-        ),
-        ({"components": (0, 1, 1), **NONE}, InvalidInputError, "components: expected 3 different numbers"),
-        ({"components": (0, 1, 3), **NONE}, InvalidInputError, "components: expected 3 different numbers below 3"),
-        ({"components": (0, 1, -1), **NONE}, InvalidInputError, "components: expected a whole number of at least 0"),
-        ({"components": 2, **NONE}, InvalidInputError, r"components: expected 3 different numbers.*got \(2,\)"),
-        (
-            {"components": "xyz", **NONE},
-            InvalidInputError,
-            "components: expected a whole number of at least 0, got 'x'",
-        ),
-    ],
-)
-def test_bad_parameters(change, error, message):
-    with pytest.raises(error, match=message):
-        baselines.make("fixed_point", REGULAR, **change)
+def largest_error(transformation, a, steps=3000):
+    scenario = ikgym.scenarios.get(BENT).replace(steps=steps)
+    policy = baselines.make(
+        "fixed_point", scenario, transformation=transformation, a=a, iterations=1, components=(0, 1)
+    )
+    return baselines.track(scenario, policy).position_error[scenario.counted()[1:]].max()
+
+
+def test_the_sign_works_for_two_joints():
+    """Where both eigenvalues keep one sign: without a Jacobian, and by growth whatever the sign of A."""
+    assert largest_error("sign", 1.0) < 1e-3
+    assert largest_error("sign", -1.0, 1000) > 0.1
+    for a in (1.0, -1.0):
+        assert largest_error("sign_by_growth", a) < 5e-3
+
+
+def test_components_choose_what_corrects_a_joint():
+    observation = away(np.array([1.2, 0.8]), name=BENT)
+    error = ikgym.arms.get("planar2").forward(observation["q"])[1] - observation["nominal"][0]
+    for components in ((0, 1), (1, 0)):
+        q, _, _ = stepped(
+            baselines.make("fixed_point", BENT, transformation="none", a=0.4, iterations=1, components=components),
+            observation,
+        )
+        np.testing.assert_allclose(q - observation["q"], 0.2 * error[list(components)], rtol=1e-6)

@@ -9,7 +9,6 @@ import baselines
 import ikgym
 from baselines.solvers.levenberg_marquardt.damping_parameters import typical_link
 from baselines.solvers.levenberg_marquardt.damping_rules import RULES, condition_number, damping_next, damping_now
-from ikgym.exceptions import InvalidInputError, UnknownNameError
 
 
 def law(rule, **numbers):
@@ -111,29 +110,3 @@ def test_condition_number(name):
         scratch = np.empty((max(e, n), min(e, n))), np.empty((min(e, n), min(e, n)))
         assert condition_number(jacobian, rank, scratch) == pytest.approx(sigma[0] / sigma[rank - 1], rel=1e-9)
     assert condition_number(np.zeros((3, 4)), 3, (np.empty((4, 3)), np.empty((3, 3)))) == np.inf
-
-
-@pytest.mark.parametrize(
-    ("numbers", "error", "message"),
-    [
-        ({"rule": "sugihra"}, UnknownNameError, r"no damping rule 'sugihra'\. Did you mean 'sugihara'"),
-        ({"rule": "constant", "growth": 2.0}, InvalidInputError, r"growth: .* rule 'constant' has only damping; got 2"),
-        ({"rule": "chan", "damping": 2.0}, InvalidInputError, "damping: .* rule 'chan' has only weight"),
-        ({"rule": "constant", "damping": -1.0}, InvalidInputError, "damping: expected a finite number of at least 0"),
-        ({"rule": "error_ratio", "growth": 0.5}, InvalidInputError, "growth: expected a finite number of at least 1"),
-        ({"rule": "error_ratio", "decay": 0.5}, InvalidInputError, "decay: expected a finite number of at least 1"),
-        ({"rule": "threshold", "threshold": 0.0}, InvalidInputError, "threshold: expected a finite number above 0"),
-        ({"rule": "threshold", "carry": 1}, InvalidInputError, "carry: expected True or False, got 1"),
-        ({"rule": "chan", "weight": 0.0}, InvalidInputError, "weight: expected a finite number above 0"),
-        ({"rule": "condition", "condition_bounds": (2, 1)}, InvalidInputError, "condition_bounds: expected ascending"),
-        ({"rule": "table", "error_bounds": (0.0, 1)}, InvalidInputError, "error_bounds: expected ascending .* above 0"),
-        ({"rule": "condition", "dampings": (-1, 1)}, InvalidInputError, "dampings: expected rows of numbers of at"),
-        ({"rule": "condition", "dampings": (0, 1)}, InvalidInputError, "dampings: expected 1 x 4 numbers.* got 1 x 2"),
-        ({"rule": "table", "dampings": (0, 1)}, InvalidInputError, "dampings: expected 3 x 3 numbers.* got 1 x 2"),
-        ({"rule": "condition", "dampings": "x"}, InvalidInputError, "dampings: expected an array of real numbers"),
-    ],
-)
-@pytest.mark.parametrize("name", ["mfac", "mfapc"])
-def test_bad_numbers(name, numbers, error, message):
-    with pytest.raises(error, match=message):
-        baselines.make(name, "varga7-fast", **numbers)

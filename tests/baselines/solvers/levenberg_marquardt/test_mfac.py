@@ -10,7 +10,6 @@ import baselines
 import ikgym
 from baselines.policy import Batch
 from baselines.status import Status
-from ikgym.exceptions import InvalidInputError
 
 NAMES = ["varga7-fast", "zhang3-helix", "zhang6-lspb", "faitli3-regular", "khan8-q1"]
 RULES = {
@@ -224,17 +223,3 @@ def test_carried_lambda_goes_on_and_a_new_episode_forgets_it(carry):
         dampings.append(state[2][0])
     wanted = [1.02**-1, 1.02**-2, 1.02**-3, 1.02**-1] if carry else [1.02**-1] * 4
     assert dampings == pytest.approx(wanted, rel=1e-14)
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"tolerance": -1.0}, "tolerance: expected a finite number of at least 0"),
-        ({"iterations": 0}, "iterations: expected a whole number of at least 1"),
-        ({"one_step": "yes"}, "one_step: expected True or False, got 'yes'"),
-    ],
-)
-@pytest.mark.parametrize("name", ["mfac", "mfapc"])
-def test_bad_parameters(name, change, message):
-    with pytest.raises(InvalidInputError, match=message):
-        baselines.make(name, "varga7-fast", **change)

@@ -45,11 +45,6 @@ def test_joints_without_limits_go_on_instead_of_jumping():
     np.testing.assert_allclose(turns, np.rint(turns), atol=1e-12)
 
 
-def test_it_is_a_reference_and_no_part_of_all_policies():
-    assert registry.get("published").reference
-    assert "published" not in baselines.names()
-
-
 @pytest.mark.parametrize(
     ("make", "error", "message"),
     [

@@ -8,7 +8,6 @@ import pytest
 import baselines
 import ikgym
 from baselines.episodes import Seeds, rollout
-from baselines.evaluation.report import is_reference
 from ikgym import Plant
 from ikgym.exceptions import InvalidInputError
 
@@ -64,13 +63,6 @@ def test_episodes_of_other_delays_are_shown_the_same():
     drawn = {scenario.drawn_plant(SEED + k).command_delay for k in range(4)}
     assert shown == {9 + 12}
     assert len(drawn) > 1
-
-
-def test_it_is_a_reference_and_none_of_all():
-    assert is_reference("told")
-    assert "told" not in baselines.names()
-    with pytest.raises(InvalidInputError, match="got the reference 'told'"):
-        baselines.make("smoothed", PLAIN, policy="told")
 
 
 @pytest.mark.parametrize(

@@ -10,9 +10,7 @@ import pytest
 import baselines
 import ikgym
 from baselines.policy import Problem
-from ikgym.exceptions import InvalidInputError, UnknownNameError
-from tests.baselines.solvers.resolved_rate.inverting import invert, move, objective_gradient
-from tests.baselines.solvers.resolved_rate.test_base import jacobians
+from tests.baselines.solvers.resolved_rate.test_formulas import invert, jacobians, move, objective_gradient
 
 AIMS = [{"objective": "posture", "posture": 0.7}, {"objective": "manipulability"}]
 
@@ -25,7 +23,7 @@ def with_limits(scenario):
 
 @pytest.mark.parametrize("damping", [0.0, 1e-3])
 @pytest.mark.parametrize("aim", [*AIMS, {"objective": "joint_centring"}], ids=lambda aim: aim["objective"])
-@pytest.mark.parametrize("name", ikgym.scenarios.names("papers"))
+@pytest.mark.parametrize("name", ["varga7-fast", "khan8-q7q8", "zhang6-lspb", "faitli3-regular"])
 def test_changes_no_task_velocity(name, aim, damping):
     scenario = with_limits(ikgym.scenarios.get(name))
     gain = 1.0 / scenario.dt
@@ -144,23 +142,3 @@ def test_by_default_joints_with_limits_are_centred_and_others_go_to_0():
         new, wanted = (baselines.make("null_space", scenario, **given) for given in (parameters, old))
         assert new.parameters == wanted.parameters
         np.testing.assert_array_equal(objective_gradient(new, q), objective_gradient(wanted, q))
-
-
-@pytest.mark.parametrize(
-    ("change", "error", "message"),
-    [
-        ({"objective": "posure"}, UnknownNameError, r"no objective 'posure'\. Did you mean 'posture'\?"),
-        ({"objective": "joint_centring"}, InvalidInputError, "expected an arm with joint limits, 'varga7' has none"),
-        ({"secondary_gain": -1.0}, InvalidInputError, "secondary_gain: expected a finite number of at least 0"),
-        (
-            {"secondary_gain": 2000.0},
-            InvalidInputError,
-            "secondary_gain: expected a number below 2/Δt = 2000, got 2000",
-        ),
-        ({"posture": (1.0, 2.0)}, InvalidInputError, r"posture: expected shape \(7,\), got \(2,\)"),
-        ({"damping": -1e-3}, InvalidInputError, "damping: expected a finite number of at least 0"),
-    ],
-)
-def test_bad_parameters(change, error, message):
-    with pytest.raises(error, match=message):
-        baselines.make("null_space", "varga7-fast", **change)

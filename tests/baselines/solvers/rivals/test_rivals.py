@@ -12,27 +12,19 @@ import baselines
 import ikgym
 from baselines.evaluate import evaluate
 from baselines.registry import get
-from baselines.solvers.rivals.base import Rival, turned
-from baselines.solvers.rivals.task_program import TaskProgram
+from baselines.solvers.rivals.base import turned
 from baselines.status import Status
-from ikgym.exceptions import InvalidInputError, MissingDependencyError, UnknownNameError
+from ikgym.exceptions import InvalidInputError, MissingDependencyError
 from ikgym.kernels.rotations import rodrigues
-from tests.baselines.making import circle, made, usual
+from tests.baselines.making import circle, made
 
 RIVALS = [name for name in baselines.names() if get(name).rival]
 every_rival = pytest.mark.parametrize("name", RIVALS)
-#: Those that keep limits of velocity.
-LIMITED = ["pink", "mink"]
 
 
 def observation(scenario, policy, q=None):
     env = ikgym.RedundantIKEnv(scenario, preview=policy.preview)
     return env.reset(seed=0, options=None if q is None else {"q": q})[0]
-
-
-def test_rivals_are_those_of_the_extra():
-    assert RIVALS == ["pink", "mink"]
-    assert all(issubclass(get(name), Rival) for name in RIVALS)
 
 
 @every_rival
@@ -50,7 +42,7 @@ def test_a_gentle_path_is_tracked_to_rounding(name, task):
     assert row.steps_at_joint_limit == row.steps_at_velocity_limit == row.steps_at_acceleration_limit == 0
 
 
-@pytest.mark.parametrize("name", ["pink", "mink"])
+@every_rival
 def test_programs_wait_for_a_slow_joint_and_the_pseudoinverse_does_not(name):
     """TIAGo's torso is slow: who knows of it lets the arm do the work."""
     scenario = circle("tiago", dt=4e-3)
@@ -62,7 +54,7 @@ def test_programs_wait_for_a_slow_joint_and_the_pseudoinverse_does_not(name):
     assert inverse.status == "saturated"
 
 
-@pytest.mark.parametrize("name", LIMITED)
+@every_rival
 def test_limits_of_velocity_are_the_smaller_of_the_arms_and_the_actions(name):
     scenario = circle(speed=2.0).replace(velocity_limit=0.1)
     policy = made(name, scenario)
@@ -72,7 +64,7 @@ def test_limits_of_velocity_are_the_smaller_of_the_arms_and_the_actions(name):
     assert row.position_error_max > 1e-3
 
 
-@pytest.mark.parametrize("name", LIMITED)
+@every_rival
 def test_stops_are_kept(name):
     """No joint may turn by more than 0.03 rad, which is not enough for the circle."""
     home = ikgym.arms.get("panda").home
@@ -149,30 +141,6 @@ def test_names_and_classes_are_to_be_had_without_the_packages(monkeypatch):
         importlib.reload(importlib.import_module(get(name).__module__))
 
 
-@pytest.mark.parametrize("name", [name for name in RIVALS if issubclass(get(name), TaskProgram)])
-@pytest.mark.parametrize(
-    ("parameters", "message"),
-    [
-        ({"gain": 0.0}, "gain: expected a finite number above 0"),
-        ({"gain": 1.5}, "gain: expected at most 1, got 1.5"),
-        ({"limit_gain": 2.0}, "limit_gain: expected at most 1, got 2"),
-        ({"posture_rate": 1e4}, r"posture_rate · Δt: expected at most 1, got 20"),
-        ({"damping": -1.0}, "damping: expected a finite number"),
-    ],
-)
-def test_bad_parameters(name, parameters, message):
-    made(name, circle())
-    with pytest.raises(InvalidInputError, match=message):
-        baselines.make(name, circle(), **parameters)
-
-
-@pytest.mark.parametrize("name", [name for name in RIVALS if issubclass(get(name), TaskProgram)])
-def test_an_unknown_program_solver(name):
-    made(name, circle())
-    with pytest.raises(UnknownNameError, match=r"no solver of quadratic programs 'dapq'\. Did you mean 'daqp'\?"):
-        baselines.make(name, circle(), solver="dapq")
-
-
 def test_two_threads_do_not_share_objects(monkeypatch):
     """Of the packages: what they hold changes at each call."""
     import threading
@@ -199,8 +167,3 @@ def test_turned_by_the_shortest_way():
         np.testing.assert_allclose(found[:, 2], axis, atol=1e-14)
         np.testing.assert_allclose(found @ found.T, np.eye(3), atol=1e-14)
         assert np.trace(found @ rotation.T) == pytest.approx(1.0 + 2.0 * np.cos(angle), abs=1e-14)
-
-
-@every_rival
-def test_usual_scenarios_suit(name):
-    made(name, usual(name))

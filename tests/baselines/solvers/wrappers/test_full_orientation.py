@@ -8,10 +8,8 @@ import pytest
 import baselines
 from baselines.episodes import rollout, rollouts
 from baselines.policy import Batch, Problem
-from baselines.solvers.wrappers import orientation
-from baselines.solvers.wrappers.orientation import resolve_one
+from baselines.solvers.wrappers.full_orientation import resolve_one, resolve_orientation, start_memory
 from ikgym import scenarios, tasks
-from ikgym.exceptions import InvalidInputError, UnknownNameError
 from ikgym.kernels.rotations import rodrigues
 from tests.baselines.random_agents import write_agent
 
@@ -48,11 +46,11 @@ def test_nominal_orientations_are_followed_through_90_degrees():
     frames = np.stack([with_poses(scenario).nominal(seed, ahead) for seed in seeds])
     skews = np.stack([scenario.nominal(seed, ahead) for seed in seeds])
     q = np.stack([scenario.nominal_joint_path(seed)[0] for seed in seeds])
-    kept = orientation.start_memory(len(seeds))
+    kept = start_memory(len(seeds))
     for k in range(scenario.steps):
         shown = np.ascontiguousarray(skews[:, k + 1 : k + 1 + ahead])
         batch = Batch(q, 0.0 * q, skews[:, 0], shown, np.full((len(seeds), 1), 9.0))
-        seen, kept = orientation.resolve_orientation(problem, batch, kept)
+        seen, kept = resolve_orientation(problem, batch, kept)
         # At 90° itself the cosine is the root of what rounding leaves.
         np.testing.assert_allclose(seen.nominal, frames[:, k + 1 : k + 1 + ahead], atol=1e-3, err_msg=f"step {k}")
         np.testing.assert_allclose(seen.pose, frames[:, 0], atol=1e-7)
@@ -84,27 +82,3 @@ def test_batches_of_agents_that_know_whole_poses_are_single_calls(tmp_path):
     policy, seeds = baselines.make("agent", scenario, path=file), scenarios.seeds("train", 3)
     for seed, together in zip(seeds, rollouts(scenario, policy, seeds), strict=True):
         np.testing.assert_array_equal(rollout(scenario, policy, seed).q, together.q)
-
-
-@pytest.mark.parametrize("name", ["khan8-q1", "faitli3-regular", "zhang6-lspb"])
-def test_other_tasks_are_refused(name):
-    with pytest.raises(InvalidInputError, match="expected the task 'skew'"):
-        baselines.make("full_orientation", name)
-
-
-@pytest.mark.parametrize(
-    ("parameters", "message"),
-    [
-        ({"policy": "oracle"}, "the reference 'oracle'"),
-        ({"policy": "smoothed"}, "made from others 'smoothed'"),
-        ({"options": 3}, "parameters of dls by name"),
-    ],
-)
-def test_what_cannot_be_inside(parameters, message):
-    with pytest.raises(InvalidInputError, match=message):
-        baselines.make("full_orientation", "varga7-fast", **parameters)
-
-
-def test_parameters_of_the_inner_policy_are_checked():
-    with pytest.raises(UnknownNameError, match="damping"):
-        baselines.make("full_orientation", "varga7-fast", options={"dampin": 1.0})

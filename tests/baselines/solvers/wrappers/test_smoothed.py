@@ -12,7 +12,7 @@ import baselines
 import ikgym
 from baselines.episodes import rollout
 from baselines.status import Status
-from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.exceptions import InvalidInputError
 
 STEPS = 200
 
@@ -175,23 +175,6 @@ def test_a_saturated_velocity_is_remembered_as_it_was_sent():
         observation, *_ = env.step(action)
 
 
-def test_the_status_is_that_of_the_inner_policy():
-    scenario = short()
-    observation, _ = gym.make("RedundantIK-v0", preview=4).reset()
-    for feedback in ("calculated", "measured"):
-        policy = smoothed(scenario, policy="moore_penrose", feedback=feedback)
-        _, state = policy.predict(observation)
-        assert policy.report(state).status[0] == Status.RANK_DEFICIENT
-
-
-def test_shows_what_the_inner_policy_shows():
-    scenario = short()
-    alone, episode = (rollout(scenario, baselines.make(n, scenario), 0) for n in ("rhc_gradient", "smoothed"))
-    assert alone.diagnostics.keys() == episode.diagnostics.keys()
-    for name, values in alone.diagnostics.items():
-        np.testing.assert_array_equal(episode.diagnostics[name], values)
-
-
 def test_options_reach_the_inner_policy():
     policy = smoothed("varga7-fast", options={"horizon": 6})
     assert policy.inner.horizon == 6
@@ -201,30 +184,6 @@ def test_options_reach_the_inner_policy():
     assert twice.inner.inner.name == "dls"
     changed = policy.replace(policy="dls", options={"damping": 0.5})
     assert changed.inner.damping == 0.5
-
-
-def test_options_are_copied():
-    options = {"damping": 0.5}
-    policy = smoothed("varga7-fast", policy="dls", options=options)
-    options["damping"] = 1.0
-    assert policy.options["damping"] == 0.5
-
-
-@pytest.mark.parametrize(
-    ("change", "error", "message"),
-    [
-        ({"policy": "rhc_gradent"}, UnknownNameError, "Did you mean 'rhc_gradient'"),
-        ({"policy": "follow_nominal"}, InvalidInputError, "got the reference 'follow_nominal'"),
-        ({"options": {"horizn": 4}}, UnknownNameError, "no parameter of rhc_gradient 'horizn'"),
-        ({"options": {"horizon": 1}}, InvalidInputError, "horizon: expected"),
-        ({"options": 5}, InvalidInputError, "options: expected the parameters of rhc_gradient by name, got 5"),
-        ({"relaxation": 0.0}, InvalidInputError, "relaxation: expected a finite number above 0"),
-        ({"feedback": "mesured"}, UnknownNameError, "Did you mean 'measured'"),
-    ],
-)
-def test_bad_parameters(change, error, message):
-    with pytest.raises(error, match=message):
-        smoothed("varga7-fast", **change)
 
 
 def test_a_disturbed_arm_is_smoothed_from_where_it_is():
