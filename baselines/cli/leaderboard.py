@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 
 import tyro
 
-from baselines import command as shared
+from baselines.cli import shell
 from baselines.evaluation import table
 from baselines.evaluation.results import Rows, slug
 from baselines.evaluation.run import evaluate
@@ -100,14 +100,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         The exit code: 0, 2 after an expected error, 130 after Ctrl-C.
     """
-    return shared.run_resumable(Options, arguments, "ikgym leaderboard", manual, _work)
+    return shell.run_resumable(Options, arguments, "ikgym leaderboard", manual, _work)
 
 
 def _work(options: Options, command: str) -> None:
     del command
     if options.test_sets and options.scenarios:
         raise InvalidInputError("expected --test-sets or --scenarios; got both.")
-    shared.find_own_modules()
+    shell.find_own_modules()
     sets = options.test_sets or (() if options.scenarios else (MAIN,))
     rows = evaluate(
         options.scenarios,

@@ -11,7 +11,7 @@ from typing import Annotated
 import tyro
 from tqdm import tqdm
 
-from baselines import command as shared
+from baselines.cli import shell
 from baselines.episodes import Seeds
 from baselines.evaluation import table
 from baselines.evaluation.metrics import Row
@@ -119,7 +119,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         The exit code: 0, 2 after an expected error, 130 after Ctrl-C.
     """
-    return shared.run_resumable(Options, arguments, "ikgym robustness", manual, _work)
+    return shell.run_resumable(Options, arguments, "ikgym robustness", manual, _work)
 
 
 def _work(options: Options, command: str) -> None:
