@@ -15,7 +15,7 @@ import tyro
 from baselines import registry
 from baselines.cli import shell
 from baselines.evaluation import report, test_sets
-from baselines.evaluation.options import Options
+from baselines.evaluation.jobs import Options
 from baselines.evaluation.results import PAGE
 from baselines.evaluation.run import carry_out
 from ikgym import scenarios

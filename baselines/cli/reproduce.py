@@ -18,7 +18,7 @@ import tyro
 
 from baselines.canonical import jsonable
 from baselines.cli import shell
-from baselines.evaluation.machine import describe
+from baselines.evaluation.metrics import describe
 from baselines.evaluation.plots.style import png
 from baselines.files import locked, write
 from baselines.papers import PAPERS, get, ledger

@@ -8,7 +8,7 @@ import pytest
 import baselines
 import ikgym
 from baselines.episodes import Seeds, rollout
-from baselines.evaluation.report import is_reference
+from baselines.evaluation.summary import is_reference
 from ikgym import Plant
 from ikgym.exceptions import InvalidInputError
 
