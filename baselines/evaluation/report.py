@@ -136,7 +136,7 @@ def readme(
     out += ["## Parameters", "", *parameters, "", "## Conditions", "", f"- command: `{command}`"]
     out += [f"- finished: {date:%Y-%m-%d %H:%M} UTC", *(f"- {escaped(one)}" for one in machines(rows))]
     out.append(
-        "- Times are those of single calls on one thread, after one call that does not count, without garbage collection."
+        "- Times are those of single calls on one thread, without the first call and without garbage collection."
     )
     return "\n".join(out) + "\n"
 
