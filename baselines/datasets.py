@@ -19,9 +19,8 @@ from minari.dataset.minari_storage import MinariStorage
 from tqdm import tqdm
 
 from baselines.episodes import add_up
-from baselines.evaluation.jobs import Job, plan
-from baselines.evaluation.machine import describe
-from baselines.evaluation.options import Options
+from baselines.evaluation.jobs import Job, Options, plan
+from baselines.evaluation.metrics import describe
 from baselines.evaluation.policies import AnyPolicy
 from baselines.files import ResultsError, locked, resumed, write_json
 from baselines.fingerprints import fingerprint

@@ -7,11 +7,11 @@ import pathlib
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from baselines.evaluation.machine import describe
+from baselines.evaluation.metrics import describe
 from baselines.files import write
 from benchmarks.table import Table
 
-#: Libraries whose versions are stated, besides those of :func:`baselines.evaluation.machine.describe`.
+#: Libraries whose versions are stated, besides those of :func:`baselines.evaluation.metrics.describe`.
 LIBRARIES = ("gymnasium", "mujoco", "envpool", "pin", "casadi", "crocoddyl", "stable-baselines3", "torch")
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 
-from baselines.evaluation.report import number
+from baselines.evaluation.table import number
 
 
 @dataclasses.dataclass(frozen=True)

@@ -18,9 +18,9 @@ import baselines
 import ikgym
 from baselines.cli.listing import kinds_of_limits, summary
 from baselines.evaluation import test_sets as sets
-from baselines.evaluation.report import NOTHING
-from baselines.evaluation.table import from_csv
-from baselines.evaluation.table import markdown as results_table
+from baselines.evaluation.records import from_csv
+from baselines.evaluation.records import markdown as results_table
+from baselines.evaluation.table import NOTHING
 from baselines.oracle import best_known
 from baselines.oracle.best_known import MARGIN
 from baselines.registry import get

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import tyro
 
-from baselines import command
+from baselines.cli import shell
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -59,13 +59,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         The exit code: 0, 2 after an expected error, 130 after Ctrl-C.
     """
     program = "ikgym dataset"
-    return command.run_resumable(Options, arguments, program, manual, _work)
+    return shell.run_resumable(Options, arguments, program, manual, _work)
 
 
 def _work(options: Options, _: str) -> None:
     from baselines import datasets  # imports Minari, an extra
 
-    command.find_own_modules()
+    shell.find_own_modules()
     datasets.write(**{field.name: getattr(options, field.name) for field in dataclasses.fields(options)}, progress=True)
     folder = options.out.resolve()
     print(f'{options.out}: MINARI_DATASETS_PATH={options.out.parent}, minari.load_dataset("{folder.name}")')

@@ -12,9 +12,10 @@ from typing import Annotated
 
 import tyro
 
-from baselines import command, registry
+from baselines import registry
+from baselines.cli import shell
 from baselines.evaluation import report, test_sets
-from baselines.evaluation.options import Options
+from baselines.evaluation.jobs import Options
 from baselines.evaluation.results import PAGE
 from baselines.evaluation.run import carry_out
 from ikgym import scenarios
@@ -115,28 +116,28 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     def work() -> int:
         nonlocal out
-        given = command.parse(Arguments, arguments, prog=_program(), description=manual())
+        given = shell.parse(Arguments, arguments, prog=_program(), description=manual())
         options = dataclasses.replace(given.options, progress=True)
         out = options.out
-        command.find_own_modules()
+        shell.find_own_modules()
         carry_out(
             given.scenarios or (() if options.test_sets else ("varga7-fast",)),
             given.policies,
             options,
             command=shlex.join([*_program().split(), *arguments]),
-            show=lambda rows: print(report.table(rows, rows.skipped, width=command.width()), flush=True),
+            show=lambda rows: print(report.table(rows, rows.skipped, width=shell.width()), flush=True),
         )
         if out is not None:
             print(f"\nwritten to {out}" + (f"; open {out / PAGE} in a browser" if options.report else ""))
         return 0
 
-    return command.run(
+    return shell.run(
         work, lambda: "Stopped." if out is None else f"Stopped. Finished episodes are in {out}; continue with --resume."
     )
 
 
 def _program() -> str:
-    return command.program("evaluate", "python -m baselines.evaluate")
+    return shell.program("evaluate", "python -m baselines.evaluate")
 
 
 def _listing(title: str, names: Iterable[str]) -> str:

@@ -9,8 +9,8 @@ from typing import Annotated, Literal
 
 import tyro
 
-from baselines import command as shared
-from baselines.evaluation import table
+from baselines.cli import shell
+from baselines.evaluation import records
 from baselines.evaluation.results import Rows, slug
 from baselines.evaluation.run import evaluate
 from baselines.files import write
@@ -76,18 +76,18 @@ def compare(rows: Rows, policies: Sequence[str], out: pathlib.Path) -> str:
     Raises:
         ResultsError: The folder cannot be written.
     """
-    from baselines.evaluation import table_plots
+    from baselines.evaluation.plots import comparison
     from baselines.evaluation.plots.style import png
 
-    lines = table.records(rows, policies)
-    text = table.markdown(lines)
-    write(out / "table.csv", table.to_csv(lines).encode())
+    lines = records.records(rows, policies)
+    text = records.markdown(lines)
+    write(out / "table.csv", records.to_csv(lines).encode())
     write(out / "table.md", f"{text}\n".encode())
     for scenario in dict.fromkeys(line["scenario"] for line in lines):
         here = [line for line in lines if line["scenario"] == scenario]
-        write(out / f"cost-time-{slug(scenario)}.png", png(table_plots.cost_time(here, scenario)))
+        write(out / f"cost-time-{slug(scenario)}.png", png(comparison.cost_time(here, scenario)))
     by_name = [{**line, "name": line["policy"].partition(":")[0]} for line in lines]
-    write(out / "foresight.png", png(table_plots.foresight(by_name, "Cost against foresight", "name")))
+    write(out / "foresight.png", png(comparison.foresight(by_name, "Cost against foresight", "name")))
     return text
 
 
@@ -100,14 +100,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         The exit code: 0, 2 after an expected error, 130 after Ctrl-C.
     """
-    return shared.run_resumable(Options, arguments, "ikgym leaderboard", manual, _work)
+    return shell.run_resumable(Options, arguments, "ikgym leaderboard", manual, _work)
 
 
 def _work(options: Options, command: str) -> None:
     del command
     if options.test_sets and options.scenarios:
         raise InvalidInputError("expected --test-sets or --scenarios; got both.")
-    shared.find_own_modules()
+    shell.find_own_modules()
     sets = options.test_sets or (() if options.scenarios else (MAIN,))
     rows = evaluate(
         options.scenarios,

@@ -12,7 +12,8 @@ from typing import Annotated
 import numpy as np
 import tyro
 
-from baselines import command, registry
+from baselines import registry
+from baselines.cli import shell
 from ikgym import arms, scenarios
 from ikgym.arms import Arm
 from ikgym.exceptions import UnknownNameError
@@ -61,9 +62,9 @@ def main(word: str, catalogue: Catalogue, arguments: Sequence[str]) -> int:
         catalogue: The catalogue.
         arguments: Names, or options.
     """
-    prog = f"{command.CONSOLE} {word}"
-    options = command.parse(Names, arguments, prog=prog, description=f"Lists the {word}, or shows some in full.")
-    print(shown(catalogue, options.names, command.width()))
+    prog = f"{shell.CONSOLE} {word}"
+    options = shell.parse(Names, arguments, prog=prog, description=f"Lists the {word}, or shows some in full.")
+    print(shown(catalogue, options.names, shell.width()))
     return 0
 
 

@@ -12,7 +12,7 @@ import numpy as np
 import tyro
 from tqdm import tqdm
 
-from baselines import command
+from baselines.cli import shell
 from baselines.episodes import Seeds
 from baselines.evaluation import test_sets as known_sets
 from baselines.oracle import best_known
@@ -205,12 +205,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         Ctrl-C.
     """
     given = sys.argv[1:] if arguments is None else list(arguments)
-    return command.run(lambda: _carry_out(given), lambda: "Stopped; what was found is kept.")
+    return shell.run(lambda: _carry_out(given), lambda: "Stopped; what was found is kept.")
 
 
 def _carry_out(arguments: Sequence[str]) -> int:
     # The numbers of a search are checked as soon as they are read.
-    options = command.parse(Options, arguments, prog="ikgym oracle", description=manual())
+    options = shell.parse(Options, arguments, prog="ikgym oracle", description=manual())
     kept, wrong = 0, 0
     todo = episodes(options.scenarios, options.test_sets, options.seeds)
     workers = Workers(cluster=options.cluster)

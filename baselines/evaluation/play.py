@@ -21,8 +21,7 @@ from baselines.canonical import canonical, jsonable
 from baselines.episodes import Episode, Policy, Seeds, Tick, rollouts, sequences
 from baselines.evaluation.foreign import ForeignPolicy, play_wrapped
 from baselines.evaluation.jobs import Job
-from baselines.evaluation.machine import describe
-from baselines.evaluation.metrics import Row, measure
+from baselines.evaluation.metrics import Row, describe, measure
 from baselines.evaluation.policies import check_picklable
 from baselines.fingerprints import fingerprint
 from baselines.oracle import best_known

@@ -8,9 +8,8 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 from baselines.evaluation import report
-from baselines.evaluation.jobs import plan
-from baselines.evaluation.machine import describe
-from baselines.evaluation.options import Options
+from baselines.evaluation.jobs import Options, plan
+from baselines.evaluation.metrics import describe
 from baselines.evaluation.play import run
 from baselines.evaluation.policies import ALL, AnyPolicy
 from baselines.evaluation.results import PAGE, Results, Rows
@@ -40,7 +39,7 @@ def evaluate(
             function that requires an argument receives the scenario. A policy that is no
             :class:`baselines.SolverPolicy` is called for one arm at a time, and once more before the first step, which
             does not count.
-        **options: Fields of :class:`baselines.evaluation.options.Options`: test_sets, episodes, split, steps, preview,
+        **options: Fields of :class:`baselines.evaluation.jobs.Options`: test_sets, episodes, split, steps, preview,
             wrap, timed, workers, cluster, out, resume, overwrite, plots, report, export, noise_seeds, pairs, progress.
             More than one of `workers` needs a main module that may be imported, that is with
             ``if __name__ == "__main__":``.

@@ -31,7 +31,7 @@ from torch.utils.tensorboard import SummaryWriter
 
 import ikgym
 from baselines.agents.files import save_agent
-from baselines.evaluation.machine import describe
+from baselines.evaluation.metrics import describe
 from baselines.files import locked, write_json
 from baselines.fingerprints import fingerprint
 from baselines.training import checkpoint

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from baselines.evaluation.trajectory_log import FRAMES, TrajectoryLog, frame_rows
+from baselines.evaluation.export import FRAMES, TrajectoryLog, frame_rows
 from ikgym.validation import FloatArray
 
 #: Bytes that the series of a page may take together, as far as each of them has :data:`FEWEST` rows.
@@ -24,7 +24,7 @@ def thinned(log: TrajectoryLog, size: int) -> dict[str, Any]:
     """A log at some of its steps, such that no peak is lost: between two of them, the worst is shown.
 
     Args:
-        log: See :func:`baselines.evaluation.trajectory_log.trajectory_log`.
+        log: See :func:`baselines.evaluation.export.trajectory_log`.
         size: Bytes that it may take as text.
 
     Returns:

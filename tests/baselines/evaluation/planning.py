@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
-from baselines.evaluation.jobs import plan
-from baselines.evaluation.options import Options
+from baselines.evaluation.jobs import Options, plan
 
 
 def planned(scenarios, policies, **options):

@@ -17,9 +17,8 @@ from baselines.evaluate import evaluate
 from baselines.evaluation import results as results_module
 from baselines.evaluation import run as module
 from baselines.evaluation import test_sets
-from baselines.evaluation.machine import describe
-from baselines.evaluation.metrics import TIME_COLUMNS, Row
-from baselines.evaluation.options import Options
+from baselines.evaluation.jobs import Options
+from baselines.evaluation.metrics import TIME_COLUMNS, Row, describe
 from baselines.evaluation.play import MOST, batches, play
 from baselines.evaluation.results import COLUMNS, Results, read_rows
 from baselines.files import ResultsError, write

@@ -9,11 +9,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import baselines
 import ikgym
-from baselines.canonical import jsonable
 from baselines.episodes import Episode, Seeds, rollout
 from baselines.evaluate import evaluate
 from baselines.evaluation.metrics import TIME_COLUMNS, Row, lost, measure
-from baselines.evaluation.summary import Spread, geometric_mean, summarise
+from baselines.evaluation.summary import Spread, summarise
 from baselines.files import from_json
 from baselines.status import Status
 from ikgym.exceptions import InvalidInputError
@@ -65,7 +64,6 @@ def position_scenario(steps=4, **changes):
     ("name", "steps", "seed", "policy"),
     [
         ("varga7-fast", 120, 0, "dls"),
-        ("varga7-fast", 40, 0, "rhc_gradient"),
         ("varga7-random", 60, 2_000_001, "moore_penrose"),
         ("zhang3-helix", 60, 0, "dls"),
         ("khan8-q7q8", 150, 0, "dls"),
@@ -187,7 +185,7 @@ def test_garbage_collection_is_as_before_even_after_an_error():
     assert gc.isenabled()
 
 
-@pytest.mark.parametrize("steps", [1, 99, 100, 250])
+@pytest.mark.parametrize("steps", [1, 100, 250])
 def test_ticks_add_up_to_the_steps(steps):
     which = scenario(steps=steps)
     ticks = []
@@ -297,10 +295,6 @@ def test_costs_are_added_up_from_left_to_right():
     assert row.total_cost == total
 
 
-def test_one_step_has_no_variation():
-    assert row_of(position_scenario(1), handmade(1, qdot=[[1.0, 2.0]])).qdot_total_variation == 0.0
-
-
 def test_the_first_call_is_stated_apart():
     row = row_of(position_scenario(), handmade(time_ns=[5_000_000_000, 1_000, 3_000, 2_000]))  # Δt is 1 s
     assert (row.time_first_us, row.time_p50_us, row.deadline_misses) == (5e6, 2.0, 0)
@@ -313,10 +307,9 @@ def test_what_was_not_timed_has_no_times():
     assert [getattr(row, name) for name in TIME_COLUMNS] == [None] * 4
     assert restored(json.loads(json.dumps(row.to_json()))) == row
     timed = dataclasses.replace(row_of(position_scenario(), handmade()), seed=1)
-    (both,) = summarise([row, timed])
-    assert [getattr(both, name) for name in TIME_COLUMNS] == [getattr(timed, name) for name in TIME_COLUMNS]
-    (neither,) = summarise([row])
-    assert [getattr(neither, name) for name in TIME_COLUMNS] == [None] * 4
+    (both,), (neither,) = summarise([row, timed]), summarise([row])
+    assert [both.largest(name) for name in TIME_COLUMNS] == [getattr(timed, name) for name in TIME_COLUMNS]
+    assert [neither.largest(name) for name in TIME_COLUMNS] == [None] * 4
 
 
 def test_cost_ratio_is_against_the_best_known_cost():
@@ -341,31 +334,6 @@ def test_numbers_that_are_not_finite_become_null():
     assert math.isnan(restored(there).total_cost)
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        (lambda there: {**there, "colour": 1}, "the key 'colour' is unknown"),
-        (lambda there: {key: there[key] for key in there if key != "qdot_peak"}, "the key 'qdot_peak' is missing"),
-        (lambda there: [], "expected an object with the keys of a Row, got list"),
-    ],
-)
-def test_rows_of_another_form_are_refused(change, message):
-    with pytest.raises(ValueError, match=message):
-        restored(change(row_of(position_scenario(), handmade()).to_json()))
-
-
-def test_parameters_become_plain_json():
-    given = {"a": np.float64(1.5), "b": np.arange(2), "c": (1, (2,)), "d": None, "e": math.inf}
-    assert jsonable(given) == {"a": 1.5, "b": [0, 1], "c": [1, [2]], "d": None, "e": "inf"}
-    json.dumps(jsonable(given), allow_nan=False)
-
-
-def test_geometric_mean():
-    assert geometric_mean([1e-3, 1e3]) == pytest.approx(1.0)
-    assert geometric_mean([7.3]) == 7.3
-    assert geometric_mean([0.0, 1e3]) == 0.0
-
-
 def test_summaries():
     base = row_of(position_scenario(), handmade())
     rows = [
@@ -388,16 +356,12 @@ def test_summaries():
     ]
     other = dataclasses.replace(base, policy="moore_penrose")
     first, second = summarise([*rows, other])
-    assert (first.policy, second.policy) == ("dls", "moore_penrose")
+    assert (first.label, second.label) == ("dls", "moore_penrose")
     assert first.episodes == 3
-    assert first.total_cost.mean == pytest.approx(10.0)
-    assert first.total_cost.median == 10.0
-    assert first.total_cost.p90 == pytest.approx(82.0)
-    assert first.total_cost.worst == 100.0
-    assert first.total_cost.worst_seed == 2
-    assert first.position_error_max == 0.3
-    assert first.orientation_error_max is None
-    assert (first.time_p50_us, first.time_p99_us, first.deadline_misses) == (6.0, 14.0, 6)
+    assert first.total_cost == Spread(pytest.approx(10.0), 10.0, pytest.approx(82.0), 100.0, 2)
+    assert first.largest("position_error_max") == 0.3
+    assert first.largest("orientation_error_max") is None
+    assert (first.median("time_p50_us"), first.largest("time_p99_us"), first.total("deadline_misses")) == (6.0, 14.0, 6)
     assert first.status == "rank_deficient"
     assert first.cost_ratio is None
 
@@ -454,7 +418,3 @@ def test_who_tracks_skew_coordinates_with_a_wrong_orientation_has_lost():
     assert row.position_error_max < 0.005
     assert row.orientation_error_max > 0.35
     assert row.lost
-
-
-def test_time_columns_are_columns():
-    assert set(TIME_COLUMNS) <= {field.name for field in dataclasses.fields(Row)}

@@ -11,8 +11,9 @@ import sys
 
 import pytest
 
-from baselines.training import command, presets, run, seeds
-from baselines.training.command import main, parse
+from baselines.cli import train
+from baselines.cli.train import main, parse
+from baselines.training import presets, run, seeds
 from baselines.training.config.apg import APG
 from baselines.training.config.reinforcement import PPO
 from baselines.training.folder import FORMAT
@@ -167,7 +168,7 @@ def test_ctrl_c(tmp_path, capsys, monkeypatch):
     def interrupted(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(command, "train_seeds", interrupted)
+    monkeypatch.setattr(train, "train_seeds", interrupted)
     assert main(["apg", *TINY, "--out", str(tmp_path)]) == 130
     assert f"is in {tmp_path}; continue with --resume" in capsys.readouterr().err
 
@@ -183,7 +184,7 @@ def test_a_missing_extra_is_named(package, tmp_path, monkeypatch, capsys):
 def test_the_command_line_is_read_without_torch():
     """Which takes seconds to load, and is an extra."""
     code = (
-        "import sys; from baselines.training.command import parse\n"
+        "import sys; from baselines.cli.train import parse\n"
         "parse(['sac', '--preset', 'smoke', '--out', 'x']); assert 'torch' not in sys.modules"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd=ROOT)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import ikgym
+from baselines.cli.view import meshes
 from baselines.viewer.readings import AT, FREE, Reader, share_colour
 from baselines.viewer.replay import Stage, size
-from baselines.viewer.view import meshes
 from ikgym.exceptions import InvalidInputError
 from ikgym.trajectories import Sinusoid
 

@@ -13,12 +13,11 @@ import urllib.request
 import numpy as np
 import pytest
 
-from baselines.cli import main
-from baselines.viewer import view
+from baselines.cli import main, view
+from baselines.cli.view import session_of
 from baselines.viewer.approach import Pose
 from baselines.viewer.replay import Stage
 from baselines.viewer.session import Mode
-from baselines.viewer.view import session_of
 from ikgym.exceptions import InvalidInputError
 
 pytest.importorskip("viser")

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from baselines.cli.view import session_of
 from baselines.viewer import session as sessions
 from baselines.viewer.approach import Pose
 from baselines.viewer.panel import escaped, readings
 from baselines.viewer.replay import Stage
 from baselines.viewer.session import PLAYS_ONLY, Mode
-from baselines.viewer.view import session_of
 
 STEPS = 40
 

@@ -17,7 +17,7 @@ from baselines import cli
 from baselines.cli import main
 from baselines.solvers.rivals.model_files import urdf
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 
 
 @pytest.fixture(autouse=True)
@@ -207,7 +207,10 @@ def test_a_command_imports_what_the_command_line_names():
     assert [name for name in modules if name.startswith(tuple(f"baselines.{one}" for one in others))] == []
     solvers = {name.split(".")[2] for name in modules if name.startswith("baselines.solvers.")}
     assert {"quadratic_program"} <= solvers <= {"quadratic_program", "resolved_rate", "arm_task", "linear_algebra"}
-    assert {name for name in modules if name.startswith("baselines.cli.")} == {"baselines.cli.evaluate"}
+    assert {name for name in modules if name.startswith("baselines.cli.")} == {
+        "baselines.cli.evaluate",
+        "baselines.cli.shell",
+    }
 
 
 def test_no_list_loads_a_learning_library():

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 import pathlib
 import sys
 import threading
@@ -12,11 +11,13 @@ from typing import Annotated, Any
 
 import tyro
 
-from baselines import command
+from baselines.cli import shell
 from baselines.viewer.following import followers
 from baselines.viewer.replay import Stage, named, play_all
 from baselines.viewer.session import Session
 from ikgym.exceptions import InvalidInputError
+
+PROGRAM = f"{shell.CONSOLE} view"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -41,7 +42,7 @@ class Options:
 
 def manual() -> str:
     """The text of ``--help`` above the options."""
-    prog = _program()
+    prog = PROGRAM
     return f"""\
 Shows policies side by side in a browser: a replay of the episode at any speed, and arms that follow a target that you
 drag, each with its own policy, without the imperfections of the scenario's plant. Sliders move the joints within their
@@ -82,8 +83,8 @@ def main(arguments: Sequence[str] | None = None, stop: threading.Event | None = 
     arguments = sys.argv[1:] if arguments is None else list(arguments)
 
     def work() -> int:
-        options = command.parse(Options, arguments, prog=_program(), description=manual())
-        command.find_own_modules()
+        options = shell.parse(Options, arguments, prog=PROGRAM, description=manual())
+        shell.find_own_modules()
         # Before episodes are played: extras may be missing, or the port taken.
         from baselines.viewer.server import Viewer, free_port, serving
 
@@ -97,7 +98,7 @@ def main(arguments: Sequence[str] | None = None, stop: threading.Event | None = 
             viewer.run(threading.Event() if stop is None else stop)
         return 0
 
-    return command.run(work)
+    return shell.run(work)
 
 
 def meshes(stage: Stage, file: pathlib.Path | None) -> Any:
@@ -125,10 +126,3 @@ def meshes(stage: Stage, file: pathlib.Path | None) -> Any:
         return None
     # Each arm in the scene moves its own model.
     return lambda server: lambda root, _: Meshes(server, root, read_urdf(source, arm), arm)
-
-
-_program = functools.partial(command.program, "view", "python -m baselines.viewer.view")
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-import importlib
-import runpy
 import subprocess
 import sys
 
 import pytest
 
-from baselines import command
+from baselines.cli import shell
 from ikgym.exceptions import InvalidInputError
 
 
@@ -53,57 +51,48 @@ def failing(error):
 def test_a_mistake_is_one_line(kind, arguments, message, columns, capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", columns)
     with pytest.raises(SystemExit) as ended:
-        command.parse(kind, arguments, prog="it", description="Does something.")
+        shell.parse(kind, arguments, prog="it", description="Does something.")
     assert ended.value.code == 2
     assert capsys.readouterr().err == f"{message}\n"
 
 
 def test_help_and_good_arguments(capsys):
-    assert command.parse(Options, ["--number", "3"], prog="it", description="") == Options(3)
+    assert shell.parse(Options, ["--number", "3"], prog="it", description="") == Options(3)
     with pytest.raises(SystemExit) as ended:
-        command.parse(Options, ["--help"], prog="it", description="Does something.")
+        shell.parse(Options, ["--help"], prog="it", description="Does something.")
     assert ended.value.code == 0
     assert "Does something." in capsys.readouterr().out
 
 
 def test_exit_codes(capsys):
-    assert command.run(lambda: 0) == 0
-    assert command.run(lambda: 1) == 1
-    assert command.run(failing(InvalidInputError("Nothing\n  fits."))) == 2
+    assert shell.run(lambda: 0) == 0
+    assert shell.run(lambda: 1) == 1
+    assert shell.run(failing(InvalidInputError("Nothing\n  fits."))) == 2
     assert capsys.readouterr().err == "error: Nothing fits.\n"
-    assert command.run(failing(KeyboardInterrupt()), lambda: "Stopped; all is kept.") == 130
+    assert shell.run(failing(KeyboardInterrupt()), lambda: "Stopped; all is kept.") == 130
     assert capsys.readouterr().err == "\nStopped; all is kept.\n"
 
 
-def test_ctrl_c_while_a_command_is_imported(capsys, monkeypatch):
-    monkeypatch.delitem(sys.modules, "baselines.reproduce", raising=False)
-    monkeypatch.setattr(importlib, "import_module", lambda name: failing(KeyboardInterrupt())())
-    with pytest.raises(SystemExit) as ended:
-        runpy.run_module("baselines.reproduce", run_name="__main__")
-    assert ended.value.code == 130
-    assert capsys.readouterr().err == "\nStopped.\n"
-
-
 def test_a_missing_extra_is_named(capsys):
-    assert command.run(failing(ModuleNotFoundError("no", name="torch.nn"))) == 2
+    assert shell.run(failing(ModuleNotFoundError("no", name="torch.nn"))) == 2
     assert capsys.readouterr().err == 'error: This needs torch: pip install "ikgym[train]"\n'
     with pytest.raises(ModuleNotFoundError):  # a module of ours that is missing is a defect, not a mistake
-        command.run(failing(ModuleNotFoundError("no", name="baselines.nowhere")))
+        shell.run(failing(ModuleNotFoundError("no", name="baselines.nowhere")))
 
 
 def test_extras_exist():
     import tomllib
     from pathlib import Path
 
-    project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text())["project"]
-    assert set(command.EXTRAS.values()) <= set(project["optional-dependencies"])
+    project = tomllib.loads((Path(__file__).parents[3] / "pyproject.toml").read_text())["project"]
+    assert set(shell.EXTRAS.values()) <= set(project["optional-dependencies"])
 
 
 def test_a_closed_pipe_is_silent():
     code = (
         "import sys\nfrom baselines import command\n"
         "def work():\n    for _ in range(100000): print('a line')\n    return 0\n"
-        "sys.exit(command.run(work))"
+        "sys.exit(shell.run(work))"
     )
     with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
         assert process.stdout.readline() == b"a line\n"
@@ -114,12 +103,12 @@ def test_a_closed_pipe_is_silent():
 
 def test_names_of_programs(monkeypatch):
     monkeypatch.setattr(sys, "argv", ["/somewhere/bin/ikgym", "evaluate"])
-    assert command.program("evaluate", "python -m baselines.evaluate") == "ikgym evaluate"
+    assert shell.program("evaluate", "python -m baselines.evaluate") == "ikgym evaluate"
     monkeypatch.setattr(sys, "argv", ["/somewhere/baselines/evaluate.py"])
-    assert command.program("evaluate", "python -m baselines.evaluate") == "python -m baselines.evaluate"
+    assert shell.program("evaluate", "python -m baselines.evaluate") == "python -m baselines.evaluate"
 
 
 def test_width(monkeypatch):
     for columns, width in {"60": 80, "80": 80, "101": 101}.items():
         monkeypatch.setenv("COLUMNS", columns)
-        assert command.width() == width
+        assert shell.width() == width

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import importlib
 import io
 import os
 import pathlib
@@ -160,18 +159,6 @@ def run_resumable(
         return 0
 
     return run(both, lambda: f"Stopped. What was finished is in {out}; go on with --resume.")
-
-
-def started(module: str) -> int:
-    """Imports the module of a command and does its work; Ctrl-C is one line from the first import on.
-
-    Args:
-        module: Its name; it has a function ``main``.
-
-    Returns:
-        The exit code, see :func:`run`.
-    """
-    return run(lambda: importlib.import_module(module).main())
 
 
 def find_own_modules() -> None:

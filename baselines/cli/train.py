@@ -15,7 +15,7 @@ from typing import Annotated, Any, Generic, TypeVar, Union
 
 import tyro
 
-from baselines import command as shared
+from baselines.cli import shell
 from baselines.training import methods, presets
 from baselines.training.config.base import Config
 from baselines.training.errors import TrainingError
@@ -64,7 +64,7 @@ class Repeat(RunOptions):
 
 def manual() -> str:
     """The text of ``--help`` above the options."""
-    prog, evaluate = _program(), shared.program("evaluate", "python -m baselines.evaluate")
+    prog, evaluate = _program(), shell.program("evaluate", "python -m baselines.evaluate")
     return f"""\
 Trains agents: networks from observations to joint velocities. apg differentiates the cost through the arm, ppo, sac and
 td3 are the algorithms of Stable-Baselines3 on ikgym.sb3.make_vec, observe trains agents with memory for plants that
@@ -127,11 +127,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         kept = "" if out is None else f" The last checkpoint is in {out}; continue with --resume."
         return f"Stopped.{kept}"
 
-    return shared.run(work, stopped)
+    return shell.run(work, stopped)
 
 
 def _program() -> str:
-    return shared.program("train", f"python {PROGRAM}")
+    return shell.program("train", f"python {PROGRAM}")
 
 
 def _require_extra() -> None:
@@ -166,7 +166,7 @@ def parse(arguments: Sequence[str]) -> Command[Any] | Repeat:
         kinds.append(Annotated[generic[kind], tyro.conf.subcommand(name, default=default, description=summary)])
     kinds.append(Annotated[Repeat, tyro.conf.subcommand("repeat")])
     any_of_them: Any = Union[tuple(kinds)]  # noqa: UP007  # made at run time
-    command: Command[Any] | Repeat = shared.parse(any_of_them, arguments, prog=_program(), description=manual())
+    command: Command[Any] | Repeat = shell.parse(any_of_them, arguments, prog=_program(), description=manual())
     return command
 
 
