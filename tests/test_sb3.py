@@ -98,16 +98,6 @@ def test_returned_types_are_those_of_dummy_vec_env():
         assert type(value) is type(wanted[0]["episode"][key])
 
 
-def test_infos_are_empty_within_an_episode_and_nobody_elses():
-    env = RedundantIKVecEnv(2, noisy())
-    env.reset()
-    infos = env.step(np.zeros((2, 7), np.float32))[3]
-    assert infos == [{}, {}]
-    infos[0]["mine"] = 1
-    assert infos[1] == {}
-    assert env.step(np.zeros((2, 7), np.float32))[3] == [{}, {}]
-
-
 def test_what_is_returned_is_the_callers():
     scenario = noisy(steps=2)
     ours, untouched = RedundantIKVecEnv(N, scenario), RedundantIKVecEnv(N, scenario)
@@ -206,13 +196,6 @@ def test_bad_steps_change_nothing():
         ours.step_wait()
     for got, wanted in zip(played(ours, 8), played(untouched, 8), strict=True):
         assert identical(got, wanted)
-
-
-def test_bad_arguments():
-    with pytest.raises(InvalidInputError, match="num_envs"):
-        RedundantIKVecEnv(0)
-    with pytest.raises(UnknownNameError, match="Did you mean 'varga7-fast'"):
-        RedundantIKVecEnv(2, "varga7-fas")
 
 
 def test_attributes_of_rows():

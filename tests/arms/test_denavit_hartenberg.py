@@ -3,7 +3,6 @@ import pytest
 
 from ikgym import arms
 from ikgym.arms import from_dh
-from ikgym.exceptions import InvalidInputError
 
 
 def rot(axis, angle):
@@ -88,20 +87,3 @@ def test_one_puma_in_both_conventions():
     q = np.random.default_rng(0).uniform(-np.pi, np.pi, (20, 6))
     for standard, craig in zip(puma.forward_and_jacobian(q), modified.forward_and_jacobian(q), strict=True):
         np.testing.assert_allclose(standard, craig, rtol=0, atol=1e-14)
-
-
-@pytest.mark.parametrize(
-    ("table", "message"),
-    [
-        ({"a": [1, 2]}, r"d of arm 'one': expected shape \(2,\), got \(1,\)"),
-        ({"d": [0, 0]}, r"d of arm 'one': expected shape \(1,\), got \(2,\)"),
-        ({"alpha": [np.nan]}, "alpha of arm 'one': expected finite numbers"),
-        ({"theta": ["0"]}, "theta of arm 'one': expected an array of real numbers"),
-        ({"a": 1.0}, r"a of arm 'one': expected shape \(any,\), got \(\)"),
-        ({"a": [], "d": [], "alpha": []}, "expected at least one row, got none"),
-        ({"prismatic": (True, True)}, "prismatic of arm 'one': expected 1 truth values"),
-    ],
-)
-def test_bad_tables_are_refused(table, message):
-    with pytest.raises(InvalidInputError, match=message):
-        from_dh("one", **({"a": [1], "d": [0], "alpha": [0]} | table))

@@ -7,7 +7,6 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
-from ikgym.kernels import rotations
 from ikgym.kernels.rotations import geodesic_angle, quaternion, rodrigues, rotation_vector
 
 # Along and between the coordinate axes, with both signs, and nearly along one.
@@ -126,14 +125,3 @@ def test_geodesic_angle_does_not_depend_on_where_it_starts(axis, angle, other_ax
 def test_geodesic_angle_to_itself_is_exactly_zero(axis, angle):
     rotation = rodrigues(axis, angle)
     assert geodesic_angle(rotation, rotation) == 0.0
-
-
-@pytest.mark.parametrize("angle", [0.0, 1e-9, 1.0, 3.0, math.pi])
-@every_axis
-def test_compiled_kernels_equal_plain_python(axis, angle, monkeypatch):
-    compiled = rodrigues(axis, angle)
-    vector, between = rotation_vector(compiled), geodesic_angle(np.eye(3), compiled)
-    monkeypatch.setattr(rotations, "quaternion", quaternion.py_func)
-    np.testing.assert_allclose(rodrigues.py_func(axis, angle), compiled, rtol=0, atol=1e-15)
-    np.testing.assert_allclose(rotation_vector.py_func(compiled), vector, rtol=0, atol=1e-15)
-    assert geodesic_angle.py_func(np.eye(3), compiled) == pytest.approx(between, abs=1e-15)

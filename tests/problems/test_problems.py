@@ -10,7 +10,6 @@ from scipy.spatial.transform import Rotation
 
 import ikgym
 from ikgym import problems
-from ikgym.exceptions import UnknownNameError
 
 RANDOM = problems.names("rlitg-random-")
 DRAWN = [name for name in problems.NAMES if name not in RANDOM]
@@ -87,17 +86,3 @@ def test_both_sources_have_two_paths_in_common(one, other):
 def test_the_hand_of_the_panda_points_forward():
     turn = Rotation.from_quat(problems.waypoints("cppflow-panda-square").quaternions[0], scalar_first=True)
     np.testing.assert_allclose(turn.apply([0.0, 0.0, 1.0]), [1.0, 0.0, 0.0], atol=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("call", "message"),
-    [
-        (lambda: problems.waypoints("rlitg-helo"), "There is no problem 'rlitg-helo'. Did you mean 'rlitg-hello'"),
-        (lambda: problems.trajectory("rlitg-helo", "greedy"), "Did you mean 'rlitg-hello'"),
-        (lambda: problems.trajectory("rlitg-hello", "greed"), "initial trajectory of rlitg-hello 'greed'. Did you"),
-        (lambda: problems.trajectory("rlitg-kaist", "greedy"), "Available: none"),
-    ],
-)
-def test_what_there_is_not(call, message):
-    with pytest.raises(UnknownNameError, match=message):
-        call()

@@ -10,7 +10,7 @@ import typing
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import ikgym
@@ -135,13 +135,10 @@ def test_every_trajectory_survives_its_file(trajectory, tmp_path):
 VALUES = st.one_of(st.booleans(), st.integers(), st.floats(allow_nan=False), st.text(), st.lists(st.floats(-1, 1)))
 
 
+@settings(max_examples=30)
 @given(st.dictionaries(st.from_regex(r"[a-z_]\w*", fullmatch=True).filter(str.isascii), VALUES))
 def test_what_is_written_is_what_is_read(values):
     assert tomllib.loads(document({**values, "Table": values})) == {**values, "Table": values}
-
-
-def test_matrices_stand_in_rows():
-    assert document({"m": np.eye(2), "left_out": None}) == "m = [\n  [1.0, 0.0],\n  [0.0, 1.0],\n]\n"
 
 
 # Arms.
@@ -222,17 +219,6 @@ def test_an_arm_of_your_own_is_written_in_numbers_though_it_has_a_name_of_ours(t
     assert tomllib.loads((tmp_path / "y.toml").read_text())["arm"] == "varga7"
 
 
-def test_names_of_joints_are_kept_but_no_part_of_the_digest(tmp_path):
-    scenario = scenarios.get("planar2-bent")
-    plain = scenario.replace(arm=scenario.arm.replace(name="leg"))
-    named = scenario.replace(arm=scenario.arm.replace(name="leg", joint_names=("hip", "knee")))
-    for one, there in ((plain, False), (named, True)):
-        one.save(tmp_path / "x.toml")
-        assert ("joint_names" in (tmp_path / "x.toml").read_text(encoding="utf-8")) is there
-        assert load(tmp_path / "x.toml").arm.joint_names == one.arm.joint_names
-    assert fingerprint(plain) == fingerprint(named)
-
-
 # What no file can hold.
 
 
@@ -288,14 +274,6 @@ def test_a_failed_write_leaves_the_file_alone(tmp_path, monkeypatch):
         FAST.save(file)
     assert file.read_text() == "before"
     assert [file.name for file in tmp_path.iterdir()] == ["x.toml"]
-
-
-@pytest.mark.parametrize("name", ["x.txt", "x", 3, "bad\0name.toml", ".toml/"])
-def test_bad_names_of_files(name, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    with pytest.raises(InvalidInputError, match=r"expected a path that ends in \.toml, got|Cannot write"):
-        FAST.save(name)
-    assert not list(tmp_path.iterdir())
 
 
 # Mistakes in a file.

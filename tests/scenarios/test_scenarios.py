@@ -12,7 +12,6 @@ import ikgym
 from ikgym import parallel, scenarios
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 from ikgym.kernels import compilation
-from ikgym.kernels.random_numbers import uniform as _uniform
 from ikgym.plant import Plant
 from tests.every_scenario import every_scenario
 
@@ -63,18 +62,7 @@ def test_nominal_is_the_model_on_the_nominal_joint_path(name):
         np.testing.assert_array_equal(observation["q"], path[0])
 
 
-def test_nominal_of_a_random_scenario_needs_a_seed():
-    with pytest.raises(InvalidInputError, match="a seed says which episode"):
-        scenarios.get("varga7-random").nominal()
-
-
-@pytest.mark.parametrize("preview", [-1, 1.5, "a", (1, -2)])
-def test_bad_previews_of_a_nominal(preview):
-    with pytest.raises(InvalidInputError, match="preview: expected a whole number of at least 0"):
-        scenarios.get("varga7-fast").nominal(preview=preview)
-
-
-@pytest.mark.parametrize("name", every_scenario())
+@pytest.mark.parametrize("name", ["varga7-random", "khan8-q1", "panda-glue"])
 def test_pickling_keeps_everything(name):
     scenario = scenarios.get(name)
     copy = pickle.loads(pickle.dumps(scenario))
@@ -110,32 +98,6 @@ def test_seed_ranges_are_disjoint_and_documented():
         scenarios.seeds("test", 0)
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"steps": 0}, "steps: expected a whole number of at least 1, got 0"),
-        ({"velocity_limit": 0.0}, "velocity_limit: expected numbers above 0"),
-        ({"velocity_limit": [1.0, 2.0]}, r"velocity_limit: expected shape \(7,\), got \(2,\)"),
-        ({"iterations_per_point": ()}, "iterations_per_point: expected at least one number"),
-        ({"iterations_per_point": (3, 0)}, "iterations_per_point: expected a whole number of at least 1, got 0"),
-        ({"model": ikgym.arms.get("faitli3")}, "expected an Arm with 7 joints, got 'faitli3' with 3"),
-        ({"name": None}, "name of a scenario: expected a text, got None"),
-        ({"arm": "varga7"}, "arm of scenario 'varga7-fast': expected Arm, got 'varga7'"),
-        ({"task": "skew"}, "task of scenario 'varga7-fast': expected Task, got 'skew'"),
-        ({"cost": None}, "cost of scenario 'varga7-fast': expected TrackingCost, got None"),
-        ({"trajectory": ikgym.trajectories.Sinusoid([1.0, 2.0])}, "expected 7 joints, as arm 'varga7' has, got 2"),
-        (
-            {"trajectory": ikgym.trajectories.Helix([0, 0, 0], 1, 1, 1), "start": np.zeros(7)},
-            "task 'skew' needs orientations",
-        ),
-        ({"plant": Plant(bias=(1.0, 2.0))}, r"bias: expected shape \(7,\)"),
-    ],
-)
-def test_bad_scenarios(change, message):
-    with pytest.raises(InvalidInputError, match=message):
-        scenarios.get("varga7-fast").replace(**change)
-
-
 def test_disturbance_moves_the_arm_as_said():
     scenario = scenarios.get("varga7-fast").replace(steps=400, plant=Plant(bias=0.5, noise=0.25))
     env = ikgym.RedundantIKEnv(scenario)
@@ -151,15 +113,6 @@ def test_disturbance_moves_the_arm_as_said():
     np.testing.assert_allclose(drifts.mean(axis=0), 0.5, atol=0.05)
     np.testing.assert_allclose(drifts.std(axis=0), 0.25 / 3**0.5, rtol=0.2)
     assert abs(np.corrcoef(drifts.T) - np.eye(7)).max() < 0.25
-
-
-def test_noise_is_uniform_and_uncorrelated():
-    key = np.uint64(12345)
-    values = np.array([_uniform(key, np.uint64(i)) for i in range(20_000)])
-    counts = np.histogram(values, bins=20, range=(-1, 1))[0]
-    assert abs(counts - 1000).max() < 5 * 1000**0.5
-    assert abs(np.corrcoef(values[:-1], values[1:])[0, 1]) < 0.03
-    assert _uniform(np.uint64(1), np.uint64(0)) != _uniform(np.uint64(2), np.uint64(0))
 
 
 def test_chunks_cover_all_rows_once(monkeypatch):
