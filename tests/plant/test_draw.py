@@ -140,11 +140,6 @@ def test_episodes_draw_other_plants_and_a_reset_without_a_seed_goes_on():
     assert identical(seen[0], seen[4])
 
 
-def test_the_trajectory_is_that_of_the_ideal_plant():
-    seen = [ikgym.RedundantIKEnv(panda(plant)).reset(seed=4)[0] for plant in (Plant(), ALL)]
-    assert identical(seen[0]["nominal"], seen[1]["nominal"])
-
-
 def test_an_ideal_plant_draws_nothing():
     generators = [np.random.default_rng(0) for _ in range(2)]
     scenario = panda()

@@ -23,12 +23,6 @@ def test_what_grows_in_proportion_and_what_in_whole_steps():
     assert half.payload_step == imperfect.FIELD.payload_step
 
 
-def test_knowledge_and_drives_are_apart():
-    knowledge, drives = imperfect.FIELD.scaled(1.0, 0.0), imperfect.FIELD.scaled(0.0, 1.0)
-    assert {*knowledge.switched_on()} & {*drives.switched_on()} == set()
-    assert {**knowledge.switched_on(), **drives.switched_on()} == imperfect.FIELD.switched_on()
-
-
 def test_single_numbers_and_one_a_joint():
     plant = Plant(
         zero=(1e-3, 2e-3), backlash=4e-4, bias=-1e-3, command_delay=4, bandwidth=10.0, q_delay=3, pose_delay=5

