@@ -61,13 +61,6 @@ def test_specs_say_how_long_episodes_are():
     assert ikgym.RedundantIKVectorEnv(2, SHORT).spec is None
 
 
-def test_wrappers_that_ask_for_the_length_work():
-    env = gym.wrappers.TimeAwareObservation(gym.make("RedundantIK-v0", scenario=SHORT), flatten=False)
-    assert env.max_timesteps == 4
-    env.reset(seed=0)
-    assert env.step(np.zeros(7, dtype=np.float32))[0]["time"] == 1
-
-
 def test_environments_are_made_again_from_their_specs():
     single = gym.make("RedundantIK-v0", scenario=SHORT, preview=3)
     for again in (gym.make(single.spec), gym.make(single.unwrapped.spec)):

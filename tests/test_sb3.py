@@ -107,20 +107,6 @@ def test_what_is_returned_is_the_callers():
         last = observation
 
 
-def test_seeds_and_options_serve_one_reset():
-    env = RedundantIKVecEnv(N, noisy())
-    env.seed(4)
-    env.set_options({"q": np.full(7, 0.25)})
-    first = env.reset()
-    np.testing.assert_array_equal(first["q"], 0.25)
-    second = env.reset()
-    assert not (second["q"] == 0.25).any()
-    assert not identical(second["nominal"], first["nominal"])
-    env.seed(4)
-    assert identical(env.reset()["nominal"], first["nominal"])
-    assert env.get_attr("np_random_seed") == [4, 5, 6]
-
-
 @pytest.mark.parametrize(
     "options",
     [

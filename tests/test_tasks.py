@@ -52,13 +52,6 @@ def test_skew_is_the_skew_part():
     np.testing.assert_allclose(got, [skew[0, 1], skew[0, 2], skew[1, 2], 1, 2, 3], atol=1e-15)
 
 
-def test_matrix_and_pose_share_their_coordinates():
-    turn = Rotation.from_rotvec([0.3, -0.7, 0.5]).as_matrix()
-    for name in ("matrix", "pose"):
-        got = ikgym.tasks.get(name).coordinates(turn, [1.0, 2.0, 3.0])
-        np.testing.assert_array_equal(got, [*turn.ravel(), 1, 2, 3])
-
-
 @pytest.mark.parametrize("angle", [0.0, 1e-12, 1e-9, 1e-4, 1.0, 3.0, np.pi - 1e-9, np.pi])
 def test_pose_error_is_the_rotation_vector_between(angle):
     """Near 0 and near π, where the printed arccos and its division fail (Zhang 2020, eq. 52, 53)."""

@@ -105,20 +105,6 @@ def test_partial_resets_by_mask_put_rows_out_of_step():
         assert identical(*both)
 
 
-def test_rows_that_end_by_themselves_leave_what_held_them_back_to_the_final_info():
-    scenario = limited(steps=6)
-    native, sync = pair(scenario, AutoresetMode.SAME_STEP)
-    assert identical(native.reset(seed=3), sync.reset(seed=3))
-    for k in range(14):
-        if k == 2:  # puts the rows out of step
-            mask = {"reset_mask": np.array([True, False, False])}
-            assert identical(native.reset(options=dict(mask)), sync.reset(options=dict(mask)))
-        actions = np.full(native.action_space.shape, 1.0 if k % 4 < 2 else -1.0, dtype=np.float32)
-        got = native.step(actions)
-        assert identical(got, sync.step(actions))
-        assert (got[4].get("at_limit", np.zeros((N, 3)))[got[3]] == 0).all()
-
-
 @pytest.mark.parametrize("mode", list(AutoresetMode), ids=lambda mode: mode.value)
 def test_record_episode_statistics(mode):
     steps = 5

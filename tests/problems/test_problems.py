@@ -81,8 +81,3 @@ def test_both_sources_have_two_paths_in_common(one, other):
     first, second = problems.waypoints(f"rlitg-{one}"), problems.waypoints(f"cppflow-fetch_arm-{other}")
     np.testing.assert_allclose(first.positions, second.positions, atol=1.1e-6)
     np.testing.assert_allclose(first.quaternions, second.quaternions, atol=1e-12)
-
-
-def test_the_hand_of_the_panda_points_forward():
-    turn = Rotation.from_quat(problems.waypoints("cppflow-panda-square").quaternions[0], scalar_first=True)
-    np.testing.assert_allclose(turn.apply([0.0, 0.0, 1.0]), [1.0, 0.0, 0.0], atol=1e-6)

@@ -75,14 +75,6 @@ def test_the_seed_chooses_a_path_and_its_start():
     assert all(any(identical(one, start) for start in published) for one in starts)
 
 
-def test_shorter_random_paths_end_at_rest():
-    (name,) = [n for n in problems.names("rlitg-random-") if len(problems.waypoints(n).positions) == 379]
-    trajectory = PublishedPath(name, PERIOD)
-    frames = trajectory.frames(RANDOM.times(RANDOM.steps + 1), RANDOM.model)
-    assert not np.diff(frames[waypoint_steps(379)[-1] :], axis=0).any()
-    assert np.diff(frames[: waypoint_steps(379)[-1]], axis=0).any(axis=1).all()
-
-
 def test_what_is_out_of_reach():
     for name, missed in {"cppflow-panda-square": range(153, 182), "cppflow-fetch-rot_yz": ()}.items():
         scenario, (positions, quaternions, _) = scenarios.get(name), problems.waypoints(name)

@@ -7,8 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import ikgym
-from ikgym.exceptions import InvalidInputError
-from ikgym.trajectories import Sinusoid, StraightLine, frames_of
+from ikgym.trajectories import Sinusoid, frames_of
 from tests.comparison import identical
 
 TIMES = np.linspace(0, 7, 57)
@@ -86,12 +85,6 @@ class TestStraightLine:
         np.testing.assert_allclose(np.cross(vectors, vectors[-1]), 0, atol=1e-13)
         assert np.linalg.norm(vectors[-1]) == pytest.approx(np.pi / 2)
 
-    def test_a_line_without_turning(self):
-        start = np.array([*np.eye(3).ravel(), 0, 0, 0])
-        end = np.array([*np.eye(3).ravel(), 1, 0, 0])
-        frames = StraightLine(start, end, duration=1.0, blend=0.5).frames(np.array([0.5]), self.scenario.arm)
-        np.testing.assert_allclose(frames[0], [*np.eye(3).ravel(), 0.5, 0, 0], atol=1e-15)
-
 
 class TestRandom:
     random = ikgym.scenarios.get("varga7-random").trajectory
@@ -109,20 +102,6 @@ class TestRandom:
             assert values.max() <= high
             np.testing.assert_allclose(values.mean(axis=0), (low + high) / 2, rtol=0.05)
             np.testing.assert_allclose(values.std(axis=0), (high - low) / 12**0.5, rtol=0.05)
-
-    def test_same_generator_same_trajectory(self):
-        first, second = (self.random.sample(np.random.default_rng(3)) for _ in range(2))
-        np.testing.assert_array_equal(first.joint_path(TIMES), second.joint_path(TIMES))
-
-    def test_a_fixed_trajectory_leaves_the_generator_alone(self):
-        rng = np.random.default_rng(3)
-        fixed = Sinusoid(np.ones(2))
-        assert fixed.sample(rng) is fixed
-        assert rng.bit_generator.state == np.random.default_rng(3).bit_generator.state
-
-    def test_has_no_path_of_its_own(self):
-        with pytest.raises(InvalidInputError, match="sample one first"):
-            self.random.frames(TIMES, ikgym.arms.get("varga7"))
 
 
 @pytest.mark.parametrize("name", ikgym.scenarios.names())
