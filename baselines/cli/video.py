@@ -13,7 +13,7 @@ from tqdm import tqdm
 
 from baselines.cli import shell
 from baselines.viewer.film import check_ffmpeg, checked_width, moments, pictures, write_video
-from baselines.viewer.replay import Stage, named, play_all
+from baselines.viewer.replay import Stage, play_all
 from ikgym.exceptions import InvalidInputError
 
 PROGRAM = f"{shell.CONSOLE} video"
@@ -71,10 +71,10 @@ def _film(options: Options) -> int:
     check_ffmpeg()  # before episodes are played
     if options.out.suffix != ".mp4":
         raise InvalidInputError(f"out: expected a file that ends in .mp4, got {str(options.out)!r}.")
-    width, names = checked_width(options.width), named(options.policy)
+    width = checked_width(options.width)
     stage = Stage.of(options.scenario, options.seed, options.steps)
     steps = moments(stage, options.fps, options.speed)
-    replays = play_all(stage, names, progress=True)
+    replays = play_all(stage, options.policy)
     content = tqdm(
         pictures(stage, replays, steps, width=width),
         total=len(steps),
