@@ -16,9 +16,8 @@ from typing import Annotated, Any, Generic, TypeVar, Union
 import tyro
 
 from baselines.cli import shell
-from baselines.training import methods, presets
-from baselines.training.config.base import Config
-from baselines.training.errors import TrainingError
+from baselines.training import methods
+from baselines.training.config import Config, TrainingError
 from baselines.training.folder import read_run
 from baselines.training.seeds import RunOptions, SeedResult, train_seeds
 from baselines.workers import Workers
@@ -72,7 +71,7 @@ differ from the model. Each method has its own options: {prog} METHOD --help
 
 {_listing("Methods", methods.METHODS)}
 
-{_listing("Presets", presets.names())}
+{_listing("Presets", methods.preset_names())}
 
 {_listing("Scenarios", scenarios.names())}
 
@@ -161,7 +160,7 @@ def parse(arguments: Sequence[str]) -> Command[Any] | Repeat:
     preset = _value_of("--preset", arguments)
     kinds: list[Any] = []
     for name, kind in methods.METHODS.items():
-        default: Any = Command(presets.configure(kind, preset if name == chosen else None), Options(out=tyro.MISSING))
+        default: Any = Command(methods.configure(kind, preset if name == chosen else None), Options(out=tyro.MISSING))
         summary, generic = (kind.__doc__ or "").strip(), Command
         kinds.append(Annotated[generic[kind], tyro.conf.subcommand(name, default=default, description=summary)])
     kinds.append(Annotated[Repeat, tyro.conf.subcommand("repeat")])

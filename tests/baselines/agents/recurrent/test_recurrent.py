@@ -13,7 +13,7 @@ from baselines.agents.recurrent.network import GatedNetwork, shapes
 from baselines.agents.recurrent.policy import RecurrentPolicy
 from baselines.episodes import rollout, rollouts, sequences
 from baselines.files import ResultsError
-from baselines.training.config.observe import Observe
+from baselines.training.config import Observe
 from ikgym.exceptions import InvalidInputError
 from tests.baselines.agents.recurrent.recurrent_agents import PROCESSING, SIZES, constant, drawn, made
 
