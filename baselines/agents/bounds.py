@@ -8,7 +8,8 @@ from typing import Self
 import numpy as np
 
 from baselines.policy import Batch, Problem
-from baselines.solvers.quadratic_program.velocity_box import limits_with_braking, velocity_box
+from baselines.solvers.quadratic_program.limits import limits_with_braking
+from baselines.solvers.quadratic_program.velocity_box import velocity_box
 from ikgym.kernels.jit import kernel
 from ikgym.validation import FloatArray
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from baselines.policy.parameters import parameter
 from baselines.solvers.quadratic_program.box_minimum import box_minimum
+from baselines.solvers.quadratic_program.limits import limits_with_braking
 from baselines.solvers.quadratic_program.program import (
     SCALING_WEIGHT,
     curvature,
@@ -19,7 +20,7 @@ from baselines.solvers.quadratic_program.program import (
     held_back,
     motion_weight,
 )
-from baselines.solvers.quadratic_program.velocity_box import limits_with_braking, velocity_box
+from baselines.solvers.quadratic_program.velocity_box import velocity_box
 from baselines.solvers.resolved_rate.base import APPLIED, TaskFeedback, task_motion
 from baselines.status import Status
 from ikgym.arms.limits import middle

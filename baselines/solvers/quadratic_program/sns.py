@@ -9,7 +9,8 @@ import numpy as np
 
 from baselines.policy.parameters import parameter
 from baselines.solvers.linear_algebra import inverted, singular_values
-from baselines.solvers.quadratic_program.velocity_box import limits_with_braking, velocity_box
+from baselines.solvers.quadratic_program.limits import limits_with_braking
+from baselines.solvers.quadratic_program.velocity_box import velocity_box
 from baselines.solvers.resolved_rate.base import APPLIED, TaskFeedback, add_feedback, task_motion
 from baselines.status import Status
 from ikgym.kernels.jit import kernel

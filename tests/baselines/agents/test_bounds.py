@@ -13,7 +13,8 @@ from baselines.agents.network import Network
 from baselines.agents.policy import Agent
 from baselines.episodes import rollouts
 from baselines.policy import Batch, Problem
-from baselines.solvers.quadratic_program.velocity_box import limits_with_braking, velocity_box
+from baselines.solvers.quadratic_program.limits import limits_with_braking
+from baselines.solvers.quadratic_program.velocity_box import velocity_box
 from ikgym import scenarios, tasks
 
 PANDA = scenarios.get("panda-random").replace(task=tasks.get("pose"), steps=300)

@@ -9,7 +9,8 @@ from scipy.optimize import linprog, lsq_linear
 import baselines
 import ikgym
 from baselines.policy import Batch
-from baselines.solvers.quadratic_program.velocity_box import limits_with_braking, velocity_box
+from baselines.solvers.quadratic_program.limits import limits_with_braking
+from baselines.solvers.quadratic_program.velocity_box import velocity_box
 from baselines.solvers.resolved_rate.base import NominalMemory
 from baselines.status import Status
 from tests.baselines.solvers.quadratic_program.paths import beyond_reach, circle, played

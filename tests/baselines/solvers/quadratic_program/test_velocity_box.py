@@ -7,7 +7,8 @@ import pytest
 
 import ikgym
 from baselines.policy import Problem
-from baselines.solvers.quadratic_program.velocity_box import braking_speed, limits_with_braking, velocity_box
+from baselines.solvers.quadratic_program.limits import limits_with_braking
+from baselines.solvers.quadratic_program.velocity_box import braking_speed, velocity_box
 from ikgym.kernels.jit import kernel
 
 DT, CHANGE = 0.1, 0.2
