@@ -32,7 +32,7 @@ def driven(which, name, pose, **parameters):
 
 @pytest.mark.parametrize(
     ("name", "parameters"),
-    [("dls", {}), ("rhc_gradient", {}), ("rhc", {"horizon": 8, "stop_at_end": True}), ("smoothed", {})],
+    [("dls", {}), ("rhc", {"horizon": 8, "stop_at_end": True})],
 )
 @pytest.mark.parametrize(
     "pose",
@@ -47,16 +47,6 @@ def test_it_moves_the_arm_as_the_environment_does(name, parameters, pose):
     which = scenario()
     expected = baselines.track(which, (name, parameters)).q
     np.testing.assert_allclose(driven(which, name, pose, **parameters), expected, rtol=0, atol=1e-12)
-
-
-def test_the_reference_may_be_rotations_and_positions():
-    which = scenario("zhang6-lspb")
-    policy = baselines.make("rhc_gradient", which)
-    q = np.array(which.first_q(which.trajectory))
-    rotation, position = which.model.forward(np.stack([q + 1e-3, q + 2e-3]))
-    one = Controller(policy).step(q, None, (rotation, position))
-    np.testing.assert_array_equal(one, Controller(policy).step(q, None, which.task.coordinates(rotation, position)))
-    assert np.abs(one).max() > 0
 
 
 def test_it_remembers_until_it_is_reset():

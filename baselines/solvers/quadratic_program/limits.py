@@ -1,4 +1,4 @@
-"""The limits of a problem as the solvers of quadratic programs take them."""
+"""The limits of a problem, as kernels take them."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ import numpy as np
 from baselines.policy import Problem
 from ikgym.validation import FloatArray
 
-# Error of a velocity by rounding an action to float32, as a share of the velocity of an action of 1.
+# Actions in float32 miss a velocity by up to this share of the one that an action of 1 means.
 ROUNDING = 2.0**-24
 
 
 def limits_with_braking(problem: Problem) -> FloatArray:
-    """The limits of a problem as :func:`velocity_box.velocity_box` takes them.
+    """The limits of a problem as :func:`velocity_box` takes them.
 
     Braking reckons with a little less than the acceleration limit: a joint that brakes as hard as it can cannot make up
     for the rounding of its actions, and would touch its stop.

@@ -1,4 +1,4 @@
-"""How fast the joints of an arm may go in the next step, so that all of its limits can be kept for good."""
+"""Kernels: how fast the joints of an arm may go in the next step, so that all of its limits can be kept for good."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import math
 from ikgym.kernels.jit import inlined, kernel
 from ikgym.kernels.limits import CHANGE, FASTEST, LOWER, UPPER
 
-# The row behind those of an arm's limits, see :func:`limits.limits_with_braking`.
+# The row behind those of an arm's limits, see :func:`baselines.solvers.quadratic_program.limits.limits_with_braking`.
 BRAKING = CHANGE + 1
 
 

@@ -71,10 +71,3 @@ def test_compiled_solvers_take_no_notice_of_them():
 def test_what_is_wrong_with_them_is_said(extras, message):
     with pytest.raises(InvalidInputError, match=message):
         shown(observed(**extras))
-
-
-def test_a_compiled_solver_that_is_shown_a_single_observation_first(monkeypatch):
-    """The first call compiles outside of the short path."""
-    monkeypatch.setattr("baselines.policy.solver.compiled_classes", set())
-    action, _ = baselines.make("dls", SCENARIO).predict(observed())
-    assert action.shape == (7,)

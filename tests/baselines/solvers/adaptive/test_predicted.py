@@ -90,12 +90,6 @@ def test_a_wrong_guess_is_stable(ideal, delay, bandwidth):
     assert np.abs(np.diff(path[0, -20:], axis=0)).max() < 1e-4  # it has come to rest with the reference
 
 
-def test_noise_costs_little_and_the_delay_is_found(ideal):
-    costs, _, told = driven(gentle(), made(), command_delay=4, bandwidth=12.0, q_noise=1e-5)
-    assert told["delay"] == 4
-    assert costs < 10.0 * ideal
-
-
 def test_old_joint_coordinates_are_taken_for_what_they_are(ideal):
     """The delay is that of the commands, not that of the sensor."""
     costs, _, told = driven(gentle(), made(oldest=5), command_delay=4, bandwidth=12.0, q_delay=5)

@@ -209,13 +209,3 @@ def test_the_null_space_leads_to_a_posture():
     assert np.linalg.norm(rests_at(scenario, posture=tuple(goal))[1] - goal) < 0.995 * np.linalg.norm(start - goal)
     _, still = rests_at(scenario, posture=tuple(goal), secondary_gain=0.0)
     np.testing.assert_allclose(still, start, rtol=0, atol=1e-7)
-
-
-def test_where_the_joints_are_led_to():
-    home = circle().arm.home
-    assert baselines.make("qp", circle()).numbers().pull.tolist() == [[1.0] * 7, home.tolist()]
-    homeless = limited()  # limits of both sides in joints 0, 1, 2, 4 and 6
-    gains, middle = baselines.make("qp", homeless, secondary_gain=3.0).numbers().pull
-    assert gains.tolist() == [3.0, 3.0, 3.0, 0.0, 3.0, 0.0, 3.0]
-    np.testing.assert_array_equal(middle[gains > 0], 0.0)
-    assert baselines.make("qp", homeless, posture=0.5).numbers().pull.tolist() == [[1.0] * 7, [0.5] * 7]

@@ -57,14 +57,6 @@ def test_delay_and_lag_are_known():
     assert unknown.position_error.max() > 2.0 * known.position_error.max()
 
 
-def test_episodes_of_other_delays_are_shown_the_same():
-    scenario = PLAIN.replace(plant=Plant(command_delay=(2, 12)))
-    shown = {baselines.make("told", scenario, policy="rhc", options=RHC, seed=SEED + k).preview for k in range(4)}
-    drawn = {scenario.drawn_plant(SEED + k).command_delay for k in range(4)}
-    assert shown == {9 + 12}
-    assert len(drawn) > 1
-
-
 @pytest.mark.parametrize(
     ("parameters", "words"),
     [

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import builtins
 import importlib
 
 import numpy as np
@@ -127,18 +126,6 @@ def test_a_missing_package_is_one_clear_error(name, monkeypatch):
     assert "ikgym[rivals]" in rows.skipped[0].reason
     with pytest.raises(InvalidInputError, match=wanted):
         evaluate(circle(), name)
-
-
-def test_names_and_classes_are_to_be_had_without_the_packages(monkeypatch):
-    real = builtins.__import__
-
-    def refuse(name, *arguments, **options):
-        assert name.partition(".")[0] not in {get(rival).package for rival in RIVALS}
-        return real(name, *arguments, **options)
-
-    monkeypatch.setattr(builtins, "__import__", refuse)
-    for name in RIVALS:
-        importlib.reload(importlib.import_module(get(name).__module__))
 
 
 def test_two_threads_do_not_share_objects(monkeypatch):

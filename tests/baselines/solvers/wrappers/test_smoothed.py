@@ -55,28 +55,6 @@ def test_is_the_papers_filter_on_the_path_of_the_policy_alone(policy, lambda_):
     np.testing.assert_allclose(episode.qdot, wanted, atol=2e-5 * max(1.0, lambda_ / 300))
 
 
-def test_the_calculated_path_is_that_of_the_policy_alone_bit_for_bit():
-    scenario = short()
-    alone = rollout(scenario, baselines.make("rhc_gradient", scenario), 0)
-    policy = smoothed(scenario)
-    env = gym.make("RedundantIK-v0", scenario=scenario, preview=policy.preview)
-    observation, _ = env.reset()
-    state = None
-    for k in range(STEPS):
-        action, state = policy.predict(observation, state)
-        observation, *_ = env.step(action)
-        np.testing.assert_array_equal(calculated(policy, state), alone.q[k])
-
-
-def test_smooths_and_lags():
-    """What figures 11, 13 and 14 of the paper say."""
-    scenario = short("varga7-slow", 600)
-    alone, episode = (rollout(scenario, baselines.make(n, scenario), 0) for n in ("rhc_gradient", "smoothed"))
-    rough, smooth = (np.abs(np.diff(e.qdot[50:], n=2, axis=0)).sum() for e in (alone, episode))
-    assert smooth < 0.2 * rough
-    assert episode.position_error.max() > 5 * alone.position_error.max()
-
-
 def test_a_constant_velocity_is_followed_2_over_lambda_late():
     scenario = short("faitli3-regular", 400)
     ramp = ikgym.trajectories.Sinusoid(np.full(3, 1e4), 1e-4, offset=np.array([0.1, 0.4, 1.0]))
@@ -173,17 +151,6 @@ def test_a_saturated_velocity_is_remembered_as_it_was_sent():
         sent = np.clip(sent + scenario.dt * bend, -2.0, 2.0)
         path.append(calculated(policy, state))
         observation, *_ = env.step(action)
-
-
-def test_options_reach_the_inner_policy():
-    policy = smoothed("varga7-fast", options={"horizon": 6})
-    assert policy.inner.horizon == 6
-    assert policy.preview == 5
-    assert policy.options == policy.inner.parameters
-    twice = smoothed("varga7-fast", policy="smoothed", options={"policy": "dls"})
-    assert twice.inner.inner.name == "dls"
-    changed = policy.replace(policy="dls", options={"damping": 0.5})
-    assert changed.inner.damping == 0.5
 
 
 def test_a_disturbed_arm_is_smoothed_from_where_it_is():
