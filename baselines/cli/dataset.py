@@ -65,7 +65,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _work(options: Options, _: str) -> None:
     from baselines import datasets  # imports Minari, an extra
 
-    shell.find_own_modules()
     datasets.write(**{field.name: getattr(options, field.name) for field in dataclasses.fields(options)}, progress=True)
     folder = options.out.resolve()
     print(f'{options.out}: MINARI_DATASETS_PATH={options.out.parent}, minari.load_dataset("{folder.name}")')

@@ -41,11 +41,3 @@ def test_it_says_what_is_compiled_and_that_this_happens_once():
     assert bar.steps == 200
     assert bar.written == ["Something else."]
     assert bar.descriptions[-1] == "varga7-fast · dls (1/2)"
-
-
-def test_a_hidden_line_leaves_messages_to_others(caplog):
-    bar = Bar(disable=True)
-    with _Line(bar).watching():
-        logging.getLogger("ikgym").warning("Compiling the policy dls; this happens once, the result is cached on disk.")
-    assert bar.descriptions == []
-    assert "Compiling the policy dls" in caplog.text
