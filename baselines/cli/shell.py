@@ -24,7 +24,7 @@ from ikgym.validation import FloatArray, whole_number
 #: The console command in front of all others.
 CONSOLE = "ikgym"
 
-#: Patterns in messages of tyro, and what is written for them.
+#: Patterns in messages of tyro, and plainer texts.
 PLAINER = (
     (r"no type matching (?:\{None\}\|)?(\S+) could be instantiated from \['(.*?)'\].*", r"expected \1, got '\2'"),
     (r"invalid literal for int\(\) with base 10: ", "expected a whole number, got "),
@@ -35,7 +35,7 @@ PLAINER = (
     (r"(Missing from .*?: --\S+).*", r"\1"),
 )
 
-#: Which extra brings a package.
+#: The extra that installs a package.
 EXTRAS = {
     "torch": "train",
     "stable_baselines3": "train",
@@ -65,11 +65,11 @@ P = TypeVar("P", bound=Resumable)
 
 
 def program(name: str, otherwise: str) -> str:
-    """What a command is called in this process.
+    """The name of a command in this process.
 
     Args:
         name: Its name behind ``ikgym``.
-        otherwise: What it is called where Python has run its module, such as ``"python -m baselines.evaluate"``.
+        otherwise: Its name if Python runs its module, such as ``"python -m baselines.evaluate"``.
     """
     return f"{CONSOLE} {name}" if pathlib.Path(sys.argv[0]).stem == CONSOLE else otherwise
 
@@ -78,8 +78,8 @@ def parse(kind: type[T], arguments: Sequence[str], *, prog: str, description: st
     """Reads the words after a command.
 
     Args:
-        kind: What :func:`tyro.cli` fills.
-        arguments: What is to be read.
+        kind: The type of the options, for :func:`tyro.cli`.
+        arguments: The words.
         prog: The name of the command.
         description: The text of ``--help`` above the options.
 
@@ -98,14 +98,14 @@ def parse(kind: type[T], arguments: Sequence[str], *, prog: str, description: st
 
 
 def run(work: Callable[[], int], stopped: Callable[[], str] = lambda: "Stopped.") -> int:
-    """Does the work of a command.
+    """Runs a command.
 
     Args:
-        work: Gives the exit code.
-        stopped: What is said after Ctrl-C.
+        work: Returns the exit code.
+        stopped: Gives the message after Ctrl-C.
 
     Returns:
-        The exit code: that of the work, 2 where something expected went wrong, 130 after Ctrl-C.
+        The exit code: that of the work, 2 after an expected error, 130 after Ctrl-C.
     """
     try:
         code = work()
@@ -123,8 +123,8 @@ def run(work: Callable[[], int], stopped: Callable[[], str] = lambda: "Stopped."
         print(f"\n{stopped()}", file=sys.stderr)
         return 130
     except BrokenPipeError:
-        # The reader, such as `head`, has seen enough. What is left in the buffer goes nowhere, or Python would try to
-        # write it once more when it ends.
+        # The reader, such as `head`, has closed the pipe. The rest of the buffer goes nowhere: Python would write it at
+        # its end.
         with contextlib.suppress(OSError, ValueError):
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
@@ -168,18 +168,18 @@ def run_resumable(
 
 
 def find_own_modules() -> None:
-    """Lets modules in the current folder be imported, where a console command does not look."""
+    """Lets modules in the current folder be imported, which a console command does not search."""
     if (here := str(pathlib.Path.cwd())) not in sys.path:
         sys.path.append(here)
 
 
 def complain(message: str) -> None:
-    """Prints what went wrong as one line on stderr."""
+    """Prints an error as one line on stderr."""
     print(f"error: {' '.join(message.split())}", file=sys.stderr)
 
 
 def width() -> int:
-    """Characters that a line of output may have: those of the terminal, 80 at least, 120 where there is none."""
+    """Most characters of a line of output: those of the terminal, at least 80; 120 if there is none."""
     return max(80, shutil.get_terminal_size((120, 24)).columns)
 
 
@@ -279,7 +279,7 @@ def _filled(part: str, most: int) -> str:
 
 
 def _in_one_line(box: str) -> str:
-    """The message in a box of tyro's: what is wrong, and what there is instead."""
+    """The message in a box of tyro's: the mistake, and the names that are available."""
     sections: list[list[str]] = [[]]
     for line in re.sub(r"\x1b\[[0-9;]*m", "", box).splitlines():
         row = line.strip("│ ")

@@ -53,8 +53,8 @@ class Options:
     steps: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
     """Most steps of an episode, for trials. The scenario's own number if left out."""
     preview: Annotated[Preview | None, tyro.conf.arg(metavar="P …")] = None
-    """Number of steps ahead that policies are shown, or several numbers for just those steps, such as 1 10 40. What
-    each policy needs if left out."""
+    """Number of steps ahead that policies are shown, or several numbers for just those steps, such as 1 10 40. The
+    policy's own preview if left out."""
     wrap: Annotated[Wrap | None, tyro.conf.Fixed, tyro.conf.Suppress] = None
     """Wraps the environment for policies that are no :class:`baselines.SolverPolicy`, as an agent needs it that was
     trained in a wrapped one: ``wrap(env) -> env``. Costs and errors are those of the environment inside."""
@@ -114,7 +114,7 @@ class Job:
     Args:
         scenario: The scenario.
         specification: The policy, not yet bound to the scenario.
-        given: The parameters that the policy is made with for this episode.
+        given: The parameters of its constructor for this episode.
         parameters: All of its parameters, as rows state them.
         seeds: Seeds of the episode.
         first: Whether it is the first episode of its policy in its scenario; its trajectory log is kept.

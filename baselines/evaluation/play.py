@@ -52,7 +52,7 @@ def run(jobs: Sequence[Job], workers: Workers, *, progress: bool) -> Generator[t
 
     Args:
         jobs: The jobs.
-        workers: Who plays them.
+        workers: The workers.
         progress: Whether to show a bar on stderr.
 
     Raises:
@@ -95,7 +95,7 @@ def play(batch: Batch, tick: Tick | None = None) -> Results:
     first = batch[0]
     policy = first.bind()
     # The matrices of one arm are too small to share out, and threads would blur the times. Environment variables
-    # would be heeded only by libraries that are not loaded yet, and NumPy is.
+    # affect only libraries that are not loaded yet.
     with threadpool_limits(limits=1):
         if any(job.before for job in batch):
             episodes = _in_sequence(batch, policy, tick)
@@ -135,7 +135,7 @@ def play_episodes(
 def batches(jobs: Iterable[Job], most: int = MOST) -> list[Batch]:
     """Jobs that are played together, in their order.
 
-    Timed jobs are played by themselves, and so are those of a reference that is made for one episode.
+    Timed jobs are played alone, and so are those of a reference that is bound to one episode.
 
     Args:
         jobs: All jobs.
@@ -221,12 +221,12 @@ def work(batch: Batch) -> tuple[Results, str]:
 
 @functools.cache
 def processor() -> str:
-    """What compiled code is made for; the name of a processor is not enough on virtual machines."""
+    """The target of compiled code; the name of a processor does not identify it on virtual machines."""
     return f"{llvm.get_host_cpu_name()} {llvm.get_host_cpu_features().flatten()}"
 
 
 class _ClusterCheck:
-    """Checks what a cluster returns: its nodes may have other versions of the code, and other processors."""
+    """Checks results of a cluster: its nodes may have other versions of the code, and other processors."""
 
     def __init__(self) -> None:
         self._here = _kind(describe()), processor()

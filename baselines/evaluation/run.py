@@ -73,8 +73,8 @@ def carry_out(
 
     Args:
         options: All options.
-        command: The command, as the files state it.
-        show: Called with the rows before plots are drawn, which takes a while.
+        command: The command, for the files.
+        show: Called with the rows before plots are drawn.
     """
     jobs, skipped = plan(options)
     workers = Workers(options.workers, options.cluster)
@@ -97,7 +97,7 @@ def carry_out(
 
 
 def _finish(results: Results, rows: Rows, options: Options, command: str) -> None:
-    """Writes the files that are made from the rows."""
+    """Writes plots, tables and the report."""
     pictures = {}
     if options.plots:
         # matplotlib is slow to import, and most evaluations from Python draw nothing.

@@ -35,12 +35,12 @@ class Specification(abc.ABC):
         return True
 
     def given(self, scenario: Scenario, seeds: Seeds) -> dict[str, Any]:
-        """The parameters that the policy is made with for one episode."""
+        """The parameters of the constructor for one episode."""
         del scenario, seeds
         return {}
 
     def per_episode(self, scenario: Scenario) -> bool:
-        """Whether the policy is made anew for each episode, as references with privileged information are."""
+        """Whether each episode needs its own policy, as with references that have privileged information."""
         return self.given(scenario, Seeds(0)) != self.given(scenario, Seeds(1))
 
     @abc.abstractmethod
