@@ -95,12 +95,6 @@ def test_plot_is_a_figure():
     assert len(style.png(figure)) > 1000
 
 
-def test_held_points_are_drawn_where_they_count():
-    track = baselines.track("khan8-q7q8", "dls", steps=200)
-    assert len(track.times) == 200
-    assert track.plot().axes
-
-
 def test_whatever_can_be_evaluated_can_be_tracked():
     class Still:
         preview = 1

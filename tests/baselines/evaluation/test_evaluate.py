@@ -2,7 +2,6 @@ import csv
 import dataclasses
 import json
 import pathlib
-import pickle
 import re
 
 import numpy as np
@@ -12,13 +11,12 @@ import baselines
 import ikgym
 from baselines.cli.evaluate import main
 from baselines.evaluate import evaluate
-from baselines.evaluation import results as results_module
 from baselines.evaluation import run as module
 from baselines.evaluation.jobs import Options
 from baselines.evaluation.metrics import TIME_COLUMNS, Row, describe
-from baselines.evaluation.play import MOST, batches, play
+from baselines.evaluation.play import MOST, batches
 from baselines.evaluation.results import COLUMNS, Results, read_rows
-from baselines.files import ResultsError, write
+from baselines.files import ResultsError
 from baselines.spec import parse_policy
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 from tests.baselines.evaluation.planning import planned
@@ -92,11 +90,6 @@ def test_all_stands_for_all():
         assert "Cartesian" in reasons[scenario, "follow_nominal"]
 
 
-def test_steps_shorten_and_never_lengthen():
-    plan = planned(["varga7-fast", "zhang3-helix"], "dls", steps=1000)
-    assert [job.scenario.steps for job in plan.jobs] == [1000, 799]
-
-
 def test_policies_are_shown_what_they_ask_for():
     plan = planned("varga7-fast", ["dls", "rhc_gradient:horizon=5"])
     assert [job.preview for job in plan.jobs] == [1, 4]
@@ -110,7 +103,6 @@ def test_policies_are_shown_what_they_ask_for():
         ("dls", ("dls", {})),
         ("dls:damping=1e-2", ("dls", {"damping": 1e-2})),
         (" dls : damping = 1e-2 , gain = 0.5 ", ("dls", {"damping": 1e-2, "gain": 0.5})),
-        ("rhc_gradient:gradient=analytic,horizon=5", ("rhc_gradient", {"gradient": "analytic", "horizon": 5})),
         ("rhc_gradient:gradient='analytic'", ("rhc_gradient", {"gradient": "analytic"})),
         ("dls:damping=(1, [2, 3]),gain=1", ("dls", {"damping": (1, [2, 3]), "gain": 1})),
         (("dls", {"damping": 2.0}), ("dls", {"damping": 2.0})),
@@ -214,13 +206,6 @@ def test_episodes_that_are_to_be_timed_after_all_are_played_again(tmp_path):
 # Workers
 
 
-def test_a_job_played_elsewhere_gives_the_same_row():
-    (job,) = planned("varga7-fast", "dls", steps=STEPS).jobs
-    ((row, episode),) = play((pickle.loads(pickle.dumps(job)),))
-    assert timeless([row]) == timeless([play((job,))[0][0]])
-    assert len(episode.q) == STEPS
-
-
 def test_workers_change_nothing_but_the_times(tmp_path):
     rows = run_all(episodes=4)
     assert timeless(run_all(tmp_path, workers=2, episodes=4)) == timeless(rows)
@@ -319,12 +304,6 @@ def test_an_interrupted_run_goes_on_to_the_same_results(tmp_path, monkeypatch, a
             assert all((one[name] == other[name]).all() for name in one)
 
 
-def test_resuming_a_finished_run_plays_nothing(tmp_path, monkeypatch):
-    rows = run_all(tmp_path)
-    interrupted(monkeypatch, 0)
-    assert run_all(tmp_path, resume=True) == rows
-
-
 def test_a_trajectory_log_that_is_missing_is_played_again(tmp_path):
     rows = run_all(tmp_path)
     (file,) = tmp_path.glob("series/zhang3-helix/dls-*.npz")
@@ -413,37 +392,6 @@ def test_a_folder_that_cannot_be_written_is_refused_before_any_work(tmp_path, mo
     interrupted(monkeypatch, 0)
     with pytest.raises(ResultsError, match="Cannot write into"):
         run_all(tmp_path / out)
-
-
-def test_a_crash_while_writing_leaves_the_old_file(tmp_path, monkeypatch):
-    file = tmp_path / "results.json"
-    write(file, b"old")
-
-    def full(_):
-        raise OSError(28, "No space left on device")
-
-    for name in ("os.fsync", "pathlib.Path.replace"):
-        with monkeypatch.context() as patch:
-            patch.setattr(name, full if name == "os.fsync" else lambda *_: full(None))
-            with pytest.raises(ResultsError, match="No space left on device"):
-                write(file, b"new")
-        assert file.read_bytes() == b"old"
-        assert [p.name for p in tmp_path.iterdir()] == ["results.json"]
-    write(file, b"new")
-    assert file.read_bytes() == b"new"
-
-
-def test_results_are_on_disk_after_each_batch(tmp_path, monkeypatch):
-    lengths = []
-    add = Results.add
-
-    def watched(self, *arguments):
-        add(self, *arguments)
-        lengths.append(len(strict_json(tmp_path / "results.json")))
-
-    monkeypatch.setattr(results_module.Results, "add", watched)
-    run_all(tmp_path, episodes=4)
-    assert lengths == [1, 4, 5, 8, 9, 10, 11, 12, 13, 14]
 
 
 # The command line

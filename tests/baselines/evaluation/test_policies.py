@@ -158,14 +158,6 @@ def test_an_object_with_a_predict_is_scored_as_a_solver_is(solved):
     assert model.calls[1:] == [(k or None, [k == 0], True) for k in range(STEPS)]
 
 
-def test_episodes_of_others_are_played_one_by_one_and_only_some_have_times():
-    options = {"episodes": 3, "steps": 5}
-    rows = evaluate("varga7-random", here("Made"), **options)
-    assert [row.time_p50_us is None for row in rows] == [False, True, True]
-    expected = evaluate("varga7-random", "dls", **options)
-    assert [numbers(row) for row in rows] == [numbers(row) for row in expected]
-
-
 @pytest.mark.parametrize(
     ("policy", "name", "parameters"),
     [

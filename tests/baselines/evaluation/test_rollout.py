@@ -53,25 +53,6 @@ def test_points_that_are_held_and_a_longer_preview():
         assert_same(episode, rollout(scenario, policy, seed, preview=5))
 
 
-def test_one_call_of_the_policy_a_step():
-    scenario = ikgym.scenarios.get("varga7-random").replace(steps=STEPS)
-    solver, shapes = baselines.make("dls", scenario), []
-
-    class Watched:
-        preview = solver.preview
-        commands = 0
-        batched = True
-        report = staticmethod(solver.report)
-        diagnostics = staticmethod(solver.diagnostics)
-
-        def predict(self, observation, state=None):
-            shapes.append(observation["q"].shape)
-            return solver.predict(observation, state)
-
-    rollouts(scenario, Watched(), SEEDS)
-    assert shapes == [(3, 7)] * (STEPS + 1)
-
-
 @pytest.mark.parametrize("steps", [1, 250])
 def test_ticks_add_up_to_the_steps_of_all(steps):
     scenario = ikgym.scenarios.get("varga7-random").replace(steps=steps)
