@@ -124,7 +124,7 @@ def write(
 def _jobs(scenario: str | Scenario, policy: AnyPolicy, episodes: int, split: str, preview: Preview | None) -> list[Job]:
     if policy == "all" or scenario == "all":
         raise InvalidInputError("A data set is of one policy in one scenario, got all of them.")
-    jobs, _ = plan([scenario], [policy], Options(episodes=episodes, split=split, preview=preview))
+    jobs, _ = plan(Options(scenarios=[scenario], policies=[policy], episodes=episodes, split=split, preview=preview))
     if len(jobs) < episodes or any(job.before for job in jobs):
         raise InvalidInputError(
             f"{jobs[0].scenario.name}: expected a scenario with {episodes} different and independent episodes."

@@ -38,7 +38,7 @@ def manual(prog: str) -> str:
     """The text of ``--help`` above the options."""
     return f"""\
 Plays episodes and writes them as a data set of Minari: observations, actions, rewards and infos, with the seed and the
-cost of each episode, and the scenario, the policy and the versions that they come from.
+cost of each episode, and the scenario, the policy and the versions.
 
 Example:
   {prog} --scenario varga7-random --policy dls:damping=1e-2 --episodes 100 --out datasets/dls-v0
@@ -65,7 +65,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _work(options: Options, _: str) -> None:
     from baselines import datasets  # imports Minari, an extra
 
-    shell.find_own_modules()
     datasets.write(**{field.name: getattr(options, field.name) for field in dataclasses.fields(options)}, progress=True)
     folder = options.out.resolve()
     print(f'{options.out}: MINARI_DATASETS_PATH={options.out.parent}, minari.load_dataset("{folder.name}")')

@@ -10,9 +10,10 @@ from typing import Annotated, Literal
 import tyro
 
 from baselines.cli import shell
+from baselines.cli.evaluate import Arguments
 from baselines.evaluation import records
 from baselines.evaluation.results import Rows, slug
-from baselines.evaluation.run import evaluate
+from baselines.evaluation.run import carry_out
 from baselines.files import write
 from ikgym.exceptions import InvalidInputError
 
@@ -20,30 +21,22 @@ from ikgym.exceptions import InvalidInputError
 MAIN = "varga7-pose-random"
 
 
-@dataclasses.dataclass(frozen=True)
-class Options:
-    """Options of the command line."""
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Options(Arguments):
+    """Options of the command line: those of evaluate, with other defaults."""
 
-    out: Annotated[pathlib.Path, tyro.conf.arg(metavar="DIR")]
+    out: Annotated[pathlib.Path, tyro.conf.arg(metavar="DIR")] = dataclasses.field()
     """Folder for the results, the table and the plots."""
-    policies: Annotated[tuple[str, ...], tyro.conf.arg(metavar="POLICY …")] = ("all",)
-    """Policies as those of evaluate. Agents in DIR/seed-N/ are training seeds of one agent and share a line, DIR."""
-    test_sets: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME …")] = ()
-    """Test sets. If neither these nor scenarios are given: varga7-pose-random."""
     scenarios: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME …")] = ()
     """Scenarios instead of test sets: names, FILE.toml, MODULE:ATTRIBUTE, or: all."""
-    episodes: Annotated[int, tyro.conf.arg(metavar="N")] = 1
-    """Test episodes of each random scenario; a test set has its own number."""
+    test_sets: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME …")] = ()
+    """Test sets. If neither these nor scenarios are given: varga7-pose-random."""
+    policies: Annotated[tuple[str, ...], tyro.conf.arg(metavar="POLICY …")] = ("all",)
+    """Policies as those of evaluate. Agents in DIR/seed-N/ are training seeds of one agent and share a line, DIR."""
     timed: Annotated[int | Literal["all"], tyro.conf.arg(metavar="N|all")] = 2
     """Episodes of each policy that are played alone and timed."""
-    resume: bool = False
-    """Continue with the results in the folder."""
-    overwrite: bool = False
-    """Replace the results in the folder."""
-    workers: Annotated[int, tyro.conf.arg(metavar="N")] = 1
-    """Processes that play episodes. With more than one, times are less reliable."""
-    cluster: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
-    """Play untimed episodes on a cluster: ray, at the address in RAY_ADDRESS."""
+    plots: bool = False
+    """Draw the plots of evaluate, too."""
 
 
 def manual(prog: str) -> str:
@@ -103,27 +96,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return shell.run_resumable(Options, arguments, "ikgym leaderboard", manual, _work)
 
 
-def _work(options: Options, command: str) -> None:
-    del command
-    if options.test_sets and options.scenarios:
+def _work(given: Options, command: str) -> None:
+    if given.scenarios and given.test_sets:
         raise InvalidInputError("expected --test-sets or --scenarios; got both.")
-    shell.find_own_modules()
-    sets = options.test_sets or (() if options.scenarios else (MAIN,))
-    rows = evaluate(
-        options.scenarios,
-        options.policies,
-        test_sets=sets,
-        episodes=options.episodes,
-        timed=options.timed,
-        out=options.out,
-        resume=options.resume,
-        overwrite=options.overwrite,
-        workers=options.workers,
-        cluster=options.cluster,
-        plots=False,
-        progress=True,
-    )
-    print(compare(rows, options.policies, options.out))
-    for one in rows.skipped:
-        print(f"skipped: {one.policy} in {one.scenario}: {one.reason}")
-    print(f"\nwritten to {options.out}")
+    sets = given.test_sets or (() if given.scenarios else (MAIN,))
+    options = dataclasses.replace(given, test_sets=sets, progress=True)
+    rows = carry_out(options, command=command)
+    print(compare(rows, given.policies, given.out))

@@ -25,7 +25,7 @@ from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario, imperfect
 from ikgym.validation import number
 
-#: How thoroughly best known costs are searched that are not recorded: on these paths all starts find the same optimum.
+#: The search for best known costs that are not recorded: on these paths all starts find the same optimum.
 HOW = Search(starts=20, generations=0)
 
 
@@ -38,9 +38,9 @@ class Options:
     policies: Annotated[tuple[str, ...], tyro.conf.arg(metavar="POLICY …")] = ("dls", "rhc", "rhc_foresight", "told")
     """Policies as those of evaluate."""
     scenario: Annotated[str, tyro.conf.arg(metavar="NAME|FILE.toml")] = imperfect.FIELD_NAME
-    """Scenario whose plant stands for severity 1; of panda-field that is the worst one."""
+    """Scenario whose plant has severity 1; of panda-field that is the worst one."""
     severities: Annotated[tuple[float, ...], tyro.conf.arg(metavar="S …")] = (0.0, 0.25, 0.5, 0.75, 1.0)
-    """Severities, from 0, of what is unknown (calibration, payload, camera) and of the drives (lag, delay)."""
+    """Severities, from 0, of unknown properties (calibration, payload, camera) and of the drives (lag, delay)."""
     episodes: Annotated[int, tyro.conf.arg(metavar="N")] = 4
     """Test episodes of each policy in each cell of the map."""
     resume: bool = False
@@ -56,7 +56,7 @@ class Options:
 def manual(prog: str) -> str:
     """The text of ``--help`` above the options."""
     return f"""\
-Maps the cost ratio of policies over two severities of an imperfect plant: of what is unknown (calibration, payload,
+Maps the cost ratio of policies over two severities of an imperfect plant: of unknown properties (calibration, payload,
 camera), and of the drives (lag, delay). Test sets of imperfect plants: ikgym leaderboard --test-sets panda-field …
 
 Examples:

@@ -149,8 +149,8 @@ def parse(arguments: Sequence[str]) -> Command[Any] | Repeat:
 
     Raises:
         UnknownNameError: There is no such preset, or the method has no option of the preset.
-        InvalidInputError: A value is refused, or there is no method.
-        SystemExit: With 0 after ``--help``, with 2 where an option is unknown.
+        InvalidInputError: A value is refused, an option is unknown, or there is no method.
+        SystemExit: With 0 after ``--help``.
     """
     if not arguments:
         with contextlib.suppress(SystemExit):

@@ -15,7 +15,7 @@ from baselines.evaluation import metrics
 from baselines.evaluation import test_sets as known_sets
 from baselines.evaluation.export import formats
 from baselines.evaluation.foreign import Wrap
-from baselines.evaluation.policies import ALL, AnyPolicy, specifications
+from baselines.evaluation.policies import ALL, specifications
 from baselines.evaluation.specification import Specification, shown_preview
 from baselines.files import ResultsError
 from baselines.fingerprints import fingerprint
@@ -28,7 +28,7 @@ from ikgym.scenarios.preview import offsets
 from ikgym.validation import whole_number
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class Options:
     """Options of :func:`baselines.evaluate.evaluate` and of the command.
 
@@ -39,6 +39,10 @@ class Options:
         InvalidInputError: A number is out of range, the preview is invalid, or `export` is given without `out`.
     """
 
+    scenarios: Annotated[Any, tyro.conf.Fixed, tyro.conf.Suppress] = ()
+    """Scenarios as :func:`ikgym.scenarios.find` takes them; ``"all"`` for all registered ones."""
+    policies: Annotated[Any, tyro.conf.Fixed, tyro.conf.Suppress] = ALL
+    """Policies as :func:`baselines.evaluation.policies.specifications` takes them."""
     test_sets: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME …")] = ()
     """Test sets, which define what is played, instead of scenarios, episodes, split, steps and noise seeds."""
     episodes: Annotated[int, tyro.conf.arg(metavar="N")] = 1
@@ -49,8 +53,8 @@ class Options:
     steps: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
     """Most steps of an episode, for trials. The scenario's own number if left out."""
     preview: Annotated[Preview | None, tyro.conf.arg(metavar="P …")] = None
-    """Number of steps ahead that policies are shown, or several numbers for just those steps, such as 1 10 40. What
-    each policy needs if left out."""
+    """Number of steps ahead that policies are shown, or several numbers for just those steps, such as 1 10 40. The
+    policy's own preview if left out."""
     wrap: Annotated[Wrap | None, tyro.conf.Fixed, tyro.conf.Suppress] = None
     """Wraps the environment for policies that are no :class:`baselines.SolverPolicy`, as an agent needs it that was
     trained in a wrapped one: ``wrap(env) -> env``. Costs and errors are those of the environment inside."""
@@ -110,7 +114,7 @@ class Job:
     Args:
         scenario: The scenario.
         specification: The policy, not yet bound to the scenario.
-        given: The parameters that the policy is made with for this episode.
+        given: The parameters of its constructor for this episode.
         parameters: All of its parameters, as rows state them.
         seeds: Seeds of the episode.
         first: Whether it is the first episode of its policy in its scenario; its trajectory log is kept.
@@ -175,17 +179,8 @@ class Skipped(NamedTuple):
     reason: str
 
 
-def plan(
-    scenarios: str | Scenario | Iterable[str | Scenario],
-    policies: AnyPolicy | Iterable[AnyPolicy],
-    options: Options | None = None,
-) -> tuple[list[Job], list[Skipped]]:
+def plan(options: Options) -> tuple[list[Job], list[Skipped]]:
     """All episodes of an evaluation, policy by policy within each scenario, and the policies that are skipped.
-
-    Args:
-        scenarios: Scenarios as :func:`ikgym.scenarios.find` takes them; ``"all"`` for all registered ones.
-        policies: Policies as :func:`baselines.evaluation.policies.specifications` takes them.
-        options: Options of the evaluation; the defaults if left out.
 
     Raises:
         UnknownNameError: There is no such scenario, policy, parameter, split or test set.
@@ -193,10 +188,9 @@ def plan(
             set has drifted or is given with options that it defines.
         ResultsError: The file of an agent cannot be used.
     """
-    options = Options() if options is None else options
     timed = sys.maxsize if options.timed == ALL else int(options.timed)
-    all_policies = specifications(policies, wrap=options.wrap)
-    played = _episodes(scenarios, options)
+    all_policies = specifications(options.policies, wrap=options.wrap)
+    played = _episodes(options)
     jobs: dict[metrics.Key, Job] = {}
     skipped: list[Skipped] = []
     for some in _with_ideal(played) if options.pairs else played:
@@ -248,9 +242,9 @@ def _drawn(scenario: Scenario, seeds: Iterable[int], noise_seeds: int, length: i
     return tuple(Seeds(seed, seed // length if length > 1 else None, noise) for seed in seeds for noise in range(times))
 
 
-def _episodes(scenarios: str | Scenario | Iterable[str | Scenario], options: Options) -> list[_Episodes]:
+def _episodes(options: Options) -> list[_Episodes]:
     """The episodes of all scenarios or test sets."""
-    listed = _scenarios(scenarios, options.steps)
+    listed = _scenarios(options.scenarios, options.steps)
     if options.test_sets:
         changed = (options.episodes, options.split, options.steps, options.noise_seeds) != (1, "test", None, 1)
         if listed or changed:

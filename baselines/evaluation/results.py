@@ -53,7 +53,7 @@ class Results:
     Every file is replaced in one go, so that none is ever half written.
 
     Args:
-        directory: The folder; it is made if it does not exist.
+        directory: The folder; created if it does not exist.
         jobs: The jobs. Their rows are kept in this order, after other rows of the folder.
         machine: Processor and versions, see :func:`baselines.evaluation.metrics.describe`.
         options: Options of the evaluation: resume, overwrite and export.
@@ -107,7 +107,7 @@ class Results:
 
         Args:
             jobs: The jobs that were played.
-            results: The row of each, and the record of its episode if files are made from it.
+            results: The row of each, and the record of its episode if files need it.
 
         Raises:
             ResultsError: The folder cannot be written.
@@ -230,10 +230,10 @@ def _check_comparable(file: pathlib.Path, rows: Sequence[Row], jobs: Sequence[Jo
             ]
             if seed := job.seeds.seed:
                 pairs.append((f"{row.scenario} on the split", _split(row.seed), _split(seed)))
-        for what, there, here in pairs:
+        for part, there, here in pairs:
             if there != here:
                 raise ResultsError(
-                    f"{file} has results of {what} {there}, this run has {here}: they cannot be compared. Choose "
+                    f"{file} has results of {part} {there}, this run has {here}: they cannot be compared. Choose "
                     "another directory."
                 )
 

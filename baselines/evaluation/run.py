@@ -60,12 +60,10 @@ def evaluate(
         ClusterError: There is no cluster.
         MissingDependencyError: The package of the cluster is not installed.
     """
-    return carry_out(scenarios, policies, Options(**options))
+    return carry_out(Options(scenarios=scenarios, policies=policies, **options))
 
 
 def carry_out(
-    scenarios: str | Scenario | Iterable[str | Scenario],
-    policies: AnyPolicy | Iterable[AnyPolicy],
     options: Options,
     *,
     command: str = "baselines.evaluate.evaluate(…)",
@@ -74,13 +72,11 @@ def carry_out(
     """See :func:`evaluate`.
 
     Args:
-        scenarios: The scenarios.
-        policies: The policies.
         options: All options.
-        command: The command, as the files state it.
-        show: Called with the rows before plots are drawn, which takes a while.
+        command: The command, for the files.
+        show: Called with the rows before plots are drawn.
     """
-    jobs, skipped = plan(scenarios, policies, options)
+    jobs, skipped = plan(options)
     workers = Workers(options.workers, options.cluster)
     workers.check()
     with contextlib.nullcontext() if options.out is None else locked(options.out):
@@ -101,7 +97,7 @@ def carry_out(
 
 
 def _finish(results: Results, rows: Rows, options: Options, command: str) -> None:
-    """Writes the files that are made from the rows."""
+    """Writes plots, tables and the report."""
     pictures = {}
     if options.plots:
         # matplotlib is slow to import, and most evaluations from Python draw nothing.

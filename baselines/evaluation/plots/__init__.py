@@ -1,4 +1,4 @@
-"""The plots of a folder of results: matplotlib without pyplot, so that no window system is asked for."""
+"""The plots of a folder of results: matplotlib without pyplot, and so without a window system."""
 
 from __future__ import annotations
 

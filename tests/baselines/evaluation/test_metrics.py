@@ -82,19 +82,6 @@ def test_total_cost_is_the_sum_of_the_rewards_of_gymnasium_bit_for_bit(name, ste
     assert row_of(which, rollout(which, solver, seed)).total_cost == total
 
 
-def test_noise_is_drawn_as_in_the_environment():
-    which = scenario(steps=50, plant=ikgym.Plant(noise=0.5))
-    solver = baselines.make("dls", which)
-    env = gym.make("RedundantIK-v0", scenario=which, preview=1)
-    observation, _ = env.reset(seed=7)
-    state = None
-    for _ in range(50):
-        action, state = solver.predict(observation, state)
-        observation, *_ = env.step(action)
-    assert_array_equal(rollout(which, solver, 7).q[-1], observation["q"])
-    assert (rollout(which, solver, 8).q[-1] != observation["q"]).any()
-
-
 class Pushing:
     """A policy that pushes all joints to and fro."""
 
@@ -123,17 +110,6 @@ def test_limits_are_in_the_row(wrap):
     assert row.qddot_peak == pytest.approx(change / which.dt)
 
 
-def test_margins_are_distances_from_the_nearest_limit():
-    inside = handmade(2, q=[[0.5, 0.0], [0.2, -1.5]], qdot=[[0.3, 0.0], [0.3, -0.6]])
-    bounded = ikgym.arms.from_dh("two", [1, 1], [0, 0], [0, 0], lower=[-1, -2], upper=[0.75, np.inf])
-    still = ikgym.trajectories.Sinusoid(np.zeros(2))
-    small = ikgym.Scenario("two", bounded, ikgym.tasks.get("position"), still, velocity_limit=1.0, dt=0.1, steps=2)
-    assert row_of(small, inside).joint_limit_margin_min == 0.25
-    assert row_of(small, inside).qddot_peak == pytest.approx(6.0)
-    free = small.replace(arm=bounded.replace(lower=None, upper=None))
-    assert row_of(free, inside).joint_limit_margin_min is None
-
-
 def test_the_warm_up_call_leaves_no_trace_in_the_episode():
     which = scenario(steps=20)
     solver = baselines.make("rhc_gradient", which)
@@ -159,38 +135,6 @@ def test_the_warm_up_call_leaves_no_trace_in_the_episode():
     assert calls[1] is None
     assert all(state is not None for state in calls[2:])
     assert_array_equal(episode.qdot, rollout(which, solver, 0).qdot)
-
-
-def test_garbage_collection_is_as_before_even_after_an_error():
-    import gc
-
-    which = scenario(steps=5)
-
-    class Failing:
-        preview = 1
-        commands = 0
-        batched = True
-        calls = 0
-
-        def predict(self, observation, state=None):
-            self.calls += 1
-            if self.calls > 1:
-                assert not gc.isenabled()
-                raise InvalidInputError("no")
-            return np.zeros(7, dtype=np.float32), ()
-
-    assert gc.isenabled()
-    with pytest.raises(InvalidInputError, match="no"):
-        rollout(which, Failing(), 0)
-    assert gc.isenabled()
-
-
-@pytest.mark.parametrize("steps", [1, 100, 250])
-def test_ticks_add_up_to_the_steps(steps):
-    which = scenario(steps=steps)
-    ticks = []
-    rollout(which, baselines.make("dls", which), 0, tick=ticks.append)
-    assert sum(ticks) == steps
 
 
 def test_metrics_equal_a_plain_numpy_computation():
@@ -249,12 +193,6 @@ def test_held_points_count_at_their_last_step_only():
     assert_allclose(row.qdot_rms, np.sqrt((episode.qdot**2).mean()), rtol=1e-12)
 
 
-def test_a_task_without_orientation_has_no_error_of_it():
-    row = row_of(position_scenario(), handmade())
-    assert row.orientation_error_max is None
-    assert row.orientation_error_rms is None
-
-
 def test_numbers_of_a_handmade_episode():
     qdot = [[1.0, 0.0], [-2.0, 0.0], [-2.0, 0.5], [0.0, 0.5]]
     times = [1_000, 2_000, 3_000, 1_000_000_001]
@@ -295,13 +233,6 @@ def test_costs_are_added_up_from_left_to_right():
     assert row.total_cost == total
 
 
-def test_the_first_call_is_stated_apart():
-    row = row_of(position_scenario(), handmade(time_ns=[5_000_000_000, 1_000, 3_000, 2_000]))  # Δt is 1 s
-    assert (row.time_first_us, row.time_p50_us, row.deadline_misses) == (5e6, 2.0, 0)
-    only = row_of(position_scenario(1), handmade(1, time_ns=[5_000]))
-    assert (only.time_first_us, only.time_p50_us, only.time_p99_us, only.deadline_misses) == (5.0, 5.0, 5.0, 0)
-
-
 def test_what_was_not_timed_has_no_times():
     row = row_of(position_scenario(), handmade(time_ns=np.empty(0, dtype=np.int64)))
     assert [getattr(row, name) for name in TIME_COLUMNS] == [None] * 4
@@ -310,10 +241,6 @@ def test_what_was_not_timed_has_no_times():
     (both,), (neither,) = summarise([row, timed]), summarise([row])
     assert [both.largest(name) for name in TIME_COLUMNS] == [getattr(timed, name) for name in TIME_COLUMNS]
     assert [neither.largest(name) for name in TIME_COLUMNS] == [None] * 4
-
-
-def test_cost_ratio_is_against_the_best_known_cost():
-    assert row_of(position_scenario(), handmade(tracking_cost=[1, 2, 3, 4]), best_known=4.0).cost_ratio == 2.5
 
 
 @pytest.mark.parametrize("test_set", [None, "0123456789ab"])
@@ -366,20 +293,6 @@ def test_summaries():
     assert first.cost_ratio is None
 
 
-def test_the_spread_of_cost_ratios():
-    base = row_of(position_scenario(), handmade())
-    cost_ratios = {3: 1.0, 4: 4.0, 5: 2.0}
-    rows = [
-        dataclasses.replace(base, seed=s, cost_ratio=cost_ratio, total_cost=1.0 / cost_ratio)
-        for s, cost_ratio in cost_ratios.items()
-    ]
-    (summary,) = summarise(rows)
-    assert summary.cost_ratio == Spread(pytest.approx(2.0), 2.0, pytest.approx(3.6), 4.0, 4)
-    assert summary.total_cost.worst_seed == 3
-    (summary,) = summarise([*rows, dataclasses.replace(base, seed=6)])
-    assert summary.cost_ratio is None  # of one of them it is not known
-
-
 @pytest.mark.parametrize("change", [{"fingerprint": "g"}, {"test_set": "0123456789ab"}])
 def test_rows_of_different_content_are_not_put_together(change):
     base = row_of(position_scenario(), handmade())
@@ -393,10 +306,8 @@ def test_rows_of_different_content_are_not_put_together(change):
     ("position", "angle", "expected"),
     [
         (0.05, 0.3, False),
-        (0.0501, 0.0, True),
         (0.0, 0.301, True),
         (0.0501, None, True),
-        (0.05, None, False),
         (math.nan, 0.0, True),
         (0.0, math.nan, True),
     ],
@@ -408,13 +319,3 @@ def test_lost_by_position_or_orientation(position, angle, expected):
     assert row.lost is expected
     (summary,) = summarise([row, dataclasses.replace(row, seed=77, position_error_max=9.0)])
     assert summary.lost == 1 + expected
-
-
-def test_who_tracks_skew_coordinates_with_a_wrong_orientation_has_lost():
-    """The cost of skew coordinates is low there: a test episode of `varga7-random` that looked well by distance."""
-    where = scenario("varga7-random")
-    policy = baselines.make("rhc", where, horizon=200, iterations=1, move_blocks=27)
-    row = row_of(where, rollout(where, policy, 2_000_018, preview=policy.preview))
-    assert row.position_error_max < 0.005
-    assert row.orientation_error_max > 0.35
-    assert row.lost

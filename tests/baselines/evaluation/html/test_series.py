@@ -107,12 +107,6 @@ def test_limits_tell_the_most_severe():
     assert limits({**log, **without, "acceleration_limit": np.full(5, np.inf)}).tolist() == [[FREE] * 5]
 
 
-def test_limits_that_are_reached_are_seen(log):
-    seen = decoded(thinned(log, BUDGET)["arrays"]["limit"])
-    assert seen.dtype == np.uint8
-    assert set(np.unique(limits(log))) == set(np.unique(seen)) > {FREE}
-
-
 def test_logs_without_pictures_have_curves(log):
     before = {name: values for name, values in log.items() if name not in ("frame", "joint_points", "tool_rotation")}
     series = thinned(before, BUDGET)
