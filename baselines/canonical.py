@@ -19,7 +19,7 @@ def canonical(value: object) -> str:
 
 
 def jsonable(value: Any) -> Any:
-    """A parameter's value as JSON has it; what JSON does not know becomes text."""
+    """A value as JSON; types that JSON does not have become text."""
     if isinstance(value, (np.ndarray, np.generic)):
         value = value.tolist()
     if isinstance(value, (list, tuple)):

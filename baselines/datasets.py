@@ -19,9 +19,8 @@ from minari.dataset.minari_storage import MinariStorage
 from tqdm import tqdm
 
 from baselines.episodes import add_up
-from baselines.evaluation.jobs import Job, plan
-from baselines.evaluation.machine import describe
-from baselines.evaluation.options import Options
+from baselines.evaluation.jobs import Job, Options, plan
+from baselines.evaluation.metrics import describe
 from baselines.evaluation.policies import AnyPolicy
 from baselines.files import ResultsError, locked, resumed, write_json
 from baselines.fingerprints import fingerprint
@@ -125,7 +124,7 @@ def write(
 def _jobs(scenario: str | Scenario, policy: AnyPolicy, episodes: int, split: str, preview: Preview | None) -> list[Job]:
     if policy == "all" or scenario == "all":
         raise InvalidInputError("A data set is of one policy in one scenario, got all of them.")
-    jobs, _ = plan([scenario], [policy], Options(episodes=episodes, split=split, preview=preview))
+    jobs, _ = plan(Options(scenarios=[scenario], policies=[policy], episodes=episodes, split=split, preview=preview))
     if len(jobs) < episodes or any(job.before for job in jobs):
         raise InvalidInputError(
             f"{jobs[0].scenario.name}: expected a scenario with {episodes} different and independent episodes."

@@ -1,4 +1,4 @@
-"""Files that the project writes itself: each replaced in one go, one writer a folder, one check on reading."""
+"""Files that the project writes: each is replaced in one go, a folder has one writer, and reading has one check."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ logger = logging.getLogger("ikgym")
 LOCK = ".lock"
 # Seconds between two attempts to get a lock.
 _PAUSE = 0.02
-# The byte that is locked: Windows lets nobody read a locked byte, and the number should be readable.
+# The locked byte: on Windows a locked byte cannot be read, and the process number should be.
 _BYTE = 2**20
 
 T = TypeVar("T")
@@ -152,8 +152,8 @@ def resumed(
     if not isinstance(there, dict):
         raise ResultsError(f"{manifest} is damaged: expected an object, got {type(there).__name__}. {advice}".rstrip())
     if names := [name for name in about if there.get(name) != about[name]]:
-        what = ", ".join(f"{name} ({there.get(name)!r} there, {about[name]!r} here)" for name in names)
-        raise ResultsError(f"{manifest} differs in {what}: resume with the same, or choose another folder.")
+        changes = ", ".join(f"{name} ({there.get(name)!r} there, {about[name]!r} here)" for name in names)
+        raise ResultsError(f"{manifest} differs in {changes}: resume with the same, or choose another folder.")
     return there
 
 
@@ -173,10 +173,10 @@ def check_flags(file: pathlib.Path, *, resume: bool, overwrite: bool) -> None:
 
 @contextlib.contextmanager
 def locked(folder: pathlib.Path, patience: float = 0.0) -> Iterator[None]:
-    """Keeps a folder for this process; the operating system frees the lock of a process that dies.
+    """Locks a folder for this process; the operating system frees the lock of a process that dies.
 
     Args:
-        folder: The folder; it is made if it does not exist.
+        folder: The folder; created if it does not exist.
         patience: How long to wait for another process that writes into it, in [s].
 
     Raises:

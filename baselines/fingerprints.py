@@ -1,4 +1,4 @@
-"""What results belong to: digests of scenarios, of single episodes, and of sets of them."""
+"""Digests of scenarios, episodes and sets of episodes, which identify results."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ DECIMALS = 12
 def fingerprint(scenario: Scenario) -> str:
     """Twelve digits that differ where two scenarios would give different results.
 
-    Covers all that a scenario is made of but its name and its source, and the version of the cost,
+    Covers all fields of a scenario but its name and its source, and the version of the cost,
     :data:`ikgym.kernels.cost.COST_VERSION`.
     """
     parts = {
@@ -40,7 +40,7 @@ def arm_fingerprint(arm: Arm) -> str:
 
 
 def _of_plant(plant: Plant) -> dict[str, Any]:
-    """What is switched on, but for bias and noise, whose digest is the one of when there was nothing else."""
+    """The parts that are switched on; the digest of bias and noise is as old as the first plants."""
     given = plant.switched_on()
     disturbance = ["Disturbance", {name: getattr(plant, name) for name in ("bias", "noise")}]
     others = {name: value for name, value in given.items() if name not in {"bias", "noise"}}
@@ -53,7 +53,7 @@ def same(one: object, other: object) -> bool:
 
 
 def episode_hash(scenario: Scenario | str, seed: int) -> str:
-    """Twelve digits that stand for one episode: its scenario, the version of the cost, and its seed.
+    """Twelve digits that identify an episode: its scenario, the version of the cost, and its seed.
 
     Args:
         scenario: The scenario, or its fingerprint.
@@ -63,7 +63,7 @@ def episode_hash(scenario: Scenario | str, seed: int) -> str:
 
 
 def set_hash(scenario: Scenario | str, seeds: Iterable[int]) -> str:
-    """Twelve digits that stand for several episodes, like :func:`episode_hash`."""
+    """Twelve digits that identify several episodes, like :func:`episode_hash`."""
     return _digest(scenario if isinstance(scenario, str) else fingerprint(scenario), list(seeds))
 
 
@@ -75,10 +75,10 @@ def _canonical(value: Any) -> Any:
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         fields = {f.name: _canonical(getattr(value, f.name)) for f in dataclasses.fields(value) if f.init}
         if isinstance(value, Arm):
-            # A posture to start from moves nothing by itself, nor does what joints are called.
+            # Home posture and names of joints move nothing.
             del fields["home"], fields["joint_names"]
         if isinstance(value, Arm) and not value.limited:
-            # Without any limit the plant moves as it did before it knew limits, and its digest is the one of then.
+            # A plant without limits keeps the digest that it had before there were limits.
             del fields["acceleration_limit"]
         return [type(value).__qualname__, fields]
     if isinstance(value, Mapping):

@@ -111,7 +111,7 @@ class Search:
 
     @property
     def about(self) -> dict[str, Any]:
-        """What must be equal when a search is resumed."""
+        """The values that must be equal when a search is resumed."""
         ranges = canonical(dict(self.ranges))
         return {"fingerprint": fingerprint(self.scenario), "episodes": len(self.seeds), "seed": self.seed} | {
             "ranges": ranges
@@ -298,8 +298,8 @@ def _begin(file: pathlib.Path, search: Search) -> None:
     study = _study(file, search)
     known = study.user_attrs.get("about", search.about)
     if names := [name for name in search.about if known.get(name) != search.about[name]]:
-        what = ", ".join(f"{name} ({known.get(name)!r} there, {search.about[name]!r} here)" for name in names)
-        raise ResultsError(f"{file} has another search of {search.spec}: {what}. Choose another folder.")
+        changes = ", ".join(f"{name} ({known.get(name)!r} there, {search.about[name]!r} here)" for name in names)
+        raise ResultsError(f"{file} has another search of {search.spec}: {changes}. Choose another folder.")
     study.set_user_attr("about", search.about)
     for trial in study.get_trials(deepcopy=False, states=[TrialState.RUNNING]):  # of a process that was killed
         study.tell(trial.number, state=TrialState.FAIL)

@@ -1,4 +1,4 @@
-"""Work that other processes do: processes of this machine, or tasks on a cluster of Ray."""
+"""Work in other processes: processes of this machine, or tasks on a cluster of Ray."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ TRIES = 3
 #: Relative difference that is allowed between costs on different kinds of processors. On processors of one kind they
 #: are identical, bit for bit.
 TOLERANCE = 1e-6
-#: Tasks that are handed to a cluster at the same time.
+#: Most tasks of a cluster at the same time.
 MOST_TASKS = 1000
 #: The environment variable with the address of the cluster.
 ADDRESS = "RAY_ADDRESS"
@@ -57,7 +57,7 @@ class ClusterError(IkgymError):
 
 @dataclasses.dataclass(frozen=True)
 class Workers:
-    """Who does the work.
+    """The workers.
 
     Args:
         number: Processes of this machine.
@@ -107,7 +107,7 @@ def finished(
     Args:
         function: Does one unit; a function at the top level of a module that workers can import.
         units: The units of work. They can be pickled.
-        workers: Who does them.
+        workers: The workers.
         tries: Attempts at a unit.
 
     Yields:
@@ -252,7 +252,7 @@ def connect() -> Any:
             f"127.0.0.1:6379, or auto for a cluster on this machine; it is not set. {START}"
         )
     try:
-        if address != "auto":  # Ray itself waits for minutes where nobody listens
+        if address != "auto":  # Ray itself waits for minutes if no cluster listens
             _listening(address)
         ray.init(address=address, log_to_driver=False, logging_level=logging.ERROR)
     except (OSError, OverflowError, RuntimeError, ValueError) as e:

@@ -1,24 +1,22 @@
-"""Measures everything, prints the tables and writes them: ``python -m benchmarks --out DIR``."""
+"""Measures speed, prints the tables and writes them: ``python -m benchmarks --out DIR``."""
 
 from __future__ import annotations
 
 import dataclasses
 import datetime
 import pathlib
-import subprocess
 import sys
 
 import tyro
 
-from benchmarks import environments, horizons, kernels, policies, poses, report
-from benchmarks.effort import FULL, QUICK, Effort
-from benchmarks.table import Column, Table
+from baselines.files import write
+from benchmarks import environments, horizons, policies, poses
+from benchmarks.measuring import FULL, QUICK
+from benchmarks.table import Table, page
 
 SECTIONS = {
-    "start": lambda effort: [_import_table(effort)],
     "environments": environments.tables,
-    "kinematics": kernels.tables,
-    "poses": poses.tables,
+    "kinematics": poses.tables,
     "policies": policies.tables,
     "horizons": horizons.tables,
 }
@@ -26,21 +24,21 @@ SECTIONS = {
 
 @dataclasses.dataclass(frozen=True)
 class Command:
-    """Measures speed beside other environments, libraries and solvers."""
+    """Measures the speed of environments, kinematics and solvers, and of those of other libraries."""
 
     out: pathlib.Path = pathlib.Path("results/bench")
-    """The folder for README.md, the report."""
+    """The folder of the report, README.md."""
     quick: bool = False
-    """Everything once and small, to see that it runs."""
+    """Measure everything once and small, to see that it runs."""
     sections: tuple[str, ...] = tuple(SECTIONS)
-    """What to measure."""
+    """The sections to measure."""
 
 
 def main(command: Command) -> list[Table]:
-    """Measures section after section, prints each table when it is done, and writes the report.
+    """Measures the sections in turn, prints each table when it is done, and writes the report.
 
     Raises:
-        SystemExit: There is no section of a name.
+        SystemExit: There is no such section.
     """
     if unknown := set(command.sections) - set(SECTIONS):
         raise SystemExit(f"sections: expected some of {', '.join(SECTIONS)}, got {', '.join(sorted(unknown))}.")
@@ -49,28 +47,14 @@ def main(command: Command) -> list[Table]:
         for table in SECTIONS[section](QUICK if command.quick else FULL):
             print(f"\n{table.text()}", flush=True)
             done.append(table)
-    given = {
+    run = {
         "command": " ".join(["python -m benchmarks", *sys.argv[1:]]),
         "finished": f"{datetime.datetime.now(datetime.UTC):%Y-%m-%d %H:%M} UTC",
         "quick": command.quick,
     }
-    report.save(command.out, done, given | report.conditions())
+    command.out.mkdir(parents=True, exist_ok=True)
+    write(command.out / "README.md", page(done, run).encode())
     return done
-
-
-def _import_table(effort: Effort) -> Table:
-    code = "import time; t = time.perf_counter(); import ikgym; print(time.perf_counter() - t)"
-    seconds = min(
-        float(subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout)
-        for _ in range(3 if effort is FULL else 1)
-    )
-    return Table(
-        "import",
-        "Start",
-        "The import of ikgym, warm, best of three.",
-        (Column("s", "time", "s"),),
-        {"import ikgym": (seconds,)},
-    )
 
 
 if __name__ == "__main__":

@@ -11,9 +11,8 @@ import gymnasium as gym
 import numpy as np
 
 import ikgym
-from benchmarks.effort import FULL, Effort
-from benchmarks.table import Column, Table
-from benchmarks.timing import medians
+from benchmarks.measuring import FULL, Effort, medians
+from benchmarks.table import Table
 
 Calls = dict[str, Callable[[], object]]
 OURS = "RedundantIK-v0, varga7-fast"
@@ -27,7 +26,7 @@ def tables(effort: Effort = FULL) -> list[Table]:
 
 
 def stepper(env_id: str, **kwargs: Any) -> Callable[[], None]:
-    """One step of a single environment with a fixed action; episodes begin anew when they end."""
+    """One step of a single environment with a fixed action; ended episodes are reset."""
     env = gym.make(env_id, **kwargs)
     env.reset(seed=0)
     env.action_space.seed(0)
@@ -81,13 +80,7 @@ def vector(rows: int) -> tuple[Calls, tuple[str, ...]]:
 
 
 def whole_episodes(rows: int, scenario: str = "varga7-random", steps: int | None = None) -> float:
-    """Steps per second of the native vector environment over a whole episode of each row, the resets included.
-
-    Args:
-        rows: How many arms.
-        scenario: A scenario's name.
-        steps: Steps of an episode; the scenario's own if left out.
-    """
+    """Steps per second of the native vector environment over a whole episode of each row, the resets included."""
     given = ikgym.scenarios.get(scenario)
     given = given if steps is None else given.replace(steps=steps)
     envs = gym.make_vec("RedundantIK-v0", num_envs=rows, scenario=given, autoreset_mode="SameStep")
@@ -110,10 +103,9 @@ def _single_table(effort: Effort) -> Table:
     calls, skipped = single()
     times = medians(calls, effort.rounds, effort.seconds)
     return Table(
-        "environment_single",
         "One step of one environment",
         "Through `gym.make` with its usual wrappers, a fixed action, the resets of ended episodes included; medians.",
-        (Column("step_us", "step", "µs"), Column("ratio", "× varga7-fast")),
+        ("step [µs]", "× varga7-fast"),
         {name: (1e6 * t, t / times[OURS]) for name, t in times.items()},
         skipped,
     )
@@ -124,11 +116,10 @@ def _vector_table(rows: int, effort: Effort) -> Table:
     times = medians(calls, effort.rounds, effort.seconds)
     reference = next(iter(times.values()))
     return Table(
-        f"environment_vector_{rows}",
         f"Steps of {rows:,} environments at once",
-        "Actions of 0, as many threads as the environment chooses, medians. Episodes begin anew where they end: after "
+        "Actions of 0, as many threads as the environment chooses, medians. Ended episodes are reset: after "
         "3000 steps of RedundantIK-v0, 200 of Pendulum-v1, 50 of Reacher-v5.",
-        (Column("steps_per_us", "steps per second", "10⁶/s"), Column("ratio", "time × native, varga7-fast")),
+        ("steps per second [10⁶/s]", "time × native, varga7-fast"),
         {name: (1e-6 * rows / t, t / reference) for name, t in times.items()},
         skipped,
     )
@@ -138,9 +129,8 @@ def _whole_table(effort: Effort) -> Table:
     rows = min(effort.rows[-1], 1024)
     steps = None if effort is FULL else effort.steps
     return Table(
-        "environment_whole_episodes",
         "Whole episodes, their resets included",
         f"Scenario varga7-random, {rows:,} arms, one episode of each.",
-        (Column("steps_per_us", "steps per second", "10⁶/s"),),
+        ("steps per second [10⁶/s]",),
         {"RedundantIK-v0 native, varga7-random": (1e-6 * whole_episodes(rows, steps=steps),)},
     )

@@ -14,19 +14,20 @@ from baselines.policy import Problem, SolverPolicy
 from baselines.solvers.receding_horizon.rhc import RecedingHorizon
 from baselines.status import Status
 from benchmarks.rivals.numpy_horizon import Horizon, Plan, plan_cost
-from benchmarks.states import Observation
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray
 
+Observation = dict[str, FloatArray]
+
 
 class Answer(NamedTuple):
-    """A plan and what it costs.
+    """A plan and its cost.
 
     Attributes:
         q: Joint coordinates at the knots, in [rad] or [m]. Shape (K, n).
         cost: By :func:`benchmarks.rivals.numpy_horizon.plan_cost`, for all solvers alike.
         iterations: Iterations made.
-        converged: Whether the solver says that it has found an optimum.
+        converged: Whether the solver reports convergence.
     """
 
     q: FloatArray
@@ -48,7 +49,7 @@ class HorizonSolver(abc.ABC):
 
 
 class PolicySolver(HorizonSolver):
-    """A policy: what is timed is its `predict`."""
+    """A policy, whose `predict` is timed."""
 
     def __init__(self, policy: SolverPolicy) -> None:
         self.policy = policy
@@ -70,7 +71,7 @@ class PolicySolver(HorizonSolver):
 
 
 class RivalSolver(HorizonSolver):
-    """Someone else's solver, which starts from its last plan, one step on."""
+    """A solver of another library, which starts from its last plan, shifted by a step."""
 
     def __init__(self, rival: Any) -> None:
         self.rival = rival
@@ -109,7 +110,7 @@ def policies(scenario: Scenario, grid: int) -> dict[str, HorizonSolver]:
 
 
 def rivals(scenario: Scenario, grid: int) -> tuple[dict[str, HorizonSolver], tuple[str, ...]]:
-    """What others solve the same problem by, by label, and what is left out."""
+    """Solvers of other libraries for the same problem, by label, and the missing ones."""
     out: dict[str, HorizonSolver] = {}
     skipped = []
     for label, (module, name, kwargs) in RIVALS.items():
@@ -120,15 +121,6 @@ def rivals(scenario: Scenario, grid: int) -> tuple[dict[str, HorizonSolver], tup
         else:
             out[label] = RivalSolver(rival(Problem.of(scenario), grid - 1, **kwargs))
     return out, tuple(skipped)
-
-
-def linear_quadratic(joints: int, knots: int) -> Callable[[], object] | None:
-    """One iteration of Crocoddyl without any kinematics; None where it is missing."""
-    try:
-        from benchmarks.rivals import crocoddyl_horizon
-    except ImportError:
-        return None
-    return crocoddyl_horizon.linear_quadratic(joints, knots)
 
 
 #: The exact solver, to which all times are compared.

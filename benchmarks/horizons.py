@@ -6,36 +6,27 @@ import statistics
 from collections.abc import Callable
 from typing import Any
 
+import gymnasium as gym
+import numpy as np
+
+import baselines
 import ikgym
-from benchmarks.effort import FULL, Effort
-from benchmarks.horizon_solvers import EXACT, linear_quadratic, policies, rivals
-from benchmarks.states import along
-from benchmarks.table import Column, Table
-from benchmarks.timing import medians
+from benchmarks.horizon_solvers import EXACT, Observation, policies, rivals
+from benchmarks.measuring import FULL, Effort, medians
+from benchmarks.table import Table
+from ikgym.scenarios import Scenario
 
 SCENARIOS = ("varga7-fast", "varga7-slow")
 CONDITIONS = (
-    "At {states} states of an episode of damped least squares, one arm, one thread. Everyone starts from its own plan "
-    "of the step before, after {lead} such steps; solve is the median over the states, slowest the slowest of them, "
-    "each the median of {solves} interleaved calls. Iterations, the share of states where the solver says that it has "
-    "converged, and the cost are means; excess is by what fraction the cost is above the lowest that any of them "
-    "reaches at that state, median and worst. rhc_gradient makes 450 steps, the paper's limit, and fewer only where it "
-    "diverges. IPOPT's barrier leaves about 1e-9 of cost, which is a large fraction of a tiny one. Crocoddyl calls a "
-    "compiled cost through Python, its only interface for this one; its LQR is one iteration of another problem of the "
-    "same size, quadratic, without kinematics and wholly in C++: a bound for its iterations."
+    "At {states} states of an episode of rhc, one arm, one thread. Each solver starts from its own plan of the step "
+    "before, after {lead} such steps; solve is the median over the states, slowest the slowest of them, each the "
+    "median of {solves} interleaved calls. Iterations, converged (the share of states at which the solver reports "
+    "convergence) and cost are means; excess is the fraction by which the cost is above the lowest of all solvers at "
+    "that state, median and worst. rhc_gradient makes 450 steps, the paper's limit, or fewer if it diverges. IPOPT's "
+    "barrier leaves about 1e-9 of cost, a large fraction of a tiny one. Crocoddyl calls a compiled cost through "
+    "Python, its only interface for this one."
 )
-#: Another problem, with a time and no cost.
-BOUND = "Crocoddyl, LQR"
-COLUMNS = (
-    Column("solve_us", "solve", "µs"),
-    Column("slowest_us", "slowest", "µs"),
-    Column("ratio", f"× {EXACT}"),
-    Column("iterations", "iterations"),
-    Column("converged", "converged"),
-    Column("cost", "cost"),
-    Column("excess", "excess"),
-    Column("worst_excess", "worst excess"),
-)
+COLUMNS = (*("solve [µs]", "slowest [µs]", f"× {EXACT}", "iterations", "converged", "cost", "excess", "worst excess"),)
 
 
 def tables(effort: Effort = FULL) -> list[Table]:
@@ -61,9 +52,6 @@ def _table(name: str, grid: int, effort: Effort, conditions: str) -> Table:
         for i, state in enumerate(states)
     }
     calls: dict[tuple[str, int], Callable[[], Any]] = {key: call for key, (call, _) in warmed.items()}
-    bound = linear_quadratic(scenario.joints, grid - 1)
-    if bound is not None:
-        calls[BOUND, 0] = bound
     answers = {key: answer(call()) for key, (call, answer) in warmed.items()}
     # One call a turn: the slow ones would take minutes otherwise, and the fast ones have as many turns.
     times = medians(calls, effort.solves, 0.0)
@@ -87,15 +75,30 @@ def _table(name: str, grid: int, effort: Effort, conditions: str) -> Table:
             statistics.median(excess),
             max(excess),
         )
-    if bound is not None:
-        spent_us = 1e6 * times[BOUND, 0]
-        share = None if reference is None else times[BOUND, 0] / reference
-        rows[BOUND] = (spent_us, spent_us, share, 1.0, None, None, None, None)
-    return Table(
-        f"horizon_{name}_{grid}",
-        f"A horizon of {grid} grid points in {name}",
-        conditions,
-        COLUMNS,
-        rows,
-        skipped,
-    )
+    return Table(f"A horizon of {grid} grid points in {name}", conditions, COLUMNS, rows, skipped)
+
+
+def along(scenario: Scenario, preview: int, count: int, lead: int) -> list[list[Observation]]:
+    """States of an episode of a receding horizon, evenly spread, each at the end of the steps that lead to it.
+
+    The episode is one of `rhc` with the same horizon, since its solver has to be fast where it leads.
+
+    Args:
+        scenario: The scenario.
+        preview: Steps of the nominal trajectory that the observations show.
+        count: The number of states.
+        lead: Steps shown before each of them.
+
+    Returns:
+        For each state, the ``lead + 1`` observations up to it.
+    """
+    policy = baselines.make("rhc", scenario, horizon=preview + 1)
+    env = gym.make("RedundantIK-v0", scenario=scenario, preview=preview)
+    observation, _ = env.reset(seed=0)
+    ends = np.linspace(0, scenario.steps, count + 2).astype(int)[1:-1]
+    episode, state = [], None
+    for _ in range(int(ends[-1]) + 1):
+        episode.append({key: np.array(value) for key, value in observation.items()})
+        action, state = policy.predict(observation, state)
+        observation, *_ = env.step(action)
+    return [episode[max(end - lead, 0) : end + 1] for end in ends]

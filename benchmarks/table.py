@@ -1,30 +1,17 @@
-"""A table of figures with their units: as text and as Markdown."""
+"""Tables of figures as text and Markdown, and the report with all of them."""
 
 from __future__ import annotations
 
 import dataclasses
+import importlib.metadata
+from collections.abc import Mapping, Sequence
+from typing import Any
 
-from baselines.evaluation.report import number
+from baselines.evaluation.metrics import describe
+from baselines.evaluation.table import number
 
-
-@dataclasses.dataclass(frozen=True)
-class Column:
-    """A column of a table.
-
-    Args:
-        key: Its name.
-        title: Its head.
-        unit: Of its figures, empty for pure numbers.
-    """
-
-    key: str
-    title: str
-    unit: str = ""
-
-    @property
-    def head(self) -> str:
-        """Title and unit."""
-        return f"{self.title} [{self.unit}]" if self.unit else self.title
+#: Libraries whose versions are stated, besides those of :func:`baselines.evaluation.metrics.describe`.
+LIBRARIES = ("gymnasium", "mujoco", "envpool", "pin", "casadi", "crocoddyl", "stable-baselines3", "torch")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -32,25 +19,22 @@ class Table:
     """Figures that were measured in one interleaved run, and so can be compared.
 
     Args:
-        key: The table's name.
-        title: What was measured.
-        conditions: How, in sentences.
-        columns: The figures' names and units.
-        rows: The figures by what they belong to, None where there is none.
+        title: The heading.
+        conditions: How the figures were measured, in sentences.
+        columns: The heads of the columns, with their units.
+        rows: The figures by name, None for a missing one.
         skipped: What could not be measured, and why.
     """
 
-    key: str
     title: str
     conditions: str
-    columns: tuple[Column, ...]
+    columns: tuple[str, ...]
     rows: dict[str, tuple[float | None, ...]]
     skipped: tuple[str, ...] = ()
 
     def cells(self) -> list[list[str]]:
-        """Head and rows in words."""
-        head = ["", *(column.head for column in self.columns)]
-        return [head, *([name, *(number(value) for value in row)] for name, row in self.rows.items())]
+        """Head and rows as text."""
+        return [["", *self.columns], *([name, *(number(value) for value in row)] for name, row in self.rows.items())]
 
     def text(self) -> str:
         """For the terminal, without the conditions."""
@@ -60,17 +44,33 @@ class Table:
             "  ".join([line[0].ljust(widths[0]), *(c.rjust(w) for c, w in zip(line[1:], widths[1:], strict=True))])
             for line in cells
         ]
-        return "\n".join([self.title, *(f"  {line}".rstrip() for line in lines), *map(_left_out, self.skipped)])
+        notes = [f"left out: {why}" for why in self.skipped]
+        return "\n".join([self.title, *(f"  {line}".rstrip() for line in lines), *notes])
 
     def markdown(self) -> str:
-        """For a README, with its heading and conditions."""
+        """With heading and conditions."""
         head, *rows = (f"| {' | '.join(line)} |" for line in self.cells())
         ruler = f"| :-- |{' --: |' * len(self.columns)}"
-        notes = [f"- {_left_out(why)}" for why in self.skipped]
-        return "\n".join(
-            [f"## {self.title}", "", self.conditions, "", head, ruler, *rows, *([""] if notes else []), *notes]
-        )
+        notes = ["", *(f"- left out: {why}" for why in self.skipped)] if self.skipped else []
+        return "\n".join([f"## {self.title}", "", self.conditions, "", head, ruler, *rows, *notes])
 
 
-def _left_out(why: str) -> str:
-    return f"left out: {why}"
+def page(tables: Sequence[Table], run: Mapping[str, Any]) -> str:
+    """All tables in Markdown, with the facts about the run, the machine, and the versions of the libraries."""
+    facts = {**run, **describe(), **{name: _version(name) for name in LIBRARIES}}
+    parts = [
+        "# Speed",
+        "Figures of one table come from one run and are medians of interleaved rounds unless it says otherwise, so "
+        "that ratios hold on a noisy machine. Figures of different tables do not compare as well.",
+        *(table.markdown() for table in tables),
+        "## Conditions",
+        "\n".join(f"- {key}: {value}" for key, value in facts.items()),
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def _version(name: str) -> str:
+    try:
+        return importlib.metadata.version(name)
+    except importlib.metadata.PackageNotFoundError:
+        return "not installed"

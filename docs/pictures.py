@@ -12,9 +12,8 @@ from matplotlib.ticker import MaxNLocator
 import baselines
 import ikgym
 from baselines.episodes import rollout
-from baselines.evaluation import table_plots
-from baselines.evaluation.plots import style
-from baselines.evaluation.table import from_csv
+from baselines.evaluation.plots import comparison, style
+from baselines.evaluation.records import from_csv
 from baselines.files import write
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray
@@ -139,9 +138,9 @@ def drawn() -> dict[str, Figure]:
     title = "rhc_foresight by horizon, geometric mean and 95 % interval"
     on_main = [line for line in results("cost_time") if line["scenario"] == "varga7-pose-random"]
     return {
-        "cost-time": table_plots.cost_time(on_main, "varga7-pose-random, 256 episodes"),
-        "foresight": table_plots.foresight(results("foresight"), title, "knows_end"),
-        "robustness": table_plots.severity_map(results("robustness_map")),
+        "cost-time": comparison.cost_time(on_main, "varga7-pose-random, 256 episodes"),
+        "foresight": comparison.foresight(results("foresight"), title, "knows_end"),
+        "robustness": comparison.severity_map(results("robustness_map")),
     }
 
 

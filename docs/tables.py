@@ -16,11 +16,12 @@ import numpy as np
 
 import baselines
 import ikgym
-from baselines.cli.listing import kinds_of_limits, summary
+from baselines.cli.arms import kinds_of_limits
+from baselines.cli.policies import summary
 from baselines.evaluation import test_sets as sets
-from baselines.evaluation.report import NOTHING
-from baselines.evaluation.table import from_csv
-from baselines.evaluation.table import markdown as results_table
+from baselines.evaluation.records import from_csv
+from baselines.evaluation.records import markdown as results_table
+from baselines.evaluation.table import NOTHING
 from baselines.oracle import best_known
 from baselines.oracle.best_known import MARGIN
 from baselines.registry import get
@@ -101,8 +102,11 @@ def policies() -> list[tuple[str, ...]]:
     rows = [("policy", "what it does", "parameters and defaults")]
     for name in baselines.names():
         policy = get(name)
-        parameters = ", ".join(_parameter(policy.__dataclass_fields__[p]) for p in policy.parameter_names())
-        rows.append((f"`{name}`" + (" (reference)" if policy.reference else ""), summary(name), parameters))
+        parameters = [_parameter(policy.__dataclass_fields__[p]) for p in policy.parameter_names()]
+        if base := next((other for other in baselines.names() if get(other) in policy.__mro__[1:]), None):
+            shared = {_parameter(get(base).__dataclass_fields__[p]) for p in get(base).parameter_names()}
+            parameters = [f"those of `{base}`", *(one for one in parameters if one not in shared)]
+        rows.append((f"`{name}`" + (" (reference)" if policy.reference else ""), summary(name), ", ".join(parameters)))
     return rows
 
 

@@ -1,8 +1,8 @@
-"""How much memory there is, and a clear word instead of a machine that runs out of it."""
+"""Checks that there is memory for something, before a machine runs out of it."""
 
 from __future__ import annotations
 
-import os
+import contextlib
 from pathlib import Path
 
 from ikgym.exceptions import InvalidInputError
@@ -10,16 +10,16 @@ from ikgym.exceptions import InvalidInputError
 GIB = 2**30
 # What takes less, in bytes, is never asked about.
 SMALL = 2**28
-# Where the system says what is available to all, and what a group of processes may take and has taken.
+# Files of Linux: the memory available to all, and the limit and the use of a control group.
 SYSTEM = Path("/proc/meminfo")
 GROUP = (Path("/sys/fs/cgroup/memory.max"), Path("/sys/fs/cgroup/memory.current"))
 
 
 def afford(what: str, needed: int) -> None:
-    """Insists that there is memory for something.
+    """Checks that there is memory for something.
 
     Args:
-        what: What it is for, as the message begins.
+        what: Its name, with which the message begins.
         needed: About how much it takes, in bytes.
 
     Raises:
@@ -58,25 +58,11 @@ def gib(amount: int) -> str:
 
 def available() -> int | None:
     """The memory that this process can still take, in bytes; None where the system does not say."""
-    known = [amount for amount in (_of_system(), _of_group()) if amount is not None]
-    return min(known, default=None)
-
-
-def _of_system() -> int | None:
-    try:
+    known = []
+    with contextlib.suppress(OSError, StopIteration, ValueError):
         lines = SYSTEM.read_text().splitlines()
-        return next(1024 * int(line.split()[1]) for line in lines if line.startswith("MemAvailable:"))
-    except (OSError, StopIteration, ValueError):
-        pass
-    try:  # no Linux: all that is built in
-        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    except (AttributeError, OSError, ValueError):
-        return None
-
-
-def _of_group() -> int | None:
-    try:
-        most, taken = (int(file.read_text()) for file in GROUP)  # "max" is no number: no bound
-    except (OSError, ValueError):
-        return None
-    return max(most - taken, 0)
+        known.append(next(1024 * int(line.split()[1]) for line in lines if line.startswith("MemAvailable:")))
+    with contextlib.suppress(OSError, ValueError):  # "max" is no number: no bound
+        most, taken = (int(file.read_text()) for file in GROUP)
+        known.append(max(most - taken, 0))
+    return min(known, default=None)

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from gymnasium.vector import AutoresetMode
 
 from ikgym.exceptions import InvalidInputError, UnknownNameError
-from ikgym.validation import known_names, number, shortened, whole_number
+from ikgym.validation import known_names, number, one_a_row, shortened, whole_number
 
 
 def checked_seeds(seed: int | Sequence[int | None] | None, rows: int) -> Sequence[int | None]:
@@ -19,17 +19,10 @@ def checked_seeds(seed: int | Sequence[int | None] | None, rows: int) -> Sequenc
     Raises:
         InvalidInputError: They are no whole numbers, or not one a row.
     """
-    if seed is None:
-        return [None] * rows
     if isinstance(seed, (int, np.integer)):
         first = whole_number("seed", seed, at_least=0)
         return [first + row for row in range(rows)]
-    if not isinstance(seed, (list, tuple)):
-        raise InvalidInputError(f"seed: expected None, a whole number or a list of them, got {seed!r}.")
-    seeds = [None if s is None else whole_number("seed", s, at_least=0) for s in seed]
-    if len(seeds) != rows:
-        raise InvalidInputError(f"seed: expected {rows} seeds, one a row, got {len(seeds)}.")
-    return seeds
+    return one_a_row("seed", seed, rows)
 
 
 def checked_mask(mask: Any, rows: int) -> npt.NDArray[np.bool_]:

@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
-
-import gymnasium as gym
-import numpy as np
+from collections.abc import Callable
+from typing import Any
 
 from ikgym.env import RedundantIKEnv
 from ikgym.exceptions import NoAttributeError
-from ikgym.scenarios import Scenario
+
+#: Attributes that every row has, from the vector environment and the number of the row.
+_SHARED: dict[str, Callable[[Any, int], Any]] = {
+    "scenario": lambda envs, _: envs.scenario,
+    "observation_space": lambda envs, _: envs.single_observation_space,
+    "action_space": lambda envs, _: envs.single_action_space,
+    "metadata": lambda *_: RedundantIKEnv.metadata,
+    "render_mode": lambda *_: None,
+    "np_random": lambda envs, row: envs.generator(row)[0],
+    "np_random_seed": lambda envs, row: envs.generator(row)[1],
+}
+_OWN = ("_envs", "_index")
 
 
 class ArmRow:
@@ -20,48 +29,18 @@ class ArmRow:
         index: Number of the row.
     """
 
-    metadata: ClassVar[dict[str, Any]] = RedundantIKEnv.metadata
-    render_mode: ClassVar[None] = None
-
     def __init__(self, envs: Any, index: int) -> None:
         self.__dict__.update(_envs=envs, _index=index)
 
-    @property
-    def scenario(self) -> Scenario:
-        """The tracking problem."""
-        scenario: Scenario = self._envs.scenario
-        return scenario
-
-    @property
-    def observation_space(self) -> gym.Space[Any]:
-        """Of one arm."""
-        space: gym.Space[Any] = self._envs.single_observation_space
-        return space
-
-    @property
-    def action_space(self) -> gym.Space[Any]:
-        """Of one arm."""
-        space: gym.Space[Any] = self._envs.single_action_space
-        return space
-
-    @property
-    def np_random(self) -> np.random.Generator:
-        """The row's generator."""
-        generator: np.random.Generator = self._envs.generator(self._index)[0]
-        return generator
-
-    @property
-    def np_random_seed(self) -> int:
-        """The seed of the row's generator."""
-        seed: int = self._envs.generator(self._index)[1]
-        return seed
-
     def __getattr__(self, name: str) -> Any:
+        if name in _SHARED:
+            return _SHARED[name](self._envs, self._index)
         if name.startswith("__"):  # what copy and pickle ask for
             raise AttributeError(name)
+        given = (one for one in self.__dict__ if one not in _OWN)
         raise NoAttributeError(
             f"The arms of a native vector environment have no {name!r}: they are reset, stepped and seen together. "
-            f"Available: {', '.join((*_SHARED, *self._given()))}. Environments one by one: gym.make_vec(…, "
+            f"Available: {', '.join((*_SHARED, *given))}. Environments one by one: gym.make_vec(…, "
             "vectorization_mode='sync')."
         )
 
@@ -69,10 +48,3 @@ class ArmRow:
         if name in _SHARED or name in _OWN:
             raise NoAttributeError(f"{name!r} of one arm cannot be set: make another environment.")
         self.__dict__[name] = value
-
-    def _given(self) -> list[str]:
-        return [name for name in self.__dict__ if name not in _OWN]
-
-
-_SHARED = ("scenario", "observation_space", "action_space", "metadata", "render_mode", "np_random", "np_random_seed")
-_OWN = ("_envs", "_index")

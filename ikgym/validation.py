@@ -139,6 +139,18 @@ def whole_number(name: str, value: int, *, at_least: int) -> int:
     return int(value)
 
 
+def one_a_row(name: str, given: Any, rows: int) -> list[int | None]:
+    """Whole numbers of at least 0 for N rows: one for all of them, or one a row; None where there is none.
+
+    Raises:
+        InvalidInputError: They are no such numbers, or not one a row.
+    """
+    numbers = list(given) if isinstance(given, (tuple, list, np.ndarray)) else [given] * rows
+    if len(numbers) != rows:
+        raise InvalidInputError(f"{name}: expected {rows} numbers, one a row, got {len(numbers)}.")
+    return [None if one is None else whole_number(name, one, at_least=0) for one in numbers]
+
+
 def flag(name: str, value: bool) -> bool:
     """A truth value.
 

@@ -1,14 +1,19 @@
-"""Bad values in every field of every part of a scenario: one table, made from the annotations of the fields."""
+"""Bad input: a table of fields and values made from annotations, and a table of calls that are refused."""
 
 from __future__ import annotations
 
 import dataclasses
+import functools
+import re
 import typing
 
+import gymnasium as gym
 import numpy as np
 import pytest
 
 import ikgym
+import ikgym.rl
+import ikgym.sb3
 from ikgym.exceptions import IkgymError
 from ikgym.plant import Plant
 from ikgym.trajectories import (
@@ -30,6 +35,7 @@ from ikgym.trajectories import (
     Trapezoidal,
     Turning,
     paths,
+    through,
 )
 from ikgym.trajectories.orientations import ORIENTATIONS
 from ikgym.trajectories.paths import PATHS
@@ -108,25 +114,193 @@ def bad_values(value, hint) -> dict[str, object]:
     return out
 
 
-CASES = [
-    pytest.param(one, field.name, bad, id=f"{type(one).__name__}.{field.name}={name}")
-    for one in GOOD
-    for field in dataclasses.fields(one)
-    if field.init
-    for name, bad in bad_values(getattr(one, field.name), typing.get_type_hints(type(one))[field.name]).items()
-    if name not in ALLOWED.get((type(one).__name__, field.name), ())
-]
+def refusal(call):
+    """The message of the error that a call raises."""
+    try:
+        call()
+    except IkgymError as error:
+        return str(error)
+    return ""
 
 
-@pytest.mark.parametrize(("good", "field", "bad"), CASES)
-def test_a_bad_value_is_refused_in_one_line(good, field, bad):
-    with pytest.raises(IkgymError) as caught:
-        good.replace(**{field: bad})
-    assert len(str(caught.value).splitlines()) == 1
-    assert len(str(caught.value)) < 4000
+@pytest.mark.parametrize("good", GOOD, ids=lambda one: type(one).__name__)
+def test_bad_values_of_fields_are_refused_in_one_line(good):
+    kind, hints = type(good).__name__, typing.get_type_hints(type(good))
+    for field in (field.name for field in dataclasses.fields(good) if field.init):
+        for name, bad in bad_values(getattr(good, field), hints[field]).items():
+            if name in ALLOWED.get((kind, field), ()):
+                continue
+            said = refusal(functools.partial(good.replace, **{field: bad}))
+            assert said, f"{kind} takes {field}={name}"
+            assert len(said.splitlines()) == 1
+            assert len(said) < 4000
 
 
 def test_every_kind_of_part_is_in_the_table():
     kinds = {*KINDS.values(), *PATHS.values(), *TIME_LAWS.values(), *ORIENTATIONS.values()}
     assert kinds == {type(one) for one in GOOD} - {ikgym.Arm, ikgym.Scenario, ikgym.TrackingCost, Plant}
     assert {JointSpline, ikgym.Scenario} <= {type(one) for one in GOOD}
+
+
+PANDA_LINE = ikgym.scenarios.get("panda-line")
+FAST = ikgym.scenarios.get("varga7-fast")
+PLANE = {"a": [1], "d": [0], "alpha": [0]}
+POINTS = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0]])
+STRAIGHT_BACK = [[0, 0, 0], [1, 0, 0], [0, 0, 0]]
+HELIX = ikgym.trajectories.Helix([0, 0, 0], 1, 1, 1)
+VARGA, SKEW = ikgym.arms.get("varga7"), ikgym.tasks.get("skew")
+TWO = ikgym.Arm("two", [[0, 0, 1], [1, 0, 0]], [[0, 0, 1], [1, 0, 0]], (False, True))
+LAW = {"speed": 1.0, "acceleration": 1.0}
+PUBLISHED = ikgym.scenarios.get("rlitg-random")
+
+
+def reset(scenario="varga7-random", /, **options):
+    ikgym.RedundantIKEnv(scenario).reset(seed=0, options=options)
+
+
+def reset_rows(seed=0, /, **options):
+    ikgym.RedundantIKVectorEnv(2, "varga7-random").reset(seed=seed, options=options)
+
+
+def inverse(**changes):
+    ARM.inverse(**{"rotation": np.eye(3), "position": np.array([0.4, 0, 0.4])} | changes)
+
+
+def dh(**changes):
+    ikgym.arms.from_dh("one", **PLANE | changes)
+
+
+#: What a call refuses, by a word that its message names: values that do not go together, and arguments of methods.
+REFUSED = [
+    *(("Axis", lambda x=x: TWO.replace(axes=[x, [1, 0, 0]])) for x in ([0, 0, 0], [1, 1, 0])),
+    ("at least one joint", lambda: ikgym.Arm("none", np.zeros((0, 3)), np.zeros((0, 3)))),
+    ("prismatic", lambda: TWO.replace(prismatic=(0, 1))),
+    ("tool_rotation", lambda: TWO.replace(tool_rotation=np.diag([1, 1, -1]))),
+    ("lower < upper", lambda: TWO.replace(lower=[0, 2], upper=[1, 2])),
+    ("velocity_limit", lambda: TWO.replace(velocity_limit=[1, 0])),
+    ("home", lambda: TWO.replace(upper=[1, 2], home=[0, 3])),
+    *(("joint_names", lambda x=x: TWO.replace(joint_names=x)) for x in ("ab", ("a", "a"))),
+    ("Did you mean 'tool'", lambda: TWO.replace(tools=1)),
+    *(("q: expected", lambda x=x: TWO.forward(x)) for x in (0.0, [1.0], [0, np.nan], ["0", "0"], [1j, 0], None)),
+    ("d of arm", lambda: dh(a=[1, 2])),
+    ("alpha", lambda: dh(alpha=[np.nan])),
+    ("row", lambda: dh(a=[], d=[], alpha=[])),
+    ("prismatic", lambda: dh(prismatic=(True, True))),
+    *(("rotation", lambda x=x: inverse(rotation=x)) for x in (np.eye(4), 2 * np.eye(3), np.full((3, 3), np.nan), "up")),
+    *(("position", lambda x=x: inverse(position=x)) for x in ([0.1, 0.2], [0.1, 0.2, np.inf])),
+    *(("start", lambda x=x: inverse(start=x)) for x in (np.zeros(6), np.zeros(7))),
+    ("fit together", lambda: inverse(position=np.zeros((2, 3)), start=np.tile(ARM.home, (3, 1)))),
+    *((name, lambda name=name: inverse(**{name: -1})) for name in ("tolerance", "restarts", "seed")),
+    ("Did you mean 'skew'", lambda: ikgym.tasks.get("skwe")),
+    ("rotation", lambda: SKEW.coordinates(np.zeros(3), np.zeros(3))),
+    ("rotation", lambda: SKEW.coordinates(np.eye(3), np.zeros((2, 3)))),
+    ("nominal", lambda: SKEW.error(np.zeros(5), np.zeros(6))),
+    ("coordinates", lambda: SKEW.error(np.zeros((4, 6)), np.zeros((3, 6)))),
+    ("coordinates", lambda: SKEW.error(np.zeros(6), np.full(6, np.nan))),
+    ("jacobian", lambda: SKEW.jacobian(np.eye(3), np.zeros((5, 7)))),
+    ("jacobian", lambda: SKEW.error_jacobian(np.zeros(6), np.zeros(6), 3.0)),
+    *(("error", lambda x=x: ikgym.TrackingCost().tracking(x)) for x in (np.nan, [np.inf, 0], "a", [], 1.0, [None])),
+    ("duration", lambda: PathTrajectory(LINE, Trapezoidal(0.5, 2.0, 2.0))),
+    ("approach", lambda: AlongPath([0, 0, 0])),
+    ("approach", lambda: PathTrajectory(paths.Circle([0, 0, 0], 1.0), Quintic(1, 1), AlongPath([1, 0, 0]))),
+    ("of length 1.41421", lambda: OrientationThrough([[1, 0, 0, 0], [1, 1, 0, 0]])),
+    ("half a turn", lambda: OrientationThrough([[1, 0, 0, 0], [0, 1, 0, 0]])),
+    ("quaternions", lambda: PathTrajectory(LINE, Quintic(1, 1), OrientationThrough(QUATERNIONS))),
+    ("at least 2", lambda: paths.SplinePath([[0, 0, 0]])),
+    ("apart", lambda: paths.SplinePath([[1, 0, 0], [0, 0, 0], [0, 0, 0]])),
+    *(("straight back", lambda make=make: make()) for make in (
+        lambda: paths.SplinePath(STRAIGHT_BACK), lambda: paths.Polyline(STRAIGHT_BACK, 0.1),
+    )),
+    ("start and end", lambda: paths.Line([1, 2, 3], [1, 2, 3])),
+    *(("corner_radius|at most 1 m", lambda x=x: paths.Polyline(POINTS, x)) for x in (2.0, 0.0)),
+    ("corner_radius", lambda: paths.Square([0, 0, 0], 0.1, 0.06)),
+    ("corner_radius", lambda: paths.Raster([0, 0, 0], 1.0, 0.3, 4, 0.1)),
+    ("lines", lambda: paths.Raster([0, 0, 0], 1.0, 1.0, 1, 0.1)),
+    ("lower < upper", lambda: RandomJointSpline([0, 1], [1, 0], 1, 1, 1)),
+    ("upper", lambda: RandomJointSpline([0, 1], [1], 1, 1, 1)),
+    ("velocity_limit", lambda: RandomJointSpline([0], [1], 0, 1, 1)),
+    *((name, lambda name=name, x=x: SPLINE.replace(**{name: x})) for name, x in (
+        ("spans", 2), ("margin", 1.0), ("scale", (0.5, 1.5)),
+    )),
+    ("lower", lambda: RandomJointSpline.within(VARGA, 2.0)),
+    ("feasible", lambda: PANDA_LINE.replace(trajectory=SPLINE.replace(velocity_limit=3 * ONES))),
+    *(("sample one first", lambda x=x: x.frames(np.zeros(1), ARM)) for x in (SPLINE, RandomSinusoid(ONES))),
+    ("control", lambda: JointSpline(np.zeros((5, 7)), 1.0)),
+    ("the same", lambda: JointSpline(np.arange(8.0)[:, None], 1.0)),
+    ("phase", lambda: Sinusoid([1, 2], phase=[1, 2, 3])),
+    ("scale", lambda: RandomSinusoid([1.0], scale=(1.0, 0.2))),
+    ("half of the duration", lambda: StraightLine(FRAME, FRAME, 1.0, 0.6)),
+    ("rotation of end", lambda: StraightLine(FRAME, np.zeros(12), 1.0, 0.5)),
+    ("speed", lambda: through(POINTS)),
+    ("acceleration", lambda: through(POINTS, speed=1.0)),
+    ("speed", lambda: through(POINTS, times=[0, 1, 2], speed=1.0)),
+    ("positions", lambda: through(POINTS, times=[0, 1])),
+    ("quaternions|shape", lambda: through(POINTS, QUATERNIONS[:2], times=[0, 1, 2])),
+    ("orientation", lambda: through(POINTS, QUATERNIONS, orientation=FixedOrientation(np.eye(3)), **LAW)),
+    ("Did you mean 'quintic'", lambda: through(POINTS, time_law="quintik", **LAW)),
+    ("Did you mean", lambda: PublishedPath("rlitg-helo", 0.2)),
+    ("period", lambda: PublishedPath("rlitg-hello", 0.0)),
+    *(("family|starts", lambda x=x: RandomPublishedPath(x, 0.2)) for x in ("none", "cppflow")),
+    ("8 joints", lambda: PUBLISHED.replace(arm=ikgym.arms.get("fetch"))),
+    ("Did you mean 'rlitg-hello'", lambda: ikgym.problems.waypoints("rlitg-helo")),
+    ("Did you mean", lambda: ikgym.problems.trajectory("rlitg-hello", "greed")),
+    *((name, lambda name=name, x=x: Plant(**{name: x})) for name, x in (
+        *((name, -1.0) for name in ("zero", "link", "axis", "backlash", "noise", "q_noise", "pose_noise")),
+        ("payload", np.inf), ("payload_step", 2.5), ("bandwidth", 0.0), ("bandwidth", (20, 10)),
+        ("bandwidth", (10, np.inf)), ("bandwidth", (1, 2, 3)), ("command_delay", (12, 2)), ("command_delay", (1.5, 2)),
+        ("q_delay", 0.5), ("pose_every", 0), ("pose_missing", 1.01), ("arms", "panda-2"), ("arms", ("panda-2",)),
+    )),
+    *((name, lambda name=name, x=x: FAST.replace(steps=20, plant=Plant(**{name: x}))) for name, x in (
+        ("zero", (1.0, 2.0)), ("bias", (1.0, 2.0)), ("command_delay", (3, 21)), ("q_delay", 21), ("pose_delay", 21),
+        ("arms", (ikgym.arms.get("faitli3"),)), ("arms", (ARM,)),
+    )),
+    ("knowledge", lambda: Plant(zero=1e-3).scaled(-0.1)),
+    ("drives", lambda: Plant(zero=1e-3).scaled(1.0, np.nan)),
+    ("pose_missing", lambda: Plant(pose_missing=0.5).scaled(3.0)),
+    ("arms", lambda: Plant(arms=(ARM,)).scaled(0.5)),
+    *((name, lambda name=name, x=x: FAST.replace(**{name: x})) for name, x in (
+        ("velocity_limit", 0.0), ("velocity_limit", [1.0, 2.0]), ("iterations_per_point", (3, 0)), ("arm", "varga7"),
+    )),
+    ("7 joints", lambda: FAST.replace(model=ikgym.arms.get("faitli3"))),
+    ("7 joints", lambda: FAST.replace(trajectory=Sinusoid([1.0, 2.0]))),
+    ("orientations", lambda: FAST.replace(trajectory=HELIX, start=np.zeros(7))),
+    ("seed", lambda: ikgym.scenarios.get("varga7-random").nominal()),
+    *(("preview", lambda x=x: FAST.nominal(preview=x)) for x in (-1, 1.5, "a", (1, -2))),
+    ("same at every reset", lambda: ikgym.scenarios.gaps(ikgym.scenarios.get("panda-random"))),
+    ("poses", lambda: ikgym.scenarios.gaps(PANDA_LINE, 1)),
+    *(("preview", lambda x=x: ikgym.RedundantIKEnv(preview=x)) for x in (
+        0, -1, True, 1.5, (), (0, 1), (3, 2), (2, 2), "2", (1, 2.5), None, 2**40, (1, 2**40),
+    )),
+    *(("commands", lambda x=x: ikgym.RedundantIKEnv(commands=x)) for x in (-1, 1.5, "a")),
+    ("render_mode", lambda: ikgym.RedundantIKEnv(render_mode="ansi")),
+    *(("step", lambda x=x: reset(step=x)) for x in (1000, -1, 1.5, [1, 2])),
+    ("path of the tool", lambda: reset("panda-circle", step=1)),
+    ("arm_seed", lambda: reset(arm_seed=3)),
+    *(("arm_seed", lambda x=x: reset("panda-camera", arm_seed=x)) for x in (-1, 1.5, [1, 2], "x")),
+    *(("Boolean|true entry", lambda x=x: reset_rows(reset_mask=x)) for x in (
+        [True, False], np.ones(2), np.ones(3, dtype=bool), np.zeros(2, dtype=bool),
+    )),
+    *(("'q'", lambda x=x: reset_rows(q=x)) for x in (np.zeros(6), np.full(7, np.inf))),
+    *(("seed", lambda x=x: reset_rows(x)) for x in ([1, 2, 3], 1.5)),
+    ("Did you mean 'reset_mask'", lambda: reset_rows(resetmask=np.ones(2, dtype=bool))),
+    ("Did you mean 'SameStep'", lambda: ikgym.RedundantIKVectorEnv(2, autoreset_mode="SamStep")),
+    ("num_envs", lambda: ikgym.RedundantIKVectorEnv(0)),
+    ("render a single one", lambda: ikgym.RedundantIKVectorEnv(2, render_mode="rgb_array")),
+    ("num_envs", lambda: ikgym.sb3.RedundantIKVecEnv(0)),
+    ("two steps ahead", lambda: ikgym.rl.make(FAST, preview=1)),
+    ("lost_distance", lambda: ikgym.rl.make(FAST, lost_distanc=1.0)),
+    ("RedundantIK-v0", lambda: ikgym.rl.RelativeAction(gym.make("CartPole-v1"))),
+    ("its own observation", lambda: ikgym.rl.RelativeAction(ikgym.rl.make(FAST))),
+    ("its own observation", lambda: ikgym.rl.vector.RelativeAction(ikgym.rl.make_vec(FAST, 2))),
+    *((name, lambda name=name, x=x: ikgym.rl.make(FAST, **{name: x})) for name, x in (
+        ("lost_distance", 0.0), ("share", 0.0), ("scale", -1.0), ("worst", 0.0),
+    )),
+    ("length", lambda: ikgym.rl.make(FAST, history=0)),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("word", "call"), [pytest.param(*case, id=f"{i}-{case[0]}") for i, case in enumerate(REFUSED)])
+def test_calls_that_are_refused(word, call):
+    said = refusal(call)
+    assert re.search(word, said), said
+    assert len(said.splitlines()) == 1

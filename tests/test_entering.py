@@ -74,20 +74,6 @@ def test_a_start_of_ones_own_is_entered_at_rest():
     assert observation["remaining"] == scenario.steps - 10
 
 
-@pytest.mark.parametrize(
-    ("step", "said"), [(1000, "below the 1000"), (-1, "at least 0"), (1.5, "whole"), ([1, 2], "1 steps")]
-)
-def test_wrong_steps_are_refused(step, said):
-    env = ikgym.RedundantIKEnv("varga7-random")
-    with pytest.raises(InvalidInputError, match=said):
-        env.reset(seed=0, options={"step": step})
-
-
-def test_paths_of_the_tool_alone_cannot_be_entered():
-    with pytest.raises(InvalidInputError, match="path of the tool"):
-        ikgym.RedundantIKEnv("panda-circle").reset(options={"step": 1})
-
-
 def test_a_lost_track_ends_the_episode_and_the_next_one_goes_on_from_there():
     env = ikgym.RedundantIKEnv("varga7-random", lost_distance=0.05)
     env.reset(seed=0)

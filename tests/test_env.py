@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 import subprocess
 import sys
@@ -11,30 +10,36 @@ import warnings
 import gymnasium as gym
 import numpy as np
 import pytest
-from gymnasium.utils.env_checker import check_env, data_equivalence
+from gymnasium.utils.env_checker import check_env
 from stable_baselines3.common.env_checker import check_env as sb3_check_env
 
 import ikgym
 from ikgym.env import OBSERVED, REPORTED
-from ikgym.exceptions import InvalidInputError, ResetNeededError, UnknownNameError
+from ikgym.exceptions import ResetNeededError
 from ikgym.kernels.outcome import SOMETIMES
 from tests.comparison import identical
 from tests.every_scenario import every_scenario
 from tests.spawning import random_env
+
+#: A scenario of each task, of 2, 3, 6, 7 and 8 joints, random, held and with a late plant.
+ONE_A_TASK = (
+    *("varga7-fast", "varga7-random", "planar2-bent", "zhang3-helix", "zhang6-lspb", "khan8-q1", "panda-glue"),
+    "panda-camera",
+)
 
 
 def make(scenario="varga7-fast", **kwargs):
     return gym.make("RedundantIK-v0", scenario=scenario, **kwargs)
 
 
-@pytest.mark.parametrize("scenario", every_scenario())
+@pytest.mark.parametrize("scenario", ONE_A_TASK)
 def test_gymnasium_check_env(scenario):
-    """Pictures, which take most of its time, of one scenario and of the axis; the tests of the rendering draw all."""
-    drawn = scenario is AXIS or scenario == "varga7-fast"
+    """Pictures, which take most of its time, of two scenarios; the tests of the rendering draw all."""
+    drawn = scenario in ("panda-glue", "varga7-fast")
     check_env(make(scenario).unwrapped, skip_render_check=not drawn)
 
 
-@pytest.mark.parametrize("scenario", every_scenario())
+@pytest.mark.parametrize("scenario", ONE_A_TASK)
 def test_stable_baselines3_check_env(scenario):
     """The contract's `nominal` of shape (p, m) earns one advice to flatten; flattened there is no warning at all."""
     with warnings.catch_warnings(record=True) as caught:
@@ -44,7 +49,7 @@ def test_stable_baselines3_check_env(scenario):
     sb3_check_env(gym.wrappers.FlattenObservation(make(scenario)))
 
 
-@pytest.mark.parametrize("scenario", every_scenario())
+@pytest.mark.parametrize("scenario", ONE_A_TASK)
 def test_docstring_tables_are_the_spaces(scenario):
     env = make(scenario, preview=(1, 4, 9)).unwrapped
     late = env.scenario.replace(plant=env.scenario.plant.replace(q_delay=1))
@@ -128,11 +133,6 @@ def test_steps_are_what_the_specification_says(scenario):
         assert truncated is (k == 11)
 
 
-@pytest.mark.parametrize("check", [test_gymnasium_check_env, test_docstring_tables_are_the_spaces])
-def test_the_task_axis_is_checked_as_well(check):
-    check(AXIS)
-
-
 def test_held_points_count_once():
     """Nominal points 1, 2, 3 are held for 3, 2 and 2 steps."""
     scenario = ikgym.scenarios.get("khan8-q1").replace(iterations_per_point=(3, 2), steps=7)
@@ -150,16 +150,6 @@ def test_held_points_count_once():
         assert (reward != 0.0) is last_of_its_point
         assert (info["tracking_cost"] > 0) is (info["velocity_cost"] > 0) is last_of_its_point
         assert info["position_error"] > 0
-
-
-def test_khan_holds_ten_points_for_60_steps_then_10():
-    points = ikgym.scenarios.get("khan8-q1").points(5)
-    lengths = np.bincount(points)
-    assert lengths[0] == 1
-    assert set(lengths[1:11]) == {60}
-    assert set(lengths[11:-1]) == {10}
-    assert ikgym.scenarios.get("khan8-q1").steps == 600 + 9990 * 10
-    assert points[100_500] == 10_000
 
 
 def test_khan_moves_and_measures_the_exact_arm_and_maps_nominals_through_the_model():
@@ -181,26 +171,6 @@ def test_zhang_helix_measures_zero_at_the_start_only():
     observation, *_, info = env.step(np.zeros(3, dtype=np.float32))
     np.testing.assert_allclose(observation["pose"], [0, 0, 19], atol=1e-12)
     assert "orientation_error" not in info
-
-
-def test_another_start_is_measured_as_it_is():
-    """The zero of the paper belongs to its own start."""
-    q = np.array([0.1, 0.2, 0.3])
-    env = make("zhang3-helix")
-    observation, _ = env.reset(options={"q": q})
-    np.testing.assert_array_equal(observation["pose"], env.unwrapped.scenario.arm.forward(q)[1])
-    observation, _ = env.reset()
-    np.testing.assert_array_equal(observation["pose"], 0.0)
-
-
-def test_an_error_that_does_not_exist_is_absent_since_gymnasium_refuses_nan():
-    """If this fails a NaN can stand in infos."""
-    assert not data_equivalence({"orientation_error": math.nan}, {"orientation_error": math.nan})
-    env = gym.make_vec("RedundantIK-v0", num_envs=2, scenario="faitli3-regular")
-    env.reset(seed=0)
-    infos = env.step(np.zeros((2, 3), dtype=np.float32))[4]
-    assert {"position_error", "_position_error"} <= infos.keys()
-    assert not {"orientation_error", "_orientation_error"} & infos.keys()
 
 
 def test_orientation_error_is_the_geodesic_angle_beyond_a_right_angle():
@@ -289,17 +259,6 @@ def test_ids_and_arguments():
     np.testing.assert_array_equal(observation["nominal"], full[[1, 10, 40, 120]])
 
 
-def test_nominal_goes_on_past_the_end():
-    scenario = ikgym.scenarios.get("varga7-fast")
-    short = scenario.replace(steps=4)
-    env = make(short, preview=5)
-    env.reset()
-    for _ in range(4):
-        observation, *_, truncated, _ = env.step(np.zeros(7, dtype=np.float32))
-    assert truncated
-    np.testing.assert_array_equal(observation["nominal"], scenario.nominal()[5:10])
-
-
 @pytest.mark.parametrize("name", every_scenario())
 def test_bounds_are_true_at_the_worst(name):
     """Full speed from the farthest start, for the whole episode."""
@@ -314,27 +273,6 @@ def test_bounds_are_true_at_the_worst(name):
         for _ in range(scenario.steps):
             observation = env.step(np.full(scenario.joints, 2.0 * sign, dtype=np.float32))[0]
             assert env.observation_space.contains(observation)
-
-
-@pytest.mark.parametrize(
-    ("action", "message"),
-    [
-        (np.zeros(6), r"expected shape \(7,\), got \(6,\)"),
-        ([[1], [1, 2]], "expected numbers of shape"),
-        (np.array([0, 0, np.nan, 0, 0, 0, 0]), "expected finite numbers.*nan.*state is as it was"),
-        (np.array([0, 0, np.inf, 0, 0, 0, 0]), "expected finite numbers.*inf.*state is as it was"),
-    ],
-)
-def test_bad_actions_leave_the_state_as_it_was(action, message):
-    env = make().unwrapped
-    twin = make().unwrapped
-    good = np.full(7, 0.3, dtype=np.float32)
-    for e in (env, twin):
-        e.reset(seed=0)
-        e.step(good)
-    with pytest.raises(InvalidInputError, match=message):
-        env.step(action)
-    assert identical(env.step(good), twin.step(good))
 
 
 def test_clipping_is_said_and_done():
@@ -356,36 +294,3 @@ def test_step_needs_an_episode():
         env.step(action)
     env.reset()
     env.step(action)
-
-
-@pytest.mark.parametrize(
-    ("options", "error", "message"),
-    [
-        ({"q": np.full(7, 7.0)}, InvalidInputError, r"at most .*6\.2832"),
-        (["q"], InvalidInputError, r"options: expected None or a dict, got \['q'\]"),
-        ({"Q": np.zeros(7)}, UnknownNameError, "option of reset 'Q'.*Available: q"),
-    ],
-)
-def test_bad_options_change_nothing(options, error, message):
-    env = make("varga7-random").unwrapped
-    env.reset(seed=5)
-    state = env.np_random.bit_generator.state
-    with pytest.raises(error, match=message):
-        env.reset(seed=6, options=options)
-    assert env.np_random.bit_generator.state == state
-    env.step(np.zeros(7, dtype=np.float32))
-
-
-@pytest.mark.parametrize(
-    "preview", [0, -1, True, 1.5, (), (0, 1), (3, 2), (2, 2), "2", (1, 2.5), None, 2**40, (1, 2**40)]
-)
-def test_bad_previews(preview):
-    with pytest.raises(InvalidInputError, match=r"preview: expected a whole number of at least 1, or rising.* got"):
-        ikgym.RedundantIKEnv(preview=preview)
-
-
-def test_unknown_scenario_and_argument():
-    with pytest.raises(UnknownNameError, match=r"There is no scenario 'varga7-fats'. Did you mean 'varga7-fast'\?"):
-        make("varga7-fats")
-    with pytest.raises(TypeError, match="scenaro"):
-        gym.make("RedundantIK-v0", scenaro="varga7-fast")

@@ -1,4 +1,3 @@
-import copy
 import itertools
 import logging
 import pickle
@@ -13,7 +12,6 @@ from gymnasium.wrappers import RecordVideo
 
 import ikgym
 from ikgym import arms
-from ikgym.exceptions import InvalidInputError, ResetNeededError
 from ikgym.rendering import Renderer, renderer, scene, style
 from ikgym.rendering.renderer import HEIGHT, WIDTH
 
@@ -123,17 +121,6 @@ def test_a_second_episode_looks_as_if_it_were_the_first():
     np.testing.assert_array_equal(env.render(), fresh.render())
 
 
-def test_the_axes_stay_during_an_episode():
-    env = environment()
-    limits = []
-    for _ in range(STEPS):
-        move(env, 1.0)
-        env.render()
-        space, *_ = renderer_of(env).figure.axes
-        limits.append((space.get_xlim(), space.get_ylim(), space.get_zlim()))
-    assert len(set(limits)) == 1
-
-
 def test_prismatic_joints_have_an_artist_of_their_own():
     env = environment()
     for _ in range(3):
@@ -158,7 +145,7 @@ def test_tool_target_and_paths_are_where_they_should_be():
     for _ in range(4):
         observation, *_ = move(env)
     env.render()
-    tool = env.scenario.arm.forward(observation["q"])[1]
+    rotation, tool = env.scenario.arm.forward(observation["q"])
     nominal = env._simulator.nominal_positions(0)
     np.testing.assert_allclose(np.ravel(artist(env, "tool").get_data_3d()), tool)
     np.testing.assert_allclose(np.ravel(artist(env, "target").get_data_3d()), nominal[4])
@@ -166,23 +153,10 @@ def test_tool_target_and_paths_are_where_they_should_be():
     actual = np.transpose(artist(env, "actual path").get_data_3d())
     assert len(actual) == 5
     np.testing.assert_allclose(actual[-1], tool)
-
-
-def test_the_tool_frame_is_turned_with_the_tool():
-    env = environment()
-    ends = []
-    for _ in range(3):
-        observation, *_ = move(env)
-        env.render()
-        rotation, position = env.scenario.arm.forward(observation["q"])
-        for name, axis in zip("xyz", rotation.T, strict=True):
-            begin, end = np.transpose(artist(env, f"tool {name}").get_data_3d())
-            np.testing.assert_allclose(begin, position)
-            np.testing.assert_allclose((end - begin) / np.linalg.norm(end - begin), axis, atol=1e-12)
-            ends.append(np.linalg.norm(end - begin))
-    np.testing.assert_allclose(ends, ends[0])
-    env.render()  # the same state again
-    np.testing.assert_allclose(np.transpose(artist(env, "tool z").get_data_3d())[0], position)
+    for name, axis in zip("xyz", rotation.T, strict=True):
+        begin, end = np.transpose(artist(env, f"tool {name}").get_data_3d())
+        np.testing.assert_allclose(begin, tool)
+        np.testing.assert_allclose((end - begin) / np.linalg.norm(end - begin), axis, atol=1e-12)
 
 
 @pytest.mark.parametrize(("name", "panels"), [("varga7-fast", 2), ("zhang3-helix", 1)])
@@ -218,8 +192,8 @@ def test_long_curves_are_thinned_and_keep_their_peaks():
 #: Arms, joint coordinates and errors that are drawn at the worst: each value once, not all together, since the picture
 #: of the arm and the curves of its errors do not know each other.
 WORST = [
-    *(("varga7", 0.0, error) for error in (0.0, 1e-300, 1e6, 1e300, np.inf)),
-    *(("varga7", 1e6, 0.0), ("varga7", -1e9, np.inf), ("puma560", 1e6, 1e-300), ("puma560", -1e9, 1e300)),
+    *(("varga7", 0.0, error) for error in (0.0, 1e-300, 1e300, np.inf)),
+    *(("varga7", -1e9, np.inf), ("puma560", 1e6, 1e-300)),
 ]
 
 
@@ -245,22 +219,6 @@ def test_human_mode_without_windows_is_silent_and_says_so_once(caplog):
     assert "agg" in message.lower()
     assert caplog.records[0].levelno == logging.INFO
     env.close()
-
-
-def test_human_mode_passes_over_states_but_never_the_first_or_the_last(monkeypatch):
-    painted = count_paintings(monkeypatch)
-    now = [100.0]
-    monkeypatch.setattr(renderer.clock, "perf_counter", lambda: now[0])
-    env = environment(mode="human", steps=40)
-    assert len(painted) == 1
-    for _ in range(39):
-        now[0] += renderer.INTERVAL / 10.5
-        move(env)
-    assert len(painted) == 1 + 3  # after 11, 22 and 33 steps
-    move(env)
-    assert len(painted) == 5
-    env.reset()
-    assert len(painted) == 6
 
 
 def test_a_window_is_drawn_on_until_it_is_closed(monkeypatch):
@@ -307,24 +265,6 @@ def test_a_video_can_be_recorded(tmp_path):
     assert (shown[0] != shown[-1]).any()  # encoders and decoders may drop frames at either end
 
 
-@pytest.mark.parametrize("mode", ["ansi", "", 3])
-def test_a_wrong_render_mode_is_an_error(mode):
-    with pytest.raises(InvalidInputError, match="rgb_array"):
-        ikgym.RedundantIKEnv(short(), render_mode=mode)
-
-
-@pytest.mark.parametrize("mode", ["human", "rgb_array"])
-def test_there_is_nothing_to_draw_before_a_reset(mode):
-    with pytest.raises(ResetNeededError, match="reset"):
-        ikgym.RedundantIKEnv(short(), render_mode=mode).render()
-
-
-def test_render_without_a_mode_warns():
-    env = environment(mode=None)
-    with pytest.warns(UserWarning, match="render_mode"):
-        assert env.render() is None
-
-
 def test_rgb_array_mode_imports_no_pyplot_and_no_mode_no_matplotlib():
     code = """
 import sys, ikgym
@@ -339,23 +279,14 @@ assert "matplotlib.pyplot" not in sys.modules
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
-@pytest.mark.parametrize("mode", ["rgb_array", "human"])
-@pytest.mark.parametrize("duplicate", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))])
-def test_copies_draw_the_episode_on_a_figure_of_their_own(mode, duplicate):
-    env = environment(mode=mode)
-    move(env)
+def test_copies_draw_the_episode_on_a_figure_of_their_own():
+    env, fresh = environment(), environment()
+    move(env), move(fresh)
     picture = env.render()
-    twin = duplicate(env)
+    twin = pickle.loads(pickle.dumps(env))
     assert twin._renderer.figure is None
-    for _ in range(3):
-        step, again = move(env), move(twin)
-        np.testing.assert_array_equal(step[0]["q"], again[0]["q"])
-    if mode == "rgb_array":
-        fresh = environment(mode=mode)
-        for _ in range(4):
-            move(fresh)
-        np.testing.assert_array_equal(twin.render(), fresh.render())
-        assert not np.array_equal(picture, env.render())
-        assert twin._renderer.figure is not env._renderer.figure
-    for each in (env, twin):
-        each.close()
+    for each in (env, twin, fresh):
+        move(each)
+    np.testing.assert_array_equal(twin.render(), fresh.render())
+    assert not np.array_equal(picture, env.render())
+    assert twin._renderer.figure is not env._renderer.figure

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import copy
-import pickle
-
 import gymnasium as gym
 import numpy as np
 import pytest
@@ -64,13 +61,6 @@ def test_specs_say_how_long_episodes_are():
     assert ikgym.RedundantIKVectorEnv(2, SHORT).spec is None
 
 
-def test_wrappers_that_ask_for_the_length_work():
-    env = gym.wrappers.TimeAwareObservation(gym.make("RedundantIK-v0", scenario=SHORT), flatten=False)
-    assert env.max_timesteps == 4
-    env.reset(seed=0)
-    assert env.step(np.zeros(7, dtype=np.float32))[0]["time"] == 1
-
-
 def test_environments_are_made_again_from_their_specs():
     single = gym.make("RedundantIK-v0", scenario=SHORT, preview=3)
     for again in (gym.make(single.spec), gym.make(single.unwrapped.spec)):
@@ -82,17 +72,3 @@ def test_environments_are_made_again_from_their_specs():
     assert gym.make_vec("RedundantIK-v0", num_envs=2, scenario=SHORT, max_episode_steps=4).num_envs == 2
     with pytest.raises(InvalidInputError, match="max_episode_steps: expected the 4 of the scenario, got 5"):
         gym.make_vec("RedundantIK-v0", num_envs=2, scenario=SHORT, max_episode_steps=5)
-
-
-@pytest.mark.parametrize("duplicate", [copy.deepcopy, lambda envs: pickle.loads(pickle.dumps(envs))])
-def test_copies_go_on_as_the_original_does(duplicate):
-    envs = native()
-    envs.reset(seed=2)
-    envs.set_attr("level", [1, 2, 3])
-    actions = np.full((N, 7), 0.3, dtype=np.float32)
-    envs.step(actions)
-    twin = duplicate(envs)
-    assert twin.get_attr("level") == (1, 2, 3)
-    assert twin.spec.max_episode_steps == 4
-    for _ in range(9):
-        assert identical(twin.step(actions), envs.step(actions))

@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
-import warnings
-
 import gymnasium as gym
 import numpy as np
 import pytest
-from stable_baselines3 import PPO, SAC
+from stable_baselines3 import PPO
 from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.monitor import Monitor
-from stable_baselines3.common.vec_env import DummyVecEnv, VecCheckNan, VecFrameStack, VecMonitor, VecNormalize
+from stable_baselines3.common.vec_env import DummyVecEnv, VecFrameStack, VecNormalize
 
 import baselines
 import ikgym
-from ikgym.exceptions import InvalidInputError, ResetNeededError, UnknownNameError
+from ikgym.exceptions import IkgymError, InvalidInputError, ResetNeededError
 from ikgym.sb3 import RedundantIKVecEnv
 from tests.comparison import identical
 
@@ -84,30 +80,6 @@ def test_bit_identical_to_dummy_vec_env_over_whole_episodes(scenario):
             assert identical(got, wanted)
 
 
-def test_returned_types_are_those_of_dummy_vec_env():
-    ours, dummy = pair(noisy(steps=1))
-    for env in (ours, dummy):
-        env.seed(0)
-        env.reset()
-    (_, rewards, ended, infos), (*_, wanted) = (env.step(np.zeros((N, 7), np.float32)) for env in (ours, dummy))
-    assert rewards.dtype == np.float32
-    assert ended.dtype == np.bool_
-    for key, value in infos[0].items():
-        assert type(value) is type(wanted[0][key])
-    for key, value in infos[0]["episode"].items():
-        assert type(value) is type(wanted[0]["episode"][key])
-
-
-def test_infos_are_empty_within_an_episode_and_nobody_elses():
-    env = RedundantIKVecEnv(2, noisy())
-    env.reset()
-    infos = env.step(np.zeros((2, 7), np.float32))[3]
-    assert infos == [{}, {}]
-    infos[0]["mine"] = 1
-    assert infos[1] == {}
-    assert env.step(np.zeros((2, 7), np.float32))[3] == [{}, {}]
-
-
 def test_what_is_returned_is_the_callers():
     scenario = noisy(steps=2)
     ours, untouched = RedundantIKVecEnv(N, scenario), RedundantIKVecEnv(N, scenario)
@@ -135,56 +107,28 @@ def test_what_is_returned_is_the_callers():
         last = observation
 
 
-def test_seeds_and_options_serve_one_reset():
-    env = RedundantIKVecEnv(N, noisy())
-    env.seed(4)
-    env.set_options({"q": np.full(7, 0.25)})
-    first = env.reset()
-    np.testing.assert_array_equal(first["q"], 0.25)
-    second = env.reset()
-    assert not (second["q"] == 0.25).any()
-    assert not identical(second["nominal"], first["nominal"])
-    env.seed(4)
-    assert identical(env.reset()["nominal"], first["nominal"])
-    assert env.get_attr("np_random_seed") == [4, 5, 6]
-
-
-def test_options_one_a_row():
-    ours, dummy = pair(noisy())
-    starts = np.random.default_rng(0).uniform(-1.0, 1.0, (N, 7))
-    for env in (ours, dummy):
-        env.seed(2)
-        env.set_options([{"q": start} for start in starts])
-    assert identical(ours.reset(), dummy.reset())
-    np.testing.assert_array_equal(ours.reset_infos, dummy.reset_infos)
-
-
 @pytest.mark.parametrize(
-    ("options", "error", "message"),
+    "options",
     [
-        ({"p": 1}, UnknownNameError, "There is no option of reset 'p'"),
-        ({"reset_mask": np.ones(N, dtype=bool)}, UnknownNameError, "'reset_mask'"),
-        ({"q": np.zeros(6)}, InvalidInputError, r"options\['q'\]: expected shape \(7,\)"),
-        ([{"q": np.zeros(7)}, {}, {}], InvalidInputError, "for all rows or for none, got 1 of 3"),
-        ([{}, {}], InvalidInputError, "options: expected 3, one a row, got 2"),
+        {"p": 1},
+        {"reset_mask": np.ones(N, dtype=bool)},
+        {"q": np.zeros(6)},
+        [{"q": np.zeros(7)}, {}, {}],
+        [{}, {}],
     ],
 )
-def test_bad_options_change_nothing(options, error, message):
+def test_bad_options_change_nothing(options):
     ours, untouched = RedundantIKVecEnv(N, noisy()), RedundantIKVecEnv(N, noisy())
     for env in (ours, untouched):
         env.seed(1)
         env.reset()
-        for _ in range(3):
-            env.step(np.zeros((N, 7), np.float32))
+        env.step(np.zeros((N, 7), np.float32))
     ours.seed(7)
     ours.set_options(options)
-    with pytest.raises(error, match=message):
+    with pytest.raises(IkgymError):
         ours.reset()
     for got, wanted in zip(played(ours, 8), played(untouched, 8), strict=True):
         assert identical(got, wanted)
-    ours.set_options()
-    untouched.seed(7)
-    assert identical(ours.reset(), untouched.reset())
 
 
 def test_bad_steps_change_nothing():
@@ -206,13 +150,6 @@ def test_bad_steps_change_nothing():
         ours.step_wait()
     for got, wanted in zip(played(ours, 8), played(untouched, 8), strict=True):
         assert identical(got, wanted)
-
-
-def test_bad_arguments():
-    with pytest.raises(InvalidInputError, match="num_envs"):
-        RedundantIKVecEnv(0)
-    with pytest.raises(UnknownNameError, match="Did you mean 'varga7-fast'"):
-        RedundantIKVecEnv(2, "varga7-fas")
 
 
 def test_attributes_of_rows():
@@ -239,36 +176,10 @@ def test_attributes_of_rows():
         ours.set_attr("scenario", noisy())
 
 
-def test_wrapped_and_closed():
-    ours, dummy = pair(noisy())
-    for wrapper in (Monitor, gym.wrappers.TimeLimit):
-        assert ours.env_is_wrapped(wrapper) == dummy.env_is_wrapped(wrapper)
-        assert ours.env_is_wrapped(wrapper, indices=1) == dummy.env_is_wrapped(wrapper, indices=1)
-    with pytest.warns(UserWarning, match="no `render_mode` was passed"):
-        assert ours.render() is None
-    ours.close()
-    ours.close()
+WRAPPERS = [lambda env: VecNormalize(env, gamma=0.9), lambda env: VecFrameStack(env, 2)]
 
 
-def normalized(env):
-    return VecNormalize(env, gamma=0.9)
-
-
-def stacked(env):
-    return VecFrameStack(env, 2)
-
-
-def monitored(env):
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "The environment is already wrapped with a `Monitor`")
-        return VecMonitor(env, info_keywords=("position_error",))
-
-
-def checked(env):
-    return VecCheckNan(env, raise_exception=True)
-
-
-@pytest.mark.parametrize("wrap", [normalized, stacked, monitored, checked])
+@pytest.mark.parametrize("wrap", WRAPPERS, ids=["VecNormalize", "VecFrameStack"])
 def test_wrappers_see_no_difference(wrap):
     scenario = noisy()
     ours, dummy = (wrap(env) for env in pair(scenario))
@@ -296,18 +207,11 @@ def test_evaluate_policy():
     assert results[0][1] == [5] * 6
 
 
-LEARNERS = {
-    "PPO": (PPO, {"n_steps": 8, "batch_size": 24, "n_epochs": 2}),
-    "SAC": (SAC, {"learning_starts": 12, "batch_size": 16}),
-}
-
-
 @pytest.mark.usefixtures("one_thread")
-@pytest.mark.parametrize(("algorithm", "parameters"), LEARNERS.values(), ids=LEARNERS)
-def test_agents_learn_the_very_same(algorithm, parameters, tmp_path):
+def test_agents_learn_the_very_same(tmp_path):
     def agent(env):
-        policy = {"net_arch": [8]}
-        return algorithm("MultiInputPolicy", env, policy_kwargs=policy, seed=0, device="cpu", **parameters)
+        settings = {"n_steps": 8, "batch_size": 24, "n_epochs": 2, "policy_kwargs": {"net_arch": [8]}}
+        return PPO("MultiInputPolicy", env, seed=0, device="cpu", **settings)
 
     steps = 144
     envs = pair(noisy())
@@ -321,30 +225,17 @@ def test_agents_learn_the_very_same(algorithm, parameters, tmp_path):
 
     ours.save(tmp_path / "agent")
     env = RedundantIKVecEnv(N, noisy(), PREVIEW)
-    loaded = algorithm.load(tmp_path / "agent", env=env, device="cpu")
+    loaded = PPO.load(tmp_path / "agent", env=env, device="cpu")
     observation = env.reset()
     got, wanted = (learned.predict(observation, deterministic=True)[0] for learned in (loaded, ours))
     assert identical(got, wanted)
     loaded.learn(N * 8)
 
 
-def test_without_stable_baselines3_it_says_what_is_missing():
-    code = (
-        "import sys; sys.modules['stable_baselines3'] = None\n"
-        "from ikgym.exceptions import MissingDependencyError\n"
-        "try:\n    import ikgym.sb3\n"
-        "except MissingDependencyError as error:\n    assert 'pip install \"ikgym[train]\"' in str(error)\n"
-        "else:\n    raise SystemExit('imported')"
-    )
-    subprocess.run([sys.executable, "-c", code], check=True)
-
-
-@pytest.mark.parametrize("use", [lambda envs: PPO("MultiInputPolicy", envs), lambda envs: DummyVecEnv([lambda: envs])])
-def test_the_vector_environment_of_gymnasium_is_another_one(use):
+def test_the_vector_environment_of_gymnasium_is_another_one():
     """What Stable-Baselines3 says when it refuses one names what it takes."""
     envs = gym.make_vec("RedundantIK-v0", num_envs=2, scenario=noisy())
-    with pytest.raises(ValueError, match="not a Gymnasium environment") as said:
-        use(envs)
-    assert "for Stable-Baselines3 there is ikgym.sb3.RedundantIKVecEnv" in str(said.value)
-    with pytest.raises(InvalidInputError, match=r"RedundantIKVecEnv\(N, scenario, preview\) has the same arms"):
+    with pytest.raises(ValueError, match=r"ikgym\.sb3\.RedundantIKVecEnv"):
+        DummyVecEnv([lambda: envs])
+    with pytest.raises(InvalidInputError, match=r"RedundantIKVecEnv\(N, scenario, preview\)"):
         RedundantIKVecEnv(envs)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import dataclasses
+import functools
 import itertools
 import pickle
 import typing
@@ -18,6 +19,8 @@ from ikgym import parallel
 from ikgym.simulator import Simulator
 from ikgym.trajectories import Helix, RandomSinusoid, Trajectory
 from tests.comparison import identical
+from tests.limited import limited
+from tests.plant.effects import ALL, panda
 
 ROWS = 9
 
@@ -96,14 +99,14 @@ def test_blocks_show_the_episodes_nominals():
 def test_threads_do_not_disturb_each_other(monkeypatch):
     """All rows of a step in several threads against the same in one."""
     monkeypatch.setattr(parallel, "cores", lambda: 4)
-    rows, outcomes = 4000, {}
+    rows, outcomes = 400, {}
     actions = np.random.default_rng(0).uniform(-1, 1, (5, rows, 7))
-    for grain in (1000, rows):
+    for grain in (100, rows):
         monkeypatch.setattr(simulator_module, "GRAIN_STEP", grain)
         simulator = Simulator(ikgym.scenarios.get("varga7-random"), rows, 2)
         simulator.reset(np.ones(rows, dtype=bool), [np.random.default_rng(i) for i in range(rows)])
         outcomes[grain] = [simulator.step(a).numbers for a in actions]
-    assert identical(outcomes[1000], outcomes[rows])
+    assert identical(outcomes[100], outcomes[rows])
 
 
 @pytest.mark.parametrize("name", ["varga7-fast", "varga7-random", "varga7-random-long"])
@@ -114,11 +117,18 @@ def test_many_arms_take_little_memory(name):
     assert taken + simulator.observe().numbers.nbytes < 100e6
 
 
+ENVS = [
+    functools.partial(make, scenario=scenario)
+    for make in (ikgym.RedundantIKEnv, functools.partial(ikgym.RedundantIKVectorEnv, 3))
+    for scenario in ("varga7-random", limited(), panda(ALL))
+]
+
+
 @pytest.mark.parametrize("duplicate", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))])
-@pytest.mark.parametrize("make", [ikgym.RedundantIKEnv, lambda name: ikgym.RedundantIKVectorEnv(3, name)])
+@pytest.mark.parametrize("make", ENVS)
 def test_copies_go_on_by_themselves(make, duplicate):
     """A copy whose kernel still saw the arrays of the first would step it instead."""
-    env, twin = make("varga7-random"), make("varga7-random")
+    env, twin = make(), make()
     actions = np.full(env.action_space.shape, 0.2, dtype=np.float32)
     for e in (env, twin):
         e.reset(seed=3)
@@ -130,9 +140,9 @@ def test_copies_go_on_by_themselves(make, duplicate):
     np.testing.assert_array_equal(env.step(actions)[0]["q"], wanted[0])
 
 
-@pytest.mark.parametrize("make", [ikgym.RedundantIKEnv, lambda name: ikgym.RedundantIKVectorEnv(3, name)])
+@pytest.mark.parametrize("make", ENVS)
 def test_what_goes_out_shares_no_memory(make):
-    env = make("varga7-random")
+    env = make()
     actions = np.full(env.action_space.shape, 0.2, dtype=np.float64)
     seen = [*env.reset(seed=0)[0].values()]
     for _ in range(2):

@@ -9,7 +9,7 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.wrappers.vector import RecordEpisodeStatistics
 
 import ikgym
-from ikgym.exceptions import InvalidInputError, ResetNeededError, UnknownNameError
+from ikgym.exceptions import InvalidInputError, ResetNeededError
 from tests.comparison import identical
 from tests.every_scenario import every_scenario
 from tests.limited import limited
@@ -105,33 +105,6 @@ def test_partial_resets_by_mask_put_rows_out_of_step():
         assert identical(*both)
 
 
-def test_rows_that_end_by_themselves_leave_what_held_them_back_to_the_final_info():
-    scenario = limited(steps=6)
-    native, sync = pair(scenario, AutoresetMode.SAME_STEP)
-    assert identical(native.reset(seed=3), sync.reset(seed=3))
-    for k in range(14):
-        if k == 2:  # puts the rows out of step
-            mask = {"reset_mask": np.array([True, False, False])}
-            assert identical(native.reset(options=dict(mask)), sync.reset(options=dict(mask)))
-        actions = np.full(native.action_space.shape, 1.0 if k % 4 < 2 else -1.0, dtype=np.float32)
-        got = native.step(actions)
-        assert identical(got, sync.step(actions))
-        assert (got[4].get("at_limit", np.zeros((N, 3)))[got[3]] == 0).all()
-
-
-def test_rows_count_and_threads_do_not_matter():
-    """Beyond a few hundred rows the kernel runs in several threads."""
-    scenario = noisy("varga7-random", 4)
-    many, few = (gym.make_vec("RedundantIK-v0", num_envs=n, scenario=scenario) for n in (1200, 5))
-    actions = np.random.default_rng(0).uniform(-1, 1, (1200, 7)).astype(np.float32)
-    assert identical(many.reset(seed=3)[0]["nominal"][:5], few.reset(seed=3)[0]["nominal"])
-    for _ in range(6):
-        a, b = many.step(actions), few.step(actions[:5])
-        for key in a[0]:
-            assert identical(a[0][key][:5], b[0][key])
-        assert identical(a[1][:5], b[1])
-
-
 @pytest.mark.parametrize("mode", list(AutoresetMode), ids=lambda mode: mode.value)
 def test_record_episode_statistics(mode):
     steps = 5
@@ -148,15 +121,6 @@ def test_record_episode_statistics(mode):
     if mode is AutoresetMode.DISABLED:
         envs.reset(options={"reset_mask": np.array([True, True, False])})
         np.testing.assert_array_equal(envs.env.unwrapped._simulator.steps_made, [0, 0, steps])
-
-
-def test_observations_are_fresh():
-    native, _ = pair(short("varga7-fast"), AutoresetMode.NEXT_STEP)
-    first, _ = native.reset(seed=0)
-    kept = {key: value.copy() for key, value in first.items()}
-    second = native.step(np.ones((N, 7), dtype=np.float32))[0]
-    assert identical(first, kept)
-    assert not any(np.shares_memory(first[key], second[key]) for key in first)
 
 
 def test_ignored_actions_may_be_anything_but_others_may_not():
@@ -189,48 +153,3 @@ def test_step_needs_episodes():
     native.step(actions)
     with pytest.raises(ResetNeededError, match=r"rows \[0, 1, 2\] have ended and autoreset is disabled"):
         native.step(actions)
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"reset_mask": [True, False, True]}, "Boolean array of shape"),
-        ({"reset_mask": np.ones(N)}, "Boolean array of shape"),
-        ({"reset_mask": np.ones(N + 1, dtype=bool)}, "Boolean array of shape"),
-        ({"reset_mask": np.zeros(N, dtype=bool)}, "at least one true entry"),
-        ({"q": np.zeros(6)}, r"options\['q'\]: expected shape \(7,\)"),
-        ({"q": np.full(7, np.inf)}, "finite"),
-    ],
-)
-def test_bad_options(options, message):
-    native, _ = pair(short("varga7-fast"), AutoresetMode.NEXT_STEP)
-    native.reset(seed=0)
-    with pytest.raises(InvalidInputError, match=message):
-        native.reset(options=options)
-
-
-def test_bad_arguments():
-    with pytest.raises(UnknownNameError, match="Did you mean 'SameStep'"):
-        ikgym.RedundantIKVectorEnv(2, autoreset_mode="SamStep")
-    with pytest.raises(InvalidInputError, match="num_envs: expected a whole number of at least 1, got 0"):
-        ikgym.RedundantIKVectorEnv(0)
-    with pytest.raises(InvalidInputError, match="render a single one"):
-        ikgym.RedundantIKVectorEnv(2, render_mode="rgb_array")
-    envs = ikgym.RedundantIKVectorEnv(2)
-    with pytest.raises(InvalidInputError, match="expected 2 seeds, one a row, got 3"):
-        envs.reset(seed=[1, 2, 3])
-    with pytest.raises(InvalidInputError, match=r"seed: expected None, a whole number or a list of them, got 1\.5"):
-        envs.reset(seed=1.5)
-    with pytest.raises(InvalidInputError, match="options: expected None or a dict, got 3"):
-        envs.reset(options=3)
-    with pytest.raises(UnknownNameError, match="Did you mean 'reset_mask'"):
-        envs.reset(options={"resetmask": np.ones(2, dtype=bool)})
-
-
-def test_seeds_and_generators():
-    envs = ikgym.RedundantIKVectorEnv(2, scenario="varga7-random")
-    envs.reset(seed=4)
-    assert envs.np_random_seed == (4, 5)
-    first = envs.reset()[0]["nominal"]
-    envs.reset(seed=4)
-    assert identical(envs.reset()[0]["nominal"], first)

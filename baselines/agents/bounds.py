@@ -30,7 +30,7 @@ class Bounds:
 
     @classmethod
     def of(cls, problem: Problem) -> Self | None:
-        """The bounds of a problem; None where the arm has no limits."""
+        """The bounds of a problem; None if the arm has no limits."""
         model = problem.model
         known = np.concatenate([model.lower, model.upper, model.velocity_limit, model.acceleration_limit])
         if not np.isfinite(known).any():

@@ -27,7 +27,7 @@ FORMAT: Final = 2
 KEY: Final = "ikgym"
 #: Digits of a hash that identify an agent in results.
 DIGITS = 12
-#: The texts and numbers that every file holds.
+#: Strings and numbers that every file contains.
 _PARTS: Final = {
     "scenario": ("name", "fingerprint"),
     "arm": ("name", "fingerprint"),
@@ -42,8 +42,8 @@ class AgentFile:
     Args:
         source: The file, as messages name it.
         network: Its network.
-        processing: What the network sees, and what its outputs mean.
-        about: The description in the file: where and how the agent was trained.
+        processing: The features of the network, and the meaning of its outputs.
+        about: The description in the file: the scenario and the method of its training.
         hash: SHA-256 of the description and the tensors, in 64 hexadecimal digits.
     """
 
@@ -69,7 +69,7 @@ def agent_of(
 
     Args:
         network: Its network.
-        processing: What the network sees, and what its outputs mean.
+        processing: The features of the network, and the meaning of its outputs.
         scenario: The scenario of its training.
         training: How it was trained, as JSON values.
 
@@ -117,7 +117,7 @@ def load_agent(file: pathlib.Path, kinds: Sequence[type[Processing]]) -> AgentFi
     """Reads the file of an agent.
 
     Args:
-        file: Where to read.
+        file: The file.
         kinds: The kinds of agents that are accepted.
 
     Raises:

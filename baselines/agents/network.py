@@ -19,9 +19,9 @@ Singles = npt.NDArray[np.float32]
 
 #: The tensors of a layer.
 PARTS = ("weight", "bias")
-#: Activations between the layers, in the order of their numbers in the kernel.
+#: Activations between the layers; the kernel knows them by their index.
 ACTIVATIONS = ("linear", "relu", "tanh", "silu", "elu")
-#: What brings the outputs of the last layer into [-1, 1]; linear outputs stay as they are.
+#: Functions that limit the outputs of the last layer to [-1, 1]; linear leaves them unchanged.
 SQUASHES = ("clip", "tanh", "linear")
 
 # Inputs added in one sweep over the outputs: each sweep reads and writes all outputs.
@@ -34,13 +34,13 @@ _ONE = np.float32(1.0)
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Network(Frozen):
-    """y ← activation(W y + b), layer by layer; the last layer has no activation, but a squash.
+    """y ← activation(W y + b), layer by layer; the last layer has a squash instead of an activation.
 
     Args:
         weights: W of each layer. Shapes (outputs, inputs), those of a layer the outputs of the one before.
         biases: b of each layer. Shapes (outputs,).
-        activation: One of :data:`ACTIVATIONS`, behind all layers but the last.
-        squash: One of :data:`SQUASHES`, behind the last layer.
+        activation: One of :data:`ACTIVATIONS`, after all layers but the last.
+        squash: One of :data:`SQUASHES`, after the last layer.
 
     Raises:
         UnknownNameError: There is no such activation or squash.
@@ -124,10 +124,10 @@ class Network(Frozen):
 
 
 def check_tensors(tensors: Mapping[str, npt.NDArray[Any]], expected: Mapping[str, tuple[int, ...]]) -> None:
-    """Refuses tensors of other names, shapes or types, or with numbers that are not finite.
+    """Checks names, shapes, types and finiteness of tensors.
 
     Raises:
-        InvalidInputError: There is one.
+        InvalidInputError: A tensor is not as expected.
     """
     got = {name: tensor.shape for name, tensor in tensors.items()}
     if got != expected or any(tensor.dtype != np.float32 for tensor in tensors.values()):

@@ -32,7 +32,7 @@ FOLDER = pathlib.Path(__file__).parents[1] / "data" / "agents"
 class LearnedPolicy(SolverPolicy):
     """A network between the features of an observation and an action.
 
-    It plays every scenario of its arm whose features have the shape of those that it was trained on. Its preview is a
+    It plays every scenario of its arm with the same number of features and outputs. Its preview is a
     tuple of steps ahead; observations that show 1, 2, … up to the furthest of them are accepted, too. An agent trained
     on whole poses also plays scenarios that show skew coordinates: their orientation is resolved by
     :func:`baselines.solvers.wrappers.full_orientation.resolve_orientation`, which needs all steps up to the furthest.
@@ -40,16 +40,16 @@ class LearnedPolicy(SolverPolicy):
 
     #: The agent in the file.
     file: AgentFile = dataclasses.field(init=False, repr=False)
-    #: The problem as the agent sees it: with whole poses where it was trained on them.
+    #: The problem as the agent sees it: with whole poses if it was trained on them.
     seen: Problem = dataclasses.field(init=False, repr=False)
-    #: Bounds of joint velocities that respect the limits of the arm; None where it has none.
+    #: Bounds of joint velocities that respect the limits of the arm; None if it has none.
     bounds: Bounds | None = dataclasses.field(init=False, repr=False)
 
     grain: ClassVar[int] = 32
     from_file: ClassVar[bool] = True
 
     def _take(self, file: AgentFile, *, any_arm: bool = False) -> None:
-        """Plays the agent of a file.
+        """Uses the agent of a file.
 
         Raises:
             InvalidInputError: The scenario does not fit the agent.
@@ -72,7 +72,7 @@ class LearnedPolicy(SolverPolicy):
 
     @property
     def preview(self) -> Preview:
-        """The steps ahead that are seen, or how many there are up to the furthest."""
+        """The steps ahead that the agent sees, or their number up to the furthest."""
         return self._offsets[-1] if self._resolves else self._offsets
 
     @property
@@ -82,11 +82,11 @@ class LearnedPolicy(SolverPolicy):
 
     @property
     def _resolves(self) -> bool:
-        """Whether the agent needs whole poses where the scenario shows skew coordinates."""
+        """Whether the scenario shows skew coordinates to an agent for whole poses."""
         return self.seen is not self.problem
 
     def memory(self, rows: int) -> Memory:
-        """That of the orientation where its ambiguity is resolved."""
+        """The memory of the orientation if its ambiguity is resolved; empty otherwise."""
         return full_orientation.start_memory(rows) if self._resolves else ()
 
     def solve(self, batch: Batch, memory: Memory) -> Solution:
@@ -112,8 +112,8 @@ class Agent(LearnedPolicy):
     Args:
         problem: What the policy is told of the scenario.
         path: The file.
-        hash: The first twelve digits of the agent's hash, to insist on; in results those of the agent that played.
-        any_arm: Whether it may play on an arm that it was not trained for.
+        hash: The first twelve digits of the agent's hash; another agent is refused. Results contain the actual ones.
+        any_arm: Whether it may control an arm that it was not trained for.
         given: An agent in memory, in place of a file.
 
     Raises:
@@ -144,7 +144,7 @@ class AgentAlone(LearnedPolicy):
 
     Args:
         problem: What the policy is told of the scenario.
-        hash: The first twelve digits of its hash, which tells its results from those of a successor.
+        hash: The first twelve digits of its hash, which distinguishes its results from those of a successor.
 
     Raises:
         InvalidInputError: The file has another hash, or the scenario does not fit the agent.
@@ -184,8 +184,8 @@ def check_scenario(agent: AgentFile, problem: Problem, *, any_arm: bool) -> None
 
     Args:
         agent: The agent.
-        problem: What it is told of the scenario.
-        any_arm: Whether it may play on another arm.
+        problem: The problem of the scenario.
+        any_arm: Whether it may control another arm.
 
     Raises:
         InvalidInputError: The scenario does not fit the agent.

@@ -1,4 +1,4 @@
-"""From observations to features, and from network outputs to actions: what all kinds of agents have in common."""
+"""The interfaces of networks, and of processings: observations to features, network outputs to actions."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class NetworkLike(Protocol):
         """All tensors by name, in the order in which they are hashed."""
 
     def to_json(self) -> dict[str, Any]:
-        """The sizes of the layers, and what stands between them."""
+        """The sizes of the layers, and the functions between them."""
 
     @classmethod
     def from_json(cls, about: Mapping[str, Any], tensors: Mapping[str, npt.NDArray[Any]]) -> Self:
@@ -34,11 +34,11 @@ class NetworkLike(Protocol):
 
 
 class Processing(Frozen):
-    """A frozen dataclass that the file of an agent describes by the values of its fields."""
+    """A frozen dataclass whose field values are stored in the file of an agent."""
 
     #: The name of the class in files.
     kind: ClassVar[str]
-    #: The kind of network that goes with it.
+    #: The class of its network.
     network: ClassVar[type[NetworkLike]]
 
     def to_json(self) -> dict[str, Any]:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping
-from typing import Any, ClassVar, Literal, Self, get_args
+from typing import ClassVar, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -13,7 +12,6 @@ import numpy.typing as npt
 from baselines.agents.network import Network, forward_rows
 from baselines.agents.processing import Processing, check_offsets
 from baselines.policy import Batch, Problem
-from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.jit import kernel
 from ikgym.kernels.outcome import OBSERVED
 from ikgym.rl.feature_kernels import observe_rows
@@ -25,16 +23,16 @@ Squash = Literal["clip", "tanh"]
 
 @dataclasses.dataclass(frozen=True)
 class Relative(Processing):
-    """Joint velocities in units of the twist that is due, from the features of :class:`ikgym.rl.AgentObservation`.
+    """Joint velocities in units of the remaining twist, from the features of :class:`ikgym.rl.AgentObservation`.
 
     The velocity of a joint is a · s (0.2 + |v̂|), with a = gain · (network output), kept within ±largest.
 
     Args:
         offsets: Steps ahead at which the reference is seen, rising, at least two.
-        furthest: Where |v̂| is cut, above 0.
+        furthest: Bound of |v̂|, above 0.
         largest: Bound of a, above 0.
         gain: Above 0.
-        squash: What keeps a within its bound: `clip` cuts it, `tanh` is largest · tanh(a / largest).
+        squash: The function that bounds a: `clip` clips it, `tanh` is largest · tanh(a / largest).
 
     Raises:
         InvalidInputError: A value is out of its range.
@@ -57,19 +55,6 @@ class Relative(Processing):
         numbers = {name: number(name, getattr(self, name), above=0.0) for name in ("furthest", "largest", "gain")}
         for field, value in {"offsets": offsets, "_ahead": ahead, **numbers}.items():
             object.__setattr__(self, field, value)
-
-    @classmethod
-    def from_json(cls, values: Mapping[str, Any]) -> Self:
-        """See :meth:`Processing.from_json`.
-
-        Raises:
-            UnknownNameError: A key is not a field.
-            InvalidInputError: A value is refused, or the network gives G and h, as in older versions.
-        """
-        own = {"bilinear": False, "damping": None, **values}
-        if own.pop("bilinear") or own.pop("damping") is not None:
-            raise InvalidInputError("bilinear: expected joint velocities as network outputs.")
-        return super().from_json(own)
 
     def size(self, problem: Problem) -> int:
         """The number of features."""
@@ -96,7 +81,7 @@ def law_rows(ahead, meaning, network, batch, out):
 
     Args:
         ahead: The first five arguments of :func:`ikgym.rl.feature_kernels.observe_rows`.
-        meaning: Whether tanh keeps velocities within their bounds, `gain` and `largest` of :class:`Relative`, and the
+        meaning: Whether tanh bounds the velocities, `gain` and `largest` of :class:`Relative`, and the
             velocity limit in [rad/s] or [m/s], of shape (n,).
         network: The first five arguments of :func:`baselines.agents.network.forward_rows`.
         batch: q, q̇, pose, reference and steps left, as for `observe_rows`.

@@ -6,20 +6,20 @@ import importlib
 import sys
 from collections.abc import Callable, Sequence
 
-from baselines import command
+from baselines.cli import shell
 from ikgym.exceptions import UnknownNameError
 
 #: A summary of each command, and the module with its function ``main``.
 COMMANDS = {
     "evaluate": ("play policies on scenarios: table, files and plots", "baselines.cli.evaluate"),
-    "train": ("train an agent", "baselines.training.command"),
+    "train": ("train an agent", "baselines.cli.train"),
     "tune": ("search settings of solvers", "baselines.cli.tune"),
     "dataset": ("write episodes as a Minari data set", "baselines.cli.dataset"),
-    "reproduce": ("draw the figures of the papers again, and test their claims", "baselines.reproduce"),
+    "reproduce": ("draw the figures of the papers again, and test their claims", "baselines.cli.reproduce"),
     "leaderboard": ("compare policies on test sets in one table with intervals", "baselines.cli.leaderboard"),
     "robustness": ("map the cost of policies over severities of an imperfect plant", "baselines.cli.robustness"),
-    "view": ("show policies side by side in a browser, live and in an episode", "baselines.viewer.view"),
-    "video": ("write an episode as a video", "baselines.viewer.video"),
+    "view": ("show policies side by side in a browser, live and in an episode", "baselines.cli.view"),
+    "video": ("write an episode as a video", "baselines.cli.video"),
     "oracle": ("search best known costs", "baselines.cli.oracle"),
     "arms": ("list the arms, or show some", "baselines.cli.arms"),
     "scenarios": ("list the scenarios, or show some", "baselines.cli.scenarios"),
@@ -37,21 +37,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
         The exit code of the command; 2 after an expected error, 130 after Ctrl-C.
     """
     first, *others = (sys.argv[1:] if arguments is None else list(arguments)) or ["--help"]
-    return command.run(lambda: _command(first)(others))
+    return shell.run(lambda: _command(first)(others))
 
 
 def manual() -> str:
     """The text of ``--help``."""
     lines = "\n".join(f"  {name:12} {summary}" for name, (summary, _) in COMMANDS.items())
     return f"""\
-usage: {command.CONSOLE} COMMAND …
+usage: {shell.CONSOLE} COMMAND …
 
 Inverse kinematics of redundant arms: a Gymnasium environment, and a benchmark
 in which every solver is a policy.
 
 {lines}
 
-{command.CONSOLE} COMMAND --help says more; {command.CONSOLE} --version prints the version."""
+{shell.CONSOLE} COMMAND --help says more; {shell.CONSOLE} --version prints the version."""
 
 
 def _command(word: str) -> Callable[[Sequence[str]], int]:

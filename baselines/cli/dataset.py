@@ -9,7 +9,7 @@ from typing import Annotated
 
 import tyro
 
-from baselines import command
+from baselines.cli import shell
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -38,7 +38,7 @@ def manual(prog: str) -> str:
     """The text of ``--help`` above the options."""
     return f"""\
 Plays episodes and writes them as a data set of Minari: observations, actions, rewards and infos, with the seed and the
-cost of each episode, and the scenario, the policy and the versions that they come from.
+cost of each episode, and the scenario, the policy and the versions.
 
 Example:
   {prog} --scenario varga7-random --policy dls:damping=1e-2 --episodes 100 --out datasets/dls-v0
@@ -59,13 +59,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         The exit code: 0, 2 after an expected error, 130 after Ctrl-C.
     """
     program = "ikgym dataset"
-    return command.run_resumable(Options, arguments, program, manual, _work)
+    return shell.run_resumable(Options, arguments, program, manual, _work)
 
 
 def _work(options: Options, _: str) -> None:
     from baselines import datasets  # imports Minari, an extra
 
-    command.find_own_modules()
     datasets.write(**{field.name: getattr(options, field.name) for field in dataclasses.fields(options)}, progress=True)
     folder = options.out.resolve()
     print(f'{options.out}: MINARI_DATASETS_PATH={options.out.parent}, minari.load_dataset("{folder.name}")')

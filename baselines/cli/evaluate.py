@@ -3,53 +3,26 @@
 from __future__ import annotations
 
 import dataclasses
-import pathlib
-import shlex
-import sys
+import inspect
+import re
 import textwrap
 from collections.abc import Iterable, Sequence
 from typing import Annotated
 
 import tyro
 
-from baselines import command, registry
+from baselines import registry
+from baselines.cli import shell
 from baselines.evaluation import report, test_sets
-from baselines.evaluation.options import Options
+from baselines.evaluation.jobs import Options
+from baselines.evaluation.metrics import Row
 from baselines.evaluation.results import PAGE
 from baselines.evaluation.run import carry_out
 from ikgym import scenarios
 
-#: The columns of a row, for ``--help``.
-COLUMNS = """\
-  scenario, policy, parameters, seed, steps      identify the episode, with arm_seed and noise_seed below
-  total_cost = tracking_cost + velocity_cost     sum of -reward
-  cost_ratio                                     total_cost / best known cost, null if none above 1e-9 is known
-  position_error_max, position_error_rms         distance from the reference position in [m]
-  orientation_error_max, orientation_error_rms   geodesic angle in [rad], null if the task has no orientation
-  qdot_peak, qdot_rms, qdot_total_variation      of the joint velocities, in [rad/s] or [m/s]
-  qddot_peak                                     largest change of a joint velocity in a step over dt, in [rad/s²] or
-                                                 [m/s²]
-  steps_at_joint_limit, steps_at_velocity_limit, steps_at_acceleration_limit
-                                                 steps in which a stop, the velocity or the acceleration limit of the
-                                                 arm held a joint back
-  joint_limit_margin_min                         smallest distance of a joint from a limit in [rad] or [m], null if the
-                                                 arm has none
-  time_first_us                                  wall time of the first call of the policy in [µs]
-  time_p50_us, time_p99_us                       wall time of later calls, null if the episode was not timed
-  deadline_misses                                later calls that took longer than the time step of the scenario
-  status                                         worst status of the episode, unknown if the policy reports none
-  machine                                        CPU, cores and versions
-  iterations, status_counts                      mean iterations of a step, null if unknown; steps by status
-  preview                                        furthest step ahead that was shown
-  fingerprint                                    digest of the scenario and the version of the cost
-  test_set                                       digest of the test set, null if there is none
-  arm_seed                                       seed of the arm, null if the reset seed sets it
-  noise_seed                                     seed of the noise, 0 is the noise of the reset seed
-  ideal                                          fingerprint of the scenario with an ideal plant"""
 
-
-@dataclasses.dataclass(frozen=True)
-class Arguments:
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Arguments(Options):
     """Arguments of the command line."""
 
     scenarios: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME …")] = ()
@@ -58,13 +31,10 @@ class Arguments:
     policies: Annotated[tuple[str, ...], tyro.conf.arg(metavar="POLICY …")] = ("all",)
     """Policies as NAME or NAME:PARAMETER=VALUE,PARAMETER=VALUE, agent:PATH for an agent in a file, MODULE:CLASS for
     one of your own, also of a module in the current folder, or: all."""
-    options: Annotated[Options, tyro.conf.arg(name="")] = dataclasses.field(default_factory=Options)
-    """Options of the evaluation."""
 
 
-def manual() -> str:
+def manual(prog: str) -> str:
     """The text of ``--help`` above the options."""
-    prog = _program()
     return f"""\
 Plays every policy on every scenario, and measures costs, errors, joint velocities and the time per step.
 
@@ -95,10 +65,16 @@ Files in the folder of --out, each replaced in one go, so that a run may be stop
   export/       with --export, the joint motion of each episode
 
 Columns:
-{COLUMNS}
+{_columns()}
 
 Where a scenario holds its reference points for several steps, costs and errors are those of the last step of each
 point."""
+
+
+def _columns() -> str:
+    """The columns of a row, from the documentation of its class."""
+    text = inspect.cleandoc(Row.__doc__ or "").partition("Args:\n")[2]
+    return re.sub(r", see :\w+:`[^`]+`", "", text).replace("None", "null")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -110,33 +86,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         The exit code: 0, 2 after an expected error, 130 after Ctrl-C.
     """
-    arguments = sys.argv[1:] if arguments is None else list(arguments)
-    out: pathlib.Path | None = None
+    program = shell.program("evaluate", "python -m baselines.evaluate")
+    return shell.run_resumable(Arguments, arguments, program, manual, _work)
 
-    def work() -> int:
-        nonlocal out
-        given = command.parse(Arguments, arguments, prog=_program(), description=manual())
-        options = dataclasses.replace(given.options, progress=True)
-        out = options.out
-        command.find_own_modules()
-        carry_out(
-            given.scenarios or (() if options.test_sets else ("varga7-fast",)),
-            given.policies,
-            options,
-            command=shlex.join([*_program().split(), *arguments]),
-            show=lambda rows: print(report.table(rows, rows.skipped, width=command.width()), flush=True),
-        )
-        if out is not None:
-            print(f"\nwritten to {out}" + (f"; open {out / PAGE} in a browser" if options.report else ""))
-        return 0
 
-    return command.run(
-        work, lambda: "Stopped." if out is None else f"Stopped. Finished episodes are in {out}; continue with --resume."
+def _work(given: Arguments, command: str) -> None:
+    scenarios = given.scenarios or (() if given.test_sets else ("varga7-fast",))
+    carry_out(
+        dataclasses.replace(given, scenarios=scenarios, progress=True),
+        command=command,
+        show=lambda rows: print(report.table(rows, rows.skipped, width=shell.width()), flush=True),
     )
-
-
-def _program() -> str:
-    return command.program("evaluate", "python -m baselines.evaluate")
+    if given.out is not None:
+        print(f"\nwritten to {given.out}" + (f"; open {given.out / PAGE} in a browser" if given.report else ""))
 
 
 def _listing(title: str, names: Iterable[str]) -> str:

@@ -9,10 +9,11 @@ from typing import Annotated, Literal
 
 import tyro
 
-from baselines import command as shared
-from baselines.evaluation import table
+from baselines.cli import shell
+from baselines.cli.evaluate import Arguments
+from baselines.evaluation import records
 from baselines.evaluation.results import Rows, slug
-from baselines.evaluation.run import evaluate
+from baselines.evaluation.run import carry_out
 from baselines.files import write
 from ikgym.exceptions import InvalidInputError
 
@@ -20,30 +21,22 @@ from ikgym.exceptions import InvalidInputError
 MAIN = "varga7-pose-random"
 
 
-@dataclasses.dataclass(frozen=True)
-class Options:
-    """Options of the command line."""
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Options(Arguments):
+    """Options of the command line: those of evaluate, with other defaults."""
 
-    out: Annotated[pathlib.Path, tyro.conf.arg(metavar="DIR")]
+    out: Annotated[pathlib.Path, tyro.conf.arg(metavar="DIR")] = dataclasses.field()
     """Folder for the results, the table and the plots."""
-    policies: Annotated[tuple[str, ...], tyro.conf.arg(metavar="POLICY …")] = ("all",)
-    """Policies as those of evaluate. Agents in DIR/seed-N/ are training seeds of one agent and share a line, DIR."""
-    test_sets: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME …")] = ()
-    """Test sets. If neither these nor scenarios are given: varga7-pose-random."""
     scenarios: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME …")] = ()
     """Scenarios instead of test sets: names, FILE.toml, MODULE:ATTRIBUTE, or: all."""
-    episodes: Annotated[int, tyro.conf.arg(metavar="N")] = 1
-    """Test episodes of each random scenario; a test set has its own number."""
+    test_sets: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME …")] = ()
+    """Test sets. If neither these nor scenarios are given: varga7-pose-random."""
+    policies: Annotated[tuple[str, ...], tyro.conf.arg(metavar="POLICY …")] = ("all",)
+    """Policies as those of evaluate. Agents in DIR/seed-N/ are training seeds of one agent and share a line, DIR."""
     timed: Annotated[int | Literal["all"], tyro.conf.arg(metavar="N|all")] = 2
     """Episodes of each policy that are played alone and timed."""
-    resume: bool = False
-    """Continue with the results in the folder."""
-    overwrite: bool = False
-    """Replace the results in the folder."""
-    workers: Annotated[int, tyro.conf.arg(metavar="N")] = 1
-    """Processes that play episodes. With more than one, times are less reliable."""
-    cluster: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
-    """Play untimed episodes on a cluster: ray, at the address in RAY_ADDRESS."""
+    plots: bool = False
+    """Draw the plots of evaluate, too."""
 
 
 def manual(prog: str) -> str:
@@ -76,18 +69,18 @@ def compare(rows: Rows, policies: Sequence[str], out: pathlib.Path) -> str:
     Raises:
         ResultsError: The folder cannot be written.
     """
-    from baselines.evaluation import table_plots
+    from baselines.evaluation.plots import comparison
     from baselines.evaluation.plots.style import png
 
-    lines = table.records(rows, policies)
-    text = table.markdown(lines)
-    write(out / "table.csv", table.to_csv(lines).encode())
+    lines = records.records(rows, policies)
+    text = records.markdown(lines)
+    write(out / "table.csv", records.to_csv(lines).encode())
     write(out / "table.md", f"{text}\n".encode())
     for scenario in dict.fromkeys(line["scenario"] for line in lines):
         here = [line for line in lines if line["scenario"] == scenario]
-        write(out / f"cost-time-{slug(scenario)}.png", png(table_plots.cost_time(here, scenario)))
+        write(out / f"cost-time-{slug(scenario)}.png", png(comparison.cost_time(here, scenario)))
     by_name = [{**line, "name": line["policy"].partition(":")[0]} for line in lines]
-    write(out / "foresight.png", png(table_plots.foresight(by_name, "Cost against foresight", "name")))
+    write(out / "foresight.png", png(comparison.foresight(by_name, "Cost against foresight", "name")))
     return text
 
 
@@ -100,30 +93,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         The exit code: 0, 2 after an expected error, 130 after Ctrl-C.
     """
-    return shared.run_resumable(Options, arguments, "ikgym leaderboard", manual, _work)
+    return shell.run_resumable(Options, arguments, "ikgym leaderboard", manual, _work)
 
 
-def _work(options: Options, command: str) -> None:
-    del command
-    if options.test_sets and options.scenarios:
+def _work(given: Options, command: str) -> None:
+    if given.scenarios and given.test_sets:
         raise InvalidInputError("expected --test-sets or --scenarios; got both.")
-    shared.find_own_modules()
-    sets = options.test_sets or (() if options.scenarios else (MAIN,))
-    rows = evaluate(
-        options.scenarios,
-        options.policies,
-        test_sets=sets,
-        episodes=options.episodes,
-        timed=options.timed,
-        out=options.out,
-        resume=options.resume,
-        overwrite=options.overwrite,
-        workers=options.workers,
-        cluster=options.cluster,
-        plots=False,
-        progress=True,
-    )
-    print(compare(rows, options.policies, options.out))
-    for one in rows.skipped:
-        print(f"skipped: {one.policy} in {one.scenario}: {one.reason}")
-    print(f"\nwritten to {options.out}")
+    sets = given.test_sets or (() if given.scenarios else (MAIN,))
+    options = dataclasses.replace(given, test_sets=sets, progress=True)
+    rows = carry_out(options, command=command)
+    print(compare(rows, given.policies, given.out))

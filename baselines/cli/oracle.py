@@ -12,7 +12,7 @@ import numpy as np
 import tyro
 from tqdm import tqdm
 
-from baselines import command
+from baselines.cli import shell
 from baselines.episodes import Seeds
 from baselines.evaluation import test_sets as known_sets
 from baselines.oracle import best_known
@@ -34,35 +34,35 @@ SeededScenario = tuple[Scenario, Seeds]
 
 @dataclasses.dataclass(frozen=True)
 class Options:
-    """What the command line takes."""
+    """Options of the command line."""
 
     scenarios: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME …")] = ()
-    """Names of scenarios. If neither scenarios nor test sets are named: all fixed scenarios and all test sets."""
+    """Names of scenarios. If neither scenarios nor test sets are given: all fixed scenarios and all test sets."""
     test_sets: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME …")] = ()
     """Names of test sets."""
     seeds: Annotated[tuple[int, ...], tyro.conf.arg(metavar="N …")] = ()
-    """Reset seeds of the random scenarios among those named."""
+    """Reset seeds of the random scenarios."""
     policies: Annotated[tuple[str, ...], tyro.conf.arg(metavar="POLICY …")] = ()
-    """Policies whose paths are starts, too, as NAME or NAME:PARAMETER=VALUE,…: those that have beaten a record."""
+    """Policies whose paths are further starts, as NAME or NAME:PARAMETER=VALUE,…, such as those that beat a record."""
     search: Annotated[Search, tyro.conf.arg(name="")] = dataclasses.field(default_factory=Search)
-    """How thoroughly is searched."""
+    """Settings of the search."""
     cache: bool = True
-    """Look on disk first, and keep there what was found."""
+    """Read optima from the cache on disk, and write new ones to it."""
     update: bool = False
-    """Write down what is better than the records, or of episodes that have none."""
+    """Save optima that are better than the records, or have no record."""
     cluster: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
     """Search on a cluster: ray, at the address in RAY_ADDRESS, a core for each episode."""
     check: bool = False
-    """Hold the records against what the search finds, or has on disk, played again; the exit code is 1 where one is
-    missing, stale or off by more than a millionth."""
+    """Compare the records with the optima, which are played again; the exit code is 1 if a record is missing, stale or
+    off by more than a millionth."""
 
 
 def manual() -> str:
     """The text of ``--help`` above the options."""
     names, prog = ", ".join(scenario_registry.names()), "ikgym oracle"
     return f"""\
-Finds the cheapest joint paths of whole episodes that are known, from many starts, and keeps their costs as records:
-cost ratio = cost / best known cost. Nobody certifies that there is no cheaper path.
+Searches the cheapest joint paths of whole episodes from many starts, and keeps their costs as records:
+cost ratio = cost / best known cost. A record is not proven to be the minimum.
 
 {textwrap.fill(f"Scenarios: {names}.", 100, subsequent_indent="  ", break_on_hyphens=False)}
 
@@ -75,28 +75,28 @@ Examples:
   {prog} --scenarios varga7-fast --policies rhc_foresight --update
   {prog} --test-sets varga7-pose-random --check
 
-Of each episode is printed: its cost; how many paths at full resolution came within a millionth of it; how many random
-starts came within 1 % of the best before the local search, their median and their worst cost; the norm of the gradient
-in [s/rad] or [s/m]; the CPU time of one path at full resolution; and what led there.
+A line for each episode has: its cost and the kind of start that led to it; the norm of the gradient in [s/rad] or
+[s/m]; the number of paths at full resolution within a millionth of the cost; the number of random starts within 1 % of
+the best before the local search, with their median and worst cost; the CPU time of one path at full resolution.
 
-Where the plant is not ideal, drives and sensors are left out: the best known cost is that of the arm that moves, driven
-and measured ideally. The search is that of an ideal plant, and its path is polished on that arm.
+If the plant is not ideal, drives and sensors are left out: the best known cost is that of the true arm, with ideal
+drives and sensors. The search uses an ideal plant, and its path is polished on the true arm.
 
-Optima are kept in the user's folder for such files, or where the environment variable {VARIABLE} says. What was
-found before Ctrl-C is kept."""
+Optima are cached in the user's cache folder, or in the folder of the environment variable {VARIABLE}. Optima
+found before Ctrl-C are kept."""
 
 
 def episodes(scenarios: Sequence[str], test_sets: Sequence[str], seeds: Sequence[int]) -> list[SeededScenario]:
-    """What is to be solved.
+    """The episodes to be searched.
 
     Args:
         scenarios: Names of scenarios.
-        test_sets: Names of test sets. Where neither these nor scenarios are named, all fixed scenarios and all sets.
+        test_sets: Names of test sets. If neither these nor scenarios are given: all fixed scenarios and all sets.
         seeds: Reset seeds of the random scenarios.
 
     Raises:
         UnknownNameError: There is no such scenario or test set.
-        InvalidInputError: Seeds are missing, or there is nothing that they belong to; a test set has drifted.
+        InvalidInputError: Seeds are missing or have no random scenario; a test set has drifted.
     """
     named = [scenario_registry.get(name) for name in scenarios]
     drawn = any(map(_drawn, named))
@@ -119,7 +119,7 @@ def episodes(scenarios: Sequence[str], test_sets: Sequence[str], seeds: Sequence
 
 
 def _drawn(scenario: Scenario) -> bool:
-    """Whether episodes differ in what a best known cost is of: in their trajectories or their arms."""
+    """Whether the trajectories or the arms of episodes differ, and so their best known costs."""
     return scenario.random or scenario.plant.draws_arm
 
 
@@ -131,14 +131,14 @@ def optima(
     cache: bool,
     workers: Workers = ALONE,
 ) -> Iterator[tuple[Scenario, Seeds, Optimum]]:
-    """Solves episodes, with a bar on stderr; workers hand them out in the order in which they are done.
+    """Searches episodes, with a bar on stderr, and yields each as soon as it is done.
 
     Args:
         todo: The episodes.
-        how: How thoroughly is searched.
-        policies: Whose paths are starts, too.
-        cache: Whether to look on disk first, and to keep there what was found.
-        workers: Who searches.
+        how: Settings of the search.
+        policies: Policies whose paths are further starts.
+        cache: Whether to read and write the cache on disk.
+        workers: The workers.
     """
     with tqdm(
         total=len(todo),
@@ -163,7 +163,7 @@ def optima(
 
 
 def line(optimum: Optimum, note: str = "") -> str:
-    """What is printed of an episode; a note stands behind its cost."""
+    """The printed line of an episode; a note follows its cost."""
     spread = optimum.spread
     parts = [
         f"{optimum.scenario}, seed {optimum.seed}: {optimum.cost:.10g}{note and f' {note}'} by {optimum.found_by}",
@@ -179,7 +179,7 @@ def line(optimum: Optimum, note: str = "") -> str:
 
 
 def verdict(scenario: Scenario, optimum: Optimum, arm_seed: int | None = None) -> str | None:
-    """What is wrong with the record of an episode, by the cost of an optimum played anew; None where nothing is."""
+    """The error of the record of an episode, compared with an optimum that is played again; None if there is none."""
     known = best_known.lookup(scenario, optimum.seed, arm_seed)
     if known is None:
         return "no record of this content"
@@ -198,19 +198,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """The command line.
 
     Args:
-        arguments: What stands behind the command; taken from the process if left out.
+        arguments: The words after the command; those of the process if left out.
 
     Returns:
-        The exit code: 0, 1 where a record does not stand the check, 2 where something expected went wrong, 130 after
-        Ctrl-C.
+        The exit code: 0, 1 if a record fails the check, 2 after an expected error, 130 after Ctrl-C.
     """
     given = sys.argv[1:] if arguments is None else list(arguments)
-    return command.run(lambda: _carry_out(given), lambda: "Stopped; what was found is kept.")
+    return shell.run(lambda: _carry_out(given), lambda: "Stopped. Optima that were found are kept.")
 
 
 def _carry_out(arguments: Sequence[str]) -> int:
-    # The numbers of a search are checked as soon as they are read.
-    options = command.parse(Options, arguments, prog="ikgym oracle", description=manual())
+    options = shell.parse(Options, arguments, prog="ikgym oracle", description=manual())
     kept, wrong = 0, 0
     todo = episodes(options.scenarios, options.test_sets, options.seeds)
     workers = Workers(cluster=options.cluster)

@@ -11,9 +11,9 @@ from typing import Annotated
 import tyro
 from tqdm import tqdm
 
-from baselines import command as shared
+from baselines.cli import shell
 from baselines.episodes import Seeds
-from baselines.evaluation import table
+from baselines.evaluation import records
 from baselines.evaluation.metrics import Row
 from baselines.evaluation.results import Rows
 from baselines.evaluation.run import evaluate
@@ -25,7 +25,7 @@ from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario, imperfect
 from ikgym.validation import number
 
-#: How thoroughly best known costs are searched that are not recorded: on these paths all starts find the same optimum.
+#: The search for best known costs that are not recorded: on these paths all starts find the same optimum.
 HOW = Search(starts=20, generations=0)
 
 
@@ -38,9 +38,9 @@ class Options:
     policies: Annotated[tuple[str, ...], tyro.conf.arg(metavar="POLICY …")] = ("dls", "rhc", "rhc_foresight", "told")
     """Policies as those of evaluate."""
     scenario: Annotated[str, tyro.conf.arg(metavar="NAME|FILE.toml")] = imperfect.FIELD_NAME
-    """Scenario whose plant stands for severity 1; of panda-field that is the worst one."""
+    """Scenario whose plant has severity 1; of panda-field that is the worst one."""
     severities: Annotated[tuple[float, ...], tyro.conf.arg(metavar="S …")] = (0.0, 0.25, 0.5, 0.75, 1.0)
-    """Severities, from 0, of what is unknown (calibration, payload, camera) and of the drives (lag, delay)."""
+    """Severities, from 0, of unknown properties (calibration, payload, camera) and of the drives (lag, delay)."""
     episodes: Annotated[int, tyro.conf.arg(metavar="N")] = 4
     """Test episodes of each policy in each cell of the map."""
     resume: bool = False
@@ -56,7 +56,7 @@ class Options:
 def manual(prog: str) -> str:
     """The text of ``--help`` above the options."""
     return f"""\
-Maps the cost ratio of policies over two severities of an imperfect plant: of what is unknown (calibration, payload,
+Maps the cost ratio of policies over two severities of an imperfect plant: of unknown properties (calibration, payload,
 camera), and of the drives (lag, delay). Test sets of imperfect plants: ikgym leaderboard --test-sets panda-field …
 
 Examples:
@@ -119,7 +119,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         The exit code: 0, 2 after an expected error, 130 after Ctrl-C.
     """
-    return shared.run_resumable(Options, arguments, "ikgym robustness", manual, _work)
+    return shell.run_resumable(Options, arguments, "ikgym robustness", manual, _work)
 
 
 def _work(options: Options, command: str) -> None:
@@ -142,20 +142,20 @@ def _work(options: Options, command: str) -> None:
     places = {scenario.name: place for place, scenario in by_place.items()}
     scored = with_cost_ratios(rows, {scenario.name: scenario for scenario in by_place.values()})
     lines = []
-    for line in table.records(scored, options.policies):
+    for line in records.records(scored, options.policies):
         knowledge, drives = places[line["scenario"]]
         lines.append({"policy": line.pop("policy"), "knowledge": knowledge, "drives": drives, **line})
     _write(options.out, lines)
     print(f"written to {options.out}")
 
 
-def _write(out: pathlib.Path, lines: Sequence[table.Record]) -> None:
+def _write(out: pathlib.Path, lines: Sequence[records.Record]) -> None:
+    from baselines.evaluation.plots.comparison import severity_map
     from baselines.evaluation.plots.style import png
-    from baselines.evaluation.table_plots import severity_map
 
     columns = ("policy", "knowledge", "drives", "episodes", "cost_ratio", "low", "worst", "lost_percent")
-    text = table.markdown(lines, columns)
-    write(out / "map.csv", table.to_csv(lines).encode())
+    text = records.markdown(lines, columns)
+    write(out / "map.csv", records.to_csv(lines).encode())
     write(out / "map.md", f"{text}\n".encode())
     write(out / "map.png", png(severity_map(lines)))
     print(text)

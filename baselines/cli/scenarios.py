@@ -4,16 +4,69 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from baselines.cli import listing
+import numpy as np
+
+from baselines.cli import shell
+from ikgym import scenarios
+from ikgym.scenarios import Scenario
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Prints all scenarios, or some in full.
+    """The command line: names, or options; returns the exit code."""
+    return shell.list_members("scenarios", SCENARIOS, arguments)
 
-    Args:
-        arguments: Names, or options.
 
-    Returns:
-        The exit code.
-    """
-    return listing.main("scenarios", listing.SCENARIOS, arguments)
+def _scenario_row(name: str) -> tuple[str, ...]:
+    scenario = scenarios.get(name)
+    return scenario.arm.name, scenario.task.name, f"{scenario.steps}", scenario.source
+
+
+def _scenario(name: str) -> str:
+    scenario = scenarios.find(name)
+    lines = [f"{scenario.name}: {scenario.steps} steps of {scenario.dt:g} s", ""]
+    lines += [scenario.source, ""] if scenario.source else []
+    return "\n".join([*lines, *(f"  {key:16} {value}" for key, value in _parts(scenario).items())])
+
+
+def _parts(scenario: Scenario) -> dict[str, object]:
+    limit = np.unique(scenario.velocity_limit)
+    return {
+        "arm": scenario.arm.name,
+        "nominal model": scenario.model.name,
+        "task": scenario.task.name,
+        "trajectory": type(scenario.trajectory).__name__,
+        "random": "yes, by the seed" if scenario.random else "no",
+        "velocity limit": f"{', '.join(f'{x:g}' for x in limit)} rad/s or m/s",
+        "cost": scenario.cost,
+    } | _path(scenario)
+
+
+def _path(scenario: Scenario) -> dict[str, object]:
+    """Duration of a path in space, and whether the arm can reach it."""
+    if scenario.random or scenario.trajectory.joint_path(np.zeros(1)) is not None:
+        return {}
+    out: dict[str, object] = {}
+    if (duration := getattr(scenario.trajectory, "duration", None)) is not None:  # some go on for ever
+        out["path takes"] = f"{duration:.3g} s, the episode {scenario.steps * scenario.dt:.3g} s"
+    return out | {"within reach": _reach(scenario)}
+
+
+def _reach(scenario: Scenario) -> str:
+    """The poses of a path that the arm cannot reach."""
+    missed = scenarios.gaps(scenario)
+    if not missed:
+        return "all sampled poses"
+    worst = max(missed, key=lambda gap: (gap.distance, gap.angle))
+    first, last = (f"{gap.time:.3g} s" for gap in (missed[0], missed[-1]))
+    far = f"{worst.distance:.3g} m and {worst.angle:.3g} rad"
+    return f"not all poses: missed from {first} to {last}, at ({shell.numbers(worst.position)}) m by {far}"
+
+
+SCENARIOS = shell.Catalogue(
+    "scenario",
+    lambda: (*scenarios.names(), *scenarios.problems_from_elsewhere()),
+    ("scenario", "arm", "task", "steps", "source"),
+    _scenario_row,
+    _scenario,
+    ".toml",
+)

@@ -10,7 +10,7 @@ from typing import Annotated
 
 import tyro
 
-from baselines import command
+from baselines.cli import shell
 from baselines.files import locked, write_json
 from baselines.fingerprints import fingerprint
 from ikgym import scenarios
@@ -67,7 +67,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         The exit code: 0, 2 after an expected error, 130 after Ctrl-C.
     """
     program = "ikgym tune"
-    return command.run_resumable(Options, arguments, program, manual, _work)
+    return shell.run_resumable(Options, arguments, program, manual, _work)
 
 
 def _work(options: Options, text: str) -> None:

@@ -1,9 +1,8 @@
-"""Joint motions as files for other programs: tables, and messages as ROS 2 tools read them."""
+"""An episode as files: the trajectory log behind plots, joint motions as tables, and messages for ROS 2."""
 
 from __future__ import annotations
 
 import csv
-import dataclasses
 import io
 import json
 from collections.abc import Callable, Iterable, Mapping
@@ -16,87 +15,34 @@ from baselines.episodes import Episode, Seeds
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray, known_names
 
+#: Most pictures of a replay.
+FRAMES = 400
+#: Arrays by name, see :func:`trajectory_log`.
+TrajectoryLog = dict[str, npt.NDArray[Any]]
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class Motion:
+
+class Motion(NamedTuple):
     """The joint motion of an episode, from its start.
 
-    Args:
-        joint_names: What the joints are called.
-        units: Of their coordinates, ``"rad"`` or ``"m"``.
+    Attributes:
         times: From 0, in [s]. Shape (steps + 1,).
         q: Joint coordinates at these times, in [rad] or [m]. Shape (steps + 1, n).
-        qdot: Joint velocities applied in the step that ends then, 0 at the start, in [rad/s] or [m/s]. (steps + 1, n).
+        qdot: Joint velocities of the step that ends then, 0 at the start, in [rad/s] or [m/s]. Shape (steps + 1, n).
     """
 
-    joint_names: tuple[str, ...]
-    units: tuple[str, ...]
     times: FloatArray
     q: FloatArray
     qdot: FloatArray
 
     @classmethod
     def of(cls, scenario: Scenario, seeds: Seeds, episode: Episode) -> Motion:
-        """The motion of an episode.
-
-        Args:
-            scenario: The scenario.
-            seeds: Seeds of the episode.
-            episode: Its record.
-        """
-        arm = scenario.arm
-        return cls(
-            tuple(arm.joint_names),
-            tuple("m" if prismatic else "rad" for prismatic in arm.prismatic),
-            scenario.times(scenario.steps + 1),
-            np.vstack([scenario.start_of(seeds.seed, seeds.arm_seed), episode.q]),
-            np.vstack([np.zeros(arm.joints), episode.qdot]),
-        )
-
-    def columns(self) -> dict[str, FloatArray]:
-        """Times, coordinates and velocities by name and unit."""
-        out = {"time [s]": self.times}
-        named = list(zip(self.joint_names, self.units, strict=True))
-        out |= {f"{name} [{unit}]": self.q[:, j] for j, (name, unit) in enumerate(named)}
-        return out | {f"{name} [{unit}/s]": self.qdot[:, j] for j, (name, unit) in enumerate(named)}
-
-    def message(self) -> dict[str, Any]:
-        """A `trajectory_msgs/msg/JointTrajectory` with all of its fields.
-
-        The header's time of 0 means at once. Accelerations and efforts are left to whoever plays it: a velocity is that
-        of a whole step, and so has none.
-        """
-        points = zip(self.times.tolist(), self.q.tolist(), self.qdot.tolist(), strict=True)
-        return {
-            "header": {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""},
-            "joint_names": list(self.joint_names),
-            "points": [
-                {
-                    "positions": q,
-                    "velocities": qdot,
-                    "accelerations": [],
-                    "effort": [],
-                    "time_from_start": _duration(time),
-                }
-                for time, q, qdot in points
-            ],
-        }
-
-
-class Format(NamedTuple):
-    """A kind of file.
-
-    Attributes:
-        suffix: Of its name.
-        content: What a motion is written as.
-    """
-
-    suffix: str
-    content: Callable[[Motion], bytes]
+        """The motion of an episode."""
+        q = np.vstack([scenario.start_of(seeds.seed, seeds.arm_seed), episode.q])
+        return cls(scenario.times(scenario.steps + 1), q, np.vstack([np.zeros(scenario.joints), episode.qdot]))
 
 
 def table(columns: Mapping[str, npt.NDArray[Any]]) -> bytes:
-    """Columns as CSV, one line a row; numbers keep all digits, and those that are no numbers are left empty."""
+    """Columns as CSV, one line a row; numbers keep all digits, NaN is an empty cell."""
     text = io.StringIO(newline="")
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(columns)
@@ -105,15 +51,52 @@ def table(columns: Mapping[str, npt.NDArray[Any]]) -> bytes:
     return text.getvalue().encode()
 
 
-def message(motion: Motion) -> bytes:
-    """A motion as JSON, which `ros2 topic pub` and everything that reads YAML takes for a message."""
-    return (json.dumps(motion.message(), ensure_ascii=False, allow_nan=False) + "\n").encode()
+def motion_table(scenario: Scenario, seeds: Seeds, episode: Episode) -> bytes:
+    """The joint motion as CSV: times, joint coordinates and velocities, from the start, with units in the head."""
+    times, q, qdot = Motion.of(scenario, seeds, episode)
+    columns: dict[str, npt.NDArray[Any]] = {"time [s]": times}
+    for values, per in ((q, ""), (qdot, "/s")):
+        for joint, (name, prismatic) in enumerate(zip(scenario.arm.joint_names, scenario.arm.prismatic, strict=True)):
+            columns[f"{name} [{'m' if prismatic else 'rad'}{per}]"] = values[:, joint]
+    return table(columns)
 
 
-#: What a motion can be exported as, by name.
+def joint_trajectory(scenario: Scenario, seeds: Seeds, episode: Episode) -> bytes:
+    """The joint motion as a `trajectory_msgs/msg/JointTrajectory` in JSON, which `ros2 topic pub` reads.
+
+    The header's time of 0 means at once. Accelerations and efforts are left to the controller: a velocity is that of a
+    whole step, and so has none.
+    """
+    times, q, qdot = Motion.of(scenario, seeds, episode)
+    points = zip(times.tolist(), q.tolist(), qdot.tolist(), strict=True)
+    message = {
+        "header": {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""},
+        "joint_names": list(scenario.arm.joint_names),
+        "points": [
+            {
+                "positions": positions,
+                "velocities": velocities,
+                "accelerations": [],
+                "effort": [],
+                "time_from_start": dict(zip(("sec", "nanosec"), divmod(round(1e9 * time), 10**9), strict=True)),
+            }
+            for time, positions, velocities in points
+        ],
+    }
+    return (json.dumps(message, ensure_ascii=False, allow_nan=False) + "\n").encode()
+
+
+class Format(NamedTuple):
+    """A kind of file: the suffix of its name, and its content."""
+
+    suffix: str
+    content: Callable[[Scenario, Seeds, Episode], bytes]
+
+
+#: Formats of joint motions by name.
 FORMATS: Mapping[str, Format] = {
-    "csv": Format(".csv", lambda motion: table(motion.columns())),
-    "joint-trajectory": Format(".json", message),
+    "csv": Format(".csv", motion_table),
+    "joint-trajectory": Format(".json", joint_trajectory),
 }
 
 
@@ -128,7 +111,66 @@ def formats(names: str | Iterable[str]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(given))
 
 
-def _duration(time: float) -> dict[str, int]:
-    """A `builtin_interfaces/msg/Duration`, to the nanosecond."""
-    sec, nanosec = divmod(round(1e9 * time), 10**9)
-    return {"sec": sec, "nanosec": nanosec}
+def trajectory_log(scenario: Scenario, seeds: Seeds, episode: Episode) -> TrajectoryLog:
+    """The data of the plots of an episode, at the steps that count.
+
+    Args:
+        scenario: The scenario.
+        seeds: Seeds of the episode.
+        episode: Its record.
+
+    Returns:
+        ``time`` in [s], of shape (k,), and over it ``nominal`` and ``pose`` (k, m), ``q`` and ``qdot`` (k, n),
+        ``position_error`` and, where there is one, ``orientation_error`` (k,); ``nominal_q`` (k, n) where there is a
+        nominal joint path; ``prismatic``, which joints are prismatic, and the limits ``lower``, ``upper`` and
+        ``velocity_limit`` of the arm, infinite where there is none, all of shape (n,). If there are limits of
+        acceleration, ``acceleration_limit`` (n,), and ``qddot`` (k, n): the change of q̇ in the step by Δt, from rest.
+        For replays, at f <= :data:`FRAMES` of these steps, whose rows are ``frame`` (f,): ``joint_points``
+        (f, n, 2, 3), the ends of the joints of the arm that moves, and ``tool`` (f, 3), both in [m], and
+        ``tool_rotation`` (f, 3, 3).
+    """
+    after = np.flatnonzero(scenario.counted())
+    kept = after - 1
+    log: TrajectoryLog = {
+        "time": after * scenario.dt,
+        "nominal": scenario.nominal(seeds.seed)[after],
+        "pose": episode.pose[kept],
+        "q": episode.q[kept],
+        "qdot": episode.qdot[kept],
+        "position_error": episode.position_error[kept],
+        "prismatic": np.array(scenario.arm.prismatic, dtype=np.bool_),
+        "lower": scenario.arm.lower,
+        "upper": scenario.arm.upper,
+        "velocity_limit": scenario.arm.velocity_limit,
+    }
+    if scenario.task.has_orientation:
+        log["orientation_error"] = episode.orientation_error[kept]
+    if np.isfinite(scenario.arm.acceleration_limit).any():
+        start = np.zeros((1, scenario.joints))
+        log["qddot"] = (np.diff(episode.qdot, axis=0, prepend=start) / scenario.dt)[kept]
+        log["acceleration_limit"] = scenario.arm.acceleration_limit
+    path = scenario.nominal_joint_path(seeds.seed)
+    if path is not None:
+        log["nominal_q"] = path[after]
+    frames = frame_rows(len(kept), FRAMES)
+    return log | {"frame": frames, **_arm_in_space(scenario, seeds, log["q"][frames], after[frames])}
+
+
+def frame_rows(rows: int, most: int) -> npt.NDArray[np.int64]:
+    """At most so many rows, evenly spread; the last one always."""
+    count = min(rows, most)
+    frames: npt.NDArray[np.int64] = -(-np.arange(1, count + 1) * rows // count) - 1
+    return frames
+
+
+def _arm_in_space(scenario: Scenario, seeds: Seeds, q: FloatArray, after: npt.NDArray[np.int64]) -> TrajectoryLog:
+    """Points of the arm that moves, which may differ from its data sheet, after numbers of steps."""
+    plant = scenario.drawn_plant(seeds.seed, seeds.arm_seed)
+    arms = [plant.loaded_arm if steps >= plant.payload_step else plant.arm for steps in after]
+    places = [arm.forward(row) for arm, row in zip(arms, q, strict=True)]
+    points = np.array([arm.joint_points(row) for arm, row in zip(arms, q, strict=True)])
+    return {
+        "joint_points": points.astype(np.float32),
+        "tool": np.array([position for _, position in places], dtype=np.float32),
+        "tool_rotation": np.array([rotation for rotation, _ in places], dtype=np.float32),
+    }

@@ -40,7 +40,7 @@ class Predictor(Protocol):
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class ForeignPolicy:
-    """A foreign policy. What it does not state about itself is left empty, never guessed.
+    """A foreign policy. Properties that it does not state are left empty, never guessed.
 
     It is called for one arm at a time, with ``deterministic=True``.
 
@@ -102,12 +102,12 @@ class ForeignPolicy:
         else:
             env, _ = self.environment(scenario)
             shown, needed = env.observation_space, env.action_space
-        for what, own, there in (
+        for kind, own, there in (
             ("observations", getattr(self.model, "observation_space", None), shown),
             ("actions", getattr(self.model, "action_space", None), needed),
         ):
             if isinstance(own, gym.Space) and _shapes(own) != _shapes(there):
-                return f"{self.name} has {what} of the shape {_shapes(own)}, the environment of {_shapes(there)}."
+                return f"{self.name} has {kind} of the shape {_shapes(own)}, the environment of {_shapes(there)}."
         return None
 
     def environment(self, scenario: Scenario) -> tuple[gym.Env[Any, Any], Recorder]:
@@ -129,10 +129,10 @@ class ForeignPolicy:
 
 
 class Recorder(gym.Wrapper[Any, Any, Any, Any]):
-    """Records what happens in an environment in float64, inside of other wrappers.
+    """Records an environment in float64, inside of other wrappers.
 
     Args:
-        env: The environment, as :func:`gymnasium.make` makes it.
+        env: The environment, from :func:`gymnasium.make`.
     """
 
     def __init__(self, env: gym.Env[Any, Any]) -> None:

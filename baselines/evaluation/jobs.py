@@ -1,24 +1,110 @@
-"""The jobs of an evaluation: scenarios × policies × episodes, checked before the first one is played."""
+"""The options of an evaluation, and its jobs: scenarios × policies × episodes, all checked before one is played."""
 
 from __future__ import annotations
 
 import dataclasses
+import pathlib
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any, NamedTuple, Self
+from typing import Annotated, Any, Literal, NamedTuple
+
+import tyro
 
 from baselines.episodes import Policy, Seeds
 from baselines.evaluation import metrics
 from baselines.evaluation import test_sets as known_sets
-from baselines.evaluation.options import Options
-from baselines.evaluation.policies import ALL, AnyPolicy, specifications
+from baselines.evaluation.export import formats
+from baselines.evaluation.foreign import Wrap
+from baselines.evaluation.policies import ALL, specifications
 from baselines.evaluation.specification import Specification, shown_preview
 from baselines.files import ResultsError
 from baselines.fingerprints import fingerprint
 from baselines.oracle.stripped import ideal
+from baselines.workers import Workers
 from ikgym import scenarios as scenario_registry
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Preview, Scenario
+from ikgym.scenarios.preview import offsets
+from ikgym.validation import whole_number
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Options:
+    """Options of :func:`baselines.evaluate.evaluate` and of the command.
+
+    Names may be given as one text or as several; `out` may be text, too.
+
+    Raises:
+        UnknownNameError: There is no such format or cluster.
+        InvalidInputError: A number is out of range, the preview is invalid, or `export` is given without `out`.
+    """
+
+    scenarios: Annotated[Any, tyro.conf.Fixed, tyro.conf.Suppress] = ()
+    """Scenarios as :func:`ikgym.scenarios.find` takes them; ``"all"`` for all registered ones."""
+    policies: Annotated[Any, tyro.conf.Fixed, tyro.conf.Suppress] = ALL
+    """Policies as :func:`baselines.evaluation.policies.specifications` takes them."""
+    test_sets: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME …")] = ()
+    """Test sets, which define what is played, instead of scenarios, episodes, split, steps and noise seeds."""
+    episodes: Annotated[int, tyro.conf.arg(metavar="N")] = 1
+    """Episodes of each random scenario: the first seeds of the split. Other scenarios are the same at every reset and
+    have one episode, with seed 0."""
+    split: Annotated[str, tyro.conf.arg(metavar="NAME")] = "test"
+    """Seeds of random scenarios: train, validation or test."""
+    steps: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
+    """Most steps of an episode, for trials. The scenario's own number if left out."""
+    preview: Annotated[Preview | None, tyro.conf.arg(metavar="P …")] = None
+    """Number of steps ahead that policies are shown, or several numbers for just those steps, such as 1 10 40. The
+    policy's own preview if left out."""
+    wrap: Annotated[Wrap | None, tyro.conf.Fixed, tyro.conf.Suppress] = None
+    """Wraps the environment for policies that are no :class:`baselines.SolverPolicy`, as an agent needs it that was
+    trained in a wrapped one: ``wrap(env) -> env``. Costs and errors are those of the environment inside."""
+    timed: Annotated[int | Literal["all"], tyro.conf.arg(metavar="N|all")] = 1
+    """Episodes of each policy in each scenario that are played one by one and timed. The others are played together,
+    which is faster, and have no times."""
+    workers: Annotated[int, tyro.conf.arg(metavar="N")] = 1
+    """Processes that play episodes. They change only the times, which are most reliable with one."""
+    cluster: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
+    """Play untimed episodes on a cluster: ray, at the address in RAY_ADDRESS. Timed episodes are played here."""
+    out: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="DIR")] = None
+    """Folder for the files. Nothing is written if left out."""
+    resume: bool = False
+    """Continue with the results in the folder: finished episodes are not played again."""
+    overwrite: bool = False
+    """Replace the results in the folder."""
+    plots: bool = True
+    """Draw plots into the folder."""
+    report: bool = True
+    """Write report.html into the folder: table, plots and replays in one page that opens without a network."""
+    export: Annotated[tuple[str, ...], tyro.conf.arg(metavar="FORMAT …")] = ()
+    """Write the joint motion of each episode into the folder: csv for a table of times, joint coordinates and
+    velocities, joint-trajectory for a ROS 2 message as JSON, or both."""
+    noise_seeds: Annotated[int, tyro.conf.arg(metavar="N")] = 1
+    """Times that each episode is played, each time with other noise in sensors and drives, the same for all policies.
+    Episodes without noise are played once. The cost of an episode is the geometric mean over its noise seeds."""
+    pairs: bool = False
+    """Also play each scenario whose plant is not ideal with an ideal one, with the same seeds, to show how much the
+    plant costs each policy."""
+    progress: Annotated[bool, tyro.conf.Fixed, tyro.conf.Suppress] = False
+    """Show a progress bar on stderr."""
+
+    def __post_init__(self) -> None:
+        for name in ("test_sets", "export"):
+            value = getattr(self, name)
+            object.__setattr__(self, name, (value,) if isinstance(value, str) else tuple(value))
+        object.__setattr__(self, "export", formats(self.export))
+        if self.out is not None:
+            object.__setattr__(self, "out", pathlib.Path(self.out))
+        elif self.export:
+            raise InvalidInputError("export: expected a folder for the files, `out` or --out; got none.")
+        for name in ("episodes", "noise_seeds"):
+            whole_number(name, getattr(self, name), at_least=1)
+        if self.steps is not None:
+            whole_number("steps", self.steps, at_least=1)
+        if self.timed != "all":
+            whole_number("timed", self.timed, at_least=1)
+        if self.preview is not None:
+            offsets(self.preview)
+        Workers(self.workers, self.cluster)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -28,7 +114,7 @@ class Job:
     Args:
         scenario: The scenario.
         specification: The policy, not yet bound to the scenario.
-        given: The parameters that the policy is made with for this episode.
+        given: The parameters of its constructor for this episode.
         parameters: All of its parameters, as rows state them.
         seeds: Seeds of the episode.
         first: Whether it is the first episode of its policy in its scenario; its trajectory log is kept.
@@ -93,17 +179,8 @@ class Skipped(NamedTuple):
     reason: str
 
 
-def plan(
-    scenarios: str | Scenario | Iterable[str | Scenario],
-    policies: AnyPolicy | Iterable[AnyPolicy],
-    options: Options | None = None,
-) -> tuple[list[Job], list[Skipped]]:
+def plan(options: Options) -> tuple[list[Job], list[Skipped]]:
     """All episodes of an evaluation, policy by policy within each scenario, and the policies that are skipped.
-
-    Args:
-        scenarios: Scenarios as :func:`ikgym.scenarios.find` takes them; ``"all"`` for all registered ones.
-        policies: Policies as :func:`baselines.evaluation.policies.specifications` takes them.
-        options: Options of the evaluation; the defaults if left out.
 
     Raises:
         UnknownNameError: There is no such scenario, policy, parameter, split or test set.
@@ -111,10 +188,9 @@ def plan(
             set has drifted or is given with options that it defines.
         ResultsError: The file of an agent cannot be used.
     """
-    options = Options() if options is None else options
     timed = sys.maxsize if options.timed == ALL else int(options.timed)
-    all_policies = specifications(policies, wrap=options.wrap)
-    played = _episodes(scenarios, options)
+    all_policies = specifications(options.policies, wrap=options.wrap)
+    played = _episodes(options)
     jobs: dict[metrics.Key, Job] = {}
     skipped: list[Skipped] = []
     for some in _with_ideal(played) if options.pairs else played:
@@ -141,8 +217,8 @@ def plan(
                     fingerprint=digest,
                     ideal=of_ideal,
                     test_set=some.test_set,
-                    # A reference is made for one episode, and has nothing to learn from those before.
-                    before=0 if per_episode else some.before(seeds),
+                    # A reference is bound to one episode, and has nothing to learn from those before.
+                    before=0 if per_episode or seeds.arm_seed is None else seeds.seed - seeds.arm_seed * some.length,
                 )
                 jobs.setdefault(job.key, job)
     if not jobs:
@@ -151,40 +227,24 @@ def plan(
     return list(jobs.values()), skipped
 
 
-@dataclasses.dataclass(frozen=True)
-class _Episodes:
-    """Episodes of a scenario.
-
-    Args:
-        scenario: The scenario.
-        seeds: Seeds of each episode.
-        test_set: Digest of their test set.
-        length: Episodes that one arm plays one after the other.
-    """
+class _Episodes(NamedTuple):
+    """Episodes of a scenario: seeds of each, digest of their test set, and how many one arm plays in a row."""
 
     scenario: Scenario
     seeds: tuple[Seeds, ...]
     test_set: str | None = None
     length: int = 1
 
-    @classmethod
-    def of(
-        cls, scenario: Scenario, seeds: Iterable[int], noise_seeds: int, test_set: str | None = None, length: int = 1
-    ) -> Self:
-        """The episodes of reset seeds, once each where there is no noise."""
-        times = noise_seeds if scenario.plant.noisy else 1
-        arm_seeds = {seed: seed // length if length > 1 else None for seed in seeds}
-        drawn = tuple(Seeds(seed, arm, noise) for seed, arm in arm_seeds.items() for noise in range(times))
-        return cls(scenario, drawn, test_set, length)
 
-    def before(self, seeds: Seeds) -> int:
-        """Episodes that the same arm plays before."""
-        return 0 if seeds.arm_seed is None else seeds.seed - seeds.arm_seed * self.length
+def _drawn(scenario: Scenario, seeds: Iterable[int], noise_seeds: int, length: int = 1) -> tuple[Seeds, ...]:
+    """All seeds of the episodes of reset seeds; each is played once if there is no noise."""
+    times = noise_seeds if scenario.plant.noisy else 1
+    return tuple(Seeds(seed, seed // length if length > 1 else None, noise) for seed in seeds for noise in range(times))
 
 
-def _episodes(scenarios: str | Scenario | Iterable[str | Scenario], options: Options) -> list[_Episodes]:
+def _episodes(options: Options) -> list[_Episodes]:
     """The episodes of all scenarios or test sets."""
-    listed = _scenarios(scenarios, options.steps)
+    listed = _scenarios(options.scenarios, options.steps)
     if options.test_sets:
         changed = (options.episodes, options.split, options.steps, options.noise_seeds) != (1, "test", None, 1)
         if listed or changed:
@@ -193,18 +253,23 @@ def _episodes(scenarios: str | Scenario | Iterable[str | Scenario], options: Opt
                 "scenarios, episodes, split, steps or noise_seeds."
             )
         sets = [known_sets.get(name) for name in options.test_sets]
-        return [_Episodes.of(one.scenario, one.seeds, one.noise_seeds, one.digest, one.sequence) for one in sets]
-    drawn = scenario_registry.seeds(options.split, options.episodes)
-    return [
-        _Episodes.of(
-            scenario,
-            # A scenario that is the same at every reset would only be played several times over.
-            drawn if scenario.random or scenario.plant.random else (0,),
-            options.noise_seeds,
-            length=known_sets.sequence(scenario.name),
-        )
-        for scenario in listed
-    ]
+        return [
+            _Episodes(
+                one.scenario,
+                _drawn(one.scenario, one.seeds, one.noise_seeds, one.sequence),
+                one.digest,
+                one.sequence,
+            )
+            for one in sets
+        ]
+    reset = scenario_registry.seeds(options.split, options.episodes)
+    out = []
+    for scenario in listed:
+        # A scenario that is the same at every reset is played once.
+        seeds = reset if scenario.random or scenario.plant.random else (0,)
+        length = known_sets.sequence(scenario.name)
+        out.append(_Episodes(scenario, _drawn(scenario, seeds, options.noise_seeds, length), None, length))
+    return out
 
 
 def _with_ideal(played: Sequence[_Episodes]) -> Iterator[_Episodes]:
@@ -216,7 +281,8 @@ def _with_ideal(played: Sequence[_Episodes]) -> Iterator[_Episodes]:
         plain = ideal(one.scenario)
         if (content := fingerprint(plain)) not in there:
             name = names.setdefault(content, f"{one.scenario.name}, ideal plant")
-            yield _Episodes.of(plain.replace(name=name), dict.fromkeys(seeds.seed for seeds in one.seeds), 1)
+            alone = plain.replace(name=name)
+            yield _Episodes(alone, _drawn(alone, dict.fromkeys(seeds.seed for seeds in one.seeds), 1))
 
 
 def _scenarios(given: str | Scenario | Iterable[str | Scenario], steps: int | None) -> list[Scenario]:

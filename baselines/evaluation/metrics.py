@@ -1,19 +1,25 @@
-"""Rows: the scores of one episode."""
+"""Rows: the scores of one episode, and the machine that it was played on."""
 
 from __future__ import annotations
 
 import collections
 import dataclasses
+import functools
 import math
+import pathlib
+import platform
 from collections.abc import Mapping
 from typing import Any
 
+import numba
 import numpy as np
 
+import ikgym
 from baselines.canonical import canonical
 from baselines.episodes import Episode, Seeds, add_up
 from baselines.status import Status
 from ikgym.arms import Arm
+from ikgym.parallel import cores
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray
 
@@ -61,7 +67,7 @@ class Row:
         time_p99_us: Its 99th percentile, in [µs].
         deadline_misses: Calls, but for the first, that took longer than the scenario's Δt.
         status: The worst status of the episode; unknown for policies that report none.
-        machine: Processor and versions, see :func:`baselines.evaluation.machine.describe`.
+        machine: Processor and versions, see :func:`describe`.
         iterations: Mean iterations of the policy in one step; None where they are not known.
         status_counts: Number of steps that ended with each status.
         preview: Furthest step ahead that the policy was shown.
@@ -224,3 +230,27 @@ def _margin(arm: Arm, q: FloatArray) -> float | None:
 
 def _finite_or_none(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+@functools.cache
+def _cpu() -> str:
+    try:
+        for line in pathlib.Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    except OSError:
+        pass  # no Linux
+    return platform.processor() or platform.machine() or "unknown"
+
+
+def describe() -> dict[str, Any]:
+    """CPU, the cores that this process may use, and the versions that matter to a number."""
+    return {
+        "cpu": _cpu(),
+        "cores": cores(),
+        "system": platform.system(),
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "numba": numba.__version__,
+        "ikgym": ikgym.__version__,
+    }

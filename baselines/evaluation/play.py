@@ -6,7 +6,6 @@ import contextlib
 import dataclasses
 import functools
 import itertools
-import logging
 import math
 import sys
 from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
@@ -15,14 +14,14 @@ from typing import Any
 import llvmlite.binding as llvm
 from threadpoolctl import threadpool_limits
 from tqdm import tqdm
+from tqdm.contrib.logging import logging_redirect_tqdm
 
 import ikgym
 from baselines.canonical import canonical, jsonable
 from baselines.episodes import Episode, Policy, Seeds, Tick, rollouts, sequences
 from baselines.evaluation.foreign import ForeignPolicy, play_wrapped
 from baselines.evaluation.jobs import Job
-from baselines.evaluation.machine import describe
-from baselines.evaluation.metrics import Row, measure
+from baselines.evaluation.metrics import Row, describe, measure
 from baselines.evaluation.policies import check_picklable
 from baselines.fingerprints import fingerprint
 from baselines.oracle import best_known
@@ -53,7 +52,7 @@ def run(jobs: Sequence[Job], workers: Workers, *, progress: bool) -> Generator[t
 
     Args:
         jobs: The jobs.
-        workers: Who plays them.
+        workers: The workers.
         progress: Whether to show a bar on stderr.
 
     Raises:
@@ -62,7 +61,7 @@ def run(jobs: Sequence[Job], workers: Workers, *, progress: bool) -> Generator[t
         ClusterError: There is no cluster.
     """
     away, here = _shared(jobs, workers)
-    with tqdm(
+    bar = tqdm(
         total=sum(job.scenario.steps for job in jobs),
         disable=not progress or not jobs,
         file=sys.stderr,
@@ -71,19 +70,23 @@ def run(jobs: Sequence[Job], workers: Workers, *, progress: bool) -> Generator[t
         dynamic_ncols=True,
         # A log file has no cursor to go back with.
         mininterval=0.1 if sys.stderr.isatty() else 10.0,
-    ) as bar:
-        line, done = _Line(bar), 0
+    )
+    done = 0
+
+    def announce(batch: Batch) -> None:
+        nonlocal done
+        done += len(batch)
+        bar.set_description(f"{batch[0].scenario.name} · {batch[0].policy} ({done}/{len(jobs)})", refresh=False)
+
+    # Messages, such as those on compilation, stand above the bar.
+    with bar, contextlib.nullcontext() if bar.disable else logging_redirect_tqdm([logger]):
         for batch, results in _elsewhere(away, workers):
-            done += len(batch)
-            line.announce(batch[0], done, len(jobs))
+            announce(batch)
             bar.update(sum(job.scenario.steps for job in batch))
             yield batch, results
         for batch in here:
-            done += len(batch)
-            line.announce(batch[0], done, len(jobs))
-            with line.watching():
-                results = play(batch, line.tick)
-            yield batch, results
+            announce(batch)
+            yield batch, play(batch, bar.update)
 
 
 def play(batch: Batch, tick: Tick | None = None) -> Results:
@@ -96,7 +99,7 @@ def play(batch: Batch, tick: Tick | None = None) -> Results:
     first = batch[0]
     policy = first.bind()
     # The matrices of one arm are too small to share out, and threads would blur the times. Environment variables
-    # would be heeded only by libraries that are not loaded yet, and NumPy is.
+    # affect only libraries that are not loaded yet.
     with threadpool_limits(limits=1):
         if any(job.before for job in batch):
             episodes = _in_sequence(batch, policy, tick)
@@ -136,7 +139,7 @@ def play_episodes(
 def batches(jobs: Iterable[Job], most: int = MOST) -> list[Batch]:
     """Jobs that are played together, in their order.
 
-    Timed jobs are played by themselves, and so are those of a reference that is made for one episode.
+    Timed jobs are played alone, and so are those of a reference that is bound to one episode.
 
     Args:
         jobs: All jobs.
@@ -222,12 +225,12 @@ def work(batch: Batch) -> tuple[Results, str]:
 
 @functools.cache
 def processor() -> str:
-    """What compiled code is made for; the name of a processor is not enough on virtual machines."""
+    """The target of compiled code; the name of a processor does not identify it on virtual machines."""
     return f"{llvm.get_host_cpu_name()} {llvm.get_host_cpu_features().flatten()}"
 
 
 class _ClusterCheck:
-    """Checks what a cluster returns: its nodes may have other versions of the code, and other processors."""
+    """Checks results of a cluster: its nodes may have other versions of the code, and other processors."""
 
     def __init__(self) -> None:
         self._here = _kind(describe()), processor()
@@ -274,48 +277,3 @@ def compare(there: Row, here: Row, tolerance: float) -> None:
 def _kind(machine: Mapping[str, Any]) -> str:
     """The properties of a machine that decide about the last bits of a number."""
     return canonical({name: value for name, value in machine.items() if name != "cores"})
-
-
-class _Line(logging.Handler):
-    """The progress bar, which also shows when kernels are compiled.
-
-    Args:
-        bar: The bar.
-    """
-
-    def __init__(self, bar: Any) -> None:
-        super().__init__()
-        self._bar, self._description, self._compiling = bar, "", False
-
-    def announce(self, job: Job, done: int, total: int) -> None:
-        """Shows which episodes are played, or have been."""
-        self._description = f"{job.scenario.name} · {job.policy} ({done}/{total})"
-        self._bar.set_description(self._description, refresh=False)
-
-    def tick(self, steps: int) -> None:
-        """Moves the bar."""
-        if self._compiling:
-            self._compiling = False
-            self._bar.set_description(self._description, refresh=False)
-        self._bar.update(steps)
-
-    def emit(self, record: logging.LogRecord) -> None:
-        """Shows compilation in the bar itself; other messages above it."""
-        text = record.getMessage()
-        if not text.startswith("Compiling "):
-            self._bar.write(text, file=sys.stderr)
-            return
-        self._compiling = True
-        self._bar.set_description(text.partition(",")[0], refresh=True)
-
-    @contextlib.contextmanager
-    def watching(self) -> Iterator[None]:
-        """Receives log messages while episodes are played, if the bar is shown."""
-        if self._bar.disable:
-            yield
-            return
-        logger.addHandler(self)
-        try:
-            yield
-        finally:
-            logger.removeHandler(self)

@@ -18,11 +18,9 @@ import numpy.typing as npt
 import ikgym
 from baselines.canonical import canonical
 from baselines.episodes import Episode
-from baselines.evaluation.export import FORMATS, Format, Motion
-from baselines.evaluation.jobs import Job, Skipped
+from baselines.evaluation.export import FORMATS, Format, trajectory_log
+from baselines.evaluation.jobs import Job, Options, Skipped
 from baselines.evaluation.metrics import Row
-from baselines.evaluation.options import Options
-from baselines.evaluation.trajectory_log import trajectory_log
 from baselines.files import ResultsError, check_flags, from_json, read_arrays, read_json, reading, write, write_json
 from ikgym.scenarios import SPLITS
 from ikgym.scenarios.preview import furthest
@@ -55,9 +53,9 @@ class Results:
     Every file is replaced in one go, so that none is ever half written.
 
     Args:
-        directory: The folder; it is made if it does not exist.
+        directory: The folder; created if it does not exist.
         jobs: The jobs. Their rows are kept in this order, after other rows of the folder.
-        machine: Processor and versions, see :func:`baselines.evaluation.machine.describe`.
+        machine: Processor and versions, see :func:`baselines.evaluation.metrics.describe`.
         options: Options of the evaluation: resume, overwrite and export.
 
     Raises:
@@ -109,7 +107,7 @@ class Results:
 
         Args:
             jobs: The jobs that were played.
-            results: The row of each, and the record of its episode if files are made from it.
+            results: The row of each, and the record of its episode if files need it.
 
         Raises:
             ResultsError: The folder cannot be written.
@@ -123,7 +121,7 @@ class Results:
                 np.savez_compressed(file, allow_pickle=False, **trajectory_log(job.scenario, job.seeds, episode))
                 write(self.series_file(row), file.getvalue())
             for kind in self._export:
-                write(self.export_file(row, kind), kind.content(Motion.of(job.scenario, job.seeds, episode)))
+                write(self.export_file(row, kind), kind.content(job.scenario, job.seeds, episode))
         self.save()
 
     def save(self) -> None:
@@ -232,10 +230,10 @@ def _check_comparable(file: pathlib.Path, rows: Sequence[Row], jobs: Sequence[Jo
             ]
             if seed := job.seeds.seed:
                 pairs.append((f"{row.scenario} on the split", _split(row.seed), _split(seed)))
-        for what, there, here in pairs:
+        for part, there, here in pairs:
             if there != here:
                 raise ResultsError(
-                    f"{file} has results of {what} {there}, this run has {here}: they cannot be compared. Choose "
+                    f"{file} has results of {part} {there}, this run has {here}: they cannot be compared. Choose "
                     "another directory."
                 )
 

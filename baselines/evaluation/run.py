@@ -8,9 +8,8 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 from baselines.evaluation import report
-from baselines.evaluation.jobs import plan
-from baselines.evaluation.machine import describe
-from baselines.evaluation.options import Options
+from baselines.evaluation.jobs import Options, plan
+from baselines.evaluation.metrics import describe
 from baselines.evaluation.play import run
 from baselines.evaluation.policies import ALL, AnyPolicy
 from baselines.evaluation.results import PAGE, Results, Rows
@@ -40,7 +39,7 @@ def evaluate(
             function that requires an argument receives the scenario. A policy that is no
             :class:`baselines.SolverPolicy` is called for one arm at a time, and once more before the first step, which
             does not count.
-        **options: Fields of :class:`baselines.evaluation.options.Options`: test_sets, episodes, split, steps, preview,
+        **options: Fields of :class:`baselines.evaluation.jobs.Options`: test_sets, episodes, split, steps, preview,
             wrap, timed, workers, cluster, out, resume, overwrite, plots, report, export, noise_seeds, pairs, progress.
             More than one of `workers` needs a main module that may be imported, that is with
             ``if __name__ == "__main__":``.
@@ -61,12 +60,10 @@ def evaluate(
         ClusterError: There is no cluster.
         MissingDependencyError: The package of the cluster is not installed.
     """
-    return carry_out(scenarios, policies, Options(**options))
+    return carry_out(Options(scenarios=scenarios, policies=policies, **options))
 
 
 def carry_out(
-    scenarios: str | Scenario | Iterable[str | Scenario],
-    policies: AnyPolicy | Iterable[AnyPolicy],
     options: Options,
     *,
     command: str = "baselines.evaluate.evaluate(…)",
@@ -75,13 +72,11 @@ def carry_out(
     """See :func:`evaluate`.
 
     Args:
-        scenarios: The scenarios.
-        policies: The policies.
         options: All options.
-        command: The command, as the files state it.
-        show: Called with the rows before plots are drawn, which takes a while.
+        command: The command, for the files.
+        show: Called with the rows before plots are drawn.
     """
-    jobs, skipped = plan(scenarios, policies, options)
+    jobs, skipped = plan(options)
     workers = Workers(options.workers, options.cluster)
     workers.check()
     with contextlib.nullcontext() if options.out is None else locked(options.out):
@@ -102,7 +97,7 @@ def carry_out(
 
 
 def _finish(results: Results, rows: Rows, options: Options, command: str) -> None:
-    """Writes the files that are made from the rows."""
+    """Writes plots, tables and the report."""
     pictures = {}
     if options.plots:
         # matplotlib is slow to import, and most evaluations from Python draw nothing.

@@ -35,12 +35,12 @@ class Specification(abc.ABC):
         return True
 
     def given(self, scenario: Scenario, seeds: Seeds) -> dict[str, Any]:
-        """The parameters that the policy is made with for one episode."""
+        """The parameters of the constructor for one episode."""
         del scenario, seeds
         return {}
 
     def per_episode(self, scenario: Scenario) -> bool:
-        """Whether the policy is made anew for each episode, as references with privileged information are."""
+        """Whether each episode needs its own policy, as with references that have privileged information."""
         return self.given(scenario, Seeds(0)) != self.given(scenario, Seeds(1))
 
     @abc.abstractmethod
@@ -56,9 +56,10 @@ class Specification(abc.ABC):
             IkgymError: The policy cannot be made.
         """
 
-    @abc.abstractmethod
     def parameters(self, scenario: Scenario, policy: Policy) -> dict[str, Any]:
-        """The parameters of the bound policy that rows state."""
+        """The parameters of the bound policy for rows."""
+        del scenario
+        return {name: jsonable(value) for name, value in getattr(policy, "parameters").items()}  # noqa: B009
 
     @abc.abstractmethod
     def unsuited(self, scenario: Scenario, seeds: Seeds, preview: Preview | None) -> str | None:
@@ -133,11 +134,6 @@ class InstanceSpecification(Specification):
         del scenario, given, preview
         return self.policy
 
-    def parameters(self, scenario: Scenario, policy: Policy) -> dict[str, Any]:
-        """All parameters."""
-        del scenario, policy
-        return {name: jsonable(value) for name, value in self.policy.parameters.items()}
-
     def unsuited(self, scenario: Scenario, seeds: Seeds, preview: Preview | None) -> str | None:
         """See :meth:`Specification.unsuited`."""
         del seeds, preview
@@ -194,11 +190,6 @@ class ForeignSpecification(Specification):
         own = self.chosen or (known if isinstance(known, Mapping) else {})
         ahead = self._preview(model, preview)
         return ForeignPolicy(self.name, cast(Predictor, model), ahead, self.wrap, jsonable(own))
-
-    def parameters(self, scenario: Scenario, policy: Policy) -> dict[str, Any]:
-        """The parameters that are known."""
-        del scenario
-        return dict(jsonable(getattr(policy, "parameters")))  # noqa: B009
 
     def unsuited(self, scenario: Scenario, seeds: Seeds, preview: Preview | None) -> str | None:
         """See :meth:`Specification.unsuited`."""

@@ -1,34 +1,61 @@
-"""The rows of several episodes put together."""
+"""The episodes of a policy in a scenario put together: geometric means, bootstrap intervals, worst cases, labels."""
 
 from __future__ import annotations
 
+import collections
 import dataclasses
+import functools
+import math
 import statistics
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple, Self
 
 import numpy as np
 
+from baselines import registry
 from baselines.canonical import canonical
 from baselines.evaluation.metrics import Row
-from baselines.evaluation.statistics import geometric_interval as geometric_interval
-from baselines.evaluation.statistics import geometric_mean as geometric_mean
 from baselines.status import Status
-from ikgym.exceptions import InvalidInputError
+from ikgym.exceptions import IkgymError, InvalidInputError
 from ikgym.validation import FloatArray
 
+#: Number of bootstrap resamples.
+RESAMPLES = 9999
 
-@dataclasses.dataclass(frozen=True)
-class Spread:
-    """A number over several episodes.
+
+def geometric_mean(values: Sequence[float] | FloatArray) -> float:
+    """Exponential of the mean logarithm; 0 if a value is 0."""
+    numbers = np.ravel(values).tolist()
+    if min(numbers) <= 0.0:
+        return 0.0
+    return float(numbers[0]) if len(numbers) == 1 else math.exp(math.fsum(map(math.log, numbers)) / len(numbers))
+
+
+def geometric_interval(values: Sequence[float] | FloatArray) -> tuple[float, float]:
+    """The 95 % percentile-bootstrap interval of a geometric mean.
+
+    Each resample draws training seeds and episodes with replacement. All seeds share the drawn episodes, because every
+    seed plays the same ones: an episode that is hard is hard for all of them, and drawing anew for each seed would
+    make the interval too narrow. With one seed, episodes alone are resampled. The draws are always the same.
 
     Args:
-        mean: Its geometric mean.
-        median: Its median.
-        p90: Its 90th percentile.
-        worst: The largest.
-        worst_seed: The reset seed of the episode with the largest.
+        values: Positive numbers, one row per training seed, one column per episode. Shape (s, e) or (e,).
+
+    Returns:
+        The 2.5th and the 97.5th percentile.
     """
+    logs = np.log(np.atleast_2d(values))
+    seeds, episodes = logs.shape
+    generator = np.random.default_rng(0)
+    drawn = generator.integers(episodes, size=(RESAMPLES, episodes))
+    means = np.stack([row[drawn].mean(axis=1) for row in logs], axis=1)
+    rows = generator.integers(seeds, size=(RESAMPLES, seeds))
+    low, high = np.exp(np.percentile(np.take_along_axis(means, rows, axis=1).mean(axis=1), (2.5, 97.5)))
+    return float(low), float(high)
+
+
+class Spread(NamedTuple):
+    """Geometric mean, median, 90th percentile and maximum of a number over episodes, and the seed of the maximum."""
 
     mean: float
     median: float
@@ -43,119 +70,134 @@ class Spread:
         p90 = float(np.percentile(numbers, 90))
         return cls(geometric_mean(numbers), statistics.median(numbers), p90, values[seed], seed)
 
-    @classmethod
-    def over(cls, values: FloatArray) -> Self:
-        """The spread of numbers that belong to no single episode, such as those of several seeds of a policy."""
-        return cls.of(dict(enumerate(np.ravel(values).tolist())))
-
 
 class Paired(NamedTuple):
-    """A policy beside itself on an ideal plant, on the same reset seeds.
+    """A policy compared with itself on an ideal plant, on the same reset seeds.
 
     Attributes:
-        ideal: Geometric mean of the total cost on the ideal plant.
-        cost_ratio: Geometric mean of the cost ratio there; None where it is not known.
+        cost_ratio: Geometric mean of the cost ratio on the ideal plant; None where it is not known.
         mean: Geometric mean of the cost divided by that of the same seed on the ideal plant.
-        low: Lower end of its interval of 95 %, over the seeds.
+        low: Lower end of its 95 % interval over the seeds.
         high: Upper end.
-        episodes: Seeds that both have played.
     """
 
-    ideal: float
     cost_ratio: float | None
     mean: float
     low: float
     high: float
-    episodes: int
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, eq=False)
 class Summary:
-    """The episodes of one policy in one scenario, put together.
+    """The episodes of one policy in one scenario. Episodes that differ in their noise alone count as one.
 
     Args:
-        scenario: Its name.
-        policy: Its name.
-        parameters: The policy's parameters.
-        steps: Steps of an episode.
-        episodes: How many there are; those that differ in their noise alone are one.
-        total_cost: Over the episodes.
-        tracking_cost: Geometric mean.
-        velocity_cost: Geometric mean.
-        cost_ratio: Over the episodes; None where one is not known.
-        position_error_max: The largest, in [m].
-        orientation_error_max: The largest, in [rad]; None without an orientation.
-        qdot_peak: The largest, in [rad/s] or [m/s].
-        steps_at_joint_limit: Their sum.
-        steps_at_velocity_limit: Likewise.
-        steps_at_acceleration_limit: Likewise.
-        time_p50_us: Median of the medians, in [µs]; None, like all times, where no episode was timed.
-        time_p99_us: The largest, in [µs].
-        deadline_misses: Their sum.
-        status: The worst.
-        time_first_us: The largest, in [µs].
-        lost: In how many the arm lost track, see :func:`baselines.evaluation.metrics.lost`; each noise seed counts.
-        paired: The policy beside itself on an ideal plant; None where the plant is ideal, or it has not played there.
+        rows: Their rows.
+        ideal: The rows of the same policy with an ideal plant; empty if the plant is ideal, or it has not played there.
+        label: The name of the policy among those of the scenario.
     """
 
-    scenario: str
-    policy: str
-    parameters: dict[str, Any]
-    steps: int
-    episodes: int
-    total_cost: Spread
-    tracking_cost: float
-    velocity_cost: float
-    cost_ratio: Spread | None
-    position_error_max: float
-    orientation_error_max: float | None
-    qdot_peak: float
-    steps_at_joint_limit: int
-    steps_at_velocity_limit: int
-    steps_at_acceleration_limit: int
-    time_p50_us: float | None
-    time_p99_us: float | None
-    deadline_misses: int | None
-    status: str
-    time_first_us: float | None
-    lost: int
-    paired: Paired | None = None
+    rows: Sequence[Row]
+    ideal: Sequence[Row] = ()
+    label: str = ""
+
+    @property
+    def first(self) -> Row:
+        """The row of the first episode."""
+        return self.rows[0]
+
+    @functools.cached_property
+    def total_cost(self) -> Spread:
+        """The total cost."""
+        return Spread.of(by_seed(self.rows, _total))
+
+    @functools.cached_property
+    def cost_ratio(self) -> Spread | None:
+        """The cost ratio; None if that of an episode is not known."""
+        if any(row.cost_ratio is None for row in self.rows):
+            return None
+        return Spread.of(by_seed(self.rows, _ratio))
+
+    @functools.cached_property
+    def interval(self) -> tuple[float, float] | None:
+        """The 95 % interval of the cost ratio, or of the total cost if the ratio is not known; None if it has none."""
+        values = list(by_seed(self.rows, _ratio if self.cost_ratio else _total).values())
+        usable = len(values) > 1 and all(0.0 < value < math.inf for value in values)
+        return geometric_interval(values) if usable else None
+
+    @functools.cached_property
+    def paired(self) -> Paired | None:
+        """The comparison with an ideal plant; None without common seeds, or if a cost is 0."""
+        costs, plain = by_seed(self.rows, _total), by_seed(self.ideal, _total)
+        common = [seed for seed in costs if seed in plain]
+        if not common or min(min(plain[seed], costs[seed]) for seed in common) <= 0.0:
+            return None
+        ratios = [costs[seed] / plain[seed] for seed in common]
+        known = [row.cost_ratio for row in self.ideal if row.seed in costs and row.cost_ratio is not None]
+        mean = geometric_mean(known) if len(known) == len(common) else None
+        return Paired(mean, geometric_mean(ratios), *geometric_interval(ratios))
+
+    @functools.cached_property
+    def episodes(self) -> int:
+        """Number of episodes."""
+        return len({row.seed for row in self.rows})
+
+    @property
+    def lost(self) -> int:
+        """Number of rows in which the arm was lost."""
+        return sum(row.lost for row in self.rows)
+
+    @property
+    def status(self) -> str:
+        """The worst status."""
+        return max((row.status for row in self.rows), key=lambda status: Status[status.upper()])
+
+    @property
+    def reference(self) -> bool:
+        """Whether the policy has privileged information."""
+        return is_reference(self.first.policy)
+
+    def _values(self, column: str) -> list[Any]:
+        return [value for row in self.rows if (value := getattr(row, column)) is not None]
+
+    def mean(self, column: str) -> float:
+        """The geometric mean of a column."""
+        return geometric_mean(self._values(column))
+
+    def median(self, column: str) -> float | None:
+        """The median of a column; None if no episode has a value."""
+        return statistics.median(values) if (values := self._values(column)) else None
+
+    def largest(self, column: str) -> float | None:
+        """The maximum of a column; None if no episode has a value."""
+        return max(self._values(column), default=None)
+
+    def total(self, column: str) -> int | None:
+        """The sum of a column; None if no episode has a value."""
+        return sum(values) if (values := self._values(column)) else None
 
 
-class Times(NamedTuple):
-    """Times of single calls over those of several episodes that were timed; None where none was.
-
-    Attributes:
-        timed: How many episodes were timed.
-        p50_us: Median of the medians, in [µs].
-        p99_us: The largest, in [µs].
-        first_us: The longest first call, in [µs].
-    """
-
-    timed: int
-    p50_us: float | None
-    p99_us: float | None
-    first_us: float | None
+def _total(row: Row) -> float:
+    return row.total_cost
 
 
-def times(rows: Iterable[Row]) -> Times:
-    """The times of some rows, put together."""
-    timed = [row for row in rows if row.time_p50_us is not None]
-    medians = [row.time_p50_us for row in timed if row.time_p50_us is not None]
-    return Times(
-        len(timed),
-        statistics.median(medians) if medians else None,
-        max((row.time_p99_us for row in timed if row.time_p99_us is not None), default=None),
-        max((row.time_first_us for row in timed if row.time_first_us is not None), default=None),
-    )
+def _ratio(row: Row) -> float:
+    return row.cost_ratio or 0.0
+
+
+def by_seed(rows: Iterable[Row], value: Callable[[Row], float]) -> dict[int, float]:
+    """A number of each episode: the geometric mean over its noise seeds, by its reset seed."""
+    found: dict[int, list[float]] = {}
+    for row in rows:
+        found.setdefault(row.seed, []).append(value(row))
+    return {seed: geometric_mean(values) for seed, values in found.items()}
 
 
 def summarise(rows: Iterable[Row]) -> list[Summary]:
     """One summary for each policy with its parameters in each scenario, in the order of their first rows.
 
     Raises:
-        InvalidInputError: Rows cannot be compared: their scenarios share a name and no more, or they belong to
-            different sets.
+        InvalidInputError: Rows cannot be compared: two scenarios share a name, or rows belong to different test sets.
     """
     groups: dict[tuple[str, str, str, int], list[Row]] = {}
     contents: dict[str, tuple[str, str | None]] = {}
@@ -167,71 +209,69 @@ def summarise(rows: Iterable[Row]) -> list[Summary]:
                 f"{contents[row.scenario]} and {content}."
             )
         groups.setdefault((row.scenario, row.policy, canonical(row.parameters), row.steps), []).append(row)
-    on_ideal = {
+    ideal = {
         (group[0].fingerprint, *key[1:]): group
         for key, group in groups.items()
         if group[0].fingerprint == group[0].ideal
     }
-    return [_summary(group, on_ideal.get((str(group[0].ideal), *key[1:]))) for key, group in groups.items()]
+    names = _labels([group[0] for group in groups.values()])
+    return [
+        Summary(
+            group,
+            () if group[0].fingerprint == group[0].ideal else ideal.get((str(group[0].ideal), *key[1:]), ()),
+            name,
+        )
+        for (key, group), name in zip(groups.items(), names, strict=True)
+    ]
 
 
-def by_seed(rows: Iterable[Row], value: Callable[[Row], float]) -> dict[int, float]:
-    """A number of each episode: the geometric mean over its noise seeds, by its reset seed."""
-    found: dict[int, list[float]] = {}
-    for row in rows:
-        found.setdefault(row.seed, []).append(value(row))
-    return {seed: geometric_mean(values) for seed, values in found.items()}
+def by_scenario(rows: Iterable[Row]) -> dict[str, list[Summary]]:
+    """Summaries of each scenario, in the order of the rows."""
+    out: dict[str, list[Summary]] = {}
+    for summary in summarise(rows):
+        out.setdefault(summary.first.scenario, []).append(summary)
+    return out
 
 
-def paired(rows: Sequence[Row], ideal: Sequence[Row]) -> Paired | None:
-    """A policy beside itself on an ideal plant; None where they have no seed in common, or a cost is 0."""
-    costs, plain = by_seed(rows, _total), by_seed(ideal, _total)
-    common = [seed for seed in costs if seed in plain]
-    if not common or min(plain[seed] for seed in common) <= 0.0 or min(costs[seed] for seed in common) <= 0.0:
-        return None
-    ratios = [costs[seed] / plain[seed] for seed in common]
-    known = [row.cost_ratio for row in ideal if row.seed in costs and row.cost_ratio is not None]
-    return Paired(
-        geometric_mean([plain[seed] for seed in common]),
-        geometric_mean(known) if len(known) == len(common) else None,
-        geometric_mean(ratios),
-        *geometric_interval(ratios),
-        len(common),
-    )
+def is_reference(policy: str) -> bool:
+    """Whether a policy has privileged information, as far as it is known without importing code of others."""
+    try:
+        kind = registry.get(policy) if registry.known(policy) else registry.imported(policy)
+    except IkgymError:
+        return False
+    return bool(getattr(kind, "reference", False))
 
 
-def _total(row: Row) -> float:
-    return row.total_cost
+def _labels(rows: Sequence[Row]) -> list[str]:
+    """A label for the policy of each row.
+
+    The name, and the parameters that are not at their defaults; if that leaves two policies of a scenario alike, all
+    parameters in which they differ.
+    """
+
+    def label(row: Row, variants: Sequence[Row]) -> str:
+        defaults = _defaults(row.policy)
+        parts = [
+            f"{name}={f'{value:g}' if isinstance(value, float) else str(value).replace(' ', '')}"
+            for name, value in row.parameters.items()
+            if any(variant.parameters.get(name) != value for variant in variants) or defaults.get(name, value) != value
+        ]
+        return row.policy + (f":{','.join(parts)}" if parts else "")
+
+    short = [(row.scenario, label(row, ())) for row in rows]
+    taken = collections.Counter(short)
+    return [
+        label(row, [other for other, name in zip(rows, short, strict=True) if name == mine])
+        if taken[mine] > 1
+        else mine[1]
+        for row, mine in zip(rows, short, strict=True)
+    ]
 
 
-def _summary(rows: Sequence[Row], ideal: Sequence[Row] | None) -> Summary:
-    first = rows[0]
-    costs = by_seed(rows, _total)
-    known = all(row.cost_ratio is not None for row in rows)
-    angles = [row.orientation_error_max for row in rows if row.orientation_error_max is not None]
-    clocked = times(rows)
-    misses = [row.deadline_misses for row in rows if row.deadline_misses is not None]
-    return Summary(
-        scenario=first.scenario,
-        policy=first.policy,
-        parameters=first.parameters,
-        steps=first.steps,
-        episodes=len(costs),
-        total_cost=Spread.of(costs),
-        tracking_cost=geometric_mean([row.tracking_cost for row in rows]),
-        velocity_cost=geometric_mean([row.velocity_cost for row in rows]),
-        cost_ratio=Spread.of(by_seed(rows, lambda row: row.cost_ratio or 0.0)) if known else None,
-        position_error_max=max(row.position_error_max for row in rows),
-        orientation_error_max=max(angles) if angles else None,
-        qdot_peak=max(row.qdot_peak for row in rows),
-        steps_at_joint_limit=sum(row.steps_at_joint_limit for row in rows),
-        steps_at_velocity_limit=sum(row.steps_at_velocity_limit for row in rows),
-        steps_at_acceleration_limit=sum(row.steps_at_acceleration_limit for row in rows),
-        time_p50_us=clocked.p50_us,
-        time_p99_us=clocked.p99_us,
-        deadline_misses=sum(misses) if misses else None,
-        status=max((row.status for row in rows), key=lambda status: Status[status.upper()]),
-        time_first_us=clocked.first_us,
-        lost=sum(row.lost for row in rows),
-        paired=None if ideal is None or first.fingerprint == first.ideal else paired(rows, ideal),
-    )
+def _defaults(policy: str) -> dict[str, Any]:
+    try:
+        fields = dataclasses.fields(registry.get(policy))
+    except IkgymError:  # of a policy that is not known here
+        return {}
+    # None often stands for a value that the policy works out itself.
+    return {f.name: f.default for f in fields if f.default is not dataclasses.MISSING and f.default is not None}

@@ -1,168 +1,148 @@
-"""The table of results: policies on scenarios, as records, as CSV and as Markdown.
-
-A CSV file is the measurement as it is kept; its Markdown table is a view of it. Names of columns carry the unit as a
-suffix (`time_p50_us`), and an interval is a pair of columns `low` and `high`, possibly with a prefix.
-"""
+"""Tables of summaries as plain text, Markdown and HTML."""
 
 from __future__ import annotations
 
-import csv
-import io
-import re
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+import dataclasses
+import math
+from collections.abc import Callable, Iterable, Sequence
+from html import escape
 
-import numpy as np
+from baselines.evaluation.summary import Summary
 
-from baselines import registry
-from baselines.canonical import canonical, jsonable
-from baselines.evaluation.metrics import Row
-from baselines.evaluation.report import NOTHING, labels, number
-from baselines.evaluation.statistics import geometric_interval, geometric_mean
-from baselines.evaluation.summary import Summary, by_seed, summarise, times
-from baselines.oracle import best_known
-from baselines.spec import parse_policy
-from ikgym.exceptions import InvalidInputError
-from ikgym.scenarios.preview import furthest
-from ikgym.validation import FloatArray
-
-#: One line of a table: the name of each column and its value.
-Record = Mapping[str, Any]
-#: Cost ratios where best known costs are missing: relative to the lowest cost in the table.
-LOWEST = "lowest in the table"
-BEST_KNOWN = "best known"
-#: Suffixes of columns and the units in the heads.
-UNITS = {"us": "µs", "ms": "ms", "s": "s", "mm": "mm", "mrad": "mrad", "rad": "rad", "deg": "°", "percent": "%"}
-#: Columns that are set as code.
-CODE = ("policy", "scenario", "agent", "solver", "beside")
+#: The text of a cell without a value, and its value for sorting.
+NOTHING, LAST = "–", 1e300
+#: Longest name of a policy in a line of a plain table; longer ones have a line of their own.
+LONGEST = 20
 
 
-def records(rows: Sequence[Row], policies: Sequence[str] = ()) -> list[dict[str, Any]]:
-    """One record per policy and scenario, sorted by cost ratio within each scenario.
+def number(value: float | None, scale: float = 1.0) -> str:
+    """A number with four significant digits: ``1234``, ``0.01235``, ``1.235e7``; a dash for none."""
+    if value is None or math.isnan(value):
+        return NOTHING
+    if value == 0.0:
+        return "0"
+    digits = f"{value * scale:#.4g}"
+    mantissa, _, exponent = digits.partition("e")
+    return f"{mantissa}e{int(exponent)}" if exponent else mantissa.removesuffix(".")
 
-    Agents whose files lie in ``DIR/seed-N/`` are training seeds of one agent, which is called DIR. Cost ratios are
-    relative to best known costs; if one is missing, to the lowest cost in the table.
+
+@dataclasses.dataclass(frozen=True)
+class Column:
+    """A column of a table of summaries.
 
     Args:
-        rows: Results of an evaluation.
-        policies: The policies that were evaluated, as text; each is the label of its line. Others are called by their
-            name and the parameters that are not at their defaults.
-
-    Raises:
-        InvalidInputError: The training seeds of an agent have played different episodes.
+        title: Its head.
+        unit: The second line of the head; empty for pure numbers.
+        value: The value of a cell: a float, an integer, a text, or None.
+        scale: Factor of floats.
+        text: The text of a cell, if it is not that of its value.
+        about: A description, shown in HTML when the pointer is on the head.
+        drop: If a line is too short, columns are left out from the highest number down; those with 0 stay.
     """
-    out: list[dict[str, Any]] = []
-    for scenario in dict.fromkeys(row.scenario for row in rows):
-        here = [row for row in rows if row.scenario == scenario]
-        known = all(row.cost_ratio is not None for row in here)
-        lowest = {} if known else _lowest(here)
-        found = [_record(label, some, lowest) for label, some in _by_label(here, policies).items()]
-        out += sorted(found, key=lambda one: one["cost_ratio"])
-    return out
+
+    title: str
+    unit: str
+    value: Callable[[Summary], float | str | None]
+    scale: float = 1.0
+    text: Callable[[Summary], str] | None = None
+    about: str = ""
+    drop: int = 0
+
+    @property
+    def head(self) -> str:
+        """The head in one line."""
+        return f"{self.title} {self.unit}".strip()
+
+    def cell(self, summary: Summary) -> str:
+        """The text of a cell."""
+        if self.text is not None:
+            return self.text(summary)
+        value = self.value(summary)
+        return str(value) if isinstance(value, (int, str)) else number(value, self.scale)
+
+    def left(self, summary: Summary) -> bool:
+        """Whether cells are aligned to the left, as text is."""
+        return isinstance(self.value(summary), str)
 
 
-def _by_label(rows: Sequence[Row], policies: Sequence[str]) -> dict[str, list[Row]]:
-    """The rows of one scenario by the label of their policy."""
-    groups: dict[str, list[Row]] = {}
-    for row in rows:
-        groups.setdefault(canonical([row.policy, row.parameters]), []).append(row)
-    given = {text: parse_policy(text) for text in policies if registry.known(text.partition(":")[0])}
-    summaries = summarise(rows)
-    names = labels(summaries)
-    out: dict[str, list[Row]] = {}
-    for summary in summaries:
-        label = _label(summary, given) or names[id(summary)]
-        out.setdefault(label, []).extend(groups[canonical([summary.policy, summary.parameters])])
-    return out
+def fitting(columns: Sequence[Column], summaries: Sequence[Summary], width: int) -> list[Column]:
+    """The columns that fit a line."""
+    kept = list(columns)
+    for column in sorted(columns, key=lambda column: -column.drop):
+        rule = next(line for line in plain(kept, summaries, 0).splitlines() if set(line) == {"-"})
+        if not column.drop or len(rule) <= width:
+            break
+        kept.remove(column)
+    return kept
 
 
-def _label(summary: Summary, given: Mapping[str, tuple[str, dict[str, Any]]]) -> str | None:
-    """The folder of an agent's training seeds, or the policy as text that names most of the parameters; else None."""
-    if seed := re.search(r"([^/\\]+)[/\\]seed-\d+[/\\]", str(summary.parameters.get("path", ""))):
-        return seed[1]
-    there = {name: canonical(value) for name, value in summary.parameters.items()}
-    fitting = {
-        text: len(parameters)
-        for text, (name, parameters) in given.items()
-        if name == summary.policy
-        and all(there.get(key) == canonical(jsonable(value)) for key, value in parameters.items())
-    }
-    return max(fitting, key=fitting.__getitem__, default=None)
-
-
-def _lowest(rows: Iterable[Row]) -> dict[int, float]:
-    """The lowest cost of each episode, by its reset seed; costs too small for a ratio count as the smallest allowed."""
-    out: dict[int, float] = {}
-    for row in rows:
-        out[row.seed] = min(out.get(row.seed, np.inf), max(row.total_cost, best_known.MEANINGLESS))
-    return out
-
-
-def _record(label: str, rows: Sequence[Row], lowest: Mapping[int, float]) -> dict[str, Any]:
-    ratios, clocked = _cost_ratios(label, rows, lowest), times(rows)
-    low, high = geometric_interval(ratios) if ratios.min() > 0.0 else (None, None)
-    return {
-        "policy": label,
-        "scenario": rows[0].scenario,
-        "foresight": max(furthest(row.preview) for row in rows),
-        "seeds": len(ratios),
-        "episodes": ratios.shape[1],
-        "relative_to": LOWEST if lowest else BEST_KNOWN,
-        "cost_ratio": geometric_mean(ratios),
-        "low": low,
-        "high": high,
-        "p90": float(np.percentile(ratios, 90)),
-        "worst": float(ratios.max()),
-        "lost_percent": 100.0 * sum(row.lost for row in rows) / len(rows),
-        "time_p50_us": clocked.p50_us,
-        "time_p99_us": clocked.p99_us,
-    }
-
-
-def _cost_ratios(label: str, rows: Sequence[Row], lowest: Mapping[int, float]) -> FloatArray:
-    """One row per training seed, one column per episode. Shape (s, e)."""
-    variants: dict[str, list[Row]] = {}
-    for row in rows:
-        variants.setdefault(canonical(row.parameters), []).append(row)
-    found = [
-        by_seed(some, lambda row: row.total_cost / lowest[row.seed] if lowest else row.cost_ratio or 0.0)
-        for some in variants.values()
-    ]
-    if len({tuple(one) for one in found}) > 1:
-        raise InvalidInputError(f"{label}: expected the same episodes of all training seeds.")
-    return np.array([list(one.values()) for one in found])
-
-
-def to_csv(lines: Sequence[Record]) -> str:
-    """The records as CSV: numbers with six significant digits, None as an empty cell."""
-    text = io.StringIO(newline="")
-    writer = csv.DictWriter(text, list(lines[0]), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows({name: _plain(value) for name, value in line.items()} for line in lines)
-    return text.getvalue()
-
-
-def from_csv(text: str) -> list[dict[str, str]]:
-    """The records of a CSV file, all values as text."""
-    return list(csv.DictReader(io.StringIO(text, newline="")))
-
-
-def markdown(lines: Sequence[Record], columns: Sequence[str] = ()) -> str:
-    """The records as a Markdown table: four significant digits, intervals in one cell, units in the heads.
+def plain(columns: Sequence[Column], summaries: Sequence[Summary], width: int) -> str:
+    """A table as plain text.
 
     Args:
-        lines: The records, or those of a CSV file.
-        columns: Names of the columns; all of them if left out. `low` stands for the interval.
-
-    Raises:
-        InvalidInputError: There is no such column.
+        columns: Its columns, the first one the names of the policies.
+        summaries: Its lines.
+        width: Characters that a line may have; columns stand closer together if they would not fit.
     """
-    names = [name for name in columns or lines[0] if not _ends(name, "high")]
-    if missing := [name for name in names if name not in lines[0]]:
-        raise InvalidInputError(f"columns: expected some of {', '.join(lines[0])}; got {', '.join(missing)}.")
-    cells = [[_cell(line, name) for name in names] for line in lines]
-    text = [i for i, name in enumerate(names) if any(_value(line[name]) is None for line in lines if line[name])]
-    return grid([_head(name) for name in names], cells, text=text)
+    heads = [[column.title for column in columns], [column.unit for column in columns]]
+    heads, body = heads[: 1 + any(heads[1])], [[column.cell(one) for column in columns] for one in summaries]
+    sizes = [max(_width(line[i]) for line in [*heads, *body]) for i in range(len(columns))]
+    sizes[0] = max(size for line in [*heads, *body] if (size := _width(line[0])) <= LONGEST)
+    gap = "  " if sum(sizes) + 2 * (len(columns) - 1) <= width else " "
+    left = [column.left(summaries[0]) for column in columns]
+
+    def padded(line: Sequence[str]) -> str:
+        blanks = [" " * (size - _width(text)) for text, size in zip(line, sizes, strict=True)]
+        cells = [
+            text + blank if leftwards else blank + text
+            for text, blank, leftwards in zip(line, blanks, left, strict=True)
+        ]
+        if _width(line[0]) > LONGEST:
+            cells[0] = f"{line[0]}\n{' ' * sizes[0]}"
+        return gap.join(cells).rstrip()
+
+    rule = "-" * (sum(sizes) + len(gap) * (len(columns) - 1))
+    return "\n".join([*map(padded, heads), rule, *map(padded, body)])
+
+
+def _width(text: str) -> int:
+    """Columns that a text takes on a terminal: the dot of q̇ has none of its own."""
+    return len(text) - text.count("\u0307")
+
+
+def markdown(columns: Sequence[Column], summaries: Sequence[Summary]) -> str:
+    """A table as Markdown."""
+    text = [i for i, column in enumerate(columns) if column.left(summaries[0])]
+    cells = [[escaped(column.cell(one)) for column in columns] for one in summaries]
+    return grid([column.head for column in columns], cells, text=text)
+
+
+def html(columns: Sequence[Column], summaries: Sequence[Summary]) -> str:
+    """A table as HTML, complete without scripts; the value of a line's checkbox is the number of its summary."""
+    heads = [("policy", "* has privileged information"), ("scenario", "name of the scenario")]
+    heads += [(column.head, column.about) for column in columns]
+    out = ['<table id="results"><thead><tr><th class="pick" scope="col" aria-label="in the plots"></th>']
+    out += [f'<th scope="col" title="{escape(about)}">{escape(title)}</th>' for title, about in heads]
+    out.append("</tr></thead><tbody>")
+    for place, summary in enumerate(summaries):
+        name, scenario = escape(summary.label + " *" * summary.reference), escape(summary.first.scenario)
+        out += [
+            f'<tr><td class="pick"><input type="checkbox" value="{place}" aria-label="{name} in {scenario}: show in '
+            f'the plots"></td><th scope="row" class="name">{name}</th><td>{scenario}</td>'
+        ]
+        for column in columns:
+            value, text = column.value(summary), escape(column.cell(summary))
+            order = value if isinstance(value, (int, float)) and math.isfinite(value) else LAST
+            out.append(
+                f"<td>{text}</td>" if isinstance(value, str) else f'<td class="number" data-order="{order}">{text}</td>'
+            )
+        out.append("</tr>")
+    return "".join([*out, "</tbody></table>"])
+
+
+def escaped(text: str) -> str:
+    """A text for a cell in Markdown."""
+    return text.replace("|", "\\|").replace("*", "\\*")
 
 
 def grid(head: Sequence[str], lines: Iterable[Sequence[str]], *, text: Sequence[int] = ()) -> str:
@@ -175,45 +155,3 @@ def grid(head: Sequence[str], lines: Iterable[Sequence[str]], *, text: Sequence[
     """
     rules = [":--" if column in text else "--:" for column in range(len(head))]
     return "\n".join(f"| {' | '.join(line)} |" for line in (head, rules, *lines))
-
-
-def _ends(name: str, end: str) -> bool:
-    return name == end or name.endswith(f"_{end}")
-
-
-def _plain(value: Any) -> Any:
-    return float(f"{value:.6g}") if isinstance(value, float) else value
-
-
-def _head(name: str) -> str:
-    if _ends(name, "low"):
-        return "95 %"
-    words, _, unit = name.rpartition("_")
-    words, unit = (words, f" [{UNITS[unit]}]") if words and unit in UNITS else (name, "")
-    return words.replace("times_", "× ").replace("time_p", "p").replace("_", " ") + unit
-
-
-def _cell(line: Record, name: str) -> str:
-    value = line[name]
-    if value in ("", None):
-        return NOTHING
-    if _ends(name, "low"):
-        return f"{number(float(value))} … {number(float(line[name.removesuffix('low') + 'high']))}"
-    if name in CODE:
-        return "`" + str(value).replace("|", "\\|") + "`"
-    found = _value(value)
-    if found is None:
-        return str(value)
-    if found.is_integer() and "." not in str(value):
-        return f"{found:,.0f}"
-    if name.endswith("_percent"):
-        return f"{found:.2g}" if found < 10.0 else f"{found:.0f}"
-    return f"{found:,.0f}" if name.endswith("_us") and found >= 10.0 else number(found)
-
-
-def _value(cell: Any) -> float | None:
-    """The number in a cell; None for text."""
-    try:
-        return float(cell)
-    except ValueError:
-        return None

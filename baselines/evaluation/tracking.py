@@ -13,12 +13,11 @@ from matplotlib.figure import Figure
 from threadpoolctl import threadpool_limits
 
 from baselines.episodes import Episode, Seeds, add_up
-from baselines.evaluation.export import Motion, message, table
+from baselines.evaluation.export import Motion, joint_trajectory, table, trajectory_log
 from baselines.evaluation.foreign import Wrap
 from baselines.evaluation.play import play_episodes
 from baselines.evaluation.plots import tracking as picture
 from baselines.evaluation.policies import AnyPolicy, bind
-from baselines.evaluation.trajectory_log import trajectory_log
 from baselines.files import write
 from baselines.status import Status
 from ikgym import scenarios
@@ -28,7 +27,7 @@ from ikgym.validation import FloatArray, read_only, whole_number
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Tracking:
-    """What happened in an episode; row k is what came of the step that ended at ``times[k]``. All arrays are read-only.
+    """The record of an episode; row k belongs to the step that ended at ``times[k]``. All arrays are read-only.
 
     Args:
         scenario: The name of the scenario.
@@ -46,7 +45,6 @@ class Tracking:
         velocity_cost: Φ^U, 0 where the step does not count. Shape (steps,).
         statuses: Values of :class:`baselines.Status`. Shape (steps,).
         prismatic: Which joints are prismatic. Shape (n,).
-        motion: The joint motion from the start on, with the names of the joints.
     """
 
     scenario: str
@@ -64,13 +62,17 @@ class Tracking:
     velocity_cost: FloatArray
     statuses: npt.NDArray[np.int64]
     prismatic: npt.NDArray[np.bool_]
-    motion: Motion = dataclasses.field(repr=False)
-    _log: dict[str, npt.NDArray[Any]] = dataclasses.field(repr=False)
+    _played: tuple[Scenario, Seeds, Episode] = dataclasses.field(repr=False)
 
     @property
     def total_cost(self) -> float:
         """Sum of −reward, as in the row of an evaluation."""
         return float(add_up(self.tracking_cost + self.velocity_cost))
+
+    @property
+    def motion(self) -> Motion:
+        """The joint motion from the start on."""
+        return Motion.of(*self._played)
 
     @property
     def status(self) -> Status:
@@ -95,7 +97,7 @@ class Tracking:
         return out
 
     def to_csv(self, file: str | os.PathLike[str]) -> None:
-        """Writes one line a step; the head has the units, and numbers that are no numbers are left empty.
+        """Writes one line a step; the head has the units, NaN is an empty cell.
 
         Raises:
             ResultsError: The file cannot be written.
@@ -103,16 +105,16 @@ class Tracking:
         write(pathlib.Path(file), table(self.columns()))
 
     def to_joint_trajectory(self, file: str | os.PathLike[str]) -> None:
-        """Writes the joint motion, from the start, as a ROS 2 `JointTrajectory` in JSON; see :class:`Motion`.
+        """Writes the joint motion, from the start, as a ROS 2 `JointTrajectory` in JSON.
 
         Raises:
             ResultsError: The file cannot be written.
         """
-        write(pathlib.Path(file), message(self.motion))
+        write(pathlib.Path(file), joint_trajectory(*self._played))
 
     def plot(self) -> Figure:
         """Task coordinates with those of the reference, and errors, over time, at the steps that count."""
-        return picture.draw(f"{self.scenario}: {self.policy}", [(self.policy, self._log)])
+        return picture.draw(f"{self.scenario}: {self.policy}", [(self.policy, trajectory_log(*self._played))])
 
 
 def track(
@@ -129,17 +131,17 @@ def track(
     >>> baselines.track("varga7-fast", "dls").to_csv("dls.csv")
 
     Args:
-        scenario: What is to be tracked, as :func:`ikgym.scenarios.find` takes it.
-        policy: Who tracks it, one policy as :func:`baselines.evaluate.evaluate` takes it.
+        scenario: The scenario, as :func:`ikgym.scenarios.find` takes it.
+        policy: The policy, as :func:`baselines.evaluate.evaluate` takes it.
         seed: The reset seed.
-        preview: Steps ahead that the policy is shown, or which ones; what it asks for if left out.
+        preview: Steps ahead that the policy is shown, or which ones; its own if left out.
         steps: Most steps; the scenario's own if left out.
         wrap: Wraps the environment for a policy that is no :class:`baselines.SolverPolicy`.
 
     Raises:
         UnknownNameError: There is no such scenario, policy or parameter.
         InvalidInputError: A value is out of range, the policy does not suit the scenario, is shown too little, or
-            chooses no action.
+            chooses an invalid action.
     """
     found = scenarios.find(scenario)
     if steps is not None:
@@ -166,5 +168,4 @@ def _tracking(scenario: Scenario, policy: str, parameters: dict[str, Any], seeds
         },
     }  # fmt: skip
     kept: dict[str, Any] = {name: read_only(np.array(values)) for name, values in arrays.items()}
-    log, motion = trajectory_log(scenario, seeds, episode), Motion.of(scenario, seeds, episode)
-    return Tracking(scenario.name, policy, parameters, seeds.seed, **kept, motion=motion, _log=log)
+    return Tracking(scenario.name, policy, parameters, seeds.seed, **kept, _played=(scenario, seeds, episode))

@@ -18,8 +18,7 @@ from baselines.canonical import canonical
 from baselines.files import ResultsError, from_json, read_arrays, reading, write
 from baselines.fingerprints import episode_hash, fingerprint
 from baselines.oracle.optimum import Optimum, Search, Start
-from baselines.oracle.polishing import polish
-from baselines.oracle.search import VERSION, search
+from baselines.oracle.search import VERSION, polish, search
 from baselines.oracle.stripped import ideal, stripped
 from ikgym import scenarios
 from ikgym.scenarios import Scenario
@@ -125,11 +124,7 @@ def folder() -> pathlib.Path:
 def file_of(scenario: Scenario, seed: int, how: Search, *, polished: bool = False) -> pathlib.Path:
     """The file of an optimum: named by the content of the episode, the search, and the version of its code.
 
-    Args:
-        scenario: What is tracked.
-        seed: The reset seed.
-        how: The search.
-        polished: Whether it was that of the episode with an ideal plant, whose path was polished.
+    ``polished`` says that the search was that of the episode with an ideal plant, whose path was polished.
     """
     what = canonical([episode_hash(scenario, seed), dataclasses.asdict(how), VERSION, *["moved, polished"] * polished])
     return folder() / "oracle" / f"{hashlib.sha256(what.encode()).hexdigest()[:24]}.npz"

@@ -11,9 +11,9 @@ from gymnasium.utils import seeding
 
 from baselines.episodes import add_up, play
 from baselines.policy import Memory, SolverPolicy
+from baselines.solvers.receding_horizon.horizon import ProblemData
 from baselines.solvers.receding_horizon.newton.grid import Grid
 from baselines.solvers.receding_horizon.newton.workspace import PathProblem
-from baselines.solvers.receding_horizon.problem_data import ProblemData
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.outcome import observation
 from ikgym.kernels.simulation import Outcome
@@ -137,11 +137,7 @@ class EpisodeProblem:
     def feasible(self, path: FloatArray) -> FloatArray:
         """A path within the limits of position and velocity: the nearest that the arm gets to each knot from the last.
 
-        Args:
-            path: Joint coordinates at the knots, in [rad] or [m]. Shape (K, n).
-
-        Returns:
-            Joint coordinates, those of the path where it keeps the limits. Shape (K, n).
+        A path (K, n) that keeps the limits stays as it is.
         """
         arm, most = self.scenario.arm, self.scenario.dt * self.grid.length[:, None] * self.scenario.largest_qdot
         out = np.clip(path, arm.lower, arm.upper)
@@ -153,14 +149,7 @@ class EpisodeProblem:
         return out
 
     def commands(self, path: FloatArray) -> FloatArray:
-        """The joint velocities that lead along a path, in [rad/s] or [m/s].
-
-        Args:
-            path: Joint coordinates at the knots, in [rad] or [m]. Shape (K, n).
-
-        Returns:
-            One row a step. Shape (steps, n).
-        """
+        """The joint velocities that lead along a path (K, n), in [rad/s] or [m/s]; one row a step. Shape (steps, n)."""
         moves = np.diff(path, axis=0, prepend=self.start[None]) / self.scenario.dt
         held = np.diff(self.grid.at, prepend=0)
         qdot = moves / self.grid.length[:, None]
@@ -169,10 +158,7 @@ class EpisodeProblem:
         return every
 
     def play(self, qdot: FloatArray) -> tuple[FloatArray, float]:
-        """What the environment makes of joint velocities.
-
-        Args:
-            qdot: In [rad/s] or [m/s]. Shape (steps, n).
+        """Plays joint velocities (steps, n) in [rad/s] or [m/s] in the environment.
 
         Returns:
             Joint coordinates after each step in [rad] or [m], of shape (steps, n), and the total cost.

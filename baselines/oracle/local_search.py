@@ -13,8 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.solvers.receding_horizon.newton.guess import DAMPING, STREAM, draw, initial_guess, uniform
-from baselines.solvers.receding_horizon.newton.interior_point.excess import cost_within
-from baselines.solvers.receding_horizon.newton.interior_point.minimise import LEFT, minimise_path
+from baselines.solvers.receding_horizon.newton.interior_point import LEFT, cost_within, minimise_path
 from baselines.solvers.receding_horizon.newton.minimise import NewtonSettings
 from baselines.solvers.receding_horizon.newton.workspace import knot_workspace, newton_workspace
 from ikgym.kernels import tasks as task_kernels
@@ -48,15 +47,7 @@ class Improved(NamedTuple):
 
 @kernel
 def random_paths(problem, seed, paths, first, last):
-    """Sets paths that drift at random in the null space of the task; path 0 does not drift.
-
-    Args:
-        problem: See the module.
-        seed: Of the draws.
-        paths: Receives the paths. Shape (S, K, n).
-        first: See the module.
-        last: See the module.
-    """
+    """Sets paths (S, K, n) that drift at random in the null space of the task; path 0 does not drift."""
     n = problem.start.shape[0]
     workspace = knot_workspace(problem.data.kind, problem.nominal.shape[1], n)
     drift = np.empty(n)
@@ -68,15 +59,9 @@ def random_paths(problem, seed, paths, first, last):
 
 @kernel
 def improve(problem, settings, paths, improved, first, last):
-    """Improves each path by Newton's method; none gets worse.
+    """Improves each path (S, K, n) by Newton's method, in place; none gets worse.
 
-    Args:
-        problem: See the module.
-        settings: The :class:`baselines.solvers.receding_horizon.newton.minimise.NewtonSettings`.
-        paths: Changed in place. Shape (S, K, n).
-        improved: Receives what became of them, :class:`Improved`.
-        first: See the module.
-        last: See the module.
+    The settings are :class:`NewtonSettings`; :class:`Improved` receives the results.
     """
     knots, n = paths.shape[1:]
     costs = improved.costs
@@ -103,7 +88,7 @@ def iterated_local_search(problem, seed, rounds, partners, paths, costs, first, 
 
     Args:
         problem: See the module.
-        seed: Of the draws.
+        seed: Of the random numbers.
         rounds: Branches of each path.
         partners: Paths to blend with. Shape (P, K, n).
         paths: Changed in place. Shape (S, K, n).
@@ -132,16 +117,8 @@ def branch_off(problem, draws, path, partners, drift, branch, workspace):
     """A random change of a path.
 
     The branch leaves the path at a random knot, drifts in the null space, and goes its own way to the end or comes
-    back; or it goes over to a partner, or comes from there.
-
-    Args:
-        problem: See the module.
-        draws: Key of the random numbers, and which branch of that key.
-        path: The path. Shape (K, n).
-        partners: Paths to blend with. Shape (P, K, n).
-        drift: Scratch. Shape (n,).
-        branch: Receives the branch. Shape (K, n).
-        workspace: A ``KnotWorkspace``.
+    back; or it goes over to a partner (P, K, n), or comes from there. ``draws`` are the key of the random numbers and
+    the number of the branch; ``drift`` is scratch.
     """
     key, r = draws
     knots = path.shape[0]

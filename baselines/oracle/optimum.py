@@ -41,16 +41,9 @@ class Search(Frozen):
     seed: int = 0
 
     def __post_init__(self) -> None:
-        for name, least in {
-            "starts": 0,
-            "chains": 1,
-            "generations": 0,
-            "rounds": 1,
-            "polished": 1,
-            "knots": 1,
-            "seed": 0,
-        }.items():
-            object.__setattr__(self, name, whole_number(name, getattr(self, name), at_least=least))
+        for name, value in dict(vars(self)).items():
+            least = 0 if name in ("starts", "generations", "seed") else 1
+            object.__setattr__(self, name, whole_number(name, value, at_least=least))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -113,12 +106,10 @@ class Optimum(Frozen):
     def spread(self) -> dict[str, float]:
         """How far the starts came.
 
-        Returns:
-            ``starts`` on the coarse grid, and how many of them came ``within_1_percent`` of the best there without
-            local search, the ``median`` and ``worst`` cost of those that keep the limits; paths ``polished`` at full
-            resolution, and how many of them came ``polished_within_1e-6`` of the best; and the cost ``without_search``,
-            the lowest of those that did not come from a search: of the nominal joint path, the roll-out, receding
-            horizons, given policies.
+        ``starts`` on the coarse grid, how many of them came ``within_1_percent`` of the best there without
+        local search, the ``median`` and ``worst`` cost of those that keep the limits; paths ``polished`` at
+        full resolution, and how many of them came ``polished_within_1e-6`` of the best; and ``without_search``
+        the lowest cost of the starts that need no search.
         """
         coarse = [one.coarse for one in self.starts if one.coarse is not None]
         first = [one.coarse for one in self.starts if one.coarse is not None and one.kind != LOCAL_SEARCH]

@@ -1,16 +1,19 @@
-"""The search for the cheapest joint path of a whole episode, from many starts."""
+"""The search for the cheapest joint path of a whole episode: many starts, local search, Newton's method at the end."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import dataclasses
+import time
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from baselines.fingerprints import episode_hash
 from baselines.oracle import local_search
 from baselines.oracle.episode import EpisodeProblem, path_of
 from baselines.oracle.optimum import LOCAL_SEARCH, RANDOM, Optimum, Search, Start
-from baselines.oracle.polishing import finished, improved
+from baselines.solvers.receding_horizon.newton.grid import Grid
 from baselines.solvers.receding_horizon.newton.minimise import NewtonSettings
 from baselines.solvers.receding_horizon.rhc import RecedingHorizon
 from ikgym.parallel import in_chunks
@@ -30,6 +33,8 @@ APART = 1e-3
 GRAIN = 4
 # Paths that others are blended with.
 PARTNERS = 32
+# Newton steps of a path at full resolution, and the relative precision that ends them before.
+MOST_STEPS, TOLERANCE = 300, 1e-12
 # Seeds of the generations of the local search lie this far apart.
 STRIDE = 1_000_003
 
@@ -43,12 +48,7 @@ def search(
 ) -> Optimum:
     """The cheapest joint path of an episode that the starts lead to.
 
-    Args:
-        scenario: What is tracked.
-        seed: The reset seed.
-        how: How thoroughly.
-        tick: Called now and then with the share of the work done since the last call.
-        paths: Joint coordinates after each step by name, further starts. Shapes (steps, n).
+    The arguments are those of :func:`baselines.oracle.solve`; ``tick`` and ``paths`` likewise.
 
     Raises:
         InvalidInputError: The seed is no whole number of at least 0, or the scenario's plant is not ideal.
@@ -90,11 +90,7 @@ def _known_paths(episode: EpisodeProblem) -> dict[str, FloatArray]:
 def _coarse_search(
     episode: EpisodeProblem, how: Search, known: Mapping[str, FloatArray], done: Callable[[float], object]
 ) -> tuple[list[Start], dict[int, FloatArray]]:
-    """Starts and local search on a coarse grid.
-
-    Returns:
-        All starts, the known ones first; and by their numbers the best of the others at full resolution.
-    """
+    """Starts and local search on a coarse grid: all starts, the known ones first, and the best others refined."""
     grid = episode.coarse(max(-(-episode.knots // how.knots), 1))
     ends = np.searchsorted(episode.grid.at, grid.at)
     paths = np.empty((len(known) + how.starts, len(grid.at), episode.scenario.joints))
@@ -141,3 +137,75 @@ def _distinct(costs: FloatArray, most: int) -> list[int]:
         if len(chosen) == most:
             break
     return chosen
+
+
+def polish(scenario: Scenario, seed: int, paths: Mapping[str, FloatArray]) -> Optimum:
+    """The cheapest joint path of an episode that given paths lead to by Newton's method alone; nothing is searched.
+
+    The paths are joint coordinates after each step by name, of shape (steps, n).
+
+    Raises:
+        InvalidInputError: See :meth:`EpisodeProblem.of`.
+    """
+    episode = EpisodeProblem.of(scenario, seed)
+    given = [episode.feasible(episode.through(path)) for path in paths.values()]
+    return finished(episode, [Start(name) for name in paths], dict(enumerate(given)))
+
+
+def finished(
+    episode: EpisodeProblem,
+    starts: Sequence[Start],
+    paths: Mapping[int, FloatArray],
+    done: Callable[[float], object] = lambda share: None,
+) -> Optimum:
+    """The best of some paths at full resolution, each of them improved until nothing more is gained.
+
+    The paths (K, n) lie within the limits, and have the numbers of the starts that led to them.
+    """
+    polished = np.stack(list(paths.values()))
+    gains, spent = improved(episode, episode.grid, polished, NewtonSettings(True, MOST_STEPS, TOLERANCE))
+    played = [_played(episode, path) for path in polished]
+    gradients, reached = gains.gradients * episode.scenario.dt, list(starts)
+    for number, (_, _, cost), gradient, steps in zip(paths, played, gradients, gains.steps, strict=True):
+        reached[number] = dataclasses.replace(
+            reached[number], cost=cost, gradient_norm=float(gradient), newton_steps=int(steps)
+        )
+    best = int(np.argmin([cost for _, _, cost in played]))
+    q, qdot, cost = played[best]
+    done(0.1)
+    return Optimum(
+        scenario=episode.scenario.name,
+        seed=episode.seed,
+        q=q,
+        qdot=qdot,
+        cost=cost,
+        gradient_norm=float(gradients[best]),
+        starts=tuple(reached),
+        seconds=spent / len(paths),
+        hash=episode_hash(episode.scenario, episode.seed),
+    )
+
+
+def improved(
+    episode: EpisodeProblem, grid: Grid, paths: FloatArray, settings: NewtonSettings
+) -> tuple[local_search.Improved, float]:
+    """Improves paths in place, in several threads; gives what became of them, and the CPU time in [s]."""
+    out, problem = local_search.Improved(*np.empty((3, len(paths)))), episode.on(grid)
+    spent: list[float] = []
+
+    def work(first: int, last: int) -> None:
+        begin = time.thread_time()
+        local_search.improve(problem, settings, paths, out, first, last)
+        spent.append(time.thread_time() - begin)
+
+    in_chunks(work, len(paths), 1)
+    return out, sum(spent)
+
+
+def _played(episode: EpisodeProblem, path: FloatArray) -> tuple[FloatArray, FloatArray, float]:
+    """Joint coordinates and joint velocities of each step, and their cost in the environment."""
+    limit = episode.scenario.largest_qdot
+    # Multipliers keep limits to rounding; what is left over would add up from step to step.
+    qdot = np.clip(episode.commands(episode.feasible(path)), -limit, limit)
+    q, cost = episode.play(qdot)
+    return q, qdot, cost

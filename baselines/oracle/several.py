@@ -41,11 +41,7 @@ class Wanted:
 
 
 def find(wanted: Wanted, tick: Callable[[float], None] = lambda share: None) -> Optimum:
-    """The cheapest path that is found, in this process.
-
-    Args:
-        wanted: Of which episode.
-        tick: Called now and then with the share of the work done since the last call.
+    """The cheapest path that is found, in this process; ``tick`` as of :func:`baselines.oracle.solve`.
 
     Raises:
         UnknownNameError: There is no such policy or parameter.
@@ -103,12 +99,7 @@ def find_all(
 
 
 def path(scenario: Scenario, seed: int, spec: str) -> FloatArray:
-    """The joint coordinates of an episode that a policy plays, in [rad] or [m]. Shape (steps, n).
-
-    Raises:
-        UnknownNameError: There is no such policy or parameter.
-        InvalidInputError: The text has another form, or the policy does not suit the scenario.
-    """
+    """The joint coordinates of an episode that a policy plays, in [rad] or [m]. Shape (steps, n)."""
     name, parameters = parse_policy(spec)
     return path_of(registry.make(name, scenario, **parameters), scenario, seed)
 

@@ -1,9 +1,9 @@
-"""Models of Stable-Baselines3 that were trained in environments of this package, as files of agents."""
+"""Exports networks of PyTorch and models of Stable-Baselines3 as agents, which need neither."""
 
 from __future__ import annotations
 
 import pathlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -17,13 +17,32 @@ from baselines.agents.files import AgentFile, agent_of, save_agent
 from baselines.agents.network import Network
 from baselines.agents.relative import Relative
 from baselines.policy import Problem
-from baselines.training.networks import runtime
 from ikgym.exceptions import InvalidInputError
 from ikgym.sb3 import LearningVecEnv
 from ikgym.scenarios.preview import offsets
 
+#: Activations by the names that agents have for them.
+ACTIVATIONS: dict[str, type[nn.Module]] = {"silu": nn.SiLU, "relu": nn.ReLU, "tanh": nn.Tanh, "elu": nn.ELU}
 #: Observations for which the actions of model and agent are compared, and the largest difference.
 _COMPARED, _NEAR = 64, 1e-4
+
+
+def runtime(modules: Sequence[nn.Module], squash: str) -> Network:
+    """The network of the compiled runtime with the layers of a PyTorch network.
+
+    Args:
+        modules: Linear layers with activations between them.
+        squash: See :class:`Network`.
+
+    Raises:
+        TypeError: There is another module, or activations of several kinds.
+    """
+    linear, between = modules[::2], modules[1::2]
+    names = [name for name, kind in ACTIVATIONS.items() if all(type(module) is kind for module in between)]
+    if not names or not all(isinstance(layer, nn.Linear) for layer in linear) or len(linear) != len(between) + 1:
+        raise TypeError(f"expected linear layers with one of {', '.join(ACTIVATIONS)} between them, got {modules}")
+    weights, biases = ([getattr(layer, part).detach().cpu().numpy() for layer in linear] for part in ("weight", "bias"))
+    return Network(tuple(weights), tuple(biases), names[0], squash)
 
 
 def export(
@@ -38,7 +57,7 @@ def export(
         model: PPO, A2C, SAC, TD3 or DDPG with Stable-Baselines3's `MlpPolicy`.
         envs: The environment of its training, of :func:`ikgym.sb3.make_vec`, without a history.
         file: Usually ``NAME.safetensors``.
-        training: How it was trained, as JSON values.
+        training: Description of the training, as JSON values.
 
     Returns:
         The agent's hash.

@@ -14,22 +14,12 @@ from ikgym.exceptions import InvalidInputError
 
 
 def sequence(seed: int, segment: int | None) -> np.random.SeedSequence:
-    """The source of the randomness of a segment.
-
-    Args:
-        seed: Of the run.
-        segment: Counted from 0; None before the first one, such as for the first weights.
-    """
+    """The seed sequence of a segment, counted from 0; None stands for the time before the first one."""
     return np.random.SeedSequence(seed, spawn_key=(0 if segment is None else segment + 1,))
 
 
 def reseed(seed: int, segment: int | None) -> None:
-    """Seeds the global generators of Python, NumPy and PyTorch, which Stable-Baselines3 draws from.
-
-    Args:
-        seed: Of the run.
-        segment: As in :func:`sequence`.
-    """
+    """Seeds the global generators of Python, NumPy and PyTorch, which Stable-Baselines3 draws from."""
     for_python, for_numpy, for_torch = sequence(seed, segment).generate_state(3).tolist()
     random.seed(for_python)
     np.random.seed(for_numpy)  # noqa: NPY002  # what Stable-Baselines3 draws from
@@ -37,12 +27,7 @@ def reseed(seed: int, segment: int | None) -> None:
 
 
 def episode_seed(seed: int, segment: int, rows: int) -> int:
-    """The reset seed of the first of some arms in a segment, of the split for training; those of the others follow it.
-
-    Args:
-        seed: Of the run.
-        segment: Counted from 0.
-        rows: The number of arms.
+    """The reset seed of the first of `rows` arms in a segment, from the split "train"; the seeds of the others follow.
 
     Raises:
         InvalidInputError: There are more arms than seeds.
@@ -56,7 +41,7 @@ def episode_seed(seed: int, segment: int, rows: int) -> int:
 
 @contextlib.contextmanager
 def deterministic_torch() -> Iterator[None]:
-    """One thread of PyTorch and only deterministic algorithms within the context.
+    """Restricts PyTorch to one thread and deterministic algorithms within the context.
 
     Networks this small are faster in one thread, and each of several seeds has its own core.
     """

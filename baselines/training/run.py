@@ -1,24 +1,14 @@
-"""One run: the training of one agent with one seed, in one folder, which can be killed at any moment and resumed.
-
-| file | content |
-|---|---|
-| `run.json` | configuration, seed, versions, machine, computing time, validations, hash of the final weights |
-| `history.json` | a row for each segment: its metrics, and the score where there was a validation |
-| `checkpoint.pt` | the state to resume from |
-| `tensorboard/` | the history, for TensorBoard |
-| `agent.safetensors` | at the end: the agent, a policy of :mod:`baselines` |
-"""
+"""One run: the training of one agent with one seed, in one folder, which can be killed at any moment and resumed."""
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import hashlib
 import math
 import pathlib
 import platform
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import gymnasium
@@ -31,34 +21,26 @@ from torch.utils.tensorboard import SummaryWriter
 
 import ikgym
 from baselines.agents.files import save_agent
-from baselines.evaluation.machine import describe
+from baselines.evaluation.metrics import describe
 from baselines.files import locked, write_json
 from baselines.fingerprints import fingerprint
-from baselines.training import checkpoint
-from baselines.training.checkpoint import Checkpoint
-from baselines.training.config.base import Config
-from baselines.training.errors import TrainingError
-from baselines.training.folder import FORMAT, Folder
-from baselines.training.methods import SegmentMetrics, new_trainer
+from baselines.training.config import Config, TrainingError
+from baselines.training.folder import FORMAT, Checkpoint, Folder
+from baselines.training.methods import new_trainer
 from baselines.training.randomness import deterministic_torch, reseed
+from baselines.training.trainers.base import SegmentMetrics
 from baselines.training.validation import Score, validate
 
 #: Weights above this have diverged.
 LARGEST = 1e9
 
-#: Called after each segment with the number of segments done, and the score where there was a validation.
+#: Called after each segment with the number of segments done, and the score if there was a validation.
 OnSegment = Callable[[int, Score | None], object]
 
 
 @dataclasses.dataclass(frozen=True)
 class Result:
-    """The result of a run.
-
-    Args:
-        folder: The folder of its files.
-        weights_sha256: Of all weights at the end, see :func:`weights_hash`.
-        score: Of the kept agent.
-    """
+    """The result of a run: its folder, the SHA-256 of the final weights, and the score of the kept agent."""
 
     folder: pathlib.Path
     weights_sha256: str
@@ -79,13 +61,13 @@ def train(
     """Trains an agent.
 
     Args:
-        config: Of any method.
+        config: The options of any method.
         seed: Determines all randomness.
-        path: The folder of the run.
+        path: The folder of the run, see :mod:`baselines.training.folder`.
         resume: Whether to continue the run in the folder, if there is one.
         overwrite: Whether to replace the run in the folder.
         checkpoint_every: Shortest time between two checkpoints, in [s].
-        command: The command that began the run, for `run.json`.
+        command: The command that started the run, for `run.json`.
         on_segment: See :data:`OnSegment`.
 
     Raises:
@@ -127,16 +109,17 @@ class _Run:
         if there is not None:
             self._about["command"] = there.get("command", self._about["command"])
             if self._folder.checkpoint.exists():
-                self._at = checkpoint.load(self._folder.checkpoint)
+                self._at = Checkpoint.load(self._folder.checkpoint)
                 if self._at.trainer is not None:
                     self._trainer.restore(self._at.trainer)
-        self._write_about()
+        write_json(self._folder.run, self._content())
 
     def go(self, checkpoint_every: float, on_segment: OnSegment | None) -> Result:
-        with self._board() as board:
+        # A killed run may have logged rows after its last checkpoint, which are purged.
+        purge = self._trainer.steps + 1 if self._at.history else None
+        with SummaryWriter(str(self._folder.tensorboard), purge_step=purge) as board:
             if not self._at.history:
                 self._note(0, {}, board)
-                self._count()
             saved = -math.inf
             while self._at.segments < self._config.segments:
                 number = self._at.segments
@@ -144,7 +127,6 @@ class _Run:
                 metrics = self._segment(number)
                 self._at.segments = number + 1
                 score = self._note(number + 1, metrics, board)
-                self._count()
                 if self._at.segments == self._config.segments or time.monotonic() - saved >= checkpoint_every:
                     self._save()
                     saved = time.monotonic()
@@ -153,7 +135,7 @@ class _Run:
         return self._finish()
 
     def _segment(self, number: int) -> SegmentMetrics:
-        """A segment of the trainer, with a clear message where its weights diverge."""
+        """A segment of the trainer, with a clear message if its weights diverge."""
         try:
             metrics = self._trainer.segment(number)
         except (ValueError, RuntimeError):
@@ -167,7 +149,7 @@ class _Run:
         )
 
     def _note(self, done: int, metrics: SegmentMetrics, board: SummaryWriter) -> Score | None:
-        """Adds a row to the history, with a score where a validation is due."""
+        """Adds a row to the history, with a score if a validation is due, and with the computing time so far."""
         config, trainer = self._config, self._trainer
         row: dict[str, Any] = {"segment": done, "steps": trainer.steps}
         row.update({name: value for name, value in metrics.items() if math.isfinite(value)})
@@ -178,48 +160,45 @@ class _Run:
             if self._at.best is None or score.cost < self._at.best["score"]["cost"]:
                 weights = {name: tensor.clone() for name, tensor in trainer.policy.state_dict().items()}
                 self._at.best = {"segment": done, "score": score.to_json(), "policy": weights}
-        self._at.history.append(row)
         for name, value in [*row.items(), *(score.to_json() if score else {}).items()]:
             if isinstance(value, float):
                 board.add_scalar(name if "/" in name else f"validation/{name}", value, trainer.steps)
+        clock, core = time.monotonic(), time.process_time()
+        self._at.wall_seconds += clock - self._clock
+        self._at.core_seconds += core - self._core
+        self._clock, self._core = clock, core
+        row["core_minutes"] = self._at.core_seconds / 60.0
+        self._at.history.append(row)
         return score
+
+    def _save(self) -> None:
+        self._at.trainer = self._trainer.state()
+        self._at.save(self._folder.checkpoint)
+        write_json(self._folder.history, self._at.history)
+        write_json(self._folder.run, self._content())
 
     def _finish(self) -> Result:
         """Writes the agent and the result of the run."""
-        policy, config = self._trainer.policy, self._config
+        policy, config, best = self._trainer.policy, self._config, self._at.best
         final = weights_hash(policy)
-        kept = {"segment": self._config.segments, "by": "end"}
-        last = self._at.history[-1]["validation"]
-        best = self._at.best
+        kept, score = {"segment": config.segments, "by": "end"}, self._at.history[-1]["validation"]
         if config.keep_best and best is not None:
             policy.load_state_dict(best["policy"])
-            kept, last = {"segment": best["segment"], "by": "validation"}, best["score"]
+            kept, score = {"segment": best["segment"], "by": "validation"}, best["score"]
         self._about["status"] = "finished"
         self._about["weights_sha256"] = final
-        self._about["kept"] = {**kept, "weights_sha256": weights_hash(policy), "validation": last}
+        self._about["kept"] = {**kept, "weights_sha256": weights_hash(policy), "validation": score}
         content = self._content()
         training = {name: content[name] for name in ("method", "seed", "training", "kept", "versions")}
         save_agent(self._folder.agent, self._trainer.agent(training))
         # A run that was killed after its last checkpoint and before its history lacks the last row.
         write_json(self._folder.history, self._at.history)
         write_json(self._folder.run, content)
-        return Result(self._folder.path, final, Score(**last))
-
-    def _save(self) -> None:
-        self._at.trainer = self._trainer.state()
-        self._at.save(self._folder.checkpoint)
-        write_json(self._folder.history, self._at.history)
-        self._write_about()
-
-    def _count(self) -> None:
-        """Adds the time since the last call to the times of the run."""
-        clock, core = time.monotonic(), time.process_time()
-        self._at.wall_seconds += clock - self._clock
-        self._at.core_seconds += core - self._core
-        self._clock, self._core = clock, core
-        self._at.history[-1]["core_minutes"] = self._at.core_seconds / 60.0
+        return Result(self._folder.path, final, Score(**score))
 
     def _content(self) -> dict[str, Any]:
+        """The content of `run.json`."""
+        times = ("segment", "steps", "core_minutes")
         return {
             **self._about,
             "training": {
@@ -229,37 +208,17 @@ class _Run:
                 "wall_minutes": self._at.wall_seconds / 60.0,
             },
             "validation": [
-                {name: row[name] for name in ("segment", "steps", "core_minutes")} | row["validation"]
+                {name: row[name] for name in times} | row["validation"]
                 for row in self._at.history
-                if "validation" in row and "core_minutes" in row
+                if "validation" in row
             ],
         }
-
-    def _write_about(self) -> None:
-        write_json(self._folder.run, self._content())
-
-    @contextlib.contextmanager
-    def _board(self) -> Iterator[SummaryWriter]:
-        """The file of TensorBoard, without the rows that a killed run wrote after its last checkpoint."""
-        gone_on = bool(self._at.history)
-        board = SummaryWriter(str(self._folder.tensorboard), purge_step=self._trainer.steps + 1 if gone_on else None)
-        try:
-            yield board
-        finally:
-            board.close()
 
 
 def versions() -> dict[str, str]:
     """The versions that a result depends on."""
-    return {
-        "ikgym": ikgym.__version__,
-        "python": platform.python_version(),
-        "numpy": np.__version__,
-        "numba": numba.__version__,
-        "gymnasium": gymnasium.__version__,
-        "torch": torch.__version__,
-        "stable_baselines3": stable_baselines3.__version__,
-    }
+    modules = (ikgym, np, numba, gymnasium, torch, stable_baselines3)
+    return {"python": platform.python_version(), **{module.__name__: module.__version__ for module in modules}}
 
 
 def weights_hash(policy: nn.Module) -> str:

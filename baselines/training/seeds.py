@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import pathlib
 import platform
 import sys
 import traceback
-import uuid
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated
 
 import tyro
 from tqdm import tqdm
 
-from baselines.files import write
-from baselines.training.config.base import Config
+from baselines.files import check_flags, locked
+from baselines.training.config import Config
+from baselines.training.folder import Folder
 from baselines.workers import ALONE, TRIES, WorkerError, Workers, finished
 from ikgym.exceptions import IkgymError
 
-if TYPE_CHECKING:  # the command line is read without agents
+if TYPE_CHECKING:  # the command line is read without PyTorch
     from baselines.training.validation import Score
 
 
@@ -50,9 +49,9 @@ class SeedResult:
 
     Args:
         seed: The seed.
-        score: Of the kept agent; None where the run failed.
-        weights_sha256: Of the final weights; empty where it failed.
-        error: Why it failed; empty otherwise.
+        score: The score of the kept agent; None if the run failed.
+        weights_sha256: The SHA-256 of the final weights; empty if the run failed.
+        error: Why the run failed; empty otherwise.
     """
 
     seed: int
@@ -61,43 +60,25 @@ class SeedResult:
     error: str = ""
 
 
-#: The advice where memory is short.
-LESS_MEMORY = "Choose fewer arms (--n-envs), a smaller network (--hidden), or --set buffer_size=…"
-
-
-class Bar:
-    """The progress bar of one seed, on stderr.
+@dataclasses.dataclass(frozen=True)
+class Seed:
+    """The job of a worker: one seed.
 
     Args:
-        segments: Segments of the training.
+        config: The options of any method.
+        options: The options of the run.
+        command: The command that started the run.
         seed: The seed.
-        line: The line of the bar below the cursor; None for no bar.
+        line: The line of the progress bar below the cursor; None for no bar.
+        remote: Whether a node of a cluster does it.
     """
 
-    def __init__(self, segments: int, seed: int, line: int | None) -> None:
-        self._bar = tqdm(
-            total=segments,
-            desc=f"seed {seed}",
-            disable=line is None,
-            position=line,
-            file=sys.stderr,
-            unit="segment",
-            dynamic_ncols=True,
-            mininterval=0.1 if sys.stderr.isatty() else 10.0,
-        )
-        self._seed = seed
-
-    def advance(self, done: int, score: Score | None) -> None:
-        """Shows the number of finished segments, and the last score."""
-        if score is not None:
-            number = score.cost if score.cost_ratio is None else score.cost_ratio
-            text = f"{'cost' if score.cost_ratio is None else 'cost ratio'} {number:.4g}"
-            self._bar.set_description(f"seed {self._seed}: {text}", refresh=False)
-        self._bar.update(done - self._bar.n)
-
-    def close(self) -> None:
-        """Leaves the bar as it is."""
-        self._bar.close()
+    config: Config
+    options: RunOptions
+    command: str
+    seed: int
+    line: int | None = None
+    remote: bool = False
 
 
 def train_seeds(
@@ -106,115 +87,101 @@ def train_seeds(
     """Trains one agent a seed.
 
     One seed is trained in this process, several in separate ones, so that a seed that fails does not end the others.
-    On a cluster, all nodes write into one shared folder: a seed whose node is lost is resumed elsewhere from its last
+    On a cluster, all nodes write into one shared folder: if a node is lost, its seed is resumed elsewhere from the last
     checkpoint.
 
     Args:
-        config: Of any method.
-        options: The common options.
+        config: The options of any method.
+        options: The options of the runs.
         seeds: One run each.
         workers: Processes of this machine or of a cluster.
-        command: The command that began the runs, for `run.json`.
+        command: The command that started the runs, for `run.json`.
 
     Returns:
         The results, in the order of the seeds.
 
     Raises:
         ClusterError: There is no cluster.
+        ResultsError: On a cluster: a run exists, and is neither resumed nor overwritten.
     """
-    far = workers.cluster is not None
-    lines = [line if options.progress and not far else None for line in range(len(seeds))]
-    if len(seeds) == 1 and not far:
-        return [train_seed(Seed(config, options, command, seeds[0], line=lines[0]))]
-    shared = dataclasses.replace(options, out=options.out.absolute()) if far else options
+    remote = workers.cluster is not None
+    lines = [line if options.progress and not remote else None for line in range(len(seeds))]
+    if len(seeds) == 1 and not remote:
+        return [train_seed(Seed(config, options, command, seeds[0], lines[0]))]
+    if remote:
+        options = _shared(options, seeds)
+    jobs = [Seed(config, options, command, seed, line, remote) for seed, line in zip(seeds, lines, strict=True)]
     results = dict[int, SeedResult]()
-    tries = TRIES if far else 1  # on one machine a second attempt would fail again
-    with _marked(shared.out, far) as mark:
-        every = [Seed(config, shared, command, seed, mark, line) for seed, line in zip(seeds, lines, strict=True)]
-        for one, future in finished(attempt, every, workers, tries=tries):
-            try:
-                results[one.seed] = future.result()
-            except WorkerError as e:
-                results[one.seed] = SeedResult(one.seed, error=f"{e} Continue with --resume.")
+    tries = TRIES if remote else 1  # on one machine a second attempt would fail again
+    for job, future in finished(attempt, jobs, workers, tries=tries):
+        try:
+            results[job.seed] = future.result()
+        except WorkerError as e:
+            results[job.seed] = SeedResult(job.seed, error=f"{e} Continue with --resume.")
     return [results[seed] for seed in seeds]
 
 
-@dataclasses.dataclass(frozen=True)
-class Seed:
-    """The task of a worker.
-
-    Args:
-        config: Of any method.
-        options: The common options.
-        command: The command that began the run.
-        seed: The seed.
-        mark: The name of a file that shows a worker of a cluster that the folder is shared; empty on one machine.
-        line: See :class:`Bar`.
-    """
-
-    config: Config
-    options: RunOptions
-    command: str
-    seed: int
-    mark: str = ""
-    line: int | None = None
+def _shared(options: RunOptions, seeds: Sequence[int]) -> RunOptions:
+    """Clears or keeps the folders of a cluster's runs, and lets the nodes resume, so that a lost seed continues."""
+    for folder in (Folder(options.folder(seed)) for seed in seeds):
+        check_flags(folder.run, resume=options.resume, overwrite=options.overwrite)
+        with locked(folder.path):
+            if not options.resume:
+                folder.clear()
+    return dataclasses.replace(options, out=options.out.absolute(), resume=True, overwrite=False)
 
 
-def train_seed(one: Seed) -> SeedResult:
+def train_seed(job: Seed) -> SeedResult:
     """Trains the agent of a seed, in the process of a worker."""
     # PyTorch takes seconds to load, and the parent process does not need it.
     from baselines.training.run import train
 
-    options, seed = one.options, one.seed
-    if one.mark and not (options.out / one.mark).exists():
-        unseen = f"{platform.node()} does not see {options.out}: expected a folder that all nodes of the cluster share"
-        return SeedResult(seed, error=unseen)
-    begun = options.out / f"{one.mark}-{seed}"
-    again = bool(one.mark) and begun.exists()  # on a node that was lost
-    if one.mark:
-        begun.touch()
-    bar = Bar(one.config.segments, seed, one.line)
+    options, seed = job.options, job.seed
+    bar = tqdm(
+        total=job.config.segments,
+        desc=f"seed {seed}",
+        disable=job.line is None,
+        position=job.line,
+        file=sys.stderr,
+        unit="segment",
+        dynamic_ncols=True,
+        mininterval=0.1 if sys.stderr.isatty() else 10.0,
+    )
+
+    def show(done: int, score: Score | None) -> None:
+        if score is not None:
+            bar.set_description(f"seed {seed}: cost {score.cost:.4g}", refresh=False)
+        bar.update(done - bar.n)
+
     try:
-        result = train(
-            one.config,
-            seed,
-            options.folder(seed),
-            resume=options.resume or again,
-            overwrite=options.overwrite and not again,
-            checkpoint_every=options.checkpoint_every,
-            command=one.command,
-            on_segment=bar.advance,
-        )
+        with bar:
+            result = train(
+                job.config,
+                seed,
+                options.folder(seed),
+                resume=options.resume,
+                overwrite=options.overwrite,
+                checkpoint_every=options.checkpoint_every,
+                command=job.command,
+                on_segment=show,
+            )
     except IkgymError as e:
         return SeedResult(seed, error=" ".join(str(e).split()))
-    except (MemoryError, RuntimeError) as e:
-        if isinstance(e, RuntimeError) and "allocate memory" not in str(e):  # PyTorch's words
-            raise
-        return SeedResult(seed, error=f"Out of memory: {' '.join(str(e).split())[:200]}. {LESS_MEMORY}")
-    finally:
-        bar.close()
+    except MemoryError as e:
+        advice = "Choose fewer arms (--n-envs), a smaller network (--hidden), or --set buffer_size=…"
+        return SeedResult(seed, error=f"Out of memory: {' '.join(str(e).split())}. {advice}")
     return SeedResult(seed, result.score, result.weights_sha256)
 
 
-def attempt(one: Seed) -> SeedResult:
-    """The same, with any error as a result, so that other seeds continue."""
+def attempt(job: Seed) -> SeedResult:
+    """The same in a worker, with any error as a result, so that other seeds continue."""
+    if job.remote and not job.options.folder(job.seed).exists():
+        unseen = (
+            f"{platform.node()} does not see {job.options.out}: expected a folder that all nodes of the cluster share"
+        )
+        return SeedResult(job.seed, error=unseen)
     try:
-        return train_seed(one)
+        return train_seed(job)
     except Exception as e:
         traceback.print_exc()
-        return SeedResult(one.seed, error=f"{type(e).__name__}: {' '.join(str(e).split())}")
-
-
-@contextlib.contextmanager
-def _marked(folder: pathlib.Path, wanted: bool) -> Iterator[str]:
-    """The name of a file that exists meanwhile in a folder; empty if not wanted."""
-    if not wanted:
-        yield ""
-        return
-    file = folder / f".cluster-{uuid.uuid4().hex}"
-    write(file, b"")
-    try:
-        yield file.name
-    finally:
-        for left in folder.glob(f"{file.name}*"):
-            left.unlink()
+        return SeedResult(job.seed, error=f"{type(e).__name__}: {' '.join(str(e).split())}")

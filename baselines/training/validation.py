@@ -33,9 +33,9 @@ from ikgym.kernels.simulation import Outcome
 from ikgym.scenarios import Preview, Scenario
 from ikgym.validation import FloatArray
 
-#: The file of the reference costs, the policy that they are of, and the scenario, tasks and number of episodes.
+#: The file of the reference costs, the reference policy, and the scenario, tasks and number of episodes.
 FILE = pathlib.Path(__file__).with_name("validation_reference.json")
-#: All initial guesses are tried in the first call, which takes longer there than real time, and costs less.
+#: All initial guesses are tried in the first call: not in real time, but at a lower cost.
 POLICY = "rhc_foresight:horizon=1501,move_blocks=48,starts=64,start_steps=0,recovery_steps=0"
 SCENARIO, TASKS, EPISODES = "varga7-random", ("skew", "pose"), 64
 #: Digits of a cost in the file.
@@ -44,7 +44,7 @@ DIGITS = 7
 
 @dataclasses.dataclass(frozen=True)
 class Score:
-    """The performance of an agent on the validation split.
+    """The score of an agent on the validation split.
 
     Args:
         episodes: Number of episodes.
@@ -76,20 +76,14 @@ def validation_seeds(scenario: Scenario, episodes: int) -> tuple[int, ...]:
 
 
 def validate(agent: AgentFile, scenario: Scenario, episodes: int) -> Score:
-    """Plays episodes of the validation split with an agent.
-
-    Args:
-        agent: The agent.
-        scenario: The scenario.
-        episodes: Number of episodes; a deterministic scenario has one.
-    """
+    """The score of an agent, see :func:`score`."""
     kind: Any = RecurrentPolicy if isinstance(agent.processing, Recurrent) else Agent
     policy = kind(Problem.of(scenario), given=agent)
     return score(policy, scenario, episodes, policy.preview)
 
 
 def score(policy: Any, scenario: Scenario, episodes: int, preview: Preview) -> Score:
-    """Plays episodes of the validation split with a policy, all of them in step.
+    """Plays episodes of the validation split with a policy, all of them side by side.
 
     Args:
         policy: Any object with the `predict` of Stable-Baselines3 for observations of the environment.
@@ -127,15 +121,7 @@ def score(policy: Any, scenario: Scenario, episodes: int, preview: Preview) -> S
 
 
 def reference_costs(digest: str, seeds: Sequence[int]) -> FloatArray | None:
-    """The costs of the reference policy on some episodes, None where they are not known.
-
-    Args:
-        digest: The fingerprint of the scenario.
-        seeds: The reset seeds.
-
-    Returns:
-        Shape (N,).
-    """
+    """The costs of the reference policy, one a seed, for a scenario with this fingerprint; None if they are unknown."""
     known: dict[int, float] = {}
     for record in _records():
         if record["fingerprint"] == digest:

@@ -1,1 +1,1 @@
-"""What shows arms on the move: a viewer in the browser, and videos; what is shown is computed apart from both."""
+"""Shows arms that move: the viewer in a browser (viser), and videos (moviepy)."""

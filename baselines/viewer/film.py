@@ -6,6 +6,7 @@ import itertools
 import pathlib
 import tempfile
 from collections.abc import Iterable, Iterator, Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +15,6 @@ from baselines.files import ResultsError, write
 from baselines.viewer.replay import Replay, Stage
 from ikgym.exceptions import InvalidInputError, MissingDependencyError
 from ikgym.rendering import Renderer
-from ikgym.rendering.renderer import WIDTH
 from ikgym.validation import number, whole_number
 
 Picture = npt.NDArray[np.uint8]
@@ -23,11 +23,6 @@ Picture = npt.NDArray[np.uint8]
 NARROWEST, WIDEST = 480, 3840
 # Widths are multiples of it: a video takes even sizes, and pictures are half as high as wide.
 STEP = 4
-
-
-def columns(policies: int) -> int:
-    """Number of pictures side by side."""
-    return 1 if policies == 1 else 2
 
 
 def moments(stage: Stage, fps: float, speed: float) -> npt.NDArray[np.int64]:
@@ -49,29 +44,6 @@ def moments(stage: Stage, fps: float, speed: float) -> npt.NDArray[np.int64]:
     return np.append(np.rint(np.arange(0.0, steps, between)), steps).astype(np.int64)
 
 
-def pictures(
-    stage: Stage, replays: Sequence[Replay], steps: npt.NDArray[np.int64], *, width: int | None = None
-) -> Iterator[Picture]:
-    """Draws an episode.
-
-    Args:
-        stage: The episode.
-        replays: The replays of the policies.
-        steps: Which steps are drawn, rising.
-        width: Of one policy's picture in [px]; the renderer's own if left out.
-
-    Yields:
-        Pictures with the policies in two columns, row by row. Shape (height, width, 3).
-
-    Raises:
-        InvalidInputError: The width is not valid, see :func:`checked_width`.
-    """
-    wide = WIDTH if width is None else checked_width(width)
-    drawn = [_drawn(stage, replay, steps, wide) for replay in replays]
-    for side_by_side in zip(*drawn, strict=True):
-        yield _tiled(side_by_side, columns(len(replays)))
-
-
 def checked_width(width: int) -> int:
     """A width of pictures in [px].
 
@@ -81,6 +53,35 @@ def checked_width(width: int) -> int:
     if whole_number("width", width, at_least=NARROWEST) > WIDEST or width % STEP:
         raise InvalidInputError(f"width: expected a multiple of {STEP} from {NARROWEST} to {WIDEST} [px], got {width}.")
     return width
+
+
+def pictures(stage: Stage, replays: Sequence[Replay], steps: npt.NDArray[np.int64], *, width: int) -> Iterator[Picture]:
+    """Draws an episode.
+
+    Args:
+        stage: The episode.
+        replays: The replays of the policies.
+        steps: Which steps are drawn, rising.
+        width: Of one policy's picture in [px], see :func:`checked_width`.
+
+    Yields:
+        Pictures with the policies in two columns, row by row, white where one is missing. Shape (height, width, 3).
+    """
+    scenario, across = stage.scenario, min(len(replays), 2)
+    oriented, renderers = scenario.task.has_orientation, []
+    for replay in replays:
+        title = f"{scenario.name}: {replay.policy}"
+        renderers.append(Renderer(scenario.arm, "rgb_array", title=title, has_orientation=oriented, width=width))
+        renderers[-1].begin(stage.frames[:, 9:], scenario.steps * scenario.dt)
+    known = 0
+    for step in steps.tolist():
+        for renderer, replay in zip(renderers, replays, strict=True):
+            for k in range(known, step + 1):
+                renderer.add(replay.q[k], replay.position_error[k], replay.orientation_error[k], k * scenario.dt)
+        known = step + 1
+        tiles: list[Any] = [renderer.draw() for renderer in renderers]
+        tiles += [np.full_like(tiles[0], 255)] * (-len(tiles) % across)
+        yield np.vstack([np.hstack(tiles[k : k + across]) for k in range(0, len(tiles), across)])
 
 
 def check_ffmpeg() -> None:
@@ -111,53 +112,20 @@ def write_video(file: pathlib.Path, content: Iterable[Picture], fps: float) -> N
         fps: Pictures a second.
 
     Raises:
-        ModuleNotFoundError: moviepy is not installed.
         ResultsError: The file cannot be written, or ffmpeg has failed.
     """
-    with tempfile.TemporaryDirectory() as folder:
-        draft = pathlib.Path(folder) / "draft.mp4"
-        try:
-            _encode(draft, content, fps)
-            video = draft.read_bytes()
-        except OSError as e:
-            raise ResultsError(f"Cannot write {file}: ffmpeg has failed ({e}).") from None
-        write(file, video)
-
-
-def _encode(file: pathlib.Path, content: Iterable[Picture], fps: float) -> None:
     from moviepy.video.io.ffmpeg_writer import FFMPEG_VideoWriter
 
     left = iter(content)
     first = next(left)
     height, width, _ = first.shape
-    with FFMPEG_VideoWriter(str(file), (width, height), fps, codec="libx264", preset="medium") as video:
-        for picture in itertools.chain([first], left):
-            video.write_frame(picture)
-
-
-def _drawn(stage: Stage, replay: Replay, steps: npt.NDArray[np.int64], width: int) -> Iterator[Picture]:
-    scenario = stage.scenario
-    renderer = Renderer(
-        scenario.arm,
-        "rgb_array",
-        title=f"{scenario.name}: {replay.policy}",
-        has_orientation=scenario.task.has_orientation,
-        width=width,
-    )
-    renderer.begin(stage.path, scenario.steps * scenario.dt)
-    known = 0
-    for step in steps.tolist():
-        for k in range(known, step + 1):
-            renderer.add(replay.q[k], replay.position_error[k], replay.orientation_error[k], replay.times[k])
-        known = max(known, step + 1)
-        picture = renderer.draw()
-        assert picture is not None  # of a renderer in memory
-        yield picture
-
-
-def _tiled(pictures: Sequence[Picture], across: int) -> Picture:
-    """Pictures of one size row by row, white where one is missing."""
-    missing = -len(pictures) % across
-    every = [*pictures, *[np.full_like(pictures[0], 255)] * missing]
-    rows = [np.hstack(every[k : k + across]) for k in range(0, len(every), across)]
-    return np.vstack(rows)
+    with tempfile.TemporaryDirectory() as folder:
+        draft = pathlib.Path(folder) / "draft.mp4"
+        try:
+            with FFMPEG_VideoWriter(str(draft), (width, height), fps, codec="libx264", preset="medium") as video:
+                for picture in itertools.chain([first], left):
+                    video.write_frame(picture)
+            written = draft.read_bytes()
+        except OSError as e:
+            raise ResultsError(f"Cannot write {file}: ffmpeg has failed ({e}).") from None
+        write(file, written)

@@ -1,23 +1,64 @@
-"""Policies that follow a dragged target, without an environment."""
+"""Policies that follow a dragged target, without an environment. Frames are rotations and positions, of shape (12,)."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
+import numpy.typing as npt
 
 from baselines.controller import Controller
 from baselines.episodes import Seeds
 from baselines.evaluation.policies import specification
 from baselines.policy import SolverPolicy
 from baselines.status import Status
-from baselines.viewer.approach import Approach
 from baselines.viewer.replay import Stage
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.rotations import geodesic_angle
 from ikgym.scenarios import Scenario
 from ikgym.scenarios.preview import offsets
+from ikgym.trajectories import StraightLine
 from ikgym.validation import FloatArray
+
+# Share of the way for each parabolic blend of the straight line: next to none.
+BLEND = 1e-9
+
+
+class Approach:
+    """A reference that moves from the start of an episode to a target, straight and at a constant pace.
+
+    Position and orientation arrive together; the slower of them moves at its limit.
+    """
+
+    def __init__(self, stage: Stage) -> None:
+        self._arm, self._pace = stage.scenario.arm, stage.pace
+        self.place(stage.frames[0])
+
+    @property
+    def frame(self) -> FloatArray:
+        """The reference now. Shape (12,)."""
+        return self.ahead([0]).ravel()
+
+    def place(self, frame: FloatArray) -> None:
+        """Puts reference and target at a frame."""
+        self._begin(frame, frame)
+
+    def aim(self, target: FloatArray) -> None:
+        """Sets another target."""
+        self._begin(self.frame, target)
+
+    def advance(self) -> None:
+        """Makes one step."""
+        self._made += 1
+
+    def ahead(self, steps: npt.ArrayLike) -> FloatArray:
+        """The reference so many steps from now. Shapes (p,) and (p, 12)."""
+        return self._line.frames(self._made + np.asarray(steps, dtype=np.float64), self._arm)
+
+    def _begin(self, start: FloatArray, target: FloatArray) -> None:
+        distance = float(np.linalg.norm(target[9:] - start[9:]))
+        angle = geodesic_angle(start[:9].reshape(3, 3), target[:9].reshape(3, 3))
+        # At least one step, also if the reference is at the target already.
+        steps = max(distance / self._pace[0], angle / self._pace[1], 1.0)
+        self._line, self._made = StraightLine(start, target, steps, BLEND * steps), 0
 
 
 class Follower:
@@ -46,7 +87,8 @@ class Follower:
         """Makes one step. An arm whose policy raises an error stands still, and its status has the message."""
         task, arm = self._scenario.task, self._scenario.arm
         # Only the previewed steps, which may be few and far ahead.
-        reference = task.coordinates(*approach.ahead(self._ahead))
+        frames = approach.ahead(self._ahead)
+        reference = task.coordinates(frames[:, :9].reshape(-1, 3, 3), frames[:, 9:])
         try:
             qdot = self._controller.step(self.q, arm.forward(self.q), reference)
         except InvalidInputError as e:
@@ -57,24 +99,16 @@ class Follower:
 
     def errors(self, approach: Approach) -> tuple[float, float]:
         """Distance in [m] and angle in [rad] from where the reference is now; NaN where the task has no orientation."""
-        (rotation, position), reference = self._scenario.arm.forward(self.q), approach.pose
-        angle = geodesic_angle(reference.rotation, rotation) if self._scenario.task.has_orientation else np.nan
-        return float(np.linalg.norm(reference.position - position)), float(angle)
+        (rotation, position), frame = self._scenario.arm.forward(self.q), approach.frame
+        oriented = self._scenario.task.has_orientation
+        angle = geodesic_angle(frame[:9].reshape(3, 3), rotation) if oriented else np.nan
+        return float(np.linalg.norm(frame[9:] - position)), float(angle)
 
 
-def followers(stage: Stage, policies: Sequence[str]) -> list[Follower | None]:
-    """The followers of policies; None for those with privileged information, and those that need an environment.
-
-    Args:
-        stage: The episode.
-        policies: Their names.
-    """
-    return [_follower(stage, policy) for policy in policies]
-
-
-def _follower(stage: Stage, policy: str) -> Follower | None:
-    one = specification(policy)
-    player = one.bind(stage.scenario, one.given(stage.scenario, Seeds(stage.seed)), None)
+def follower(stage: Stage, policy: str) -> Follower | None:
+    """The follower of a policy; None if it has privileged information or needs an environment."""
+    found = specification(policy)
+    player = found.bind(stage.scenario, found.given(stage.scenario, Seeds(stage.seed)), None)
     if not isinstance(player, SolverPolicy) or player.reference:
         return None
     return Follower(stage.scenario, player, stage.start)

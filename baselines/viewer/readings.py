@@ -30,13 +30,15 @@ class Reading(NamedTuple):
         manipulability: Yoshikawa's w = √det(J Jᵀ), of the linear rows where the task has no orientation.
         share: The same as a share of the largest among random postures, between 0 and 1.
         margins: Distances of the joints from their nearest limit in [rad] or [m], inf without limits. Shape (n,).
-        colours: Of the n joints: :data:`FREE`, :data:`NEAR` or :data:`AT`.
+        joints: Colours of the n joints: :data:`FREE`, :data:`NEAR` or :data:`AT`.
+        tool: Colour of the tool: from vermilion in a singular posture to bluish green in the best one.
     """
 
     manipulability: float
     share: float
     margins: FloatArray
-    colours: tuple[Colour, ...]
+    joints: list[Colour]
+    tool: Colour
 
 
 class Reader:
@@ -50,23 +52,25 @@ class Reader:
     def __init__(self, arm: Arm, task: Task) -> None:
         self._arm, self._rows = arm, 6 if task.has_orientation and arm.joints >= 6 else 3
         self._near = np.minimum(NEAR_SHARE * (arm.upper - arm.lower), NEAR_MOST)
-        low, high = slider_range(arm)
-        postures = np.random.default_rng(0).uniform(low, high, (POSTURES, arm.joints))
-        self.largest = float(self.manipulability(postures).max())
-
-    def manipulability(self, q: FloatArray) -> FloatArray:
-        """√det(J Jᵀ) of postures, of shape (..., n) in [rad] or [m]. Shape (...)."""
-        jacobian = self._arm.jacobian(q)[..., : self._rows, :]
-        # The product of the singular values: the root of a determinant would lose half of the digits.
-        values: FloatArray = np.linalg.svd(jacobian, compute_uv=False).prod(axis=-1)
-        return values
+        postures = np.random.default_rng(0).uniform(*slider_range(arm), (POSTURES, arm.joints))
+        self.largest = float(self._manipulability(postures).max())
 
     def read(self, q: FloatArray) -> Reading:
         """The readings of a posture of shape (n,) in [rad] or [m]."""
         margins = np.minimum(q - self._arm.lower, self._arm.upper - q)
-        colours = map(_colour, margins.tolist(), self._near.tolist())
-        found = float(self.manipulability(q))
-        return Reading(found, min(found / self.largest, 1.0) if self.largest else 0.0, margins, tuple(colours))
+        joints = np.where(margins <= TOUCHING, 2, np.where(margins <= self._near, 1, 0)).tolist()
+        found = float(self._manipulability(q))
+        share = min(found / self.largest, 1.0) if self.largest else 0.0
+        red, green, blue = (
+            round((1.0 - share) * bad + share * good) for bad, good in zip(AT, (0, 158, 115), strict=True)
+        )
+        return Reading(found, share, margins, [(FREE, NEAR, AT)[k] for k in joints], (red, green, blue))
+
+    def _manipulability(self, q: FloatArray) -> FloatArray:
+        jacobian = self._arm.jacobian(q)[..., : self._rows, :]
+        # The product of the singular values: the root of a determinant would lose half of the digits.
+        values: FloatArray = np.linalg.svd(jacobian, compute_uv=False).prod(axis=-1)
+        return values
 
 
 def slider_range(arm: Arm) -> tuple[FloatArray, FloatArray]:
@@ -80,16 +84,3 @@ def slider_range(arm: Arm) -> tuple[FloatArray, FloatArray]:
         np.where(np.isfinite(arm.lower), arm.lower, np.minimum(-usual, arm.upper - usual)),
         np.where(np.isfinite(arm.upper), arm.upper, np.maximum(usual, arm.lower + usual)),
     )
-
-
-def _colour(margin: float, near: float) -> Colour:
-    if margin > near:
-        return FREE
-    return NEAR if margin > TOUCHING else AT
-
-
-def share_colour(share: float) -> Colour:
-    """From vermilion at 0, a singular posture, to bluish green at 1."""
-    bad, good = np.array((213, 94, 0)), np.array((0, 158, 115))
-    red, green, blue = np.rint(bad + np.clip(share, 0.0, 1.0) * (good - bad)).astype(int).tolist()
-    return red, green, blue

@@ -8,82 +8,63 @@ import queue
 import socket
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
 import viser
 from viser.transforms import SO3
 
-from baselines.viewer.approach import Pose
-from baselines.viewer.panel import Panel
-from baselines.viewer.scene import DrawArm, Scene
-from baselines.viewer.session import Session
+from baselines.viewer.arms import Shape
+from baselines.viewer.readings import slider_range
+from baselines.viewer.scene import Scene
+from baselines.viewer.session import Mode, Session, Shown, escaped
 from ikgym.exceptions import InvalidInputError
 
 # Updates of the scene and of the readings per second.
 PICTURES, READINGS = 30.0, 5.0
-# Longest wait in [s] for a thread of the server to end.
+# Longest wait in [s] for the server to end.
 PATIENCE = 5.0
+#: Seconds of the episode per second.
+SPEEDS = ("0.02", "0.05", "0.1", "0.25", "0.5", "1", "2", "5", "10", "50")
+# Digits behind the point of a slider's value.
+DIGITS = 4
 
-
-@contextlib.contextmanager
-def serving(host: str, port: int) -> Iterator[Any]:
-    """A server of viser, stopped at the end.
-
-    Args:
-        host: The address to listen on.
-        port: The port; 0 for a free one.
-
-    Raises:
-        InvalidInputError: It cannot listen there.
-    """
-    others = set(threading.enumerate())
-    server = viser.ViserServer(host, free_port(host, port), label="ikgym view", verbose=False)
-    own = [thread for thread in threading.enumerate() if thread.daemon and thread not in others]
-    try:
-        yield server
-    finally:
-        server.stop()
-        for thread in own:
-            thread.join(PATIENCE)
-        loop = server.get_event_loop()
-        if not (loop.is_running() or loop.is_closed()):
-            loop.run_until_complete(_cancel_others())
-            loop.close()
-
-
-async def _cancel_others() -> None:
-    """Ends the tasks that viser leaves in its loop; Python would complain about them when it collects the loop."""
-    others = asyncio.all_tasks() - {asyncio.current_task()}
-    for task in others:
-        task.cancel()
-    await asyncio.gather(*others, return_exceptions=True)
+LEGEND = (
+    "Drag the target, or move a joint; *Play* returns to the episode. A joint is yellow near a limit and red at it. "
+    "The ball at the tool shows the manipulability, from red (singular) to green."
+)
 
 
 class Viewer:
-    """A session in the browser.
+    """A session in the browser: the scene, and a panel with controls and readings beside it.
 
     Args:
         server: The server of viser.
         session: The session.
-        draw: Adds arms to the scene of a server, see :class:`Scene`.
+        shapes: Meshes of the arm; cylinders if left out.
     """
 
-    def __init__(self, server: Any, session: Session, draw: Callable[[Any], DrawArm] | None = None) -> None:
-        self.session = session
+    def __init__(self, server: Any, session: Session, shapes: list[Shape] | None = None) -> None:
+        self.session, gui, stage = session, server.gui, session.stage
+        # Requests of browsers, which come in threads of the server.
         self._requests: queue.SimpleQueue[Callable[[], object]] = queue.SimpleQueue()
-        self._scene = Scene(server, session, draw and draw(server))
-        self._panel = Panel(server, session, self._requests.put)
-        target = self._scene.target
-
-        def dragged(_: object) -> None:
-            # Read at once: the scene may move the target before the request is handled.
-            pose = Pose(SO3(target.wxyz).as_matrix(), np.array(target.position))
-            self._requests.put(lambda: session.aim(pose))
-
-        target.on_update(dragged)
-        server.on_client_connect(lambda client: self._scene.look(client.camera))
+        self.scene = Scene(server, session, shapes)
+        self.scene.target.on_update(self._dragged)
+        server.on_client_connect(lambda client: self.scene.look(client.camera))
+        gui.add_markdown(f"**{escaped(stage.scenario.name)}**, seed {stage.seed}\n\n{LEGEND}")
+        with gui.add_folder("Episode"):
+            self.play = gui.add_button("Play")
+            self.time = gui.add_slider("time [s]", 0.0, session.duration, session.duration / 1000.0, 0.0)
+            speed = gui.add_dropdown("speed", SPEEDS, initial_value="1")
+        with gui.add_folder("Now"):
+            self.readings = gui.add_markdown("")
+        with gui.add_folder("Joints"):
+            self.joints = _sliders(gui, session)
+        self.play.on_click(lambda _: self._requests.put(session.toggle))
+        self._on_user([self.time], session.scrub)
+        self._on_user([speed], lambda chosen: setattr(session, "speed", float(chosen)))
+        self._on_user(self.joints, lambda *q: session.place(np.array(q)))
         self._since_reading = 0.0
 
     def run(self, stop: threading.Event) -> None:
@@ -95,17 +76,68 @@ class Viewer:
             before = now
 
     def tick(self, seconds: float) -> None:
-        """Handles requests of browsers, advances the session by a time in [s], and updates the scene."""
+        """Handles requests of browsers, advances the session by a time in [s], and updates the page."""
         with contextlib.suppress(queue.Empty):
             while True:
                 self._requests.get_nowait()()
         self.session.advance(seconds)
         shown = self.session.shown()
-        self._scene.show(shown)
+        self.scene.show(shown)
         self._since_reading += seconds
         if self._since_reading >= 1.0 / READINGS:
             self._since_reading = 0.0
-            self._panel.show(shown)
+            self._show_panel(shown)
+
+    def _show_panel(self, shown: Sequence[Shown]) -> None:
+        """Shows readings, and the joints of the first policy on the sliders."""
+        session = self.session
+        self.readings.content = session.text(shown)
+        self.play.label = "Pause" if session.playing else "Play"
+        if session.mode is Mode.PLAY:
+            _set(self.time, session.time)
+        if session.mode is not Mode.HAND:
+            for slider, coordinate in zip(self.joints, shown[0].q.tolist(), strict=True):
+                _set(slider, min(max(coordinate, slider.min), slider.max))
+
+    def _dragged(self, _: object) -> None:
+        # Read at once: the scene may move the target before the request is handled.
+        target = self.scene.target
+        rotation, position = SO3(target.wxyz).normalize().as_matrix(), np.array(target.position)
+        self._requests.put(lambda: self.session.aim(np.append(rotation, position)))
+
+    def _on_user(self, controls: Sequence[Any], then: Callable[..., object]) -> None:
+        """Queues a request with the values of controls when a user, not the program, has moved one of them."""
+
+        def moved(event: Any) -> None:
+            if event.client is not None:
+                values = [control.value for control in controls]
+                self._requests.put(lambda: then(*values))
+
+        for control in controls:
+            control.on_update(moved)
+
+
+@contextlib.contextmanager
+def serving(host: str, port: int) -> Iterator[Any]:
+    """A server of viser on a port, 0 for a free one; stopped at the end.
+
+    Raises:
+        InvalidInputError: It cannot listen there.
+    """
+    server = viser.ViserServer(host, free_port(host, port), label="ikgym view", verbose=False)
+    try:
+        yield server
+    finally:
+        server.stop()
+        loop, end = server.get_event_loop(), time.monotonic() + PATIENCE
+        while loop.is_running() and time.monotonic() < end:
+            time.sleep(0.01)
+        if not loop.is_running():
+            # viser leaves its tasks and its loop to Python, which complains.
+            for task in asyncio.all_tasks(loop):
+                task.cancel()
+            loop.run_until_complete(asyncio.sleep(0.0))
+            loop.close()
 
 
 def free_port(host: str, port: int) -> int:
@@ -123,3 +155,21 @@ def free_port(host: str, port: int) -> int:
                 f"port: expected one that is free on {host!r}, got {port} ({getattr(e, 'strerror', None) or e})."
             ) from None
         return int(probe.getsockname()[1])
+
+
+def _sliders(gui: Any, session: Session) -> list[Any]:
+    """One slider a joint, from limit to limit and at least to the start."""
+    arm, start = session.stage.scenario.arm, session.stage.start
+    low, high = slider_range(arm)
+    low, high = np.minimum(low, start).tolist(), np.maximum(high, start).tolist()
+    units = ["m" if prismatic else "rad" for prismatic in arm.prismatic]
+    return [
+        gui.add_slider(f"{name} [{units[j]}]", low[j], high[j], (high[j] - low[j]) / 1000.0, float(start[j]))
+        for j, name in enumerate(arm.joint_names)
+    ]
+
+
+def _set(control: Any, value: float) -> None:
+    """Shows a value if it differs: viser sends it in any case, and slow browsers would undo what users do."""
+    if control.value != (shown := round(value, DIGITS)):
+        control.value = shown

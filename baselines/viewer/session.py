@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+import re
 import time
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -10,10 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from baselines.status import Status
-from baselines.viewer.approach import Approach, Pose
-from baselines.viewer.following import Follower
+from baselines.viewer.following import Approach, follower
 from baselines.viewer.readings import Reader, Reading
-from baselines.viewer.replay import Replay, Stage
+from baselines.viewer.replay import Stage, play_all
 from ikgym.validation import FloatArray
 
 #: The status of a policy that cannot follow a target.
@@ -53,20 +53,24 @@ class Shown(NamedTuple):
 
 
 class Session:
-    """The state of the viewer.
+    """The state of the viewer; all policies play the episode when it is made.
 
     Args:
         stage: The episode.
-        replays: The replays of the policies.
-        followers: Their followers, None for policies that cannot follow a target.
+        policies: Names of policies, as the command line takes them.
+
+    Raises:
+        UnknownNameError: There is no such policy or parameter.
+        InvalidInputError: There is no policy, or one does not suit the scenario.
     """
 
-    def __init__(self, stage: Stage, replays: Sequence[Replay], followers: Sequence[Follower | None]) -> None:
-        self.stage, self.replays, self._followers = stage, list(replays), list(followers)
+    def __init__(self, stage: Stage, policies: Sequence[str]) -> None:
+        self.stage, self.replays = stage, play_all(stage, policies)
+        self._followers = [follower(stage, replay.policy) for replay in self.replays]
         self._reader = Reader(stage.scenario.arm, stage.scenario.task)
-        self._approach = Approach(stage.pose(0), *stage.pace)
-        self._q = [replay.q[0] for replay in self.replays]
-        self.duration = float(self.replays[0].times[-1])
+        self._approach = Approach(stage)
+        self._q = [stage.start for _ in self.replays]
+        self.duration = stage.scenario.steps * stage.scenario.dt
         self.mode, self.playing, self.time, self.speed = Mode.PLAY, False, 0.0, 1.0
         #: Share of real time that the policies reach while they follow the target.
         self.kept = 1.0
@@ -78,21 +82,18 @@ class Session:
         return min(round(self.time / self.stage.scenario.dt), self.stage.scenario.steps)
 
     @property
-    def reference(self) -> Pose:
-        """The pose of the reference."""
-        return self.stage.pose(self.step) if self.mode is Mode.PLAY else self._approach.pose
+    def reference(self) -> FloatArray:
+        """The reference: rotation and position in [m]. Shape (12,)."""
+        return self.stage.frames[self.step] if self.mode is Mode.PLAY else self._approach.frame
 
     def place(self, q: FloatArray) -> None:
-        """Puts all arms at a posture, and the target at their tool.
-
-        Args:
-            q: Joint coordinates in [rad] or [m]; cut to the limits. Shape (n,).
-        """
+        """Puts all arms at joint coordinates in [rad] or [m], cut to the limits, and the target at their tool. (n,)."""
         arm = self.stage.scenario.arm
         posture = np.clip(q, arm.lower, arm.upper)
-        self._leave(Mode.HAND, Pose(*arm.forward(posture)), [posture] * len(self._q))
+        rotation, position = arm.forward(posture)
+        self._leave(Mode.HAND, np.append(rotation, position), [posture] * len(self._q))
 
-    def aim(self, target: Pose) -> None:
+    def aim(self, target: FloatArray) -> None:
         """Moves the target; the arms follow it from where they are."""
         if self.mode is not Mode.FOLLOW:
             self._leave(Mode.FOLLOW, self.reference, [one.q for one in self.shown()])
@@ -110,11 +111,7 @@ class Session:
         self.time = float(np.clip(moment, 0.0, self.duration))
 
     def advance(self, seconds: float) -> None:
-        """Advances the time.
-
-        Args:
-            seconds: Since the last call, in [s].
-        """
+        """Advances the time by so many [s]."""
         if self.mode is Mode.FOLLOW:
             self._follow(seconds * self.speed)
         elif self.playing:
@@ -125,23 +122,30 @@ class Session:
         """The arm of each policy now."""
         return [self._shown(number) for number in range(len(self.replays))]
 
-    def _leave(self, mode: Mode, reference: Pose, postures: Sequence[FloatArray]) -> None:
+    def text(self, shown: Sequence[Shown]) -> str:
+        """The readings of each policy, as Markdown."""
+        moment = f"t = {self.time:.3f} s" if self.mode is Mode.PLAY else self.mode.value
+        if self.mode is Mode.FOLLOW and self.kept < 0.95:
+            moment += f"; the policies keep up with {self.kept:.0%} of the speed"
+        return "\n\n".join([f"*{moment}*", *map(self._readings, shown)])
+
+    def _leave(self, mode: Mode, reference: FloatArray, postures: Sequence[FloatArray]) -> None:
         """Changes the mode, with the arms at the given postures."""
         self.mode, self.playing, self._due, self.kept = mode, False, 0.0, 1.0
         self._approach.place(reference)
         self._q = list(postures)
-        for follower, posture in zip(self._followers, postures, strict=True):
-            if follower is not None:
-                follower.place(posture)
+        for one, posture in zip(self._followers, postures, strict=True):
+            if one is not None:
+                one.place(posture)
 
     def _follow(self, seconds: float) -> None:
         """Makes the steps that are due, within the budget of time."""
         self._due += seconds / self.stage.scenario.dt
         due, made, end = int(self._due), 0, time.perf_counter() + BUDGET
         while made < due and time.perf_counter() < end:
-            for follower in self._followers:
-                if follower is not None:
-                    follower.step(self._approach)
+            for one in self._followers:
+                if one is not None:
+                    one.step(self._approach)
             self._approach.advance()
             made += 1
         if due:
@@ -149,15 +153,37 @@ class Session:
         self._due -= due
 
     def _shown(self, number: int) -> Shown:
-        replay, follower = self.replays[number], self._followers[number]
+        replay, following = self.replays[number], self._followers[number]
         position, orientation, cost = np.nan, np.nan, np.nan
         if self.mode is Mode.PLAY:
             k = self.step
             q, status = replay.q[k], Status(int(replay.statuses[k])).label
             position, orientation, cost = replay.position_error[k], replay.orientation_error[k], replay.cost[k]
-        elif follower is None:
+        elif following is None:
             q, status = self._q[number], PLAYS_ONLY
         else:
-            q, status = follower.q, follower.status
-            position, orientation = follower.errors(self._approach)
+            q, status = following.q, following.status
+            position, orientation = following.errors(self._approach)
         return Shown(replay.policy, q, float(position), float(orientation), float(cost), status, self._reader.read(q))
+
+    def _readings(self, one: Shown) -> str:
+        """A heading and a list."""
+        arm, reading = self.stage.scenario.arm, one.reading
+        status = "" if one.status == Status.UNKNOWN.label else f": {escaped(one.status)}"
+        lines = [f"**{escaped(one.policy)}**{status}\n"]
+        errors = [(one.position_error, "mm"), (one.orientation_error, "mrad")]
+        if found := [f"{1e3 * error:.3g} {unit}" for error, unit in errors if np.isfinite(error)]:
+            lines.append(f"- error {', '.join(found)}")
+        lines.append(f"- manipulability {reading.manipulability:.3g}, {reading.share:.0%} of the largest found")
+        joint = int(np.argmin(reading.margins))
+        if np.isfinite(reading.margins[joint]):
+            margin = f"{reading.margins[joint]:.3g} {'m' if arm.prismatic[joint] else 'rad'}"
+            lines.append(f"- {escaped(arm.joint_names[joint])} is {margin} from its limit")
+        if np.isfinite(one.cost):
+            lines.append(f"- cost so far {one.cost:.4g}")
+        return "\n".join(lines)
+
+
+def escaped(text: str) -> str:
+    """A name as Markdown shows it letter by letter: viser would run what stands in braces."""
+    return re.sub(r"([\\`*_{}\[\]<>&#|~!])", r"\\\1", " ".join(text.split()))

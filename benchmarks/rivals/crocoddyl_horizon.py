@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Callable
 from typing import Any
 
 import crocoddyl
@@ -76,24 +75,6 @@ class CrocoddylHorizon:
         return Plan(q, plan_cost(self.problem, horizon, q), int(self.solver.iter), bool(converged))
 
 
-def linear_quadratic(joints: int, knots: int) -> Callable[[], object]:
-    """One iteration of FDDP where all costs are quadratic and Crocoddyl's own: another problem, of the same size.
-
-    It holds no kinematics, and so is a bound below which no iteration of Crocoddyl on this grid can fall.
-    """
-    given = [np.eye(joints), np.eye(joints), np.eye(joints), np.eye(joints), np.zeros((joints, joints))]
-    model = crocoddyl.ActionModelLQR(*given, np.zeros(joints), np.ones(joints), np.ones(joints))
-    solver = crocoddyl.SolverFDDP(crocoddyl.ShootingProblem(np.ones(joints), [model] * knots, model))
-    rest = [np.ones(joints)] * (knots + 1), [np.zeros(joints)] * knots
-
-    def iterate() -> None:
-        solver.setCandidate(*rest, False)
-        solver.computeDirection(True)
-        solver.tryStep(1.0)
-
-    return iterate
-
-
 class _Action(crocoddyl.ActionModelAbstract):  # type: ignore[misc]
     """A knot and the interval behind it; ``origin``, ``length``, ``weight`` and ``nominal`` belong to the state."""
 
@@ -152,19 +133,9 @@ def _derivatives(chain, kind, cost, dt, origin, length, weight, nominal, x, qdot
             by_uu[j, j] = length * curvature[j]
     if weight > 0.0:
         e = task_kernels.error_size(kind, nominal.shape[0])
-        rotation, position, geometric, pose = (
-            np.empty((3, 3)),
-            np.empty(3),
-            np.empty((6, n)),
-            np.empty(nominal.shape[0]),
-        )
-        error, gradient, curvature, jacobian, by_q = (
-            np.empty(e),
-            np.empty(e),
-            np.empty(e),
-            np.empty((e, n)),
-            np.empty((e, n)),
-        )
+        rotation, position, geometric = np.empty((3, 3)), np.empty(3), np.empty((6, n))
+        error, gradient, curvature = np.empty(e), np.empty(e), np.empty(e)
+        pose, jacobian, by_q = np.empty(nominal.shape[0]), np.empty((e, n)), np.empty((e, n))
         forward_and_jacobian(chain, origin + dt * x, rotation, position, geometric)
         task_kernels.coordinates(kind, rotation, position, pose)
         task_kernels.error(kind, nominal, pose, error)

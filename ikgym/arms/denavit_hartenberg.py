@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -24,10 +25,7 @@ def from_dh(
     *,
     prismatic: Sequence[bool] = (),
     convention: str = "standard",
-    lower: npt.ArrayLike | None = None,
-    upper: npt.ArrayLike | None = None,
-    velocity_limit: npt.ArrayLike | None = None,
-    acceleration_limit: npt.ArrayLike | None = None,
+    **fields: Any,
 ) -> Arm:
     """An arm from its Denavit–Hartenberg table.
 
@@ -43,16 +41,13 @@ def from_dh(
         convention: ``"standard"``: H_i = Rot_z(θ_i) Trans_z(d_i) Trans_x(a_i) Rot_x(α_i). ``"modified"``
             (Craig): H_i = Rot_x(α_i) Trans_x(a_i) Rot_z(θ_i) Trans_z(d_i), where row i holds what Craig writes
             as a_{i-1} and α_{i-1}.
-        lower: Lower limits of the joints in [rad] or [m]. Shape (n,).
-        upper: Upper limits of the joints in [rad] or [m]. Shape (n,).
-        velocity_limit: Largest speeds of the joints in [rad/s] or [m/s]. Shape (n,).
-        acceleration_limit: Largest accelerations of the joints in [rad/s²] or [m/s²]. Shape (n,).
+        fields: Other fields of :class:`ikgym.Arm`, such as ``lower``, ``upper``, ``velocity_limit`` and ``home``.
 
     Returns:
         The arm, in the one form that all arms have.
 
     Raises:
-        InvalidInputError: The columns are of different lengths, or hold something else than finite numbers.
+        InvalidInputError: The columns differ in length, a number is not finite, or another field is refused.
         UnknownNameError: There is no such convention.
     """
     known_name("Denavit–Hartenberg convention", convention, CONVENTIONS)
@@ -76,18 +71,7 @@ def from_dh(
         frame = frame @ turn
         if convention == "standard":
             frame = frame @ link
-    return from_home(
-        name,
-        axes,
-        points,
-        prismatic,
-        rotation=frame[:3, :3],
-        position=frame[:3, 3],
-        lower=lower,
-        upper=upper,
-        velocity_limit=velocity_limit,
-        acceleration_limit=acceleration_limit,
-    )
+    return from_home(name, axes, points, prismatic, frame[:3, :3], frame[:3, 3], **fields)
 
 
 def _screw_z(angle: float, shift: float) -> FloatArray:

@@ -9,7 +9,6 @@ import numpy as np
 import numpy.typing as npt
 
 from ikgym.arms import Arm
-from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.kinematics import Chain
 from ikgym.kernels.random_numbers import stream
 from ikgym.plant.arm_kernels import ARM_STREAMS
@@ -18,7 +17,7 @@ from ikgym.plant.draw import Draws, arm_key, episode_key
 from ikgym.plant.plant import Plant
 from ikgym.plant.sensor_kernels import STREAMS
 from ikgym.plant.step import Drives, PlantState, Sensors
-from ikgym.validation import FloatArray, whole_number
+from ikgym.validation import FloatArray, one_a_row
 
 # Numbers of the streams that other noises of an episode come from: more than there are effects.
 NOISE_SEEDS = 1000
@@ -43,10 +42,7 @@ def checked_arm_seeds(given: Any, rows: int, plant: Plant, name: str) -> list[in
     """
     if given is None:
         return None
-    seeds = list(given) if isinstance(given, (tuple, list, np.ndarray)) else [given] * rows
-    if len(seeds) != rows:
-        raise InvalidInputError(f"options['arm_seed']: expected {rows} seeds, one a row, got {len(seeds)}.")
-    checked = [None if one is None else whole_number("options['arm_seed']", one, at_least=0) for one in seeds]
+    checked = one_a_row("options['arm_seed']", given, rows)
     if any(one is not None for one in checked):
         plant.check_draws_arm(name)
     return checked

@@ -119,7 +119,9 @@ class HistoryStage(Stage):
         space = getattr(env, "single_observation_space", env.observation_space)
         self._length = whole_number("length", length, at_least=1)
         if not isinstance(space, spaces.Box) or len(space.shape) != 1:
-            raise InvalidInputError(f"History: expected an environment whose observation is a vector, got {space}.")
+            raise InvalidInputError(
+                f"History: expected an environment whose observation is a vector, got {shortened(space)}."
+            )
         low, high = np.tile(space.low, self._length), np.tile(space.high, self._length)
         self.observation_space = spaces.Box(low, high, dtype=np.float32)
         self._kept: npt.NDArray[np.float32] = np.zeros((getattr(env, "num_envs", 1), self._length, *space.shape), "f4")

@@ -88,7 +88,8 @@ def _own_space(env: Any) -> spaces.Dict:
     name = "single_observation_space" if hasattr(env, "single_observation_space") else "observation_space"
     space, own = getattr(env, name), getattr(env.unwrapped, name)
     if space != own:
-        raise InvalidInputError(f"env: expected its own observation, wrapped by nothing that changes it, got {space}.")
+        got = f"a {type(space).__name__} of shape {space.shape}"
+        raise InvalidInputError(f"env: expected its own observation, wrapped by nothing that changes it, got {got}.")
     found: spaces.Dict = own
     return found
 

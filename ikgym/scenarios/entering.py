@@ -11,7 +11,7 @@ import numpy.typing as npt
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios.scenario import Scenario
 from ikgym.trajectories import Trajectory
-from ikgym.validation import FloatArray, float_array, shortened, whole_number
+from ikgym.validation import FloatArray, float_array, one_a_row, shortened
 
 Steps = npt.NDArray[np.int64]
 
@@ -66,10 +66,7 @@ def checked_steps(given: Any, rows: int, scenario: Scenario) -> Steps | None:
     """
     if given is None:
         return None
-    steps = list(given) if isinstance(given, (tuple, list, np.ndarray)) else [given] * rows
-    if len(steps) != rows:
-        raise InvalidInputError(f"options['step']: expected {rows} steps, one a row, got {len(steps)}.")
-    checked = [0 if k is None else whole_number("options['step']", k, at_least=0) for k in steps]
+    checked = [step or 0 for step in one_a_row("options['step']", given, rows)]
     if max(checked) >= scenario.steps:
         raise InvalidInputError(
             f"options['step']: expected steps below the {scenario.steps} of the episode, got {max(checked)}."

@@ -118,7 +118,7 @@ def _arm(table: Table, folder: pathlib.Path, where: str) -> Arm:
     elif "urdf" in table:
         make, own = arms.from_urdf, ("name", "base", "tip", "tool", "tool_rotation")
         with located(where):
-            known_names("key", table, ("urdf", *own, *inspect.signature(Arm).parameters))
+            known_names("key", table, dict.fromkeys(("urdf", *own, *inspect.signature(Arm).parameters)))
         given = {"path": table["urdf"], **{key: table[key] for key in own if key in table}}
         changes = {key: value for key, value in table.items() if key not in ("urdf", *own)}
     given = arguments(make, given, folder, where)

@@ -6,7 +6,7 @@ import pytest
 
 from ikgym import arms
 from ikgym.arms import Arm
-from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.exceptions import InvalidInputError
 
 every_arm = pytest.mark.parametrize("arm", [arms.get(name) for name in arms.names()], ids=arms.names())
 
@@ -22,47 +22,6 @@ def parts(**changes):
         "prismatic": (False, True),
         "tool": [0.5, 0, 0],
     } | changes
-
-
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({"axes": [[0, 0, 0], [1, 0, 0]]}, "Axis of joint 0 of arm 'two': expected a unit vector, got the zero vec"),
-        ({"axes": [[0, 0, 1], [1, 1, 0]]}, r"Axis of joint 1 .* got \[1.0, 1.0, 0.0\] of length 1.41421"),
-        ({"offsets": np.zeros((0, 3)), "axes": np.zeros((0, 3))}, "expected at least one joint, got none"),
-        ({"prismatic": (0, 1)}, r"prismatic of arm 'two': expected 2 truth values, one a joint, got \(0, 1\)"),
-        ({"tool_rotation": np.diag([1, 1, -1])}, "tool_rotation of arm 'two': expected a rotation matrix"),
-        ({"lower": [0, 2], "upper": [1, 2]}, "expected lower < upper, got 2 and 2 at joint 1"),
-        ({"upper": ["1", "2"]}, "upper of arm 'two': expected 2 numbers"),
-        ({"velocity_limit": [1, 0]}, r"velocity_limit of arm 'two': expected .* above 0, got \[1, 0\]"),
-        (
-            {"upper": [1, 2], "home": [0, 3]},
-            r"home: expected joint 1 of .* within its limits, .* to 2\.0",
-        ),
-        ({"joint_names": ("a", "a")}, "joint_names of arm 'two': expected 2 different texts, got"),
-        ({"joint_names": "ab"}, "joint_names of arm 'two': expected 2 different texts, got"),
-    ],
-)
-def test_bad_input_is_refused(changes, message):
-    with pytest.raises(InvalidInputError, match=message):
-        Arm(**parts(**changes))
-
-
-def test_what_is_left_out_has_its_default():
-    arm = Arm("one", [[0, 0, 1]], [[0, 1, 0]])
-    assert arm.joints == 1
-    assert (arm.prismatic, arm.joint_names) == ((False,), ("joint_1",))
-    np.testing.assert_array_equal(arm.tool, np.zeros(3))
-    np.testing.assert_array_equal(arm.tool_rotation, np.eye(3))
-    np.testing.assert_array_equal(arm.lower, [-np.inf])
-    np.testing.assert_array_equal(arm.upper, [np.inf])
-    np.testing.assert_array_equal(arm.velocity_limit, [np.inf])
-    np.testing.assert_array_equal(arm.acceleration_limit, [np.inf])
-
-
-def test_an_axis_that_is_nearly_a_unit_vector_is_made_one():
-    arm = Arm(**parts(axes=[[0, 0, 1 + 5e-7], [1, 0, 0]]))
-    assert np.linalg.norm(arm.axes, axis=1).tolist() == [1.0, 1.0]
 
 
 @every_arm
@@ -92,9 +51,8 @@ def test_arrays_are_no_aliases_of_the_input():
 
 
 @every_arm
-@pytest.mark.parametrize("copied", [lambda arm: pickle.loads(pickle.dumps(arm)), copy.copy, copy.deepcopy])
-def test_copies_are_equal_and_read_only(arm, copied):
-    other = copied(arm)
+def test_copies_are_equal_and_read_only(arm):
+    other = pickle.loads(pickle.dumps(copy.deepcopy(arm)))
     assert (other.name, other.prismatic, other.joint_names) == (arm.name, arm.prismatic, arm.joint_names)
     for field in ARRAYS:
         np.testing.assert_array_equal(getattr(other, field), getattr(arm, field))
@@ -112,12 +70,6 @@ def test_replace_changes_a_copy_and_checks_it():
     assert arm.name == "two"
     with pytest.raises(InvalidInputError, match="tool of arm 'two'"):
         arm.replace(tool=[2, 0])
-
-
-@pytest.mark.parametrize(("wrong", "near"), [("offset", "offsets"), ("tools", "tool"), ("prismatc", "prismatic")])
-def test_replace_suggests_the_field_that_was_meant(wrong, near):
-    with pytest.raises(UnknownNameError, match=rf"no field of Arm '{wrong}'\. Did you mean '{near}'"):
-        Arm(**parts()).replace(**{wrong: 1})
 
 
 def test_a_copy_is_the_arm_bit_for_bit():

@@ -1,7 +1,5 @@
 """The papers' arms against the formulas that are printed in the papers."""
 
-import itertools
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -119,14 +117,6 @@ def test_khan_shifts_are_those_of_eq_3_14_and_eq_3_15(name, l1, l2, l3, tool):
     printed = [[0, l1, l1, l1, l3, l3, l1, l3], [0, 0, 0, 0, 0, l3, -l2, l2], [l1, 0, 0, l2, l3, 0, l3, -l1]]
     np.testing.assert_array_equal(arms.get(name).offsets.T, printed)
     np.testing.assert_array_equal(arms.get(name).tool, tool)
-
-
-def test_no_two_registered_arms_are_the_same():
-    for one, other in itertools.combinations(map(arms.get, arms.names()), 2):
-        if one.joints == other.joints:
-            tools = [arm.forward(CONFIGURATIONS[:, : arm.joints])[1] for arm in (one, other)]
-            # Arms of one maker may differ in their limits alone.
-            assert not np.allclose(*tools) or not np.array_equal(one.lower, other.lower)
 
 
 def test_puma_in_its_textbook_postures():

@@ -8,9 +8,7 @@ import pytest
 
 from ikgym import arms
 from ikgym.arms import from_urdf
-from ikgym.arms.urdf import MAX_BYTES
 from ikgym.exceptions import InvalidInputError, MissingDependencyError, UnknownNameError
-from tests.pinocchio_models import tool_state
 
 LIMIT = '<limit lower="-1.5" upper="2.5" velocity="3" effort="1"/>'
 
@@ -95,17 +93,6 @@ def test_forward_kinematics_is_that_of_pinocchio(write, base, tip, moving):
         np.testing.assert_allclose(position, expected.translation, rtol=0, atol=1e-12)
 
 
-def test_jacobian_is_that_of_pinocchio(write):
-    xml = robot(
-        joint("turn", "a", "b", inside=ORIGIN.format(1, 2) + '<axis xyz="0 0.8 0.6"/>' + LIMIT),
-        joint("slide", "b", "c", "prismatic", ORIGIN.format(3, 4) + '<axis xyz="0 -1 0"/>' + LIMIT),
-    )
-    model, arm = pin.buildModelFromXML(xml), from_urdf(write(xml))
-    for q in np.random.default_rng(0).uniform(-3, 3, (20, 2)):
-        expected = tool_state(model, model.getFrameId("c"), q).jacobian
-        np.testing.assert_allclose(arm.jacobian(q), expected, rtol=0, atol=1e-12)
-
-
 def test_limits_and_kinds_are_read(write):
     arm = from_urdf(write(WHOLE), tip="tool")
     assert arm.name == "r2"
@@ -115,25 +102,11 @@ def test_limits_and_kinds_are_read(write):
     np.testing.assert_array_equal(arm.velocity_limit, [3, np.inf, 0.1, 3])
 
 
-def test_a_rounded_axis_is_scaled_to_unit_length(write):
-    arm = from_urdf(write(robot(joint("j", "a", "b", inside='<axis xyz="0.71 0 -0.71"/>' + LIMIT), links="ab")))
-    np.testing.assert_allclose(arm.axes, [[np.sqrt(0.5), 0, -np.sqrt(0.5)]], rtol=0, atol=1e-15)
-
-
 def test_the_only_leaf_below_the_base_is_the_tip(write):
     xml = robot(joint("left", "a", "b"), joint("right", "a", "c"), joint("wrist", "c", "d"), links="abcd")
     assert from_urdf(write(xml), base="c").joints == 1
     with pytest.raises(InvalidInputError, match="expected a tip, since there are several: 'b', 'd'"):
         from_urdf(write(xml))
-
-
-def test_names_may_hold_anything_that_xml_can_hold(write):
-    xml = robot(joint("j&lt;1&gt;", "a &amp; b", "größe"), links=()).replace(
-        "</robot>", '<link name="a &amp; b"/><link name="größe"/></robot>'
-    )
-    assert from_urdf(write(xml), tip="größe").joints == 1
-    latin = b'<?xml version="1.0" encoding="latin-1"?>' + xml.encode("latin-1")
-    assert from_urdf(write(latin), tip="größe").joints == 1
 
 
 PAIR = (joint("j1", "a", "b"), joint("j2", "b", "c"))
@@ -143,80 +116,54 @@ def with_joint(kind="revolute", inside=LIMIT):
     return robot(joint("j1", "a", "b", kind, inside), links="ab")
 
 
-# What is wrong, the file, and what the message says.
-BAD_FILES = {
-    "empty": ("", "expected XML, got 0 bytes with a fault: no element found"),
-    "no xml": ("rubbish", "expected XML, got 7 bytes with a fault"),
-    "cut off": (robot(*PAIR)[:-3], "expected XML, .* fault"),
-    "not utf-8": (b'<robot name="\xff\xfe"/>', "expected XML, .* fault: not well-formed"),
-    "encoding": (b'<?xml version="1.0" encoding="klingon"?><robot/>', "fault: unknown encoding"),
-    "zero bytes": (b"\x00" * 100, "expected XML, got 100 bytes with a fault"),
-    "very deep": ("<a>" * 10**6, "expected XML, .* fault"),
-    "another root": ("<sdf/>", "expected the root element <robot>, got <sdf>"),
-    "xacro": (
-        '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="r"><xacro:macro name="m"/></robot>',
-        "expected a URDF, got macros of xacro; expand them",
-    ),
-    "no link": ('<robot name="r"/>', "expected at least one <link> in <robot>, got none"),
-    "no joint": (robot(), "expected at least one <joint> in <robot>, got none"),
-    "no name": (robot(*PAIR).replace(' name="r2"', ""), 'robot: expected <robot name="…">'),
-    "links": (robot(*PAIR, links="abca"), "every link to have a name of its own, got two called 'a'"),
-    "joints": (
-        robot(joint("j", "a", "b"), joint("j", "b", "c")),
-        "every joint to have a name of its own, got two called 'j'",
-    ),
-    "nameless link": (robot(*PAIR).replace("name='c'", ""), 'expected <link name="…">, got none'),
-    "unknown type": (
-        with_joint("hinge"),
-        "joint 'j1': expected type of <joint> to be one of 'revolute', .*'planar'; got 'hinge'",
-    ),
-    "no type": (with_joint("").replace(' type=""', ""), "joint 'j1': expected <joint type=\"…\">"),
-    "child nowhere": (robot(*PAIR, links="ab"), "joint 'j2': expected link of <child> to be one of 'a', 'b'; got 'c'"),
-    "parent nowhere": (
-        robot(*PAIR, links="bc"),
-        "joint 'j1': expected link of <parent> to be one of 'b', 'c'; got 'a'",
-    ),
-    "no child": (with_joint().replace('<child link="b"/>', ""), "'j1': expected a <child>, got none"),
-    "parent unnamed": (with_joint().replace('<parent link="a"/>', "<parent/>"), 'expected <parent link="…">'),
-    "two limits": (with_joint(inside=LIMIT + LIMIT), "joint 'j1': expected one <limit>, got 2"),
-    "two parents": (
-        robot(*PAIR, joint("j3", "a", "c")),
-        "link 'c': expected one joint above it, got joint 'j2' and joint 'j3'",
-    ),
-    "cycle": (robot(*PAIR, joint("j3", "c", "a")), "a tree of links, got a loop of 'a', 'b', 'c'"),
-    "own parent": (robot(joint("j1", "a", "a"), links="a"), "got a loop of 'a'"),
-    "cycle apart": (
+def limits(text):
+    return with_joint(inside=f"<limit {text}/>")
+
+
+# Files that are refused, and a word of the message.
+BAD_FILES = [
+    ("", "expected XML, got 0 bytes"),
+    (robot(*PAIR)[:-3], "expected XML"),
+    (b'<robot name="\xff\xfe"/>', "fault: not well-formed"),
+    (b'<?xml version="1.0" encoding="klingon"?><robot/>', "unknown encoding"),
+    ("<a>" * 10**5, "expected XML"),
+    ("<sdf/>", "root element <robot>, got <sdf>"),
+    ('<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="r"><xacro:macro name="m"/></robot>', "macros of xacro"),
+    ('<robot name="r"/>', "at least one <link>"),
+    (robot(), "at least one <joint>"),
+    (robot(*PAIR).replace(' name="r2"', ""), 'expected <robot name="…">'),
+    (robot(*PAIR, links="abca"), "two called 'a'"),
+    (robot(joint("j", "a", "b"), joint("j", "b", "c")), "two called 'j'"),
+    (robot(*PAIR).replace("name='c'", ""), 'expected <link name="…">'),
+    (with_joint("hinge"), "type of <joint> .* got 'hinge'"),
+    (with_joint("").replace(' type=""', ""), 'expected <joint type="…">'),
+    (robot(*PAIR, links="ab"), "link of <child>"),
+    (robot(*PAIR, links="bc"), "link of <parent>"),
+    (with_joint().replace('<child link="b"/>', ""), "expected a <child>"),
+    (with_joint().replace('<parent link="a"/>', "<parent/>"), 'expected <parent link="…">'),
+    (with_joint(inside=LIMIT + LIMIT), "expected one <limit>, got 2"),
+    (robot(*PAIR, joint("j3", "a", "c")), "one joint above it, got joint 'j2' and joint 'j3'"),
+    (robot(*PAIR, joint("j3", "c", "a")), "got a loop of 'a', 'b', 'c'"),
+    (
         robot(joint("j1", "a", "b"), joint("j2", "c", "d"), joint("j3", "d", "c"), links="abcd"),
         "got a loop of 'c', 'd'",
     ),
-    "loose links": (robot(*PAIR, links="abcde"), "expected one link without a joint above it, got 'a', 'd', 'e'"),
-    "floating": (with_joint("floating"), "joint 'j1': expected one of 'revolute', .* got 'floating'"),
-    "planar": (with_joint("planar"), "joint 'j1': expected one of 'revolute', .* got 'planar'"),
-    "mimic": (with_joint(inside=LIMIT + "<mimic joint='x'/>"), "'j1': .* got one with <mimic>"),
-    "nothing moves": (with_joint("fixed"), "a joint that moves between links 'a' and 'b', got none"),
-    "no limit": (with_joint(inside=""), "joint 'j1': expected a <limit>, got none"),
-    "no limits": (
-        robot(
-            joint("j1", "a", "b", inside=""),
-            joint("j2", "b", "c"),
-            joint("j3", "c", "d", "prismatic", ""),
-            links="abcd",
-        ),
-        "joint 'j1', joint 'j3': expected a <limit>, got none; what turns without end is of type 'continuous'",
-    ),
-    "no slide limit": (with_joint("prismatic", ""), "joint 'j1': expected a <limit>, got none"),
-    "no velocity": (with_joint(inside='<limit lower="-1" upper="1"/>'), '<limit velocity="…">'),
-    "velocity 0": (with_joint(inside='<limit upper="1" velocity="0"/>'), "velocity limit above 0, got 0"),
-    "limits crossed": (
-        with_joint(inside='<limit lower="2" upper="1" velocity="1"/>'),
-        "joint 'j1': expected limits lower < upper, got 2 and 1",
-    ),
-    "limits left out": (with_joint(inside='<limit velocity="1"/>'), "expected limits lower < upper, got 0 and 0"),
-    "zero axis": (with_joint(inside='<axis xyz="0 0 0"/>' + LIMIT), r"axis of unit length, got \(0.0, 0.0, 0.0\)"),
-    "long axis": (with_joint(inside='<axis xyz="0 0 2"/>' + LIMIT), r"axis of unit length, got \(0.0, 0.0, 2.0\)"),
-    "∞": (with_joint(inside=LIMIT.replace("2.5", "∞")), "upper to be a finite number, got '∞'"),
-    "two": (with_joint(inside=LIMIT.replace("3", "1 2")), "velocity to be a finite number, got '1 2'"),
-}
+    (robot(*PAIR, links="abcde"), "one link without a joint above it, got 'a', 'd', 'e'"),
+    (with_joint("floating"), "got 'floating'"),
+    (with_joint("planar"), "got 'planar'"),
+    (with_joint(inside=LIMIT + "<mimic joint='x'/>"), "got one with <mimic>"),
+    (with_joint("fixed"), "a joint that moves"),
+    (with_joint(inside=""), "expected a <limit>"),
+    (with_joint("prismatic", ""), "expected a <limit>"),
+    (limits('lower="-1" upper="1"'), '<limit velocity="…">'),
+    (limits('upper="1" velocity="0"'), "velocity limit above 0"),
+    (limits('lower="2" upper="1" velocity="1"'), "limits lower < upper, got 2 and 1"),
+    (limits('velocity="1"'), "limits lower < upper, got 0 and 0"),
+    (with_joint(inside='<axis xyz="0 0 0"/>' + LIMIT), "axis of unit length"),
+    (with_joint(inside='<axis xyz="0 0 2"/>' + LIMIT), "axis of unit length"),
+    (with_joint(inside=LIMIT.replace("2.5", "∞")), "upper to be a finite number"),
+    (with_joint(inside=LIMIT.replace("3", "1 2")), "velocity to be a finite number"),
+]
 BAD_NUMBERS = ("0 0", "0 0 1 0", "", "nan 0 1", "0 inf 0", "0 0 1e999", "0 1_0 1", "0,0,1", "x y z")
 
 
@@ -225,18 +172,18 @@ def refused(path, message):
         from_urdf(path)
 
 
-@pytest.mark.parametrize(("content", "message"), BAD_FILES.values(), ids=BAD_FILES)
+@pytest.mark.parametrize(("content", "message"), BAD_FILES, ids=[message for _, message in BAD_FILES])
 def test_bad_files_are_refused(write, content, message, capfd):
     refused(write(content), message)
     # All is found out before Pinocchio sees it, which would complain on its own.
     assert capfd.readouterr() == ("", "")
 
 
-@pytest.mark.parametrize("numbers", BAD_NUMBERS)
 @pytest.mark.parametrize(("tag", "key"), [("origin", "xyz"), ("origin", "rpy"), ("axis", "xyz")])
-def test_bad_numbers_are_refused(write, tag, key, numbers):
-    path = write(with_joint(inside=f'<{tag} {key}="{numbers}"/>{LIMIT}'))
-    refused(path, f"joint 'j1': expected {key} to be 3 finite numbers, got '{numbers}'")
+def test_bad_numbers_are_refused(write, tag, key):
+    for numbers in BAD_NUMBERS:
+        path = write(with_joint(inside=f'<{tag} {key}="{numbers}"/>{LIMIT}'))
+        refused(path, f"joint 'j1': expected {key} to be 3 finite numbers, got '{numbers}'")
 
 
 ENTITIES = "".join(f"<!ENTITY {new} '{10 * f'&{old};'}'>" for old, new in pairwise("abcdefghijklmnopqrstuvwxyz"))
@@ -262,22 +209,14 @@ def test_what_cannot_be_read_is_refused(tmp_path):
             from_urdf(path)
 
 
-def test_a_huge_file_is_refused(tmp_path):
-    path = tmp_path / "huge.urdf"
-    with path.open("wb") as file:
-        file.truncate(MAX_BYTES + 1)
-    with pytest.raises(InvalidInputError, match=f"huge.urdf: expected at most {MAX_BYTES} bytes"):
-        from_urdf(path)
-
-
 def chain(count):
     names = [f"l{i}" for i in range(count + 1)]
     return robot(*(joint(f"j{i}", *names[i : i + 2]) for i in range(count)), links=names)
 
 
 def test_a_chain_that_would_overflow_the_stack_of_parsers_is_refused(write):
-    with pytest.raises(InvalidInputError, match="expected at most 128 joints from 'l0' to 'l20000', got 20000"):
-        from_urdf(write(chain(20_000)))
+    with pytest.raises(InvalidInputError, match="expected at most 128 joints from 'l0' to 'l4000', got 4000"):
+        from_urdf(write(chain(4000)))
     # The longest that is read, also on the small stack of a thread.
     read = []
     thread = threading.Thread(target=lambda: read.append(from_urdf(write(chain(128))).joints))
@@ -292,12 +231,6 @@ def test_unknown_links_are_answered_with_the_nearest(write):
         from_urdf(path, tip="tol")
     with pytest.raises(UnknownNameError, match=r"no link 'bas'\. Did you mean 'base'\? Available: world, base"):
         from_urdf(path, base="bas", tip="tool")
-
-
-@pytest.mark.parametrize(("base", "tip"), [("finger", "tool"), ("tool", "base")])
-def test_a_base_that_is_not_above_the_tip_is_refused(write, base, tip):
-    with pytest.raises(InvalidInputError, match=f"expected a base above tip '{tip}', one of .*'world'; got '{base}'"):
-        from_urdf(write(WHOLE), base=base, tip=tip)
 
 
 def test_a_missing_pinocchio_is_named_with_its_remedy(write, monkeypatch):
@@ -322,15 +255,6 @@ def test_a_tool_offset_is_a_fixed_joint_at_the_tip(write, rotated):
         expected = pinocchio_pose(with_tool, "world", "end", coordinates)
         np.testing.assert_allclose(rotation, expected.rotation, rtol=0, atol=1e-12)
         np.testing.assert_allclose(position, expected.translation, rtol=0, atol=1e-12)
-
-
-def test_the_jacobian_is_that_at_the_tool_point(write):
-    xml = robot(*PAIR, joint("mount", "c", "end", "fixed", OFFSET), links=("a", "b", "c", "end"))
-    arm = from_urdf(write(robot(*PAIR)), tool=[0.1, -0.2, 0.35], tool_rotation=TURN)
-    model = pin.buildModelFromXML(xml)
-    for q in np.random.default_rng(2).uniform(-3, 3, (20, 2)):
-        expected = tool_state(model, model.getFrameId("end"), q).jacobian
-        np.testing.assert_allclose(arm.jacobian(q), expected, rtol=0, atol=1e-12)
 
 
 def test_an_arm_remembers_its_file_until_it_is_changed(write, monkeypatch):

@@ -10,7 +10,6 @@ import signal
 import subprocess
 import sys
 
-import numpy as np
 import pytest
 
 from baselines.evaluate import evaluate
@@ -121,11 +120,6 @@ def test_a_damaged_file_is_named(tmp_path, content, read):
         read(file, "Run it again.")
     with pytest.raises(ResultsError, match=f"Cannot read {tmp_path / 'none'}: No such file"):
         read(tmp_path / "none")
-
-
-def test_arrays(tmp_path):
-    np.savez(tmp_path / "it.npz", q=np.arange(3.0))
-    assert read_arrays(tmp_path / "it.npz")["q"].tolist() == [0.0, 1.0, 2.0]
 
 
 def test_only_the_same_work_is_resumed(tmp_path):

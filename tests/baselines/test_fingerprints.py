@@ -1,7 +1,7 @@
 import pickle
 
 import ikgym
-from baselines.fingerprints import episode_hash, fingerprint, same, set_hash
+from baselines.fingerprints import episode_hash, fingerprint, set_hash
 from ikgym.kernels import cost as cost_kernels
 
 
@@ -56,8 +56,3 @@ def test_episodes_and_sets_have_hashes_of_their_own():
     ]
     assert len(set(hashes)) == len(hashes)
     assert episode_hash(fingerprint(fast()), 1) == hashes[1]
-
-
-def test_a_home_posture_changes_no_result():
-    panda = ikgym.arms.get("panda")
-    assert same(panda, panda.replace(home=None))

@@ -31,15 +31,15 @@ def test_a_linear_law_of_the_features_follows_paths_to_centimetres():
 
 
 @pytest.mark.usefixtures("one_thread")
-def test_training_ends_in_time_and_says_how_far_it_is(monkeypatch, capsys):
-    asked = []
+def test_training_stops_in_time_and_prints_errors(monkeypatch, capsys):
+    given = []
 
     def short(policy, envs, **parameters):
         assert envs.action_space.high[0] == 4.0  # 2 / share
         return PPO(policy, envs, n_steps=8, batch_size=16, n_epochs=1, **parameters)
 
     monkeypatch.setattr(learning, "PPO", short)
-    monkeypatch.setattr(learning, "largest_errors", lambda *given: asked.append(given[-1]) or np.array([0.01, 0.03]))
-    learning.main(["--minutes", "0.001", "--episodes", "2", "--every", "1000", "--change", "share=0.5", "history=2"])
-    assert asked == 2 * [{"share": 0.5, "history": 2}]
+    monkeypatch.setattr(learning, "largest_errors", lambda *a: given.append(a[-1]) or np.array([0.01, 0.03]))
+    learning.main(learning.Command(minutes=0.001, episodes=2, every=1000, change=("share=0.5", "history=2")))
+    assert given == 2 * [{"share": 0.5, "history": 2}]
     assert capsys.readouterr().out.count("validation: median    20.00 mm") == 2

@@ -1,12 +1,10 @@
-"""What the benchmark of inverse kinematics measures is what it says; how fast it is found is nobody's test."""
-
-import dataclasses
+"""The benchmark of inverse kinematics counts poses that are met; its times are not tested."""
 
 import numpy as np
 import pytest
 
 import ikgym
-from benchmarks import effort, pose_solvers, poses
+from benchmarks import pose_solvers, poses
 
 PANDA = ikgym.arms.get("panda")
 
@@ -47,9 +45,3 @@ def test_every_solver_meets_poses_of_the_very_arm(name, label):
         pytest.skip("pip install ikgym[rivals]")
     drawn = poses.random_poses(arm, 5)
     assert poses.met(arm, drawn, solve(drawn)).mean() >= 0.8
-
-
-def test_tables_say_what_is_left_out():
-    for table in poses.tables(dataclasses.replace(effort.QUICK)):
-        assert set(pose_solvers.OURS) <= set(table.rows)
-        assert len(table.rows) + len(table.skipped) == len(pose_solvers.OURS) + len(pose_solvers.RIVALS)

@@ -6,21 +6,22 @@ import math
 
 import pytest
 
-from benchmarks import report
+from benchmarks import table
 from benchmarks.__main__ import SECTIONS, Command, main
-from benchmarks.table import Column, Table
+from benchmarks.horizons import COLUMNS
+from benchmarks.pose_solvers import OURS, RIVALS
+from benchmarks.table import Table, page
 
 TABLE = Table(
-    "speed",
     "Speed of things",
     "On a quiet day.",
-    (Column("step_us", "step", "µs"), Column("ratio", "× first")),
+    ("step [µs]", "× first"),
     {"first": (12.3456, 1.0), "second": (2.0e6, None)},
     ("third: it is not there",),
 )
 
 
-def test_text():
+def test_text_and_markdown(monkeypatch):
     assert TABLE.text().splitlines() == [
         "Speed of things",
         "          step [µs]  × first",
@@ -28,14 +29,7 @@ def test_text():
         "  second    2.000e6        –",
         "left out: third: it is not there",
     ]
-
-
-def test_markdown():
-    assert TABLE.markdown().splitlines() == [
-        "## Speed of things",
-        "",
-        "On a quiet day.",
-        "",
+    assert TABLE.markdown().splitlines()[4:] == [
         "|  | step [µs] | × first |",
         "| :-- | --: | --: |",
         "| first | 12.35 | 1.000 |",
@@ -43,30 +37,31 @@ def test_markdown():
         "",
         "- left out: third: it is not there",
     ]
-
-
-def test_a_missing_library_is_said_to_be_missing(monkeypatch):
-    monkeypatch.setattr(report, "LIBRARIES", ("gymnasium", "no-such-library"))
-    given = report.conditions()
-    assert given["no-such-library"] is None
-    assert given["gymnasium"]
-    assert "- no-such-library: not installed" in report.page([], given)
+    monkeypatch.setattr(table, "LIBRARIES", ("gymnasium", "no-such-library"))
+    text = page([TABLE], {"command": "mine"})
+    assert TABLE.markdown() in text
+    for line in ("- command: mine", "- gymnasium: 1.", "- no-such-library: not installed"):
+        assert line in text
 
 
 def test_quick_report_is_complete(tmp_path, capsys):
     tables = main(Command(tmp_path, quick=True))
-    page = (tmp_path / "README.md").read_text(encoding="utf-8")
+    text = (tmp_path / "README.md").read_text(encoding="utf-8")
     printed = capsys.readouterr().out
-    assert len({table.key for table in tables}) == len(tables) >= len(SECTIONS)
-    for table in tables:
-        assert table.markdown() in page
-        assert table.text() in printed
-        united = [k for k, column in enumerate(table.columns) if column.unit]
-        for row in table.rows.values():
+    assert len({table.title for table in tables}) == len(tables) >= len(SECTIONS)
+    for found in tables:
+        assert found.markdown() in text
+        assert found.text() in printed
+        united = [k for k, column in enumerate(found.columns) if "[" in column]
+        for row in found.rows.values():
             assert all(math.isfinite(row[k]) and row[k] > 0 for k in united if row[k] is not None)
+        if found.columns == COLUMNS:  # no solver is below the best of them
+            assert min(row[COLUMNS.index("worst excess")] for row in found.rows.values()) == 0.0
+        if found.title.startswith("Inverse"):
+            assert set(OURS) <= set(found.rows)
+            assert len(found.rows) + len(found.skipped) == len(OURS) + len(RIVALS)
 
 
-def test_sections_can_be_chosen(tmp_path):
-    assert [table.key for table in main(Command(tmp_path, quick=True, sections=("start",)))] == ["import"]
+def test_unknown_sections_are_refused(tmp_path):
     with pytest.raises(SystemExit, match=r"expected some of .*horizons.*, got nonsense"):
         main(Command(tmp_path, quick=True, sections=("nonsense",)))

@@ -1,4 +1,4 @@
-"""What is measured runs, and is what its name says; how fast it is found is nobody's test."""
+"""The benchmarks measure what they say; their times are not tested."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 import baselines
 import ikgym
 from baselines.policy import Problem
-from benchmarks import effort, environments, horizon_solvers, horizons, kernels, policies, states, timing
+from benchmarks import environments, horizon_solvers, horizons, measuring, policies, poses
 from benchmarks.rivals.numpy_horizon import Horizon, plan_cost
 
 
@@ -20,7 +20,7 @@ def test_medians_are_of_what_was_called():
     def count(name):
         counts[name] += 1
 
-    times = timing.medians({name: lambda name=name: count(name) for name in counts}, rounds=3, seconds=1e-5)
+    times = measuring.medians({name: lambda name=name: count(name) for name in counts}, rounds=3, seconds=1e-5)
     assert set(times) == set(counts)
     assert all(t > 0 for t in times.values())
     assert all(n > 3 for n in counts.values())
@@ -28,7 +28,7 @@ def test_medians_are_of_what_was_called():
 
 def test_a_turn_is_at_least_one_call():
     made = []
-    timing.medians({"a": lambda: made.append(1)}, rounds=4, seconds=0.0)
+    measuring.medians({"a": lambda: made.append(1)}, rounds=4, seconds=0.0)
     assert len(made) == 1 + 1 + 4
 
 
@@ -40,25 +40,17 @@ def test_environments_step():
             call()
 
 
-def test_many_environments_are_not_stepped_one_by_one(monkeypatch):
-    monkeypatch.setattr(environments, "MOST_IN_A_ROW", 2)
-    calls, skipped = environments.vector(3)
-    assert not any("SyncVectorEnv" in name for name in calls)
-    assert any("SyncVectorEnv" in why for why in skipped)
-
-
 def test_both_kinematics_are_of_the_same_arm():
     import pinocchio as pin
 
     arm = ikgym.arms.get("varga7")
-    model, frame = kernels.pinocchio_model(arm)
+    model, frame = poses.pinocchio_model(arm)
     q = np.random.default_rng(0).uniform(-1, 1, 7)
     data = model.createData()
     pin.framesForwardKinematics(model, data, q)
     np.testing.assert_allclose(data.oMf[frame].translation, arm.forward(q)[1], atol=1e-12)
-    for call, poses in kernels.kinematics().values():
+    for call, _ in poses.kinematics().values():
         call()
-        assert poses >= 1
 
 
 def test_policies_are_those_of_their_scenarios():
@@ -69,7 +61,7 @@ def test_policies_are_those_of_their_scenarios():
 
 def test_states_lead_to_one_another():
     scenario = ikgym.scenarios.get("varga7-fast").replace(steps=30)
-    for seen in states.along(scenario, preview=4, count=2, lead=3):
+    for seen in horizons.along(scenario, preview=4, count=2, lead=3):
         assert len(seen) == 4
         for before, after in itertools.pairwise(seen):
             assert before["remaining"] - after["remaining"] == 1
@@ -79,7 +71,7 @@ def test_states_lead_to_one_another():
 
 def test_costs_of_solvers_are_those_of_their_plans():
     scenario = ikgym.scenarios.get("varga7-slow")
-    (seen,) = states.along(scenario, preview=4, count=1, lead=2)
+    (seen,) = horizons.along(scenario, preview=4, count=1, lead=2)
     others, _ = horizon_solvers.rivals(scenario, 5)
     costs = {}
     for label, solver in (horizon_solvers.policies(scenario, 5) | others).items():
@@ -90,7 +82,6 @@ def test_costs_of_solvers_are_those_of_their_plans():
         assert found.cost == pytest.approx(plan_cost(Problem.of(scenario), horizon, found.q))
         assert found.iterations >= 1
         costs[label] = found.cost
-    # The rest of the solvers are what the optimum is compared with.
     assert min(costs.values()) == pytest.approx(costs["CasADi, IPOPT"], rel=1e-4)
     assert costs["rhc_gradient, analytic"] > costs["CasADi, IPOPT"]
 
@@ -100,10 +91,3 @@ def test_what_is_not_installed_is_named(monkeypatch):
     found, skipped = horizon_solvers.rivals(ikgym.scenarios.get("varga7-slow"), 3)
     assert "Somebody" not in found
     assert any(why.startswith("Somebody") and "ikgym[rivals]" in why for why in skipped)
-
-
-def test_nobody_is_below_the_best():
-    for table in horizons.tables(effort.QUICK):
-        keys = [column.key for column in table.columns]
-        excesses = [row[keys.index("worst_excess")] for row in table.rows.values()]
-        assert min(value for value in excesses if value is not None) == 0.0

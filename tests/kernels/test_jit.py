@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import os
 import pathlib
 import pickle
@@ -75,6 +76,63 @@ def test_numba_alone_would_not_notice(tmp_path):
     """If this fails numba has learned it, and the stamp can go."""
     assert answer(tmp_path, NUMBAS, scale=2.0, shift=0.0) == 2.0
     assert answer(tmp_path, NUMBAS, scale=3.0, shift=10.0) == 2.0
+
+
+LARGE = (
+    "from ikgym.kernels.jit import kernel\nSCALE = {scale}\n@kernel\ndef scaled(x):\n    total = 0.0\n"
+    + "".join(f"    total += np.sin(x[{i}]) * x[{i + 1}]\n" for i in range(40))
+    + "    return SCALE * total\n"
+).replace("SCALE =", "import numpy as np\nSCALE =", 1)
+MIDDLE = (
+    "from ikgym.kernels.jit import kernel\nfrom callee import scaled\n@kernel\ndef middle(x):\n    return scaled(x)\n"
+)
+OUTER = (
+    "from ikgym.kernels.jit import kernel\nfrom middle import middle\n"
+    "@kernel\ndef outer(x):\n    return 1.0 + middle(x)\n"
+)
+LINKED = """
+import numpy as np
+from caller import outer
+from callee import scaled
+from middle import middle
+print(outer(np.ones(99)), *(sum(kernel.stats.cache_misses.values()) for kernel in (outer, middle, scaled)))
+modules = [result.library._final_module for kernel in (outer, middle) for result in kernel.overloads.values()]
+copies = [f.name for module in modules for f in module.functions if "scaled" in f.name and not f.is_declaration]
+print(len(copies))
+"""
+
+
+def linked(folder, scale):
+    """What a fresh process gets from a small kernel that calls a large one, and how many it has compiled."""
+    for name, text in {"callee": LARGE.format(scale=scale), "middle": MIDDLE, "caller": OUTER, "run": LINKED}.items():
+        (folder / f"{name}.py").write_text(text)
+    environment = {**os.environ, "PYTHONDONTWRITEBYTECODE": "1"}
+    line = [sys.executable, "run.py"]
+    done = subprocess.run(line, cwd=folder, env=environment, capture_output=True, text=True, check=True)
+    (total, *missed), (copies,) = map(str.split, done.stdout.splitlines())
+    assert copies == "0"
+    return round(float(total), 6), list(map(int, missed))
+
+
+def test_a_large_callee_is_compiled_once_and_its_name_linked(tmp_path):
+    one, two = 1.0 + 40.0 * math.sin(1.0), 1.0 + 80.0 * math.sin(1.0)
+    assert linked(tmp_path, scale=1.0) == (round(one, 6), [1, 1, 1])
+    assert linked(tmp_path, scale=1.0) == (round(one, 6), [0, 0, 0])
+    # A callee that is missing is compiled under the same name: its callers are as good as before.
+    for file in tmp_path.glob("__pycache__/callee.*"):
+        file.unlink()
+    assert linked(tmp_path, scale=1.0) == (round(one, 6), [0, 0, 1])
+    # One of another process, or from another source, has another.
+    assert linked(tmp_path, scale=2.0) == (round(two, 6), [1, 1, 1])
+
+
+@pytest.mark.parametrize("symbol", ["another", None])
+def test_a_callee_of_another_name_or_none_is_refused(symbol):
+    """Its caller is compiled anew then: see what reading the cache may raise."""
+    name = "geodesic_angle" if symbol else "no_such_kernel"
+    rotation = numba.typeof(np.eye(3))
+    with pytest.raises(jit.UNREADABLE):
+        jit._Callee("ikgym.kernels.rotations", name, (rotation, rotation), symbol or "any")()
 
 
 @pytest.fixture

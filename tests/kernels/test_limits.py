@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import copy
 import math
-import pickle
 
-import gymnasium as gym
 import numpy as np
 import pytest
-from gymnasium.utils.env_checker import check_env
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
@@ -170,15 +166,6 @@ def test_no_action_leaves_the_limits(actions, seed, noise):
         last = seen
 
 
-def test_without_limits_nothing_is_held_back():
-    env = gym.make("RedundantIK-v0", scenario="varga7-fast")
-    env.reset(seed=0)
-    info = env.step(np.full(7, 1.5, dtype=np.float32))[4]
-    assert info["clipped"]
-    assert info["at_limit"].dtype == np.int64
-    assert info["at_limit"].tolist() == [0, 0, 0]
-
-
 def test_wide_limits_change_no_bit():
     plain = limited(arm=ikgym.arms.get("varga7"))
     wide = np.full(7, 1e9)
@@ -190,23 +177,6 @@ def test_wide_limits_change_no_bit():
     for _ in range(plain.steps):
         action = rng.uniform(-1.2, 1.2, 7)
         assert identical(*(env.step(action) for env in envs))
-
-
-def test_gymnasium_finds_no_fault():
-    check_env(ikgym.RedundantIKEnv(limited()), skip_render_check=True)
-
-
-@pytest.mark.parametrize("copied", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))])
-def test_a_copy_in_the_middle_of_an_episode_goes_on_alike(copied):
-    env = ikgym.RedundantIKEnv(limited())
-    env.reset(seed=1)
-    for _ in range(4):
-        env.step(np.ones(7, dtype=np.float32))
-    other = copied(env)
-    for _ in range(4):
-        pair = [one.step(np.full(7, -0.7, dtype=np.float32)) for one in (env, other)]
-        assert identical(*pair)
-        assert pair[0][4]["at_limit"].any()
 
 
 @pytest.mark.parametrize("make", [ikgym.RedundantIKEnv, lambda scenario: ikgym.RedundantIKVectorEnv(2, scenario)])
@@ -223,19 +193,6 @@ def test_a_start_outside_the_limits_is_refused_with_its_joint(make):
     with pytest.raises(InvalidInputError, match=r"joint 2 of arm .* from -1.2 to 1.2 \[m\], got -1.3"):
         env.reset(options={"q": [0, 0, -1.3, 0, 0, 0, 0]})
     assert identical(env.reset(seed=3)[0], before)
-
-
-def test_starts_of_scenarios_are_within_the_limits():
-    with pytest.raises(InvalidInputError, match=r"Start of scenario 'limited7-random': expected joint 1 .* got 1.5"):
-        limited(start=[0, 1.5, 0, 0, 0, 0, 0])
-    shifted = ikgym.trajectories.Sinusoid(np.zeros(7), offset=np.array([0.0, 0, 0, 9, 0, 0, -3]))
-    with pytest.raises(InvalidInputError, match=r"Start of scenario .* joint 6 of arm 'limited7' .* got -3"):
-        limited(trajectory=shifted)
-    assert limited(trajectory=shifted, start=np.zeros(7)).start is not None
-    # Of a random motion it is known when it is drawn.
-    wide = ikgym.trajectories.RandomSinusoid(np.full(7, 4.0), scale=(1.0, 1.0))
-    with pytest.raises(InvalidInputError, match="Start of scenario 'limited7-random': expected joint"):
-        ikgym.RedundantIKEnv(limited(trajectory=wide)).reset(seed=0)
 
 
 def test_the_bounds_of_q_are_the_limits():
@@ -263,21 +220,3 @@ def test_an_action_of_1_means_the_limits_of_the_arm():
         ikgym.Scenario("own", **{**made, "arm": free})
     with pytest.raises(InvalidInputError, match=r"has no velocity limit of its own at joint 1, 3\."):
         limited(velocity_limit=None)
-
-
-def test_a_scenario_with_limits_survives_its_file(tmp_path):
-    scenario = limited()
-    scenario.save(tmp_path / "limited.toml")
-    again = ikgym.scenarios.load(tmp_path / "limited.toml")
-    for name in ("lower", "upper", "velocity_limit", "acceleration_limit"):
-        np.testing.assert_array_equal(getattr(again.arm, name), getattr(scenario.arm, name))
-    file = tmp_path / "limited.toml"
-    text = file.read_text(encoding="utf-8")
-    assert "acceleration_limit = [300.0, inf, " in text
-    own = one_joint(velocity_limit=None)
-    own.save(file)
-    lines = [line for line in file.read_text(encoding="utf-8").splitlines() if not line.startswith("velocity_limit")]
-    head, arm = "\n".join(lines), f"\n[arm]\nvelocity_limit = [{own.velocity_limit[0]}]\n"
-    file.write_text(head.replace("\n[arm]\n", arm), encoding="utf-8")
-    assert ikgym.scenarios.load(file).velocity_limit.tolist() == [2.0]
-    assert math.isinf(ikgym.scenarios.load(file).arm.acceleration_limit[0])

@@ -41,8 +41,3 @@ def test_streams_have_nothing_in_common():
     assert len({int(key) for key in keys}) == len(keys)
     numbers = np.array([drawn(uniform, key, 2000) for key in keys])
     assert abs(np.corrcoef(numbers) - np.eye(len(keys))).max() < 0.1
-
-
-def test_keys_may_be_plain_numbers():
-    assert normal(12345, 3) == normal(KEY, np.uint64(3))
-    assert stream(12345, 3) == stream(KEY, 3)

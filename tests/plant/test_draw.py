@@ -132,19 +132,6 @@ def test_the_drawn_plant_is_the_one_that_moves(name):
         assert drawn.payload_step == 7
 
 
-def test_episodes_draw_other_plants_and_a_reset_without_a_seed_goes_on():
-    env = ikgym.RedundantIKEnv(panda(Plant(zero=1e-2)))
-    q = env.scenario.arm.home
-    seen = [env.reset(seed=seed, options={"q": q})[0]["pose"] for seed in (1, 2, None, None, 1)]
-    assert len({pose.tobytes() for pose in seen[:4]}) == 4
-    assert identical(seen[0], seen[4])
-
-
-def test_the_trajectory_is_that_of_the_ideal_plant():
-    seen = [ikgym.RedundantIKEnv(panda(plant)).reset(seed=4)[0] for plant in (Plant(), ALL)]
-    assert identical(seen[0]["nominal"], seen[1]["nominal"])
-
-
 def test_an_ideal_plant_draws_nothing():
     generators = [np.random.default_rng(0) for _ in range(2)]
     scenario = panda()

@@ -132,14 +132,6 @@ def test_missing_poses():
     assert never.of("pose_age")[-1] == STEPS
 
 
-def test_the_first_pose_is_measured_before_the_episode():
-    scenario = ikgym.scenarios.get("zhang3-helix")
-    assert scenario.initial_pose is not None
-    played = Played(Plant(pose_every=4), scenario=scenario, steps=9, command=lambda k: np.zeros(3))
-    assert identical(played.of("pose")[:4], np.tile(scenario.initial_pose, (4, 1)))
-    assert identical(played.of("pose")[4:5], played.poses(scenario.arm)[4:5])
-
-
 def test_kinematics_are_those_of_the_drawn_arm():
     """In the pose that is seen, and in errors and costs."""
     plant = Plant(zero=5e-3, link=1e-3, axis=5e-3, payload=0.01, payload_step=20)
@@ -189,18 +181,6 @@ def test_backlash_is_lost_where_a_drive_turns():
     np.testing.assert_allclose(way[-1] - way[30], wanted[-1] - wanted[30] + 1e-4, atol=1e-12)
     assert identical(played.of("q"), np.array(played.true_q))
     assert identical(played.of("qdot"), free.of("qdot"))
-
-
-def test_a_stop_ends_all_motion():
-    """A drive that lags is stopped as well, and leaves the stop without delay."""
-    scenario, there = limited(), np.ones(7)
-    played = Played(Plant(bandwidth=3.0), lambda k: there if k < 40 else -there, scenario=scenario, steps=80)
-    q, arm = np.array(played.true_q), scenario.arm
-    assert ((q >= arm.lower) & (q <= arm.upper)).all()
-    stopped = q[40] == arm.upper
-    assert stopped.any()
-    assert (q[41][stopped] < arm.upper[stopped]).all()
-    assert played.told_of("at_limit")[:, 0].any()
 
 
 def test_commands_are_shown_newest_first():

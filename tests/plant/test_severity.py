@@ -4,11 +4,7 @@ from __future__ import annotations
 
 import math
 
-import pytest
-
-import ikgym
 from ikgym import Plant, scenarios
-from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import imperfect
 
 
@@ -27,12 +23,6 @@ def test_what_grows_in_proportion_and_what_in_whole_steps():
     assert half.payload_step == imperfect.FIELD.payload_step
 
 
-def test_knowledge_and_drives_are_apart():
-    knowledge, drives = imperfect.FIELD.scaled(1.0, 0.0), imperfect.FIELD.scaled(0.0, 1.0)
-    assert {*knowledge.switched_on()} & {*drives.switched_on()} == set()
-    assert {**knowledge.switched_on(), **drives.switched_on()} == imperfect.FIELD.switched_on()
-
-
 def test_single_numbers_and_one_a_joint():
     plant = Plant(
         zero=(1e-3, 2e-3), backlash=4e-4, bias=-1e-3, command_delay=4, bandwidth=10.0, q_delay=3, pose_delay=5
@@ -41,19 +31,3 @@ def test_single_numbers_and_one_a_joint():
     assert (half.zero, half.backlash, half.bias) == ((5e-4, 1e-3), 2e-4, -5e-4)
     assert (half.command_delay, half.bandwidth, half.q_delay, half.pose_delay) == (2, 20.0, 2, 2)
     assert Plant(noise=1e-3).scaled(0.5).bandwidth == math.inf
-
-
-@pytest.mark.parametrize("severities", [(-0.1, None), (1.0, -0.1), (math.nan, None)])
-def test_bad_severities(severities):
-    with pytest.raises(InvalidInputError, match=r"knowledge|drives"):
-        imperfect.FIELD.scaled(*severities)
-
-
-def test_a_share_grows_to_1_at_most():
-    with pytest.raises(InvalidInputError, match="pose_missing"):
-        imperfect.FIELD.scaled(6.0)
-
-
-def test_arms_are_no_matter_of_degree():
-    with pytest.raises(InvalidInputError, match="without arms of its own"):
-        ikgym.scenarios.get("panda-measured").plant.scaled(0.5)

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import copy
-import functools
-import pickle
 
 import numpy as np
 import pytest
@@ -13,7 +11,6 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 import ikgym
 from ikgym import Plant
-from ikgym.exceptions import InvalidInputError
 from tests.comparison import identical
 from tests.plant.effects import ALL, PLANTS, panda
 
@@ -80,19 +77,6 @@ def test_with_everything_off_the_kernel_of_plants_is_that_of_the_ideal_plant():
             assert identical(got, wanted)
 
 
-@pytest.mark.parametrize("copied", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))])
-@pytest.mark.parametrize("make", [ikgym.RedundantIKEnv, functools.partial(ikgym.RedundantIKVectorEnv, N)])
-def test_a_copy_in_the_middle_of_an_episode_goes_on_alike(make, copied):
-    env = make(panda(ALL), commands=2)
-    env.reset(seed=1)
-    command = np.full(env.action_space.shape, 0.3, dtype=np.float32)
-    for _ in range(5):
-        env.step(command)
-    other = copied(env)
-    for _ in range(5):
-        assert identical(env.step(-command), other.step(-command))
-
-
 def test_rows_are_arms_of_their_own_and_an_arm_seed_keeps_one():
     envs = ikgym.RedundantIKVectorEnv(N, panda(Plant(zero=1e-2)))
     home = envs.scenario.arm.home
@@ -123,40 +107,6 @@ def test_an_arm_seed_keeps_the_drives_too_but_no_noise():
     q = scenario.arm.home
     seen = [env.reset(seed=seed, options={"q": q, "arm_seed": 3})[0]["q"] for seed in (1, 2)]
     assert not (seen[0] == seen[1]).any()
-
-
-@pytest.mark.parametrize(
-    ("seed", "message"),
-    [
-        (-1, r"options\['arm_seed'\]: expected a whole number of at least 0, got -1"),
-        (1.5, r"options\['arm_seed'\]: expected a whole number of at least 0, got 1\.5"),
-        ([1, 2], r"options\['arm_seed'\]: expected 3 seeds, one a row, got 2"),
-        ("x", r"options\['arm_seed'\]: expected a whole number of at least 0, got 'x'"),
-    ],
-)
-def test_bad_arm_seeds(seed, message):
-    envs = ikgym.RedundantIKVectorEnv(N, panda(ALL))
-    before = envs.reset(seed=1)[0]
-    with pytest.raises(InvalidInputError, match=message):
-        envs.reset(options={"arm_seed": seed})
-    assert identical(envs.reset(seed=1)[0], before)
-
-
-@pytest.mark.parametrize("plant", [Plant(), Plant(q_noise=1e-3), Plant(bandwidth=20.0)])
-def test_an_arm_seed_is_refused_where_there_is_nothing_to_keep(plant):
-    message = "arm_seed: expected a scenario whose plant draws an arm or its drives, .* 'panda-random' draws none"
-    for env in (ikgym.RedundantIKEnv(panda(plant)), ikgym.RedundantIKVectorEnv(N, panda(plant))):
-        with pytest.raises(InvalidInputError, match=message):
-            env.reset(seed=0, options={"arm_seed": 3})
-    with pytest.raises(InvalidInputError, match=message):
-        panda(plant).drawn_plant(0, arm_seed=3)
-
-
-@pytest.mark.parametrize("commands", [-1, 1.5, "a"])
-def test_bad_numbers_of_commands(commands):
-    for make in (ikgym.RedundantIKEnv, lambda scenario, **given: ikgym.RedundantIKVectorEnv(N, scenario, **given)):
-        with pytest.raises(InvalidInputError, match="commands: expected a whole number of at least 0"):
-            make(panda(), commands=commands)
 
 
 def test_gymnasium_finds_no_fault():

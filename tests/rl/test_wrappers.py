@@ -14,7 +14,7 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 import ikgym
 from ikgym import rl
-from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.exceptions import InvalidInputError
 from ikgym.rl.feature_kernels import MOST, radian
 
 N = 3
@@ -141,29 +141,3 @@ def test_rewards_are_what_the_logarithm_of_the_cost_leaves():
         rewards.append(env.step(action)[1])
         assert math.isclose(rewards[-1], 0.1 * max(0.0, 1.0 - math.log1p(-cost) / 14.0), rel_tol=1e-12)
     assert 0.0 <= rewards[-1] < rewards[0] < 0.1
-
-
-def test_wrong_use_is_refused():
-    env = rl.make(short())
-    env.reset(seed=0)
-    with pytest.raises(InvalidInputError, match=r"expected numbers of shape \(7,\)"):
-        env.step(np.zeros(6, dtype=np.float32))
-    with pytest.raises(InvalidInputError, match="finite"):
-        env.step(np.full(7, np.nan, dtype=np.float32))
-    envs = rl.make_vec(short(), 2)
-    envs.reset(seed=0)
-    with pytest.raises(InvalidInputError, match=r"expected numbers of shape \(2, 7\)"):
-        envs.step(np.zeros(7, dtype=np.float32))
-    with pytest.raises(InvalidInputError, match="at least two steps ahead"):
-        rl.make(short(), preview=1)
-    with pytest.raises(UnknownNameError, match="lost_distance"):
-        rl.make(short(), lost_distanc=1.0)
-    with pytest.raises(InvalidInputError, match="RedundantIK-v0"):
-        rl.RelativeAction(gym.make("CartPole-v1"))
-    with pytest.raises(InvalidInputError, match="its own observation"):
-        rl.RelativeAction(env)
-    with pytest.raises(InvalidInputError, match="its own observation"):
-        rl.vector.RelativeAction(envs)
-    for wrong in ({"lost_distance": 0.0}, {"share": 0.0}, {"scale": -1.0}, {"worst": 0.0}, {"history": 0}):
-        with pytest.raises(InvalidInputError):
-            rl.make(short(), **wrong)

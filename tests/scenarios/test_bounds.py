@@ -69,12 +69,6 @@ def test_more_steps_than_any_memory_holds(field, steps):
         FAST.replace(**{field: steps})
 
 
-def test_a_point_that_is_held_for_longer_than_the_episode_takes_no_more_memory():
-    scenario = FAST.replace(iterations_per_point=(2, 10**8), steps=5)
-    np.testing.assert_array_equal(scenario.points(3), [0, 1, 1, 2, 2, 2, 2, 2, 2])
-    np.testing.assert_array_equal(scenario.points(3), FAST.replace(iterations_per_point=(2, 50), steps=5).points(3))
-
-
 @pytest.fixture
 def little(monkeypatch):
     """A machine with 1 GiB."""

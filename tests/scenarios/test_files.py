@@ -4,20 +4,19 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import os
 import tomllib
 import typing
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import ikgym
 from baselines.fingerprints import fingerprint
 from ikgym import scenarios
 from ikgym.arms import Arm, catalogue, from_urdf
-from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.exceptions import IkgymError, InvalidInputError, UnknownNameError
 from ikgym.plant import Plant
 from ikgym.scenarios import Scenario, load
 from ikgym.scenarios.toml import document
@@ -135,13 +134,10 @@ def test_every_trajectory_survives_its_file(trajectory, tmp_path):
 VALUES = st.one_of(st.booleans(), st.integers(), st.floats(allow_nan=False), st.text(), st.lists(st.floats(-1, 1)))
 
 
+@settings(max_examples=30)
 @given(st.dictionaries(st.from_regex(r"[a-z_]\w*", fullmatch=True).filter(str.isascii), VALUES))
 def test_what_is_written_is_what_is_read(values):
     assert tomllib.loads(document({**values, "Table": values})) == {**values, "Table": values}
-
-
-def test_matrices_stand_in_rows():
-    assert document({"m": np.eye(2), "left_out": None}) == "m = [\n  [1.0, 0.0],\n  [0.0, 1.0],\n]\n"
 
 
 # Arms.
@@ -222,17 +218,6 @@ def test_an_arm_of_your_own_is_written_in_numbers_though_it_has_a_name_of_ours(t
     assert tomllib.loads((tmp_path / "y.toml").read_text())["arm"] == "varga7"
 
 
-def test_names_of_joints_are_kept_but_no_part_of_the_digest(tmp_path):
-    scenario = scenarios.get("planar2-bent")
-    plain = scenario.replace(arm=scenario.arm.replace(name="leg"))
-    named = scenario.replace(arm=scenario.arm.replace(name="leg", joint_names=("hip", "knee")))
-    for one, there in ((plain, False), (named, True)):
-        one.save(tmp_path / "x.toml")
-        assert ("joint_names" in (tmp_path / "x.toml").read_text(encoding="utf-8")) is there
-        assert load(tmp_path / "x.toml").arm.joint_names == one.arm.joint_names
-    assert fingerprint(plain) == fingerprint(named)
-
-
 # What no file can hold.
 
 
@@ -254,48 +239,20 @@ HELIX = scenarios.get("zhang3-helix")
 @pytest.mark.parametrize(
     ("scenario", "message"),
     [
-        (
-            HELIX.replace(trajectory=OwnTrajectory([0, 0, 0], 1, 1, 1)),
-            "'zhang3-helix' cannot be written: expected one of the kinds sinusoid, .* got a OwnTrajectory",
-        ),
-        (FAST.replace(arm=OwnArm(**FAST.arm._fields())), "expected no class of your own, got OwnArm"),
-        (
-            FAST.replace(task=FAST.task.replace(name="mine")),
-            "task: expected one of position, skew, matrix, pose, axis, got Task",
-        ),
-        (FAST.replace(name="\ud800"), "cannot be written: .* surrogates not allowed"),
-        (OwnScenario(**FAST._fields()), "expected a Scenario itself, got a OwnScenario"),
+        (HELIX.replace(trajectory=OwnTrajectory([0, 0, 0], 1, 1, 1)), "one of the kinds sinusoid, .* OwnTrajectory"),
+        (FAST.replace(arm=OwnArm(**FAST.arm._fields())), "no class of your own, got OwnArm"),
+        (FAST.replace(task=FAST.task.replace(name="mine")), "task: expected one of position"),
+        (FAST.replace(name="\ud800"), "surrogates not allowed"),
+        (OwnScenario(**FAST._fields()), "expected a Scenario itself"),
     ],
 )
-def test_what_cannot_be_written_says_so_and_leaves_the_file_alone(scenario, message, tmp_path):
+def test_scenarios_that_no_file_can_hold_leave_the_file_alone(scenario, message, tmp_path):
     file = tmp_path / "x.toml"
     file.write_text("before")
     with pytest.raises(InvalidInputError, match=message):
         scenario.save(file)
     assert file.read_text() == "before"
     assert [file.name for file in tmp_path.iterdir()] == ["x.toml"]
-
-
-def test_a_failed_write_leaves_the_file_alone(tmp_path, monkeypatch):
-    file = tmp_path / "x.toml"
-    file.write_text("before")
-
-    def full(_):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(os, "fsync", full)
-    with pytest.raises(InvalidInputError, match=r"Cannot write .*x\.toml: .*No space left"):
-        FAST.save(file)
-    assert file.read_text() == "before"
-    assert [file.name for file in tmp_path.iterdir()] == ["x.toml"]
-
-
-@pytest.mark.parametrize("name", ["x.txt", "x", 3, "bad\0name.toml", ".toml/"])
-def test_bad_names_of_files(name, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    with pytest.raises(InvalidInputError, match=r"expected a path that ends in \.toml, got|Cannot write"):
-        FAST.save(name)
-    assert not list(tmp_path.iterdir())
 
 
 # Mistakes in a file.
@@ -324,71 +281,38 @@ def test_what_has_a_default_may_be_left_out(tmp_path):
 
 PATH = "{kind = 'line', start = [0, 0, 0], end = [0, 0, 1]}"
 LAW = "{kind = 'quintic', speed = 1, acceleration = 1}"
-UNKNOWN = {
-    "kind of path": (
-        {"trajectory": f"{{kind = 'path', path = {{kind = 'lime'}}, time_law = {LAW}}}"},
-        r"no kind of \[trajectory.path\] in .*mine\.toml 'lime'\. Did you mean 'line'\?",
-    ),
-    "key of a law": (
-        {"trajectory": f"{{kind = 'path', path = {PATH}, time_law = {{kind = 'quintic', sped = 1}}}}"},
-        r"no key of \[trajectory.time_law\] in .*mine\.toml 'sped'\. Did you mean 'speed'\?",
-    ),
-    "key": ({"stepps": "3"}, r"no key in .*mine\.toml 'stepps'\. Did you mean 'steps'\?"),
-    "arm": ({"arm": "'varga8'"}, r"no arm in .*mine\.toml 'varga8'\. Did you mean 'varga7'\?"),
-    "parameter": (
-        {"trajectory": "{kind = 'sinusoid', amplitude = [1], frequencies = 1}"},
-        r"no key of \[trajectory\] in .*mine\.toml 'frequencies'\. Did you mean 'frequency'\?",
-    ),
-    "arms of a plant": (
-        {"plant": "{arms = ['panda-22']}"},
-        r"no arm of \[plant\] in .*'panda-22'\. Did you mean 'panda-2'",
-    ),
-    "arm's": ({"arm": "{name = 'a', axis = []}"}, r"no key of \[arm\] in .*'axis'\. Did you mean 'axes'"),
-    "urdf's": ({"model": "{urdf = 'a.urdf', tipp = 'c'}"}, r"no key of \[model\] in .*'tipp'\. Did you mean 'tip'"),
-}
+#: A change of the file, and a word of the message.
+BAD = [
+    ({"trajectory": f"{{kind = 'path', path = {{kind = 'lime'}}, time_law = {LAW}}}"}, "Did you mean 'line'"),
+    ({"trajectory": f"{{kind = 'path', path = {PATH}, time_law = {{kind = 'quintic', sped = 1}}}}"}, "mean 'speed'"),
+    ({"trajectory": "{kind = 'sinusoid', amplitude = [1], frequencies = 1}"}, "Did you mean 'frequency'"),
+    ({"trajectory": "{amplitude = [1]}"}, r"\[trajectory\] kind: expected one of sinusoid"),
+    ({"trajectory": "{kind = 'sinusoid'}"}, r"\[trajectory\] amplitude: expected numbers"),
+    ({"stepps": "3"}, "Did you mean 'steps'"),
+    ({"name": None}, "name: expected a text"),
+    ({"name": "'"}, "expected TOML in UTF-8"),
+    ({"dt": "[" * 10**5}, "expected TOML"),
+    ({"dt": "2026-01-01"}, "dt: expected numbers, got datetime"),
+    ({"velocity_limit": None}, "velocity_limit: expected a number, or one a joint"),
+    ({"velocity_limit": "true"}, "velocity_limit: expected numbers"),
+    ({"arm": None}, "arm: expected the name of an arm or a table"),
+    ({"arm": "3"}, "arm: expected the name of an arm or a table"),
+    ({"arm": "'varga8'"}, "Did you mean 'varga7'"),
+    ({"arm": "{name = 'a', axis = []}"}, "Did you mean 'axes'"),
+    ({"arm": "{name = 'varga7'}"}, r"\[arm\] offsets: expected numbers"),
+    ({"arm": "{urdf = 'a.urdf'}"}, r"\[arm\] Cannot read .*a\.urdf"),
+    ({"arm": "{urdf = 3}"}, r"\[arm\] path: expected a text"),
+    ({"model": "{urdf = 'a.urdf', tipp = 'c'}"}, "Did you mean 'tip'"),
+    ({"plant": "{arms = ['panda-22']}"}, "Did you mean 'panda-2'"),
+    ({"plant": "{arms = 'panda-2'}"}, r"\[plant\] arms: expected a list of arms"),
+    ({"plant": "{arms = [{name = 'a'}]}"}, r"\[plant.arms\] offsets: expected numbers"),
+]
 
 
-@pytest.mark.parametrize(("changes", "message"), UNKNOWN.values(), ids=UNKNOWN)
-def test_unknown_names_are_answered_with_the_nearest(changes, message, tmp_path):
-    with pytest.raises(UnknownNameError, match=message):
-        load(written(tmp_path, changes))
-
-
-BAD = {
-    "no name": ({"name": None}, "name: expected a text, got no such key"),
-    "no arm": ({"arm": None}, "arm: expected the name of an arm or a table, got no such key"),
-    "no limit": (
-        {"velocity_limit": None},
-        "velocity_limit: expected a number, or one a joint, since arm 'varga7' has no velocity limit",
-    ),
-    "arm": ({"arm": "3"}, "arm: expected the name of an arm or a table, got 3"),
-    "truth": ({"velocity_limit": "true"}, "velocity_limit: expected numbers, got True"),
-    "date": ({"dt": "2026-01-01"}, "dt: expected numbers, got datetime"),
-    "no kind": ({"trajectory": "{amplitude = [1]}"}, r"\[trajectory\] kind: expected one of sinusoid, .*, got no such"),
-    "no amplitude": ({"trajectory": "{kind = 'sinusoid'}"}, r"\[trajectory\] amplitude: expected numbers, got no such"),
-    "one arm of a plant": ({"plant": "{arms = 'panda-2'}"}, r"\[plant\] arms: expected a list of arms, got 'panda-2'"),
-    "offsets of a plant's arm": ({"plant": "{arms = [{name = 'a'}]}"}, r"\[plant.arms\] offsets: expected numbers"),
-    "no offsets": ({"arm": "{name = 'varga7'}"}, r"\[arm\] offsets: expected numbers, got no such key"),
-    "no file": ({"arm": "{urdf = 'a.urdf'}"}, r"\[arm\] Cannot read .*a\.urdf"),
-    "urdf": ({"arm": "{urdf = 3}"}, r"\[arm\] path: expected a text, got 3"),
-    "no toml": ({"name": "'"}, "expected TOML in UTF-8, got a fault"),
-    "deep": ({"dt": "[" * 10**5}, "expected TOML"),
-}
-
-
-@pytest.mark.parametrize(("changes", "message"), BAD.values(), ids=BAD)
+@pytest.mark.parametrize(("changes", "message"), BAD, ids=[message for _, message in BAD])
 def test_bad_files_are_refused(changes, message, tmp_path):
-    with pytest.raises(InvalidInputError, match=rf"mine\.toml: .*{message}|mine\.toml: ({message})"):
+    with pytest.raises(IkgymError, match=rf"mine\.toml.*{message}"):
         load(written(tmp_path, changes))
-
-
-def test_what_cannot_be_read_is_refused(tmp_path):
-    for file in (tmp_path, tmp_path / "missing.toml", "bad\0name", 7.5, None):
-        with pytest.raises(InvalidInputError, match="Cannot read"):
-            load(file)
-    (tmp_path / "latin.toml").write_bytes("name = 'größe'".encode("latin-1"))
-    with pytest.raises(InvalidInputError, match=r"latin\.toml: expected TOML in UTF-8"):
-        load(tmp_path / "latin.toml")
 
 
 def test_like_another_scenario(tmp_path):

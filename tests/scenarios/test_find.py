@@ -11,7 +11,7 @@ import pytest
 import baselines
 import ikgym
 from ikgym import scenarios
-from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.exceptions import IkgymError
 from ikgym.sb3 import RedundantIKVecEnv
 
 FAST = scenarios.get("varga7-fast")
@@ -77,28 +77,26 @@ def test_registered_names_take_precedence(folder, registry):
 
 
 @pytest.mark.parametrize(
-    ("item", "error", "message"),
+    ("item", "message"),
     [
-        ("varga7-fats", UnknownNameError, r"There is no scenario 'varga7-fats'\. Did you mean 'varga7-fast'\?"),
-        (3, InvalidInputError, r"scenario: expected a Scenario, its name, a file ending in \.toml or .* got 3"),
-        (None, InvalidInputError, "got None"),
-        ("shot.toml", InvalidInputError, r"Cannot read shot\.toml"),
-        ("my_scenarios:SHOT", UnknownNameError, r"attribute of my_scenarios 'SHOT'\. Did you mean 'SHORT'\?"),
-        ("my_scenarios:number", InvalidInputError, "expected a Scenario or what makes one, got 3"),
-        ("my_scenarios:fail", InvalidInputError, "making it failed: ZeroDivisionError: division by zero"),
-        ("no_such:x", InvalidInputError, "no_such cannot be imported: ModuleNotFoundError: No module named 'no_such'"),
-        ("my_faulty:x", InvalidInputError, "my_faulty cannot be imported: .*No module named 'no_such_module'"),
-        ("my_scenarios:", InvalidInputError, "expected 'package.module:attribute', got 'my_scenarios:'"),
-        (":x", InvalidInputError, "expected 'package.module:attribute', got ':x'"),
-        ("a b:x", InvalidInputError, "expected 'package.module:attribute', got 'a b:x'"),
+        ("varga7-fats", "Did you mean 'varga7-fast'"),
+        (3, "expected a Scenario, its name"),
+        (None, "got None"),
+        ("shot.toml", "Cannot read"),
+        ("my_scenarios:SHOT", "Did you mean 'SHORT'"),
+        ("my_scenarios:number", "expected a Scenario or what makes one"),
+        ("my_scenarios:fail", "ZeroDivisionError: division by zero"),
+        ("no_such:x", "cannot be imported"),
+        ("my_faulty:x", "cannot be imported: .*no_such_module"),
+        *((item, "expected 'package.module:attribute'") for item in ("my_scenarios:", ":x", "a b:x")),
     ],
 )
-def test_what_is_not_found(folder, item, error, message):
-    with pytest.raises(error, match=message):
+def test_bad_items(folder, item, message):
+    with pytest.raises(IkgymError, match=message):
         scenarios.find(item)
 
 
-@pytest.mark.parametrize("item", ITEMS, ids=str)
+@pytest.mark.parametrize("item", ["short.toml", "my_package.arms:make_short"])
 def test_all_that_takes_a_scenario_finds_it(folder, item):
     assert gym.make("RedundantIK-v0", scenario=item).unwrapped.scenario.steps == 3
     assert gym.make_vec("RedundantIK-v0", num_envs=2, scenario=item).unwrapped.scenario.steps == 3

@@ -13,15 +13,12 @@ import pytest
 import ikgym
 from baselines.fingerprints import fingerprint
 from ikgym.scenarios import Scenario
-from ikgym.trajectories.orientations import ORIENTATIONS
-from ikgym.trajectories.paths import PATHS
-from ikgym.trajectories.time_laws import TIME_LAWS
 from tests.arms.test_urdf import joint, robot
 
 ROOT = Path(__file__).parents[2]
 TEXT = (ROOT / "docs" / "scenarios.md").read_text(encoding="utf-8").split("## A scenario of your own")[1]
 WHOLE, ON_URDF, PLANT, FROM_CSV = re.findall(r"```toml\n(.*?)```", TEXT, re.DOTALL)
-PATH, SNIPPET = re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL)
+_, SNIPPET = re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL)
 
 
 @pytest.fixture
@@ -70,10 +67,6 @@ def test_the_arm_from_a_urdf_is_read(tmp_path):
     assert scenario.arm.home.tolist() == arm["home"]
 
 
-def test_the_kinds_of_trajectories_are_named():
-    assert all(f"`{kind}`" in TEXT for kind in ikgym.trajectories.KINDS)
-
-
 def test_the_waypoints_of_a_csv_file_are_read(tmp_path):
     points = [[0.3, 0.0, 0.0], [0.4, 0.2, 0.0], [0.3, 0.4, 0.0]]
     lines = [",".join(map(str, point)) for point in [["x", "y", "z"], *points]]
@@ -88,12 +81,3 @@ def test_the_waypoints_of_a_csv_file_are_read(tmp_path):
     np.testing.assert_array_equal(scenario.nominal(), scenario.replace(trajectory=wanted).nominal())
     scenario.save(tmp_path / "y.toml")
     assert fingerprint(ikgym.scenarios.load(tmp_path / "y.toml")) == fingerprint(scenario)
-
-
-def test_the_path_is_one_and_its_kinds_are_named():
-    found = {}
-    exec(PATH.replace("PathTrajectory(\n", "trajectory = PathTrajectory(\n"), found)
-    assert found["trajectory"].duration > 0.0
-    for name, kinds in {"path": PATHS, "time_law": TIME_LAWS, "orientation": ORIENTATIONS}.items():
-        row = re.search(rf"^\| `{name}`.*\|$", TEXT, re.MULTILINE).group()
-        assert all(f"`{kind}`" in row for kind in kinds)

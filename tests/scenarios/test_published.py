@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 import ikgym
 from ikgym import problems, scenarios
 from ikgym.exceptions import InvalidInputError, UnknownNameError
-from ikgym.trajectories import PublishedPath, RandomPublishedPath
+from ikgym.trajectories import PublishedPath
 from tests.comparison import identical
 
 NAMES = scenarios.names("published")
@@ -75,37 +75,12 @@ def test_the_seed_chooses_a_path_and_its_start():
     assert all(any(identical(one, start) for start in published) for one in starts)
 
 
-def test_shorter_random_paths_end_at_rest():
-    (name,) = [n for n in problems.names("rlitg-random-") if len(problems.waypoints(n).positions) == 379]
-    trajectory = PublishedPath(name, PERIOD)
-    frames = trajectory.frames(RANDOM.times(RANDOM.steps + 1), RANDOM.model)
-    assert not np.diff(frames[waypoint_steps(379)[-1] :], axis=0).any()
-    assert np.diff(frames[: waypoint_steps(379)[-1]], axis=0).any(axis=1).all()
-
-
 def test_what_is_out_of_reach():
     for name, missed in {"cppflow-panda-square": range(153, 182), "cppflow-fetch-rot_yz": ()}.items():
         scenario, (positions, quaternions, _) = scenarios.get(name), problems.waypoints(name)
         rotations = Rotation.from_quat(quaternions, scalar_first=True).as_matrix()
         converged = scenario.arm.inverse(rotations, positions, restarts=300)[1]
         assert np.flatnonzero(~converged).tolist() == list(missed)
-
-
-@pytest.mark.parametrize(
-    ("make", "error", "message"),
-    [
-        (lambda: PublishedPath("rlitg-helo", 0.2), UnknownNameError, "no problem 'rlitg-helo'. Did you mean"),
-        (lambda: PublishedPath("rlitg-hello", 0.0), InvalidInputError, "period: expected a finite number"),
-        (lambda: RandomPublishedPath("none", 0.2), InvalidInputError, "family: expected the beginning of names"),
-        (lambda: RandomPublishedPath("cppflow", 0.2), InvalidInputError, "with starts, got 'cppflow'"),
-        (lambda: RandomPublishedPath("rlitg", -1), InvalidInputError, "period: expected a finite number"),
-        (lambda: RANDOM.trajectory.frames(np.zeros(1), RANDOM.model), InvalidInputError, "sample one first"),
-        (lambda: RANDOM.replace(arm=ikgym.arms.get("fetch")), InvalidInputError, "expected 8 joints, as arm 'fetch'"),
-    ],
-)
-def test_bad_input(make, error, message):
-    with pytest.raises(error, match=message):
-        make()
 
 
 def test_reach_bounds_all_random_paths():

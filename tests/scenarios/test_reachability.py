@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import ikgym
-from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import gaps
 from ikgym.trajectories import FixedOrientation, PathTrajectory, Quintic, paths
 
@@ -52,20 +51,3 @@ def test_a_free_orientation_is_not_looked_for():
     assert not gaps(out_to(edge, task="position"))
     assert not gaps(out_to(edge, task="axis"))
     assert all(gap.angle == 0.0 for gap in gaps(out_to(1.2, task="position")))
-
-
-def test_short_episodes_have_few_poses():
-    scenario = out_to(1.0, steps=3).replace(start=PANDA.inverse(np.diag([1.0, -1.0, -1.0]), [0.5, 0.0, 0.4])[0])
-    assert gaps(scenario) == ()
-
-
-@pytest.mark.parametrize(
-    ("scenario", "poses", "message"),
-    [
-        ("panda-random", 200, "expected a scenario that is the same at every reset, got 'panda-random'"),
-        ("panda-line", 1, "poses: expected a whole number of at least 2, got 1"),
-    ],
-)
-def test_bad_input(scenario, poses, message):
-    with pytest.raises(InvalidInputError, match=message):
-        gaps(ikgym.scenarios.get(scenario), poses)

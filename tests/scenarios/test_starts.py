@@ -64,13 +64,6 @@ def test_a_path_that_begins_out_of_reach_is_refused():
         scenario(trajectory=line(begin=(1.2, 0.0, 0.3), orientation=False), task=ikgym.tasks.get("position"))
 
 
-def test_an_arm_without_limits_finds_its_start_too():
-    one = scenarios.get("zhang3-helix").replace(start=None, initial_pose=None)
-    q = one.first_q(one.trajectory)
-    np.testing.assert_allclose(one.arm.forward(q)[1], one.nominal()[0], atol=1e-8)
-    assert (one.start_bound() >= abs(q)).all()
-
-
 @dataclasses.dataclass(frozen=True, eq=False)
 class Somewhere(Trajectory):
     """A distribution over paths in space."""

@@ -19,9 +19,9 @@ from ikgym.trajectories import (
     Trapezoidal,
     Turning,
 )
-from ikgym.trajectories.paths import Circle, Line, SplinePath
+from ikgym.trajectories.paths import Line
 from ikgym.trajectories.time_laws import TIME_LAWS
-from tests.trajectories.test_paths import EXAMPLES, POINTS, every_path
+from tests.trajectories.test_paths import EXAMPLES, every_path
 
 ARM = ikgym.arms.get("varga7")
 LINE = Line([0, 0, 0], [1, 0, 0])
@@ -30,7 +30,7 @@ SPEED, ACCELERATION = 0.5, 2.0
 every_law = pytest.mark.parametrize("law", TIME_LAWS.values(), ids=TIME_LAWS)
 
 
-def motion(trajectory, dt=1e-3):
+def motion(trajectory, dt=2e-3):
     """Positions from a little before the start until a little after the end, velocities and accelerations."""
     times = np.arange(-5, int(trajectory.duration / dt) + 10) * dt
     positions = trajectory.frames(times, ARM)[:, -3:]
@@ -122,31 +122,3 @@ def test_only_with_an_orientation_is_there_one():
             assert one.frames(np.zeros(2), ARM).shape == (2, 12 if orientation else 3)
     with pytest.raises(InvalidInputError, match="task 'pose' needs orientations, the trajectory has none"):
         ikgym.Scenario("x", ARM, pose, PathTrajectory(LINE, Quintic(1.0, 1.0)), 1.0, start=np.zeros(7))
-
-
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (
-            lambda: PathTrajectory(LINE, Trapezoidal(0.5, 2.0, 2.0)),
-            "duration: expected at least 2.25 s for a path",
-        ),
-        (lambda: AlongPath([0, 0, 0]), "approach: expected a direction, got the zero vector"),
-        (
-            lambda: PathTrajectory(Circle([0, 0, 0], 1.0), Quintic(1, 1), AlongPath([1, 0, 0])),
-            r"approach: expected a direction across the path, got \[1.0, 0.0, 0.0\], along which .* after (1.57|4.71)",
-        ),
-        (
-            lambda: OrientationThrough([[1, 0, 0, 0], [1, 1, 0, 0]]),
-            r"got \[1.0, 1.0, 0.0, 0.0\] of length 1.41421",
-        ),
-        (lambda: OrientationThrough([[1, 0, 0, 0], [0, 1, 0, 0]]), "got half a turn from number 0 to number 1"),
-        (
-            lambda: PathTrajectory(SplinePath(POINTS), Quintic(1, 1), OrientationThrough([[1, 0, 0, 0]] * 3)),
-            "quaternions: expected 6, one a waypoint of the path, got 3",
-        ),
-    ],
-)
-def test_bad_parts(make, message):
-    with pytest.raises(InvalidInputError, match=message):
-        make()

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from ikgym.exceptions import InvalidInputError
 from ikgym.trajectories.paths import (
     PATHS,
     Circle,
@@ -105,26 +104,3 @@ def test_points_in_a_line_have_no_corners():
     path = Polyline([[0, 0, 0], [1, 0, 0], [3, 0, 0]], 0.1)
     assert (path.length, path.curvature) == (3.0, 0.0)
     np.testing.assert_array_equal(path.stations, [0, 1, 3])
-
-
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: SplinePath([[0, 0, 0]]), "points: expected at least 2 points, got 1"),
-        (lambda: SplinePath([[1, 0, 0], [0, 0, 0], [0, 0, 0]]), "at least 1e-09 m apart, got .* as numbers 1 and 2"),
-        (
-            lambda: SplinePath([[0, 0, 0], [1, 0, 0], [0, 0, 0]]),
-            r"turns straight back, .* number 1, \[1.0, 0.0, 0.0",
-        ),
-        (lambda: Line([1, 2, 3], [1, 2, 3]), "start and end: expected points at least"),
-        (lambda: Polyline([[0, 0, 0], [1, 0, 0], [0, 0, 0]], 0.1), "no corner that turns straight back, got one at nu"),
-        (lambda: Polyline([[0, 0, 0], [1, 0, 0], [1, 1, 0]], 2.0), "at most 1 m, .* number 0 and 1, got 2 m"),
-        (lambda: Polyline([[0, 0, 0], [1, 0, 0], [1, 1, 0]], 0.0), "corner_radius: expected a finite number of|from"),
-        (lambda: Square(CENTER, 0.1, 0.06), "corner_radius: expected a finite number from 1e-12 to 0.05, got 0.06"),
-        (lambda: Raster(CENTER, 1.0, 1.0, 1, 0.1), "lines: expected a whole number of at least 2, got 1"),
-        (lambda: Raster(CENTER, 1.0, 0.3, 4, 0.1), "corner_radius: expected a finite number from 1e-12 to 0.05"),
-    ],
-)
-def test_bad_paths(make, message):
-    with pytest.raises(InvalidInputError, match=message):
-        make()

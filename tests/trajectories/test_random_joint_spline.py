@@ -7,9 +7,7 @@ import numpy as np
 import pytest
 
 import ikgym
-from ikgym.exceptions import InvalidInputError
-from ikgym.simulator import Simulator
-from ikgym.trajectories import JointSpline, RandomJointSpline, first_joints_of, frames_of
+from ikgym.trajectories import RandomJointSpline, first_joints_of, frames_of
 from tests.comparison import identical
 
 DT = 0.002
@@ -96,44 +94,3 @@ def test_many_are_drawn_as_each_alone():
         assert identical(frames, motion.frames(row, ARM))
     first = first_joints_of(motions)
     assert identical(first, np.array([motion.joint_path(np.zeros(1))[0] for motion in motions]))
-
-
-def test_a_reset_of_many_is_that_of_each():
-    simulator = Simulator(SCENARIO, 3, preview=2)
-    simulator.reset(np.array([True, False, True]), [np.random.default_rng(seed) for seed in range(3)])
-    observed = simulator.observe()
-    for row in (0, 2):
-        motion = RANDOM.sample(np.random.default_rng(row))
-        assert identical(observed.q[row], motion.joint_path(np.zeros(1))[0])
-    assert not observed.q[1].any()
-
-
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: RandomJointSpline([0, 1], [1, 0], 1, 1, 1), "expected lower < upper, got 1 and 0 at joint 1"),
-        (lambda: RandomJointSpline([0, 1], [1], 1, 1, 1), r"upper: expected shape \(2,\), got \(1,\)"),
-        (lambda: RandomJointSpline([0], [1], 0, 1, 1), r"velocity_limit: expected numbers above 0, got \[0.0\]"),
-        (lambda: RandomJointSpline([0], [1], 1, np.inf, 1), "acceleration_limit: expected finite numbers"),
-        (lambda: RANDOM.replace(spans=2), "spans: expected a whole number of at least 3, got 2"),
-        (lambda: RANDOM.replace(margin=1.0), "margin: expected a finite number from 0 to 0.99, got 1"),
-        (
-            lambda: RANDOM.replace(scale=(0.5, 1.5)),
-            r"scale: expected a range \(low, high\) within 0 and 1, got \(0.5",
-        ),
-        (
-            lambda: RandomJointSpline.within(ikgym.arms.get("varga7"), 2.0),
-            "lower: expected one for every joint, since arm 'varga7' has none at joint 0, 1, 2, 3, 4, 5, 6",
-        ),
-        (
-            lambda: SCENARIO.replace(trajectory=RANDOM.replace(velocity_limit=2.0)),
-            "velocity_limit of joint 0 within that of arm 'varga7', 0.3, so that what is drawn is feasible, got 2",
-        ),
-        (lambda: RANDOM.frames(np.zeros(1), ARM), "sample one first"),
-        (lambda: JointSpline(np.zeros((5, 7)), 1.0), "control: expected at least 6 control points, got 5"),
-        (lambda: JointSpline(np.arange(8.0)[:, None], 1.0), "the first three to be the same and the last three"),
-    ],
-)
-def test_bad_motions(make, message):
-    with pytest.raises(InvalidInputError, match=message):
-        make()

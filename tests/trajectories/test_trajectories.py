@@ -7,12 +7,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import ikgym
-from ikgym.exceptions import InvalidInputError
-from ikgym.trajectories import Helix, RandomSinusoid, Sinusoid, StraightLine, frames_of
+from ikgym.trajectories import Sinusoid, frames_of
 from tests.comparison import identical
 
 TIMES = np.linspace(0, 7, 57)
-HOME = np.array([*np.eye(3).ravel(), 0.0, 0.0, 0.0])
 VARGA = np.array([0.8, 1.0, 1.2, 1.4, 1.6, 1.8, 2.0])
 
 
@@ -87,12 +85,6 @@ class TestStraightLine:
         np.testing.assert_allclose(np.cross(vectors, vectors[-1]), 0, atol=1e-13)
         assert np.linalg.norm(vectors[-1]) == pytest.approx(np.pi / 2)
 
-    def test_a_line_without_turning(self):
-        start = np.array([*np.eye(3).ravel(), 0, 0, 0])
-        end = np.array([*np.eye(3).ravel(), 1, 0, 0])
-        frames = StraightLine(start, end, duration=1.0, blend=0.5).frames(np.array([0.5]), self.scenario.arm)
-        np.testing.assert_allclose(frames[0], [*np.eye(3).ravel(), 0.5, 0, 0], atol=1e-15)
-
 
 class TestRandom:
     random = ikgym.scenarios.get("varga7-random").trajectory
@@ -111,20 +103,6 @@ class TestRandom:
             np.testing.assert_allclose(values.mean(axis=0), (low + high) / 2, rtol=0.05)
             np.testing.assert_allclose(values.std(axis=0), (high - low) / 12**0.5, rtol=0.05)
 
-    def test_same_generator_same_trajectory(self):
-        first, second = (self.random.sample(np.random.default_rng(3)) for _ in range(2))
-        np.testing.assert_array_equal(first.joint_path(TIMES), second.joint_path(TIMES))
-
-    def test_a_fixed_trajectory_leaves_the_generator_alone(self):
-        rng = np.random.default_rng(3)
-        fixed = Sinusoid(np.ones(2))
-        assert fixed.sample(rng) is fixed
-        assert rng.bit_generator.state == np.random.default_rng(3).bit_generator.state
-
-    def test_has_no_path_of_its_own(self):
-        with pytest.raises(InvalidInputError, match="sample one first"):
-            self.random.frames(TIMES, ikgym.arms.get("varga7"))
-
 
 @pytest.mark.parametrize("name", ikgym.scenarios.names())
 def test_reach_bounds_the_positions(name):
@@ -133,22 +111,6 @@ def test_reach_bounds_the_positions(name):
     drawn = scenario.trajectory.sample(np.random.default_rng(1))
     farthest = np.linalg.norm(drawn.frames(times, scenario.model)[:, -3:], axis=1).max()
     assert farthest <= scenario.trajectory.reach(times, scenario.model) * (1 + 1e-12)
-
-
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: Sinusoid([1, 2], phase=[1, 2, 3]), r"phase: expected shape \(2,\), got \(3,\)"),
-        (lambda: Sinusoid([1, 2], sigmoid=0), "sigmoid: expected a finite number above 0"),
-        (lambda: RandomSinusoid([1.0], scale=(1.0, 0.2)), r"scale: expected a range \(low, high\), got \(1, 0.2\)"),
-        (lambda: Helix([0, 0, 0], 0, 1, 1), "radius: expected a finite number above 0"),
-        (lambda: StraightLine(HOME, HOME, 1.0, 0.6), "at most half of the duration of 1 s, got 0.6"),
-        (lambda: StraightLine(HOME, np.zeros(12), 1.0, 0.5), "rotation of end: expected a rotation matrix"),
-    ],
-)
-def test_bad_trajectories(make, message):
-    with pytest.raises(InvalidInputError, match=message):
-        make()
 
 
 class Shaken(Sinusoid):

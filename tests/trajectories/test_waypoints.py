@@ -93,35 +93,3 @@ def test_bad_files(text, message, tmp_path):
     law = {} if "t\n" in text else {"speed": 1.0, "acceleration": 1.0}
     with pytest.raises((InvalidInputError, UnknownNameError), match=message):
         from_csv(written(tmp_path, text), **law)
-
-
-def test_what_cannot_be_read(tmp_path):
-    (tmp_path / "latin.csv").write_bytes("größe".encode("latin-1"))
-    for file in (tmp_path, tmp_path / "missing.csv", tmp_path / "latin.csv", None):
-        with pytest.raises(InvalidInputError, match=r"Cannot read|expected a CSV file"):
-            from_csv(file)
-
-
-@pytest.mark.parametrize(
-    ("given", "message"),
-    [
-        ({}, "speed: expected a number, or times of the waypoints, got neither"),
-        ({"speed": 1.0}, "acceleration: expected a number, or times"),
-        ({"times": TIMES, "speed": 1.0}, "speed: expected none beside times"),
-        ({"times": TIMES[:4]}, r"positions: expected shape \(4, 3\), got \(5, 3\)"),
-        ({"times": TIMES, "quaternions": QUATERNIONS[:4]}, r"quaternions: expected shape \(5, 4\), got \(4, 4\)"),
-        ({"quaternions": QUATERNIONS[:4], "speed": 1.0, "acceleration": 1.0}, r"expected shape \(5, 4\)"),
-        (
-            {"quaternions": QUATERNIONS, "orientation": FixedOrientation(np.eye(3)), "speed": 1.0, "acceleration": 1.0},
-            "orientation: expected none beside quaternions",
-        ),
-    ],
-)
-def test_what_does_not_go_together(given, message):
-    with pytest.raises(InvalidInputError, match=message):
-        through(POINTS, **given)
-
-
-def test_unknown_time_law():
-    with pytest.raises(UnknownNameError, match=r"no time law 'quintik'. Did you mean 'quintic'"):
-        through(POINTS, speed=1.0, acceleration=1.0, time_law="quintik")

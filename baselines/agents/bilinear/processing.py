@@ -22,7 +22,7 @@ from ikgym.validation import FloatArray, number
 
 @dataclasses.dataclass(frozen=True)
 class Bilinear(Processing):
-    """q̇ = G v + h s: joint velocities linear in the twist that is due, with G and h from the network.
+    """q̇ = G v + h s: joint velocities linear in the remaining twist, with G and h from the network.
 
     v is the twist that removes the error from the next reference pose within Δt: feedback and feed-forward in one. The
     law is homogeneous in the error, so that an error of 10 % in G still removes nine tenths of the error in each step,
@@ -48,12 +48,12 @@ class Bilinear(Processing):
 
     where the last outputs of the network are ln λ, relative to `damping`, and ln U, the diagonal of a metric, relative
     to the one of :func:`baselines.agents.bilinear.rates.metric_rows`, in which a fast joint counts less. h is then
-    projected into the null space: (I - G J) h takes its place. The agent begins as weighted damped least squares and
-    need not learn the kinematics of the arm.
+    projected into the null space: (I - G J) h takes its place. The untrained agent is weighted damped least squares
+    and need not learn the kinematics of the arm.
 
     Args:
         offsets: o, steps ahead at which the reference is seen, rising from 1, at least two.
-        damping: λ where the network output is 0, above 0; None for G and h alone.
+        damping: λ at a network output of 0, above 0; None for G and h alone.
 
     Raises:
         InvalidInputError: Offsets do not rise from 1, or the damping is not above 0.

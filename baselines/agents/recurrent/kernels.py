@@ -1,4 +1,4 @@
-"""Kernels of agents with memory: features of a measurement, the meaning of outputs, and a step of the filter."""
+"""Kernels of agents with memory: features of a measurement, variances from network outputs, and the filter."""
 
 from __future__ import annotations
 
@@ -60,8 +60,8 @@ def describe(surprise, loaded, spread, steps, out):
 
 
 @kernel
-def believe(output, variances):
-    """The variances that an output of the network stands for.
+def interpret(output, variances):
+    """The variances from an output of the network.
 
     Args:
         output: Shape (4,).
@@ -100,7 +100,7 @@ def linearise(arm, q, pose, error, sensitivity):
 
 
 @kernel
-def remember_rows(chain, network, rule, observed, first, known, deviation, old):
+def filter_rows(chain, network, rule, observed, first, known, deviation, old):
     """Updates the estimates by the measurements, and computes the deviations, row by row.
 
     Args:
@@ -128,21 +128,21 @@ def remember_rows(chain, network, rule, observed, first, known, deviation, old):
             absorb(sensitivity, error, variances, change, covariance)
             parameters += change
         known.since[row] += 1
-        tell(chain, parameters, q[row], parts, old[row])
+        write_deviation(chain, parameters, q[row], parts, old[row])
         deviation[row] = old[row]
         if new[row] and (starts[row] or known.since[row] >= gap):
             arm = changed_chain(chain, parameters, *parts)
             linearise(arm, then[row] + parameters[:n], pose[row], error, sensitivity)
-            weigh(network, (error, sensitivity), max(known.since[row], 1), covariance, known.hidden[row], variances)
+            tune(network, (error, sensitivity), max(known.since[row], 1), covariance, known.hidden[row], variances)
             change[:] = 0.0
             absorb(sensitivity, error, variances, change, covariance)
             parameters += change
             known.since[row] = 0
-            tell(chain, parameters, q[row], parts, deviation[row])
+            write_deviation(chain, parameters, q[row], parts, deviation[row])
 
 
 @kernel
-def weigh(network, measured, steps, covariance, hidden, variances):
+def tune(network, measured, steps, covariance, hidden, variances):
     """The variances of a measurement, from the network.
 
     Args:
@@ -167,14 +167,14 @@ def weigh(network, measured, steps, covariance, hidden, variances):
     describe(error, loaded, spread, steps, features)
     packed, sizes = network
     step_network(packed, sizes, features, hidden, output)
-    change, payload = believe(output, variances)
+    change, payload = interpret(output, variances)
     covariance[:n, :n] += payload
     for i in range(n):
         covariance[i, i] += change
 
 
 @kernel
-def tell(chain, parameters, q, parts, out):
+def write_deviation(chain, parameters, q, parts, out):
     """The deviation of an arm with some parameters. Shapes: (p,), (n,), those of :func:`changed_chain`, (6,)."""
     rotation, position, model_rotation, model_position = np.empty((3, 3)), np.empty(3), np.empty((3, 3)), np.empty(3)
     forward(chain, q, model_rotation, model_position)

@@ -67,11 +67,6 @@ class GatedNetwork(Frozen):
         """The size of its hidden state."""
         return sum(self.sizes[1:-1])
 
-    @classmethod
-    def quiet(cls, sizes: tuple[int, ...]) -> Self:
-        """A network whose outputs are all 0."""
-        return cls(sizes, {name: np.zeros(shape, np.float32) for name, shape in shapes(sizes).items()})
-
 
 def shapes(sizes: tuple[int, ...]) -> dict[str, tuple[int, ...]]:
     """The tensors of a network by name, in their order.

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from baselines.agents.files import AgentFile
 from baselines.agents.network import Singles
 from baselines.agents.policy import FOLDER, agent_at, check_scenario
-from baselines.agents.recurrent.kernels import remember_rows
+from baselines.agents.recurrent.kernels import filter_rows
 from baselines.agents.recurrent.network import GatedNetwork
 from baselines.agents.recurrent.processing import Recurrent
 from baselines.policy import Batch
@@ -36,7 +36,7 @@ class RecurrentMemory(NamedTuple):
         age: See :class:`Measurement`. Shape (B, 1).
         rest: Changes of the estimates that are not blended in yet. Shape (B, 6).
         parameters: See :mod:`baselines.solvers.adaptive.chain_parameters`. Shape (B, p).
-        covariance: Of their errors. Shape (B, p, p).
+        covariance: The covariance of their errors. Shape (B, p, p).
         hidden: The hidden state of the network. Shape (B, units).
         since: Steps since the last measurement that was used. Shape (B,).
     """
@@ -62,8 +62,8 @@ class RecurrentPolicy(Corrected):
     Args:
         problem: What the policy is told of the scenario.
         path: The file of the agent; the one that comes with the package if left out.
-        any_arm: Whether it may play on an arm that it was not trained for.
-        hash: The first twelve digits of the agent's hash, to insist on; in results those of the agent that played.
+        any_arm: Whether it may control an arm that it was not trained for.
+        hash: The first twelve digits of the agent's hash; another agent is refused. Results contain the actual ones.
         given: An agent in memory, in place of a file.
 
     Raises:
@@ -79,7 +79,7 @@ class RecurrentPolicy(Corrected):
     any_arm: bool = False
     hash: str | None = None
 
-    #: What the file describes.
+    #: The description and the network in the file.
     processing: Recurrent = dataclasses.field(init=False, repr=False)
     network: GatedNetwork = dataclasses.field(init=False, repr=False)
     given: dataclasses.InitVar[AgentFile | None] = dataclasses.field(default=None, kw_only=True)
@@ -124,7 +124,7 @@ class RecurrentPolicy(Corrected):
     ) -> RecurrentMemory:
         """See :meth:`Corrected.learn`."""
         kept = own._replace(**{name: getattr(own, name).copy() for name in own._fields[3:]})
-        remember_rows(
+        filter_rows(
             self.problem.model.chain,
             self.network.constants,
             (self.processing.gap, self.processing.start**2),

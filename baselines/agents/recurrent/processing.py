@@ -23,10 +23,10 @@ class Recurrent(Processing):
 
     Args:
         base_policy: The policy that is corrected.
-        zero: Standard deviation of the joint zeros before anything is measured, in [rad] or [m].
+        zero: Prior standard deviation of the joint zeros, in [rad] or [m].
         link: The same of each part of the offsets from joint to joint, and of the tool point, in [m].
         axis: The same of each of the two tilts of an axis, in [rad].
-        start: How far from its reference the arm begins an episode, as a standard deviation in [m] and [rad].
+        start: Standard deviation of the pose error at the start of an episode, in [m] and [rad].
         gap: Smallest number of steps between two measurements that the filter uses.
 
     Raises:

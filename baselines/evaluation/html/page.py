@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import functools
 import importlib.resources
 import json
 import math
@@ -11,17 +12,42 @@ from collections.abc import Iterable, Sequence
 from html import escape
 from typing import Any
 
-from baselines.canonical import canonical
-from baselines.evaluation.html.entries import Entry, entries
+from baselines.evaluation import report
 from baselines.evaluation.html.series import BUDGET, thinned
-from baselines.evaluation.html.table import table
 from baselines.evaluation.jobs import Skipped
-from baselines.evaluation.metrics import Row
-from baselines.evaluation.report import NOTHING, machine_in_words, remarks
 from baselines.evaluation.results import Results
+from baselines.evaluation.summary import Summary, by_scenario
+from baselines.evaluation.table import NOTHING, Column, html
 
 #: A placeholder in the template.
 PLACE = re.compile(r"\[\[(\w+)\]\]")
+
+
+COLUMNS = (
+    report.RATIO,
+    Column(
+        "95 %",
+        "",
+        lambda s: s.interval[0] if s.cost_ratio and s.interval else None,
+        text=lambda s: report.interval_text(s.interval if s.cost_ratio else None),
+        about="interval of the mean cost ratio over the episodes",
+    ),
+    Column("worst", "", lambda s: s.cost_ratio and s.cost_ratio.worst, about="largest cost ratio of an episode"),
+    report.TOTAL,
+    *report.ERRORS,
+    *(
+        Column(f"at {limit}", "", functools.partial(Summary.total, column=f"steps_at_{kind}_limit"), about=about)
+        for limit, kind, about in (
+            ("stop", "joint", "steps in which a stop held a joint back"),
+            ("q̇ limit", "velocity", "steps in which a velocity limit held a joint back"),
+            ("q̈ limit", "acceleration", "steps in which an acceleration limit held a joint back"),
+        )
+    ),
+    *report.TIMES,
+    report.EPISODES,
+    report.LOST,
+    report.STATUS,
+)
 
 
 def page(results: Results, skipped: Sequence[Skipped] = (), *, command: str, date: datetime.datetime) -> bytes:
@@ -36,19 +62,22 @@ def page(results: Results, skipped: Sequence[Skipped] = (), *, command: str, dat
     Raises:
         ResultsError: A trajectory log is damaged.
     """
-    from plotly.offline import get_plotlyjs  # not for those who only want rows
+    from plotly.offline import get_plotlyjs  # slow to import, and not needed for rows
 
     rows = results.rows
-    shown = entries(rows)
-    said = [*remarks(rows), *(f"skipped: {one.policy} in {one.scenario}: {one.reason}" for one in skipped)]
+    shown = [summary for some in by_scenario(rows).values() for summary in some]
+    scenarios = list(dict.fromkeys(one.first.scenario for one in shown))
+    numbers = {"scenarios": len(scenarios), "policies": len({one.label for one in shown}), "episodes": len(rows)}
     parts = {
         "style": _file("page.css"),
-        "title": escape(", ".join(dict.fromkeys(one.scenario for one in shown))),
-        "subtitle": f"{_count(rows, shown)}, finished {date:%Y-%m-%d %H:%M} UTC",
-        "table": table(shown),
-        "notes": _items(said),
-        "conditions": _items([f"command: {command}", *_machines(rows)]),
-        "parameters": _items(f"{one.policy} in {one.scenario}: {_parameters(one)}" for one in shown),
+        "title": escape(", ".join(scenarios)),
+        "subtitle": f"{', '.join(f'{name}: {n}' for name, n in numbers.items())}; {date:%Y-%m-%d %H:%M} UTC",
+        "table": html(COLUMNS, shown),
+        "notes": _items(
+            [*report.remarks(rows), *(f"skipped: {one.policy} in {one.scenario}: {one.reason}" for one in skipped)]
+        ),
+        "conditions": _items([f"command: {command}", *report.machines(rows)]),
+        "parameters": _items(f"{one.label} in {one.first.scenario}: {_parameters(one)}" for one in shown),
         "data": embedded(data(results, shown)),
         "datatables": _file("datatables.min.js"),
         "plotly": get_plotlyjs(),
@@ -57,31 +86,31 @@ def page(results: Results, skipped: Sequence[Skipped] = (), *, command: str, dat
     return PLACE.sub(lambda found: parts[found[1]], _file("template.html")).encode()
 
 
-def data(results: Results, all_entries: Sequence[Entry]) -> list[dict[str, Any]]:
-    """The data of the plots: costs, times and the thinned trajectory log of each entry.
+def data(results: Results, summaries: Sequence[Summary]) -> list[dict[str, Any]]:
+    """The data of the plots: costs, times and the thinned trajectory log of each summary.
 
     Args:
         results: The folder.
-        all_entries: The lines of the table.
+        summaries: The lines of the table.
 
     Raises:
         ResultsError: A trajectory log is damaged.
     """
-    logged = [entry for entry in all_entries if results.series_file(entry.rows[0]).exists()]
+    logged = [one for one in summaries if results.series_file(one.first).exists()]
     return [
         {
-            "scenario": entry.scenario,
-            "policy": entry.policy,
-            "reference": entry.reference,
-            "quantity": entry.quantity,
-            "value": _finite((entry.summary.cost_ratio or entry.summary.total_cost).mean),
-            "low": _finite(entry.interval[0]) if entry.interval else None,
-            "high": _finite(entry.interval[1]) if entry.interval else None,
-            "time": entry.summary.time_p50_us,
-            "seed": entry.rows[0].seed,
-            "series": thinned(results.series(entry.rows[0]), BUDGET // len(logged)) if entry in logged else None,
+            "scenario": one.first.scenario,
+            "policy": one.label,
+            "reference": one.reference,
+            "quantity": "cost ratio" if one.cost_ratio else "total cost",
+            "value": _finite((one.cost_ratio or one.total_cost).mean),
+            "low": one.interval and _finite(one.interval[0]),
+            "high": one.interval and _finite(one.interval[1]),
+            "time": one.median("time_p50_us"),
+            "seed": one.first.seed,
+            "series": thinned(results.series(one.first), BUDGET // len(logged)) if one in logged else None,
         }
-        for entry in all_entries
+        for one in summaries
     ]
 
 
@@ -103,22 +132,5 @@ def _items(texts: Iterable[str]) -> str:
     return "".join(f"<li>{escape(text)}</li>" for text in texts)
 
 
-def _count(rows: Sequence[Row], shown: Sequence[Entry]) -> str:
-    """Numbers of scenarios, policies and episodes, in words."""
-    numbers = {
-        "scenario": len({one.scenario for one in shown}),
-        "policy": len({one.policy for one in shown}),
-        "episode": len(rows),
-    }
-    plural = {"policy": "policies"}
-    return ", ".join(f"{n} {name if n == 1 else plural.get(name, name + 's')}" for name, n in numbers.items())
-
-
-def _machines(rows: Sequence[Row]) -> list[str]:
-    different = list({canonical(row.machine): row.machine for row in rows}.values())
-    warning = ["The rows were measured on different machines: their times cannot be compared."]
-    return [f"machine: {machine_in_words(one)}" for one in different] + warning * (len(different) > 1)
-
-
-def _parameters(entry: Entry) -> str:
-    return ", ".join(f"{name}={value}" for name, value in entry.summary.parameters.items()) or NOTHING
+def _parameters(summary: Summary) -> str:
+    return ", ".join(f"{name}={value}" for name, value in summary.first.parameters.items()) or NOTHING

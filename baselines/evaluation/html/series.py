@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from baselines.evaluation.trajectory_log import FRAMES, TrajectoryLog, frame_rows
+from baselines.evaluation.export import FRAMES, TrajectoryLog, frame_rows
 from ikgym.validation import FloatArray
 
 #: Bytes that the series of a page may take together, as far as each of them has :data:`FEWEST` rows.
@@ -24,15 +24,15 @@ def thinned(log: TrajectoryLog, size: int) -> dict[str, Any]:
     """A log at some of its steps, such that no peak is lost: between two of them, the worst is shown.
 
     Args:
-        log: See :func:`baselines.evaluation.trajectory_log.trajectory_log`.
+        log: See :func:`baselines.evaluation.export.trajectory_log`.
         size: Bytes that it may take as text.
 
     Returns:
         ``arrays`` as :func:`encoded` gives them: ``time``, ``nominal`` positions, ``points`` of the links from the base
         to the tool, ``rotation`` of the tool, and ``q`` at the frames that are kept; of all steps since the one before,
         the largest errors, the ``qdot`` and ``qddot`` that are largest in magnitude, and the worst ``limit``. Besides
-        how many steps there were (``rows``), the limits, which joints are prismatic, and which of the points stand for
-        a joint's end (``joint_ends``). Without what a replay needs where the log has no frames.
+        how many steps there were (``rows``), the limits, which joints are prismatic, and which points are ends of
+        joints (``joint_ends``). A log without frames has no data for a replay.
     """
     frames = log.get("frame", frame_rows(len(log["time"]), FRAMES))
     picked = frame_rows(len(frames), max(FEWEST, size // _row_size(log["q"].shape[1])))
@@ -96,5 +96,5 @@ def _links(log: TrajectoryLog, picked: npt.NDArray[np.int64]) -> tuple[npt.NDArr
 
 
 def _listed(values: FloatArray) -> list[float | None]:
-    """Limits as JSON; None stands for none."""
+    """Limits as JSON; None if there is none."""
     return [value if math.isfinite(value) else None for value in values.tolist()]

@@ -1,4 +1,4 @@
-"""How all plots look, and how they get on disk."""
+"""The style of all plots, and their files."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.ticker import MaxNLocator
 
-# Okabe and Ito's colours, which the colour-blind can tell apart, without their yellow, which is lost on white.
+# Okabe and Ito's colours, which colour-blind readers can distinguish, without yellow, which is invisible on white.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7A4B1E", "#222222")
 DASHES = ("-", "--", ":")
 INK, STEEL, MIST = "#222222", "#6e6e6e", "#dddddd"
@@ -27,7 +27,7 @@ LETTERS, LINE = 115, 10  # small ones that fit the width, and those that a legen
 
 
 def figure(height: float, width: float = WIDTH) -> Figure:
-    """An empty figure, without pyplot, which would reach for a window system and keep figures alive.
+    """An empty figure, without pyplot, which needs a window system and keeps figures alive.
 
     Args:
         height: In [in].
@@ -39,7 +39,7 @@ def figure(height: float, width: float = WIDTH) -> Figure:
 
 
 def png(drawn: Figure) -> bytes:
-    """The picture; always the same bytes for the same figure."""
+    """The figure as PNG; the same bytes for the same figure."""
     # `savefig` would draw a figure with a layout engine twice, the first time to have it laid out, which one drawing
     # does as well.
     canvas: Any = drawn.canvas
@@ -50,7 +50,7 @@ def png(drawn: Figure) -> bytes:
 
 
 def small_png(drawn: Figure) -> bytes:
-    """The picture with a palette, a third as large: for those that lie in the tree."""
+    """The figure as PNG with a palette, a third as large, for files under version control."""
     out = io.BytesIO()
     PIL.Image.open(io.BytesIO(png(drawn))).convert("RGB").quantize(256).save(out, format="png", optimize=True)
     return out.getvalue()
@@ -80,7 +80,7 @@ def looks(number: int) -> dict[str, Any]:
 
 
 def legend(drawn: Figure, title: str, handles: Sequence[Artist], names: Sequence[str]) -> None:
-    """Title and legend above all axes, where they cover nothing."""
+    """Title and legend above all axes."""
     lengths = [len(re.sub(r"\$[^$]*\$", "qi", name)) + LINE for name in names]  # formulas are short once typeset
     # A legend fills its columns one after the other, each as wide as its longest name.
     fits = (n for n in range(len(names), 0, -1) if sum(map(max, np.array_split(lengths, n))) <= LETTERS)

@@ -15,20 +15,20 @@ from ikgym.validation import FloatArray
 
 Series = Mapping[str, npt.NDArray[Any]]
 
-#: Policies that can be told apart in one picture.
+#: Most policies that can be distinguished in one plot.
 MOST = len(style.COLOURS)
-# Errors below leave the picture: rounding errors say nothing and would flatten all else.
+# Errors below are rounding, which would flatten the other curves.
 SMALLEST = 1e-10  # [m] and [rad]
 COLUMNS = 3
 
 
 def draw(title: str, logs: Sequence[tuple[str, Series]]) -> Figure:
-    """The picture.
+    """The plot.
 
     Args:
         title: Stands above it.
         logs: Names of policies, those of references with a star at the end, and the logs of their episodes;
-            at most :data:`MOST`. A later one is drawn wider and below those before, so that all are seen where
+            at most :data:`MOST`. A later one is drawn wider and below those before, so that all are visible where
             they agree.
     """
     first = logs[0][1]
@@ -74,7 +74,7 @@ def coordinate_labels(coordinates: int) -> list[str]:
 
 
 def _draw_errors(axes: Axes, errors: Sequence[tuple[str, FloatArray]], time: FloatArray) -> None:
-    """Errors of all policies; of references, whose errors are rounding, what is as large as those of the others."""
+    """Errors of all policies; those of references, which are rounding errors, may be below the axis."""
     contenders = [error for name, error in errors if not name.endswith("*")] or [error for _, error in errors]
     lowest = max(SMALLEST, 0.5 * min(float(np.percentile(error, 1)) for error in contenders))
     axes.set_yscale("log")
@@ -93,7 +93,7 @@ def _width(number: int, of: int) -> float:
 
 
 def _limit(axes: Axes, nominal: FloatArray, actual: Sequence[FloatArray]) -> None:
-    """Shows the nominal in full, and of those who have lost it no more than half its range beyond."""
+    """Shows the nominal in full, and of policies that have lost it at most half its range beyond."""
     low, high = float(nominal.min()), float(nominal.max())
     span = max(high - low, 1e-2)
     low = max(low - 0.5 * span, min(low, *(float(values.min()) for values in actual)))

@@ -20,8 +20,7 @@ from baselines.solvers.receding_horizon.descent import (
     stop_test,
     take_step,
 )
-from baselines.solvers.receding_horizon.horizon import analytic_gradient, difference_gradient
-from baselines.solvers.receding_horizon.problem_data import ProblemData
+from baselines.solvers.receding_horizon.horizon import ProblemData, analytic_gradient, difference_gradient
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.jit import kernel
 from ikgym.validation import FloatArray, known_name, number, whole_number

@@ -1,4 +1,13 @@
-"""Receding horizon, minimised to its optimum by Newton's method."""
+"""Receding horizon, minimised to its optimum by Newton's method.
+
+Initial guesses and restart candidates are worth their time. Without one of them `rhc_foresight` costs so many times as
+much on 53 and 58 validation episodes of `varga7-pose-random` and `varga7-random` (geometric mean, 95 % interval):
+``restart_steps=0`` 1.10 (1.03 to 1.20) and 2.7 (1.7 to 4.8), ``starts=1`` 1.03 (1.01 to 1.05) and 1.10 (1.03 to 1.21).
+``start_steps=0`` costs 0.998 (0.996 to 0.9995) and 0.98 (0.94 to 1.01) times as much, but its first call takes 22 ms of
+CPU time instead of 0.8. ``recovery_steps=0`` costs 1.000 and 1.01 (1.00 to 1.04) times as much on the trajectory; from
+0.5 rad off it in all joints 36 of 48 episodes are back within 500 steps, instead of 48, at 2.9 (2.2 to 4.1) times the
+cost.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +28,7 @@ from ikgym.validation import FloatArray, number, whole_number
 
 # What the kernel's counters and random numbers can hold.
 MOST = 2**31 - 1
-LEAST = {"starts": 1, "restart_steps": 0, "restart_rate": 1, "seed": 0, "start_steps": 0, "recovery_steps": 0}
+LEAST = {"starts": 1, "restart_steps": 0, "seed": 0, "start_steps": 0, "recovery_steps": 0}
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -28,7 +37,7 @@ class RecedingHorizon(CompiledPolicy):
 
     The unknowns are the joint coordinates at the knots of the horizon. In them the Hessian is block-tridiagonal, so
     that a damped Newton step costs time linear in the number of knots. The kinks of the cost, on which minima often
-    lie, and the limits are held by multipliers, see :mod:`newton.augmented_lagrangian`. The plan of one period, shifted
+    lie, and the limits are held by multipliers, see :mod:`newton.terms`. The plan of one period, shifted
     by one step, is the warm start of the next.
 
     To convergence (``iterations=None``) the plan is a local minimum of the horizon's cost, found with the exact Hessian
@@ -58,8 +67,8 @@ class RecedingHorizon(CompiledPolicy):
         starts: Initial guesses from which the first plan of an episode is chosen: damped least squares from knot to
             knot, and with more than one the others with a random drift in the null space and random damping.
         restart_steps: Newton steps of a restart candidate: a second plan, which branches off at a random knot into a
-            random guess, and replaces the plan when it is cheaper after its last step. 0 for none.
-        restart_rate: Newton steps of the restart candidate in one control period.
+            random guess, has one Newton step a control period, and replaces the plan when it is cheaper after its last
+            step. 0 for none.
         seed: Of the random guesses, which are the same in all episodes.
         start_steps: Newton steps of an initial guess in a period, where they are spread over the first periods: the
             first plan comes from the first guess, with its steps shared by the first two periods, and each of
@@ -85,7 +94,6 @@ class RecedingHorizon(CompiledPolicy):
     stop_at_end: bool = False
     starts: int = 1
     restart_steps: int = 0
-    restart_rate: int = 1
     seed: int = 0
     start_steps: int = 0
     recovery_steps: int = 0
@@ -130,7 +138,6 @@ class RecedingHorizon(CompiledPolicy):
             tolerance,
             self.starts,
             self.restart_steps,
-            self.restart_rate,
             self.seed,
             self.start_steps,
             self.recovery_steps,

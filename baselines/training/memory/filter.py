@@ -69,7 +69,7 @@ def describe(surprise: Tensor, loaded: Tensor, spread: Tensor, steps: Tensor) ->
     return torch.cat([shown, along, *logs, steps.log()[:, None] / kernels.SPAN], 1)
 
 
-def believe(output: Tensor) -> tuple[Tensor, Tensor]:
+def interpret(output: Tensor) -> tuple[Tensor, Tensor]:
     """Variances of the noises, of shape (B, 6), and of changes of the joint zeros, of shape (B, 2)."""
     scale = (kernels.MOST * torch.tanh(output.double() / kernels.MOST)).exp()
     noise = scale[:, :2] * torch.tensor([kernels.POSITION_NOISE, kernels.ROTATION_NOISE], dtype=torch.float64)
@@ -118,7 +118,7 @@ def errors(network: Recurrence, processing: Recurrent, measured: Measurements) -
         output, fresh = network(features, hidden)
         hidden = [torch.where(arrived[:, None], new, old) for new, old in zip(fresh, hidden, strict=True)]
         before.append(measured.true[:, k] - _product(rate, parameters))
-        noise, change = believe(output)
+        noise, change = interpret(output)
         pair = rate, measured.error[:, k]
         parameters, covariance = _absorbed(pair, noise, change, arrived, parameters, covariance)
         after.append(measured.true[:, k] - _product(rate, parameters))

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import copy
+import itertools
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -12,16 +14,16 @@ from torch import Tensor, nn
 
 from baselines.agents.bilinear.processing import Bilinear
 from baselines.agents.files import AgentFile, agent_of, load_agent
-from baselines.training.config.apg import APG
-from baselines.training.errors import TrainingError
+from baselines.training.config import APG, Activation, TrainingError
+from baselines.training.exporting import ACTIVATIONS, runtime
 from baselines.training.gradients.arms import Arms
 from baselines.training.gradients.law import Law
-from baselines.training.methods import SegmentMetrics
-from baselines.training.networks import new_actor, runtime
 from baselines.training.randomness import sequence
-from baselines.training.trainers.actor_only import ActorTrainer
+from baselines.training.trainers.base import ActorTrainer, SegmentMetrics
 from ikgym.scenarios import Scenario
 
+#: Factor of the first weights of the last layer.
+QUIET = 0.01
 #: Norm at which gradients with respect to joint coordinates are clipped: longer ones have overflowed.
 OVERFLOW = 1e30
 
@@ -30,9 +32,9 @@ class APGTrainer(ActorTrainer):
     """See :class:`APG`. `policy` is the average of the actor, whose weights Adam changes.
 
     Args:
-        config: Of the method.
+        config: The options of the method.
         scenario: The scenario to train on.
-        seed: Of the run.
+        seed: The seed of the run.
 
     Raises:
         InvalidInputError: The scenario's plant is not ideal.
@@ -91,7 +93,7 @@ class APGTrainer(ActorTrainer):
         """Moves all arms through a window; their states at its start are constants for the gradient.
 
         All steps of an episode in it have the same weight, from the cost of the episode at the end of the window.
-        Weights from the cost before each step would favour the way into a costly passage over the passage itself.
+        Weights from the cost before each step would favour the approach to a costly passage over the passage itself.
 
         Args:
             steps: A multiple of `hold`.
@@ -103,7 +105,8 @@ class APGTrainer(ActorTrainer):
         config, arms, total, given_up = self._config, self._arms, torch.zeros((), dtype=torch.float64), 0
         spent = torch.zeros(config.n_envs, dtype=torch.float64)  # in this window, each arm in its episode
         arms.q, arms.qdot = arms.q.detach(), arms.qdot.detach()
-        most, precision = config.max_gradient_share * config.hold / (config.n_envs * steps), self._precision
+        most = config.max_gradient_share * config.hold / (config.n_envs * steps)
+        precision = next(self._actor.parameters()).dtype
         for _ in range(steps // config.hold):
             over = torch.from_numpy(self._lost | arms.ended)
             if over.any():
@@ -131,17 +134,12 @@ class APGTrainer(ActorTrainer):
 
     @property
     def _lost(self) -> npt.NDArray[np.bool_]:
-        """Which arms are too far from their paths. Shape (N,)."""
+        """Which arms are too far from their references. Shape (N,)."""
         lost: npt.NDArray[np.bool_] = self._far > self._farthest
         return lost
 
-    @property
-    def _precision(self) -> torch.dtype:
-        """Of the actor's weights."""
-        return next(self._actor.parameters()).dtype
-
     def _average(self) -> None:
-        """Moves the average towards the actor, at first faster."""
+        """Moves the average towards the actor, faster at first."""
         kept = min(self._config.averaging, (1.0 + self._updates) / (10.0 + self._updates))
         self._updates += 1
         with torch.no_grad():
@@ -150,7 +148,7 @@ class APGTrainer(ActorTrainer):
 
 
 def _limited(tensor: Tensor, most: float) -> Tensor:
-    """The same numbers, whose gradients are clipped row by row at a norm; values that overflowed count as 0."""
+    """The same tensor, with gradients clipped row by row at a norm; gradients that overflowed count as 0."""
 
     def cut(gradient: Tensor) -> Tensor:
         finite = gradient.nan_to_num(0.0, 0.0, 0.0)
@@ -164,7 +162,7 @@ def _limited(tensor: Tensor, most: float) -> Tensor:
 
 
 def _load_weights(policy: nn.Sequential, config: APG) -> None:
-    """Gives a network the weights of the agent in `init`.
+    """Loads the weights of the agent in `init`.
 
     Raises:
         ResultsError: The file cannot be read.
@@ -180,3 +178,18 @@ def _load_weights(policy: nn.Sequential, config: APG) -> None:
     with torch.no_grad():
         for parameter, tensor in zip(policy.parameters(), agent.network.tensors.values(), strict=True):
             parameter.copy_(torch.from_numpy(tensor.copy()))
+
+
+def new_actor(sizes: Sequence[int], activation: Activation) -> nn.Sequential:
+    """Linear layers with activations between them, whose first outputs are almost 0.
+
+    Args:
+        sizes: Numbers of inputs, of neurons of the hidden layers, and of outputs.
+        activation: Activation of the hidden layers.
+    """
+    layers = [nn.Linear(inputs, outputs) for inputs, outputs in itertools.pairwise(sizes)]
+    with torch.no_grad():
+        layers[-1].weight.mul_(QUIET)
+        layers[-1].bias.zero_()
+    hidden = [module for layer in layers[:-1] for module in (layer, ACTIVATIONS[activation]())]
+    return nn.Sequential(*hidden, layers[-1])

@@ -9,13 +9,12 @@ import numpy as np
 import torch
 
 from baselines.agents.files import AgentFile, agent_of
-from baselines.training.config.observe import Observe
+from baselines.training.config import Observe
 from baselines.training.memory.episodes import Measurements, draw_plant, joined, measure, taken
 from baselines.training.memory.filter import Gated, loss
 from baselines.training.memory.rewards import explored, surrogate
-from baselines.training.methods import SegmentMetrics
 from baselines.training.randomness import episode_seed, sequence
-from baselines.training.trainers.actor_only import ActorTrainer
+from baselines.training.trainers.base import ActorTrainer, SegmentMetrics
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels import tasks as task_kernels
 from ikgym.scenarios import Scenario
@@ -25,12 +24,12 @@ class ObserveTrainer(ActorTrainer):
     """See :class:`Observe`.
 
     Args:
-        config: Of the method.
-        scenario: Whose arm and paths plants are drawn for.
-        seed: Of the run.
+        config: The options of the method.
+        scenario: The scenario with the arm and the paths.
+        seed: The seed of the run.
 
     Raises:
-        InvalidInputError: The task does not show whole poses.
+        InvalidInputError: The task coordinates are not whole poses.
     """
 
     _config: Observe
@@ -39,7 +38,7 @@ class ObserveTrainer(ActorTrainer):
     def __init__(self, config: Observe, scenario: Scenario, seed: int) -> None:
         if scenario.task.kind != task_kernels.POSE:
             raise InvalidInputError(
-                f"task: expected pose, whose errors are those of position and rotation, got {scenario.task.name!r}."
+                f"task: expected pose, with errors of position and rotation, got {scenario.task.name!r}."
             )
         network = Gated(config.processing.sizes(config.hidden))
         super().__init__(config, scenario, seed, network, network)

@@ -15,15 +15,15 @@ from stable_baselines3.common.noise import NormalActionNoise
 
 import ikgym.sb3
 from baselines.agents.files import AgentFile
-from baselines.training.config.reinforcement import Reinforcement
+from baselines.training.config import Reinforcement
 from baselines.training.exporting import exported
-from baselines.training.methods import SegmentMetrics, Trainer
 from baselines.training.randomness import episode_seed, sequence
+from baselines.training.trainers.base import SegmentMetrics, Trainer
 from ikgym.scenarios import Scenario
 from ikgym.validation import known_names
 
 ALGORITHMS: dict[str, type[BaseAlgorithm]] = {"ppo": PPO, "sac": SAC, "td3": TD3}
-#: Parameters of the algorithms that a run sets itself.
+#: Parameters of the algorithms that are no options.
 OWN = ("self", "policy", "env", "seed", "device", "verbose", "tensorboard_log", "_init_setup_model")
 
 
@@ -31,13 +31,13 @@ class SB3Trainer(Trainer):
     """Calls `learn` once a segment. New episodes begin in each, so that a segment depends on the model alone.
 
     Args:
-        config: Of PPO, SAC or TD3.
+        config: The options of PPO, SAC or TD3.
         scenario: The scenario to train on.
-        seed: Of the run.
+        seed: The seed of the run.
 
     Raises:
         UnknownNameError: The algorithm has no such setting.
-        InvalidInputError: Agents cannot see what the environment shows, such as a history.
+        InvalidInputError: Agents do not support the observation, such as a history.
     """
 
     def __init__(self, config: Reinforcement, scenario: Scenario, seed: int) -> None:
@@ -66,8 +66,10 @@ class SB3Trainer(Trainer):
         model.set_random_seed(int(sequence(self._seed, number).generate_state(1)[0]))
         self._envs.seed(episode_seed(self._seed, number, config.n_envs))
         target = config.total_timesteps * (number + 1) // config.segments
+        self._log.values.clear()
         if model.num_timesteps < target:
             model.learn(target - model.num_timesteps, reset_num_timesteps=False)
+            model.logger.dump()  # metrics of the last update, which Stable-Baselines3 keeps for the next rollout
         return {name: float(value) for name, value in self._log.values.items() if isinstance(value, (int, float))}
 
     def agent(self, training: dict[str, Any] | None = None) -> AgentFile:

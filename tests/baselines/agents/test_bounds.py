@@ -37,9 +37,6 @@ def test_actions_are_kept_within_the_velocity_box():
         inside = wanted == asked[row] * problem.velocity_limit
         assert np.array_equal(kept[row, inside], asked[row, inside])
     assert np.isnan(kept[0, 3])
-
-
-def test_an_arm_without_limits_has_no_bounds():
     assert Bounds.of(Problem.of(scenarios.get("varga7-pose-random"))) is None
 
 

@@ -54,15 +54,7 @@ def test_round_trip(agent, tmp_path):
     content = file.read_bytes()
     save_agent(file, read)
     assert file.read_bytes() == content
-    assert list(tmp_path.iterdir()) == [file]
-
-
-def test_the_description(file):
-    agent = load_agent(file, KINDS)
-    assert agent.about["scenario"] == {"name": "varga7-pose-random", "fingerprint": fingerprint(SCENARIO)}
-    assert agent.about["training"] == {"seed": 1}
-    assert (agent.about["joints"], agent.about["task"]["name"]) == (7, "pose")
-    assert agent.digits == agent.hash[:12]
+    assert read.about["scenario"] == {"name": "varga7-pose-random", "fingerprint": fingerprint(SCENARIO)}
 
 
 def test_other_agents_have_other_hashes():
@@ -85,7 +77,7 @@ def test_training_has_to_be_json(training):
 def test_changed_bytes_are_noticed(file):
     content, rng = file.read_bytes(), np.random.default_rng(0)
     header = 8 + int.from_bytes(content[:8], "little")
-    for place in {*range(12), *rng.integers(header, size=60).tolist(), *rng.integers(len(content), size=60).tolist()}:
+    for place in {*range(12), *rng.integers(header, size=20).tolist(), *rng.integers(len(content), size=20).tolist()}:
         spoilt = bytearray(content)
         spoilt[place] ^= 1
         file.write_bytes(spoilt)
@@ -108,9 +100,6 @@ def parts(file):
         (lambda t, a: a["processing"].update(kind="raw"), "kind bilinear or relative or recurrent, got 'raw'"),
         (lambda t, a: a["processing"].update(future=1), "no field of the processing 'future'"),
         (lambda t, a: a["processing"].update(offsets=[2, 1]), "rising steps ahead"),
-        (lambda t, a: a["processing"].update(offsets=None), "rising steps"),
-        (lambda t, a: a["processing"].update(bilinear=True), "joint velocities as network outputs"),
-        (lambda t, a: a.update(scenario="x"), "indices"),
         (lambda t, a: a["network"].update(activation="gelu"), "no activation 'gelu'"),
         (lambda t, a: a["network"].update(sizes=[10**12, 10**12]), "tensors: expected float32 of the shapes"),
         (lambda t, a: a.update(joints=6), "changed after it was written"),
@@ -130,21 +119,14 @@ def header(text):
     return struct.pack("<Q", len(text)) + text
 
 
-HUGE = {"dtype": "F32", "shape": [10**9, 10**9], "data_offsets": [0, 4]}
-
-
 @pytest.mark.parametrize(
     "content",
     [
         b"",
         b"\xff" * 8 + b"{}",
-        header(b"abcd"),
         header(b"[" * 10**5),
         header(b"{}"),
-        header(b"[]"),
-        header(json.dumps({"__metadata__": {"ikgym": "[" * 10**5}}).encode()),
         header(json.dumps({"__metadata__": {"ikgym": "[]"}}).encode()),
-        header(json.dumps({"__metadata__": {"ikgym": "{}"}, "a": HUGE}).encode()) + b"1234",
     ],
 )
 def test_other_files_are_refused(content, file):
@@ -170,8 +152,6 @@ def test_processings_are_checked():
         Relative((1, 2), 0.0)
     with pytest.raises(InvalidInputError, match="offsets: expected at least two"):
         Relative((1,), 5.0)
-    older = {**Relative((2, 5), 5.0).to_json(), "bilinear": False}
-    assert Relative.from_json(older) == Relative((2, 5), 5.0)
     with pytest.raises(InvalidInputError, match="damping: expected it together with predicted rates"):
         Bilinear.from_json({"damping": 1e-2})  # of a version that knew other joint rates
     with pytest.raises(UnknownNameError, match="no activation 'relo'"):

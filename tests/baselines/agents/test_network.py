@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from baselines.agents.network import ACTIVATIONS, SQUASHES, Network
-from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.exceptions import InvalidInputError
 from tests.baselines.random_agents import network
 from tests.comparison import identical
 
@@ -24,7 +24,7 @@ SIZES = [(5, 3), (1, 1), (7, 8, 2), (76, 33, 31, 7), (17, 256, 6)]
 
 
 def written_out(net, features):
-    """The answers in float64, as NumPy has them."""
+    """The outputs in float64, by NumPy."""
     x = features.astype(np.float64)
     for weights, biases in zip(net.weights[:-1], net.biases[:-1], strict=True):
         x = FORMULAS[net.activation](x @ weights.T.astype(np.float64) + biases)
@@ -37,16 +37,15 @@ def features(rows, size, seed=1):
 
 
 @pytest.mark.parametrize("sizes", SIZES, ids=str)
-@pytest.mark.parametrize("squash", SQUASHES)
 @pytest.mark.parametrize("activation", ACTIVATIONS)
-def test_answers_are_those_of_the_formula(activation, squash, sizes):
-    net = network(sizes, activation, squash)
-    x = features(50, sizes[0])
-    answers = net.forward(x)
-    assert answers.dtype == np.float32
-    np.testing.assert_allclose(answers, written_out(net, x), rtol=1e-5, atol=1e-5)
-    assert np.abs(answers).max() <= 1.0 or squash == "linear"
-    assert np.ptp(answers) > 0.5
+def test_outputs_are_those_of_the_formula(activation, sizes):
+    for squash in SQUASHES:
+        net, x = network(sizes, activation, squash), features(50, sizes[0])
+        outputs = net.forward(x)
+        assert outputs.dtype == np.float32
+        np.testing.assert_allclose(outputs, written_out(net, x), rtol=1e-5, atol=1e-5)
+        assert np.abs(outputs).max() <= 1.0 or squash == "linear"
+        assert np.ptp(outputs) > 0.5
 
 
 @pytest.mark.parametrize("activation", ACTIVATIONS)
@@ -64,12 +63,8 @@ def test_extreme_numbers():
     for activation in ACTIVATIONS:
         net = network((4, 8, 2), activation, "clip")
         assert np.abs(net.forward(np.full((1, 4), 1e30, dtype=np.float32))).max() <= 1.0
-        assert np.isfinite(net.forward(np.full((1, 4), -1e30, dtype=np.float32))).all()
-
-
-def test_a_sum_that_overflows_is_no_answer():
     net = Network((np.array([[3e38, 3e38], [3e38, -3e38]]), np.ones((1, 2))), (np.zeros(2), np.zeros(1)), "linear")
-    assert np.isnan(net.forward(np.array([[-3e38, 3e38]], dtype=np.float32))).all()
+    assert np.isnan(net.forward(np.array([[-3e38, 3e38]], dtype=np.float32))).all()  # the sum overflows
 
 
 def test_networks_are_frozen_copies():
@@ -91,26 +86,17 @@ def test_networks_are_frozen_copies():
         ((np.ones((2, 3)),), (), "got 1 and 0"),
         ((np.ones((2, 3)),), (np.ones(3),), r"weights of layer 0: expected shape \(3, 3\), got \(2, 3\)"),
         ((np.ones((2, 3)), np.ones((1, 3))), (np.ones(2), np.ones(1)), r"layer 1: expected shape \(1, 2\)"),
-        ((np.ones(3),), (np.ones(3),), "weights of layer 0: expected 2 axes"),
         ((np.ones((2, 3)),), (np.ones((2, 1)),), "biases of layer 0: expected 1 axes"),
         ((np.full((2, 3), np.nan),), (np.ones(2),), "weights of layer 0: expected finite"),
         ((np.ones((2, 3)),), (np.array([1.0, np.inf]),), "biases of layer 0: expected finite"),
-        ((np.ones((0, 3)),), (np.ones(0),), "weights of layer 0: expected shape"),
     ],
 )
-def test_what_is_no_network(weights, biases, message):
+def test_refused(weights, biases, message):
     with pytest.raises(InvalidInputError, match=message):
         Network(weights, biases)
 
 
-def test_unknown_names():
-    with pytest.raises(UnknownNameError, match=r"no activation 'relo'\. Did you mean 'relu'"):
-        network((2, 2), "relo")
-    with pytest.raises(UnknownNameError, match="no squash 'cut'"):
-        network((2, 2), "relu", "cut")
-
-
 @pytest.mark.parametrize("x", [np.ones((1, 2)), np.ones((1, 3), dtype=np.float32), np.ones(2, dtype=np.float32)])
-def test_features_of_another_shape_or_type(x):
+def test_refused_features(x):
     with pytest.raises(InvalidInputError, match=r"features: expected float32 of shape \(any, 2\), got"):
         network((2, 2)).forward(x)

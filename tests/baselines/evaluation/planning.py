@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
-from baselines.evaluation.jobs import plan
-from baselines.evaluation.options import Options
+from baselines.evaluation.jobs import Options, plan
 
 
 def planned(scenarios, policies, **options):
-    """What :func:`baselines.evaluation.jobs.plan` returns, by name."""
-    jobs, skipped = plan(scenarios, policies, Options(**options))
+    """The result of :func:`baselines.evaluation.jobs.plan`, by name."""
+    jobs, skipped = plan(Options(scenarios=scenarios, policies=policies, **options))
     return SimpleNamespace(jobs=jobs, skipped=skipped)

@@ -13,7 +13,6 @@ from baselines.evaluate import evaluate
 from baselines.evaluation import play as playing
 from baselines.evaluation.results import read_rows
 from baselines.workers import TOLERANCE, ClusterError, WorkerError, Workers
-from tests.baselines.evaluation.planning import planned
 from tests.baselines.losing import LosingCluster
 
 STEPS = 5
@@ -78,11 +77,6 @@ def test_a_unit_that_kills_every_worker_is_named_and_the_others_are_kept(pool, o
     before = len(pool.units)
     assert costs(play(cluster="ray", out=tmp_path, resume=True)) == costs(play())
     assert len(pool.units) == before + 1
-
-
-def test_blocks_of_seeds():
-    jobs = planned("varga7-random", "dls", episodes=20).jobs
-    assert [len(batch) for batch in playing.batches(jobs, playing.BLOCK)] == [1, 8, 8, 3]
 
 
 def test_another_version_of_the_code_is_refused(pool, monkeypatch):

@@ -2,10 +2,7 @@ import csv
 import dataclasses
 import json
 import pathlib
-import pickle
 import re
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -14,22 +11,19 @@ import baselines
 import ikgym
 from baselines.cli.evaluate import main
 from baselines.evaluate import evaluate
-from baselines.evaluation import results as results_module
 from baselines.evaluation import run as module
-from baselines.evaluation import test_sets
-from baselines.evaluation.machine import describe
-from baselines.evaluation.metrics import TIME_COLUMNS, Row
-from baselines.evaluation.options import Options
-from baselines.evaluation.play import MOST, batches, play
+from baselines.evaluation.jobs import Options
+from baselines.evaluation.metrics import TIME_COLUMNS, Row, describe
+from baselines.evaluation.play import MOST, batches
 from baselines.evaluation.results import COLUMNS, Results, read_rows
-from baselines.files import ResultsError, write
+from baselines.files import ResultsError
 from baselines.spec import parse_policy
 from ikgym.exceptions import InvalidInputError, UnknownNameError
-from ikgym.kernels import cost as cost_kernels
 from tests.baselines.evaluation.planning import planned
 
 ROOT = pathlib.Path(__file__).parents[3]
 STEPS = 15
+SET = {"test_sets": "varga7-random"}
 
 
 def timeless(rows):
@@ -72,20 +66,11 @@ def test_order_and_seeds_of_the_rows():
     assert set(rows[0].machine) == {"cpu", "cores", "system", "python", "numpy", "numba", "ikgym"}
 
 
-def test_two_runs_agree_in_all_but_the_times():
-    assert timeless(run_all()) == timeless(run_all())
-
-
 def test_a_reference_plays_the_episode_that_it_is_given():
     rows = evaluate("varga7-random", "follow_nominal", episodes=2, steps=STEPS)
     assert all(row.position_error_max < 1e-8 for row in rows)
     assert rows[0].total_cost != rows[1].total_cost
     assert all("seed" not in row.parameters for row in rows)
-
-
-def test_seeds_come_from_the_split():
-    rows = evaluate("varga7-random", "dls", episodes=2, split="train", steps=5)
-    assert [row.seed for row in rows] == [0, 1]
 
 
 def test_a_scenario_that_is_always_the_same_has_one_episode_unless_there_is_noise():
@@ -105,16 +90,6 @@ def test_all_stands_for_all():
         assert "Cartesian" in reasons[scenario, "follow_nominal"]
 
 
-def test_what_is_given_twice_is_done_once():
-    plan = planned(["varga7-fast", "varga7-fast"], ["dls", "dls:damping=1e-3", "all"])
-    assert [job.policy for job in plan.jobs].count("dls") == 1
-
-
-def test_steps_shorten_and_never_lengthen():
-    plan = planned(["varga7-fast", "zhang3-helix"], "dls", steps=1000)
-    assert [job.scenario.steps for job in plan.jobs] == [1000, 799]
-
-
 def test_policies_are_shown_what_they_ask_for():
     plan = planned("varga7-fast", ["dls", "rhc_gradient:horizon=5"])
     assert [job.preview for job in plan.jobs] == [1, 4]
@@ -128,7 +103,6 @@ def test_policies_are_shown_what_they_ask_for():
         ("dls", ("dls", {})),
         ("dls:damping=1e-2", ("dls", {"damping": 1e-2})),
         (" dls : damping = 1e-2 , gain = 0.5 ", ("dls", {"damping": 1e-2, "gain": 0.5})),
-        ("rhc_gradient:gradient=analytic,horizon=5", ("rhc_gradient", {"gradient": "analytic", "horizon": 5})),
         ("rhc_gradient:gradient='analytic'", ("rhc_gradient", {"gradient": "analytic"})),
         ("dls:damping=(1, [2, 3]),gain=1", ("dls", {"damping": (1, [2, 3]), "gain": 1})),
         (("dls", {"damping": 2.0}), ("dls", {"damping": 2.0})),
@@ -150,17 +124,26 @@ def test_text_is_never_run():
         ("varga7-fast", "dsl", {}, UnknownNameError, "no policy 'dsl'. Did you mean 'dls'"),
         ("varga7-fast", "dls:dampin=1", {}, UnknownNameError, "no parameter of dls 'dampin'. Did you mean 'damping'"),
         ("varga7-fast", "dls:damping", {}, InvalidInputError, "expected name=value,…, got 'damping'"),
-        ("varga7-fast", "dls:", {}, InvalidInputError, "expected name=value,…, got ''"),
         ("varga7-fast", "dls:damping=1,damping=2", {}, InvalidInputError, "'damping' is given twice"),
         ("varga7-fast", "dls:damping=-1", {}, InvalidInputError, "damping: expected a finite number above 0"),
-        ("varga7-fast", "dls:damping=much", {}, InvalidInputError, "above 0, got 'much'"),
         ("varga7-fast", [("dls", 3)], {}, InvalidInputError, "expected 'name:parameter=value' or"),
         ("varga7-fast", "dls", {"episodes": 0}, InvalidInputError, "episodes: expected a whole number of at least 1"),
         ("varga7-fast", "dls", {"steps": 0}, InvalidInputError, "steps: expected a whole number of at least 1, got 0"),
         ("varga7-fast", "dls", {"workers": 0}, InvalidInputError, "workers: expected a whole number of at least 1"),
         ("varga7-fast", "dls", {"preview": 0}, InvalidInputError, "preview: expected a whole number of at least 1"),
         ("varga7-fast", "dls", {"timed": 0}, InvalidInputError, "timed: expected a whole number of at least 1, got 0"),
-        ("varga7-fast", "dls", {"timed": "every"}, InvalidInputError, "timed: expected a whole number of at least 1"),
+        ("varga7-fast", "dls", {"noise_seeds": 0}, InvalidInputError, "noise_seeds: expected a whole number"),
+        ("varga7-fast", "dls", {"export": "cvs"}, UnknownNameError, "no format of export 'cvs'. Did you mean 'csv'"),
+        ("varga7-fast", "dls", {"export": "csv"}, InvalidInputError, "export: expected a folder for the files"),
+        ("varga7-fast", "dls", {"wrap": lambda env: env}, InvalidInputError, "wrap: expected a policy that uses it"),
+        ("varga7-fast", 3, {}, InvalidInputError, "expected a name, 'package.module:Class', a class, or an object"),
+        ("varga7-fast", dict, {}, InvalidInputError, "expected a class with the predict of Stable-Baselines3"),
+        ("varga7-fast", "no_such_module:Policy", {}, InvalidInputError, "No module named 'no_such_module'"),
+        ((), "dls", {"test_sets": "varga7-randm"}, UnknownNameError, "no test set 'varga7-randm'. Did you mean"),
+        ("varga7-fast", "dls", SET, InvalidInputError, "A test set defines what is played"),
+        ((), "dls", {**SET, "episodes": 2}, InvalidInputError, "A test set defines what is played"),
+        ((), "dls", {**SET, "steps": 5}, InvalidInputError, "A test set defines what is played"),
+        ((), "dls", {**SET, "noise_seeds": 2}, InvalidInputError, "A test set defines what is played"),
         ("varga7-fast", "dls", {"split": "tset"}, UnknownNameError, "no split 'tset'. Did you mean 'test'"),
         ("varga7-fast", "rhc_gradient", {"preview": 1}, InvalidInputError, "needs to be shown 2 steps ahead"),
         ("zhang3-helix", "follow_nominal", {}, InvalidInputError, "Nothing to evaluate: follow_nominal in"),
@@ -223,22 +206,10 @@ def test_episodes_that_are_to_be_timed_after_all_are_played_again(tmp_path):
 # Workers
 
 
-def test_a_job_played_elsewhere_gives_the_same_row():
-    (job,) = planned("varga7-fast", "dls", steps=STEPS).jobs
-    ((row, episode),) = play((pickle.loads(pickle.dumps(job)),))
-    assert timeless([row]) == timeless([play((job,))[0][0]])
-    assert len(episode.q) == STEPS
-
-
 def test_workers_change_nothing_but_the_times(tmp_path):
     rows = run_all(episodes=4)
     assert timeless(run_all(tmp_path, workers=2, episodes=4)) == timeless(rows)
     assert timeless(read_rows(tmp_path / "results.json")) == timeless(rows)
-
-
-def test_an_error_in_a_worker_reaches_the_user():
-    with pytest.raises(InvalidInputError, match="needs to be shown 2 steps ahead"):
-        evaluate(["varga7-fast", "varga7-slow"], "rhc_gradient", preview=1, workers=2)
 
 
 # Files
@@ -300,17 +271,6 @@ def test_results_are_never_overwritten_in_silence(tmp_path):
         run_all(tmp_path, resume=True, overwrite=True)
 
 
-def test_overwriting_removes_what_an_evaluation_wrote_and_nothing_else(tmp_path):
-    run_all(tmp_path)
-    (tmp_path / "notes.txt").write_text("mine")
-    (tmp_path / "series" / "notes.txt").write_text("mine")
-    rows = evaluate("zhang3-helix", "dls", steps=5, out=tmp_path, overwrite=True, plots=False)
-    assert read_rows(tmp_path / "results.json") == rows
-    assert not list(tmp_path.glob("series/varga7-random/*.npz"))
-    assert (tmp_path / "notes.txt").exists()
-    assert (tmp_path / "series" / "notes.txt").exists()
-
-
 def interrupted(monkeypatch, after):
     play_jobs = module.run
 
@@ -324,7 +284,7 @@ def interrupted(monkeypatch, after):
 
 
 # One episode of each policy is timed. The others of dls and moore_penrose are one batch, those of the reference two.
-@pytest.mark.parametrize(("after", "finished"), [(0, 0), (1, 1), (2, 3), (4, 6), (8, 10)])
+@pytest.mark.parametrize(("after", "finished"), [(0, 0), (2, 3), (8, 10)])
 def test_an_interrupted_run_goes_on_to_the_same_results(tmp_path, monkeypatch, after, finished):
     whole, parts = tmp_path / "whole", tmp_path / "parts"
     rows = run_all(whole, episodes=3)
@@ -342,12 +302,6 @@ def test_an_interrupted_run_goes_on_to_the_same_results(tmp_path, monkeypatch, a
         with np.load(file) as one, np.load(parts / file.relative_to(whole)) as other:
             assert set(one) == set(other)
             assert all((one[name] == other[name]).all() for name in one)
-
-
-def test_resuming_a_finished_run_plays_nothing(tmp_path, monkeypatch):
-    rows = run_all(tmp_path)
-    interrupted(monkeypatch, 0)
-    assert run_all(tmp_path, resume=True) == rows
 
 
 def test_a_trajectory_log_that_is_missing_is_played_again(tmp_path):
@@ -394,11 +348,8 @@ def test_what_cannot_be_compared_is_not_gone_on_with(tmp_path, change, options, 
     ("content", "message"),
     [
         ("", "is damaged, or was written by another version: Expecting value"),
-        ('[{"scenario": "varga7-', "Unterminated string"),
         ("{}", "expected a list of rows, got dict"),
-        ("[3]", "in row 0 expected an object with the keys of a Row, got int"),
         ('[{"scenario": "a"}]', "in row 0 the key 'policy' is missing"),
-        ("\udcff", "is damaged"),
     ],
 )
 def test_damaged_results_are_named_and_kept(tmp_path, content, message):
@@ -410,20 +361,14 @@ def test_damaged_results_are_named_and_kept(tmp_path, content, message):
     assert file.read_bytes() == content.encode("utf-8", "surrogateescape")
 
 
-def renamed(row, old, new):
-    return {(new if name == old else name): value for name, value in row.items()}
-
-
 @pytest.mark.parametrize(
     "change",
     [
-        lambda row: renamed(row, "cost_ratio", "regret"),
-        lambda row: renamed(row, "test_set", "frozen"),
         lambda row: {name: value for name, value in row.items() if name != "iterations"},
         lambda row: {**row, "qdddot_peak": 1.0},
     ],
 )
-def test_rows_of_another_version_are_refused_with_its_number(tmp_path, capsys, change):
+def test_rows_of_another_version_are_refused_with_its_number(tmp_path, change):
     arguments = {"steps": 5, "out": tmp_path, "plots": False}
     evaluate("varga7-random", "dls", **arguments)
     file = tmp_path / "results.json"
@@ -434,22 +379,11 @@ def test_rows_of_another_version_are_refused_with_its_number(tmp_path, capsys, c
     with pytest.raises(ResultsError, match=message):
         evaluate("varga7-random", "dls", resume=True, **arguments)
     assert file.read_bytes() == before
-    assert main(["--scenarios", "varga7-random", "--steps", "5", "--out", str(tmp_path), "--resume"]) == 2
-    assert capsys.readouterr().err.count("\n") == 1
     # The same in a file of this version is damage.
     file.write_text(json.dumps([change(row)]), encoding="utf-8")
     with pytest.raises(ResultsError, match=r"is damaged, .*: in row 0"):
         read_rows(file)
     assert len(evaluate("varga7-random", "dls", overwrite=True, **arguments)) == 1
-
-
-def test_a_row_that_is_there_twice_is_damage(tmp_path):
-    run_all(tmp_path)
-    file = tmp_path / "results.json"
-    content = strict_json(file)
-    file.write_text(json.dumps([*content, content[0]]), encoding="utf-8")
-    with pytest.raises(ResultsError, match="a row is there twice"):
-        read_rows(file)
 
 
 @pytest.mark.parametrize("out", ["file", "file/below"])
@@ -460,58 +394,7 @@ def test_a_folder_that_cannot_be_written_is_refused_before_any_work(tmp_path, mo
         run_all(tmp_path / out)
 
 
-def test_a_crash_while_writing_leaves_the_old_file(tmp_path, monkeypatch):
-    file = tmp_path / "results.json"
-    write(file, b"old")
-
-    def full(_):
-        raise OSError(28, "No space left on device")
-
-    for name in ("os.fsync", "pathlib.Path.replace"):
-        with monkeypatch.context() as patch:
-            patch.setattr(name, full if name == "os.fsync" else lambda *_: full(None))
-            with pytest.raises(ResultsError, match="No space left on device"):
-                write(file, b"new")
-        assert file.read_bytes() == b"old"
-        assert [p.name for p in tmp_path.iterdir()] == ["results.json"]
-    write(file, b"new")
-    assert file.read_bytes() == b"new"
-
-
-def test_results_are_on_disk_after_each_batch(tmp_path, monkeypatch):
-    lengths = []
-    add = Results.add
-
-    def watched(self, *arguments):
-        add(self, *arguments)
-        lengths.append(len(strict_json(tmp_path / "results.json")))
-
-    monkeypatch.setattr(results_module.Results, "add", watched)
-    run_all(tmp_path, episodes=4)
-    assert lengths == [1, 4, 5, 8, 9, 10, 11, 12, 13, 14]
-
-
 # The command line
-
-
-def test_errors_are_one_line_and_exit_code_2(capsys, tmp_path):
-    cases = [
-        ["--policies", "dsl"],
-        ["--scenarios", "varga7-fest"],
-        ["--policies", "rhc_gradient", "--preview", "1"],
-        ["--episodes", "0"],
-        ["--test-sets", "varga7-random"],  # with --steps
-        ["--out", str(tmp_path / "results.json" / "x")],
-    ]
-    (tmp_path / "results.json").write_text("[")
-    cases.append(["--out", str(tmp_path), "--resume"])
-    for arguments in cases:
-        assert main([*arguments, "--steps", "5"]) == 2
-        printed = capsys.readouterr()
-        lines = [line for line in printed.err.split("\n") if "error:" in line]
-        assert len(lines) == 1
-        assert "Traceback" not in printed.err
-        assert printed.out == ""
 
 
 def test_ctrl_c_says_how_to_go_on(capsys, tmp_path, monkeypatch):
@@ -522,49 +405,8 @@ def test_ctrl_c_says_how_to_go_on(capsys, tmp_path, monkeypatch):
     assert len(read_rows(tmp_path / "results.json")) == 1
 
 
-def test_results_of_another_cost_are_not_gone_on_with(tmp_path, monkeypatch):
-    evaluate("varga7-random", "dls", steps=5, out=tmp_path, plots=False)
-    monkeypatch.setattr(cost_kernels, "COST_VERSION", 0)
-    with pytest.raises(ResultsError, match="another scenario varga7-random with fingerprint"):
-        evaluate("varga7-random", "dls", steps=5, out=tmp_path, resume=True, plots=False)
-
-
-def test_a_test_set_from_the_command_line(capsys, tmp_path):
-    assert main(["--test-sets", "varga7-random", "--policies", "dls", "--no-plots", "--out", str(tmp_path)]) == 0
-    assert "varga7-random: 64 episodes of 1000 steps" in capsys.readouterr().out
-    rows = read_rows(tmp_path / "results.json")
-    assert {row.test_set for row in rows} == {test_sets.SETS["varga7-random"].digest}
-    with pytest.raises(ResultsError, match=r"in the test set .*, this run has none"):
-        evaluate("varga7-random", "dls", episodes=64, out=tmp_path, resume=True, plots=False)
-
-
-def test_the_demo_may_be_run_twice(capsys, tmp_path):
-    arguments = ["--policies", "dls", "--steps", "5", "--no-plots", "--out", str(tmp_path), "--overwrite"]
-    assert main(arguments) == 0
-    assert main(arguments) == 0
-    assert "varga7-fast: 5 steps" in capsys.readouterr().out
-
-
-def command(*arguments):
-    return subprocess.run(
-        [sys.executable, "-W", "error", "-m", "baselines.evaluate", *arguments],
-        cwd=ROOT, capture_output=True, text=True, timeout=120, check=False,
-    )  # fmt: skip
-
-
-def test_help_is_a_manual():
-    done = command("--help")
-    assert done.returncode == 0
-    for word in ("Examples:", "results.json", "total_cost", "[rad]", "[µs]", "--resume", "--overwrite", "varga7-fast"):
-        assert word in done.stdout
-    for column in COLUMNS:
-        assert column in done.stdout
-
-
-def test_a_small_run_from_the_command_line(tmp_path):
-    done = command("--policies", "dls", "dls:damping=1e-2", "--steps", "20", "--out", str(tmp_path), "--no-plots")
-    assert done.returncode == 0, done.stderr
-    assert "dls:damping=0.01" in done.stdout
-    assert f"written to {tmp_path}" in done.stdout
-    assert "varga7-fast · dls (2/2)" in done.stderr
-    assert len(strict_json(tmp_path / "results.json")) == 2
+def test_help_names_the_columns(capsys):
+    with pytest.raises(SystemExit):
+        main(["--help"])
+    text = capsys.readouterr().out
+    assert all(column in text for column in COLUMNS)

@@ -11,12 +11,9 @@ import pytest
 
 import baselines
 import ikgym
-from baselines.cli.evaluate import main
 from baselines.evaluate import evaluate
 from baselines.evaluation import run as command
 from baselines.evaluation.export import FORMATS
-from baselines.files import ResultsError
-from ikgym.exceptions import InvalidInputError, UnknownNameError
 from tests.baselines.making import circle
 
 STEPS = 12
@@ -132,11 +129,6 @@ def test_every_episode_in_every_format_and_from_workers(tmp_path, workers):
         np.testing.assert_array_equal(read_csv(file)[1][0, 1:8], scenario.nominal_joint_path(seed)[0])
 
 
-def test_nothing_is_exported_unasked(tmp_path):
-    evaluate("varga7-fast", "dls", steps=3, out=tmp_path, plots=False)
-    assert not (tmp_path / "export").exists()
-
-
 def test_resuming_plays_what_is_not_exported_yet_and_overwriting_removes_it(tmp_path, monkeypatch):
     given = {"steps": 3, "out": tmp_path, "plots": False}
     evaluate("varga7-fast", "dls", **given, export="csv")
@@ -149,24 +141,3 @@ def test_resuming_plays_what_is_not_exported_yet_and_overwriting_removes_it(tmp_
     monkeypatch.undo()
     evaluate("varga7-fast", "dls", **given, overwrite=True)
     assert files(tmp_path) == []
-
-
-def test_faults():
-    with pytest.raises(UnknownNameError, match=r"no format of export 'cvs'\. Did you mean 'csv'\?"):
-        evaluate("varga7-fast", "dls", export="cvs")
-    with pytest.raises(InvalidInputError, match="export: expected a folder for the files, `out` or --out"):
-        evaluate("varga7-fast", "dls", export="csv")
-
-
-def test_faults_on_the_command_line(capsys, tmp_path):
-    assert main(["--policies", "dls", "--export", "ros", "--out", str(tmp_path)]) == 2
-    assert "Available: csv, joint-trajectory." in capsys.readouterr().err
-    assert main(["--policies", "dls", "--export", "csv"]) == 2
-    assert "expected a folder" in capsys.readouterr().err
-
-
-def test_a_file_that_cannot_be_written(tmp_path):
-    track = baselines.track("varga7-fast", "dls", steps=3)
-    (tmp_path / "file").write_text("")
-    with pytest.raises(ResultsError, match="Cannot write"):
-        track.to_joint_trajectory(tmp_path / "file" / "motion.json")

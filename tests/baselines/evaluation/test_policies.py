@@ -7,7 +7,6 @@ import pathlib
 import pickle
 import subprocess
 import sys
-import textwrap
 
 import gymnasium as gym
 import numpy as np
@@ -15,10 +14,8 @@ import pytest
 
 import baselines
 import ikgym
-from baselines.cli.evaluate import main
 from baselines.evaluate import evaluate
 from baselines.evaluation.metrics import TIME_COLUMNS, Row
-from baselines.evaluation.report import table
 from baselines.evaluation.results import read_rows
 from baselines.files import ResultsError
 from baselines.policy import Problem
@@ -69,10 +66,6 @@ class Seeing(Bare):
 
 def make_borrowed():
     return Borrowed()
-
-
-def make_solver(scenario):
-    return baselines.make("dls", scenario)
 
 
 def refuse(scenario):
@@ -127,7 +120,7 @@ def test_a_class_that_nobody_registered_is_named_by_its_place():
 
 @pytest.mark.parametrize(
     ("change", "what"),
-    [({"dt": 0.5}, "dt"), ({"velocity_limit": 3.0}, "velocity_limit"), ({"cost": ikgym.TrackingCost(p_x=2)}, "cost")],
+    [({"dt": 0.5}, "dt"), ({"cost": ikgym.TrackingCost(p_x=2)}, "cost")],
 )
 def test_an_instance_plays_only_what_it_was_made_for(change, what):
     scenario = ikgym.scenarios.get(HELIX)
@@ -165,30 +158,12 @@ def test_an_object_with_a_predict_is_scored_as_a_solver_is(solved):
     assert model.calls[1:] == [(k or None, [k == 0], True) for k in range(STEPS)]
 
 
-def test_unknown_numbers_are_dashes_in_the_table():
-    rows = evaluate(HELIX, [borrowed, "dls"], steps=3)
-    text = table(rows)
-    assert "Borrowed" in text
-    assert "unknown" in text
-
-
-def test_episodes_of_others_are_played_one_by_one_and_only_some_have_times():
-    options = {"episodes": 3, "steps": 5}
-    rows = evaluate("varga7-random", here("Made"), **options)
-    assert [row.time_p50_us is None for row in rows] == [False, True, True]
-    expected = evaluate("varga7-random", "dls", **options)
-    assert [numbers(row) for row in rows] == [numbers(row) for row in expected]
-
-
 @pytest.mark.parametrize(
     ("policy", "name", "parameters"),
     [
-        (here("Borrowed"), here("Borrowed"), {}),
         (here("Borrowed:damping=1e-3"), here("Borrowed"), {"damping": 1e-3}),
         ((here("Made"), {"damping": 1e-3}), here("Made"), {"damping": 1e-3}),
-        (here("Made"), here("Made"), {}),
         (Made, here("Made"), {}),
-        ((Made, {"damping": 1e-3}), here("Made"), {"damping": 1e-3}),
         (here("borrowed"), here("borrowed"), {}),
         (here("make_borrowed"), here("make_borrowed"), {}),
     ],
@@ -196,12 +171,6 @@ def test_episodes_of_others_are_played_one_by_one_and_only_some_have_times():
 def test_places_classes_and_factories(solved, policy, name, parameters):
     (row,) = evaluate(HELIX, policy, steps=STEPS)
     assert (row.policy, row.parameters, row.status) == (name, parameters, "unknown")
-    assert numbers(row) == numbers(solved)
-
-
-def test_a_factory_may_make_a_solver(solved):
-    (row,) = evaluate(HELIX, here("make_solver"), steps=STEPS)
-    assert (row.policy, row.parameters, row.status) == (here("make_solver"), solved.parameters, solved.status)
     assert numbers(row) == numbers(solved)
 
 
@@ -215,12 +184,6 @@ def test_objects_that_share_a_class_get_names_of_their_own():
         pass
 
     assert [row.policy for row in evaluate(HELIX, [dls(), "dls"], steps=3)] == ["dls-2", "dls"]
-
-
-def test_parameters_that_an_object_states_are_in_its_row():
-    model = Borrowed()
-    model.parameters = {"width": (64, 64)}
-    assert evaluate(HELIX, model, steps=3)[0].parameters == {"width": [64, 64]}
 
 
 def test_what_others_are_shown():
@@ -266,7 +229,6 @@ def fail():
     ("answer", "message"),
     [
         (lambda: (np.array([0.0, np.nan, 0.0]), None), r"Answering in zhang3-helix, seed 0, step 3: expected finite"),
-        (lambda: ([0.0, np.inf, 0.0], None), r"step 3: expected finite actions, got \[0\.0, inf, 0\.0\]"),
         (lambda: np.zeros(3), r"Answering: expected predict to return \(action, state\)"),
         (lambda: (None, None), "Answering: expected an action of numbers, got None"),
         (lambda: (np.zeros((1, 3)), None), r"action: expected shape \(3,\), got \(1, 3\)"),
@@ -278,28 +240,14 @@ def test_answers_that_are_no_actions(answer, message):
         evaluate(HELIX, Answering(answer), steps=STEPS)
 
 
-def test_actions_of_solvers_that_are_not_finite_are_named_too():
-    class Wild(DampedLeastSquares):
-        def predict(self, observation, state=None, episode_start=None, deterministic=True):
-            action, state = super().predict(observation, state, episode_start)
-            return action * np.where(observation["remaining"] == 997, np.nan, 1.0), state
-
-    with pytest.raises(InvalidInputError, match=r"seed 2000000, step 4: expected finite actions"):
-        evaluate("varga7-random", Wild, episodes=2)
-
-
 @pytest.mark.parametrize(
     ("policy", "message"),
     [
-        (3, "expected a name, 'package.module:Class', a class, or an object with the predict"),
-        (dict, "expected a class with the predict of Stable-Baselines3"),
         (here("number"), "an object with a predict, or a class or function that makes one, got 3"),
         (here("nothing"), "has no attribute 'nothing'"),
-        ("no_such_module:Policy", "No module named 'no_such_module'"),
         (here("Problem"), "cannot be made: TypeError"),
         (here("Borrowed:dampin=1"), "There is no parameter of dls 'dampin'"),
         (here("refuse"), "Nothing to evaluate: .*refuse in zhang3-helix: only for seven joints"),
-        (here("Borrowed:damping"), "expected name=value"),
     ],
 )
 def test_what_is_no_policy_is_refused(policy, message):
@@ -358,13 +306,6 @@ def test_a_wrapped_environment_is_scored_below_its_wrappers(solved):
         evaluate(HELIX, Flat(), steps=STEPS)
 
 
-def test_random_episodes_of_a_wrapped_environment():
-    options = {"episodes": 2, "steps": 5}
-    rows = evaluate("varga7-random", Flat("varga7-random"), wrap=flattened, **options)
-    assert [numbers(row) for row in rows] == [numbers(row) for row in evaluate("varga7-random", "dls", **options)]
-    assert [row.time_p50_us is None for row in rows] == [False, True]
-
-
 class NoSeed(gym.Wrapper):
     def reset(self, *, seed=None, options=None):
         return self.env.reset()
@@ -385,7 +326,6 @@ class FirstStep(gym.Wrapper):
     ("wrap", "message"),
     [
         (lambda env: 3, "wrap: expected the environment that it was given in wrappers, got 3"),
-        (lambda env: gym.make("RedundantIK-v0", scenario=HELIX), "expected the environment that it was given"),
         (lambda env: env.nothing, "wrap: raised AttributeError on zhang3-helix"),
         (lambda env: gym.wrappers.TimeLimit(env, 5), "ended after 5 of 20 steps"),
         (NoSeed, r"expected reset\(seed=0\) to reach the environment"),
@@ -396,11 +336,6 @@ class FirstStep(gym.Wrapper):
 def test_wrappers_that_change_the_episode_are_refused(wrap, message):
     with pytest.raises(InvalidInputError, match=message):
         evaluate(HELIX, Borrowed(), steps=STEPS, wrap=wrap)
-
-
-def test_there_must_be_somebody_to_wrap_for():
-    with pytest.raises(InvalidInputError, match="wrap: expected a policy that uses it"):
-        evaluate(HELIX, "dls", steps=STEPS, wrap=flattened)
 
 
 # Models of Stable-Baselines3
@@ -488,7 +423,7 @@ def test_a_policy_of_fifteen_lines_outside_the_tree_is_evaluated_by_one_command(
     assert len([line for line in MINE.splitlines() if line.strip()]) <= 15
     command = ["-m", "baselines.evaluate", "--policies", "mine:Proportional:gain=0.5", "dls"]
     done = subprocess.run(
-        [sys.executable, "-W", "error", *command, "--scenarios", "mine:slow", "--steps", "12", "--out", "out"],
+        [sys.executable, "-W", "error", *command, "--scenarios", "mine:slow", "--out", "out", "--no-plots"],
         cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(ROOT)}, capture_output=True, text=True, timeout=120,
         check=False,
     )  # fmt: skip
@@ -498,24 +433,3 @@ def test_a_policy_of_fifteen_lines_outside_the_tree_is_evaluated_by_one_command(
     rows = read_rows(tmp_path / "out" / "results.json")
     assert [row.policy for row in rows] == ["mine:Proportional", "dls"]
     assert rows[0].parameters == {"gain": 0.5}
-    assert list((tmp_path / "out" / "plots").glob("slow/*.png"))
-
-
-def test_modules_are_found_in_the_current_folder(tmp_path, monkeypatch, capsys):
-    name = "module_of_the_current_folder"
-    (tmp_path / f"{name}.py").write_text(textwrap.dedent(MINE))
-    (tmp_path / "broken_module.py").write_text("1 / 0")
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(sys, "path", [entry for entry in sys.path if entry])
-    assert main(["--policies", f"{name}:Proportional", "--scenarios", f"{name}:slow"]) == 0
-    assert f"{name}:Proportional" in capsys.readouterr().out
-    for policy, message in [
-        (f"{name}:Proportionl", "has no attribute 'Proportionl'"),
-        ("broken_module:Policy", "ZeroDivisionError"),
-        ("dls:Policy", "expected name=value"),
-    ]:
-        assert main(["--policies", policy, "--steps", "3"]) == 2
-        printed = capsys.readouterr()
-        assert printed.err.startswith("error: ")
-        assert message in printed.err
-        assert printed.err.count("\n") == 1

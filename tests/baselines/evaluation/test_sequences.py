@@ -99,13 +99,6 @@ def test_a_reference_is_told_its_arm():
     assert second.bind().drawn.arm.offsets[0, 0] == SAME_ARM.drawn_plant(arm_seed=400_000).arm.offsets[0, 0]
 
 
-def test_a_reference_is_the_same_one_for_every_arm():
-    first, *_, last = planned((), "told:policy=dls", test_sets="panda-same-arm").jobs
-    assert first.seeds.arm_seed != last.seeds.arm_seed
-    assert "arm_seed" not in last.parameters
-    assert last.bind().arm_seed == last.seeds.arm_seed
-
-
 def test_other_noise_on_the_same_path_with_the_same_arm():
     scenario = SAME_ARM.replace(name="noisy", plant=Plant(zero=5e-4, q_noise=1e-4))
     rows = evaluate(scenario, "rhc:horizon=3", episodes=2, noise_seeds=3)
@@ -115,13 +108,6 @@ def test_other_noise_on_the_same_path_with_the_same_arm():
     assert identical(one.offsets, other.offsets)
     once = evaluate(scenario.replace(plant=Plant(zero=5e-4)), "rhc:horizon=3", episodes=2, noise_seeds=3)
     assert len(once) == 2
-
-
-def test_policies_that_are_compared_have_the_same_noise():
-    scenario = SAME_ARM.replace(name="noisy", plant=Plant(q_noise=1e-4))
-    rows = evaluate(scenario, ["follow_nominal", "follow_nominal"], noise_seeds=2)
-    again = evaluate(scenario, "follow_nominal", noise_seeds=2)
-    assert [row.total_cost for row in rows] == [row.total_cost for row in again]
 
 
 def test_wrapped_environments_play_no_sequences():
@@ -135,10 +121,3 @@ def test_wrapped_environments_play_no_sequences():
     assert wrapped.before == job.before
     with pytest.raises(InvalidInputError, match="in sequences of episodes, without wrappers"):
         play([wrapped])
-
-
-def test_bad_numbers():
-    with pytest.raises(InvalidInputError, match="noise_seeds"):
-        planned(SAME_ARM, "dls", noise_seeds=0)
-    with pytest.raises(InvalidInputError, match="expected no scenarios"):
-        planned((), "dls", test_sets="panda-camera", noise_seeds=2)

@@ -506,7 +506,7 @@ class TestCommandLine:
         monkeypatch.setattr(cache, "search", interrupted)
         seeds = ("--scenarios", "varga7-random", "--seeds", "1000000", "1000001", "1000002")
         assert optimum_command.main([*seeds, *self.HOW, "--update"]) == 130
-        assert "what was found is kept" in capsys.readouterr().err
+        assert "are kept" in capsys.readouterr().err
         assert [known.seed for known in best_known.read(data)] == [1_000_000]
 
     @pytest.mark.parametrize(

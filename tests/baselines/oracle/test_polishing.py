@@ -8,8 +8,7 @@ import pytest
 import ikgym
 from baselines.oracle import Search
 from baselines.oracle.episode import EpisodeProblem
-from baselines.oracle.polishing import polish
-from baselines.oracle.search import search
+from baselines.oracle.search import polish, search
 from ikgym.exceptions import InvalidInputError
 from ikgym.plant import Plant
 

@@ -9,10 +9,10 @@ import re
 
 import pytest
 
+from baselines.cli.reproduce import main, reproduce
 from baselines.papers import PAPERS, ledger
 from baselines.papers.paper import Finding
 from baselines.papers.runs import Runs
-from baselines.reproduce import main, reproduce
 
 #: One figure for each function that draws and each episode; the others are in the slow run.
 OF_EACH_KIND = {"varga": [2, 5, 6, 8, 9, 11], "khan": [3, 7, 8, 11, 14, 18, 19]}

@@ -7,9 +7,10 @@ import pathlib
 from typing import Any
 
 from baselines.training import methods
-from baselines.training.config.base import Config
-from baselines.training.methods import Trainer, new_trainer
+from baselines.training.config import Config
+from baselines.training.methods import new_trainer
 from baselines.training.randomness import reseed
+from baselines.training.trainers.base import Trainer
 
 #: Options that make a run of a method short.
 SHORT: dict[str, dict[str, Any]] = {"segments": 3, "evaluate_every": 2, "validation_episodes": 2, "n_envs": 4}

@@ -8,7 +8,7 @@ import torch
 
 from baselines.agents.bilinear.processing import Bilinear
 from baselines.agents.files import load_agent, save_agent
-from baselines.training.errors import TrainingError
+from baselines.training.config import TrainingError
 from baselines.training.gradients.arms import Arms
 from baselines.training.gradients.law import Law
 from baselines.training.randomness import deterministic_torch
@@ -147,12 +147,6 @@ def test_the_agent_is_the_average_of_the_actor():
         mean = [kept * old + (1 - kept) * new for old, new in zip(mean, trainer._actor.parameters(), strict=True)]
         for wanted, given in zip(mean, trainer.policy.parameters(), strict=True):
             np.testing.assert_allclose(given.detach(), wanted.detach(), rtol=1e-5, atol=1e-7)
-
-
-def test_windows_and_reset_distances_of_segments():
-    config = CONFIG.replace(segments=8, window=(16, 48), reset_distance=0.3, reset_distance_end=0.5)
-    assert [config.window_of(number) for number in range(8)] == [16] * 4 + [48] * 4
-    assert [config.reset_distance_of(number) for number in range(8)] == [0.3] * 4 + [0.5] * 4
 
 
 @pytest.mark.parametrize("name", ["panda-random", "panda-circle", "tiago-line", "khan8-q7q8", "panda-glue"])

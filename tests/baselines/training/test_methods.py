@@ -15,6 +15,7 @@ from baselines.training.methods import METHODS
 from baselines.training.randomness import deterministic_torch
 from baselines.training.run import train, weights_hash
 from baselines.training.validation import validation_seeds
+from ikgym.exceptions import InvalidInputError
 from tests.baselines.training.killing import run_until_done, run_with_kills
 from tests.baselines.training.small import about, play_segments, timeless, tiny, trainer_of
 
@@ -44,18 +45,6 @@ def test_a_segment_depends_on_state_and_number(config, tmp_path):
     assert other.steps == undisturbed.steps > 0
 
 
-class StoppedError(Exception):
-    """Raised in the middle of a run."""
-
-
-def stop_after(segments):
-    def on_segment(done, score):
-        if done == segments:
-            raise StoppedError
-
-    return on_segment
-
-
 @pytest.fixture(scope="module", params=METHODS)
 def finished(request, tmp_path_factory):
     """A run of each method, from beginning to end."""
@@ -71,10 +60,15 @@ def assert_same_run(folder, other):
 
 
 def test_a_run_that_was_stopped_ends_like_one_that_was_not(finished, tmp_path):
-    """Also where it was stopped after more than its last checkpoint; TensorBoard has each step once."""
+    """Also if it was stopped some segments after its last checkpoint; TensorBoard has each step once."""
     config, folder, result = finished
-    with pytest.raises(StoppedError):
-        train(config, 3, tmp_path, checkpoint_every=1e9, on_segment=stop_after(2))
+
+    def stop(done, score):
+        if done == 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        train(config, 3, tmp_path, checkpoint_every=1e9, on_segment=stop)
     assert about(tmp_path)["training"]["segments"] == 1  # the first one is written at once
     assert not (tmp_path / "agent.safetensors").exists()
     time.sleep(1.0)  # TensorBoard orders files by the second of their beginning
@@ -129,3 +123,20 @@ def test_killed_at_a_random_moment(tmp_path):
 @pytest.mark.parametrize("method", METHODS)
 def test_any_method_may_be_killed_at_random_moments(method, tmp_path):
     check_kills(method, 2, tmp_path, np.random.default_rng())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("estimator", ["analytic", "ppo"])
+def test_observe_learns(estimator):
+    """It learns that measurements are exact or noisy, and that arms change."""
+    sizes = {"hidden": (12,), "n_envs": 16, "plants": 8, "measurements": 8, "gradient_steps": 10, "batch_size": 16}
+    with deterministic_torch():
+        before, *_, after = play_segments(trainer_of(tiny("observe", estimator=estimator, **sizes)), range(4))
+    assert after["train/loss"] < before["train/loss"] - 0.1
+
+
+def test_scenarios_that_observe_refuses():
+    with pytest.raises(InvalidInputError, match=r"task: expected pose, .* got 'skew'"):
+        trainer_of(tiny("observe", task="skew"))
+    with pytest.raises(InvalidInputError, match="reference joint path"):
+        play_segments(trainer_of(tiny("observe", scenario="panda-circle")), [0])

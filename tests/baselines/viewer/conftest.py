@@ -1,4 +1,4 @@
-"""A server of viser's, on a port that the system chooses, for all tests of a module."""
+"""A server of viser on a free port, one for all tests of a module."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Arms in the scene: cylinders where the kinematics are, and meshes of a URDF file that is of the arm."""
+"""Arms in the scene: frames where the kinematics are, and meshes of a URDF file that describes the arm."""
 
 from __future__ import annotations
 
@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 import ikgym
-from baselines.viewer.readings import AT, FREE, Reader, share_colour
-from baselines.viewer.replay import Stage, size
-from baselines.viewer.view import meshes
+from baselines.cli.view import meshes
+from baselines.viewer.readings import AT, FREE, NEAR, Reader, slider_range
+from baselines.viewer.replay import size
 from ikgym.exceptions import InvalidInputError
-from ikgym.trajectories import Sinusoid
 
 pytest.importorskip("yourdfpy")
 trimesh = pytest.importorskip("trimesh")
@@ -31,7 +30,7 @@ def arm():
 
 def urdf(folder, length=1.0, joints=JOINTS, shape='<mesh filename="link.stl"/>'):
     trimesh.creation.box((1.0, 0.1, 0.1)).apply_translation((0.5, 0.0, 0.0)).export(folder / "link.stl")
-    visual = f"<visual><geometry>{shape}</geometry></visual>" if shape else ""
+    visual = f'<visual><origin xyz="0 0 0.1"/><geometry>{shape}</geometry></visual>' if shape else ""
     text = '<robot name="two"><link name="base"/>'
     before, xyz = "base", "0 0 0.5"
     for number, joint in enumerate(joints):
@@ -44,54 +43,77 @@ def urdf(folder, length=1.0, joints=JOINTS, shape='<mesh filename="link.stl"/>')
     return file
 
 
-def chained(poses):
-    """The last of poses that are each seen from the one before."""
+def place(handles):
+    """Where a frame is whose parents are the handles before it."""
     out = transforms.SE3.identity()
-    for position, wxyz in poses:
-        out = out @ transforms.SE3.from_rotation_and_translation(transforms.SO3(np.asarray(wxyz)), np.asarray(position))
+    for one in handles:
+        rotation = transforms.SO3(np.asarray(one.wxyz))
+        out = out @ transforms.SE3.from_rotation_and_translation(rotation, np.asarray(one.position))
     return out
-
-
-@pytest.mark.parametrize("name", ikgym.arms.names())
-def test_frames_of_joints_are_those_of_the_arm(name):
-    arm = ikgym.arms.get(name)
-    low, high = np.maximum(arm.lower, -3.0), np.minimum(arm.upper, 3.0)
-    q = np.random.default_rng(0).uniform(low, high)
-    frames = list(zip(*arms.joint_frames(arm, q), strict=True))
-    for joint, point in enumerate(arm.joint_points(q)[:, 1]):
-        found = chained(frames[: joint + 1])
-        np.testing.assert_allclose(found.translation(), point, atol=1e-12 * size(arm))
-    np.testing.assert_allclose(found @ arm.tool, arm.forward(q)[1], atol=1e-12 * size(arm))
 
 
 def read(arm, q):
     return Reader(arm, ikgym.tasks.get("position")).read(q)
 
 
+def test_frames_of_joints_are_those_of_the_arm(server):
+    for name in ikgym.arms.names():
+        arm = ikgym.arms.get(name)
+        q = np.random.default_rng(0).uniform(np.maximum(arm.lower, -3.0), np.minimum(arm.upper, 3.0))
+        drawn = arms.DrawnArm(server, f"/{name}", arm, FREE)
+        drawn.show(q, read(arm, q))
+        for joint, point in enumerate(arm.joint_points(q)[:, 1]):
+            # viser leaves out motion that it takes for none.
+            np.testing.assert_allclose(place(drawn._frames[: joint + 1]).translation(), point, atol=1e-6 * size(arm))
+        np.testing.assert_allclose(place(drawn._frames) @ arm.tool, arm.forward(q)[1], atol=1e-6 * size(arm))
+
+
 def test_cylinders_have_the_colours_of_the_readings(arm, server):
-    made = arms.Cylinders(server, "/root", arm, FREE)
-    made.show(np.array([0.3, 1.0]), read(arm, np.array([0.3, 1.0])))
-    assert [tuple(joint.color) for joint in made._joints] == [FREE, AT]
-    assert tuple(made._tool.color) != share_colour(0.0)
-    made.show(np.zeros(2), read(arm, np.zeros(2)))
-    assert tuple(made._tool.color) == share_colour(0.0)
+    drawn = arms.DrawnArm(server, "/root", arm, FREE)
+    drawn.show(np.array([0.95, 1.0]), read(arm, np.array([0.95, 1.0])))
+    assert [tuple(joint.color) for joint in drawn._joints] == [NEAR, AT]
+    assert tuple(drawn._tool.color) != AT
+    drawn.show(np.zeros(2), read(arm, np.zeros(2)))
+    assert [tuple(joint.color) for joint in drawn._joints] == [FREE, FREE]
+    assert tuple(drawn._tool.color) == AT  # stretched, thus singular
+
+
+def test_manipulability_is_the_root_of_the_determinant():
+    panda = ikgym.arms.get("panda")
+    jacobian = panda.jacobian(panda.home)
+    reader = Reader(panda, ikgym.tasks.get("pose"))
+    reading = reader.read(panda.home)
+    assert reading.manipulability == pytest.approx(np.sqrt(np.linalg.det(jacobian @ jacobian.T)), rel=1e-9)
+    assert reading.share == pytest.approx(reading.manipulability / reader.largest, rel=1e-9)
+    assert 0.1 < reading.share <= 1.0
+
+
+def test_sliders_go_as_far_as_the_limits():
+    panda, varga = ikgym.arms.get("panda"), ikgym.arms.get("varga7")
+    np.testing.assert_array_equal(slider_range(panda), [panda.lower, panda.upper])
+    low, high = slider_range(varga)  # without limits: half a turn, or half the reach
+    np.testing.assert_allclose(high, np.where(varga.prismatic, 0.5 * size(varga), np.pi))
+    np.testing.assert_array_equal(low, -high)
 
 
 def test_meshes_move_with_the_arm(arm, server, tmp_path):
-    made, q = arms.Meshes(server, "/root", arms.read_urdf(urdf(tmp_path), arm), arm), np.array([0.3, 0.5])
-    made.show(q, read(arm, q))
-    first, last = made._meshes.values()
-    np.testing.assert_allclose([first.position, last.position], arm.joint_points(q)[:, 1], atol=1e-6)
-    np.testing.assert_allclose(last.wxyz, [np.cos(0.4), 0.0, 0.0, np.sin(0.4)], atol=1e-6)
-    np.testing.assert_allclose(made._tool.position, arm.forward(q)[1], atol=1e-6)
+    shapes, q = arms.read_urdf(urdf(tmp_path), arm), np.array([0.3, 0.5])
+    drawn = arms.DrawnArm(server, "/root", arm, FREE, shapes)
+    drawn.show(q, read(arm, q))
+    assert [shape.frame for shape in shapes] == [1, 2]
+    for shape, joint in zip(shapes, arm.joint_points(q)[:, 1], strict=True):
+        corners = shape.mesh.vertices
+        np.testing.assert_allclose(corners.min(axis=0), [0.0, -0.05, 0.05], atol=1e-6)
+        np.testing.assert_allclose(corners.max(axis=0), [1.0, 0.05, 0.15], atol=1e-6)
+        np.testing.assert_allclose(place(drawn._frames[: shape.frame]).translation(), joint, atol=1e-6)
 
 
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"length": 1.1}, "moves differently from arm 'two'"),
-        ({"joints": ("shoulder", "wrist")}, "has no joint 'elbow' of arm 'two'; it has shoulder, wrist"),
-        ({"shape": ""}, "has no visible shapes"),
+        ({"length": 1.1}, "moves differently"),
+        ({"joints": ("shoulder", "wrist")}, "no joint 'elbow'"),
+        ({"shape": ""}, "no visible shapes"),
     ],
 )
 def test_other_files_are_refused(arm, tmp_path, changes, message):
@@ -108,24 +130,8 @@ def test_files_that_cannot_be_read(arm, tmp_path):
         arms.read_urdf(broken, arm)
 
 
-@pytest.fixture
-def stage(tmp_path):
-    """Makes a stage for an arm that was read from a URDF file."""
+def test_an_arm_from_a_file_is_shown_with_its_meshes_if_there_are_any(tmp_path, capsys):
     pytest.importorskip("pinocchio")
-
-    def made(**changes):
-        arm = ikgym.arms.from_urdf(urdf(tmp_path, **changes))
-        sinusoid, task = Sinusoid(np.array([0.1, 0.2])), ikgym.tasks.get("position")
-        return Stage.of(ikgym.Scenario("mine", arm, task, sinusoid, velocity_limit=3.0, steps=2))
-
-    return made
-
-
-def test_an_arm_from_a_file_with_meshes_is_shown_with_them(stage, server):
-    made = meshes(stage(), None)(server)("/root", AT)
-    assert isinstance(made, arms.Meshes)
-
-
-def test_an_arm_from_a_file_without_meshes_is_shown_as_cylinders(stage, capsys):
-    assert meshes(stage(shape=""), None) is None
+    assert len(meshes(ikgym.arms.from_urdf(urdf(tmp_path)), None)) == 2
+    assert meshes(ikgym.arms.from_urdf(urdf(tmp_path, shape="")), None) is None
     assert "Cylinders are shown: urdf:" in capsys.readouterr().err

@@ -13,7 +13,7 @@ from baselines.cli import main
 from baselines.files import ResultsError
 from baselines.viewer import film
 from baselines.viewer.film import checked_width, moments, pictures, write_video
-from baselines.viewer.replay import Stage, play
+from baselines.viewer.replay import Stage, play_all
 from ikgym.exceptions import InvalidInputError
 
 WIDTH = 480
@@ -33,12 +33,6 @@ def test_steps_that_are_drawn(stage):
     assert len(slow) == 61
 
 
-@pytest.mark.parametrize(("fps", "speed", "name"), [(0.0, 1.0, "fps"), (30.0, -1.0, "speed")])
-def test_fps_and_speed_are_above_0(stage, fps, speed, name):
-    with pytest.raises(InvalidInputError, match=name):
-        moments(stage, fps, speed)
-
-
 @pytest.mark.parametrize("width", [479, 482, 3844, 480.0])
 def test_widths(width):
     with pytest.raises(InvalidInputError, match="width"):
@@ -47,7 +41,7 @@ def test_widths(width):
 
 
 def test_policies_stand_in_two_columns(stage):
-    one = play(stage, "dls")
+    (one,) = play_all(stage, ["dls"])
     steps = moments(stage, 50.0, 1.5)
     (alone, *_) = drawn = list(pictures(stage, [one], steps, width=WIDTH))
     assert len(drawn) == 2
@@ -96,43 +90,36 @@ def test_a_video_that_breaks_off_leaves_the_old_one(tmp_path):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--out", "x.gif"], "out: expected a file that ends in .mp4, got 'x.gif'."),
-        (["--out", "x.mp4", "--policy", "dlss"], "There is no policy 'dlss'. Did you mean 'dls'?"),
-        (["--out", "x.mp4", "--width", "481"], "width: expected a multiple of 4"),
-        (["--out", "x.mp4", "--fps", "0"], "fps: expected a finite number above 0"),
-        (["--out", "x.mp4", "--scenario", "panda-cirkle"], "Did you mean 'panda-circle'?"),
+        (["--out", "x.gif"], "out: expected a file that ends in .mp4"),
+        (["--policy", "dlss"], "Did you mean 'dls'?"),
+        (["--scenario", "panda-cirkle"], "Did you mean 'panda-circle'?"),
+        (["--width", "481"], "width: expected"),
+        (["--fps", "0"], "fps: expected"),
+        (["--speed", "-1"], "speed: expected"),
     ],
 )
 def test_mistakes(options, message, capsys, tmp_path, monkeypatch):
     pytest.importorskip("moviepy")
     monkeypatch.chdir(tmp_path)
-    assert main(["video", "--steps", "2", *options]) == 2
+    assert main(["video", "--steps", "2", "--out", "x.mp4", *options]) == 2
     assert message in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
 
 
-def test_without_moviepy_the_extra_is_named(capsys, monkeypatch):
-    monkeypatch.setitem(sys.modules, "moviepy", None)
-    monkeypatch.setattr(film, "pictures", None)  # nothing is drawn before
-    assert main(["video", "--out", "x.mp4"]) == 2
-    assert capsys.readouterr().err == 'error: This needs moviepy: pip install "ikgym[video]"\n'
-
-
-@pytest.mark.parametrize("found", [True, False])
-def test_without_ffmpeg_the_extra_is_named(found, capsys, monkeypatch, tmp_path):
-    """Whether moviepy has found one that does not start, or none when it was imported."""
-    config = pytest.importorskip("moviepy.config")
-    if found:
-        monkeypatch.setattr(config, "FFMPEG_BINARY", str(tmp_path / "ffmpeg"))
-    else:
+@pytest.mark.parametrize("missing", ["moviepy", "ffmpeg", "working ffmpeg"])
+def test_what_is_missing_is_named_before_anything_is_drawn(missing, capsys, monkeypatch, tmp_path):
+    monkeypatch.setattr(film, "pictures", None)
+    if missing == "moviepy":
+        monkeypatch.setitem(sys.modules, "moviepy", None)
+    elif missing == "working ffmpeg":
+        monkeypatch.setattr(pytest.importorskip("moviepy.config"), "FFMPEG_BINARY", str(tmp_path / "ffmpeg"))
+    else:  # moviepy looks for it when it is imported
+        pytest.importorskip("moviepy.config")
         monkeypatch.setenv("FFMPEG_BINARY", str(tmp_path / "ffmpeg"))
         monkeypatch.delitem(sys.modules, "moviepy.config")
         monkeypatch.delattr("moviepy.config")
-    monkeypatch.setattr(film, "pictures", None)  # nothing is drawn before
     assert main(["video", "--out", "x.mp4"]) == 2
-    assert capsys.readouterr().err.startswith(
-        'error: Videos need the program ffmpeg, which pip install "ikgym[video]" brings for most machines ('
-    )
+    assert 'pip install "ikgym[video]"' in capsys.readouterr().err
 
 
 def test_an_ffmpeg_that_fails_is_an_error(tmp_path, monkeypatch):

@@ -13,13 +13,9 @@ import urllib.request
 import numpy as np
 import pytest
 
-from baselines.cli import main
-from baselines.viewer import view
-from baselines.viewer.approach import Pose
+from baselines.cli import main, view
 from baselines.viewer.replay import Stage
-from baselines.viewer.session import Mode
-from baselines.viewer.view import session_of
-from ikgym.exceptions import InvalidInputError
+from baselines.viewer.session import Mode, Session
 
 pytest.importorskip("viser")
 import msgspec
@@ -53,7 +49,7 @@ class Browser:
 
 @pytest.fixture
 def viewer(server):
-    return servers.Viewer(server, session_of(Stage.of("panda-circle", steps=20), ["dls", "qp"]))
+    return servers.Viewer(server, Session(Stage.of("panda-circle", steps=20), ["dls", "qp"]))
 
 
 @pytest.fixture
@@ -88,20 +84,20 @@ def test_what_is_played_is_shown(viewer):
     viewer.session.toggle()
     viewer.tick(0.01)
     session = viewer.session
-    np.testing.assert_allclose(viewer._scene.target.position, session.stage.path[10], atol=1e-12)
-    frame = viewer._scene._arms[1]._frames[2]
+    np.testing.assert_allclose(viewer.scene.target.position, session.stage.frames[10, 9:], atol=1e-12)
+    frame = viewer.scene._arms[1]._frames[2]
     q = session.replays[1].q[10]
     np.testing.assert_allclose(frame.wxyz, [np.cos(q[2] / 2), *(np.sin(q[2] / 2) * session.stage.scenario.arm.axes[2])])
 
 
 def test_buttons_and_sliders_do_what_they_say(viewer, browser):
-    session, panel = viewer.session, viewer._panel
-    browser.set(panel._play, True)
+    session = viewer.session
+    browser.set(viewer.play, True)
     wait_for(viewer, lambda: session.playing)
-    browser.set(panel._time, 0.012)
+    browser.set(viewer.time, 0.012)
     wait_for(viewer, lambda: session.step == 12)
     assert not session.playing
-    browser.set(panel._joints[3], -1.0)
+    browser.set(viewer.joints[3], -1.0)
     wait_for(viewer, lambda: session.mode is Mode.HAND)
     assert session.shown()[0].q[3] == -1.0
 
@@ -111,37 +107,26 @@ def test_what_the_program_sets_is_not_taken_for_a_user(viewer):
     viewer.tick(1.0)  # readings and sliders are due
     viewer.tick(0.0)
     assert viewer.session.mode is Mode.PLAY
-    assert viewer._panel._joints[0].value == pytest.approx(viewer.session.shown()[0].q[0], abs=1e-4)
-    assert "dls" in viewer._panel._readings.content
-
-
-def test_controls_are_told_what_is_new_alone(viewer):
-    viewer.tick(1.0)
-    told = []
-    viewer._panel._time.on_update(told.append)
-    viewer.tick(1.0)
-    assert told == []
-    viewer.session.scrub(0.01)
-    viewer.tick(1.0)
-    assert len(told) == 1
+    assert viewer.joints[0].value == pytest.approx(viewer.session.shown()[0].q[0], abs=1e-4)
+    assert "dls" in viewer.readings.content
 
 
 def test_a_target_that_is_dragged_is_followed(viewer, browser):
-    session, target = viewer.session, viewer._scene.target
+    session, target = viewer.session, viewer.scene.target
     browser.drag(target, target.position + np.array([0.0, 0.0, 0.01]))
     wait_for(viewer, lambda: session.mode is Mode.FOLLOW)
     viewer.tick(0.01)
-    assert session.reference.position[2] > session.stage.path[0, 2]
+    assert session.reference[11] > session.stage.frames[0, 11]
 
 
 def test_a_picture_leaves_the_target_in_the_hand_that_drags_it(viewer):
-    session, target = viewer.session, viewer._scene.target
+    session, target = viewer.session, viewer.scene.target
     start = target.position.copy()
-    np.testing.assert_allclose(start, session.stage.path[0], atol=1e-12)
+    np.testing.assert_allclose(start, session.stage.frames[0, 9:], atol=1e-12)
     target.position = start + 0.01
     viewer.tick(0.0)
     np.testing.assert_allclose(target.position, start + 0.01)
-    session.aim(Pose(session.reference.rotation, np.array(target.position)))
+    session.aim(np.append(session.reference[:9], target.position))
     viewer.tick(0.0)
     np.testing.assert_allclose(target.position, start + 0.01)
     session.toggle()  # back to the episode
@@ -170,24 +155,21 @@ def test_a_port_in_use_is_an_error(capsys):
     with socket.socket() as taken:
         taken.bind((HOST, 0))
         taken.listen()
-        port = taken.getsockname()[1]
-        with pytest.raises(InvalidInputError, match=f"port: expected one that is free .*, got {port}"):
-            servers.free_port(HOST, port)
-        assert main(["view", "--steps", "2", "--port", str(port)]) == 2
+        assert main(["view", "--steps", "2", "--port", str(taken.getsockname()[1])]) == 2
     assert "port: expected one that is free" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--policy", "dlss"], "There is no policy 'dlss'. Did you mean 'dls'?"),
+        (["--policy", "dlss"], "Did you mean 'dls'?"),
         (["--scenario", "panda-cirkle"], "Did you mean 'panda-circle'?"),
         (["--port", "70000"], "port: expected"),
-        (["--urdf", "nowhere.urdf"], "urdf: expected a file, got 'nowhere.urdf'."),
+        (["--urdf", "nowhere.urdf"], "urdf: expected a file"),
     ],
 )
 def test_mistakes(options, message, capsys):
-    assert main(["view", "--steps", "2", *(options if "--port" in options else ["--port", "0", *options])]) == 2
+    assert main(["view", "--steps", "2", "--port", "0", *options]) == 2
     assert message in capsys.readouterr().err
 
 
@@ -197,4 +179,4 @@ def test_without_it_the_extra_is_named(package, capsys, monkeypatch):
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, package, None)
     assert main(["view", "--steps", "2", "--port", "0"]) == 2
-    assert capsys.readouterr().err == f'error: This needs {package}: pip install "ikgym[view]"\n'
+    assert f'This needs {package}: pip install "ikgym[view]"' in capsys.readouterr().err

@@ -1,16 +1,18 @@
-"""What the viewer shows, moment by moment."""
+"""What the viewer shows, moment by moment: the episode as the environment has it, and arms that follow a target."""
 
 from __future__ import annotations
 
+import gymnasium as gym
 import numpy as np
 import pytest
 
+import baselines
 from baselines.viewer import session as sessions
-from baselines.viewer.approach import Pose
-from baselines.viewer.panel import escaped, readings
-from baselines.viewer.replay import Stage
-from baselines.viewer.session import PLAYS_ONLY, Mode
-from baselines.viewer.view import session_of
+from baselines.viewer.following import Approach, Follower
+from baselines.viewer.replay import Stage, play_all
+from baselines.viewer.session import PLAYS_ONLY, Mode, Session, escaped
+from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.kernels.rotations import geodesic_angle, rodrigues
 
 STEPS = 40
 
@@ -20,14 +22,103 @@ def time_enough(monkeypatch):
     monkeypatch.setattr(sessions, "BUDGET", 60.0)
 
 
+@pytest.fixture(scope="module")
+def stage():
+    return Stage.of("panda-circle", steps=STEPS)
+
+
 @pytest.fixture
-def session():
-    return session_of(Stage.of("panda-circle", steps=STEPS), ["dls", "qp"])
+def session(stage):
+    return Session(stage, ["dls", "qp"])
 
 
-def above(session, height):
-    """A target that is higher than the reference by so many [m]."""
-    return Pose(session.reference.rotation, session.reference.position + np.array([0.0, 0.0, height]))
+def moved(frame, shift, turn=0.0):
+    """A frame that is shifted by a vector in [m] and turned by an angle in [rad]."""
+    rotation = rodrigues(np.array([0.0, 0.6, 0.8]), turn) @ frame[:9].reshape(3, 3)
+    return np.append(rotation, frame[9:] + np.array(shift))
+
+
+@pytest.mark.parametrize("scenario", ["varga7-random", "panda-circle", "faitli3-regular"])
+def test_a_replay_is_the_episode(scenario):
+    stage = Stage.of(scenario, seed=3, steps=12)
+    (replay,) = play_all(stage, ["dls", "dls"])
+    policy = baselines.make("dls", stage.scenario)
+    env = gym.make("RedundantIK-v0", scenario=stage.scenario, preview=policy.preview)
+    observation, _ = env.reset(seed=3)
+    np.testing.assert_array_equal(replay.q[0], observation["q"])
+    state, cost = None, 0.0
+    for k in range(1, 13):
+        action, state = policy.predict(observation, state)
+        observation, reward, _, _, info = env.step(action)
+        cost -= reward
+        np.testing.assert_array_equal(replay.q[k], observation["q"])
+        assert replay.position_error[k] == info["position_error"]
+        assert replay.cost[k] == pytest.approx(cost, rel=1e-12)
+        if stage.scenario.task.has_orientation:
+            assert replay.orientation_error[k] == info["orientation_error"]
+    assert np.isnan(replay.orientation_error).all() == (not stage.scenario.task.has_orientation)
+    found = stage.scenario.task.coordinates(stage.frames[:, :9].reshape(-1, 3, 3), stage.frames[:, 9:])
+    np.testing.assert_allclose(found, stage.scenario.nominal(3), atol=1e-12)
+    _, tool = stage.scenario.arm.forward(stage.start)
+    assert stage.errors[0] == pytest.approx(np.linalg.norm(tool - stage.frames[0, 9:]), abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("options", "error"),
+    [
+        (("panda-cirkle",), UnknownNameError),
+        (("panda-circle", -1), InvalidInputError),
+        (("panda-circle", 0, 0), InvalidInputError),
+    ],
+)
+def test_bad_stages(options, error):
+    with pytest.raises(error):
+        Stage.of(*options)
+
+
+def test_bad_policies(stage):
+    with pytest.raises(InvalidInputError, match="at least one"):
+        play_all(stage, [])
+    with pytest.raises(UnknownNameError, match="Did you mean 'dls'"):
+        play_all(stage, ["dlss"])
+
+
+@pytest.mark.parametrize(("steps", "turns"), [(50, 0), (0, 20), (50, 20), (10, 40)])
+def test_the_reference_goes_straight_at_the_pace_of_the_slower_part(stage, steps, turns):
+    whole = Stage.of("panda-circle")
+    length = np.linalg.norm(np.diff(whole.frames[:, 9:], axis=0), axis=1).sum()
+    assert stage.pace == whole.pace  # although it begins slowly
+    assert stage.pace[0] == pytest.approx(length / whole.scenario.steps)
+    way, start, needed = Approach(stage), stage.frames[0], max(steps, turns)
+    target = moved(start, [steps * stage.pace[0], 0.0, 0.0], turns * stage.pace[1])
+    way.aim(target)
+    ahead = way.ahead(range(needed + 3))
+    np.testing.assert_allclose(ahead[0], start, atol=1e-9)
+    np.testing.assert_allclose(ahead[needed:], np.tile(target, (3, 1)), atol=1e-9)
+    np.testing.assert_allclose(ahead[: needed + 1, 9:], np.linspace(start[9:], target[9:], needed + 1), atol=1e-8)
+    for k in range(1, needed):
+        angle = geodesic_angle(start[:9].reshape(3, 3), ahead[k, :9].reshape(3, 3))
+        assert angle == pytest.approx(turns * stage.pace[1] * k / needed, abs=1e-6)
+        way.advance()
+        np.testing.assert_array_equal(way.frame, ahead[k])
+    way.aim(start)  # a new target does not make it jump
+    np.testing.assert_allclose(way.frame, ahead[needed - 1], atol=1e-12)
+
+
+@pytest.mark.parametrize("policy", ["dls", "mfac"])
+def test_a_placed_arm_has_forgotten(stage, policy):
+    follower = Follower(stage.scenario, baselines.make(policy, stage.scenario), stage.start)
+    way, first = Approach(stage), []
+    for _ in range(2):
+        follower.place(stage.start)
+        way.place(stage.frames[0])
+        way.aim(moved(stage.frames[0], [0.0, 0.02, 0.0]))
+        follower.step(way)
+        first.append(follower.q)
+        way.advance()
+        follower.step(way)
+    np.testing.assert_array_equal(*first)
+    assert np.abs(first[0] - stage.start).max() > 0.0
 
 
 def test_it_begins_at_the_start_of_the_episode(session):
@@ -37,38 +128,28 @@ def test_it_begins_at_the_start_of_the_episode(session):
         assert one.cost == 0.0
 
 
-def test_playing_shows_each_policy_at_the_same_moment(session):
+def test_play_speed_pause_end_and_scrub(session):
     session.toggle()
     session.advance(0.01)
     assert session.step == 10
     for one, replay in zip(session.shown(), session.replays, strict=True):
         np.testing.assert_array_equal(one.q, replay.q[10])
         assert (one.position_error, one.cost) == (replay.position_error[10], replay.cost[10])
-    np.testing.assert_array_equal(session.reference.position, session.stage.path[10])
-
-
-def test_speed_pause_and_end(session):
-    session.toggle()
+    np.testing.assert_array_equal(session.reference, session.stage.frames[10])
     session.speed = 2.0
     session.advance(0.005)
-    assert session.time == pytest.approx(0.01)
     session.toggle()
     session.advance(1.0)
-    assert session.time == pytest.approx(0.01)
+    assert session.time == pytest.approx(0.02)
     session.toggle()
     session.advance(1.0)
     assert (session.step, session.playing) == (STEPS, False)
     session.toggle()  # begins again
     assert (session.time, session.playing) == (0.0, True)
-
-
-def test_scrubbing(session):
-    session.toggle()
     session.scrub(0.025)
     assert (session.step, session.playing) == (25, False)
     session.scrub(99.0)
     assert session.step == STEPS
-    np.testing.assert_array_equal(session.shown()[1].q, session.replays[1].q[-1])
 
 
 def test_joints_by_hand_stay_within_the_limits(session):
@@ -78,68 +159,74 @@ def test_joints_by_hand_stay_within_the_limits(session):
         np.testing.assert_array_equal(one.q, arm.upper)
         np.testing.assert_allclose(one.reading.margins, 0.0, atol=1e-12)
         assert one.position_error == pytest.approx(0.0, abs=1e-12)
-    np.testing.assert_allclose(session.reference.position, arm.forward(arm.upper)[1], atol=1e-12)
+    np.testing.assert_allclose(session.reference[9:], arm.forward(arm.upper)[1], atol=1e-12)
 
 
 def test_arms_follow_a_target_from_where_they_are(session):
     session.scrub(0.02)
     before = [one.q for one in session.shown()]
-    target = above(session, 0.005)
+    target = moved(session.reference, [0.0, 0.0, 0.005], 0.02)
     session.aim(target)
     assert session.mode is Mode.FOLLOW
     for one, q in zip(session.shown(), before, strict=True):
         np.testing.assert_array_equal(one.q, q)
-    session.advance(1.0)
+    session.advance(2.0)
     for one in session.shown():
-        _, tool = session.stage.scenario.arm.forward(one.q)
-        np.testing.assert_allclose(tool, target.position, atol=1e-4)
+        assert one.position_error < 1e-4
+        assert one.orientation_error < 1e-3
+        np.testing.assert_allclose(session.stage.scenario.arm.forward(one.q)[1], target[9:], atol=1e-4)
     assert session.kept == pytest.approx(1.0)
+    session.aim(moved(target, [3.0, 0.0, 0.0]))  # out of reach
+    arm = session.stage.scenario.arm
+    for _ in range(10):
+        session.advance(0.1)
+        for one in session.shown():
+            assert ((arm.lower <= one.q) & (one.q <= arm.upper)).all()
 
 
-def test_time_that_is_no_whole_step_is_not_lost(session):
-    session.aim(above(session, 0.05))
-    start = session.reference.position
+def test_part_of_a_step_is_not_lost(session):
+    session.aim(moved(session.reference, [0.0, 0.0, 0.05]))
+    start = session.reference[9:]
     for _ in range(10):
         session.advance(0.0005)
-    assert np.linalg.norm(session.reference.position - start) == pytest.approx(5 * session.stage.pace[0], rel=1e-9)
+    assert np.linalg.norm(session.reference[9:] - start) == pytest.approx(5 * session.stage.pace[0], rel=1e-6)
 
 
 def test_slow_policies_hold_the_target_back(session, monkeypatch):
     """The picture comes in time, and says which share of the speed was kept."""
     monkeypatch.setattr(sessions, "BUDGET", 0.0)
-    session.aim(above(session, 0.05))
-    start = session.reference.position
+    session.aim(moved(session.reference, [0.0, 0.0, 0.05]))
+    start = session.reference
     for _ in range(30):
         session.advance(0.02)
-    np.testing.assert_array_equal(session.reference.position, start)
+    np.testing.assert_array_equal(session.reference, start)
     assert session.kept < 0.01
-    assert "keep up with 0%" in readings(session, session.shown())
+    assert "keep up with 0%" in session.text(session.shown())
 
 
 def test_readings_name_policies_errors_and_limits(session):
     session.scrub(0.04)
-    text = readings(session, session.shown())
-    assert "t = 0.040 s" in text
-    assert "**dls**: applied" in text
-    assert "**qp**" in text
-    assert text.count("manipulability") == 2
-    one = session.shown()[0]
-    assert f"error {1e3 * one.position_error:.3g} mm, {1e3 * one.orientation_error:.3g} mrad" in text
-    nearest = int(np.argmin(one.reading.margins))
-    name = session.stage.scenario.arm.joint_names[nearest]
-    assert f"{escaped(name)} is {one.reading.margins[nearest]:.3g} rad from its limit" in text
-    assert "cost so far" in text
+    shown = session.shown()
+    text, reading = session.text(shown), shown[0].reading
+    joint = int(np.argmin(reading.margins))
+    name = escaped(session.stage.scenario.arm.joint_names[joint])
+    for part in (
+        "t = 0.040 s", "**dls**: applied", "**qp**", "manipulability", "cost so far",
+        f"error {1e3 * shown[0].position_error:.3g} mm, {1e3 * shown[0].orientation_error:.3g} mrad",
+        f"{name} is {reading.margins[joint]:.3g} rad from its limit",
+    ):  # fmt: skip
+        assert part in text
 
 
 def test_privileged_information_plays_only():
-    session = session_of(Stage.of("varga7-fast", steps=5), ["follow_nominal", "dls"])
-    session.aim(above(session, 0.01))
+    session = Session(Stage.of("varga7-fast", steps=5), ["follow_nominal", "dls"])
+    session.aim(moved(session.reference, [0.0, 0.0, 0.01]))
     session.advance(0.003)
     reference, solver = session.shown()
     assert reference.status == PLAYS_ONLY
     np.testing.assert_array_equal(reference.q, session.stage.start)
     assert np.abs(solver.q - session.stage.start).max() > 0.0
-    assert "from its limit" not in readings(session, session.shown())  # an arm without limits
+    assert "from its limit" not in session.text(session.shown())  # an arm without limits
 
 
 def test_names_are_shown_letter_by_letter():

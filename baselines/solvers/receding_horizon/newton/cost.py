@@ -2,14 +2,13 @@
 
 The tracking cost of a knot depends on its own joint coordinates alone, the velocity cost of a block on those of its two
 ends, joint by joint: the Hessian is block-tridiagonal, with diagonal blocks beside the diagonal. Changes of velocity,
-where they cost something, couple three knots: see :mod:`rate`.
+where they cost something, couple three knots: see :func:`change`.
 """
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
-from baselines.solvers.receding_horizon.newton.rate import add_rate_cost, rate_cost
 from baselines.solvers.receding_horizon.newton.second_order import second_order
 from baselines.solvers.receding_horizon.newton.terms import (
     joint_limit_term,
@@ -45,17 +44,66 @@ class Values(NamedTuple):
 
 
 @inlined
-def tracking_errors(problem, path, workspace):
-    """The tracking errors at the knots that count.
+def change(problem, path, k, j):
+    """The change of velocity at the beginning of block ``k``, of joint ``j``, in [rad/s] or [m/s].
 
-    Args:
-        problem: A :class:`workspace.PathProblem` of K knots.
-        path: Joint coordinates at the knots in [rad] or [m]. Shape (K, n).
-        workspace: A :class:`workspace.NewtonWorkspace`, whose ``errors`` are set.
+    Between a block of g steps and one of h steps the joint velocity changes by Δq̇, which is taken to need (g + h) / 2
+    steps: Σ (Δq̇)² over these steps is Δq̇² / ((g + h) / 2), exact where both are one step long. The block before the
+    first is the step that has passed.
 
     Returns:
-        The errors. Shape (at least K, e).
+        The change, its derivative by the knot at the block's end, that by the knot two before (both in [1/s]), and the
+        weight of its square.
     """
+    lengths, dt, start = problem.grid.length, problem.data.dt, problem.start
+    here = path[k - 1, j] if k > 0 else start[j]
+    by_end = 1.0 / (lengths[k] * dt)
+    length, by_beginning, velocity = 1.0, 0.0, problem.qdot_before[j]
+    if k > 0:
+        length, by_beginning = lengths[k - 1], 1.0 / (lengths[k - 1] * dt)
+        velocity = (here - (path[k - 2, j] if k > 1 else start[j])) * by_beginning
+    weight = problem.rate_weight / (0.5 * (length + lengths[k]))
+    return (path[k, j] - here) * by_end - velocity, by_end, by_beginning, weight
+
+
+@uncounted
+def rate_cost(problem, path):
+    """The cost of a path's changes of velocity."""
+    total = 0.0
+    for k in range(path.shape[0]):
+        for j in range(path.shape[1]):
+            changed, _, _, weight = change(problem, path, k, j)
+            total += weight * changed * changed
+    return total
+
+
+@uncounted
+def add_rate_cost(problem, path, model):
+    """Adds gradient and Hessian of :func:`rate_cost` to a quadratic model, whose ``far`` is set; gives the cost."""
+    gradient, diagonal, coupling, far = model.gradient, model.diagonal, model.coupling, model.far
+    total = 0.0
+    for k in range(path.shape[0]):
+        for j in range(path.shape[1]):
+            changed, a, c, weight = change(problem, path, k, j)
+            total += weight * changed * changed
+            twice = 2.0 * weight
+            gradient[k, j] += twice * changed * a
+            diagonal[k, j, j] += twice * a * a
+            far[k, j] = twice * a * c if k > 1 else 0.0
+            if k > 0:
+                gradient[k - 1, j] -= twice * changed * (a + c)
+                diagonal[k - 1, j, j] += twice * (a + c) * (a + c)
+                coupling[k, j] += twice * a * (a + c)
+            if k > 1:
+                gradient[k - 2, j] += twice * changed * c
+                diagonal[k - 2, j, j] += twice * c * c
+                coupling[k - 1, j] += twice * c * (a + c)
+    return total
+
+
+@inlined
+def tracking_errors(problem, path, workspace):
+    """The tracking errors at the knots that count, which the workspace keeps as well. Shape (at least K, e)."""
     chain, kind, nominal = problem.data.chain, problem.data.kind, problem.nominal
     at, tracking = problem.grid.at, problem.grid.tracking
     rotation, position, pose = workspace.knot.rotation, workspace.knot.position, workspace.knot.pose
@@ -70,13 +118,7 @@ def tracking_errors(problem, path, workspace):
 
 @uncounted
 def true_cost(problem, path, workspace):
-    """The cost of a path, from the same kernels as the environment's; limits apart.
-
-    Args:
-        problem: A :class:`workspace.PathProblem` of K knots.
-        path: Joint coordinates at the knots in [rad] or [m]. Shape (K, n).
-        workspace: A :class:`workspace.NewtonWorkspace`.
-    """
+    """The cost of a path, from the same kernels as the environment's; limits apart."""
     data, grid, start = problem.data, problem.grid, problem.start
     cost, lengths, tracking, velocities = data.cost, grid.length, grid.tracking, grid.velocity
     errors = tracking_errors(problem, path, workspace)
@@ -95,15 +137,7 @@ def true_cost(problem, path, workspace):
 
 @uncounted
 def merit(problem, path, multipliers, workspace):
-    """The smooth function that Newton's method minimises: the cost with its kinks and limits held by multipliers.
-
-    Args:
-        problem: A :class:`workspace.PathProblem` of K knots.
-        path: Joint coordinates at the knots in [rad] or [m]. Shape (K, n).
-        multipliers: λ₀ of each knot: of its e errors, its n velocities and its n joint coordinates.
-            Shape (K, e + 2 n).
-        workspace: A :class:`workspace.NewtonWorkspace`.
-    """
+    """The smooth function that Newton's method minimises: the cost with its kinks and limits held by multipliers."""
     data, grid, start = problem.data, problem.grid, problem.start
     cost, lengths, tracking, velocities = data.cost, grid.length, grid.tracking, grid.velocity
     limits, lower, upper = data.velocity_limit, data.lower, data.upper
@@ -136,12 +170,12 @@ def linearise(problem, path, multipliers, advance, exact, workspace):
     """:func:`merit`, its gradient and its Hessian.
 
     Args:
-        problem: A :class:`workspace.PathProblem` of K knots.
-        path: Joint coordinates at the knots in [rad] or [m]. Shape (K, n).
-        multipliers: λ₀, see :func:`merit`. Shape (K, e + 2 n).
+        problem: See :mod:`newton`.
+        path: See :mod:`newton`.
+        multipliers: See :mod:`newton`.
         advance: Whether to replace λ₀ by the λ of the path first.
         exact: Whether the second derivatives of the error are wanted, too.
-        workspace: A :class:`workspace.NewtonWorkspace`, whose ``model`` receives gradient and Hessian.
+        workspace: See :mod:`newton`; its ``model`` receives gradient and Hessian.
 
     Returns:
         The :class:`Values` of the path.

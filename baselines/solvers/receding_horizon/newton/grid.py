@@ -153,10 +153,7 @@ def shift_path(old, path, qdot, new, out):
 def shift_multipliers(old, multipliers, new):
     """Multipliers one step later, in place: each knot takes over those of the old knot at its time or next after it.
 
-    Args:
-        old: The grid of the multipliers.
-        multipliers: Shape (at least as many as the knots of both, w).
-        new: The grid asked for, counted from one step later; with no more knots than the old one.
+    The new grid is counted from one step later, and has no more knots than the old one.
     """
     last, block = old.at.shape[0] - 1, 0
     for k in range(new.at.shape[0]):

@@ -62,12 +62,7 @@ def initial_guess(problem, first, drift, damping, path, workspace):
 
 @uncounted
 def slow_down(problem, path):
-    """Makes a path follow itself within the velocity limits, and so later where it was too fast; in place.
-
-    Args:
-        problem: A :class:`workspace.PathProblem` of K knots.
-        path: Joint coordinates at the knots in [rad] or [m]. Shape (K, n).
-    """
+    """Makes a path follow itself within the velocity limits, and so later where it was too fast; in place."""
     data, start, length = problem.data, problem.start, problem.grid.length
     for k in range(path.shape[0]):
         for j in range(path.shape[1]):

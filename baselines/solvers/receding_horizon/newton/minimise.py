@@ -7,8 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from baselines.solvers.receding_horizon.newton.cost import linearise, merit
-from baselines.solvers.receding_horizon.newton.newton_step import newton_step
-from baselines.solvers.receding_horizon.newton.pentadiagonal import pentadiagonal_step
+from baselines.solvers.receding_horizon.newton.newton_step import newton_step, pentadiagonal_step
 from ikgym.kernels.jit import inlined, uncounted
 
 CONVERGED, RAN_OUT, STALLED = 0, 1, 2
@@ -82,11 +81,11 @@ def minimise(problem, path, multipliers, settings, workspace):
     with these they are updated.
 
     Args:
-        problem: A :class:`workspace.PathProblem` of K knots.
-        path: Joint coordinates at the knots in [rad] or [m], changed in place. Shape (K, n).
-        multipliers: λ of the kinks and limits, changed in place. Shape (K, e + 2 n).
+        problem: See :mod:`newton`.
+        path: See :mod:`newton`; changed in place.
+        multipliers: See :mod:`newton`; changed in place.
         settings: :class:`NewtonSettings`.
-        workspace: A :class:`workspace.NewtonWorkspace`.
+        workspace: See :mod:`newton`.
 
     Returns:
         A :class:`Minimum`.
@@ -146,18 +145,8 @@ def minimise(problem, path, multipliers, settings, workspace):
 def damped_newton_step(problem, exact, damping, unit, workspace, step):
     """A Newton step with the least damping, from ``damping`` up, that makes the Hessian positive definite.
 
-    Where the exact Hessian is not positive definite its Gauss–Newton part is taken before any damping is added.
-
-    Args:
-        problem: The :class:`workspace.PathProblem`, whose quadratic model is in the workspace.
-        exact: Whether to try the exact Hessian.
-        damping: Damping to begin with, in units of ``unit``.
-        unit: (Δt Δq̇)⁻².
-        workspace: The :class:`workspace.NewtonWorkspace`.
-        step: Receives the step. Shape (K, n).
-
-    Returns:
-        The damping of the step, above MOST_DAMPING where none was found.
+    Where the exact Hessian is not positive definite its Gauss–Newton part is taken before any damping is added. The
+    damping is in units of ``unit``, (Δt Δq̇)⁻². Gives that of the step, above MOST_DAMPING where none was found.
     """
     model, inverse, factor = workspace.model, workspace.inverse, workspace.factor
     second = exact
@@ -179,20 +168,10 @@ def damped_newton_step(problem, exact, damping, unit, workspace, step):
 
 @inlined
 def line_search(problem, path, multipliers, value, derivative, step, trial, workspace):
-    """Shortens a step until the merit decreases enough (Armijo).
+    """Shortens a step until the merit decreases enough (Armijo); gives a :class:`LineSearch`.
 
-    Args:
-        problem: The :class:`workspace.PathProblem`.
-        path: Where the step begins. Shape (K, n).
-        multipliers: λ₀. Shape (K, e + 2 n).
-        value: The merit there.
-        derivative: Its derivative along the step.
-        step: The step. Shape (K, n).
-        trial: Receives the path at the last trial. Shape (K, n).
-        workspace: The :class:`workspace.NewtonWorkspace`.
-
-    Returns:
-        A :class:`LineSearch`.
+    ``value`` and ``derivative`` are the merit at the path and its derivative along the step; ``trial`` receives the
+    path at the last trial.
     """
     length, reached, accepted = 1.0, value, False
     for _ in range(TRIALS):

@@ -1,4 +1,4 @@
-"""Kernel: the Newton step of a block-tridiagonal quadratic model, in time linear in its knots."""
+"""Kernels: Newton steps of block-tridiagonal and block-pentadiagonal models, in time linear in the knots."""
 
 from __future__ import annotations
 
@@ -41,14 +41,9 @@ def newton_step(model, exact, damping, inverse, factor, step):
 
 @inlined
 def _eliminate(coupling, inverse, rhs_before, pivot, rhs):
-    """Eliminates the knot before: its Schur complement from the pivot, its share from the right-hand side.
+    """Eliminates the knot before, by the diagonal (n,) of the block beside the pivot.
 
-    Args:
-        coupling: The negative of the block's diagonal. Shape (n,).
-        inverse: Inverse of the pivot before. Shape (n, n).
-        rhs_before: The right-hand side before. Shape (n,).
-        pivot: Lower triangle, changed in place. Shape (n, n).
-        rhs: Changed in place. Shape (n,).
+    Its Schur complement is taken from the pivot, whose lower triangle counts, its share from the right-hand side.
     """
     n = rhs.shape[0]
     for a in range(n):
@@ -62,16 +57,7 @@ def _eliminate(coupling, inverse, rhs_before, pivot, rhs):
 
 @inlined
 def pivot_of(model, exact, damping, k, pivot, rhs):
-    """Knot ``k`` before anything is eliminated from it: its block of the Hessian, damped, and minus its gradient.
-
-    Args:
-        model: The :class:`workspace.QuadraticModel`.
-        exact: Whether to take the Hessian itself instead of its Gauss–Newton part.
-        damping: Added to the diagonal.
-        k: Which knot.
-        pivot: Receives the block's lower triangle. Shape (n, n).
-        rhs: Receives minus the gradient. Shape (n,).
-    """
+    """Knot ``k`` before anything is eliminated: the lower triangle of its damped block, and minus its gradient."""
     diagonal, second, gradient = model.diagonal[k], model.second[k], model.gradient[k]
     for a in range(rhs.shape[0]):
         for b in range(a + 1):
@@ -91,3 +77,75 @@ def multiply(matrix, scratch, vector):
         scratch[0, a] = total
     for a in range(n):
         vector[a] = scratch[0, a]
+
+
+@uncounted
+def pentadiagonal_step(model, exact, damping, inverse, factor, step):
+    """:func:`newton_step` where ``model.far`` is not zero.
+
+    The blocks two away from the diagonal are diagonal and stay so; those beside it fill up on the way.
+    """
+    knots, n = step.shape
+    far, beside = model.far, model.beside
+    for k in range(knots):
+        pivot_of(model, exact, damping, k, factor, step[k])
+        if k > 0:
+            _fill(model, inverse, k)
+            _eliminate_full(beside[k], inverse[k - 1], step[k - 1], model.product, factor, step[k])
+        if k > 1:
+            _eliminate_diagonal(far[k], inverse[k - 2], step[k - 2], factor, step[k])
+        if not cholesky(factor):
+            return False
+        inverse_of_factor(factor, inverse[k])
+    for k in range(knots - 1, -1, -1):
+        for a in range(n):
+            if k + 1 < knots:
+                for b in range(n):
+                    step[k, a] -= beside[k + 1, b, a] * step[k + 1, b]
+            if k + 2 < knots:
+                step[k, a] -= far[k + 2, a] * step[k + 2, a]
+        multiply(inverse[k], factor, step[k])
+    return True
+
+
+@inlined
+def _fill(model, inverse, k):
+    """The block beside the diagonal in row ``k``, behind the elimination of the knot two before."""
+    far, beside = model.far, model.beside
+    n = far.shape[1]
+    for a in range(n):
+        for b in range(n):
+            total = -model.coupling[k, a] if a == b else 0.0
+            if k > 1:
+                for c in range(n):
+                    total -= far[k, a] * inverse[k - 2, a, c] * beside[k - 1, b, c]
+            beside[k, a, b] = total
+
+
+@inlined
+def _eliminate_full(beside, inverse, rhs_before, product, pivot, rhs):
+    """Eliminates the knot before likewise, by a full block; ``product`` is scratch. Shapes (n, n)."""
+    n = rhs.shape[0]
+    for a in range(n):
+        for b in range(n):
+            total = 0.0
+            for c in range(n):
+                total += beside[a, c] * inverse[c, b]
+            product[a, b] = total
+            rhs[a] -= total * rhs_before[b]
+        for b in range(a + 1):
+            total = 0.0
+            for c in range(n):
+                total += product[a, c] * beside[b, c]
+            pivot[a, b] -= total
+
+
+@inlined
+def _eliminate_diagonal(far, inverse, rhs_before, pivot, rhs):
+    """Eliminates the knot two before likewise. Shape of ``far`` (n,)."""
+    n = rhs.shape[0]
+    for a in range(n):
+        for b in range(n):
+            rhs[a] -= far[a] * inverse[a, b] * rhs_before[b]
+        for b in range(a + 1):
+            pivot[a, b] -= far[a] * inverse[a, b] * far[b]

@@ -9,8 +9,7 @@ import numpy.typing as npt
 
 from baselines.solvers.receding_horizon.newton.grid import Grid, empty_grid, shift_multipliers, shift_path
 from baselines.solvers.receding_horizon.newton.guess import DAMPING, STREAM, draw, initial_guess, slow_down, uniform
-from baselines.solvers.receding_horizon.newton.interior_point.excess import cost_within
-from baselines.solvers.receding_horizon.newton.interior_point.minimise import minimise_path
+from baselines.solvers.receding_horizon.newton.interior_point import cost_within, minimise_path
 from baselines.solvers.receding_horizon.newton.minimise import NewtonSettings
 from baselines.solvers.receding_horizon.newton.workspace import NewtonWorkspace, newton_workspace
 from ikgym.kernels.jit import inlined, kernel, uncounted
@@ -73,7 +72,7 @@ def plan_workspace(kind, m, knots, n, width, limited):
 
 @inlined
 def plan_in(block, knots, n):
-    """The plan that a block of numbers holds: the path of ``knots`` knots and ``n`` joints, then the multipliers."""
+    """The plan in a block of numbers: the path of ``knots`` knots and ``n`` joints, then the multipliers."""
     end = knots * n
     return Plan(block[:end].reshape(knots, n), block[end:].reshape(knots, block.shape[0] // knots - n))
 
@@ -86,13 +85,9 @@ def first_part(plan, knots):
 
 @uncounted
 def shift_plan(old_grid, plan, grid, workspace):
-    """Turns a plan into what is left of it one step later, in place.
+    """Turns a plan into what is left of it one step later, in place; ``workspace.passed`` is set.
 
-    Args:
-        old_grid: The grid of the plan.
-        plan: A :class:`Plan` of at least as many knots as either grid.
-        grid: The grid asked for, counted from one step later.
-        workspace: A :class:`PlanWorkspace` whose ``passed`` is set.
+    The plan has at least as many knots as either grid; the new grid is counted from one step later.
     """
     shifted = workspace.kept.path
     shift_path(old_grid, plan.path, workspace.passed, grid, shifted)
@@ -106,14 +101,7 @@ def shift_plan(old_grid, plan, grid, workspace):
 def initial_plan(problem, settings, plan, workspace):
     """The initial plan of an episode: the cheapest of several initial guesses, each a few Newton steps on.
 
-    Args:
-        problem: A :class:`workspace.PathProblem` of K knots.
-        settings: :class:`settings.PlanSettings`.
-        plan: Receives the :class:`Plan`.
-        workspace: A :class:`PlanWorkspace`.
-
-    Returns:
-        Newton steps made.
+    The :class:`Plan` receives it. Gives the Newton steps made.
     """
     made, best = 0, np.inf
     trials = 1 if settings.start_steps > 0 else settings.starts
@@ -150,14 +138,14 @@ def _guess(problem, settings, first, damping, path, workspace):
 
 @kernel
 def try_start(problem, settings, steps, plan, cost, number, workspace):
-    """Improves an initial guess by some Newton steps, and lets it replace the plan where it is cheaper.
+    """Improves a random guess by some Newton steps; it replaces the plan where it is cheaper.
 
     Args:
-        problem: A :class:`workspace.PathProblem` of K knots.
+        problem: See :mod:`newton`.
         settings: :class:`settings.PlanSettings`.
         steps: Newton steps.
         plan: The :class:`Plan`.
-        cost: What the plan costs.
+        cost: The cost of the plan.
         number: Which random guess of the seed.
         workspace: A :class:`PlanWorkspace`.
 
@@ -180,7 +168,7 @@ def branch_off(problem, settings, plan, anew, number, candidate, workspace):
     """Begins a restart candidate: the plan up to a random knot, and from there on a random guess.
 
     Args:
-        problem: A :class:`workspace.PathProblem` of K knots.
+        problem: See :mod:`newton`.
         settings: :class:`settings.PlanSettings`.
         plan: The :class:`Plan`.
         anew: Whether to branch off at once.
@@ -199,14 +187,14 @@ def branch_off(problem, settings, plan, anew, number, candidate, workspace):
 
 @kernel
 def improve_candidate(problem, settings, rate, plan, cost, candidate, age, workspace):
-    """Improves a restart candidate by some Newton steps, and lets it replace the plan where it is cheaper.
+    """Improves a restart candidate by some Newton steps; it replaces the plan where it is cheaper.
 
     Args:
-        problem: A :class:`workspace.PathProblem` of K knots.
+        problem: See :mod:`newton`.
         settings: :class:`settings.PlanSettings`.
         rate: Newton steps.
         plan: The :class:`Plan`.
-        cost: What the plan costs.
+        cost: The cost of the plan.
         candidate: The candidate, a :class:`Plan` of K knots.
         age: Newton steps that the candidate has had; 0 after its last. Shape (1,).
         workspace: A :class:`PlanWorkspace`.

@@ -8,8 +8,9 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from baselines.solvers.receding_horizon.horizon import ProblemData
 from baselines.solvers.receding_horizon.newton.grid import cut, first_knots
-from baselines.solvers.receding_horizon.newton.interior_point.minimise import minimise_path
+from baselines.solvers.receding_horizon.newton.interior_point import minimise_path
 from baselines.solvers.receding_horizon.newton.minimise import CONVERGED, NewtonSettings
 from baselines.solvers.receding_horizon.newton.plan import (
     SMOOTHING,
@@ -24,7 +25,6 @@ from baselines.solvers.receding_horizon.newton.plan import (
 )
 from baselines.solvers.receding_horizon.newton.settings import settings_of
 from baselines.solvers.receding_horizon.newton.workspace import PathProblem
-from baselines.solvers.receding_horizon.problem_data import ProblemData
 from baselines.status import Status
 from ikgym.kernels.jit import inlined, kernel, uncounted
 from ikgym.kernels.kinematics import Chain
@@ -79,16 +79,7 @@ def plan_step(model, numbers, seen, memory, answer):
 
 @uncounted
 def plan_batch(data, settings, observations, memory, answers, workspace):
-    """Plans one period for each of B arms.
-
-    Args:
-        data: The :class:`ProblemData`.
-        settings: :class:`settings.PlanSettings`.
-        observations: A :class:`Seen`.
-        memory: The :class:`HorizonMemory`, turned into the next one in place.
-        answers: Receives the :class:`Answer`.
-        workspace: A :class:`plan.PlanWorkspace`.
-    """
+    """Plans one period for each of B arms; the settings are :class:`PlanSettings`, other arguments as above."""
     plans, counts = memory
     for row in range(observations.q.shape[0]):
         q, qdot_before, count = observations.q[row], observations.qdot[row], counts[row]
@@ -130,16 +121,10 @@ def _grids(settings, remaining, workspace):
 def _plan_row(problem, settings, old_grid, plans, counts, workspace):
     """Plans a period of one arm, and goes on with its restart candidate.
 
-    Args:
-        problem: A :class:`PathProblem`.
-        settings: :class:`settings.PlanSettings`.
-        old_grid: The grid of the plans, those of the period before.
-        plans: Of :class:`HorizonMemory`, changed in place. Shape (1 or 2, K (e + 3 n)).
-        counts: Likewise. Shape (4,).
-        workspace: A :class:`plan.PlanWorkspace`.
+    The plans (1 or 2, K (e + 3 n)) and counts (4,) of :class:`HorizonMemory` are changed in place.
 
     Returns:
-        The :class:`minimise.Minimum` of the plan, and Newton steps made.
+        The :class:`Minimum` of the plan, and Newton steps made.
     """
     all_knots, knots, n = settings.at.shape[0], problem.grid.at.shape[0], problem.start.shape[0]
     period, far, spread = counts[PERIODS], counts[FAR], settings.start_steps > 0
@@ -163,10 +148,8 @@ def _plan_row(problem, settings, old_grid, plans, counts, workspace):
 def _newton_steps(settings, first, hurried):
     """Newton steps of the plan in one period; -1 to the optimum.
 
-    Args:
-        settings: :class:`settings.PlanSettings`.
-        first: Which of the periods of the first plan this is, -1 for none.
-        hurried: Whether the period before ended beyond the velocity limits, and there is time to make up for it.
+    ``first`` is the number of the period among those of the first plan, -1 for later ones; ``hurried`` is whether the
+    period before ended beyond the velocity limits, and there is time to make up for it.
     """
     if settings.iterations < 0:
         return -1
@@ -183,20 +166,17 @@ def _newton_steps(settings, first, hurried):
 
 @inlined
 def _restart(problem, settings, old_grid, plans, counts, cost, starting, workspace):
-    """Begins a restart candidate, or goes on with the one there is.
+    """Begins a restart candidate, or goes on with the one there is; gives the Newton steps made.
 
     Args:
         problem: A :class:`PathProblem`.
-        settings: :class:`settings.PlanSettings`.
+        settings: :class:`PlanSettings`.
         old_grid: The grid of the candidate, that of the period before.
         plans: Of :class:`HorizonMemory`, changed in place. Shape (2, K (e + 3 n)).
         counts: Likewise. Shape (4,).
-        cost: What the plan costs.
+        cost: The cost of the plan.
         starting: Whether initial guesses are still to be tried.
-        workspace: A :class:`plan.PlanWorkspace`.
-
-    Returns:
-        Newton steps made.
+        workspace: A :class:`PlanWorkspace`.
     """
     all_knots, knots, n = settings.at.shape[0], problem.grid.at.shape[0], problem.start.shape[0]
     plan, whole = first_part(plan_in(plans[0], all_knots, n), knots), plan_in(plans[1], all_knots, n)
@@ -208,7 +188,7 @@ def _restart(problem, settings, old_grid, plans, counts, cost, starting, workspa
         shift_plan(old_grid, whole, problem.grid, workspace)
     # Newton steps of the interior point method take three times as long: no period has time for several of a guess.
     hasty = starting and problem.change_limit.shape[0] == 0
-    rate, made = settings.start_steps if hasty else settings.restart_rate, 0
+    rate, made = settings.start_steps if hasty else 1, 0
     counts[TRIED] += starting
     if begun and settings.start_steps > 0 and not starting:
         age[0] = 1  # a guess takes as long as a Newton step, and counts as one: no period has time for both
@@ -222,17 +202,10 @@ def _restart(problem, settings, old_grid, plans, counts, cost, starting, workspa
 def _plan(problem, settings, most, period, old_grid, plan, workspace):
     """Plans a period of one arm, from the plan of the period before or from an initial guess.
 
-    Args:
-        problem: A :class:`PathProblem`.
-        settings: :class:`settings.PlanSettings`.
-        most: Newton steps in this period behind initial guesses; -1 to the optimum.
-        period: Periods planned before.
-        old_grid: The grid of the plan before.
-        plan: The :class:`Plan`, changed in place.
-        workspace: A :class:`plan.PlanWorkspace`.
+    ``most`` is the number of Newton steps behind initial guesses, -1 to the optimum; the plan is changed in place.
 
     Returns:
-        The :class:`minimise.Minimum`, and Newton steps made, those of initial guesses among them.
+        The :class:`Minimum`, and Newton steps made, those of initial guesses among them.
     """
     part = first_part(plan, problem.grid.at.shape[0])
     made, exact, steps = 0, most < 0, most
@@ -252,10 +225,7 @@ def _plan(problem, settings, most, period, old_grid, plan, workspace):
 def _first_velocity(problem, target, qdot):
     """The joint velocities of a plan's first block, within all limits.
 
-    Args:
-        problem: The :class:`PathProblem`.
-        target: Joint coordinates at the first knot, in [rad] or [m]. Shape (at least n,).
-        qdot: Receives the joint velocities, in [rad/s] or [m/s]. Shape (n,).
+    ``target`` is the first knot, and ``qdot`` receives the velocities. Shapes (at least n,) and (n,).
 
     Returns:
         Whether the plan keeps the limits of velocity and acceleration.

@@ -65,14 +65,7 @@ def second_order(kind, workspace, out):
 
 @inlined
 def set_moment(kind, gradient, rotation, moment):
-    """G Rᵀ - tr(G Rᵀ) I with G = ∂Φ / ∂R: then Σ G : w_b × (w_a × R) = w_aᵀ moment w_b.
-
-    Args:
-        kind: SKEW or MATRIX.
-        gradient: ∂Φ / ∂error. Shape (e,).
-        rotation: R. Shape (3, 3).
-        moment: Receives the matrix. Shape (3, 3).
-    """
+    """G Rᵀ - tr(G Rᵀ) I with G = ∂Φ / ∂R: then Σ G : w_b × (w_a × R) = w_aᵀ moment w_b. For SKEW and MATRIX."""
     trace = 0.0
     for i in range(3):
         for j in range(3):

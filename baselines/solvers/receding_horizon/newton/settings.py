@@ -15,22 +15,11 @@ Integers = npt.NDArray[np.int64]
 
 
 class PlanSettings(NamedTuple):
-    """What the parameters of :class:`baselines.solvers.receding_horizon.rhc.RecedingHorizon` say to the kernels.
+    """The parameters of :class:`baselines.solvers.receding_horizon.rhc.RecedingHorizon`, as its kernels see them.
 
-    Attributes:
+    Attributes, where they are not the parameters themselves:
         at: Steps from now to the knots. Shape (K,).
-        terminal_weight: Factor of the tracking cost of the last knot.
-        stop_at_end: Whether the horizon ends with the episode.
         iterations: Newton steps in one period; -1 to the optimum.
-        tolerance: Relative precision of the optimum.
-        starts: Initial guesses to choose from.
-        restart_steps: Newton steps of a restart candidate, 0 for none.
-        restart_rate: Of them in one period.
-        seed: Of the random guesses.
-        start_steps: Newton steps of an initial guess that has a period of its own; 0 where all share the first. The
-            first plan's are shared by two periods.
-        recovery_steps: Newton steps behind a period that ended beyond the velocity limits; 0 for as many as in others.
-        rate_weight: What changes of velocity cost, see :mod:`rate`.
         change_limit: Largest changes of velocity in one step, see :class:`workspace.PathProblem`. Shape (n or 0,).
     """
 
@@ -41,7 +30,6 @@ class PlanSettings(NamedTuple):
     tolerance: float
     starts: int
     restart_steps: int
-    restart_rate: int
     seed: int
     start_steps: int
     recovery_steps: int
@@ -70,7 +58,7 @@ def plain_settings(cost: CostParameters, settings: PlanSettings) -> tuple[Floats
     """
     s = settings
     numbers = np.array([*cost, s.terminal_weight, s.tolerance, s.rate_weight, *s.change_limit])
-    steps = s.iterations, s.starts, s.restart_steps, s.restart_rate, s.seed, s.start_steps, s.recovery_steps
+    steps = s.iterations, s.starts, s.restart_steps, s.seed, s.start_steps, s.recovery_steps
     integers = np.array([s.stop_at_end, *steps, *s.at], dtype=np.int64)
     for block in (numbers, integers):
         block.flags.writeable = False
@@ -83,7 +71,7 @@ def settings_of(numbers, integers):
     cost = CostParameters(numbers[0], numbers[1], numbers[2], numbers[3], numbers[4])
     terminal_weight, tolerance, rate_weight = numbers[5], numbers[6], numbers[7]
     return cost, PlanSettings(
-        integers[8:],
+        integers[7:],
         terminal_weight,
         integers[0] != 0,
         integers[1],
@@ -93,7 +81,6 @@ def settings_of(numbers, integers):
         integers[4],
         integers[5],
         integers[6],
-        integers[7],
         rate_weight,
         numbers[8:],
     )

@@ -1,6 +1,18 @@
-"""Kernels: the terms of the merit function, one component at a time, each with its derivatives.
+"""Kernels: the smooth terms that stand for kinks and limits of the cost, one component at a time.
 
-The merit function is the cost of a path with its kinks and limits replaced by augmented-Lagrangian terms.
+The cost has kinks: beyond |e| = Δx the derivative of Φ^X jumps from 2 to P_X. A minimum often lies right on such a
+kink, where no gradient vanishes. There are two ways to make it smooth.
+
+**Augmented Lagrangian.** The part beyond the kink, max(0, |x| - 1), is the largest of λ x - |λ| over |λ| <= 1. Held
+near the λ known from the step before, which is the method of multipliers, it is smooth, and Newton's method finds the
+minimum exactly. A joint limit is the same with a λ without bound.
+
+**Barrier.** A kink of the cost is w max(0, u), and a limit u <= 0 the same with a w above its multiplier (an exact
+penalty, so that no path is infeasible). Both are the least w t over t >= 0 and t >= u, and with a logarithmic barrier
+for these two conditions a smooth function of u: φ(u) = min_t w t - μ log t - μ log (t - u), which tends to w max(0, u)
+with μ. Newton's method with the exact φ'' goes wrong from far; the curvature is taken from the primal-dual equations λ
+(t - u) = μ and (w - λ) t = μ with a multiplier λ of its own (Nocedal and Wright, *Numerical optimization*, 2006,
+section 19.3).
 """
 
 from __future__ import annotations
@@ -8,7 +20,6 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from baselines.solvers.receding_horizon.newton.augmented_lagrangian import augmented_term
 from ikgym.kernels import cost as cost_kernels
 from ikgym.kernels.cost import P_X_INSIDE
 from ikgym.kernels.jit import inlined
@@ -22,6 +33,54 @@ VELOCITY_PENALTY = 300.0
 JOINT_PENALTY = 1e4
 # Velocities below this share of Δq̇ count as this share in the curvature of Φ^U, which vanishes at rest.
 LEAST_SPEED = 1e-3
+# A multiplier stays within this factor of what the barrier's gradient says (Wächter and Biegler 2006, eq. 16).
+TRUSTED = 1e4
+
+
+class AugmentedTerm(NamedTuple):
+    """An augmented-Lagrangian term at one place.
+
+    Attributes:
+        value: Its value.
+        multiplier: λ, the multiplier brought up to date, which is also the term's derivative.
+        curvature: Its second derivative.
+        linear: λ (x - bound) alone.
+    """
+
+    value: float
+    multiplier: float
+    curvature: float
+    linear: float
+
+
+@inlined
+def augmented_term(x, low, high, multiplier, penalty, largest):
+    """The largest of λ (x - bound) - (λ - λ₀)² / (2 ρ) over |λ| <= largest; λ > 0 at ``high``, λ < 0 at ``low``.
+
+    Args:
+        x: Where.
+        low: The lower bound, below which the term grows.
+        high: The upper bound, above which it grows.
+        multiplier: λ₀, the multiplier so far.
+        penalty: ρ.
+        largest: The largest |λ|: the steepness of a kink, infinite for a limit.
+
+    Returns:
+        An :class:`AugmentedTerm`.
+    """
+    beyond = x - high
+    updated = multiplier + penalty * beyond
+    if updated <= 0.0:
+        beyond = x - low
+        updated = multiplier + penalty * beyond
+        if updated >= 0.0:
+            return AugmentedTerm(-0.5 * multiplier * multiplier / penalty, 0.0, 0.0, 0.0)
+    curvature = penalty
+    if abs(updated) >= largest:
+        updated = largest if updated > 0.0 else -largest
+        curvature = 0.0
+    change = updated - multiplier
+    return AugmentedTerm(updated * beyond - 0.5 * change * change / penalty, updated, curvature, updated * beyond)
 
 
 class TrackingTerm(NamedTuple):
@@ -100,3 +159,74 @@ def joint_limit_term(data, j, q, multiplier, penalty_factor):
     """The term of the limits of joint ``j``, in [rad] or [m]; gives an ``AugmentedTerm``."""
     penalty = penalty_factor * JOINT_PENALTY * 2.0 / (data.cost.delta_x * data.cost.delta_x)
     return augmented_term(q, data.lower[j], data.upper[j], multiplier, penalty, math.inf)
+
+
+@inlined
+def kink_steepness(cost):
+    """By how much the derivative of Φ^X jumps at its kink, in units of Δx; 0 where it falls."""
+    return max(cost.p_x - P_X_INSIDE, 0.0)
+
+
+@inlined
+def without_kink(cost, error, steepness):
+    """A component of Φ^X without the part beyond its kink."""
+    value = cost_kernels.value(error, cost.delta_x, P_X_INSIDE, cost.p_x)
+    return value - steepness * max(abs(error) / cost.delta_x - 1.0, 0.0)
+
+
+@inlined
+def derivatives_without_kink(cost, error, steepness):
+    """The first and second derivative of :func:`without_kink`."""
+    gradient = cost_kernels.gradient(error, cost.delta_x, P_X_INSIDE, cost.p_x)
+    if abs(error) > cost.delta_x:
+        gradient -= math.copysign(steepness / cost.delta_x, error)
+    return gradient, cost_kernels.curvature(error, cost.delta_x, P_X_INSIDE, cost.p_x)
+
+
+class Smoothed(NamedTuple):
+    """φ at one place.
+
+    Attributes:
+        value: φ.
+        gradient: φ', which lies between 0 and w.
+        above: 2 w t.
+        room: 2 w (t - u).
+    """
+
+    value: float
+    gradient: float
+    above: float
+    room: float
+
+
+@inlined
+def smoothed(u, weight, mu):
+    """φ(u) for a weight w and a barrier parameter μ > 0; gives a :class:`Smoothed`."""
+    scaled, two = weight * u, 2.0 * mu
+    root = math.sqrt(scaled * scaled + two * two)
+    # The smaller of root ± scaled by the product of the two, without cancellation.
+    if scaled > 0.0:
+        above = two + (root + scaled)
+        room = two + two * two / (root + scaled)
+    else:
+        above = two + two * two / (root - scaled)
+        room = two + (root - scaled)
+    value = 0.5 * above - mu * math.log(above * room / (two * two))
+    return Smoothed(value, weight * two / room, above, room)
+
+
+@inlined
+def primal_dual_curvature(here, weight, multiplier):
+    """What the primal-dual equations take for φ'', with the λ given."""
+    by_room = 2.0 * weight * multiplier / here.room
+    by_above = 2.0 * weight * (weight - multiplier) / here.above
+    return by_room * by_above / (by_room + by_above)
+
+
+@inlined
+def trusted(multiplier, here, weight):
+    """The λ nearest to the one given for which λ and w - λ are not far from what φ' says."""
+    rest = weight - here.gradient
+    low = max(here.gradient / TRUSTED, weight - TRUSTED * rest)
+    high = min(TRUSTED * here.gradient, weight - rest / TRUSTED)
+    return min(max(multiplier, low), high)

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from baselines.solvers.receding_horizon.horizon import ProblemData
 from baselines.solvers.receding_horizon.newton.grid import Grid
-from baselines.solvers.receding_horizon.problem_data import ProblemData
 from ikgym.kernels import tasks as task_kernels
 from ikgym.kernels.jit import inlined, kernel
 
@@ -34,7 +34,7 @@ class PathProblem(NamedTuple):
         nominal: Nominal task coordinates 1, 2, … steps ahead. Shape (at least grid.at[-1], m).
         qdot_before: Joint velocities of the step that has passed, in [rad/s] or [m/s]; read where changes of velocity
             cost something. Shape (n,).
-        rate_weight: What changes of velocity cost, see :mod:`rate`, in [cost] / [(rad/s)²] or [cost] / [(m/s)²].
+        rate_weight: What changes of velocity cost, in [cost] / [(rad/s)²] or [cost] / [(m/s)²]; see :mod:`cost`.
         change_limit: Largest changes of the joint velocities in one step, in [rad/s] or [m/s]; inf where a joint has
             none. Shape (n,), for the interior point method, or (0,), for multipliers, which cannot limit them.
         braking: Whether the arm has to be able to stop within its joint limits behind the last knot; read where
@@ -99,7 +99,7 @@ class QuadraticModel(NamedTuple):
         second: What is missing to the Hessian itself: Σ gradient_i ∂²error_i, lower triangles. Shape (K, n, n).
         coupling: The block between a knot and the one before is diagonal: its negative. Shape (K, n).
         far: The block between a knot and the one two before, diagonal as well. Shape (K, n).
-        beside: Scratch of :mod:`pentadiagonal`: blocks beside the diagonal, filled up. Shape (K, n, n).
+        beside: Scratch of :mod:`newton_step`: blocks beside the diagonal, filled up. Shape (K, n, n).
         product: Scratch likewise. Shape (n, n).
     """
 

@@ -53,12 +53,6 @@ def test_rates_are_those_between_predicted_postures(arm, task):
     assert np.array_equal(features(problem, batch, OFFSETS, 1e-3)[:, :-own], features(problem, batch))
 
 
-def test_a_turn_of_joint_1_changes_nothing():
-    problem = problem_of()
-    here, there = (features(problem, batch_of(problem, turned=turned), OFFSETS, 1e-3) for turned in (0.0, 0.8))
-    np.testing.assert_allclose(there, here, atol=2e-5)
-
-
 def test_steps_are_bounded_far_off_the_path():
     problem = problem_of()
     batch = batch_of(problem)
@@ -106,7 +100,5 @@ def test_one_call_is_the_parts_of_the_law(arm, task, damping):
         held_rows(kind, chain, damping, batch.q, output, held)
         output = held
     found = processing.act(problem, batch, net)
-    assert np.array_equal(found, qdot(problem, batch, output) / problem.velocity_limit) or np.allclose(
-        found, qdot(problem, batch, output) / problem.velocity_limit, rtol=1e-15
-    )
+    np.testing.assert_allclose(found, qdot(problem, batch, output) / problem.velocity_limit, rtol=1e-15)
     assert np.ptp(found) > 0.0

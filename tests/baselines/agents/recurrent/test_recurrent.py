@@ -11,9 +11,9 @@ from baselines.agents.files import agent_of, save_agent
 from baselines.agents.policy import FOLDER
 from baselines.agents.recurrent.network import GatedNetwork, shapes
 from baselines.agents.recurrent.policy import RecurrentPolicy
-from baselines.episodes import rollout, rollouts, sequences
+from baselines.episodes import rollout, rollouts
 from baselines.files import ResultsError
-from baselines.training.config.observe import Observe
+from baselines.training.config import Observe
 from ikgym.exceptions import InvalidInputError
 from tests.baselines.agents.recurrent.recurrent_agents import PROCESSING, SIZES, constant, drawn, made
 
@@ -28,8 +28,8 @@ def test_rows_of_a_batch_are_single_episodes_bit_for_bit():
         np.testing.assert_array_equal(rollout(SHORT, policy, seed).q, episode.q)
 
 
-def test_with_outputs_that_never_change_it_is_the_calibration_with_those_settings():
-    """In units of what an output of 0 means: twice the noise of the position, half that of the orientation."""
+def test_with_constant_outputs_it_is_the_calibration_with_those_settings():
+    """Twice the noise of the position at an output of 0, and half that of the orientation."""
     scale = np.array([2.0, 0.5, 0.05, 0.05])
     options = {"policy": "dls", "options": {"damping": 1e-2}, "start": PROCESSING.start, "jump": 0.0}
     noise = {"pose_noise": 6e-4, "pose_rotation_noise": 2.5e-4}
@@ -38,13 +38,6 @@ def test_with_outputs_that_never_change_it_is_the_calibration_with_those_setting
     np.testing.assert_allclose(ours.pose, theirs.pose, atol=1e-8)
     plain = rollout(SHORT, baselines.make("dls", SHORT, damping=1e-2), SEEDS[0])
     assert np.abs(ours.pose - plain.pose).max() > 1e-4  # it does correct
-
-
-def test_what_it_remembers_ends_with_the_episode():
-    policy = made(scenario=SHORT)
-    alone = rollout(SHORT, policy, SEEDS[1])
-    ((_, second),) = sequences(SHORT, policy, [SEEDS[:2]])
-    np.testing.assert_array_equal(second.q, alone.q)
 
 
 def test_another_arm_is_refused_unless_asked_for():
@@ -80,7 +73,7 @@ def test_agents_of_other_kinds_are_refused():
         made(drawn(sizes=(12, 4, 4)))
 
 
-def test_the_one_that_comes_along_was_trained_as_the_page_says():
+def test_the_agent_of_the_package_has_the_default_processing():
     policy = baselines.make("recurrent", SHORT)
     assert policy.processing == Observe().processing
     assert rollout(SHORT, policy, SEEDS[0]).position_error.max() < 2e-3

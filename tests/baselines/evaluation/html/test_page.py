@@ -11,14 +11,12 @@ import pytest
 from baselines.cli.evaluate import main
 from baselines.evaluate import evaluate
 from baselines.evaluation.html import page
-from baselines.evaluation.html.entries import entries
-from baselines.evaluation.html.page import embedded
-from baselines.evaluation.html.table import COLUMNS, LAST, table
-from baselines.evaluation.jobs import Skipped
-from baselines.evaluation.machine import describe
-from baselines.evaluation.options import Options
+from baselines.evaluation.html.page import COLUMNS, embedded
+from baselines.evaluation.jobs import Options, Skipped
+from baselines.evaluation.metrics import describe
 from baselines.evaluation.results import PAGE, Results, read_rows
-from baselines.evaluation.summary import geometric_interval
+from baselines.evaluation.summary import geometric_interval, summarise
+from baselines.evaluation.table import LAST, html
 from baselines.files import ResultsError
 from tests.baselines.evaluation.html.conftest import EPISODES, NASTY, STEPS
 from tests.baselines.evaluation.test_report import BASE as ROW
@@ -42,8 +40,8 @@ def text(folder):
 
 def cells(entry):
     """Sort value and text of each cell of the entry's line, by the head of its column."""
-    found = re.findall(r"<td(?: class=\"number\" data-order=\"([^\"]*)\")?>([^<]*)</td>", table([entry]))
-    return dict(zip(["scenario", *(column.title for column in COLUMNS)], found, strict=True))
+    found = re.findall(r"<td(?: class=\"number\" data-order=\"([^\"]*)\")?>([^<]*)</td>", html(COLUMNS, [entry]))
+    return dict(zip(["scenario", *(column.head for column in COLUMNS)], found, strict=True))
 
 
 def test_nothing_comes_from_elsewhere_and_names_are_text(text):
@@ -58,8 +56,8 @@ def test_nothing_comes_from_elsewhere_and_names_are_text(text):
 
 def test_the_table_has_the_numbers_of_the_results(folder):
     rows = read_rows(folder / "results.json")
-    shown = entries(rows)
-    assert [entry.policy for entry in shown] == ["dls", "moore_penrose", "dls:damping=0.05", "follow_nominal"] * 2
+    shown = summarise(rows)
+    assert [one.label for one in shown] == ["dls", "moore_penrose", "dls:damping=0.05", "follow_nominal"] * 2
     own = [row for row in rows if (row.scenario, row.policy) == (NASTY, "moore_penrose")]
     line = cells(shown[1])
     assert float(line["total cost"][0]) == pytest.approx(math.prod(row.total_cost for row in own) ** (1 / EPISODES))
@@ -72,25 +70,25 @@ def test_the_table_has_the_numbers_of_the_results(folder):
 def test_the_interval_is_that_of_the_cost_ratio_over_the_episodes():
     rows = [dataclasses.replace(BASE, seed=seed, cost_ratio=1.0 + 0.1 * seed) for seed in range(1, 6)]
     low, high = geometric_interval([row.cost_ratio for row in rows])
-    (entry,) = entries(rows)
+    (entry,) = summarise(rows)
     assert entry.interval == (low, high)
     assert cells(entry)["95 %"] == (str(low), f"{low:.4g} … {high:.4g}")
-    assert entries(rows[:1])[0].interval is None
+    assert summarise(rows[:1])[0].interval is None
 
 
 def test_missing_numbers_are_dashes_and_sorted_last():
     lost = {"total_cost": math.nan, "position_error_max": math.inf}
-    (entry,) = entries([dataclasses.replace(BASE, **lost, time_p50_us=None, orientation_error_max=None)])
+    (entry,) = summarise([dataclasses.replace(BASE, **lost, time_p50_us=None, orientation_error_max=None)])
     line = cells(entry)
     assert [line[name] for name in ("total cost", "p50 [µs]", "ori max [mrad]")] == [(str(LAST), "–")] * 3
     assert line["lost"] == ("1", "1")
 
 
 def test_the_series_are_those_of_the_first_episodes(folder, text):
-    for entry, one in zip(data_of(text), entries(read_rows(folder / "results.json")), strict=True):
+    for entry, one in zip(data_of(text), summarise(read_rows(folder / "results.json")), strict=True):
         assert entry["seed"] == one.rows[0].seed
-        assert entry["series"]["rows"] == one.summary.steps
-        assert entry["series"]["arrays"]["q"]["shape"] == [min(one.summary.steps, 400), 7]
+        assert entry["series"]["rows"] == one.first.steps
+        assert entry["series"]["arrays"]["q"]["shape"] == [min(one.first.steps, 400), 7]
     assert STEPS > 400
 
 

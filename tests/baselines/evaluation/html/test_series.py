@@ -6,6 +6,7 @@ import pytest
 import baselines
 import ikgym
 from baselines.episodes import Seeds, rollout
+from baselines.evaluation.export import FRAMES, frame_rows, trajectory_log
 from baselines.evaluation.html.series import (
     ACCELERATION,
     BUDGET,
@@ -13,11 +14,9 @@ from baselines.evaluation.html.series import (
     FREE,
     STOP,
     VELOCITY,
-    encoded,
     limits,
     thinned,
 )
-from baselines.evaluation.trajectory_log import FRAMES, frame_rows, trajectory_log
 from tests.limited import limited
 
 
@@ -88,11 +87,6 @@ def test_no_peak_is_lost_however_few_rows_are_kept(log, size):
     assert arrays["time"][-1] == np.float32(log["time"][-1])
 
 
-def test_what_is_no_number_stays_so(log):
-    log = {**log, "position_error": np.full(1000, np.nan)}
-    assert np.isnan(decoded(thinned(log, BUDGET)["arrays"]["position_error"])).all()
-
-
 def test_a_series_keeps_to_its_size(log):
     for size in (20_000, 60_000, 120_000):
         series = thinned(log, size)
@@ -111,17 +105,6 @@ def test_limits_tell_the_most_severe():
     assert limits(log).tolist() == [[FREE, STOP, STOP, VELOCITY, ACCELERATION]]
     without = {"lower": np.full(5, -np.inf), "upper": np.full(5, np.inf), "velocity_limit": np.full(5, np.inf)}
     assert limits({**log, **without, "acceleration_limit": np.full(5, np.inf)}).tolist() == [[FREE] * 5]
-
-
-def test_limits_that_are_reached_are_seen(log):
-    seen = decoded(thinned(log, BUDGET)["arrays"]["limit"])
-    assert seen.dtype == np.uint8
-    assert set(np.unique(limits(log))) == set(np.unique(seen)) > {FREE}
-
-
-def test_arrays_go_there_and_back():
-    values = np.array([[1.5, np.nan], [np.inf, -0.25]])
-    np.testing.assert_array_equal(decoded(encoded(values)), values.astype(np.float32))
 
 
 def test_logs_without_pictures_have_curves(log):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import ikgym
-from baselines.solvers.receding_horizon.problem_data import ProblemData
+from baselines.solvers.receding_horizon.horizon import ProblemData
 from baselines.solvers.receding_horizon.task_constraints import Unknowns, kinematic_errors, task_system
 
 HORIZONS = pytest.mark.parametrize(

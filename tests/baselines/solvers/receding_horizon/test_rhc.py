@@ -518,7 +518,6 @@ def test_status_and_iterations_are_said():
         ({"stop_at_end": 1}, "stop_at_end: expected True or False, got 1"),
         ({"starts": 0}, "starts: expected a whole number of at least 1"),
         ({"restart_steps": -1}, "restart_steps: expected a whole number of at least 0"),
-        ({"restart_rate": 0}, "restart_rate: expected a whole number of at least 1"),
         ({"start_steps": -1}, "start_steps: expected a whole number of at least 0"),
         ({"recovery_steps": -1}, "recovery_steps: expected a whole number of at least 0"),
         ({"seed": -1}, "seed: expected a whole number of at least 0"),

@@ -7,10 +7,10 @@ import dataclasses
 import numpy as np
 
 import ikgym
+from baselines.solvers.receding_horizon.horizon import ProblemData
 from baselines.solvers.receding_horizon.newton.cost import linearise, merit
 from baselines.solvers.receding_horizon.newton.grid import Grid, cut, empty_grid, first_knots
 from baselines.solvers.receding_horizon.newton.workspace import PathProblem, newton_workspace
-from baselines.solvers.receding_horizon.problem_data import ProblemData
 from ikgym import TrackingCost
 
 

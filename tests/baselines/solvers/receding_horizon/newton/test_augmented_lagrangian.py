@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from baselines.solvers.receding_horizon.newton.augmented_lagrangian import augmented_term
+from baselines.solvers.receding_horizon.newton.terms import augmented_term
 from ikgym.kernels.jit import kernel
 
 LOW, HIGH = -0.7, 1.2

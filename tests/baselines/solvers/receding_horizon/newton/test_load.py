@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from baselines.solvers.receding_horizon.newton import barrier as limited
 from baselines.solvers.receding_horizon.newton.cost import linearise, merit, true_cost
-from baselines.solvers.receding_horizon.newton.interior_point import merit as limited
 from tests.baselines.solvers.receding_horizon.newton.interior_point.test_merit import BARRIER
 from tests.baselines.solvers.receding_horizon.newton.interior_point.test_merit import place as limited_place
 from tests.baselines.solvers.receding_horizon.newton.problems import place

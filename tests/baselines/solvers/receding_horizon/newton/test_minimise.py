@@ -9,11 +9,11 @@ import pytest
 
 import ikgym
 from baselines.solvers.linear_algebra import inverse_of_factor
+from baselines.solvers.receding_horizon.horizon import ProblemData
 from baselines.solvers.receding_horizon.newton.cost import true_cost
 from baselines.solvers.receding_horizon.newton.minimise import CONVERGED, RAN_OUT, NewtonSettings, minimise
 from baselines.solvers.receding_horizon.newton.newton_step import newton_step
 from baselines.solvers.receding_horizon.newton.workspace import PathProblem, newton_workspace
-from baselines.solvers.receding_horizon.problem_data import ProblemData
 from ikgym import TrackingCost
 from ikgym.arms import Arm
 from ikgym.kernels import tasks as task_kernels

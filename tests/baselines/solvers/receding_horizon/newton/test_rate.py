@@ -11,9 +11,8 @@ import pytest
 import baselines
 import ikgym
 from baselines.episodes import rollouts
-from baselines.solvers.receding_horizon.newton.cost import true_cost
-from baselines.solvers.receding_horizon.newton.pentadiagonal import pentadiagonal_step
-from baselines.solvers.receding_horizon.newton.rate import rate_cost
+from baselines.solvers.receding_horizon.newton.cost import rate_cost, true_cost
+from baselines.solvers.receding_horizon.newton.newton_step import pentadiagonal_step
 from benchmarks.rivals.casadi_horizon import OPTIONS, CasadiHorizon
 from tests.baselines.solvers.receding_horizon.newton.problems import Place, place
 from tests.baselines.solvers.receding_horizon.newton.test_cost import dense, differences

@@ -8,10 +8,10 @@ import numpy as np
 
 import ikgym
 from baselines.policy import Problem
-from baselines.solvers.receding_horizon.newton.interior_point.minimise import minimise_limited
+from baselines.solvers.receding_horizon.horizon import ProblemData
+from baselines.solvers.receding_horizon.newton.interior_point import minimise_limited
 from baselines.solvers.receding_horizon.newton.minimise import NewtonSettings
 from baselines.solvers.receding_horizon.newton.workspace import PathProblem, newton_workspace
-from baselines.solvers.receding_horizon.problem_data import ProblemData
 from benchmarks.rivals.numpy_horizon import Horizon
 from tests.baselines.solvers.receding_horizon.newton.problems import grid_of
 

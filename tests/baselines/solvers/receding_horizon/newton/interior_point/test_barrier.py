@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
 
-from baselines.solvers.receding_horizon.newton.interior_point.barrier import primal_dual_curvature, smoothed, trusted
+from baselines.solvers.receding_horizon.newton.terms import primal_dual_curvature, smoothed, trusted
 
 PLACES = pytest.mark.parametrize("u", [-30.0, -1.0, -1e-3, 0.0, 1e-3, 1.0, 30.0])
 

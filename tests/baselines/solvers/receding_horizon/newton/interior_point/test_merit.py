@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from baselines.solvers.receding_horizon.newton.barrier import ANEW, KEPT, Barrier, linearise, merit
 from baselines.solvers.receding_horizon.newton.cost import true_cost
-from baselines.solvers.receding_horizon.newton.interior_point.merit import ANEW, KEPT, Barrier, linearise, merit
 from baselines.solvers.receding_horizon.newton.workspace import GRADIENT, MULTIPLIER, newton_workspace
 from benchmarks.rivals.numpy_horizon import beyond_limits
 from tests.baselines.solvers.receding_horizon.newton.interior_point.states import (

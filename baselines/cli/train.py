@@ -15,10 +15,9 @@ from typing import Annotated, Any, Generic, TypeVar, Union
 
 import tyro
 
-from baselines import command as shared
-from baselines.training import methods, presets
-from baselines.training.config.base import Config
-from baselines.training.errors import TrainingError
+from baselines.cli import shell
+from baselines.training import methods
+from baselines.training.config import Config, TrainingError
 from baselines.training.folder import read_run
 from baselines.training.seeds import RunOptions, SeedResult, train_seeds
 from baselines.workers import Workers
@@ -64,7 +63,7 @@ class Repeat(RunOptions):
 
 def manual() -> str:
     """The text of ``--help`` above the options."""
-    prog, evaluate = _program(), shared.program("evaluate", "python -m baselines.evaluate")
+    prog, evaluate = _program(), shell.program("evaluate", "python -m baselines.evaluate")
     return f"""\
 Trains agents: networks from observations to joint velocities. apg differentiates the cost through the arm, ppo, sac and
 td3 are the algorithms of Stable-Baselines3 on ikgym.sb3.make_vec, observe trains agents with memory for plants that
@@ -72,7 +71,7 @@ differ from the model. Each method has its own options: {prog} METHOD --help
 
 {_listing("Methods", methods.METHODS)}
 
-{_listing("Presets", presets.names())}
+{_listing("Presets", methods.preset_names())}
 
 {_listing("Scenarios", scenarios.names())}
 
@@ -127,11 +126,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         kept = "" if out is None else f" The last checkpoint is in {out}; continue with --resume."
         return f"Stopped.{kept}"
 
-    return shared.run(work, stopped)
+    return shell.run(work, stopped)
 
 
 def _program() -> str:
-    return shared.program("train", f"python {PROGRAM}")
+    return shell.program("train", f"python {PROGRAM}")
 
 
 def _require_extra() -> None:
@@ -150,8 +149,8 @@ def parse(arguments: Sequence[str]) -> Command[Any] | Repeat:
 
     Raises:
         UnknownNameError: There is no such preset, or the method has no option of the preset.
-        InvalidInputError: A value is refused, or there is no method.
-        SystemExit: With 0 after ``--help``, with 2 where an option is unknown.
+        InvalidInputError: A value is refused, an option is unknown, or there is no method.
+        SystemExit: With 0 after ``--help``.
     """
     if not arguments:
         with contextlib.suppress(SystemExit):
@@ -161,12 +160,12 @@ def parse(arguments: Sequence[str]) -> Command[Any] | Repeat:
     preset = _value_of("--preset", arguments)
     kinds: list[Any] = []
     for name, kind in methods.METHODS.items():
-        default: Any = Command(presets.configure(kind, preset if name == chosen else None), Options(out=tyro.MISSING))
+        default: Any = Command(methods.configure(kind, preset if name == chosen else None), Options(out=tyro.MISSING))
         summary, generic = (kind.__doc__ or "").strip(), Command
         kinds.append(Annotated[generic[kind], tyro.conf.subcommand(name, default=default, description=summary)])
     kinds.append(Annotated[Repeat, tyro.conf.subcommand("repeat")])
     any_of_them: Any = Union[tuple(kinds)]  # noqa: UP007  # made at run time
-    command: Command[Any] | Repeat = shared.parse(any_of_them, arguments, prog=_program(), description=manual())
+    command: Command[Any] | Repeat = shell.parse(any_of_them, arguments, prog=_program(), description=manual())
     return command
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 import pathlib
 import sys
 import threading
@@ -12,11 +11,13 @@ from typing import Annotated, Any
 
 import tyro
 
-from baselines import command
-from baselines.viewer.following import followers
-from baselines.viewer.replay import Stage, named, play_all
+from baselines.cli import shell
+from baselines.viewer.replay import Stage
 from baselines.viewer.session import Session
+from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
+
+PROGRAM = f"{shell.CONSOLE} view"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -41,7 +42,7 @@ class Options:
 
 def manual() -> str:
     """The text of ``--help`` above the options."""
-    prog = _program()
+    prog = PROGRAM
     return f"""\
 Shows policies side by side in a browser: a replay of the episode at any speed, and arms that follow a target that you
 drag, each with its own policy, without the imperfections of the scenario's plant. Sliders move the joints within their
@@ -51,22 +52,6 @@ Examples:
   {prog} --scenario panda-circle --policy dls rhc
   {prog} --scenario varga7-random --seed 2000000 --policy mfac rhc_foresight
   {prog} --scenario lab.toml --policy dls --urdf lab.urdf"""
-
-
-def session_of(stage: Stage, policies: Sequence[str], *, progress: bool = False) -> Session:
-    """The session that shows policies in an episode.
-
-    Args:
-        stage: The episode.
-        policies: Their names, as the command line takes them.
-        progress: Whether to show a bar on stderr while they play the episode.
-
-    Raises:
-        UnknownNameError: There is no such policy or parameter.
-        InvalidInputError: There is no policy, or one does not suit the scenario.
-    """
-    names = named(policies)
-    return Session(stage, play_all(stage, names, progress=progress), followers(stage, names))
 
 
 def main(arguments: Sequence[str] | None = None, stop: threading.Event | None = None) -> int:
@@ -82,53 +67,43 @@ def main(arguments: Sequence[str] | None = None, stop: threading.Event | None = 
     arguments = sys.argv[1:] if arguments is None else list(arguments)
 
     def work() -> int:
-        options = command.parse(Options, arguments, prog=_program(), description=manual())
-        command.find_own_modules()
+        options = shell.parse(Options, arguments, prog=PROGRAM, description=manual())
+        shell.find_own_modules()
         # Before episodes are played: extras may be missing, or the port taken.
         from baselines.viewer.server import Viewer, free_port, serving
 
         port = free_port(options.host, options.port)
         stage = Stage.of(options.scenario, options.seed, options.steps)
-        draw = meshes(stage, options.urdf)
-        session = session_of(stage, options.policy, progress=True)
+        shapes = meshes(stage.scenario.arm, options.urdf)
+        session = Session(stage, options.policy)
         with serving(options.host, port) as server:
-            viewer = Viewer(server, session, draw)
+            viewer = Viewer(server, session, shapes)
             print(f"http://{server.get_host()}:{server.get_port()}  (Ctrl-C ends it)", flush=True)
             viewer.run(threading.Event() if stop is None else stop)
         return 0
 
-    return command.run(work)
+    return shell.run(work)
 
 
-def meshes(stage: Stage, file: pathlib.Path | None) -> Any:
-    """Draws arms with the meshes of a URDF file; None for cylinders.
+def meshes(arm: Arm, file: pathlib.Path | None) -> Any:
+    """The meshes that an arm is shown with; None for cylinders.
 
     Args:
-        stage: The episode.
+        arm: The arm.
         file: A URDF file of the arm; the one that the arm was read from if left out.
 
     Raises:
-        InvalidInputError: The given file is not of the arm.
+        InvalidInputError: The given file does not describe the arm.
     """
-    arm = stage.scenario.arm
     source = arm.urdf.file if file is None and arm.urdf is not None else file
     if source is None:
         return None
-    from baselines.viewer.arms import Meshes, read_urdf
+    from baselines.viewer.arms import read_urdf
 
     try:
-        read_urdf(source, arm)
+        return read_urdf(source, arm)
     except InvalidInputError as e:
         if file is not None:
             raise
         print(f"Cylinders are shown: {e}", file=sys.stderr)
         return None
-    # Each arm in the scene moves its own model.
-    return lambda server: lambda root, _: Meshes(server, root, read_urdf(source, arm), arm)
-
-
-_program = functools.partial(command.program, "view", "python -m baselines.viewer.view")
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -1,4 +1,4 @@
-"""The table of results: records from rows, CSV and Markdown, intervals and plots."""
+"""Comparisons of policies: records from rows, CSV and Markdown, intervals and plots."""
 
 import dataclasses
 
@@ -7,8 +7,9 @@ import pytest
 import scipy.stats
 
 from baselines.evaluate import evaluate
-from baselines.evaluation import table, table_plots
-from baselines.evaluation.statistics import geometric_interval, geometric_mean
+from baselines.evaluation import records
+from baselines.evaluation.plots import comparison
+from baselines.evaluation.summary import geometric_interval, geometric_mean
 from ikgym.exceptions import InvalidInputError
 
 
@@ -34,25 +35,25 @@ def agent(row, seed, cost_ratios):
 class TestRecords:
     def test_one_line_per_policy_sorted_by_cost_ratio(self, row):
         rows = [*episodes(row, (4.0, 9.0)), *episodes(row, (1.0, 4.0), policy="qp", parameters={}, time_p99_us=7.0)]
-        first, second = table.records(rows)
+        first, second = records.records(rows)
         assert (first["policy"], first["cost_ratio"], first["time_p99_us"]) == ("qp", pytest.approx(2.0), 7.0)
         assert (second["cost_ratio"], second["worst"], second["p90"]) == (pytest.approx(6.0), 9.0, 8.5)
-        assert (second["episodes"], second["seeds"], second["relative_to"]) == (2, 1, table.BEST_KNOWN)
+        assert (second["episodes"], second["seeds"], second["relative_to"]) == (2, 1, records.BEST_KNOWN)
         assert (second["low"], second["high"]) == geometric_interval((4.0, 9.0))
 
     def test_training_seeds_share_a_line(self, row):
-        (line,) = table.records([*agent(row, 0, (1.0, 2.0)), *agent(row, 1, (2.0, 4.0))])
+        (line,) = records.records([*agent(row, 0, (1.0, 2.0)), *agent(row, 1, (2.0, 4.0))])
         assert (line["policy"], line["seeds"], line["episodes"]) == ("apg", 2, 2)
         assert line["cost_ratio"] == pytest.approx(2.0)
 
     def test_training_seeds_play_the_same_episodes(self, row):
         with pytest.raises(InvalidInputError, match="apg: expected the same episodes"):
-            table.records([*agent(row, 0, (1.0, 2.0)), *agent(row, 1, (2.0,))])
+            records.records([*agent(row, 0, (1.0, 2.0)), *agent(row, 1, (2.0,))])
 
     def test_without_best_known_costs_relative_to_the_lowest(self, row):
         rows = [*episodes(row, (2.0, 8.0)), *episodes(row, (4.0, 2.0), policy="qp", parameters={})]
-        lines = table.records([dataclasses.replace(one, cost_ratio=None) for one in rows])
-        assert [line["relative_to"] for line in lines] == [table.LOWEST] * 2
+        lines = records.records([dataclasses.replace(one, cost_ratio=None) for one in rows])
+        assert [line["relative_to"] for line in lines] == [records.LOWEST] * 2
         assert [line["cost_ratio"] for line in lines] == pytest.approx([np.sqrt(2.0), 2.0])
 
     def test_labels_are_the_policies_as_given(self, row):
@@ -60,7 +61,7 @@ class TestRecords:
         plain, short = ({"horizon": 3, "iterations": iterations} for iterations in (None, 1))
         rows = [*episodes(row, (2.0,), policy="rhc", parameters=plain)]
         rows += episodes(row, (3.0,), policy="rhc", parameters=short)
-        assert [line["policy"] for line in table.records(rows, given)] == given
+        assert [line["policy"] for line in records.records(rows, given)] == given
 
 
 class TestFiles:
@@ -70,13 +71,13 @@ class TestFiles:
     )
 
     def test_csv_and_back(self):
-        lines = table.from_csv(table.to_csv(self.LINES))
+        lines = records.from_csv(records.to_csv(self.LINES))
         assert lines[0]["cost_ratio"] == "1.23457"
         assert lines[1]["low"] == ""
-        assert table.markdown(lines) == table.markdown(self.LINES)
+        assert records.markdown(lines) == records.markdown(self.LINES)
 
     def test_markdown(self):
-        assert table.markdown(self.LINES).splitlines() == [
+        assert records.markdown(self.LINES).splitlines() == [
             "| policy | n | cost ratio | 95 % | lost [%] |",
             "| :-- | --: | --: | --: | --: |",
             "| `a\\|b` | 1,200 | 1.235 | 1.000 … 2.000 | 0.5 |",
@@ -84,9 +85,9 @@ class TestFiles:
         ]
 
     def test_columns(self):
-        assert table.markdown(self.LINES, ["n", "policy"]).startswith("| n | policy |")
+        assert records.markdown(self.LINES, ["n", "policy"]).startswith("| n | policy |")
         with pytest.raises(InvalidInputError, match="expected some of policy, n"):
-            table.markdown(self.LINES, ["m"])
+            records.markdown(self.LINES, ["m"])
 
 
 class TestInterval:
@@ -96,24 +97,12 @@ class TestInterval:
         expected = np.exp([found.confidence_interval.low, found.confidence_interval.high])
         assert geometric_interval(values) == pytest.approx(tuple(expected), rel=0.02)
 
-    def test_variances_of_seeds_and_episodes_add_up(self):
-        rng = np.random.default_rng(3)
-        of_seed, of_episode = rng.normal(size=(50, 1)), 2.0 * rng.normal(size=(1, 60))
-        low, high = np.log(geometric_interval(np.exp(of_seed + of_episode)))
-        deviation = np.sqrt(of_seed.var() / 50 + of_episode.var() / 60)
-        assert high - low == pytest.approx(2 * 1.96 * deviation, rel=0.1)
-
     def test_copies_of_a_seed_say_nothing_new(self):
         one = np.random.default_rng(6).lognormal(size=(1, 64))
         assert geometric_interval(np.tile(one, (5, 1))) == pytest.approx(geometric_interval(one), rel=1e-12)
 
-    def test_one_number_has_no_width(self):
-        assert geometric_interval([3.0]) == pytest.approx((3.0, 3.0))
-
     @pytest.mark.slow
-    @pytest.mark.parametrize(
-        ("seeds", "of_seed", "of_episode", "least"), [(10, 0.3, 1.0, 0.88), (1, 0.0, 1.0, 0.88), (5, 1.0, 0.1, 0.72)]
-    )
+    @pytest.mark.parametrize(("seeds", "of_seed", "of_episode", "least"), [(10, 0.3, 1.0, 0.88), (5, 1.0, 0.1, 0.72)])
     def test_coverage(self, seeds, of_seed, of_episode, least):
         rng, hits, trials = np.random.default_rng(9), 0, 150
         for _ in range(trials):
@@ -136,17 +125,18 @@ def line(policy, ratio, p99, **changes):
 def test_the_front_is_what_no_other_beats():
     lines = [
         *(line("fast", 3.0, 10.0), line("beaten", 4.0, 20.0), line("good", 1.1, 50.0), line("untimed", 1.0, None)),
+        line("diverged", float("nan"), 1.0),
         line("fewer episodes", 1.0, 5.0, episodes=1),
     ]
-    assert [one["policy"] for one in table_plots.front(lines)] == ["fast", "good"]
+    assert [one["policy"] for one in comparison.front(lines)] == ["fast", "good"]
 
 
 def test_plots_show_every_line():
     lines = [line("a", 3.0, 10.0), line("b", 1.1, 50.0, foresight=9)]
-    drawn = table_plots.cost_time(lines, "title")
+    drawn = comparison.cost_time(lines, "title")
     assert [text.get_text() for text in drawn.legends[0].get_texts()] == ["a", "b"]
-    drawn = table_plots.foresight(lines, "title", "policy")
+    drawn = comparison.foresight(lines, "title", "policy")
     assert [text.get_text() for text in drawn.legends[0].get_texts()] == ["policy: a", "policy: b"]
     cells = [line("a", 2.0, None, knowledge=k, drives=d) for k in (0, 1) for d in (0, 1)]
-    texts = [text.get_text() for text in table_plots.severity_map(cells).axes[0].texts]
+    texts = [text.get_text() for text in comparison.severity_map(cells).axes[0].texts]
     assert texts == ["2.000"] * 4

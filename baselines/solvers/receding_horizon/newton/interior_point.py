@@ -1,12 +1,16 @@
-"""Kernel: the minimum of a joint path under limits of acceleration, by following the barrier parameter to 0."""
+"""Kernels: the cheapest joint path under limits of acceleration, by a primal-dual interior point method.
+
+Limits of acceleration couple three knots, and in a horizon that makes up for an error most of them are active: chains
+of double integrators, on which multipliers of an augmented Lagrangian settle slowly. An interior point method takes
+some thirty Newton steps, whatever is active: the barrier parameter is followed to 0.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
+from baselines.solvers.receding_horizon.newton.barrier import ANEW, KEPT, Barrier, change_steps, linearise, merit
 from baselines.solvers.receding_horizon.newton.cost import true_cost
-from baselines.solvers.receding_horizon.newton.interior_point.excess import excess
-from baselines.solvers.receding_horizon.newton.interior_point.merit import ANEW, KEPT, Barrier, linearise, merit
 from baselines.solvers.receding_horizon.newton.minimise import (
     CONVERGED,
     MOST_DAMPING,
@@ -46,15 +50,15 @@ def minimise_limited(problem, path, settings, smoothing, workspace):
     """Damped Newton steps on the barrier function, until the path is a minimum or they run out.
 
     Args:
-        problem: A :class:`newton.workspace.PathProblem` of K knots with limits of acceleration.
-        path: Joint coordinates at the knots in [rad] or [m], changed in place. Shape (K, n).
-        settings: :class:`newton.minimise.NewtonSettings`.
+        problem: See :mod:`newton`; with limits of acceleration, which may be infinite.
+        path: See :mod:`newton`; changed in place.
+        settings: :class:`NewtonSettings`.
         smoothing: μ throughout, in units of the cost for each knot, for few steps from a path that is almost a minimum;
             0 to follow it to what the tolerance asks for.
-        workspace: A :class:`newton.workspace.NewtonWorkspace`.
+        workspace: See :mod:`newton`.
 
     Returns:
-        A :class:`newton.minimise.Minimum`; STALLED where no path keeps the limits, too.
+        A :class:`Minimum`; STALLED where no path keeps the limits, too.
     """
     knots, bounds = path.shape[0], workspace.barriers[: path.shape[0]].size // BARRIER_SIZE
     gradient, step, trial = workspace.model.gradient[:knots], workspace.step[:knots], workspace.trial[:knots]
@@ -104,20 +108,9 @@ def minimise_limited(problem, path, settings, smoothing, workspace):
 
 @uncounted
 def minimise_path(problem, path, multipliers, settings, smoothing, workspace):
-    """The minimum of a joint path: by the interior point method where there are limits of changes, or by multipliers.
+    """The minimum of a joint path: by the interior point method where ``change_limit`` is there, or by multipliers.
 
-    Infinite ones hold nothing back, and choose the interior point method all the same: the way of oracle and preset.
-
-    Args:
-        problem: A :class:`newton.workspace.PathProblem` of K knots.
-        path: Joint coordinates at the knots in [rad] or [m], changed in place. Shape (K, n).
-        multipliers: As of :func:`newton.minimise.minimise`; of no use in the interior point method.
-        settings: :class:`newton.minimise.NewtonSettings`.
-        smoothing: As of :func:`minimise_limited`; of no use without it.
-        workspace: A :class:`newton.workspace.NewtonWorkspace`.
-
-    Returns:
-        A :class:`newton.minimise.Minimum`.
+    The arguments are those of :func:`minimise.minimise` and, for the former, the smoothing of :func:`minimise_limited`.
     """
     if problem.change_limit.shape[0] > 0:
         return minimise_limited(problem, path, settings, smoothing, workspace)
@@ -148,3 +141,33 @@ def _line_search(problem, path, barrier, value, derivative, step, trial, workspa
             return length
         length *= SHORTENING
     return 0.0
+
+
+@uncounted
+def excess(problem, path, before):
+    """By how much a path leaves its limits, at most: a share of them, and of positions in units of the largest step.
+
+    Not above 0 where all limits are kept. Braking behind the last knot is not looked at. ``before`` is scratch.
+    """
+    data, lengths, start = problem.data, problem.grid.length, problem.start
+    limits, lower, upper, changes = data.velocity_limit, data.lower, data.upper, problem.change_limit
+    limited, dt, most = changes.shape[0] > 0, data.dt, -np.inf
+    for k in range(path.shape[0]):
+        rate, span = 1.0 / (lengths[k] * dt), change_steps(lengths, k)
+        for j in range(path.shape[1]):
+            velocity = (path[k, j] - (path[k - 1, j] if k > 0 else start[j])) * rate
+            beyond = max(path[k, j] - upper[j], lower[j] - path[k, j]) / (dt * limits[j])
+            most = max(most, abs(velocity) / limits[j] - 1.0, beyond)
+            if limited:
+                change = velocity - (before[j] if k > 0 else problem.qdot_before[j])
+                most = max(most, abs(change) / (span * changes[j]) - 1.0)
+            before[j] = velocity
+    return most
+
+
+@uncounted
+def cost_within(problem, path, slack, workspace):
+    """The cost of a path; infinite where accelerations are limited and the path leaves a limit by more than a share."""
+    if problem.change_limit.shape[0] > 0 and excess(problem, path, workspace.before) > slack:
+        return np.inf
+    return true_cost(problem, path, workspace)

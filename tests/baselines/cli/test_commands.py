@@ -17,7 +17,7 @@ from baselines import cli
 from baselines.cli import main
 from baselines.solvers.rivals.model_files import urdf
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 
 
 @pytest.fixture(autouse=True)
@@ -75,21 +75,6 @@ def test_help_of_each_command(word, capsys):
         (["reproduce", "--figure", "-1"], "paper 'varga' has no figure -1"),
         (["reproduce", "--steps", "0"], "steps: expected a whole number of at least 1, got 0."),
         (["reproduce", "--paper", "khan", "--figure", "1"], "has no figure 1"),
-        (["train", "ppo", "--preset", "smok", "--out", "x"], "There is no preset 'smok'. Did you mean 'smoke'?"),
-    ],
-)
-def test_a_mistake_is_one_line_and_ends_with_2(arguments, message, capsys, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    assert main(arguments) == 2
-    error = capsys.readouterr().err
-    assert message in error
-    assert error.startswith("error: ")
-    assert error.count("\n") == 1
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
         (["evaluate", "--polices", "dls"], "Did you mean '--policies'? See ikgym evaluate --help."),
         (["evaluate", "--steps", "few"], "Error parsing --steps: expected INT, got 'few'. See ikgym evaluate --help."),
         (["oracle", "--knots", "few"], "Error parsing --knots: expected a whole number, got 'few'."),
@@ -97,12 +82,15 @@ def test_a_mistake_is_one_line_and_ends_with_2(arguments, message, capsys, tmp_p
         (["train", "pp"], "Available: ppo, sac, td3, apg, observe, repeat. See ikgym train --help."),
         (["train", "ppo"], "Missing from ikgym train ppo: --out."),
         (["arms", "--name", "varga7"], "See ikgym arms --help."),
+        (["arms", "none.urdf"], "Cannot read none.urdf"),
+        (["scenarios", "none.toml"], "Cannot read none.toml"),
+        (["arms", "mine.toml"], "There is no arm 'mine.toml'."),
+        (["train", "ppo", "--preset", "smok", "--out", "x"], "There is no preset 'smok'. Did you mean 'smoke'?"),
     ],
 )
-def test_options_that_cannot_be_read(arguments, message, capsys):
-    with pytest.raises(SystemExit) as ended:
-        main(arguments)
-    assert ended.value.code == 2
+def test_a_mistake_is_one_line_and_ends_with_2(arguments, message, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(arguments) == 2
     error = capsys.readouterr().err
     assert message in error
     assert error.startswith("error: ")
@@ -172,20 +160,6 @@ def test_files_are_shown_like_members(tmp_path, monkeypatch, capsys):
     assert "within reach" not in capsys.readouterr().out
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["arms", "none.urdf"], "Cannot read none.urdf"),
-        (["scenarios", "none.toml"], "Cannot read none.toml"),
-        (["arms", "mine.toml"], "There is no arm 'mine.toml'."),
-    ],
-)
-def test_files_that_cannot_be_shown(arguments, message, capsys, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    assert main(arguments) == 2
-    assert message in capsys.readouterr().err
-
-
 def test_the_table_stands_before_the_plots_and_the_readme_has_the_command(tmp_path, capsys):
     arguments = ["evaluate", "--policies", "dls", "--steps", "5", "--out", str(tmp_path / "out")]
     assert main(arguments) == 0
@@ -207,7 +181,10 @@ def test_a_command_imports_what_the_command_line_names():
     assert [name for name in modules if name.startswith(tuple(f"baselines.{one}" for one in others))] == []
     solvers = {name.split(".")[2] for name in modules if name.startswith("baselines.solvers.")}
     assert {"quadratic_program"} <= solvers <= {"quadratic_program", "resolved_rate", "arm_task", "linear_algebra"}
-    assert {name for name in modules if name.startswith("baselines.cli.")} == {"baselines.cli.evaluate"}
+    assert {name for name in modules if name.startswith("baselines.cli.")} == {
+        "baselines.cli.evaluate",
+        "baselines.cli.shell",
+    }
 
 
 def test_no_list_loads_a_learning_library():

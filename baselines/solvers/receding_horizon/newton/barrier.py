@@ -1,7 +1,6 @@
-"""Kernels: the barrier function of a joint path, and its quadratic model.
+"""Kernels: the barrier function of a joint path, its cost with kinks and limits smoothed, and its quadratic model.
 
-The cost with its kinks and limits smoothed, see :mod:`barrier`. Limits of acceleration couple three knots, joint by
-joint: the Hessian is block-pentadiagonal.
+Limits of acceleration couple three knots, joint by joint: the Hessian is block-pentadiagonal.
 """
 
 from __future__ import annotations
@@ -9,15 +8,20 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from baselines.solvers.receding_horizon.newton.cost import tracking_errors
-from baselines.solvers.receding_horizon.newton.interior_point.barrier import primal_dual_curvature, smoothed, trusted
-from baselines.solvers.receding_horizon.newton.rate import add_rate_cost, rate_cost
+from baselines.solvers.receding_horizon.newton.cost import add_rate_cost, rate_cost, tracking_errors
 from baselines.solvers.receding_horizon.newton.second_order import second_order
-from baselines.solvers.receding_horizon.newton.terms import velocity_cost, velocity_derivatives
+from baselines.solvers.receding_horizon.newton.terms import (
+    derivatives_without_kink,
+    kink_steepness,
+    primal_dual_curvature,
+    smoothed,
+    trusted,
+    velocity_cost,
+    velocity_derivatives,
+    without_kink,
+)
 from baselines.solvers.receding_horizon.newton.workspace import BEYOND, CURVATURE, GRADIENT, MULTIPLIER, joints_at
-from ikgym.kernels import cost as cost_kernels
 from ikgym.kernels import tasks as task_kernels
-from ikgym.kernels.cost import P_X_INSIDE
 from ikgym.kernels.jit import inlined, uncounted
 from ikgym.kernels.kinematics import forward_and_jacobian
 
@@ -53,14 +57,7 @@ class Bounded(NamedTuple):
 
 @uncounted
 def merit(problem, path, barrier, workspace):
-    """The barrier function.
-
-    Args:
-        problem: A :class:`newton.workspace.PathProblem` of K knots with limits of acceleration.
-        path: Joint coordinates at the knots in [rad] or [m]. Shape (K, n).
-        barrier: :class:`Barrier`.
-        workspace: A :class:`newton.workspace.NewtonWorkspace`.
-    """
+    """The barrier function."""
     data, grid, start = problem.data, problem.grid, problem.start
     cost, dt, mu, weight = data.cost, data.dt, barrier.mu, barrier.limit_weight
     lengths, tracking, velocities = grid.length, grid.tracking, grid.velocity
@@ -97,13 +94,13 @@ def linearise(problem, path, barrier, advance, exact, workspace):
     """:func:`merit`, its gradient and its Hessian.
 
     Args:
-        problem: A :class:`newton.workspace.PathProblem` of K knots with limits of acceleration.
-        path: Joint coordinates at the knots in [rad] or [m]. Shape (K, n).
+        problem: See :mod:`newton`.
+        path: See :mod:`newton`.
         barrier: :class:`Barrier`.
         advance: Length of the step that led here, by which the multipliers change; KEPT to leave them, ANEW to set
             them.
         exact: Whether the second derivatives of the error are wanted, too.
-        workspace: A :class:`newton.workspace.NewtonWorkspace`, whose barriers and quadratic model are set.
+        workspace: See :mod:`newton`; its barriers and quadratic model are set.
 
     Returns:
         The barrier function.
@@ -218,28 +215,6 @@ def change_steps(lengths, k):
 def braking_way(velocity, per):
     """How far a joint moves while it brakes, in [rad] or [m], with 1 / q̈_max ``per``; 0 where that is 0."""
     return 0.5 * per * velocity * abs(velocity)
-
-
-@inlined
-def kink_steepness(cost):
-    """By how much the derivative of Φ^X jumps at its kink, in units of Δx; 0 where it falls."""
-    return max(cost.p_x - P_X_INSIDE, 0.0)
-
-
-@inlined
-def without_kink(cost, error, steepness):
-    """A component of Φ^X without the part beyond its kink."""
-    value = cost_kernels.value(error, cost.delta_x, P_X_INSIDE, cost.p_x)
-    return value - steepness * max(abs(error) / cost.delta_x - 1.0, 0.0)
-
-
-@inlined
-def derivatives_without_kink(cost, error, steepness):
-    """The first and second derivative of :func:`without_kink`."""
-    gradient = cost_kernels.gradient(error, cost.delta_x, P_X_INSIDE, cost.p_x)
-    if abs(error) > cost.delta_x:
-        gradient -= math.copysign(steepness / cost.delta_x, error)
-    return gradient, cost_kernels.curvature(error, cost.delta_x, P_X_INSIDE, cost.p_x)
 
 
 @inlined

@@ -14,8 +14,8 @@ from matplotlib.image import AxesImage
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter, NullLocator
 
 from baselines.evaluation.plots import style
-from baselines.evaluation.report import number
-from baselines.evaluation.table import Record
+from baselines.evaluation.records import Record
+from baselines.evaluation.table import number
 
 #: Excess costs below this are drawn here, in [%].
 FLOOR = 0.01
@@ -33,12 +33,16 @@ def front(lines: Sequence[Record]) -> list[Record]:
         From fast to slow.
     """
     most = max(int(line["episodes"]) for line in lines)
-    timed = [line for line in lines if line["time_p99_us"] not in ("", None) and int(line["episodes"]) == most]
+    timed = [line for line in lines if _timed(line) and int(line["episodes"]) == most]
     out: list[Record] = []
     for line in sorted(timed, key=lambda line: (float(line["time_p99_us"]), float(line["cost_ratio"]))):
         if not out or float(line["cost_ratio"]) < float(out[-1]["cost_ratio"]):
             out.append(line)
     return out
+
+
+def _timed(line: Record) -> bool:
+    return line["time_p99_us"] not in ("", None) and np.isfinite(float(line["cost_ratio"]))
 
 
 def cost_time(lines: Sequence[Record], title: str) -> Figure:
@@ -47,15 +51,12 @@ def cost_time(lines: Sequence[Record], title: str) -> Figure:
     Args:
         lines: Lines of one scenario.
         title: Stands above the plot.
-
-    Raises:
-        InvalidInputError: There are no times.
     """
     drawn = style.figure(4.6)
     axes = drawn.subplots()
     best = front(lines)
     for line in lines:
-        if line not in best and line["time_p99_us"] not in ("", None):
+        if line not in best and _timed(line):
             _interval(axes, float(line["time_p99_us"]), line, color=style.STEEL, marker="o", ms=3.5, lw=0.8)
     times, excess = [float(line["time_p99_us"]) for line in best], [_excess(line["cost_ratio"]) for line in best]
     axes.step(times, excess, where="post", color=style.MIST, lw=3.0, zorder=1)

@@ -1,30 +1,24 @@
 """Regenerates the papers' experiments as figures and numbers, and the ledger of their claims.
 
->>> from baselines.reproduce import reproduce
+>>> from baselines.cli.reproduce import reproduce
 >>> findings = reproduce(["zhang"])
 """
 
 from __future__ import annotations
 
-import sys
-
-if __name__ == "__main__":  # ahead of all that takes seconds to import, so that Ctrl-C is heeded there, too
-    from baselines.command import started
-
-    sys.exit(started("baselines.reproduce"))
-
 import contextlib
 import dataclasses
 import json
 import pathlib
+import sys
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Annotated
 
 import tyro
 
-from baselines import command
 from baselines.canonical import jsonable
-from baselines.evaluation.machine import describe
+from baselines.cli import shell
+from baselines.evaluation.metrics import describe
 from baselines.evaluation.plots.style import png
 from baselines.files import locked, write
 from baselines.papers import PAPERS, get, ledger
@@ -32,6 +26,8 @@ from baselines.papers.paper import Finding, Paper
 from baselines.papers.runs import Runs
 from ikgym.exceptions import InvalidInputError
 from ikgym.validation import whole_number
+
+PROGRAM = f"{shell.CONSOLE} reproduce"
 
 #: The results of testing claims, by paper and claim.
 Findings = dict[str, dict[str, Finding]]
@@ -122,7 +118,7 @@ class Options:
 
 def manual() -> str:
     """The text of ``--help`` above the options."""
-    prog = _program()
+    prog = PROGRAM
     return f"""\
 Regenerates the experiments of the papers: draws every figure again and tests every claim.
 
@@ -137,10 +133,6 @@ Files in the folder of --out:
   papers.md            the same as tables, with how each claim was tested"""
 
 
-def _program() -> str:
-    return command.program("reproduce", "python -m baselines.reproduce")
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """The command line.
 
@@ -151,11 +143,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         The exit code: 0, 2 after an expected error, 130 after Ctrl-C.
     """
     given = sys.argv[1:] if arguments is None else list(arguments)
-    return command.run(lambda: _carry_out(given))
+    return shell.run(lambda: _carry_out(given))
 
 
 def _carry_out(arguments: Sequence[str]) -> int:
-    options = command.parse(Options, arguments, prog=_program(), description=manual())
+    options = shell.parse(Options, arguments, prog=PROGRAM, description=manual())
     findings = reproduce(
         options.paper, figures=options.figure or None, out=options.out, steps=options.steps, progress=True
     )

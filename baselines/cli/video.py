@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 import pathlib
 import sys
 from collections.abc import Sequence
@@ -12,10 +11,12 @@ from typing import Annotated
 import tyro
 from tqdm import tqdm
 
-from baselines import command
+from baselines.cli import shell
 from baselines.viewer.film import check_ffmpeg, checked_width, moments, pictures, write_video
-from baselines.viewer.replay import Stage, named, play_all
+from baselines.viewer.replay import Stage, play_all
 from ikgym.exceptions import InvalidInputError
+
+PROGRAM = f"{shell.CONSOLE} video"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -42,7 +43,7 @@ class Options:
 
 def manual() -> str:
     """The text of ``--help`` above the options."""
-    prog = _program()
+    prog = PROGRAM
     return f"""\
 Draws an episode as an H.264 video: the arm, the paths and the errors over time, several policies at the same time.
 Needs pip install "ikgym[video]".
@@ -62,18 +63,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
         The exit code: 0, 2 after an expected error, 130 after Ctrl-C.
     """
     arguments = sys.argv[1:] if arguments is None else list(arguments)
-    return command.run(lambda: _film(command.parse(Options, arguments, prog=_program(), description=manual())))
+    return shell.run(lambda: _film(shell.parse(Options, arguments, prog=PROGRAM, description=manual())))
 
 
 def _film(options: Options) -> int:
-    command.find_own_modules()
+    shell.find_own_modules()
     check_ffmpeg()  # before episodes are played
     if options.out.suffix != ".mp4":
         raise InvalidInputError(f"out: expected a file that ends in .mp4, got {str(options.out)!r}.")
-    width, names = checked_width(options.width), named(options.policy)
+    width = checked_width(options.width)
     stage = Stage.of(options.scenario, options.seed, options.steps)
     steps = moments(stage, options.fps, options.speed)
-    replays = play_all(stage, names, progress=True)
+    replays = play_all(stage, options.policy)
     content = tqdm(
         pictures(stage, replays, steps, width=width),
         total=len(steps),
@@ -84,10 +85,3 @@ def _film(options: Options) -> int:
     write_video(options.out, content, options.fps)
     print(f"{options.out}: {len(steps)} pictures, {len(steps) / options.fps:.1f} s")
     return 0
-
-
-_program = functools.partial(command.program, "video", "python -m baselines.viewer.video")
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -1,0 +1,299 @@
+"""The base of all commands: reading arguments, exit codes, and the commands that list a registry."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import io
+import os
+import pathlib
+import re
+import shlex
+import shutil
+import sys
+import textwrap
+from collections.abc import Callable, Sequence
+from typing import Annotated, Protocol, TypeVar
+
+import numpy as np
+import tyro
+
+from ikgym.exceptions import IkgymError, InvalidInputError, UnknownNameError
+from ikgym.validation import FloatArray, whole_number
+
+#: The console command in front of all others.
+CONSOLE = "ikgym"
+
+#: Patterns in messages of tyro, and plainer texts.
+PLAINER = (
+    (r"no type matching (?:\{None\}\|)?(\S+) could be instantiated from \['(.*?)'\].*", r"expected \1, got '\2'"),
+    (r"invalid literal for int\(\) with base 10: ", "expected a whole number, got "),
+    (r"could not convert string to float: ", "expected a number, got "),
+    (r"Expected 1 values", "Expected one"),
+    (r"Error parsing [A-Z]\w+: ", ""),
+    (r" Arguments are applied to the directly preceding subcommand.*", ""),
+    (r"(Missing from .*?: --\S+).*", r"\1"),
+)
+
+#: The extra that installs a package.
+EXTRAS = {
+    "torch": "train",
+    "stable_baselines3": "train",
+    "tensorboard": "train",
+    "rich": "train",
+    "optuna": "train",
+    "h5py": "data",
+    "minari": "data",
+    "pinocchio": "urdf",
+    "moviepy": "video",
+    "ray": "cluster",
+    "trimesh": "view",
+    "viser": "view",
+    "yourdfpy": "view",
+}
+
+
+class Resumable(Protocol):
+    """The options of a command that writes into a folder, and continues there with ``--resume``."""
+
+    @property
+    def out(self) -> pathlib.Path | None: ...  # noqa: D102
+
+
+T = TypeVar("T")
+P = TypeVar("P", bound=Resumable)
+
+
+def program(name: str, otherwise: str) -> str:
+    """The name of a command in this process.
+
+    Args:
+        name: Its name behind ``ikgym``.
+        otherwise: Its name if Python runs its module, such as ``"python -m baselines.evaluate"``.
+    """
+    return f"{CONSOLE} {name}" if pathlib.Path(sys.argv[0]).stem == CONSOLE else otherwise
+
+
+def parse(kind: type[T], arguments: Sequence[str], *, prog: str, description: str) -> T:
+    """Reads the words after a command.
+
+    Args:
+        kind: The type of the options, for :func:`tyro.cli`.
+        arguments: The words.
+        prog: The name of the command.
+        description: The text of ``--help`` above the options.
+
+    Raises:
+        InvalidInputError: An option is unknown, missing or refused; the message is one line.
+        SystemExit: With 0 after ``--help``.
+    """
+    said = io.StringIO()
+    try:
+        with contextlib.redirect_stderr(said):
+            return tyro.cli(kind, prog=prog, description=description, args=list(arguments))
+    except SystemExit as e:
+        if e.code:
+            raise InvalidInputError(f"{_in_one_line(said.getvalue())} See {prog} --help.") from None
+        raise
+
+
+def run(work: Callable[[], int], stopped: Callable[[], str] = lambda: "Stopped.") -> int:
+    """Runs a command.
+
+    Args:
+        work: Returns the exit code.
+        stopped: Gives the message after Ctrl-C.
+
+    Returns:
+        The exit code: that of the work, 2 after an expected error, 130 after Ctrl-C.
+    """
+    try:
+        code = work()
+        sys.stdout.flush()
+    except IkgymError as e:
+        complain(str(e))
+        return 2
+    except ModuleNotFoundError as e:
+        package = (e.name or "").partition(".")[0]
+        if package not in EXTRAS:
+            raise
+        complain(f'This needs {package}: pip install "{CONSOLE}[{EXTRAS[package]}]"')
+        return 2
+    except KeyboardInterrupt:
+        print(f"\n{stopped()}", file=sys.stderr)
+        return 130
+    except BrokenPipeError:
+        # The reader, such as `head`, has closed the pipe. The rest of the buffer goes nowhere: Python would write it at
+        # its end.
+        with contextlib.suppress(OSError, ValueError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    return code
+
+
+def run_resumable(
+    kind: type[P],
+    arguments: Sequence[str] | None,
+    prog: str,
+    manual: Callable[[str], str],
+    work: Callable[[P, str], None],
+) -> int:
+    """Reads the options of a command that writes into the folder of ``--out``, and does its work.
+
+    Args:
+        kind: The type of the options; `workers` and `episodes`, if there are such, must be at least 1.
+        arguments: The words after the command; those of the process if left out.
+        prog: The name of the command.
+        manual: Gives the text of ``--help`` above the options for that name.
+        work: Called with the options and the whole command line.
+
+    Returns:
+        The exit code, see :func:`run`.
+    """
+    given, out = sys.argv[1:] if arguments is None else list(arguments), None
+
+    def both() -> int:
+        nonlocal out
+        options = parse(kind, given, prog=prog, description=manual(prog))
+        out = options.out
+        for name in ("workers", "episodes"):
+            if (value := getattr(options, name, None)) is not None:
+                whole_number(name, value, at_least=1)
+        find_own_modules()
+        work(options, shlex.join([*prog.split(), *given]))
+        return 0
+
+    kept = "Stopped. Finished work is in {}; continue with --resume."
+    return run(both, lambda: "Stopped." if out is None else kept.format(out))
+
+
+def find_own_modules() -> None:
+    """Lets modules in the current folder be imported, which a console command does not search."""
+    if (here := str(pathlib.Path.cwd())) not in sys.path:
+        sys.path.append(here)
+
+
+def complain(message: str) -> None:
+    """Prints an error as one line on stderr."""
+    print(f"error: {' '.join(message.split())}", file=sys.stderr)
+
+
+def width() -> int:
+    """Most characters of a line of output: those of the terminal, at least 80; 120 if there is none."""
+    return max(80, shutil.get_terminal_size((120, 24)).columns)
+
+
+@dataclasses.dataclass(frozen=True)
+class Names:
+    """Arguments of a list."""
+
+    names: Annotated[tyro.conf.Positional[tuple[str, ...]], tyro.conf.arg(metavar="NAME …")] = ()
+    """Names to show in full, or files: .urdf for arms, .toml for scenarios. The list if left out."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Catalogue:
+    """A registry for printing.
+
+    Args:
+        kind: The word for a member.
+        names: Gives the names of all members.
+        head: Heads of the columns; the last column fills the line.
+        row: The other cells of a member's line.
+        full: The full description of a member.
+        ending: Suffix of files that are shown in full like members; none if empty.
+    """
+
+    kind: str
+    names: Callable[[], Sequence[str]]
+    head: tuple[str, ...]
+    row: Callable[[str], tuple[str, ...]]
+    full: Callable[[str], str]
+    ending: str = ""
+
+
+def list_members(word: str, catalogue: Catalogue, arguments: Sequence[str]) -> int:
+    """A command that prints a catalogue, or some of its members in full.
+
+    Args:
+        word: The command.
+        catalogue: The catalogue.
+        arguments: Names, or options.
+
+    Raises:
+        UnknownNameError: There is no such member; the message has the nearest name.
+        InvalidInputError: A file cannot be read.
+        MissingDependencyError: A URDF file is to be read, and Pinocchio is not installed.
+    """
+    prog = f"{CONSOLE} {word}"
+    given = parse(Names, arguments, prog=prog, description=f"Lists the {word}, or shows some in full.").names
+    known = catalogue.names()
+    for name in given:
+        if name not in known and not (catalogue.ending and name.endswith(catalogue.ending)):
+            raise UnknownNameError(catalogue.kind, name, known)
+    if given:
+        print("\n\n".join(_refilled(catalogue.full(name), width()) for name in given))
+    else:
+        print(aligned([catalogue.head, *((name, *catalogue.row(name)) for name in known)], width()))
+    return 0
+
+
+def aligned(rows: Sequence[Sequence[str]], most: int) -> str:
+    """A table whose first row is the head, its last column wrapped to fit.
+
+    Args:
+        rows: Cells, the same number in each row.
+        most: Characters of a line.
+    """
+    sizes = [max(len(row[i]) for row in rows) for i in range(len(rows[0]) - 1)]
+    start = sum(sizes) + 2 * len(sizes)
+    lines = []
+    for row in rows:
+        wrapped = textwrap.wrap(row[-1], max(most - start, 16), break_on_hyphens=False) or [""]
+        cells = "  ".join(f"{cell:{size}}" for cell, size in zip(row[:-1], sizes, strict=True))
+        lines += [f"{cells}  {wrapped[0]}".rstrip(), *(" " * start + line for line in wrapped[1:])]
+    return "\n".join([*lines[:1], "-" * min(max(map(len, lines)), most), *lines[1:]])
+
+
+def numbers(values: Sequence[float] | FloatArray) -> str:
+    """Numbers as text, with four digits."""
+    return ", ".join(f"{x:.4g}" for x in np.round(np.array(values), 9) + 0.0)
+
+
+def _refilled(text: str, most: int) -> str:
+    """A text with its paragraphs and items wrapped."""
+    parts: list[str] = []
+    for line in text.splitlines():
+        item = re.match(r" *- | {0,4}\w+:( |$)| *\w.*?  |  \w+ = ", line)
+        if not line.strip() or item or not (parts and parts[-1]):
+            parts.append(line.rstrip())
+        else:
+            parts[-1] += f" {line.strip()}"
+    return "\n".join(_filled(part, most) for part in parts)
+
+
+def _filled(part: str, most: int) -> str:
+    indent = len(part) - len(part.lstrip())
+    hanging = indent + 2 if part.lstrip().startswith("- ") else indent + 4 if indent else 0
+    return textwrap.fill(part, most, subsequent_indent=" " * hanging, break_on_hyphens=False)
+
+
+def _in_one_line(box: str) -> str:
+    """The message in a box of tyro's: the mistake, and the names that are available."""
+    sections: list[list[str]] = [[]]
+    for line in re.sub(r"\x1b\[[0-9;]*m", "", box).splitlines():
+        row = line.strip("│ ")
+        if not row.strip("─-"):
+            sections.append([])
+        elif not row.startswith(("╭", "╰")):
+            sections[-1].append(row)
+    # Where nothing but ASCII can be printed there is no frame that holds the title: it is a section.
+    texts = [" ".join(section) for section in sections if section][0 if "╭" in box else 1 :]
+    message, more = (*texts, "", "")[:2]
+    for pattern, plain in PLAINER:
+        message = re.sub(pattern, plain, message)
+    if listed := re.match(r"Available subcommands: ([\w, -]+)", more):
+        message += f". Available: {listed[1].strip()}"
+    if near := re.match(r"Perhaps you meant:? (\S+)", more):
+        message += f". Did you mean {near[1]!r}?"
+    return message if message.endswith(("?", ".")) else f"{message}."

@@ -1,0 +1,384 @@
+"""The options of each method of training: everything that the result of a run depends on, except the seed.
+
+One file, although long: most of it is the help text of the options.
+"""
+
+from __future__ import annotations
+
+import ast
+import dataclasses
+import json
+import pathlib
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, Literal, Self, get_args
+
+import tyro
+
+from baselines.agents.bilinear.processing import Bilinear
+from baselines.agents.recurrent.processing import Recurrent
+from ikgym import scenarios, tasks
+from ikgym.exceptions import IkgymError, InvalidInputError
+from ikgym.rl import Learning
+from ikgym.scenarios import Scenario
+from ikgym.validation import Frozen, flag, known_names, number, whole_number
+
+Activation = Literal["silu", "relu", "tanh", "elu"]
+#: How `observe` estimates its gradient.
+Estimator = Literal["analytic", "ppo"]
+
+#: Upper bounds, so that a typing error gives a message and does not exhaust the memory.
+MOST_ARMS, MOST_LAYERS, MOST_NEURONS = 10_000, 10, 2048
+MOST_RATE = 1e30  # weights are float32
+
+
+class TrainingError(IkgymError):
+    """A run cannot be started or repeated, or its weights diverged."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Config(Frozen):
+    """The options that all methods share.
+
+    Raises:
+        UnknownNameError: There is no such scenario, activation or the like.
+        InvalidInputError: A value is out of its range.
+    """
+
+    #: The name of the method on the command line.
+    method: ClassVar[str]
+
+    scenario: Annotated[str, tyro.conf.arg(metavar="NAME")] = "varga7-random"
+    """The scenario to train on. Random scenarios are trained on seeds of the split "train"."""
+    steps: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
+    """Largest number of steps of an episode, in training and validation, for short trials. That of the scenario if left
+    out."""
+    task: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
+    """Task coordinates to train on, if not those of the scenario. An agent trained on whole poses (pose) also plays
+    scenarios that show skew coordinates, whose 90° ambiguity is resolved for it."""
+    n_envs: Annotated[int, tyro.conf.arg(metavar="N")] = 16
+    """Number of arms stepped together, at most 10000."""
+    segments: Annotated[int, tyro.conf.arg(metavar="N")] = 20
+    """Number of parts of the training. A validation and a checkpoint may follow each of them."""
+    evaluate_every: Annotated[int, tyro.conf.arg(metavar="N")] = 2
+    """Segments between validations; the untrained and the final agent are always validated."""
+    validation_episodes: Annotated[int, tyro.conf.arg(metavar="N")] = 32
+    """Episodes of each validation: the first seeds of the split "validation". A deterministic scenario has one."""
+    keep_best: bool = True
+    """Keep the agent with the best validation score (geometric mean of the costs) instead of the last one."""
+
+    def __post_init__(self) -> None:
+        self._whole("segments", "evaluate_every", "validation_episodes")
+        self._whole("n_envs", at_most=MOST_ARMS)
+        if self.steps is not None:
+            self._whole("steps")
+        flag("keep_best", self.keep_best)
+
+    def make_scenario(self) -> Scenario:
+        """The scenario with the options `task` and `steps` applied.
+
+        Raises:
+            UnknownNameError: There is no such scenario or task.
+        """
+        scenario = scenarios.get(self.scenario)
+        if self.task is not None:
+            scenario = scenario.replace(task=tasks.get(self.task))
+        return scenario if self.steps is None else scenario.replace(steps=min(self.steps, scenario.steps))
+
+    def to_json(self) -> dict[str, Any]:
+        """All fields as JSON values."""
+        values = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        out: dict[str, Any] = json.loads(json.dumps(values, default=str))
+        return out
+
+    @classmethod
+    def from_json(cls, values: Mapping[str, Any]) -> Self:
+        """A configuration from values by name; fields left out have their defaults.
+
+        Raises:
+            UnknownNameError: A name is not a field; the message has the nearest one.
+            InvalidInputError: A value is refused.
+        """
+        known_names(f"option of {cls.method}", values, [f.name for f in dataclasses.fields(cls)])
+        converted: Any = {name: tuple(v) if isinstance(v, list) else v for name, v in values.items()}
+        return cls(**converted)
+
+    def _whole(self, *names: str, at_least: int = 1, at_most: int | None = None) -> None:
+        """Checks whole numbers, single or in a tuple, and stores them as int."""
+        for name in names:
+            value = getattr(self, name)
+            several = isinstance(value, tuple)
+            checked = tuple(whole_number(name, each, at_least=at_least) for each in (value if several else (value,)))
+            if at_most is not None and max(checked) > at_most:
+                raise InvalidInputError(f"{name}: expected a whole number from 1 to {at_most}, got {max(checked)}.")
+            self._set(name, checked if several else checked[0])
+
+    def _numbers(self, *names: str, **bounds: float) -> None:
+        """Checks real numbers and stores them as floats."""
+        for name in names:
+            self._set(name, number(name, getattr(self, name), **bounds))
+
+    def _set(self, field: str, value: object) -> None:
+        """Sets a field while this frozen object is initialised."""
+        object.__setattr__(self, field, value)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class ActorOnly(Config):
+    """The options of methods that train a network by Adam, without a critic."""
+
+    hidden: Annotated[tuple[int, ...], tyro.conf.arg(metavar="N …")] = (256, 256)
+    """Neurons of the hidden layers: at most 10 layers of at most 2048 neurons."""
+    activation: Activation = "silu"
+    """Activation of the hidden layers."""
+    learning_rate: Annotated[float, tyro.conf.arg(metavar="RATE")] = 1e-3
+    """Learning rate of Adam in the first segment."""
+    learning_rate_end: Annotated[float, tyro.conf.arg(metavar="RATE")] = 2e-5
+    """Learning rate in the last segment; in between it decays geometrically."""
+    max_grad_norm: Annotated[float, tyro.conf.arg(metavar="X")] = 1.0
+    """Norm at which gradients are clipped."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        known_names("activation", [self.activation], get_args(Activation))
+        if not isinstance(self.hidden, tuple) or not 1 <= len(self.hidden) <= MOST_LAYERS:
+            raise InvalidInputError(f"hidden: expected 1 to {MOST_LAYERS} layers, got {self.hidden!r}.")
+        self._whole("hidden", at_most=MOST_NEURONS)
+        self._numbers("learning_rate", "learning_rate_end", "max_grad_norm", above=0.0, at_most=MOST_RATE)
+
+    def learning_rate_of(self, segment: int) -> float:
+        """The learning rate of a segment, counted from 0."""
+        part = segment / max(self.segments - 1, 1)
+        return float(self.learning_rate * (self.learning_rate_end / self.learning_rate) ** part)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class APG(ActorOnly):
+    """Analytic policy gradient: back-propagation of the cost through the arm, over windows of some steps.
+
+    The agent is bilinear: its network gives the matrix that maps the remaining twist to joint velocities.
+    """
+
+    method: ClassVar[str] = "apg"
+
+    offsets: Annotated[tuple[int, ...], tyro.conf.arg(metavar="N …")] = Bilinear.offsets
+    """Steps ahead at which the agent sees the reference trajectory, rising from 1."""
+    damping: Annotated[float | None, tyro.conf.arg(metavar="λ")] = None
+    """Start from the damped inverse of the Jacobian with this λ; the network adjusts it and adds to it, and sees the
+    joint rates that the reference ahead requires. If left out, the network gives the whole matrix. Not for skew
+    coordinates."""
+    n_envs: Annotated[int, tyro.conf.arg(metavar="N")] = 256
+    """Number of arms stepped together, at most 10000. At first they are spread over their episodes."""
+    learning_rate: Annotated[float, tyro.conf.arg(metavar="RATE")] = 2e-3
+    """Learning rate of Adam in the first segment."""
+    learning_rate_end: Annotated[float, tyro.conf.arg(metavar="RATE")] = 5e-5
+    """Learning rate in the last segment; in between it decays geometrically."""
+    window: Annotated[tuple[int, ...], tyro.conf.arg(metavar="N …")] = (64, 120, 240, 480)
+    """Steps through which gradients are back-propagated for one step of Adam: these values in turn, each for an equal
+    part of the segments. The way through a singularity is decided some hundred steps before it, and costs beyond the
+    window have no gradient."""
+    segment_steps: Annotated[int, tyro.conf.arg(metavar="N")] = 1920
+    """Steps of each arm in a segment: a multiple of each window."""
+    hold: Annotated[int, tyro.conf.arg(metavar="N")] = 8
+    """Steps for which the network output is held, with feedback at every step: a divisor of each window."""
+    max_gradient_share: Annotated[float, tyro.conf.arg(metavar="X")] = 10.0
+    """The gradient with respect to the network output of one arm is clipped at this multiple of an equal share of a
+    loss of 1: near singularities it would otherwise exceed that of all other arms together."""
+    cost_prior_steps: Annotated[float, tyro.conf.arg(metavar="N")] = 100.0
+    """Costs are divided by the mean stage cost of their episode up to the end of the window, so that the objective is
+    the logarithm of the costs of whole episodes. The mean cost of the reference joint path counts in it as much as this
+    many steps."""
+    reset_distance: Annotated[float, tyro.conf.arg(metavar="M")] = 0.3
+    """Arms farther from their reference position than this, in [m], are put back on the reference path."""
+    reset_distance_end: Annotated[float, tyro.conf.arg(metavar="M")] = 1.0
+    """The same in the segments of the last window, in which the agent learns to come back from farther away."""
+    averaging: Annotated[float, tyro.conf.arg(metavar="β")] = 0.99
+    """Factor of the exponential moving average of the weights, which is the agent."""
+    init: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None
+    """The agent.safetensors of an earlier run with the first weights; offsets, damping, hidden and activation must be
+    those of that run."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self._set("offsets", self.processing.offsets)
+        self._set("damping", self.processing.damping)
+        if self.init is not None:
+            self._set("init", pathlib.Path(self.init))
+        if not isinstance(self.window, tuple) or not self.window:
+            raise InvalidInputError(f"window: expected whole numbers, got {self.window!r}.")
+        self._whole("hold", "segment_steps", "window")
+        for steps in self.window:
+            if steps % self.hold or self.segment_steps % steps:
+                raise InvalidInputError(
+                    f"window: expected multiples of hold, {self.hold}, that divide segment_steps, "
+                    f"{self.segment_steps}, got {steps}."
+                )
+        self._numbers("max_gradient_share", "cost_prior_steps", "reset_distance", "reset_distance_end", above=0.0)
+        self._numbers("averaging", at_least=0.0, at_most=1.0)
+
+    @property
+    def processing(self) -> Bilinear:
+        """The features and the law of the agent."""
+        return Bilinear(self.offsets, self.damping)
+
+    def window_of(self, segment: int) -> int:
+        """The window of a segment, counted from 0."""
+        return self.window[self._stage(segment)]
+
+    def reset_distance_of(self, segment: int) -> float:
+        """The reset distance of a segment, counted from 0, in [m]."""
+        last = self._stage(segment) == len(self.window) - 1
+        return self.reset_distance_end if last else self.reset_distance
+
+    def _stage(self, segment: int) -> int:
+        return segment * len(self.window) // self.segments
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Observe(ActorOnly):
+    """An agent with memory for plants that differ from the model: a recurrent network tunes a Kalman filter.
+
+    Each segment has new random plants: calibration, payload, and noise, rate and losses of the camera. The gradient of
+    the costs of the filter's estimates is back-propagated through all measurements of an episode, or estimated from
+    costs alone.
+    """
+
+    method: ClassVar[str] = "observe"
+
+    scenario: Annotated[str, tyro.conf.arg(metavar="NAME")] = "panda-field"
+    """The scenario with the arm and the paths; agents are validated on its own plant."""
+    base_policy: Annotated[str, tyro.conf.arg(metavar="POLICY")] = Recurrent.base_policy
+    """The policy that is corrected; it matters in the validation alone."""
+    hidden: Annotated[tuple[int, ...], tyro.conf.arg(metavar="N …")] = (32,)
+    """Units of the recurrent layers."""
+    n_envs: Annotated[int, tyro.conf.arg(metavar="N")] = 128
+    """Episodes of a segment, a multiple of the plants."""
+    segments: Annotated[int, tyro.conf.arg(metavar="N")] = 40
+    """Number of parts of the training, of about five core-seconds each."""
+    evaluate_every: Annotated[int, tyro.conf.arg(metavar="N")] = 40
+    """Segments between validations; the untrained and the final agent are always validated."""
+    validation_episodes: Annotated[int, tyro.conf.arg(metavar="N")] = 16
+    """Episodes of each validation: the first seeds of the split "validation"."""
+    plants: Annotated[int, tyro.conf.arg(metavar="N")] = 16
+    """Random plants in a segment; each episode draws an arm and noise from one of them."""
+    measurements: Annotated[int, tyro.conf.arg(metavar="N")] = 96
+    """Measurements of an episode; gradients are back-propagated through all of them."""
+    gradient_steps: Annotated[int, tyro.conf.arg(metavar="N")] = 10
+    """Gradient steps of a segment."""
+    batch_size: Annotated[int, tyro.conf.arg(metavar="N")] = 32
+    """Episodes of one gradient step."""
+    step_cost: Annotated[float, tyro.conf.arg(metavar="X")] = 0.13
+    """The cost of a step without error: the objective is the logarithm of the cost of an episode."""
+    learning_rate: Annotated[float, tyro.conf.arg(metavar="RATE")] = 5e-3
+    """Learning rate of Adam in the first segment."""
+    learning_rate_end: Annotated[float, tyro.conf.arg(metavar="RATE")] = 3e-4
+    """Learning rate in the last segment; in between it decays geometrically."""
+    estimator: Estimator = "analytic"
+    """How the gradient is estimated. analytic: back-propagation through filter and network. ppo: proximal policy
+    optimisation (Schulman et al. 2017) from the costs of estimates, with noise on the network output; each episode is
+    repeated group_size times with different noise."""
+    group_size: Annotated[int, tyro.conf.arg(metavar="N")] = 8
+    """For ppo: repetitions of each episode in a batch, at least two."""
+    n_epochs: Annotated[int, tyro.conf.arg(metavar="N")] = 4
+    """For ppo: gradient steps on a batch."""
+    clip_range: Annotated[float, tyro.conf.arg(metavar="ε")] = 0.2
+    """For ppo: largest distance of the probability ratio from 1."""
+    gamma: Annotated[float, tyro.conf.arg(metavar="γ")] = 0.95
+    """For ppo: discount factor, from one measurement to the next."""
+    log_std_init: Annotated[float, tyro.conf.arg(metavar="X")] = -1.0
+    """For ppo: logarithm of the standard deviation of the noise in the first segment."""
+    log_std_end: Annotated[float, tyro.conf.arg(metavar="X")] = -2.0
+    """For ppo: the same in the last segment; in between it changes linearly."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        known_names("estimator", [self.estimator], get_args(Estimator))
+        self._whole("plants", "gradient_steps", "n_epochs")
+        self._whole("measurements", "group_size", at_least=2)
+        self._whole("batch_size", at_most=self.n_envs)
+        self._numbers("clip_range", "step_cost", above=0.0)
+        self._numbers("gamma", above=0.0, at_most=1.0)
+        self._numbers("log_std_init", "log_std_end", at_least=-20.0, at_most=2.0)
+        if self.n_envs % self.plants:
+            raise InvalidInputError(f"n_envs: expected a multiple of {self.plants} plants, got {self.n_envs}.")
+
+    @property
+    def processing(self) -> Recurrent:
+        """The base policy and the prior of the filter."""
+        return Recurrent(self.base_policy)
+
+    def log_std_of(self, segment: int) -> float:
+        """The logarithm of the standard deviation in a segment, counted from 0."""
+        return self.log_std_init + (self.log_std_end - self.log_std_init) * segment / max(self.segments - 1, 1)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Reinforcement(Config):
+    """The options of the algorithms of Stable-Baselines3."""
+
+    scenario: Annotated[str, tyro.conf.arg(metavar="NAME")] = "panda-random"
+    """The scenario to train on. Random scenarios are trained on seeds of the split "train"."""
+    n_envs: Annotated[int, tyro.conf.arg(metavar="N")] = 8
+    """Number of arms stepped together, at most 10000."""
+    total_timesteps: Annotated[int, tyro.conf.arg(metavar="N")] = 1_600_000
+    """Steps of the environment in the whole training, summed over all arms."""
+    settings: Annotated[tuple[str, ...], tyro.conf.arg(name="set", metavar="NAME=VALUE …")] = ()
+    """Settings of the algorithm by Stable-Baselines3's names, such as learning_rate=1e-3 or
+    policy_kwargs={'net_arch':[64,64]}. Those left out have the defaults of Stable-Baselines3, except buffer_size, which
+    is at most total_timesteps. A number for action_noise is the standard deviation of normal noise."""
+    learning: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=VALUE …")] = ()
+    """Settings of the environment by the names of ikgym.rl.Learning, such as furthest=20.0 or preview=(1,10,40)."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self._whole("total_timesteps", at_least=self.segments)
+        _parsed("set", self.settings)
+        Learning().replace(**self.learning_settings)
+
+    @property
+    def algorithm_settings(self) -> dict[str, Any]:
+        """The settings of the algorithm by name."""
+        return _parsed("set", self.settings)
+
+    @property
+    def learning_settings(self) -> dict[str, Any]:
+        """The settings of the environment by name."""
+        return _parsed("learning", self.learning)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class PPO(Reinforcement):
+    """Proximal policy optimisation (Schulman et al. 2017), by Stable-Baselines3 on ikgym.sb3.make_vec."""
+
+    method: ClassVar[str] = "ppo"
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class SAC(Reinforcement):
+    """Soft actor-critic (Haarnoja et al. 2018), by Stable-Baselines3 on ikgym.sb3.make_vec."""
+
+    method: ClassVar[str] = "sac"
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class TD3(Reinforcement):
+    """Twin delayed DDPG (Fujimoto et al. 2018), by Stable-Baselines3 on ikgym.sb3.make_vec."""
+
+    method: ClassVar[str] = "td3"
+
+
+def _parsed(option: str, settings: tuple[str, ...]) -> dict[str, Any]:
+    """Values by name, read as Python literals, or else as strings.
+
+    Raises:
+        InvalidInputError: A setting does not have the form NAME=VALUE.
+    """
+    out: dict[str, Any] = {}
+    for setting in settings:
+        name, equals, text = str(setting).partition("=")
+        if not name or not equals:
+            raise InvalidInputError(f"{option}: expected NAME=VALUE, got {setting!r}.")
+        try:
+            out[name] = ast.literal_eval(text)
+        except (ValueError, SyntaxError):
+            out[name] = text
+    return out

@@ -1,1 +1,0 @@
-"""Configurations of training runs, as validated data."""

@@ -1,0 +1,72 @@
+"""How speed is measured: the sizes of the tables, and medians of interleaved calls."""
+
+from __future__ import annotations
+
+import dataclasses
+import statistics
+import time
+from collections.abc import Callable, Hashable, Mapping
+from typing import TypeVar
+
+Call = Callable[[], object]
+Name = TypeVar("Name", bound=Hashable)
+
+
+@dataclasses.dataclass(frozen=True)
+class Effort:
+    """The size of a run.
+
+    Args:
+        rounds: Turns of each call that is compared.
+        seconds: About how long a turn lasts, at least one call, in [s].
+        rows: Sizes N of vector environments.
+        steps: Steps along which `predict` is timed.
+        grids: Horizons HL, in grid points with the present one, at which solvers are compared.
+        states: States at which they are compared.
+        solves: Turns of each solver at each of these states.
+        lead: Steps before each of these states, in which solvers warm up and are not timed.
+        poses: Poses whose inverse kinematics is measured.
+    """
+
+    rounds: int = 15
+    seconds: float = 0.05
+    rows: tuple[int, ...] = (64, 1024, 16384)
+    steps: int = 1000
+    grids: tuple[int, ...] = (3, 10, 30, 100)
+    states: int = 5
+    solves: int = 7
+    lead: int = 3
+    poses: int = 10_000
+
+
+FULL = Effort()
+#: Shows that everything runs; its figures mean nothing.
+QUICK = Effort(rounds=1, seconds=0.0, rows=(3,), steps=3, grids=(3,), states=1, solves=1, lead=1, poses=3)
+
+
+def medians(calls: Mapping[Name, Call], rounds: int = 15, seconds: float = 0.05) -> dict[Name, float]:
+    """The median time of each call in [s].
+
+    Machines are noisy: the calls take turns, round by round, so that a slow period affects all alike.
+
+    Args:
+        calls: The calls by name. Each is made once before anything is timed.
+        rounds: Number of turns of each call.
+        seconds: About how long a turn lasts; never less than one call.
+    """
+    repeats = {}
+    for name, call in calls.items():
+        call()
+        repeats[name] = max(1, int(seconds / max(_time(call, 1), 1e-9)))
+    times: dict[Name, list[float]] = {name: [] for name in calls}
+    for _ in range(rounds):
+        for name, call in calls.items():
+            times[name].append(_time(call, repeats[name]))
+    return {name: statistics.median(values) for name, values in times.items()}
+
+
+def _time(call: Call, repeats: int) -> float:
+    begin = time.perf_counter()
+    for _ in range(repeats):
+        call()
+    return (time.perf_counter() - begin) / repeats

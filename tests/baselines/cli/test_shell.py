@@ -1,0 +1,113 @@
+"""What all commands share: one line for a mistake, and how they end."""
+
+from __future__ import annotations
+
+import dataclasses
+import subprocess
+import sys
+
+import pytest
+
+from baselines.cli import shell
+from ikgym.exceptions import InvalidInputError
+
+
+@dataclasses.dataclass(frozen=True)
+class Options:
+    """What a command takes."""
+
+    number: int = 1
+    share: float | None = None
+    name: str = ""
+
+
+@dataclasses.dataclass(frozen=True)
+class Needy:
+    """What a command takes that needs something."""
+
+    out: str
+    """A folder."""
+
+
+def failing(error):
+    def work():
+        raise error
+
+    return work
+
+
+@pytest.mark.parametrize(
+    ("kind", "arguments", "message"),
+    [
+        (Options, ["--numbr", "2"], "Unrecognized options: --numbr, 2. Did you mean '--number'? See it --help."),
+        (Options, ["--number", "x"], "Error parsing --number: expected a whole number, got 'x'. See it --help."),
+        (Options, ["--share", "x"], "Error parsing --share: expected FLOAT, got 'x'. See it --help."),
+        (Options, ["--name"], "Missing value for argument '--name'. Expected one. See it --help."),
+        (Options, ["all"], "Unrecognized options: all. See it --help."),
+        (Needy, [], "Missing from it: --out. See it --help."),
+    ],
+)
+@pytest.mark.parametrize("columns", ["40", "200"])
+def test_a_mistake_is_one_line(kind, arguments, message, columns, monkeypatch):
+    monkeypatch.setenv("COLUMNS", columns)
+    with pytest.raises(InvalidInputError) as refused:
+        shell.parse(kind, arguments, prog="it", description="Does something.")
+    assert str(refused.value) == message
+
+
+def test_help_and_good_arguments(capsys):
+    assert shell.parse(Options, ["--number", "3"], prog="it", description="") == Options(3)
+    with pytest.raises(SystemExit) as ended:
+        shell.parse(Options, ["--help"], prog="it", description="Does something.")
+    assert ended.value.code == 0
+    assert "Does something." in capsys.readouterr().out
+
+
+def test_exit_codes(capsys):
+    assert shell.run(lambda: 0) == 0
+    assert shell.run(lambda: 1) == 1
+    assert shell.run(failing(InvalidInputError("Nothing\n  fits."))) == 2
+    assert capsys.readouterr().err == "error: Nothing fits.\n"
+    assert shell.run(failing(KeyboardInterrupt()), lambda: "Stopped; all is kept.") == 130
+    assert capsys.readouterr().err == "\nStopped; all is kept.\n"
+
+
+def test_a_missing_extra_is_named(capsys):
+    assert shell.run(failing(ModuleNotFoundError("no", name="torch.nn"))) == 2
+    assert capsys.readouterr().err == 'error: This needs torch: pip install "ikgym[train]"\n'
+    with pytest.raises(ModuleNotFoundError):  # a module of ours that is missing is a defect, not a mistake
+        shell.run(failing(ModuleNotFoundError("no", name="baselines.nowhere")))
+
+
+def test_extras_exist():
+    import tomllib
+    from pathlib import Path
+
+    project = tomllib.loads((Path(__file__).parents[3] / "pyproject.toml").read_text())["project"]
+    assert set(shell.EXTRAS.values()) <= set(project["optional-dependencies"])
+
+
+def test_a_closed_pipe_is_silent():
+    code = (
+        "import sys\nfrom baselines.cli import shell\n"
+        "def work():\n    for _ in range(100000): print('a line')\n    return 0\n"
+        "sys.exit(shell.run(work))"
+    )
+    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        assert process.stdout.readline() == b"a line\n"
+        process.stdout.close()
+        assert process.stderr.read() == b""
+    assert process.returncode == 0
+
+
+def test_names_of_programs(monkeypatch):
+    monkeypatch.setattr(sys, "argv", ["/somewhere/bin/ikgym", "evaluate"])
+    assert shell.program("evaluate", "python -m baselines.evaluate") == "ikgym evaluate"
+    monkeypatch.setattr(sys, "argv", ["/somewhere/baselines/evaluate.py"])
+    assert shell.program("evaluate", "python -m baselines.evaluate") == "python -m baselines.evaluate"
+
+
+def test_width(monkeypatch):
+    for columns, width in {"60": 80, "80": 80, "101": 101}.items():
+        monkeypatch.setenv("COLUMNS", columns)
+        assert shell.width() == width

@@ -1,0 +1,80 @@
+"""Configurations and presets."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from baselines.training.config import APG, PPO, SAC, Observe
+from baselines.training.methods import METHODS, configure, get, preset_names
+from ikgym.exceptions import IkgymError, InvalidInputError
+from tests.baselines.training.small import tiny
+
+#: Refused options, and a part of the message.
+REFUSED = [
+    (APG, {"windo": 3}, "no option of apg 'windo'. Did you mean 'window'"),
+    (APG, {"activation": "sili"}, "Did you mean 'silu'"),
+    (APG, {"hidden": []}, "hidden: expected 1 to 10 layers"),
+    (APG, {"hidden": [8, 0]}, "hidden: expected a whole number of at least 1, got 0"),
+    (APG, {"hidden": [8, 10**6]}, "hidden: expected a whole number from 1 to 2048, got 1000000"),
+    (APG, {"n_envs": 10**7}, "n_envs: expected a whole number from 1 to 10000"),
+    (APG, {"offsets": [2, 5]}, "offsets: expected steps ahead that rise from 1"),
+    (APG, {"segments": 0}, "segments: expected"),
+    (APG, {"steps": 0}, "steps: expected"),
+    (APG, {"keep_best": "yes"}, "keep_best: expected true or false"),
+    (APG, {"learning_rate": -1}, "learning_rate: expected a finite number above 0"),
+    (APG, {"window": 64}, "window: expected whole numbers, got 64"),
+    (APG, {"window": [88]}, "window: expected .* that divide segment_steps, 1920, got 88"),
+    (APG, {"averaging": 1.5}, "averaging"),
+    (APG, {"damping": 0.0}, "damping"),
+    (APG, {"reset_distance": -1.0}, "reset_distance"),
+    (Observe, {"n_envs": 40}, "n_envs: expected a multiple of 16 plants"),
+    (Observe, {"measurements": 1}, "measurements: expected a whole number of at least 2"),
+    (Observe, {"batch_size": 129}, "batch_size: expected a whole number from 1 to 128"),
+    (Observe, {"group_size": 1}, "group_size: expected a whole number of at least 2, got 1"),
+    (Observe, {"gamma": 0.0}, "gamma"),
+    (Observe, {"log_std_end": 3.0}, "log_std_end"),
+    (Observe, {"estimator": "pppo"}, r"estimator 'pppo'\. Did you mean 'ppo'"),
+    (PPO, {"settings": ["n_steps"]}, "set: expected NAME=VALUE, got 'n_steps'"),
+    (SAC, {"learning": ["furthst=1"]}, "Did you mean 'furthest'"),
+    (SAC, {"total_timesteps": 2}, "total_timesteps: expected a whole number of at least 20"),
+]
+
+
+@pytest.mark.parametrize(("kind", "values", "message"), REFUSED)
+def test_refused(kind, values, message):
+    with pytest.raises(IkgymError, match=message):
+        kind.from_json(values)
+
+
+@pytest.mark.parametrize("kind", METHODS.values(), ids=METHODS)
+def test_configurations_are_json(kind):
+    config = tiny(kind.method, n_envs=np.int64(6))
+    assert kind.from_json(json.loads(json.dumps(config.to_json()))) == config
+    assert configure(kind, "smoke").make_scenario()
+    assert configure(kind, None) == kind()
+
+
+def test_values_of_segments():
+    config = APG(segments=3, learning_rate=1e-2, learning_rate_end=1e-4)
+    assert [config.learning_rate_of(n) for n in range(3)] == pytest.approx([1e-2, 1e-3, 1e-4], rel=1e-12)
+    assert (APG(steps=50).make_scenario().steps, APG(steps=5000).make_scenario().steps) == (50, 1000)
+    config = tiny("apg", segments=8, window=(16, 48), reset_distance=0.3, reset_distance_end=0.5)
+    assert [config.window_of(number) for number in range(8)] == [16] * 4 + [48] * 4
+    assert [config.reset_distance_of(number) for number in range(8)] == [0.3] * 4 + [0.5] * 4
+
+
+def test_presets(tmp_path):
+    assert preset_names() == ("quick", "standard", "long", "smoke")
+    assert {configure(APG, name).damping for name in ("quick", "standard", "long")} == {1e-2}
+    (tmp_path / "mine.toml").write_text("windo = 2\n")
+    with pytest.raises(IkgymError, match="no option of apg 'windo'"):
+        configure(APG, str(tmp_path / "mine.toml"))
+    (tmp_path / "mine.toml").write_text("window = \n")
+    for name in ("mine.toml", "none.toml"):
+        with pytest.raises(InvalidInputError, match=f"Cannot read the preset .*{name}"):
+            configure(APG, str(tmp_path / name))
+    with pytest.raises(IkgymError, match=r"no method 'pp'\. Did you mean 'ppo'"):
+        get("pp")
