@@ -185,27 +185,6 @@ def _call(block: Any, numbers: Any, checking: Any, seen: Any, memory: Any, actio
 
 
 @kernel
-def scale_rows(qdot, limit, status):
-    """Slows down all joints of a row alike, until each of them is within its limit.
-
-    Args:
-        qdot: In [rad/s] or [m/s]; rows that are not finite are left to :func:`cut_rows`. Shape (B, n).
-        limit: In [rad/s] or [m/s]. Shape (n,).
-        status: Raised to what the row deserves. Shape (B,).
-    """
-    for row in range(qdot.shape[0]):
-        fastest = 1.0
-        for j in range(qdot.shape[1]):
-            # Where one of them is no number, neither is the largest.
-            fraction = abs(qdot[row, j]) / limit[j]
-            fastest = fraction if fraction > fastest or np.isnan(fraction) else fastest
-        if fastest > 1.0 and np.isfinite(fastest):
-            status[row] = max(status[row], _SATURATED)
-            for j in range(qdot.shape[1]):
-                qdot[row, j] /= fastest
-
-
-@kernel
 def cut_rows(qdot, limit, action, status):
     """Joint velocities as fractions of their limit, within the box, row by row.
 
