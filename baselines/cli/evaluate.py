@@ -5,8 +5,7 @@ from __future__ import annotations
 import dataclasses
 import inspect
 import re
-import textwrap
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Annotated
 
 import tyro
@@ -38,11 +37,11 @@ def manual(prog: str) -> str:
     return f"""\
 Plays every policy on every scenario, and measures costs, errors, joint velocities and the time per step.
 
-{_listing("Scenarios", scenarios.names())}
+{shell.listing("Scenarios", scenarios.names())}
 
-{_listing("Test sets", test_sets.names())}
+{shell.listing("Test sets", test_sets.names())}
 
-{_listing("Policies", (*registry.names(), "agent:PATH (an agent in a file)", "package.module:Class"))}
+{shell.listing("Policies", (*registry.names(), "agent:PATH (an agent in a file)", "package.module:Class"))}
 
 Examples:
   {prog}
@@ -99,7 +98,3 @@ def _work(given: Arguments, command: str) -> None:
     )
     if given.out is not None:
         print(f"\nwritten to {given.out}" + (f"; open {given.out / PAGE} in a browser" if given.report else ""))
-
-
-def _listing(title: str, names: Iterable[str]) -> str:
-    return textwrap.fill(f"{title}: {', '.join(names)}.", 100, subsequent_indent="  ", break_on_hyphens=False)

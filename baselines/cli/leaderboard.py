@@ -103,3 +103,6 @@ def _work(given: Options, command: str) -> None:
     options = dataclasses.replace(given, test_sets=sets, progress=True)
     rows = carry_out(options, command=command)
     print(compare(rows, given.policies, given.out))
+    for one in rows.skipped:
+        print(f"skipped: {one.policy} in {one.scenario}: {one.reason}")
+    print(f"\nwritten to {given.out}")

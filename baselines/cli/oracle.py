@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import sys
-import textwrap
 from collections.abc import Iterator, Sequence
 from typing import Annotated
 
@@ -59,14 +58,14 @@ class Options:
 
 def manual() -> str:
     """The text of ``--help`` above the options."""
-    names, prog = ", ".join(scenario_registry.names()), "ikgym oracle"
+    prog = "ikgym oracle"
     return f"""\
 Searches the cheapest joint paths of whole episodes from many starts, and keeps their costs as records:
 cost ratio = cost / best known cost. A record is not proven to be the minimum.
 
-{textwrap.fill(f"Scenarios: {names}.", 100, subsequent_indent="  ", break_on_hyphens=False)}
+{shell.listing("Scenarios", scenario_registry.names())}
 
-Test sets: {", ".join(known_sets.names())}.
+{shell.listing("Test sets", known_sets.names())}
 
 Examples:
   {prog} --scenarios varga7-fast

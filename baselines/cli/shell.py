@@ -12,7 +12,7 @@ import shlex
 import shutil
 import sys
 import textwrap
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Annotated, Protocol, TypeVar
 
 import numpy as np
@@ -171,6 +171,11 @@ def find_own_modules() -> None:
     """Lets modules in the current folder be imported, which a console command does not search."""
     if (here := str(pathlib.Path.cwd())) not in sys.path:
         sys.path.append(here)
+
+
+def listing(title: str, names: Iterable[str]) -> str:
+    """Names as a paragraph of a manual."""
+    return textwrap.fill(f"{title}: {', '.join(names)}.", 100, subsequent_indent="  ", break_on_hyphens=False)
 
 
 def complain(message: str) -> None:

@@ -9,7 +9,6 @@ import itertools
 import pathlib
 import shlex
 import sys
-import textwrap
 from collections.abc import Iterable, Sequence
 from typing import Annotated, Any, Generic, TypeVar, Union
 
@@ -69,11 +68,11 @@ Trains agents: networks from observations to joint velocities. apg differentiate
 td3 are the algorithms of Stable-Baselines3 on ikgym.sb3.make_vec, observe trains agents with memory for plants that
 differ from the model. Each method has its own options: {prog} METHOD --help
 
-{_listing("Methods", methods.METHODS)}
+{shell.listing("Methods", methods.METHODS)}
 
-{_listing("Presets", methods.preset_names())}
+{shell.listing("Presets", methods.preset_names())}
 
-{_listing("Scenarios", scenarios.names())}
+{shell.listing("Scenarios", scenarios.names())}
 
 Examples:
   {prog} apg --preset quick --out runs/apg
@@ -93,10 +92,6 @@ Files in the folder of a run, which may be killed at any time:
 
 Agents are trained on the seeds of the split "train" and validated on those of "validation"; those of "test" are not
 used. Where there is a reference, the cost ratio is the geometric mean of the costs over those of rhc_foresight."""
-
-
-def _listing(title: str, names: Iterable[str]) -> str:
-    return textwrap.fill(f"{title}: {', '.join(names)}.", 100, subsequent_indent="  ", break_on_hyphens=False)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -141,24 +141,12 @@ class Recorder(gym.Wrapper[Any, Any, Any, Any]):
         assert isinstance(base, RedundantIKEnv)
         self.steps = base.scenario.steps
         self.rows: list[tuple[FloatArray, ...]] = []
-        self._seeds: list[int | None] = []
+        self.seeds: list[int | None] = []
 
     @property
     def ended(self) -> bool:
         """Whether the episode is over."""
         return len(self.rows) == self.steps
-
-    def check(self, seed: int) -> None:
-        """Checks that the wrappers have begun the episode with this seed, and made no step.
-
-        Raises:
-            InvalidInputError: They have not.
-        """
-        if self._seeds != [seed] or self.rows:
-            raise InvalidInputError(
-                f"wrap: expected reset(seed={seed}) to reach the environment once and no step to be made, got resets "
-                f"with the seeds {self._seeds} and {len(self.rows)} steps."
-            )
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Begins the episode.
@@ -171,7 +159,7 @@ class Recorder(gym.Wrapper[Any, Any, Any, Any]):
         if 0 < len(self.rows) < self.steps:
             raise InvalidInputError(f"wrap: the episode was reset after {len(self.rows)} of {self.steps} steps.")
         if not self.ended:
-            self._seeds.append(seed)
+            self.seeds.append(seed)
         return self.env.reset(seed=seed)
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
@@ -207,7 +195,11 @@ def play_wrapped(
         raise InvalidInputError(f"wrap: expected an episode that has no seed but the reset seed, got {seeds}.")
     env, recorder = policy.environment(scenario)
     seen, _ = env.reset(seed=seeds.seed)
-    recorder.check(seeds.seed)
+    if recorder.seeds != [seeds.seed] or recorder.rows:
+        raise InvalidInputError(
+            f"wrap: expected reset(seed={seeds.seed}) to reach the environment once and no step to be made, got resets "
+            f"with the seeds {recorder.seeds} and {len(recorder.rows)} steps."
+        )
     state, times, over = None, [], False
     while not (recorder.ended or over):
         begin = time.perf_counter_ns()

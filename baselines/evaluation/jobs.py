@@ -236,10 +236,13 @@ class _Episodes(NamedTuple):
     length: int = 1
 
 
-def _drawn(scenario: Scenario, seeds: Iterable[int], noise_seeds: int, length: int = 1) -> tuple[Seeds, ...]:
-    """All seeds of the episodes of reset seeds; each is played once if there is no noise."""
+def _drawn(
+    scenario: Scenario, seeds: Iterable[int], noise_seeds: int, test_set: str | None = None, length: int = 1
+) -> _Episodes:
+    """The episodes of reset seeds; each is played once if there is no noise."""
     times = noise_seeds if scenario.plant.noisy else 1
-    return tuple(Seeds(seed, seed // length if length > 1 else None, noise) for seed in seeds for noise in range(times))
+    every = (Seeds(seed, seed // length if length > 1 else None, noise) for seed in seeds for noise in range(times))
+    return _Episodes(scenario, tuple(every), test_set, length)
 
 
 def _episodes(options: Options) -> list[_Episodes]:
@@ -253,23 +256,18 @@ def _episodes(options: Options) -> list[_Episodes]:
                 "scenarios, episodes, split, steps or noise_seeds."
             )
         sets = [known_sets.get(name) for name in options.test_sets]
-        return [
-            _Episodes(
-                one.scenario,
-                _drawn(one.scenario, one.seeds, one.noise_seeds, one.sequence),
-                one.digest,
-                one.sequence,
-            )
-            for one in sets
-        ]
+        return [_drawn(one.scenario, one.seeds, one.noise_seeds, one.digest, one.sequence) for one in sets]
     reset = scenario_registry.seeds(options.split, options.episodes)
-    out = []
-    for scenario in listed:
-        # A scenario that is the same at every reset is played once.
-        seeds = reset if scenario.random or scenario.plant.random else (0,)
-        length = known_sets.sequence(scenario.name)
-        out.append(_Episodes(scenario, _drawn(scenario, seeds, options.noise_seeds, length), None, length))
-    return out
+    return [
+        _drawn(
+            scenario,
+            # A scenario that is the same at every reset is played once.
+            reset if scenario.random or scenario.plant.random else (0,),
+            options.noise_seeds,
+            length=known_sets.sequence(scenario.name),
+        )
+        for scenario in listed
+    ]
 
 
 def _with_ideal(played: Sequence[_Episodes]) -> Iterator[_Episodes]:
@@ -281,8 +279,7 @@ def _with_ideal(played: Sequence[_Episodes]) -> Iterator[_Episodes]:
         plain = ideal(one.scenario)
         if (content := fingerprint(plain)) not in there:
             name = names.setdefault(content, f"{one.scenario.name}, ideal plant")
-            alone = plain.replace(name=name)
-            yield _Episodes(alone, _drawn(alone, dict.fromkeys(seeds.seed for seeds in one.seeds), 1))
+            yield _drawn(plain.replace(name=name), dict.fromkeys(seeds.seed for seeds in one.seeds), 1)
 
 
 def _scenarios(given: str | Scenario | Iterable[str | Scenario], steps: int | None) -> list[Scenario]:

@@ -12,8 +12,7 @@ from baselines import registry
 from baselines.episodes import Policy, Seeds
 from baselines.evaluation.foreign import Predictor, Wrap
 from baselines.evaluation.specification import (
-    ForeignSpecification,
-    InstanceSpecification,
+    ObjectSpecification,
     SolverSpecification,
     Specification,
     shown_preview,
@@ -54,11 +53,11 @@ def specifications(given: AnyPolicy | Iterable[AnyPolicy], *, wrap: Wrap | None 
             out.append(specification(item, wrap=wrap))
         elif id(item) not in objects:
             found = specification(item, wrap=wrap)
-            if isinstance(found, ForeignSpecification):
+            if isinstance(found, ObjectSpecification) and found.foreign:
                 found = dataclasses.replace(found, name=_unique(found.name, (one.name for one in out)))
             objects[id(item)] = found
             out.append(found)
-    if wrap is not None and not any(isinstance(one, ForeignSpecification) for one in out):
+    if wrap is not None and not any(isinstance(one, ObjectSpecification) and one.foreign for one in out):
         raise InvalidInputError("wrap: expected a policy that uses it; a SolverPolicy plays without wrappers.")
     return out
 
@@ -66,9 +65,9 @@ def specifications(given: AnyPolicy | Iterable[AnyPolicy], *, wrap: Wrap | None 
 def specification(item: AnyPolicy, *, wrap: Wrap | None = None) -> Specification:
     """One policy, see :func:`specifications`."""
     if isinstance(item, SolverPolicy):
-        return InstanceSpecification(registry.name_of(type(item)), item)
+        return ObjectSpecification(registry.name_of(type(item)), item, {})
     if _is_object(item):
-        return ForeignSpecification(type(item).__name__, item, {}, wrap)
+        return ObjectSpecification(type(item).__name__, item, {}, wrap)
     if isinstance(item, type):
         return _of_class(item, {}, wrap)
     if isinstance(item, tuple) and len(item) == 2 and isinstance(item[0], type) and isinstance(item[1], Mapping):
@@ -78,7 +77,7 @@ def specification(item: AnyPolicy, *, wrap: Wrap | None = None) -> Specification
         content = registry.load(place)
         if isinstance(content, type) and issubclass(content, SolverPolicy):
             return _of_class(registry.resolve(place), parameters, wrap)
-        return ForeignSpecification(place, place, parameters, wrap)
+        return ObjectSpecification(place, place, parameters, wrap)
     if not isinstance(item, (str, tuple)):
         raise InvalidInputError(
             "policy: expected a name, 'package.module:Class', a class, or an object with the predict of "
@@ -129,7 +128,7 @@ def _of_class(kind: type[Any], parameters: Mapping[str, Any], wrap: Wrap | None)
         return SolverSpecification(name, kind, dict(parameters))
     if not callable(getattr(kind, "predict", None)):
         raise InvalidInputError(f"policy: expected a class with the predict of Stable-Baselines3, got {kind!r}.")
-    return ForeignSpecification(registry.place_of(kind), kind, dict(parameters), wrap)
+    return ObjectSpecification(registry.place_of(kind), kind, dict(parameters), wrap)
 
 
 def _registered(name: str) -> Specification:

@@ -118,41 +118,13 @@ class SolverSpecification(Specification):
         return {name: getattr(seeds, name) for name, needed in drawn.items() if needed and name in names}
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class InstanceSpecification(Specification):
-    """A policy that is already bound to a scenario.
-
-    Args:
-        name: The name of the policy in rows.
-        policy: The policy.
-    """
-
-    policy: SolverPolicy
-
-    def bind(self, scenario: Scenario, given: Mapping[str, Any], preview: Preview | None) -> SolverPolicy:
-        """The policy itself."""
-        del scenario, given, preview
-        return self.policy
-
-    def unsuited(self, scenario: Scenario, seeds: Seeds, preview: Preview | None) -> str | None:
-        """See :meth:`Specification.unsuited`."""
-        del seeds, preview
-        if self.policy.reference and scenario.random:
-            return f"{self.name} has privileged information on one episode: give its name instead of an instance."
-        mine, there = self.policy.problem, Problem.of(scenario)
-        for field in dataclasses.fields(Problem):
-            if not same(getattr(mine, field.name), getattr(there, field.name)):
-                return f"{self.name} was made for a scenario with another {field.name}."
-        return None
-
-
 class _RefusedError(InvalidInputError):
     """A class or factory refuses the scenario."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class ForeignSpecification(Specification):
-    """An object with the `predict` of Stable-Baselines3, or a class or factory of such objects.
+class ObjectSpecification(Specification):
+    """A policy that is bound to a scenario, an object with the `predict` of Stable-Baselines3, or a factory of either.
 
     Args:
         name: The name of the policy in rows.
@@ -167,8 +139,13 @@ class ForeignSpecification(Specification):
 
     @property
     def identifiable(self) -> bool:
-        """Whether it is a class or an import path; two objects of one class may differ."""
-        return isinstance(self.model, (str, type))
+        """Whether it is a class, an import path or a solver; two objects of one class may differ."""
+        return isinstance(self.model, (str, type, SolverPolicy))
+
+    @property
+    def foreign(self) -> bool:
+        """Whether it may be a policy of others, which plays in wrappers."""
+        return not isinstance(self.model, SolverPolicy)
 
     def bind(self, scenario: Scenario, given: Mapping[str, Any], preview: Preview | None) -> Policy:
         """See :meth:`Specification.bind`.
@@ -181,7 +158,7 @@ class ForeignSpecification(Specification):
         if isinstance(model, type) or not callable(getattr(model, "predict", None)):
             model = self._call(model, scenario)
         if isinstance(model, SolverPolicy):
-            if reason := InstanceSpecification(self.name, model).unsuited(scenario, Seeds(0), preview):
+            if reason := _misfit(self.name, model, scenario):
                 raise _RefusedError(reason)
             return model
         if not callable(getattr(model, "predict", None)):
@@ -226,6 +203,17 @@ class ForeignSpecification(Specification):
         except InvalidInputError as e:
             raise InvalidInputError(f"Policy {self.name!r}: {e}") from None
         return tuple(own) if isinstance(own, list) else cast(Preview, own)
+
+
+def _misfit(name: str, policy: SolverPolicy, scenario: Scenario) -> str | None:
+    """The reason why a bound policy does not suit a scenario; None if it does."""
+    if policy.reference and scenario.random:
+        return f"{name} has privileged information on one episode: give its name instead of an instance."
+    mine, there = policy.problem, Problem.of(scenario)
+    for field in dataclasses.fields(Problem):
+        if not same(getattr(mine, field.name), getattr(there, field.name)):
+            return f"{name} was made for a scenario with another {field.name}."
+    return None
 
 
 def shown_preview(policy: Policy, preview: Preview | None) -> Preview:

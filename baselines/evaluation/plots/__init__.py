@@ -54,6 +54,8 @@ def draw(results: Results, *, progress: bool = False) -> dict[str, Pictures]:
 def _figures(results: Results, scenario: str, summaries: Sequence[Summary]) -> Iterator[tuple[str, str, str, Figure]]:
     """Groups, file names, captions and figures of one scenario."""
     lines = records([row for summary in summaries for row in summary.rows])
+    references = {one.label: f"{one.label} *" for one in summaries if one.reference}
+    lines = [{**line, "policy": references.get(line["policy"], line["policy"])} for line in lines]
     if any(line["time_p99_us"] is not None for line in lines):
         caption = f"Cost against the 99th percentile of the time per step in {scenario}"
         yield OVERVIEW, "cost-time", caption, comparison.cost_time(lines, scenario)

@@ -48,25 +48,30 @@ def _timed(line: Record) -> bool:
 def cost_time(lines: Sequence[Record], title: str) -> Figure:
     """Excess cost against the 99th percentile of the time per call, with intervals and the Pareto front.
 
+    All policies have a name in the legend if there are colours enough; else those of the front.
+
     Args:
         lines: Lines of one scenario.
         title: Stands above the plot.
     """
     drawn = style.figure(4.6)
     axes = drawn.subplots()
-    best = front(lines)
-    for line in lines:
-        if line not in best and _timed(line):
+    timed, best = [line for line in lines if _timed(line)], front(lines)
+    named = timed if len(timed) <= len(style.COLOURS) else best
+    for line in timed:
+        if line not in named:
             _interval(axes, float(line["time_p99_us"]), line, color=style.STEEL, marker="o", ms=3.5, lw=0.8)
     times, excess = [float(line["time_p99_us"]) for line in best], [_excess(line["cost_ratio"]) for line in best]
     axes.step(times, excess, where="post", color=style.MIST, lw=3.0, zorder=1)
     points = []
-    for place, (time, line) in enumerate(zip(times, best, strict=True)):
+    for place, line in enumerate(named):
         look = {"color": style.looks(place)["color"], "marker": "osD^v"[place % 5]}
-        points.append(_interval(axes, time, line, ms=7.0, lw=1.2, ls="", **look))
+        points.append(_interval(axes, float(line["time_p99_us"]), line, ms=7.0, lw=1.2, ls="", **look))
     _logarithmic(axes)
     style.dress(axes, xlabel="time of a call, 99th percentile [µs]", ylabel="cost above the reference [%]")
-    style.legend(drawn, f"{title}: cost against time, and the Pareto front", points, [str(o["policy"]) for o in best])
+    style.legend(
+        drawn, f"{title}: cost against time, and the Pareto front", points, [str(one["policy"]) for one in named]
+    )
     return drawn
 
 

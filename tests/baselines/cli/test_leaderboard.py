@@ -14,13 +14,16 @@ def lines_of(file):
 
 
 def test_leaderboard_plays_and_resumes(tmp_path, capsys):
-    words = ["--scenarios", "varga7-fast", "--policies", "dls", "broyden", "--out", str(tmp_path), "--timed", "1"]
+    policies = ["dls", "broyden", "agent_alone"]
+    words = ["--scenarios", "zhang3-helix", "--policies", *policies, "--out", str(tmp_path), "--timed", "1"]
     assert leaderboard.main(words) == 0
     printed = capsys.readouterr().out
+    assert "skipped: agent_alone in zhang3-helix: " in printed
+    assert printed.endswith(f"written to {tmp_path}\n")
     lines = lines_of(tmp_path / "table.csv")
     assert [line["policy"] for line in lines] == ["dls", "broyden"]
     assert all(f"`{line['policy']}`" in printed for line in lines)
-    assert {"table.md", "cost-time-varga7-fast.png", "foresight.png", "results.json", "report.html"} <= {
+    assert {"table.md", "cost-time-zhang3-helix.png", "foresight.png", "results.json", "report.html"} <= {
         file.name for file in tmp_path.iterdir()
     }
     assert leaderboard.main(words) == 2

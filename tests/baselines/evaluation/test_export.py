@@ -7,7 +7,6 @@ import json
 import re
 
 import numpy as np
-import pytest
 
 import baselines
 import ikgym
@@ -113,11 +112,10 @@ def test_joint_trajectory_is_a_whole_message(tmp_path):
     assert (tmp_path / "again.json").read_text(encoding="utf-8") == text
 
 
-@pytest.mark.parametrize("workers", [1, pytest.param(2, marks=pytest.mark.slow)])
-def test_every_episode_in_every_format_and_from_workers(tmp_path, workers):
+def test_every_episode_in_every_format(tmp_path):
     rows = evaluate(
         "varga7-random", ["dls", "dls:damping=1e-2"], episodes=2, steps=STEPS, out=tmp_path, export=list(FORMATS),
-        plots=False, workers=workers,
+        plots=False,
     )  # fmt: skip
     found = files(tmp_path)
     assert len(found) == len(rows) * len(FORMATS) == 8
