@@ -227,7 +227,7 @@ class RedundantIKEnv(gym.Env[Any, Any]):
             "velocity_cost": velocity,
             "position_error": position,
         }
-        # A NaN differs from itself, and Gymnasium's checker insists on equal infos: what does not exist is left out.
+        # A NaN differs from itself, and Gymnasium's checker compares infos: an error that does not exist is left out.
         if self._has_orientation:
             info["orientation_error"] = orientation
         info["clipped"] = clipped > 0.0

@@ -20,7 +20,7 @@ class InvalidInputError(IkgymError, ValueError):
 
 
 class UnknownNameError(IkgymError, LookupError):
-    """A name is in no registry; the message lists what there is and the nearest match."""
+    """A name is in no registry; the message lists the available names and the nearest match."""
 
     def __init__(self, kind: str, name: object, available: Iterable[str]) -> None:
         self.kind, self.name, self.available = kind, name, tuple(available)

@@ -8,18 +8,18 @@ from pathlib import Path
 from ikgym.exceptions import InvalidInputError
 
 GIB = 2**30
-# What takes less, in bytes, is never asked about.
+# Less than this, in bytes, is not checked.
 SMALL = 2**28
 # Files of Linux: the memory available to all, and the limit and the use of a control group.
 SYSTEM = Path("/proc/meminfo")
 GROUP = (Path("/sys/fs/cgroup/memory.max"), Path("/sys/fs/cgroup/memory.current"))
 
 
-def afford(what: str, needed: int) -> None:
+def check_memory(name: str, needed: int) -> None:
     """Checks that there is memory for something.
 
     Args:
-        what: Its name, with which the message begins.
+        name: Its name, with which the message begins.
         needed: About how much it takes, in bytes.
 
     Raises:
@@ -30,8 +30,7 @@ def afford(what: str, needed: int) -> None:
     left = available()
     if left is not None and needed > left:
         raise InvalidInputError(
-            f"{what}: expected what fits into memory, got what takes about {gib(needed)}, where {gib(left)} are "
-            "available."
+            f"{name}: expected to fit into memory, but take about {gib(needed)}, and {gib(left)} are available."
         )
 
 
@@ -43,7 +42,7 @@ def of_rows(rows: int, shown: int, frames: int) -> int:
         shown: Numbers that a row shows after a step.
         frames: Numbers in the nominal frames of all rows.
     """
-    # What is shown has copies: state, actions, bounds of the spaces. A row's generator takes the rest.
+    # Observations have copies: state, actions, bounds of the spaces. A row's generator takes the rest.
     return rows * (5 * 8 * shown + 1500) + 8 * frames
 
 

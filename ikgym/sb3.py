@@ -54,7 +54,7 @@ class RedundantIKVecEnv(VecEnv):
 
     Args:
         num_envs: N.
-        scenario: A scenario or what names one, see `ikgym.scenarios.find`.
+        scenario: A scenario or its name, see `ikgym.scenarios.find`.
         preview: How many steps ahead the nominal coordinates are shown, or which ones.
         commands: How many of the last commands are shown.
 
@@ -222,7 +222,7 @@ class LearningVecEnv(RedundantIKVecEnv):
 
     Args:
         num_envs: N.
-        scenario: A scenario or what names one, see `ikgym.scenarios.find`.
+        scenario: A scenario or its name, see `ikgym.scenarios.find`.
         learning: The parameters of the wrappers.
 
     Raises:
@@ -242,7 +242,7 @@ def make_vec(scenario: str | Scenario, num_envs: int = 1, **changes: Any) -> Lea
     >>> model = PPO("MlpPolicy", make_vec("panda-random", 8))
 
     Args:
-        scenario: A scenario or what names one, see `ikgym.scenarios.find`.
+        scenario: A scenario or its name, see `ikgym.scenarios.find`.
         num_envs: N.
         changes: Fields of :class:`ikgym.rl.Learning` with other values than the default.
 

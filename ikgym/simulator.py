@@ -1,4 +1,4 @@
-"""N episodes of one scenario side by side: what both environments and the evaluation run on."""
+"""N episodes of one scenario side by side: the core of both environments and of the evaluation."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ikgym.kernels.compilation import announced
 from ikgym.kernels.outcome import OBSERVED, Outcome, more_size, observation, outcome, size
 from ikgym.kernels.outcome import Observation as Observation
 from ikgym.kernels.simulation import Constants, State
-from ikgym.memory import afford, of_rows
+from ikgym.memory import check_memory, of_rows
 from ikgym.parallel import in_chunks
 from ikgym.plant import step as plant_step
 from ikgym.plant.rows import PlantRows, checked_arm_seeds
@@ -42,7 +42,7 @@ class Simulator:
         rows: N, or None for one arm whose actions have no row axis.
         preview: How many steps ahead the nominal coordinates are shown: an int p shows 1 … p, a sequence just
             those.
-        memory: What the nominal frames of all rows may take, in bytes. Those of random episodes that would take
+        memory: Most memory for the nominal frames of all rows, in bytes. Those of random episodes that would take
             more are computed block by block on the way; a block is never shorter than the preview looks ahead.
         commands: How many of the last commands are shown.
 
@@ -68,7 +68,7 @@ class Simulator:
         if not ideal:
             shown += more_size(joints, coordinates, commands)
         kept = 0 if ideal else PlantRows.size(scenario.plant, joints, coordinates, commands)
-        afford(f"{rows} environments", of_rows(rows, shown, math.prod(self._nominal.shape) + rows * kept))
+        check_memory(f"{rows} environments", of_rows(rows, shown, math.prod(self._nominal.shape) + rows * kept))
         self._shared = Constants(
             kind=scenario.task.kind,
             dt=scenario.dt,
@@ -93,7 +93,7 @@ class Simulator:
         self._shape = (rows, joints, coordinates, len(self.preview), None if ideal else commands)
         self._count, usual = rows * shown, rows * size(joints, coordinates, len(self.preview))
         self._told, self._held = slice(usual - 8, usual - 3), slice(usual - 3, usual)
-        # Where what is seen of the only arm is in the block: what always is, and what sometimes is, with its shape.
+        # Places in the block of the parts of an observation: those always there, and the others with their shapes.
         seen = observation(self._outcome(np.arange(self._count, dtype=np.float64)), 0)
         places = {key: slice(int(part.flat[0]), int(part.flat[-1]) + 1) for key, part in seen.items()}
         self._parts, self._nominal_shape = [places[key] for key in OBSERVED], seen["nominal"].shape
@@ -125,10 +125,10 @@ class Simulator:
         Args:
             active: The rows to reset. Shape (N,).
             generators: One a row; each draws its row's trajectory and plant.
-            starts: What :meth:`checked_starts` gave; the scenario's own starts if left out. Shape (N, n).
-            arm_seeds: What :meth:`checked_arm_seeds` gave, one a row; arms are drawn with their episodes if left out.
+            starts: Result of :meth:`checked_starts`; the scenario's own starts if left out. Shape (N, n).
+            arm_seeds: Result of :meth:`checked_arm_seeds`; arms are drawn with their episodes if left out.
             noise_seeds: Which noise of drives and sensors, one a row; 0 is that of the generator, as if left out.
-            steps: What :meth:`checked_steps` gave: episodes are entered after so many steps. Shape (N,).
+            steps: Result of :meth:`checked_steps`: episodes are entered after so many steps. Shape (N,).
         """
         scenario, state = self.scenario, self._state
         rows = np.flatnonzero(active)
@@ -152,11 +152,11 @@ class Simulator:
             self._enter(entered, [shared[row] for row in entered.tolist()], steps[entered], starts)
 
     def checked_starts(self, q: npt.ArrayLike | None) -> FloatArray | None:
-        """Starts that a user asks for, see :func:`ikgym.scenarios.entering.checked_starts`."""
+        """Starts chosen by the user, see :func:`ikgym.scenarios.entering.checked_starts`."""
         return checked_starts(q, self.rows, self.scenario)
 
     def checked_arm_seeds(self, given: Any) -> list[int | None] | None:
-        """Seeds of arms that a user asks for, see :func:`ikgym.plant.rows.checked_arm_seeds`."""
+        """Seeds of arms chosen by the user, see :func:`ikgym.plant.rows.checked_arm_seeds`."""
         return checked_arm_seeds(given, self.rows, self.scenario.plant, self.scenario.name)
 
     def checked_steps(self, given: Any) -> npt.NDArray[np.int64] | None:
@@ -164,7 +164,7 @@ class Simulator:
         return checked_steps(given, self.rows, self.scenario)
 
     def observe(self, active: npt.NDArray[np.bool_] | None = None, out: Outcome | None = None) -> Outcome:
-        """What the arms show before a step.
+        """The outcome before a step.
 
         Args:
             active: The rows to observe, all if left out. Shape (N,).
@@ -204,7 +204,7 @@ class Simulator:
         """:meth:`step` of the only arm, in less time.
 
         Returns:
-            What a policy sees, without a row axis; costs, errors and whether the action was clipped; joints held back.
+            The observation, without a row axis; costs, errors and whether the action was clipped; joints held back.
         """
         self._accept(action, self._all)
         numbers = np.empty(self._count)
@@ -289,7 +289,7 @@ class Simulator:
         )
 
     def _taken_apart(self) -> tuple[Any, ...]:
-        """What never changes, in parts as :func:`simulation.step` takes it, or in tuples for that of a plant."""
+        """The constant arguments of a step: single arrays for :func:`simulation.step`, tuples for that of a plant."""
         plant, cost = self._plant, self.scenario.cost.parameters
         if plant is not None:
             return self._shared, cost, plant.drives, plant.sensors, plant.arms, self._state, plant.state

@@ -45,7 +45,7 @@ class RedundantIKVectorEnv(
     axis of N. Over whole episodes all of it is bit-identical to Gymnasium's `SyncVectorEnv`, in every autoreset
     mode, with seeds seed + i.
 
-    | `autoreset_mode` | what happens to a row whose episode has ended |
+    | `autoreset_mode` | effect on a row whose episode has ended |
     |---|---|
     | `NEXT_STEP` | the next step resets it: its action is ignored, its reward is 0, it has no info |
     | `SAME_STEP` | it is reset at once: the last observation and info are in `final_obs` and `final_info` |

@@ -63,22 +63,14 @@ def count_paintings(monkeypatch):
     return painted
 
 
-#: One scenario an arm, and one with held points; one of each other path, as its name ends, is in the slow run.
+#: One scenario an arm, and one with held points.
 ONE_AN_ARM = {
     *("varga7-fast", "varga7-random", "faitli3-regular", "khan8-q1", "khan8-q7q8", "planar2-bent", "zhang3-helix"),
     *("zhang6-lspb", "panda-circle", "tiago-raster", "iiwa14-random"),
 }
-PATHS = {name.partition("-")[2]: name for name in ikgym.scenarios.names()}
-PATHS |= {name.partition("-")[2]: name for name in ONE_AN_ARM}
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        *sorted(ONE_AN_ARM),
-        *(pytest.param(name, marks=pytest.mark.slow) for name in sorted({*PATHS.values()} - ONE_AN_ARM)),
-    ],
-)
+@pytest.mark.parametrize("name", sorted(ONE_AN_ARM))
 def test_every_arm_and_path_gives_a_picture_of_the_same_even_size(name):
     env = environment(name)
     for _ in range(2):

@@ -59,7 +59,7 @@ def random_scenarios():
     }
 
 
-@pytest.mark.parametrize("preview", [1, 4, (2, 13), (1, 59), (1, 200)])
+@pytest.mark.parametrize("preview", [1, (2, 13), (1, 200)])
 @pytest.mark.parametrize("name", random_scenarios())
 def test_blocks_of_nominal_frames_are_the_whole_table_bit_for_bit(name, preview):
     """Rows begin new episodes at different times, so that they stand in different blocks."""

@@ -241,7 +241,7 @@ class Arm(Frozen):
         """Refuses joint coordinates outside the limits.
 
         Args:
-            name: What the coordinates are called in messages.
+            name: Name of the coordinates in messages.
             q: Joint coordinates in [rad] or [m]. Shape (..., n).
 
         Raises:

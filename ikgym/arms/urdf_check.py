@@ -1,4 +1,4 @@
-"""What is checked of a URDF file before Pinocchio sees any of it: the XML, the tree of links, the numbers."""
+"""Checks of a URDF file before Pinocchio reads it: the XML, the tree of links, the numbers."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class UrdfJoint(NamedTuple):
     """A joint of the chain, its numbers checked.
 
     Attributes:
-        name: What the file calls it.
+        name: Its name in the file.
         kind: One of ``READABLE``.
         xyz: Where the joint is in the frame of the joint before, in [m]. Three numbers.
         rpy: Roll, pitch and yaw of its frame in [rad]. Three numbers.
@@ -81,7 +81,7 @@ def read_chain(data: bytes, base: str | None, tip: str | None) -> tuple[str, lis
     path = tree.path(base, tip)
     if without := [_label(joint) for joint in path if joint.get("type") in BOUNDED and joint.find("limit") is None]:
         raise InvalidInputError(
-            f"{', '.join(without)}: expected a <limit>, got none; what turns without end is of type 'continuous'."
+            f"{', '.join(without)}: expected a <limit>, got none; an endless joint is of type 'continuous'."
         )
     joints = [_joint(element) for element in path]
     if not any(joint.kind in MOVING for joint in joints):

@@ -1,4 +1,4 @@
-"""The plant: what of a real arm, its drives and its sensors differs from the data sheet, and what is drawn of it."""
+"""The plant: deviations of arm, drives and sensors from the data sheet, and their random draws."""
 
 from __future__ import annotations
 

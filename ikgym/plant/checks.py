@@ -1,4 +1,4 @@
-"""Checks of what a plant is made of."""
+"""Checks of the fields of a plant."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def joint_numbers(name: str, value: Any, *, signed: bool = False) -> PerJoint:
     """One number for all joints, or one a joint.
 
     Args:
-        name: What it is called in messages.
+        name: Name in messages.
         value: The number or numbers.
         signed: Whether they may be negative.
 

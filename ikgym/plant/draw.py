@@ -1,4 +1,4 @@
-"""What an episode draws of the plant."""
+"""Draws of a plant, once an episode."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Draws:
     """Draws plants of many episodes.
 
     Args:
-        plant: What is drawn from.
+        plant: The plant.
         arm: The arm of the data sheet.
     """
 
@@ -73,9 +73,9 @@ class Draws:
         """Draws the arms of some rows.
 
         Args:
-            keys: One a row that is drawn. Shape (k,).
-            rows: Which rows they are. Shape (k,).
-            out: Receives them.
+            keys: One a row. Shape (k,).
+            rows: The numbers of the rows. Shape (k,).
+            out: Receives the arms.
         """
         draw_arms(self._spread, keys, rows, out)
 
@@ -99,12 +99,12 @@ class Draws:
 
 
 def episode_key(plant: Plant, generator: np.random.Generator) -> int:
-    """What an episode's plant is drawn by; nothing is asked of the generator where the plant is ideal."""
+    """The key from which an episode's plant is drawn; an ideal plant does not touch the generator."""
     return 0 if plant.ideal else int(generator.integers(2**63, dtype=np.uint64))
 
 
 def arm_key(arm_seed: Any) -> int:
-    """What an arm is drawn by that is kept.
+    """The key from which an arm is drawn that is kept.
 
     Raises:
         InvalidInputError: The seed is no whole number of at least 0.

@@ -1,4 +1,4 @@
-"""What of the arm that moves differs from the arm in the data sheet: its kinematics, its drives, its sensors."""
+"""The plant: deviations of the arm, its drives and its sensors from the data sheet."""
 
 from __future__ import annotations
 
@@ -16,52 +16,51 @@ from ikgym.plant import checks, severity
 from ikgym.plant.checks import Drawn, PerJoint
 from ikgym.validation import LARGEST, FloatArray, Frozen, number, per_joint, shortened, whole_number
 
-#: What is one number for all joints, or one a joint; and which of them may be negative.
+#: Fields with one number for all joints, or one a joint; and those of them that may be negative.
 JOINT_WISE = ("zero", "payload", "backlash", "bias", "noise", "q_noise")
 SIGNED = ("payload", "bias")
-#: What is one number of at least 0.
+#: Fields with one number of at least 0.
 SCALARS = ("link", "axis", "pose_noise", "pose_rotation_noise")
-#: Steps by which something comes late, as far as they are not drawn.
+#: Delays of measurements, in steps.
 DELAYS = ("q_delay", "pose_delay")
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class Plant(Frozen):
-    """The plant as it is: kinematics, drives and sensors that are not those of the data sheet. All off by default.
+    """Deviations of kinematics, drives and sensors from the data sheet. All are off by default.
 
-    What is drawn is drawn once an episode, but for the noises and for missing poses, which are drawn at each step. Each
-    effect has a stream of random numbers of its own, so that switching one on shifts no other; normal numbers are cut
-    at 6 standard deviations. Of the values that :meth:`ikgym.Scenario.drawn_plant` gives, policies see what sensors
-    show, and nothing else.
+    Noises and missing poses are drawn at each step, all other random values once an episode. Each effect has its own
+    stream of random numbers, so that switching one on shifts no other; normal numbers are cut at 6 standard deviations.
+    Policies see the measurements, never the values of :meth:`ikgym.Scenario.drawn_plant`.
 
     *Kinematics.* Drawn anew each episode, or kept by the reset option `arm_seed`. The arm keeps the limits of
-    `scenario.arm`, and solvers go on to know `scenario.model`. Where the scenario gives no start, the arm is jogged to
-    it: episodes begin where the arm that moves has the pose that the one in the data sheet would begin with.
+    `scenario.arm`; solvers still use `scenario.model`. Unless the scenario gives a start, an episode begins at the
+    posture in which the moving arm has the pose that the arm of the data sheet would begin with.
 
-    *Drives.* In a step, in this order: delay of the command, velocity limit, acceleration limit, lag, bias and noise,
+    *Drives.* Order within a step: delay of the command, velocity limit, acceleration limit, lag, bias and noise,
     backlash, stop. The backlash lies between drive and joint: the drive turns within it before the joint follows. It
-    begins in the middle. Encoders and stops are on the joint's side of it.
+    begins in the middle. Encoders and stops are on the side of the joint.
 
     *Sensors.* The first measurement is made at rest before the episode: it is there from the start, and never missing.
-    A camera that measures every E-th step does so at the steps 0, E, 2 E, …; what is observed is the newest measurement
-    that has arrived. Noise belongs to the measurement, and stays with it as long as it is shown.
+    A camera that measures every E-th step does so at the steps 0, E, 2 E, …; the newest measurement that has arrived is
+    observed. Noise belongs to the measurement, and stays with it as long as it is shown.
 
     Args:
         zero: Standard deviation of the joints' zeros, in [rad] or [m]. A number, or one a joint.
         link: Standard deviation of each of the three parts of each offset from joint to joint, and of the tool point,
             in [m].
         axis: Standard deviation by which each joint's axis is tilted, in each of two directions, in [rad].
-        payload: What is added to the joints' zeros from `payload_step` on, in [rad] or [m]. A number, or one a joint.
+        payload: Shift of the joints' zeros from `payload_step` on, in [rad] or [m]. A number, or one a joint.
         payload_step: Steps made when the payload is taken up; one after the end of the episode is never reached.
-        arms: Arms one of which moves in place of `scenario.arm`, drawn each episode; their limits are not used. What
-            the standard deviations above say comes on top.
-        bandwidth: Bandwidth f of a first-order velocity loop, in [Hz]: of what is missing to the velocity that is asked
-            for, a step makes up for 1 − exp(−2π f Δt). A number, inf for none, or a range (low, high) that episodes
-            draw from evenly.
-        command_delay: Steps after which a command reaches the drive, which is told to stand before. A whole number, or
-            a range (low, high) that episodes draw from evenly, both ends included.
+        arms: Arms one of which moves in place of `scenario.arm`, drawn each episode; their limits are not used. The
+            deviations above are added to it.
+        bandwidth: Bandwidth f of a first-order velocity loop, in [Hz]: a step closes the share 1 − exp(−2π f Δt) of the
+            gap to the commanded velocity. A number, inf for none, or a range (low, high) from which episodes draw
+            uniformly.
+        command_delay: Steps after which a command reaches the drive, which stands still before. A whole number, or a
+            range (low, high) from which episodes draw uniformly, both ends included.
         backlash: Width of the backlash in [rad] or [m]. A number, or one a joint.
-        bias: A constant that is added to the joint velocity, in [rad/s] or [m/s]. A number, or one a joint.
+        bias: Constant part of the joint velocity, in [rad/s] or [m/s]. A number, or one a joint.
         noise: Bound of a uniform random part of the joint velocity, drawn anew at each step, in [rad/s] or [m/s]. A
             number, or one a joint.
         q_noise: Standard deviation of the measured joint coordinates, in [rad] or [m]. A number, or one a joint.
@@ -116,7 +115,7 @@ class Plant(Frozen):
         return f"Plant({', '.join(f'{name}={value!r}' for name, value in values.items())})"
 
     def switched_on(self) -> dict[str, Any]:
-        """The fields that are not as they are by default, and their values."""
+        """The fields that differ from their defaults, and their values."""
         values = {field.name: (getattr(self, field.name), field.default) for field in dataclasses.fields(self)}
         return {name: value for name, (value, default) in values.items() if value != default}
 
@@ -124,14 +123,13 @@ class Plant(Frozen):
         """The plant at other severities: 0 is ideal, 1 the plant itself.
 
         Args:
-            knowledge: Of calibration, payload and sensors: deviations, noises and the share of lost measurements are
-                so many times as large, and delays and the steps from one measurement to the next so many times as long,
-                rounded to whole steps.
-            drives: Of the drives: time constants, delays, backlash, bias and noise; as the knowledge if left out.
+            knowledge: Factor of deviations, noises and the share of lost measurements, and, rounded to whole steps, of
+                the delays of sensors and of the steps from one measurement to the next.
+            drives: Factor of the time constants, delays, backlash, bias and noise of drives; by default the same.
 
         Raises:
-            InvalidInputError: A severity is below 0 or too large, or the plant has arms of its own, which are no matter
-                of degree.
+            InvalidInputError: A severity is below 0 or too large, or the plant has arms of its own, which cannot be
+                scaled.
         """
         if self.arms:
             raise InvalidInputError(f"scaled: expected a plant without arms of its own, got {self}.")
@@ -141,14 +139,14 @@ class Plant(Frozen):
         return self.replace(**severity.knowledge(values, known), **severity.drives(values, driven))
 
     def check(self, arm: Arm, steps: int) -> None:
-        """Insists that the plant suits an arm and an episode.
+        """Checks that the plant suits an arm and an episode.
 
         Args:
             arm: The arm of the data sheet.
             steps: Steps of an episode.
 
         Raises:
-            InvalidInputError: Numbers of joints differ, or something comes later than the episode ends.
+            InvalidInputError: Numbers of joints differ, or a delay is longer than the episode.
         """
         for name in JOINT_WISE:
             per_joint(name, getattr(self, name), arm.joints)
@@ -165,13 +163,10 @@ class Plant(Frozen):
                 )
 
     def check_draws_arm(self, name: str) -> None:
-        """Insists that there is something that a seed of the arm could keep.
-
-        Args:
-            name: Of the scenario.
+        """Checks that the plant draws an arm or drives, which a seed of the arm can keep; takes the scenario's name.
 
         Raises:
-            InvalidInputError: Neither the arm nor its drives are drawn.
+            InvalidInputError: It draws neither.
         """
         if not self.draws_arm:
             raise InvalidInputError(
@@ -181,27 +176,18 @@ class Plant(Frozen):
 
     @property
     def ideal(self) -> bool:
-        """Whether nothing is switched on."""
-        return not (self.moves_otherwise or self.measures_otherwise)
-
-    @property
-    def moves_otherwise(self) -> bool:
-        """Whether the arm or its drives are not those of the data sheet."""
-        return self._perturbs_arm or self._on("backlash", "bias", "noise") or self._driven_late
-
-    @property
-    def measures_otherwise(self) -> bool:
-        """Whether sensors are noisy, slow or late."""
-        return self._on("q_noise", "pose_noise", "pose_rotation_noise") or self.late
+        """Whether all effects are off."""
+        driven = self.bandwidth != math.inf or self.longest_command_delay > 0
+        return not (self.arms or driven or self.late or self._on(*JOINT_WISE, *SCALARS))
 
     @property
     def late(self) -> bool:
-        """Whether what is observed may be of an earlier step."""
+        """Whether observations may belong to an earlier step."""
         return self._on("q_delay", "pose_delay", "pose_missing") or self.pose_every > 1
 
     @property
     def other_arm(self) -> bool:
-        """Whether the arm that moves is not that of the data sheet, a payload aside."""
+        """Whether the moving arm differs from the data sheet, payload aside."""
         return self._on("zero", "link", "axis") or bool(self.arms)
 
     @property
@@ -212,7 +198,7 @@ class Plant(Frozen):
 
     @property
     def random(self) -> bool:
-        """Whether anything is drawn, of an episode or of a step."""
+        """Whether anything is drawn, once an episode or at each step."""
         return self.draws_arm or self.noisy
 
     @property
@@ -226,7 +212,7 @@ class Plant(Frozen):
         return int(np.max(self.command_delay))
 
     def reach(self, arm: Arm, travel: FloatArray) -> float:
-        """A radius around the base that the tool point of no drawn arm leaves, in [m].
+        """A radius around the base, in [m], that no drawn arm's tool point leaves.
 
         Args:
             arm: The arm of the data sheet.
@@ -238,14 +224,6 @@ class Plant(Frozen):
 
     def _on(self, *names: str) -> bool:
         return any(np.any(getattr(self, name)) for name in names)
-
-    @property
-    def _perturbs_arm(self) -> bool:
-        return self.other_arm or self._on("payload")
-
-    @property
-    def _driven_late(self) -> bool:
-        return self.bandwidth != math.inf or self.longest_command_delay > 0
 
 
 def _arms(given: Any) -> tuple[Arm, ...]:

@@ -26,16 +26,16 @@ Generators = Sequence[np.random.Generator] | Mapping[int, np.random.Generator]
 
 
 def checked_arm_seeds(given: Any, rows: int, plant: Plant, name: str) -> list[int | None] | None:
-    """Seeds of arms that a user asks for.
+    """Seeds of arms, chosen by the user.
 
     Args:
         given: A whole number for all rows, or one a row, where None stands for an arm that is drawn with the episode.
         rows: N.
-        plant: What arms are drawn from.
-        name: Of the scenario.
+        plant: The plant of the scenario.
+        name: Name of the scenario.
 
     Returns:
-        One a row, or None where nothing is asked for.
+        One a row, or None if none is given.
 
     Raises:
         InvalidInputError: They are no such numbers, not one a row, or the plant draws no arm that could be kept.
@@ -49,15 +49,15 @@ def checked_arm_seeds(given: Any, rows: int, plant: Plant, name: str) -> list[in
 
 
 class PlantRows:
-    """What the plants of N arms are and remember, as kernels take it.
+    """Parameters and state of the plants of N arms, as kernels take them.
 
     Args:
-        plant: What their plants are drawn from.
+        plant: The plant of the scenario.
         arm: The arm of the data sheet.
         dt: Δt in [s].
         rows: N.
         coordinates: m, of the task.
-        commands: h, how many of the last commands are shown.
+        commands: h, the number of past commands shown.
     """
 
     def __init__(self, plant: Plant, arm: Arm, dt: float, rows: int, coordinates: int, commands: int) -> None:
@@ -113,10 +113,10 @@ class PlantRows:
         """Draws the plants of new episodes.
 
         Args:
-            rows: Which rows begin one. Shape (k,).
+            rows: The rows that begin one. Shape (k,).
             generators: One a row.
             arm_seeds: One a row: the seed of the arm that it keeps, None for an arm that is drawn with the episode.
-            noise_seeds: One a row: which noise there is, of drives and sensors; 0 is that of the episode.
+            noise_seeds: One a row, for the noise of drives and sensors; 0 is the noise of the episode.
         """
         keys = [episode_key(self._plant, generators[row]) for row in rows.tolist()]
         given = [None if arm_seeds is None else arm_seeds[row] for row in rows.tolist()]
@@ -140,12 +140,12 @@ class PlantRows:
             yield Chain(offsets, axes, self.drives.prismatic, tool, tool_rotation)
 
     def settle(self, rows: npt.NDArray[np.int64], qdot: FloatArray, steps: npt.NDArray[np.int64]) -> None:
-        """Has rows remember nothing but their first measurement and a velocity, as after a long time of both.
+        """Fills the histories of rows with their first measurement and a velocity, as after a long time of both.
 
         Args:
-            rows: Which rows, observed at their first step. Shape (k,).
+            rows: The rows, observed at their first step. Shape (k,).
             qdot: In [rad/s] or [m/s]. Shape (k, n).
-            steps: When this is, in steps. Shape (k,).
+            steps: Steps of the episodes made by then. Shape (k,).
         """
         state = self.state
         for ring in (state.q, state.pose):

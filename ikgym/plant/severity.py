@@ -1,4 +1,4 @@
-"""A plant that is more or less imperfect than another one."""
+"""Plants at other severities."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-#: What grows in proportion: what solvers do not know of the arm and its sensors, and what the drives do.
+#: Fields that grow in proportion: deviations and noises of arm and sensors, and those of the drives.
 KNOWLEDGE = ("zero", "link", "axis", "payload", "q_noise", "pose_noise", "pose_rotation_noise", "pose_missing")
 DRIVES = ("backlash", "bias", "noise")
 

@@ -15,7 +15,7 @@ from ikgym.validation import BoolArray, FloatArray, number, shortened, whole_num
 
 
 class Stage:
-    """What one wrapper changes. This base changes nothing; each hook is overridden where needed.
+    """The work of one wrapper. This base changes nothing; each hook is overridden where needed.
 
     Attributes:
         observation_space: Space of one row's observation, None where it is that of the environment.

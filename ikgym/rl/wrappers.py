@@ -21,7 +21,7 @@ class ArmWrapper(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
     Args:
         env: The environment.
         stage: The work of the wrapper.
-        parameters: What the stage was made with, recorded in the environment's `spec`.
+        parameters: The parameters of the stage, recorded in the environment's `spec`.
     """
 
     def __init__(self, env: gym.Env[Any, Any], stage: Stage, **parameters: Any) -> None:

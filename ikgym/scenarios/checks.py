@@ -11,7 +11,7 @@ from ikgym.arms import Arm
 from ikgym.cost import TrackingCost
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels import tasks as task_kernels
-from ikgym.memory import afford, gib
+from ikgym.memory import check_memory, gib
 from ikgym.plant import Plant
 from ikgym.tasks import Task
 from ikgym.trajectories import Trajectory
@@ -72,13 +72,13 @@ def bytes_of(points: int, joints: int) -> int:
     return 8 * points * (joints + 3 * 12)
 
 
-def afford_points(points: int, joints: int) -> None:
+def check_memory_of_points(points: int, joints: int) -> None:
     """Checks that there is memory for the nominal points of an episode.
 
     Raises:
         InvalidInputError: There is not; the message says how much it takes and how much is available.
     """
-    afford(f"An episode with {points} nominal points", bytes_of(points, joints))
+    check_memory(f"The {points} nominal points of an episode", bytes_of(points, joints))
 
 
 def largest_step_cost(task: Task, cost: TrackingCost, velocity_limit: FloatArray, distance: float) -> float:

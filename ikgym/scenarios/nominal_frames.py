@@ -14,7 +14,7 @@ from ikgym.validation import FloatArray
 
 Integers = npt.NDArray[np.int64]
 
-# What the nominal frames of all rows may take, in bytes: of many long episodes only what is near is kept.
+# Most memory for the nominal frames of all rows, in bytes: of many long episodes only the next frames are kept.
 MEMORY = 2**26
 # Rows worth a thread of their own: below, handing over costs more than it saves.
 GRAIN = 4
@@ -26,10 +26,10 @@ class NominalFrames:
     """The frames that N episodes need soon; where the scenario is fixed they share one table.
 
     Args:
-        scenario: What is tracked.
+        scenario: The scenario.
         rows: N.
         ahead: Steps ahead that are shown, rising.
-        memory: What the frames of all rows may take, in bytes. Those of random episodes that would take more are
+        memory: Most memory for the frames of all rows, in bytes. Those of random episodes that would take more are
             computed block by block on the way; a block is never shorter than the preview looks ahead.
     """
 
@@ -64,7 +64,7 @@ class NominalFrames:
         """Begins new episodes of a random scenario.
 
         Args:
-            tables: What :meth:`allocate` gave.
+            tables: Result of :meth:`allocate`.
             rows: Which rows begin one. Shape (k,).
             episodes: Their trajectories.
             steps: Steps after which they are entered. Shape (k,).

@@ -95,8 +95,8 @@ class Reference:
             InvalidInputError: There is no memory for so many.
         """
         last = self.steps + furthest(preview)
-        checks.afford_points(last + 1, self.model.joints)
-        # What is held for longer than the episode is held to its end.
+        checks.check_memory_of_points(last + 1, self.model.joints)
+        # Points that are held for longer than the episode are held to its end.
         *first, usual = (min(held, last + 1) for held in self._held())
         ends = np.cumsum(first, dtype=np.int64)
         rest = (last - (int(ends[-1]) if len(ends) else 0)) // usual + 1

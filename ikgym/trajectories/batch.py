@@ -23,7 +23,7 @@ def frames_of(trajectories: Sequence[Trajectory], times: FloatArray, model: Arm)
         model: The arm through whose kinematics a joint path is mapped.
 
     Returns:
-        Bit for bit what :meth:`Trajectory.frames` gives row by row. Shape (k, t, 12) or (k, t, 3).
+        The results of :meth:`Trajectory.frames` row by row, bit for bit. Shape (k, t, 12) or (k, t, 3).
     """
     path = _paths(trajectories, times)
     if path is not None:

@@ -10,7 +10,7 @@ from ikgym.exceptions import InvalidInputError
 from ikgym.trajectories.trajectory import Trajectory
 from ikgym.validation import LARGEST, SMALLEST, FloatArray, frozen_array, number
 
-# A bound is this much wider than what it bounds, for rounding.
+# Relative slack of bounds, for rounding.
 SLACK = 1e-12
 
 

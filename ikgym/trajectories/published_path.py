@@ -20,8 +20,8 @@ from ikgym.validation import LARGEST, SMALLEST, FloatArray, number, shortened
 class PublishedPath(Trajectory):
     """Through the waypoints of a problem of :mod:`ikgym.problems`, one a period, as :class:`TimedWaypoints` do it.
 
-    The waypoints are met at multiples of the period; what lies between them, and that the path begins and ends at
-    rest, is not published. Episodes begin at the first published start where there is one.
+    The waypoints are met at multiples of the period; the motion between them, and the rest at both ends, are not
+    published. Episodes begin at the first published start where there is one.
 
     Args:
         problem: Its name.
@@ -41,7 +41,7 @@ class PublishedPath(Trajectory):
 
     @property
     def waypoints(self) -> problems.Waypoints:
-        """What the path leads through."""
+        """The waypoints of the problem."""
         return problems.waypoints(self.problem)
 
     def frames(self, times: FloatArray, model: Arm) -> FloatArray:
@@ -68,7 +68,7 @@ class RandomPublishedPath(Trajectory):
     """One of the problems whose names begin with a text, each as likely, as a :class:`PublishedPath`.
 
     Args:
-        family: What the names begin with. All these problems have starts.
+        family: The beginning of the names. All these problems have starts.
         period: From waypoint to waypoint, in [s].
 
     Raises:

@@ -22,7 +22,7 @@ TINY = 1e-12
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class RandomJointSpline(Trajectory):
-    """A distribution over :class:`JointSpline` that keep limits: what is drawn can be followed exactly.
+    """A distribution over :class:`JointSpline` that keep limits: each draw can be followed exactly.
 
     Each joint starts uniformly within its range, makes random moves from control point to control point, and these are
     scaled down until position, velocity and acceleration are within the limits, by a margin. So the draw itself is the
@@ -37,7 +37,7 @@ class RandomJointSpline(Trajectory):
         duration: From rest to rest, in [s].
         spans: Pieces of the spline; more of them make a livelier and a slower motion.
         margin: The share of every limit that is not used, of positions at either end of half of the range.
-        scale: Each joint moves by U(scale) of what its limits allow.
+        scale: Each joint moves by the share U(scale) of the motion that its limits allow.
 
     Raises:
         InvalidInputError: A shape is wrong, a number out of its range, or a range the wrong way round.
@@ -127,7 +127,7 @@ class RandomJointSpline(Trajectory):
                 i = int(np.argmin(within))
                 raise InvalidInputError(
                     f"Trajectory: expected {name} of joint {i} within that of arm {model.name!r}, "
-                    f"{getattr(model, name)[i]:g}, so that what is drawn is feasible, got {getattr(self, name)[i]:g}."
+                    f"{getattr(model, name)[i]:g}, so that each draw is feasible, got {getattr(self, name)[i]:g}."
                 )
 
     def _controls(self, start: FloatArray, share: FloatArray, moves: FloatArray) -> FloatArray:

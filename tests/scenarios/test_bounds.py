@@ -75,12 +75,12 @@ def little(monkeypatch):
     monkeypatch.setattr(memory, "available", lambda: memory.GIB)
 
 
-NO_MEMORY = r"expected what fits into memory, got what takes about [\d,.]+ GiB, where 1\.0 GiB are available"
+NO_MEMORY = r"expected to fit into memory, but take about [\d,.]+ GiB, and 1\.0 GiB are available"
 
 
 @pytest.mark.usefixtures("little")
 def test_many_steps_need_memory():
-    with pytest.raises(InvalidInputError, match=f"An episode with 50000001 nominal points: {NO_MEMORY}"):
+    with pytest.raises(InvalidInputError, match=f"The 50000001 nominal points of an episode: {NO_MEMORY}"):
         FAST.replace(steps=50_000_000)
 
 
@@ -93,7 +93,7 @@ def test_many_steps_need_memory():
 @pytest.mark.usefixtures("little")
 def test_many_environments_need_memory(make, number):
     with pytest.raises(
-        InvalidInputError, match=f"{number} environments: expected what fits" if number < 10**400 else "fits"
+        InvalidInputError, match=f"{number} environments: expected to fit" if number < 10**400 else "to fit"
     ):
         make(number)
 

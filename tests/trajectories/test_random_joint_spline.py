@@ -34,8 +34,7 @@ def used(random, times):
     return positions, np.abs(velocities) / ARM.velocity_limit, np.abs(accelerations) / ARM.acceleration_limit
 
 
-@pytest.mark.parametrize("margin", [0.0, 0.1, 0.5])
-@pytest.mark.parametrize("spans", [3, 8, 15])
+@pytest.mark.parametrize(("margin", "spans"), [(0.0, 3), (0.0, 15), (0.1, 8), (0.5, 15)])
 def test_all_limits_are_kept_by_the_margin_and_used(margin, spans):
     random = RANDOM.replace(margin=margin, spans=spans, scale=(1.0, 1.0))
     times = np.arange(-5, int(random.duration / DT) + 5) * DT

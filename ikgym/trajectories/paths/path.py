@@ -1,4 +1,4 @@
-"""What all paths have in common."""
+"""The base class of paths."""
 
 from __future__ import annotations
 

@@ -87,7 +87,7 @@ class Polyline(Path):
 
     @functools.cached_property
     def _turns(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Lengths and directions of the sides; the angles of the corners and what an arc takes of either side."""
+        """Lengths and directions of the sides; angles of the corners, and the length of a side that an arc takes."""
         sides = np.diff(self.points, axis=0)
         lengths = np.linalg.norm(sides, axis=1)
         directions = sides / lengths[:, None]
