@@ -16,7 +16,7 @@ from ikgym.validation import FloatArray
 
 #: Poses of shape (N, 4, 4) in, postures of shape (N, n) out, NaN where there is none.
 Solve = Callable[[FloatArray], FloatArray]
-#: What counts as met, in [m] and in [rad]. All are asked for it by the measure that they have, none for less.
+#: Tolerance of a pose that is met, in [m] and in [rad]. Each solver gets it in its own measure, none a looser one.
 MET = 1e-5
 
 

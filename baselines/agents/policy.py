@@ -110,7 +110,7 @@ class Agent(LearnedPolicy):
     """An agent from a file, ``agent:FILE.safetensors``.
 
     Args:
-        problem: What the policy is told of the scenario.
+        problem: The part of the scenario that the policy knows.
         path: The file.
         hash: The first twelve digits of the agent's hash; another agent is refused. Results contain the actual ones.
         any_arm: Whether it may control an arm that it was not trained for.
@@ -143,7 +143,7 @@ class AgentAlone(LearnedPolicy):
     """Learned agent that comes with the package, trained on `varga7-random` by apg.
 
     Args:
-        problem: What the policy is told of the scenario.
+        problem: The part of the scenario that the policy knows.
         hash: The first twelve digits of its hash, which distinguishes its results from those of a successor.
 
     Raises:

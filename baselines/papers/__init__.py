@@ -2,18 +2,31 @@
 
 from __future__ import annotations
 
-from baselines.papers.faitli import PAPER as FAITLI
-from baselines.papers.khan import PAPER as KHAN
-from baselines.papers.paper import Paper
-from baselines.papers.varga import PAPER as VARGA
-from baselines.papers.zhang import PAPER as ZHANG
+from baselines.papers.faitli import claims as faitli_claims
+from baselines.papers.faitli.figures import FIGURES as FAITLI_FIGURES
+from baselines.papers.khan import claims as khan_claims
+from baselines.papers.khan.figures import FIGURES as KHAN_FIGURES
+from baselines.papers.paper import Paper, claims_of
+from baselines.papers.varga import claims as varga_claims
+from baselines.papers.varga.figures import FIGURES as VARGA_FIGURES
+from baselines.papers.zhang import claims as zhang_claims
+from baselines.papers.zhang.figures import FIGURES as ZHANG_FIGURES
 from ikgym.exceptions import UnknownNameError
 
-PAPERS: dict[str, Paper] = {paper.name: paper for paper in (VARGA, FAITLI, KHAN, ZHANG)}
+_TITLES = {
+    "varga": "Varga, Issa, Horváth, Tar 2021: receding horizon without Lagrange multipliers",
+    "faitli": "Faitli, Tar 2018: quasi-differential fixed-point transformation",
+    "khan": "Khan, Tar 2020: fixed-point iteration with abstract rotations",
+    "zhang": "Zhang 2020: inverse kinematics by Levenberg–Marquardt and model-free adaptive (predictive) control",
+}
+_CLAIMS = {"varga": varga_claims, "faitli": faitli_claims, "khan": khan_claims, "zhang": zhang_claims}
+_FIGURES = {"varga": VARGA_FIGURES, "faitli": FAITLI_FIGURES, "khan": KHAN_FIGURES, "zhang": ZHANG_FIGURES}
+
+PAPERS = {name: Paper(name, title, _FIGURES[name], claims_of(_CLAIMS[name])) for name, title in _TITLES.items()}
 
 
 def get(name: str) -> Paper:
-    """The paper of a name.
+    """The paper with a name.
 
     Raises:
         UnknownNameError: There is no such paper.

@@ -8,10 +8,10 @@ import numpy as np
 
 from ikgym.validation import FloatArray
 
-#: "More", "smaller", "degraded": apart by a tenth of the larger value. "Significantly", "considerably": one and a half
-#: times.
+#: "More", "smaller", "degraded": a difference of a tenth of the larger value. "Significantly", "considerably": a factor
+#: of one and a half.
 MORE, CONSIDERABLY = 1.0 / 0.9, 1.5
-#: Results are the same where they are apart by less than this share. It is also the width of a line in a plot: the
+#: Results are the same if they differ by less than this share. It is also the width of a line in a plot: the
 #: share of a path's extent below which an error is not visible.
 SAME = 0.01
 #: A yank is a joint velocity above this many times the median over time of the fastest joint's.
@@ -24,7 +24,7 @@ def larger(value: float, than: float, by: float = MORE) -> bool:
 
 
 def differ(one: float, other: float) -> bool:
-    """Whether two values are apart by a tenth of the larger one or more."""
+    """Whether two values differ by a tenth of the larger one or more."""
     return one != other and (larger(one, other) or larger(other, one))
 
 

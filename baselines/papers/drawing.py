@@ -1,4 +1,4 @@
-"""Pictures of panels in rows, as all figures of the papers are."""
+"""Figures of the papers: panels in rows."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Curve(NamedTuple):
     """A line.
 
     Attributes:
-        name: Stands in the legend; curves of the same name in a picture share colour and entry.
+        name: Its legend entry; curves of the same name in a figure share colour and entry.
         x: Abscissae. Shape (k,).
         y: Ordinates. Shape (k,).
         dashed: Whether the line is dashed, as nominal curves are.
@@ -35,11 +35,11 @@ class Panel(NamedTuple):
     """Curves over one pair of axes.
 
     Attributes:
-        ylabel: With the unit.
+        ylabel: Label of the ordinate, with the unit.
         curves: The curves.
-        xlabel: With the unit; the lowest panel has one at least.
+        xlabel: Label of the abscissa, with the unit; always shown in the lowest row.
         log: Whether the ordinate is logarithmic.
-        title: Stands above the panel.
+        title: The title of the panel.
     """
 
     ylabel: str
@@ -77,10 +77,10 @@ def picture(title: str, panels: Sequence[Panel], *, columns: int = 1, height: fl
     """Panels in rows, with one legend for all.
 
     Args:
-        title: Stands above.
+        title: The title of the figure.
         panels: From left to right, from top to bottom.
         columns: Panels in a row.
-        height: Of a row, in [in].
+        height: Height of a row in [in].
     """
     rows = -(-len(panels) // columns)
     drawn = style.figure(0.8 + height * rows)

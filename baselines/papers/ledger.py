@@ -1,4 +1,4 @@
-"""The ledger: what the papers claim and what their tests found, as a CSV file and as a table in Markdown."""
+"""The ledger: claims of the papers and findings of their tests, as a CSV file and as Markdown."""
 
 from __future__ import annotations
 

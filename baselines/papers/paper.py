@@ -101,7 +101,7 @@ class Claim:
         where: Its place in the paper, for example ``"section IV, fig. 6"``.
         method: How it is tested here, with the threshold.
         test: Tests it on episodes.
-        condition: Where the verdict depends: when it holds. Where it is not testable: why not.
+        condition: If the verdict depends: when the claim holds. If it is not testable: why not.
     """
 
     name: str

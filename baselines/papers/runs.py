@@ -16,7 +16,7 @@ from ikgym.scenarios import Scenario
 
 
 class Runs:
-    """Plays episodes when they are asked for, and keeps them.
+    """Plays episodes on demand, and keeps them.
 
     Args:
         steps: Most steps of an episode, for trials; the scenarios' own if left out.

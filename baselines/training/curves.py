@@ -17,8 +17,8 @@ from baselines.files import write
 from baselines.training.folder import read_run
 from ikgym.exceptions import IkgymError, InvalidInputError
 
-#: Ratios that span more than this are drawn on a logarithmic axis.
-FEW = 10.0
+#: Ratios that span a larger factor are drawn on a logarithmic axis.
+SPAN = 10.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -38,7 +38,7 @@ def curves(trainings: dict[str, pathlib.Path]) -> Figure:
         trainings: The folders of seeds by name.
 
     Raises:
-        TrainingError: A `run.json` cannot be read.
+        ResultsError: A `run.json` cannot be read.
         InvalidInputError: A folder has no runs.
     """
     drawn = style.figure(4.2)
@@ -54,36 +54,26 @@ def curves(trainings: dict[str, pathlib.Path]) -> Figure:
             (line,) = axes.plot(minutes, costs / costs[:1], lw=1.0, marker="o", ms=2.5, **style.looks(number))
         handles.append(line)
     shown = np.concatenate([line.get_ydata() for line in axes.lines])
-    if shown.size and shown.max() > FEW * shown.min():
+    if shown.size and shown.max() > SPAN * shown.min():
         axes.set_yscale("log")
-    style.dress(axes, ylabel="validation cost ÷ that at first", xlabel="core-minutes of training")
-    style.legend(drawn, "Training: a line a seed", handles, list(trainings))
+    style.dress(axes, ylabel="validation cost ÷ initial one", xlabel="core-minutes of training")
+    style.legend(drawn, "Training: one line per seed", handles, list(trainings))
     return drawn
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """The command line.
-
-    Args:
-        arguments: The arguments; those of the process if left out.
-
-    Returns:
-        The exit code: 0, or 2 after an error.
-    """
+    """The command line; the exit code is 0, or 2 after an error."""
     options = tyro.cli(
         Options,
         prog="python -m baselines.training.curves",
-        description="Draws training curves: the geometric mean of the costs on validation episodes over that of the "
-        "untrained agent.",
+        description="Plots the validation costs of trainings over those of the untrained agents.",
         args=arguments,
     )
+    pairs = [text.partition("=") for text in options.runs]
     try:
-        trainings = {}
-        for text in options.runs:
-            name, equals, folder = text.partition("=")
-            if not (name and equals and folder):
-                raise InvalidInputError(f"expected NAME=DIR, got {text!r}.")
-            trainings[name] = pathlib.Path(folder)
+        if wrong := [text for text, pair in zip(options.runs, pairs, strict=True) if not all(pair)]:
+            raise InvalidInputError(f"expected NAME=DIR, got {wrong[0]!r}.")
+        trainings = {name: pathlib.Path(folder) for name, _, folder in pairs}
         write(options.write, style.small_png(curves(trainings)))
     except IkgymError as e:
         print(f"error: {' '.join(str(e).split())}", file=sys.stderr)

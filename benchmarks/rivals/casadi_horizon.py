@@ -1,4 +1,4 @@
-"""The horizon problem for IPOPT, by way of CasADi: an independent optimiser of the very same cost."""
+"""The horizon problem for IPOPT, through CasADi: an independent optimiser of the same cost."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from benchmarks.rivals.numpy_horizon import Horizon, Plan, plan_cost
 from ikgym.exceptions import InvalidInputError
 from ikgym.validation import FloatArray
 
-#: Below a tolerance of 1e-10 IPOPT often cannot tell that it has arrived, and goes on until its iterations are spent;
+#: Below a tolerance of 1e-10 IPOPT often does not detect convergence, and uses up its iterations;
 #: scaled by the gradient it finds its way from a far start in a fraction of the iterations.
 OPTIONS: dict[str, Any] = {
     "print_time": False,
@@ -100,7 +100,7 @@ class CasadiHorizon:
         return casadi.nlpsol("horizon", "ipopt", nlp, {**OPTIONS, **self.options})
 
     def _room(self, start: Any, y: Any, h: Any, before: Any) -> list[Any]:
-        """What must not be negative within the limits; see :func:`numpy_horizon.beyond_limits`."""
+        """The slacks of the limits, which must not be negative; see :func:`numpy_horizon.beyond_limits`."""
         problem, arm, knots = self.problem, self.problem.model, self.knots
         out, fastest, here = [], casadi.DM(problem.largest_qdot), casadi.SX.zeros(arm.joints)
         for k in range(knots):

@@ -1,4 +1,4 @@
-"""The arm, its task coordinates and their error once more, in symbols of CasADi."""
+"""The arm, its task coordinates and their error as symbols of CasADi."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def forward(arm: Arm, q: Any) -> tuple[Any, Any]:
 
 
 def error(task: str, nominal: Any, rotation: Any, position: Any) -> Any:
-    """What is missing from a pose to its nominal task coordinates.
+    """The error of a pose with respect to nominal task coordinates.
 
     Args:
         task: The name of the task coordinates.

@@ -1,4 +1,4 @@
-"""The horizon problem in plain NumPy: the number by which all plans are compared, whoever made them.
+"""The horizon problem in plain NumPy: one cost function for the plans of all solvers.
 
 Over knots 1 … K behind a start q_0, with lengths h_k in steps and weights w_k, a plan q_1 … q_K costs
 ``Σ_k h_k Φ^U((q_k - q_{k-1}) / (h_k Δt)) + w_k Φ^X(error(X^N_k, F(q_k)))``; the horizon of HL grid points of
@@ -60,7 +60,7 @@ class Horizon:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Plan:
-    """What a solver answers.
+    """The result of a solver.
 
     Args:
         q: Joint coordinates at the knots, in [rad] or [m]. Shape (K, n).
@@ -95,7 +95,7 @@ def plan_cost(problem: Problem, horizon: Horizon, q: FloatArray) -> float:
 
 
 def beyond_limits(problem: Problem, horizon: Horizon, q: FloatArray, braking: bool = False) -> dict[str, float]:
-    """By how much a plan leaves the limits of the model, at most; below 0 where it keeps them.
+    """The largest violation of the limits of the model by a plan; below 0 within the limits.
 
     Args:
         problem: Arm, task, cost and Δt.
@@ -141,7 +141,7 @@ def coordinates(task: str, rotation: FloatArray, position: FloatArray) -> FloatA
 
 
 def error(task: str, nominal: FloatArray, here: FloatArray) -> FloatArray:
-    """What is missing to the nominal coordinates. Shape (e,)."""
+    """The error with respect to the nominal coordinates. Shape (e,)."""
     if task == "axis":
         return np.concatenate([nominal[3:] - here[3:], _direction_error(nominal[:3], here[:3])])
     if task != "pose":

@@ -60,7 +60,7 @@ class RecurrentPolicy(Corrected):
     gain). It was trained on randomly drawn plants.
 
     Args:
-        problem: What the policy is told of the scenario.
+        problem: The part of the scenario that the policy knows.
         path: The file of the agent; the one that comes with the package if left out.
         any_arm: Whether it may control an arm that it was not trained for.
         hash: The first twelve digits of the agent's hash; another agent is refused. Results contain the actual ones.

@@ -32,7 +32,7 @@ def solved(runs: Runs, name: str | Scenario = STRETCHED, **parameters: Any) -> E
 
 
 def past_shoulder(runs: Runs, distance: float) -> Scenario:
-    """A straight line at 0.9 m/s past the shoulder axis, with a velocity limit that no solver should meet.
+    """A straight line at 0.9 m/s past the shoulder axis, with a velocity limit above the needs of all solvers.
 
     The tool is at rest at both ends, and the elbow stays bent.
 
@@ -55,7 +55,7 @@ def past_shoulder(runs: Runs, distance: float) -> Scenario:
 
 
 def singular_places(runs: Runs) -> tuple[Scenario, ...]:
-    """Where yanks are looked for: both trajectories with singular points, and the lines past the shoulder axis."""
+    """The trajectories on which yanks may occur: both with singular points, and the lines past the shoulder axis."""
     return *map(runs.scenario, (STRETCHED, SHOULDER)), *(past_shoulder(runs, d) for d in DISTANCES)
 
 
@@ -77,7 +77,7 @@ def jacobians(scenario: Scenario, q: FloatArray) -> FloatArray:
 
 
 def singular_values(jacobian: FloatArray) -> FloatArray:
-    """From the largest to the smallest, in [m]. Shape (k, 3)."""
+    """Singular values from the largest to the smallest, in [m]. Shape (k, 3)."""
     return np.asarray(np.linalg.svd(jacobian, compute_uv=False), dtype=np.float64)
 
 

@@ -54,7 +54,7 @@ class Points(NamedTuple):
     diagnostics: dict[str, FloatArray]
 
     def settled(self, values: FloatArray) -> FloatArray:
-        """Values from 1 s on, when the initial error is gone; all of them in a shorter trial."""
+        """Values from 1 s on, after the initial error has vanished; all values in a shorter trial."""
         late = values[self.time > 1.0]
         return late if len(late) else values
 

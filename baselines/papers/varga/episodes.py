@@ -40,7 +40,7 @@ def slow(runs: Runs) -> Episode:
 
 
 def smooth(runs: Runs) -> Episode:
-    """The fast trajectory with second-order smoothing behind the method."""
+    """The fast trajectory with second-order smoothing after the method."""
     return runs.play(FAST, "smoothed", policy=METHOD)
 
 
@@ -60,7 +60,7 @@ def at_limit(episode: Episode) -> float:
 
 
 def without_start(qdot: FloatArray) -> FloatArray:
-    """Joint velocities without the first twentieth, whose jump from rest would outweigh the rest."""
+    """Joint velocities without the first twentieth, whose jump from rest would dominate."""
     return qdot[len(qdot) // 20 :]
 
 

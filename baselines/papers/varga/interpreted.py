@@ -1,4 +1,4 @@
-"""The printed descent once more, interpreted: with 4 × 4 matrices in NumPy, one forward difference after another.
+"""The printed descent, interpreted: with 4 × 4 matrices in NumPy, one forward difference after another.
 
 For times only, beside those of compiled kernels; the results are those of ``rhc_gradient``.
 """
@@ -45,7 +45,7 @@ def _cost(scenario: Scenario, q: FloatArray, nominal: FloatArray, qdot: FloatArr
 
 
 def descend(scenario: Scenario, q: FloatArray, nominal: FloatArray, steps: int) -> FloatArray:
-    """So many steps of the descent of section IV from rest, without its stop test.
+    """Some steps of the descent of section IV from rest, without its stop test.
 
     Args:
         scenario: With task ``skew``.

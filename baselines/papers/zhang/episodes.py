@@ -46,18 +46,18 @@ def iterative(runs: Runs, **numbers: Any) -> Episode:
 
 
 def settled_from(episode: Episode) -> int:
-    """The sample from which the transient is over, in a short trial the middle."""
+    """The first sample after the transient; in a short trial the middle one."""
     return min(SETTLED, len(episode.q) // 2)
 
 
 def _joints(scenario: Scenario, episode: Episode) -> FloatArray:
-    """q(0), q(1), …: where the arm stood before each sample's input, then at the end. Shape (steps + 1, n)."""
+    """q(0), q(1), …: the joint coordinates before each input, and at the end. Shape (steps + 1, n)."""
     start = np.zeros(scenario.joints) if scenario.start is None else scenario.start
     return np.vstack([start, episode.q])
 
 
 def outputs(scenario: Scenario, episode: Episode) -> FloatArray:
-    """y(1), y(2), …: what was measured. Shape (steps + 1, m)."""
+    """y(1), y(2), …: the measured outputs. Shape (steps + 1, m)."""
     first = scenario.initial_pose
     if first is None:
         first = scenario.task.coordinates(*scenario.arm.forward(_joints(scenario, episode)[0]))
@@ -65,12 +65,12 @@ def outputs(scenario: Scenario, episode: Episode) -> FloatArray:
 
 
 def jacobians_used(scenario: Scenario, episode: Episode) -> FloatArray:
-    """J(1), J(2), …: what the controller used. Shape (steps, 3, n)."""
+    """J(1), J(2), …: the Jacobians that the controller used. Shape (steps, 3, n)."""
     return np.asarray(scenario.model.jacobian(_joints(scenario, episode)[:-1])[:, :3])
 
 
 def lambdas_used(episode: Episode) -> FloatArray:
-    """λ(1), λ(2), … of example 1, as the controller used them; what it kept is for the next sample. Shape (steps,)."""
+    """λ(1), λ(2), … of example 1, as the controller used them; its memory holds the next one. Shape (steps,)."""
     return np.concatenate([[HelixPredictiveControl.damping], episode.diagnostics["lambda"][:-1]])
 
 
@@ -80,7 +80,7 @@ def of_link(runs: Runs, scenario: str, share: float) -> float:
 
 
 def ramp_errors(runs: Runs, velocity: float, damping: float, horizon: int = 1) -> tuple[FloatArray, FloatArray]:
-    """The error that is left on a straight ramp of example 1's arm, and the same by eq. 10, both in [m].
+    """The static error on a straight ramp of example 1's arm, measured and by eq. 10, in [m].
 
     Args:
         runs: Plays the episode.
@@ -127,7 +127,7 @@ def along_the_helix(runs: Runs, policy: str, ahead: int, *, hold: bool = False, 
 
 
 def unmet_of_the_way(runs: Runs) -> float:
-    """The largest error of example 2's horizon that (40) leaves unmet, as a share of the way of the period ahead."""
+    """The largest error of example 2's horizon that (40) leaves unmet, as a share of the next distance."""
     scenario, episode = runs.scenario(LINE), iterative(runs)
     policy = make("mfapc_line", scenario)
     nominal, later = scenario.nominal(preview=policy.preview), np.arange(2, len(episode.q) + 1)

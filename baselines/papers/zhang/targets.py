@@ -1,4 +1,4 @@
-"""Zhang 2020: targets of the inverse kinematics, at random, at singular points and at rest, and solvers' ways there."""
+"""Zhang 2020: random, singular and resting targets of the inverse kinematics, and the iterates of solvers."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ TARGETS: dict[str, tuple[str, float, int | None]] = {
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Targets:
-    """Targets of the inverse kinematics, and where to start.
+    """Targets of the inverse kinematics, and initial guesses.
 
     Args:
         scenario: The scenario of the arm and the task.
@@ -115,7 +115,7 @@ def iterates(targets: Targets, **parameters: object) -> list[Iterate]:
 
 
 def sugihara(targets: Targets, damping: float) -> list[FloatArray]:
-    """Levenberg and Marquardt as [1] has them, in joint space: (Jᵀ J + λ I) Δq = Jᵀ e with λ = ½ ‖e‖² + a constant."""
+    """Levenberg–Marquardt iteration of [1], in joint space: (Jᵀ J + λ I) Δq = Jᵀ e with λ = ½ ‖e‖² + a constant."""
     path, eye = [targets.q], np.eye(targets.q.shape[1])
     for _ in range(ITERATIONS):
         q, error = path[-1], targets.error(path[-1])
@@ -143,7 +143,7 @@ def _regular(arm: Arm, rows: int, shift: float) -> tuple[FloatArray, FloatArray]
 
 
 def at_rest(runs: Runs, share: float, shift: float, *, links: float = 1.0) -> tuple[FloatArray, FloatArray]:
-    """How `mfac` with `one_step` goes to 200 targets at rest, with example 1's arm.
+    """The response of `mfac` with `one_step` to 200 targets at rest, with example 1's arm.
 
     Args:
         runs: Says how many targets.

@@ -48,7 +48,7 @@ class Gradient(NamedTuple):
     output: Floats
 
 
-class Place(NamedTuple):
+class Kinematics(NamedTuple):
     """The kinematics of the arm at one configuration, with Jacobians of the error there.
 
     Attributes:
@@ -90,7 +90,7 @@ def adjoint(task, rows, output, path, by_cost, gradient, start, stop):
     turned, w, of_twist = is_turned(kind, prismatic), twist_size(kind), error_kind(kind)
     size = 5 if kind == task_kernels.AXIS else w
     pose, task_jacobian, jacobian = np.empty(m), np.empty((max(e, 6), n)), np.empty((max(e, 6), n))
-    place = Place(np.empty((3, 3)), np.empty(3), pose, np.empty((6, n)), task_jacobian, jacobian)
+    place = Kinematics(np.empty((3, 3)), np.empty(3), pose, np.empty((6, n)), task_jacobian, jacobian)
     error, by_error, due, by_due = np.empty(max(e, 6)), np.empty(max(e, 6)), np.empty(w), np.empty(w)
     for row in range(start, stop):
         lambda_, mu, into = by_q[row], by_qdot[row], by_output[row]
@@ -112,10 +112,10 @@ def adjoint(task, rows, output, path, by_cost, gradient, start, stop):
                 turn(axis, -q[0], due)
             by_due[:] = 0.0
             for j in range(n):
-                asked = commanded(output[row], j, due, speed[row], dt)
+                command = commanded(output[row], j, due, speed[row], dt)
                 move, by = (last[j], q[j], reached[j]), (lambda_[j], mu[j])
-                by_asked, lambda_[j], mu[j] = unlimited(limits, velocity_limit, j, asked, move, by, dt)
-                through_law(output[row], j, by_asked, due, speed[row], dt, into, by_due)
+                by_command, lambda_[j], mu[j] = unlimited(limits, velocity_limit, j, command, move, by, dt)
+                through_law(output[row], j, by_command, due, speed[row], dt, into, by_due)
             if turned:
                 lambda_[0] += turn_gradient(axis, due, by_due)
                 turn(axis, q[0], by_due)
@@ -126,7 +126,7 @@ def adjoint(task, rows, output, path, by_cost, gradient, start, stop):
 
 @uncounted
 def look(chain, kind, q, place):
-    """Fills a :class:`Place` at some joint coordinates of shape (n,)."""
+    """Fills a :class:`Kinematics` at some joint coordinates of shape (n,)."""
     forward_and_jacobian(chain, q, place.rotation, place.position, place.geometric)
     task_kernels.coordinates(kind, place.rotation, place.position, place.pose)
 
@@ -138,7 +138,7 @@ def through_error(kind, target, place, error, by_error, lambda_):
     Args:
         kind: Of task coordinates.
         target: Reference task coordinates. Shape (m,).
-        place: A :class:`Place`.
+        place: A :class:`Kinematics`.
         error: Of the task. Shape (e,).
         by_error: The gradient with respect to it. Shape (e,).
         lambda_: That with respect to the joint coordinates. Shape (n,).
@@ -153,36 +153,36 @@ def through_error(kind, target, place, error, by_error, lambda_):
 
 
 @inlined
-def through_law(output, j, by_asked, due, speed, dt, into, by_due):
+def through_law(output, j, by_command, due, speed, dt, into, by_due):
     """Adds the gradient through the command of a joint to those with respect to (G, h) and the twist that is due.
 
     Args:
         output: (G, h). Shape (n (w + 1),).
         j: The joint.
-        by_asked: The gradient with respect to its command.
+        by_command: The gradient with respect to its command.
         due: The twist. Shape (w,).
         speed: s.
         dt: Δt in [s].
         into: The gradient with respect to (G, h). Shape (n (w + 1),).
         by_due: The gradient with respect to the twist. Shape (w,).
     """
-    w, scaled = due.shape[0], by_asked / dt
+    w, scaled = due.shape[0], by_command / dt
     own = j * (w + 1)
     for a in range(w):
         into[own + a] += scaled * due[a]
         by_due[a] += scaled * output[own + a]
-    into[own + w] += by_asked * speed
+    into[own + w] += by_command * speed
 
 
 @inlined
-def unlimited(limits, velocity_limit, j, asked, move, by, dt):
+def unlimited(limits, velocity_limit, j, command, move, by, dt):
     """Propagates the gradients of joint ``j`` back through the limits of :func:`ikgym.kernels.simulation.step`.
 
     Args:
         limits: Shape (4, n), or (0, n).
         velocity_limit: Shape (n,).
         j: The joint.
-        asked: The command in [rad/s] or [m/s].
+        command: The command in [rad/s] or [m/s].
         move: The velocity applied in the step before; the coordinate before this step in [rad] or [m], and after it.
         by: The gradients with respect to the coordinate after the step, and to the velocity applied in it.
         dt: Δt in [s].
@@ -192,10 +192,10 @@ def unlimited(limits, velocity_limit, j, asked, move, by, dt):
     """
     last, here, reached = move
     lambda_, mu = by
-    by_last, passes = 0.0, abs(asked) <= velocity_limit[j]
+    by_last, passes = 0.0, abs(command) <= velocity_limit[j]
     if limits.shape[0] == 0:
         return (dt * lambda_ + mu if passes else 0.0), lambda_, by_last
-    allowed = within(asked, velocity_limit[j])
+    allowed = within(command, velocity_limit[j])
     passes = passes and abs(allowed) <= limits[FASTEST, j]
     allowed = within(allowed, limits[FASTEST, j])
     accelerates = abs(allowed - last) <= limits[CHANGE, j]

@@ -16,21 +16,16 @@ from ikgym.validation import FloatArray
 
 Indices = npt.NDArray[np.int64]
 
-#: Steps between those that the mean cost of the reference joint path is taken from.
+#: Interval, in steps, at which the mean cost of the reference joint path is sampled.
 EVERY = 16
 #: Added to that mean, which is 0 for an arm at rest.
 LEAST = 1e-3
 
 
 def spread_steps(scenario: Scenario, rows: int) -> Indices:
-    """Steps at which arms enter their episodes, so that an update sees all parts of one.
+    """Steps at which N arms enter their episodes, so that an update sees all parts of one. Shape (N,).
 
-    Args:
-        scenario: The scenario. Where it has no reference joint path, episodes begin at step 0.
-        rows: N.
-
-    Returns:
-        Shape (N,).
+    Without a reference joint path, all episodes begin at step 0.
     """
     if scenario.nominal_joint_path(scenarios.SPLITS["train"].start) is None:
         return np.zeros(rows, dtype=np.int64)
@@ -52,7 +47,7 @@ class Arms:
         self._counted = np.append(scenario.counted(), np.zeros(offsets[-1], dtype=np.bool_))
         self._every = np.arange(rows)[:, None]
         self._nominal = np.empty((rows, scenario.steps + offsets[-1] + 1, m))
-        # Where the reference joint path is; NaN where there is none.
+        # The reference joint path; NaN without one.
         self._path = np.full((rows, scenario.steps + 1, n), np.nan)
         self.q, self.qdot = torch.zeros(rows, n, dtype=torch.float64), torch.zeros(rows, n, dtype=torch.float64)
         self.seed, self.made = np.zeros((2, rows), dtype=np.int64)
@@ -60,7 +55,7 @@ class Arms:
 
     @property
     def ended(self) -> npt.NDArray[np.bool_]:
-        """Whose episode is over. Shape (N,)."""
+        """Whether each episode is over. Shape (N,)."""
         return self.made >= self._scenario.steps
 
     @property
@@ -75,23 +70,13 @@ class Arms:
         return out
 
     def rows(self, steps: int, speed: FloatArray) -> Rows:
-        """The input of a segment.
-
-        Args:
-            steps: K.
-            speed: s of each arm. Shape (N,).
-        """
+        """The input of a segment of K steps, with the speed s of each arm, of shape (N,)."""
         at = self.made[:, None] + np.arange(1, steps + 1)
         left = np.minimum(self._scenario.steps - self.made, steps)
         return Rows(self._nominal[self._every, at], self._counted[at], left, speed)
 
     def advance(self, steps: Indices, cost: Tensor) -> None:
-        """Adds up steps and costs of a segment.
-
-        Args:
-            steps: Steps of each arm. Shape (N,).
-            cost: Cost of each arm. Shape (N,).
-        """
+        """Adds the steps and the cost of each arm in a segment. Shapes (N,)."""
         self.made += steps
         self.played += steps
         self.spent += cost.detach().numpy()
@@ -111,7 +96,7 @@ class Arms:
         return cost * torch.from_numpy((self.played + prior) / (self.spent + prior * self.usual))
 
     def begin(self, rows: Indices, generator: np.random.Generator, at: Indices | None = None) -> None:
-        """Begins new episodes of the split `train`, or enters them where their reference joint path is then.
+        """Begins new episodes of the split `train`, or enters them on their reference joint path after some steps.
 
         Args:
             rows: Which arms. Shape (R,).
@@ -128,16 +113,16 @@ class Arms:
         self.begin(rows, generator, spread_steps(self._scenario, len(rows)))
 
     def give_up(self, rows: Indices) -> None:
-        """Puts arms that are lost back on their reference joint paths, or to the starts where there are none."""
+        """Puts lost arms back on their reference joint paths, or to the start if there is none."""
         self._put(rows, np.where(self._follows[rows], self.made[rows], 0))
 
     def state(self) -> dict[str, Any]:
-        """Where they are."""
+        """The state of all arms and episodes."""
         numbers = {name: torch.from_numpy(getattr(self, name).copy()) for name in ("seed", "made", "spent", "played")}
         return {"q": self.q.detach().clone(), "qdot": self.qdot.detach().clone(), **numbers}
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Goes on from what :meth:`state` gave."""
+        """Continues from a :meth:`state`."""
         self._load(np.arange(len(self.seed)), state["seed"].numpy())
         self.q, self.qdot = state["q"].clone(), state["qdot"].clone()
         for name in ("made", "spent", "played"):
@@ -150,7 +135,7 @@ class Arms:
         return known
 
     def _put(self, rows: Indices, at: Indices) -> None:
-        """Puts arms where their episodes are after some steps, at the velocity of the reference, at rest at first."""
+        """Puts arms on their references after some steps, with the reference velocity; at rest at step 0."""
         q, qdot = self.q.detach().numpy().copy(), self.qdot.detach().numpy().copy()
         q[rows] = self._path[rows, at]
         qdot[rows] = (q[rows] - self._path[rows, np.maximum(at - 1, 0)]) / self._scenario.dt

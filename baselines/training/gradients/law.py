@@ -39,7 +39,7 @@ class Law:
     def __init__(self, scenario: Scenario, processing: Bilinear) -> None:
         if not scenario.plant.ideal:
             raise InvalidInputError(
-                f"Scenario {scenario.name!r}: expected an ideal plant, whose gradient is known, got {scenario.plant}."
+                f"Scenario {scenario.name!r}: expected an ideal plant with a known gradient, got {scenario.plant}."
             )
         if scenario.initial_pose is not None:
             raise InvalidInputError(f"Scenario {scenario.name!r}: its first pose is not that of the arm.")
@@ -50,10 +50,9 @@ class Law:
         self._damping, self._twists = processing.damping, len(processing.offsets) - 1
 
     def features(self, q: Tensor, nominal: FloatArray, remaining: FloatArray) -> tuple[Tensor, FloatArray]:
-        """See :class:`Bilinear`.
+        """The features of :class:`Bilinear`.
 
-        With joint rates among them, features are constants for the gradient: that of costs then goes through the arm
-        and its law, not through the features.
+        With a damping they are constants for the gradient, which then goes through the arm and its law alone.
 
         Args:
             q: Joint coordinates in [rad] or [m]. Shape (N, n), float64.
@@ -74,15 +73,7 @@ class Law:
     def see(
         self, q: FloatArray, nominal: FloatArray, remaining: FloatArray, out: FloatArray, speed: FloatArray
     ) -> None:
-        """:meth:`features` without a gradient.
-
-        Args:
-            q: Shape (N, n).
-            nominal: Shape (N, p, m).
-            remaining: Shape (N, 1).
-            out: Receives the features. Shape (N, f).
-            speed: Receives the speeds. Shape (N,).
-        """
+        """:meth:`features` without a gradient, into arrays of shapes (N, f) and (N,)."""
         task, rates = self.task, self._damping is not None
 
         def work(start: int, stop: int) -> None:

@@ -29,7 +29,7 @@ class Task(NamedTuple):
         kind: Of task coordinates, see :mod:`ikgym.kernels.tasks`.
         error_size: e.
         dt: Δt in [s].
-        velocity_limit: What an action of 1 means, in [rad/s] or [m/s]. Shape (n,).
+        velocity_limit: The velocity at an action of 1, in [rad/s] or [m/s]. Shape (n,).
         limits: See :func:`ikgym.arms.limits.limit_rows`. Shape (4, n), or (0, n) where there are none.
         cost: Of the tracking error and of the joint velocities.
     """
@@ -85,7 +85,7 @@ class Path(NamedTuple):
 
     @classmethod
     def empty(cls, rows: int, steps: int, n: int) -> Path:
-        """An uninitialised one of N arms and K steps."""
+        """An uninitialised path of N arms and K steps."""
         q, qdot = np.empty((2, rows, steps + 1, n))
         return cls(q, qdot, np.empty(rows), np.empty(rows))
 
@@ -120,8 +120,8 @@ def segment(task, rows, output, path, start, stop):
             if turned:
                 turn(axis, -q[0], due)
             for j in range(n):
-                asked = commanded(output[row], j, due, speed[row], dt)
-                applied[j] = within(asked, velocity_limit[j])
+                command = commanded(output[row], j, due, speed[row], dt)
+                applied[j] = within(command, velocity_limit[j])
                 if limited:
                     applied[j] = driven(limits, j, applied[j], qdot[j], 0.0, held, 0)
                 reached[j] = q[j] + dt * applied[j]
@@ -138,7 +138,7 @@ def segment(task, rows, output, path, start, stop):
 
 @inlined
 def commanded(output, j, due, speed, dt):
-    """The velocity command of joint ``j``: row j of G times the twist that is due, plus h_j s."""
+    """The velocity command of joint ``j``: row j of G times the remaining twist, plus h_j s."""
     w = due.shape[0]
     velocity = output[j * (w + 1) + w] * speed
     for a in range(w):

@@ -106,7 +106,7 @@ def errors(network: Recurrence, processing: Recurrent, measured: Measurements) -
     exact = torch.full((rows, 6), processing.start**2, dtype=torch.float64)
     nothing, always = torch.zeros(rows, 2, dtype=torch.float64), torch.ones(rows, dtype=torch.bool)
     first = measured.sensitivity[:, 0], measured.true[:, 0]
-    parameters, covariance = _absorbed(first, exact, nothing, always, parameters, covariance)
+    parameters, covariance = _updated(first, exact, nothing, always, parameters, covariance)
     hidden, waited = network.start(rows), torch.ones(rows, dtype=torch.float64)
     before, after = [], []
     for k in range(events):
@@ -120,7 +120,7 @@ def errors(network: Recurrence, processing: Recurrent, measured: Measurements) -
         before.append(measured.true[:, k] - _product(rate, parameters))
         noise, change = interpret(output)
         pair = rate, measured.error[:, k]
-        parameters, covariance = _absorbed(pair, noise, change, arrived, parameters, covariance)
+        parameters, covariance = _updated(pair, noise, change, arrived, parameters, covariance)
         after.append(measured.true[:, k] - _product(rate, parameters))
         waited = torch.where(arrived, 0.0, waited) + measured.steps
     return torch.stack(before, 1), torch.stack(after, 1)
@@ -158,7 +158,7 @@ def _product(rate: Tensor, parameters: Tensor) -> Tensor:
     return (rate @ parameters[:, :, None])[:, :, 0]
 
 
-def _absorbed(
+def _updated(
     pair: tuple[Tensor, Tensor], noise: Tensor, change: Tensor, arrived: Tensor, parameters: Tensor, covariance: Tensor
 ) -> tuple[Tensor, Tensor]:
     """A step of the filter.

@@ -19,7 +19,7 @@ from baselines.agents.recurrent.processing import Recurrent
 from baselines.training.memory.episodes import Measurements, taken
 from baselines.training.memory.filter import Gated, costs
 
-#: Added to the variance by whose root advantages are divided.
+#: Added to the variance of the advantages before the division by its root.
 LITTLE = 1e-8
 
 
@@ -53,7 +53,7 @@ class Exploring:
         self._network, self._std = network, std
         self.seen: list[Tensor] = []
         self.means: list[Tensor] = []
-        self.said: list[Tensor] = []
+        self.outputs: list[Tensor] = []
 
     @property
     def dtype(self) -> torch.dtype:
@@ -67,10 +67,10 @@ class Exploring:
     def __call__(self, x: Tensor, hidden: list[Tensor], /) -> tuple[Tensor, list[Tensor]]:
         """See :class:`Gated`."""
         mean, after = self._network(x, hidden)
-        said = mean + self._std * torch.randn_like(mean)
-        for kept, part in ((self.seen, x), (self.means, mean), (self.said, said)):
+        output = mean + self._std * torch.randn_like(mean)
+        for kept, part in ((self.seen, x), (self.means, mean), (self.outputs, output)):
             kept.append(part)
-        return said, after
+        return output, after
 
 
 def explored(
@@ -104,7 +104,9 @@ def explored(
     with torch.no_grad():
         spent = costs(exploring, processing, again, delta_x)
         usual = spent.mean(1).reshape(-1, group_size).mean(1).repeat_interleave(group_size) + floor
-        features, means, outputs = (torch.stack(x[:-1], 1) for x in (exploring.seen, exploring.means, exploring.said))
+        features, means, outputs = (
+            torch.stack(x[:-1], 1) for x in (exploring.seen, exploring.means, exploring.outputs)
+        )
         log_prob = _log_prob(outputs, means, std)
         returns = -(spent / usual[:, None])
         for k in range(returns.shape[1] - 2, -1, -1):

@@ -1,4 +1,4 @@
-"""Files of agents: what is written is read again, and anything else is refused with one error that names the file."""
+"""Files of agents: round trips; other files are refused with one error that names the file."""
 
 from __future__ import annotations
 

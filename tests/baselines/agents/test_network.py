@@ -1,4 +1,4 @@
-"""Networks of agents: the forward pass, and what is refused."""
+"""Networks of agents: the forward pass and its checks."""
 
 from __future__ import annotations
 

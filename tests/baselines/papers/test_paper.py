@@ -8,11 +8,9 @@ import pytest
 
 import ikgym
 from baselines.papers import PAPERS, ledger
-from baselines.papers.comparisons import above, below, differ, falls, larger
+from baselines.papers.comparisons import differ, falls
 from baselines.papers.paper import Claim, Finding, Paper, scaled
 from baselines.papers.runs import Runs
-
-CLAIMS = [pytest.param(claim, id=f"{name}-{claim.name}") for name, paper in PAPERS.items() for claim in paper.claims]
 
 
 @pytest.mark.parametrize(
@@ -42,23 +40,13 @@ def test_figures_in_words():
         (1.0, 0.8, {"a": True}),
         (0.8, 1.0, {"a": False}),
         (1.0, 0.95, {}),
-        (2.0, 2.0, {}),
         (0.0, 0.0, {}),
         (0.0, 3.0, {"a": False}),
-        (7.08, 1.08, {"a": True}),
-        (1.08, 1.14, {}),
     ],
 )
 def test_changes_of_less_than_a_tenth_decide_nothing(before, after, wanted):
     assert falls({"a": (before, after)}) == wanted
     assert differ(before, after) == differ(after, before) == bool(wanted)
-
-
-def test_thresholds():
-    assert larger(1.0, 0.899)
-    assert not larger(1.0, 0.901)
-    assert above({"a": 2.0, "b": 1.0}, 1.0) == {"a": True, "b": False}
-    assert below({"a": 2.0, "b": 1.0}, 2.0) == {"a": False, "b": True}
 
 
 def test_a_ledger_is_read_as_it_was_written():
@@ -86,14 +74,11 @@ def test_episodes_are_identified_by_the_content_of_their_scenarios():
     assert len(one.q) == 5
 
 
-@pytest.mark.parametrize("claim", CLAIMS)
-def test_words_of_claims_fit_a_table(claim):
-    for text in (claim.text, claim.where, claim.method):
-        assert text.strip() == text != ""
-        assert not re.search(r"[|\n]", text + claim.condition)
-
-
 @pytest.mark.parametrize("name", PAPERS)
-def test_claims_differ(name):
-    assert PAPERS[name].name == name
-    assert len({claim.text for claim in PAPERS[name].claims}) == len(PAPERS[name].claims)
+def test_texts_of_claims_fit_a_table(name):
+    paper = PAPERS[name]
+    assert paper.name == name
+    assert len({claim.text for claim in paper.claims}) == len(paper.claims)
+    for claim in paper.claims:
+        assert all((claim.text, claim.where, claim.method))
+        assert not re.search(r"[|\n]", claim.text + claim.where + claim.method + claim.condition)

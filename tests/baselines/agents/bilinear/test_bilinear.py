@@ -1,4 +1,4 @@
-"""The bilinear actor: what it sees, and what its outputs mean."""
+"""The bilinear agent: its features and its law."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The damped inverse that the matrix of a bilinear agent begins as."""
+"""The damped inverse of a bilinear agent."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The filter in PyTorch against that of the runtime, and what training draws."""
+"""The filter in PyTorch against that of the runtime, and random plants."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ def test_gradients_are_those_of_differences():
         assert abs(slope - (parameter.grad * direction).sum().item()) < 1e-6 + 1e-4 * abs(slope)
 
 
-def test_what_was_lost_changes_nothing():
+def test_lost_measurements_change_nothing():
     one, shown = network(), measured()
     noisier = shown._replace(error=torch.where(shown.arrived[..., None], shown.error, shown.error + 1.0))
     assert not shown.arrived.all()
