@@ -17,7 +17,7 @@ from baselines.solvers.receding_horizon.newton.interior_point import LEFT, cost_
 from baselines.solvers.receding_horizon.newton.minimise import NewtonSettings
 from baselines.solvers.receding_horizon.newton.workspace import knot_workspace, newton_workspace
 from ikgym.kernels import tasks as task_kernels
-from ikgym.kernels.jit import inlined, kernel
+from ikgym.kernels.jit import expanded, kernel
 
 # Newton steps of a branch, and the relative precision that ends them before.
 STEPS, PRECISION = 50, 1e-4
@@ -151,7 +151,7 @@ def _blend(a, b, middle, width, out):
             out[k, j] = (1.0 - share) * a[k, j] + share * b[k, j]
 
 
-@inlined
+@expanded
 def _newton(problem, knots, n):
     """Workspace and multipliers of Newton's method."""
     kind, m = problem.data.kind, problem.nominal.shape[1]

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from ikgym.kernels import tasks as task_kernels
-from ikgym.kernels.jit import inlined, kernel
+from ikgym.kernels.jit import expanded, kernel
 
 
-@inlined
+@expanded
 def pose_arrays(n, m):
     """Arrays for one pose: rotation (3, 3), position (3,), geometric Jacobian (6, n) and task coordinates (m,)."""
     return np.empty((3, 3)), np.empty(3), np.empty((6, n)), np.empty(m)

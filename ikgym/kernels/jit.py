@@ -11,6 +11,7 @@ machine code by name. The name is the same in all processes, and whoever loads t
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import gc
 import hashlib
@@ -19,16 +20,18 @@ import itertools
 import logging
 import pickle
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import llvmlite.binding as llvm
-from numba import njit
+from numba import njit, types
 from numba.core.compiler import Compiler
+from numba.core.compiler_lock import global_compiler_lock
 from numba.core.dispatcher import Dispatcher
+from numba.core.sigutils import normalize_signature
 
 logger = logging.getLogger("ikgym")
 
@@ -43,6 +46,9 @@ _stamps: dict[str, str] = {}
 
 # Stamps of single kernels.
 _stamps_of_kernels: dict[Any, str] = {}
+
+# Not empty while kernels are compiled for other kernels.
+_called_by_kernels: list[None] = []
 
 # Names of kernels for which there is no folder on disk.
 _not_kept: set[str] = set()
@@ -71,7 +77,15 @@ def uncounted(function: Any) -> Any:
 
 
 def inlined(function: Any) -> Any:
-    """Like :func:`kernel`, and copied into its callers, so that constant arguments become constants."""
+    """Like :func:`uncounted`, and copied into its callers by LLVM, so that constant arguments become constants."""
+    return _cached(function, _nrt=False, forceinline=True)
+
+
+def expanded(function: Any) -> Any:
+    """Like :func:`kernel`, and copied into its callers before they are compiled: the way to return arrays to all.
+
+    Each copy is compiled anew, at ten times the cost of :func:`inlined`.
+    """
     return _cached(function, inline="always")
 
 
@@ -114,11 +128,17 @@ class _Compiler(Compiler):
                 gc.enable()
 
     def define_pipelines(self) -> Any:
+        if _called_by_kernels:
+            self.state.targetctx.create_cpython_wrapper = _no_wrapper
         function = self.state.func_id.func
         if function in _stamps_of_kernels and _find(function.__module__, function.__qualname__, function):
             self.state.func_id.unique_id = _stamps_of_kernels[function][:16]
             self.state.func_id.unique_name = f"{function.__qualname__}${self.state.func_id.unique_id}"
         return super().define_pipelines()  # type: ignore[no-untyped-call]
+
+
+def _no_wrapper(*_: Any, **__: Any) -> None:
+    """In place of numba's wrapper for calls from Python: for a tuple of twenty arrays it took half of the time."""
 
 
 @dataclass(frozen=True)
@@ -141,9 +161,20 @@ class _Callee:
         importlib.import_module(self.module)
         if (compiled := _find(self.module, self.name)) is None:
             raise ImportError(f"{self.module} has no kernel {self.name}.")
-        compiled.compile(self.arguments)
+        with _for_kernels():
+            compiled.compile(self.arguments)
         if compiled.overloads[self.arguments].fndesc.llvm_func_name != self.symbol:
             raise ImportError(f"{self.module}.{self.name} is another one.")
+
+
+@contextlib.contextmanager
+def _for_kernels() -> Iterator[None]:
+    """Within it kernels are compiled to be called by kernels."""
+    _called_by_kernels.append(None)
+    try:
+        yield
+    finally:
+        _called_by_kernels.pop()
 
 
 def _find(module: str, name: str, function: Any = None) -> Any:
@@ -160,30 +191,60 @@ def _linked(compiled: Any) -> Any:
     if not isinstance(compiled, Dispatcher):  # compilation is switched off
         return compiled
     dispatcher: Any = compiled
-    add, function = compiled.add_overload, compiled.py_func
+    function, engine = compiled.py_func, dispatcher.targetctx.codegen()._engine
+    add, compile_, template = dispatcher.add_overload, dispatcher.compile, dispatcher.get_call_template
 
     def add_overload(result: Any) -> None:
         # What a callee needs, its callers need: numba forgets it of what it loads from disk.
+        if not compiled.targetoptions.get("_nrt", True) and _has_arrays(result.signature.return_type):
+            raise TypeError(f"{function.__qualname__} does not count references, and returns an array.")
         library, symbol = result.library, result.fndesc.llvm_func_name
         library._reload_init.update(result.reload_init or ())
-        if _find(function.__module__, function.__qualname__, function) and _large(library, symbol):
+        copied = compiled.targetoptions.get("forceinline", False)
+        if not copied and _find(function.__module__, function.__qualname__, function) and _large(library, symbol):
             library._shared_module = llvm.parse_assembly("")
             arguments = tuple(result.fndesc.argtypes)
             library._reload_init.add(_Callee(function.__module__, function.__qualname__, arguments, symbol))
-        add(result)
+        if engine.is_symbol_defined(result.fndesc.llvm_cpython_wrapper_name):
+            add(result)
+        else:
+            compiled.overloads[tuple(result.signature.args)] = result
 
-    dispatcher.add_overload = add_overload
+    def compile_for(signature: Any) -> Any:
+        with global_compiler_lock:
+            arguments, _ = normalize_signature(signature)  # type: ignore[no-untyped-call]
+            known: Any = dispatcher.overloads.get(tuple(arguments))
+            if known and not (_called_by_kernels or engine.is_symbol_defined(known.fndesc.llvm_cpython_wrapper_name)):
+                del compiled.overloads[tuple(known.signature.args)]  # compiled once more, to be called from Python
+            return compile_(signature)
+
+    def get_call_template(arguments: Any, named: Any) -> Any:
+        # numba would compile a kernel once for each constant that it is called with.
+        unliteral: Any = types.unliteral
+        with _for_kernels():
+            return template(tuple(map(unliteral, arguments)), {name: unliteral(kind) for name, kind in named.items()})
+
+    dispatcher.add_overload, dispatcher.compile = add_overload, compile_for
+    dispatcher.get_call_template = get_call_template
     disk = getattr(getattr(compiled, "_cache", None), "_impl", None)
     if disk is not None:
         rebuild = disk.rebuild
 
         def rebuilt(context: Any, payload: Any) -> Any:
-            # numba looks for names in the copy for callers, which is empty.
-            context.codegen()._engine._defined_symbols.add(payload[1].llvm_cpython_wrapper_name)
+            (_, _, (machine_code, _)), names = payload[:2]
+            if (wrapper := names.llvm_cpython_wrapper_name).encode() in machine_code:
+                engine._defined_symbols.add(wrapper)  # numba looks for it in the copy for callers, which is empty
+            elif not _called_by_kernels:
+                return None
             return rebuild(context, payload)
 
         disk.rebuild = rebuilt
     return compiled
+
+
+def _has_arrays(kind: Any) -> bool:
+    parts: Any = kind if isinstance(kind, types.BaseTuple) else ()
+    return isinstance(kind, types.Array) or any(_has_arrays(part) for part in parts)
 
 
 def _large(library: Any, symbol: str) -> bool:

@@ -16,7 +16,7 @@ from ikgym.kernels import cost as cost_kernels
 from ikgym.kernels import tasks as task_kernels
 from ikgym.kernels.axes import angle_between
 from ikgym.kernels.cost import CostParameters
-from ikgym.kernels.jit import inlined, kernel, uncounted
+from ikgym.kernels.jit import expanded, inlined, kernel, uncounted
 from ikgym.kernels.kinematics import Chain, forward
 from ikgym.kernels.limits import LOWER, SLACK, UPPER, driven, stopped
 from ikgym.kernels.outcome import Outcome as Outcome
@@ -76,7 +76,7 @@ class State(NamedTuple):
     scratch: Floats
 
 
-_parts = inlined(parts)
+_parts = expanded(parts)
 
 
 @kernel
@@ -137,7 +137,7 @@ def _tracking(kind, cost, frame, pose, nominal, error):
     return cost_kernels.tracking(cost, error)
 
 
-@inlined
+@uncounted
 def show_row(constants, cost, state, row, pose, frame, shown):
     """Shows where the tool of a row is, what lies ahead of it, its errors, and what the step costs.
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ikgym.kernels.jit import inlined, kernel, uncounted
+from ikgym.kernels.jit import expanded, inlined, kernel, uncounted
 from ikgym.kernels.kinematics import Chain, forward
 from ikgym.kernels.limits import FASTEST, LOWER, SLACK, UPPER, driven, stopped, within
 from ikgym.kernels.outcome import more_parts, parts, size
@@ -15,7 +15,7 @@ from ikgym.kernels.simulation import Floats, Integers, commanded, show_row
 from ikgym.plant.drive_kernels import counter_of, disturbed, engaged, filtered, remembered
 from ikgym.plant.sensor_kernels import NOISE, measure_pose, measure_q
 
-_parts, _more_parts, _size = inlined(parts), inlined(more_parts), inlined(size)
+_parts, _more_parts, _size = expanded(parts), expanded(more_parts), inlined(size)
 
 
 class Drives(NamedTuple):

@@ -78,6 +78,17 @@ def test_numba_alone_would_not_notice(tmp_path):
     assert answer(tmp_path, NUMBAS, scale=3.0, shift=10.0) == 2.0
 
 
+@pytest.fixture
+def no_folder(monkeypatch):
+    """Kernels that are defined in the test are compiled in it."""
+
+    def no_locator(self, function):
+        raise RuntimeError("cannot cache function: no locator available")
+
+    monkeypatch.setattr(numba.core.dispatcher.FunctionCache, "__init__", no_locator)
+    monkeypatch.setattr(jit, "_not_kept", set())
+
+
 LARGE = (
     "from ikgym.kernels.jit import kernel\nSCALE = {scale}\n@kernel\ndef scaled(x):\n    total = 0.0\n"
     + "".join(f"    total += np.sin(x[{i}]) * x[{i + 1}]\n" for i in range(40))
@@ -126,6 +137,42 @@ def test_a_large_callee_is_compiled_once_and_its_name_linked(tmp_path):
     assert linked(tmp_path, scale=2.0) == (round(two, 6), [1, 1, 1])
 
 
+def test_a_kernel_that_kernels_have_called_can_be_called_from_python(tmp_path):
+    """It is compiled once more then, and found on disk with and without what Python needs."""
+    assert linked(tmp_path, scale=1.0)[1] == [1, 1, 1]
+    (tmp_path / "run2.py").write_text("import numpy as np\nfrom middle import middle\n" + LINKED.split("\n", 2)[2])
+    code = (
+        "import numpy as np\nfrom caller import outer\nfrom callee import scaled\n{first}\n"
+        "print(scaled(np.ones(99)) == outer(np.ones(99)) - 1.0, *scaled.stats.cache_misses.values())"
+    )
+    for first, misses in ("outer(np.ones(99))", "1"), ("outer(np.ones(99))", ""), ("", ""):
+        line = [sys.executable, "-c", code.format(first=first)]
+        done = subprocess.run(line, cwd=tmp_path, env=os.environ, capture_output=True, text=True, check=True)
+        assert done.stdout.split() == ["True", *misses.split()]
+
+
+def test_a_kernel_is_compiled_once_for_all_constants(no_folder):
+    @kernel
+    def power(x, k):
+        return x**k
+
+    @kernel
+    def sums(x):
+        return power(x, 2) + power(x, 3)
+
+    assert sums(2.0) == 12.0
+    assert len(power.signatures) == 1
+
+
+def test_an_uncounted_kernel_returns_no_array(no_folder):
+    @uncounted
+    def itself(x):
+        return x, 1.0
+
+    with pytest.raises(TypeError, match="itself does not count references, and returns an array"):
+        itself(np.ones(3))
+
+
 @pytest.mark.parametrize("symbol", ["another", None])
 def test_a_callee_of_another_name_or_none_is_refused(symbol):
     """Its caller is compiled anew then: see what reading the cache may raise."""
@@ -133,17 +180,6 @@ def test_a_callee_of_another_name_or_none_is_refused(symbol):
     rotation = numba.typeof(np.eye(3))
     with pytest.raises(jit.UNREADABLE):
         jit._Callee("ikgym.kernels.rotations", name, (rotation, rotation), symbol or "any")()
-
-
-@pytest.fixture
-def no_folder(monkeypatch):
-    """Kernels that are defined in the test are compiled in it."""
-
-    def no_locator(self, function):
-        raise RuntimeError("cannot cache function: no locator available")
-
-    monkeypatch.setattr(numba.core.dispatcher.FunctionCache, "__init__", no_locator)
-    monkeypatch.setattr(jit, "_not_kept", set())
 
 
 def test_without_a_folder_to_write_to(no_folder, caplog):

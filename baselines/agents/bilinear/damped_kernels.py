@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.solvers.linear_algebra import damped_gram, ldl, ldl_scaled_inverse
-from ikgym.kernels.jit import inlined, kernel
+from ikgym.kernels.jit import expanded, inlined, kernel
 from ikgym.rl.feature_kernels import seen_jacobian
 from ikgym.rl.twists import is_turned, twist_size
 
@@ -45,7 +45,7 @@ class Inverse(NamedTuple):
     products: Floats
 
 
-@inlined
+@expanded
 def empty_inverse(w, n):
     """An uninitialised one."""
     return Inverse(np.empty((6, n)), np.empty(n), np.empty((w, w)), np.empty((w, n)))

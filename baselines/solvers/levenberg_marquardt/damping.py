@@ -16,7 +16,7 @@ import numpy as np
 from baselines.solvers.linear_algebra import orthogonal_columns
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
-from ikgym.kernels.jit import inlined, kernel
+from ikgym.kernels.jit import expanded, kernel
 from ikgym.validation import FloatArray, flag, float_array, frozen_array, known_name, number
 
 LOOKUP, PROPORTIONAL, STEPPED = 0, 1, 2
@@ -160,7 +160,7 @@ def condition_number(jacobian, rank, scratch):
     return math.sqrt(largest / smallest) if smallest > 0.0 else np.inf
 
 
-@inlined
+@expanded
 def condition_scratch(size, n):
     """What :func:`condition_number` works with. Shapes (max(e, n), min(e, n)) and (min(e, n), min(e, n))."""
     narrow = min(size, n)

@@ -21,7 +21,7 @@ from baselines.solvers.receding_horizon.newton.workspace import joints_at
 from ikgym.kernels import cost as cost_kernels
 from ikgym.kernels import tasks as task_kernels
 from ikgym.kernels.cost import P_X_INSIDE
-from ikgym.kernels.jit import inlined, uncounted
+from ikgym.kernels.jit import expanded, inlined, uncounted
 from ikgym.kernels.kinematics import forward, forward_and_jacobian
 
 # All loops take their arrays out of the tuples first: numba counts references at each access, which costs more than the
@@ -101,7 +101,7 @@ def add_rate_cost(problem, path, model):
     return total
 
 
-@inlined
+@expanded
 def tracking_errors(problem, path, workspace):
     """The tracking errors at the knots that count, which the workspace keeps as well. Shape (at least K, e)."""
     chain, kind, nominal = problem.data.chain, problem.data.kind, problem.nominal

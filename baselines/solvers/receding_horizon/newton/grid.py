@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ikgym.kernels.jit import inlined, kernel, uncounted
+from ikgym.kernels.jit import expanded, kernel, uncounted
 
 Floats = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
@@ -113,7 +113,7 @@ def cut(at, steps, terminal, grid):
     return knots
 
 
-@inlined
+@expanded
 def first_knots(grid, knots):
     """The first so many knots of a grid."""
     return Grid(grid.at[:knots], grid.length[:knots], grid.tracking[:knots], grid.velocity[:knots])

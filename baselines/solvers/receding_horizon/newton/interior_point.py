@@ -26,7 +26,7 @@ from baselines.solvers.receding_horizon.newton.minimise import (
     scalar_product,
 )
 from baselines.solvers.receding_horizon.newton.workspace import BARRIER_SIZE, BEYOND
-from ikgym.kernels.jit import inlined, uncounted
+from ikgym.kernels.jit import uncounted
 
 # μ at the beginning, and w of the limits, in units of the cost for each knot, or of this where that is less. Where the
 # path leaves limits μ is larger by how much it does, up to a bound: else the barrier function has a kink in its way.
@@ -128,7 +128,7 @@ def limits_left(workspace, knots, slack):
     return False
 
 
-@inlined
+@uncounted
 def _line_search(problem, path, barrier, value, derivative, step, trial, workspace):
     """Shortens a step until the barrier function decreases enough (Armijo): its length, 0 for none."""
     length = 1.0

@@ -141,7 +141,7 @@ def minimise(problem, path, multipliers, settings, workspace):
     return Minimum(outcome, made, true, np.sqrt(scalar_product(gradient, gradient)))
 
 
-@inlined
+@uncounted
 def damped_newton_step(problem, exact, damping, unit, workspace, step):
     """A Newton step with the least damping, from ``damping`` up, that makes the Hessian positive definite.
 
@@ -166,7 +166,7 @@ def damped_newton_step(problem, exact, damping, unit, workspace, step):
     return damping
 
 
-@inlined
+@uncounted
 def line_search(problem, path, multipliers, value, derivative, step, trial, workspace):
     """Shortens a step until the merit decreases enough (Armijo); gives a :class:`LineSearch`.
 

@@ -12,7 +12,7 @@ from baselines.solvers.receding_horizon.newton.guess import DAMPING, STREAM, dra
 from baselines.solvers.receding_horizon.newton.interior_point import cost_within, minimise_path
 from baselines.solvers.receding_horizon.newton.minimise import NewtonSettings
 from baselines.solvers.receding_horizon.newton.workspace import NewtonWorkspace, newton_workspace
-from ikgym.kernels.jit import inlined, kernel, uncounted
+from ikgym.kernels.jit import expanded, kernel, uncounted
 
 Floats = npt.NDArray[np.float64]
 
@@ -70,14 +70,14 @@ def plan_workspace(kind, m, knots, n, width, limited):
     return PlanWorkspace(newton, kept, vectors[0], vectors[1], empty_grid(knots), empty_grid(knots))
 
 
-@inlined
+@expanded
 def plan_in(block, knots, n):
     """The plan in a block of numbers: the path of ``knots`` knots and ``n`` joints, then the multipliers."""
     end = knots * n
     return Plan(block[:end].reshape(knots, n), block[end:].reshape(knots, block.shape[0] // knots - n))
 
 
-@inlined
+@expanded
 def first_part(plan, knots):
     """The first so many knots of a plan, as views."""
     return Plan(plan.path[:knots], plan.multipliers[:knots])
@@ -128,7 +128,7 @@ def initial_plan(problem, settings, plan, workspace):
     return made
 
 
-@inlined
+@uncounted
 def _guess(problem, settings, first, damping, path, workspace):
     """An initial guess from knot ``first`` on, with the drift in the workspace; slowed down where plans may recover."""
     initial_guess(problem, first, workspace.drift, damping, path, workspace.newton.knot)

@@ -26,7 +26,7 @@ from baselines.solvers.receding_horizon.newton.plan import (
 from baselines.solvers.receding_horizon.newton.settings import settings_of
 from baselines.solvers.receding_horizon.newton.workspace import PathProblem
 from baselines.status import Status
-from ikgym.kernels.jit import inlined, kernel, uncounted
+from ikgym.kernels.jit import expanded, inlined, kernel, uncounted
 from ikgym.kernels.kinematics import Chain
 
 _CONVERGED, _LIMIT, _SATURATED = int(Status.CONVERGED), int(Status.ITERATION_LIMIT), int(Status.SATURATED)
@@ -107,7 +107,7 @@ def plan_batch(data, settings, observations, memory, answers, workspace):
         answers.iterations[row] = made
 
 
-@inlined
+@expanded
 def _grids(settings, remaining, workspace):
     """The grid of this period, and that of the period before, which began one step earlier."""
     at, stop, weight = settings.at, settings.stop_at_end, settings.terminal_weight
@@ -117,7 +117,7 @@ def _grids(settings, remaining, workspace):
     return first_knots(grid, cut(at, left, weight, grid)), first_knots(old_grid, old_knots)
 
 
-@inlined
+@uncounted
 def _plan_row(problem, settings, old_grid, plans, counts, workspace):
     """Plans a period of one arm, and goes on with its restart candidate.
 
@@ -164,7 +164,7 @@ def _newton_steps(settings, first, hurried):
     return max(least, settings.iterations)
 
 
-@inlined
+@uncounted
 def _restart(problem, settings, old_grid, plans, counts, cost, starting, workspace):
     """Begins a restart candidate, or goes on with the one there is; gives the Newton steps made.
 
@@ -198,7 +198,7 @@ def _restart(problem, settings, old_grid, plans, counts, cost, starting, workspa
     return made
 
 
-@inlined
+@uncounted
 def _plan(problem, settings, most, period, old_grid, plan, workspace):
     """Plans a period of one arm, from the plan of the period before or from an initial guess.
 

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ikgym.kernels.cost import CostParameters
-from ikgym.kernels.jit import inlined
+from ikgym.kernels.jit import expanded
 
 Floats = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
@@ -65,7 +65,7 @@ def plain_settings(cost: CostParameters, settings: PlanSettings) -> tuple[Floats
     return numbers, integers
 
 
-@inlined
+@expanded
 def settings_of(numbers, integers):
     """The :class:`CostParameters` and :class:`PlanSettings` that :func:`plain_settings` took apart."""
     cost = CostParameters(numbers[0], numbers[1], numbers[2], numbers[3], numbers[4])

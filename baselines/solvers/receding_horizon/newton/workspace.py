@@ -10,7 +10,7 @@ import numpy.typing as npt
 from baselines.solvers.receding_horizon.horizon import ProblemData
 from baselines.solvers.receding_horizon.newton.grid import Grid
 from ikgym.kernels import tasks as task_kernels
-from ikgym.kernels.jit import inlined, kernel
+from ikgym.kernels.jit import expanded, kernel
 
 Floats = npt.NDArray[np.float64]
 
@@ -140,7 +140,7 @@ class NewtonWorkspace(NamedTuple):
     barriers: Floats
 
 
-@inlined
+@expanded
 def joints_at(problem, path, k, knot):
     """The joint coordinates that the kinematics see at a knot: those of the path, with the payload where there is one.
 
