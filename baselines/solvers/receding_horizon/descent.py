@@ -48,17 +48,7 @@ class DescentMemory(NamedTuple):
 
 @kernel
 def stop_test(value, norm, settings, step):
-    """Whether to stop before the next step.
-
-    Args:
-        value: The cost.
-        norm: Norm of the gradient.
-        settings: :class:`DescentSettings`.
-        step: Steps made.
-
-    Returns:
-        A value of :class:`Status`, or GOES_ON.
-    """
+    """Whether to stop before step number ``step``: a value of :class:`Status`, or GOES_ON."""
     if not (np.isfinite(value) and np.isfinite(norm)):
         return DIVERGED
     if norm <= settings.tolerance:
@@ -68,14 +58,7 @@ def stop_test(value, norm, settings, step):
 
 @kernel
 def adapted(alpha, norm, last_norm, settings):
-    """α for the next step: larger where the norm fell, smaller where it rose, within its bounds.
-
-    Args:
-        alpha: α.
-        norm: Norm of the gradient.
-        last_norm: Norm before the last step, 0 before the first.
-        settings: :class:`DescentSettings`.
-    """
+    """α for the next step: larger where the norm fell, smaller where it rose, within its bounds; as it is at first."""
     if last_norm == 0.0:
         return alpha
     if norm < last_norm:
@@ -105,19 +88,9 @@ def take_step(x, alpha, gradient):
 
 @kernel
 def stop_if_diverged(status, value, first_value, limit, qdot):
-    """Finds out a blow-up that looks like convergence, and clears the plan after any.
+    """Finds out a blow-up that looks like convergence, and clears the plan after any; gives a :class:`Status`.
 
     A gradient of 0 beyond all limits, at a cost that has risen, is no minimum: the finite differences have drowned.
-
-    Args:
-        status: What :func:`stop_test` said.
-        value: The last cost.
-        first_value: The cost at the start.
-        limit: Velocity limit in [rad/s] or [m/s]. Shape (n,).
-        qdot: The plan, cleared after a blow-up. Shape (HL - 1, n).
-
-    Returns:
-        A value of :class:`Status`.
     """
     if value > first_value:
         for i in range(qdot.shape[0]):

@@ -62,16 +62,7 @@ def horizon_cost(data, q, nominal, qdot):
 def difference_gradient(data, q, nominal, qdot, delta, gradient):
     """∂Φ/∂q̇ by forward differences of ``delta`` (Varga 2021, section IV), and Φ; arguments as above.
 
-    Args:
-        data: As above.
-        q: Joint coordinates at the first grid point. Shape (n,).
-        nominal: Nominal coordinates ahead. Shape (at least HL - 1, m).
-        qdot: Joint velocities, put back as they were. Shape (HL - 1, n).
-        delta: The difference, in [rad/s] or [m/s].
-        gradient: Receives the gradient. Shape (HL - 1, n).
-
-    Returns:
-        The cost.
+    The velocities are put back as they were; ``gradient`` (HL - 1, n) receives the gradient.
     """
     steps, n = qdot.shape
     workspace = frame_workspace(data.kind, nominal)
@@ -148,16 +139,7 @@ def analytic_gradient(data, q, nominal, qdot, gradient):
 def analytic_state_gradient(data, nominal, q, qdot, by_q, by_qdot):
     """∂Φ/∂q(2 … HL) and ∂Φ/∂q̇(1 … HL - 1) with states and velocities taken for independent, and Φ.
 
-    Args:
-        data: As above.
-        nominal: Nominal coordinates of the second and later grid points. Shape (at least HL - 1, m).
-        q: Joint coordinates at the second and later grid points. Shape (HL - 1, n).
-        qdot: Joint velocities. Shape (HL - 1, n).
-        by_q: Receives ∂Φ/∂q. Shape (HL - 1, n).
-        by_qdot: Receives ∂Φ/∂q̇. Shape (HL - 1, n).
-
-    Returns:
-        The cost.
+    ``q`` are the joint coordinates at the second and later grid points; all arrays have the shape (HL - 1, n).
     """
     steps, n = q.shape
     chain, cost = data.chain, data.cost
@@ -231,10 +213,7 @@ def gradient_workspace(kind, nominal, n):
 def linearise(kind, nominal, workspace):
     """Task coordinates, their error and its derivative by the joint coordinates, of the frame and geometric Jacobian.
 
-    Args:
-        kind: The kind of task coordinates.
-        nominal: Nominal coordinates. Shape (m,).
-        workspace: Of :func:`gradient_workspace`; pose, error, Jacobian and error Jacobian are changed in place.
+    They are arrays of :func:`gradient_workspace`, changed in place.
     """
     task_kernels.coordinates(kind, workspace.rotation, workspace.position, workspace.pose)
     task_kernels.error(kind, nominal, workspace.pose, workspace.error)

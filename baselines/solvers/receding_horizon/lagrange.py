@@ -96,17 +96,9 @@ class RecedingHorizonLagrange(RecedingHorizonGradient):
 
 @kernel
 def reduce_rows(with_tasks, data, settings, q, nominal, memory, status, iterations):
-    """Descent along the reduced gradient row by row.
+    """Descent along the reduced gradient row by row; ``with_tasks`` says whether the task coordinates are unknowns.
 
-    Args:
-        with_tasks: Whether the task coordinates are unknowns.
-        data: The :class:`ProblemData`.
-        settings: :class:`DescentSettings`.
-        q: Joint coordinates in [rad] or [m]. Shape (B, n).
-        nominal: Nominal task coordinates ahead. Shape (B, at least HL - 1, m).
-        memory: :class:`DescentMemory`, changed in place.
-        status: Receives values of :class:`Status`. Shape (B,).
-        iterations: Receives the steps made. Shape (B,).
+    Other arguments are those of :func:`gradient.descend_rows`.
     """
     alpha, difference, dt, (_, steps, n) = memory.alpha, settings.difference, data.dt, memory.plan.shape
     e = frame_workspace(data.kind, nominal[0])[3].shape[0] if with_tasks else 0
@@ -155,10 +147,7 @@ def reduce_rows(with_tasks, data, settings, q, nominal, memory, status, iteratio
 def factorise(dt, diagonal, ratio):
     """L D Lᵀ of Δt² A Aᵀ of one joint, which has 1 + Δt², then 2 + Δt² on its diagonal and −1 beside it.
 
-    Args:
-        dt: Δt in [s].
-        diagonal: Receives D. Shape (HL - 1,).
-        ratio: Receives the entries of L below its diagonal of ones, the first of no use. Shape (HL - 1,).
+    ``diagonal`` receives D, ``ratio`` the entries of L below its diagonal of ones, the first of no use; (HL - 1,).
     """
     for i in range(diagonal.shape[0]):
         diagonal[i] = (1.0 if i == 0 else 2.0) + dt * dt
@@ -172,13 +161,8 @@ def factorise(dt, diagonal, ratio):
 def reduce_gradient(dt, diagonal, ratio, multipliers, by_q, by_qdot):
     """Turns ∇Φ into the reduced gradient, along which no constraint changes.
 
-    Args:
-        dt: Δt in [s].
-        diagonal: D of :func:`factorise`. Shape (HL - 1,).
-        ratio: L of :func:`factorise`. Shape (HL - 1,).
-        multipliers: Receives λ(1) … λ(HL - 1). Shape (HL - 1, n).
-        by_q: ∂Φ/∂q(2 … HL), changed in place. Shape (HL - 1, n).
-        by_qdot: ∂Φ/∂q̇(1 … HL - 1), changed in place. Shape (HL - 1, n).
+    ``diagonal`` and ``ratio`` are D and L of :func:`factorise`, ``multipliers`` receives λ(1) … λ(HL - 1), and ``by_q``
+    and ``by_qdot`` are ∂Φ/∂q(2 … HL) and ∂Φ/∂q̇(1 … HL - 1), changed in place. Shapes (HL - 1, n).
     """
     steps, n = by_q.shape
     for j in range(n):

@@ -99,15 +99,7 @@ def reduced_task_gradient(data, nominal, difference, x, system, gradient):
 def analytic_task_gradient(data, nominal, x, jacobian, gradient):
     """∂Φ/∂E and ∂Φ/∂q̇ with all unknowns taken for independent, so that ∂Φ/∂q is 0; ∂ε/∂q, and Φ.
 
-    Args:
-        data: As above.
-        nominal: As above.
-        x: :class:`Unknowns`.
-        jacobian: Receives ∂ε/∂q. Shape (HL - 1, e, n).
-        gradient: :class:`Unknowns`, receives ∂Φ/∂E and ∂Φ/∂q̇.
-
-    Returns:
-        The cost.
+    ``jacobian`` receives ∂ε/∂q, of shape (HL - 1, e, n); other arguments as above. Gives the cost.
     """
     steps, n = x.q.shape
     workspace = gradient_workspace(data.kind, nominal, n)
@@ -156,10 +148,7 @@ def difference_task_gradient(data, nominal, x, delta, jacobian, gradient):
 def reduce_task_gradient(dt, system, gradient):
     """Turns ∇Φ into the reduced gradient ∇Φ + Aᵀλ, along which the constraints stagnate: A Aᵀ λ = −A ∇Φ.
 
-    Args:
-        dt: Δt in [s].
-        system: :class:`TaskSystem` with ∂ε/∂q; the rest is changed in place.
-        gradient: :class:`Unknowns` with ∂Φ/∂E and ∂Φ/∂q̇, changed in place.
+    The :class:`TaskSystem` has ∂ε/∂q, the rest of it and the gradient are changed in place.
 
     Returns:
         False where the system cannot be solved, as numbers are not finite; then there is no reduced gradient.
@@ -216,10 +205,7 @@ def _assemble(dt, jacobian, gram):
 def _solve_banded(matrix, width, rhs):
     """Solves a symmetric system in place by Cholesky; False where it is not positive definite.
 
-    Args:
-        matrix: Its lower triangle, zero further than ``width`` from the diagonal, becomes the factor. Shape (s, s).
-        width: Of the band beside the diagonal.
-        rhs: Becomes the solution. Shape (s,).
+    The lower triangle of the matrix (s, s), zero further than ``width`` from the diagonal, becomes the factor.
     """
     s = rhs.shape[0]
     for i in range(s):

@@ -8,7 +8,7 @@ import pytest
 
 import ikgym
 from baselines.evaluate import evaluate
-from baselines.evaluation import report, test_sets
+from baselines.evaluation import test_sets
 from baselines.files import ResultsError
 from baselines.oracle import best_known
 from baselines.oracle.best_known import MARGIN, Record, beaten, cost, episode_hash, lookup, read, record
@@ -172,18 +172,7 @@ def test_a_record_is_beaten_by_more_than_rounding(file):
     assert beaten(dataclasses.replace(row, total_cost=0.1, fingerprint="0" * 12)) is None
 
 
-def test_who_beats_a_record_is_told_the_command(file):
-    (row,) = evaluate(short(), "dls")
-    assert "beats" not in report.table([row])
-    record([one(short(), 2.0 * row.total_cost)], file)
-    text = " ".join(report.table([row]).split())
-    assert "dls beats the best known cost of varga7-fast, seed 0" in text
-    assert best_known.UPDATE in text
-
-
 # No policy beats a record: whoever finds a better path writes it down.
-
-QUICK = ["dls", "moore_penrose", "null_space", "fixed_point", "follow_nominal", "rhc_gradient"]
 
 
 def recorded():
@@ -195,10 +184,6 @@ def nobody_beats(scenarios, policies):
     rows = evaluate(scenarios, policies) if scenarios else []
     better = [(row.scenario, row.policy, row.total_cost) for row in rows if beaten(row)]
     assert not better, f"write them down with: {best_known.UPDATE}"
-
-
-def test_no_quick_policy_beats_a_record_on_a_short_scenario():
-    nobody_beats([s for s in recorded() if s.name == "zhang6-lspb"], QUICK)
 
 
 #: What plans ahead: of the other policies none has come nearer to a record than 0.08 %.
@@ -216,14 +201,6 @@ def doubtful():
 @pytest.mark.parametrize("name", [*doubtful(), "varga7-fast", "panda-line", "iiwa14-fast"])
 def test_no_planner_beats_a_record(name):
     nobody_beats([ikgym.scenarios.get(name)], PLANNERS)
-
-
-def test_a_record_that_is_too_high_does_not_go_unnoticed(file):
-    (row,) = evaluate(NAME, "dls")
-    record([one(ikgym.scenarios.get(NAME), 1.001 * row.total_cost)], file)
-    assert [s.name for s in recorded()] == [NAME]
-    with pytest.raises(AssertionError, match="write them down"):
-        nobody_beats(recorded(), ["dls"])
 
 
 WRITER = """

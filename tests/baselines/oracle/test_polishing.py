@@ -42,16 +42,6 @@ def test_a_payload_is_foreseen(optimum):
     assert late.cost == pytest.approx(optimum.cost, rel=1e-9)
 
 
-def test_the_payload_stands_at_its_knots():
-    problem = EpisodeProblem.of(PLAIN.replace(plant=Plant(payload=1e-3, payload_step=30)), SEED)
-    load = problem.on(problem.grid).load
-    assert not load[:29].any()
-    assert (load[29:] == 1e-3).all()  # knot 29 is the end of step 30
-    coarse = problem.coarse(7)
-    assert (problem.on(coarse).load.any(axis=1) == (coarse.at >= 30)).all()
-    assert EpisodeProblem.of(PLAIN, SEED).on(problem.grid).load.shape == (0, 7)
-
-
 @pytest.mark.parametrize("plant", [Plant(zero=1e-3), Plant(bandwidth=10.0), Plant(pose_noise=1e-3), Plant(bias=0.1)])
 def test_of_a_plant_there_is_nothing_but_a_payload(plant):
     with pytest.raises(InvalidInputError, match="expected an ideal plant, but for a payload"):

@@ -48,12 +48,6 @@ def test_recovers_from_far_off():
     assert not recovered(signs, 130, recovery_steps=0).all()  # which is what the parameter is for
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("signs", [random_signs(16), np.ones((16, 7))], ids=["random signs", "all up"])
-def test_recovers_from_far_off_in_16_episodes(signs):
-    assert recovered(signs, 500).all()
-
-
 def iterations(steps, **parameters):
     """Newton steps in the periods of an episode."""
     scenario = ikgym.scenarios.get(SCENARIO).replace(steps=steps)
@@ -80,27 +74,6 @@ def test_few_periods_are_longer_than_others():
     assert (made[40:] == 1).any()
 
 
-@pytest.mark.slow
-def test_initial_guesses_one_after_the_other_lose_little():
-    """At most 1 % in the geometric mean against 64 of them in the first call (0.23 % on 256 episodes)."""
-    scenario, seeds = ikgym.scenarios.get(SCENARIO), ikgym.scenarios.seeds("validation", 12)
-    costs = []
-    for parameters in ({}, {"start_steps": 0, "starts": 64}):
-        episodes = rollouts(scenario, baselines.make("rhc_foresight", scenario, **parameters), seeds)
-        costs.append([float((e.tracking_cost + e.velocity_cost).sum()) for e in episodes])
-    one_by_one, at_once = np.log(costs)
-    assert np.exp(np.mean(one_by_one - at_once)) <= 1.01
-
-
-def test_initial_guesses_one_after_the_other_find_another_plan():
-    scenario, seeds = ikgym.scenarios.get(SCENARIO).replace(steps=40), ikgym.scenarios.seeds("validation", 3)
-    many, one = (
-        rollouts(scenario, baselines.make("rhc_foresight", scenario, starts=starts, horizon=41), seeds)
-        for starts in (64, 1)
-    )
-    assert any(not np.array_equal(a.q, b.q) for a, b in zip(many, one, strict=True))
-
-
 def long_costs(seeds, **parameters):
     scenario = ikgym.scenarios.get("varga7-pose-random-long")
     episodes = rollouts(scenario, baselines.make("rhc_foresight", scenario, **parameters), seeds)
@@ -110,27 +83,6 @@ def long_costs(seeds, **parameters):
 def test_1500_steps_of_foresight_are_too_few_in_a_long_episode():
     """How the arm moves in its null space from the first step on decides what the last 300 of 3,000 steps cost."""
     assert 2.0 * long_costs([1_000_038]) < long_costs([1_000_038], horizon=1501, move_blocks=57)
-
-
-@pytest.mark.slow
-def test_evenly_growing_blocks_cost_no_more_than_geometric_ones_in_long_episodes():
-    """56 knots in 3,000 steps against 64, the last two of them 258 steps apart; by at most 0.5 %."""
-    seeds = ikgym.scenarios.seeds("validation", 4)
-    assert np.log(long_costs(seeds) / long_costs(seeds, move_blocks=64)).mean() < 0.005
-
-
-@pytest.mark.parametrize(("seed", "same"), [(0, True), (1, False)])
-def test_the_seed_chooses_the_initial_guesses(seed, same):
-    candidates = []
-    for number in (0, seed):
-        policy = baselines.make("rhc_foresight", SCENARIO, seed=number)
-        env = gym.make("RedundantIK-v0", scenario=SCENARIO, preview=policy.preview)
-        observation, _ = env.reset(seed=1_000_000)
-        state = None
-        for _ in range(3):  # the first plan takes two periods
-            _, state = policy.predict(observation, state)
-        candidates.append(policy.memory_of(state).plans[:, 1])
-    assert np.array_equal(*candidates) == same
 
 
 @pytest.mark.parametrize(
@@ -144,13 +96,6 @@ def test_knots_of_each_horizon(horizon, knots):
     assert policy.offsets[-1] == horizon - 1
     assert np.array_equal(policy.offsets[:-1], full[: knots - 1])
     assert np.diff(policy.offsets).max(initial=1) <= 101
-
-
-def test_knots_that_are_asked_for_are_those_of_rhc():
-    asked, rhc = (
-        baselines.make(name, SCENARIO, horizon=1501, move_blocks=57).offsets for name in ("rhc_foresight", "rhc")
-    )
-    assert np.array_equal(asked, rhc)
 
 
 def test_initial_guesses_after_the_first_are_restart_candidates():

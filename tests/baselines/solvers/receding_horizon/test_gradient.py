@@ -9,8 +9,6 @@ import pytest
 import baselines
 import ikgym
 from baselines import episodes
-from baselines.solvers.receding_horizon.descent import DescentMemory, DescentSettings
-from baselines.solvers.receding_horizon.gradient import descend_rows
 from baselines.solvers.receding_horizon.horizon import analytic_gradient, difference_gradient, horizon_cost
 from baselines.status import Status
 from ikgym.exceptions import InvalidInputError, UnknownNameError
@@ -71,28 +69,8 @@ def test_follows_the_printed_descent(name, warm_start, alpha_start):
         observation, *_ = env.step(action)
 
 
-def test_kept_alpha_with_the_smaller_bound_is_what_the_default_was():
-    """Bit for bit the kernel with its memory handed on; the sum of the costs was recorded before α could restart."""
-    scenario = ikgym.scenarios.get("varga7-fast").replace(steps=300)
-    policy = baselines.make("rhc_gradient", scenario, alpha_start="kept", alpha_max=1e-4)
-    episode = episodes.rollout(scenario, policy, 0)
-    cost = float((episode.tracking_cost + episode.velocity_cost).sum())
-    assert cost == pytest.approx(7155972.453893215, rel=1e-9)
-
-    settings = DescentSettings(20.0, 450, 1e-8, 1e-4, 1.2, 1e-3)
-    memory = DescentMemory(np.zeros((1, 2, 7)), np.full(1, 1e-8))
-    status, iterations = np.empty((2, 1), dtype=np.int64)
-    nominal, q = scenario.nominal(preview=2), scenario.nominal_joint_path()[0]
-    for k in range(300):
-        descend_rows(data_of(scenario), settings, q[None], nominal[None, k + 1 : k + 3], memory, status, iterations)
-        assert (status[0], iterations[0]) == (episode.status[k], episode.iterations[k])
-        assert memory.alpha[0] == episode.diagnostics["alpha"][k]
-        np.testing.assert_allclose(memory.plan[0, 0], episode.qdot[k], rtol=1e-6, atol=1e-6)
-        q = episode.q[k]
-
-
 @pytest.mark.parametrize("name", ONE_OF_EACH)
-@pytest.mark.parametrize("steps", [1, 2, 5])
+@pytest.mark.parametrize("steps", [1, 5])
 def test_gradients_against_central_differences(name, steps):
     scenario = ikgym.scenarios.get(name)
     model, rng = scenario.model, np.random.default_rng(steps)
@@ -119,10 +97,8 @@ def test_gradients_against_central_differences(name, steps):
     ("alpha_start", "warm_start", "name", "steps"),
     [
         ("kept", "unshifted", "varga7-fast", 100),
-        ("kept", "shifted", "varga7-fast", 120),
         pytest.param("restart", "shifted", "varga7-fast", 1300, marks=pytest.mark.slow),
         ("kept", "unshifted", "varga7-literal-fast", 150),
-        ("kept", "shifted", "varga7-literal-fast", 120),
         ("restart", "shifted", "varga7-literal-fast", 220),
         pytest.param("restart", "unshifted", "varga7-literal-fast", 2000, marks=pytest.mark.slow),
     ],
@@ -148,15 +124,6 @@ def test_restarted_alpha_does_not_diverge_as_printed(steps, cost):
     assert (episode.tracking_cost + episode.velocity_cost).sum() == pytest.approx(cost, rel=1e-3)
 
 
-@pytest.mark.parametrize("name", ["varga7-fast", "varga7-literal-fast"])
-def test_kept_alpha_with_the_smaller_bound_does_not_diverge(name):
-    scenario = ikgym.scenarios.get(name).replace(steps=600)
-    policy = baselines.make("rhc_gradient", scenario, alpha_start="kept", alpha_max=1e-4)
-    episode = episodes.rollout(scenario, policy, 0)
-    assert Status.DIVERGED not in episode.status
-    assert episode.position_error.max() < 0.1
-
-
 @pytest.mark.parametrize("gradient", ["finite_difference", "analytic"])
 def test_a_blow_up_is_not_taken_for_convergence(gradient):
     """One huge step leads where finite differences of the cost are exactly 0."""
@@ -170,23 +137,6 @@ def test_a_blow_up_is_not_taken_for_convergence(gradient):
     assert policy.report(state).status[0] == Status.DIVERGED
     np.testing.assert_array_equal(action, 0.0)
     np.testing.assert_array_equal(state[2], 0.0)
-
-
-def test_statuses():
-    env = gym.make("RedundantIK-v0")
-    observation, _ = env.reset()
-    for kwargs, wanted in [
-        ({"tolerance": 1e12}, Status.CONVERGED),
-        ({"tolerance": 0.0, "iterations": 5}, Status.ITERATION_LIMIT),
-    ]:
-        policy = baselines.make("rhc_gradient", "varga7-fast", **kwargs)
-        _, state = policy.predict(observation)
-        assert policy.report(state).status[0] == wanted
-
-
-def test_preview_is_what_the_horizon_needs():
-    assert baselines.make("rhc_gradient", "varga7-fast").preview == 2
-    assert baselines.make("rhc_gradient", "varga7-fast", horizon=10).preview == 9
 
 
 @pytest.mark.parametrize(

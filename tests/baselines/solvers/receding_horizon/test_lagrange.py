@@ -16,10 +16,9 @@ from baselines.solvers.receding_horizon.horizon import (
     difference_state_gradient,
 )
 from baselines.solvers.receding_horizon.lagrange import factorise, reduce_gradient
-from baselines.solvers.receding_horizon.task_constraints import analytic_task_gradient
 from baselines.status import Status
 from ikgym.exceptions import InvalidInputError, UnknownNameError
-from tests.baselines.solvers.receding_horizon.data import constraints, data_of, problem, with_tasks
+from tests.baselines.solvers.receding_horizon.data import constraints, data_of, problem
 from tests.every_scenario import ONE_OF_EACH
 
 
@@ -42,7 +41,7 @@ KINDS = pytest.mark.parametrize("kind", ["analytic", "finite_difference"])
 
 
 @KINDS
-@pytest.mark.parametrize("stages", [1, 2, 5])
+@pytest.mark.parametrize("stages", [5])
 @pytest.mark.parametrize("name", ONE_OF_EACH)
 def test_states_eliminated_is_the_plain_gradient(name, stages, kind):
     """dΦ/dq̇(i) = ∂Φ/∂q̇(i) + Δt Σ_{k>i} ∂Φ/∂q(k), for differences as well."""
@@ -53,8 +52,8 @@ def test_states_eliminated_is_the_plain_gradient(name, stages, kind):
 
 
 @KINDS
-@pytest.mark.parametrize("stages", [1, 2, 5, 20])
-@pytest.mark.parametrize("name", ["varga7-fast", "khan8-q1", "zhang3-helix", "zhang6-lspb"])
+@pytest.mark.parametrize("stages", [1, 20])
+@pytest.mark.parametrize("name", ["varga7-fast", "zhang3-helix"])
 def test_reduced_gradient(name, stages, kind):
     """Against eq. 4 with multipliers by least squares, and against the plain gradient preconditioned."""
     scenario, q, nominal, qdot = problem(name, stages)
@@ -110,31 +109,6 @@ def test_costs_are_those_of_the_plain_method(kind, states):
     assert np.mean(reduced.iterations) == pytest.approx(np.mean(plain.iterations), rel=0.05)
 
 
-def test_one_step_differs_from_the_plain_one_by_what_the_metric_says():
-    """One α from rest, so that rounding and the rule for α have no say: the difference is (M⁻¹ − I) of the step."""
-    q = np.full(7, 0.3)
-    observation, _ = gym.make("RedundantIK-v0", preview=4).reset(options={"q": q})
-    common = {"horizon": 5, "iterations": 1, "tolerance": 0.0, "gradient": "analytic"}
-    scenario = ikgym.scenarios.get("varga7-fast")
-
-    def plan(name, **parameters):
-        _, state = baselines.make(name, scenario, **common, **parameters).predict(observation)
-        return state[2][0]
-
-    def agree(plan, m):
-        np.testing.assert_allclose(plan.ravel(), np.linalg.solve(m, plain.ravel()), rtol=1e-8, atol=1e-11)
-        assert 1e-7 < np.linalg.norm(plan - plain) / np.linalg.norm(plain) < 1e-2
-
-    plain, lower = plan("rhc_gradient"), np.kron(np.tril(np.ones((4, 4))), np.eye(7))
-    m = np.eye(28) + scenario.dt**2 * lower.T @ lower
-    agree(plan("rhc_lagrange"), m)
-    # At rest, all grid points are at q.
-    _, x, system, g = with_tasks(scenario, q, observation["nominal"], np.zeros((4, 7)))
-    analytic_task_gradient(data_of(scenario), observation["nominal"], x, system.jacobian, g)
-    by_qdot = scenario.dt * np.kron(np.tril(np.ones((4, 4))), system.jacobian[0])
-    agree(plan("rhc_lagrange", states=True), m + by_qdot.T @ by_qdot)
-
-
 @pytest.mark.parametrize("states", [False, True])
 def test_diverges_as_printed_with_alpha_kept_and_says_so(states):
     episode = run("rhc_lagrange", 150, alpha_start="kept", states=states)
@@ -154,17 +128,6 @@ def test_a_blow_up_is_not_taken_for_convergence(kind, states):
     assert policy.report(state).status[0] == Status.DIVERGED
     np.testing.assert_array_equal(action, 0.0)
     np.testing.assert_array_equal(state[2], 0.0)
-
-
-def test_statuses():
-    observation, _ = gym.make("RedundantIK-v0").reset()
-    for parameters, wanted in [
-        ({"tolerance": 1e12}, Status.CONVERGED),
-        ({"tolerance": 0.0, "iterations": 5}, Status.ITERATION_LIMIT),
-    ]:
-        policy = baselines.make("rhc_lagrange", "varga7-fast", **parameters)
-        _, state = policy.predict(observation)
-        assert policy.report(state).status[0] == wanted
 
 
 @pytest.mark.parametrize(

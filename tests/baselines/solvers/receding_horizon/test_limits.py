@@ -9,8 +9,8 @@ import baselines
 import ikgym
 from baselines.episodes import rollouts
 from benchmarks.rivals.numpy_horizon import Horizon, beyond_limits, plan_cost
-from tests.baselines.solvers.receding_horizon.newton.interior_point.states import DT, KNOTS, horizon_of, problem_of
-from tests.baselines.solvers.receding_horizon.newton.interior_point.test_minimise import GOLDEN
+from tests.baselines.solvers.receding_horizon.newton.states import DT, KNOTS, horizon_of, problem_of
+from tests.baselines.solvers.receding_horizon.newton.test_interior_point import GOLDEN
 from tests.baselines.solvers.receding_horizon.test_rhc import observe
 from tests.limited import limited
 
@@ -119,14 +119,6 @@ def test_joints_without_a_limit_are_free():
         assert np.isfinite(episode.qdot).all()
 
 
-def test_who_plans_by_the_interior_point_method():
-    """`rhc` under limits of acceleration; the preset for real time under limits of any kind."""
-    expected = {"varga7-fast": (False, False), "tiago-turn": (False, True), "panda-turn": (True, True)}
-    for scenario, interior_point in expected.items():
-        made = tuple(baselines.make(name, scenario).interior_point for name in ("rhc", "rhc_foresight"))
-        assert made == interior_point
-
-
 PRESET = {"varga7-fast": (1, 23, 20, 10), "tiago-turn": (3, 1, 0, 0), "panda-turn": (3, 1, 0, 0)}
 
 
@@ -149,15 +141,6 @@ def test_foresight_stays_within_limits_of_position_and_velocity():
     assert episode.position_error.max() < 1e-5
 
 
-@pytest.mark.slow
-def test_foresight_stays_with_a_whole_random_motion():
-    """Its errors stay below a millimetre and no limit is run into; one Newton step a period loses this one."""
-    scenario = ikgym.scenarios.get("panda-random")
-    (episode,) = rollouts(scenario, baselines.make("rhc_foresight", scenario), [SEEDS[1]])
-    assert not episode.at_limit.any()
-    assert episode.position_error.max() < 1e-3
-
-
 def test_the_preset_looks_as_far_ahead_in_time_at_any_control_period():
     """1.5 s, and never over a stretch longer than 0.1 s at once; a knot at each step where control is slower."""
     for dt in (1e-3, 2e-3, 4e-3, 0.02, 0.2):
@@ -165,11 +148,3 @@ def test_the_preset_looks_as_far_ahead_in_time_at_any_control_period():
         times = dt * np.append(0, policy.offsets)
         assert times[-1] == pytest.approx(1.5, abs=0.51 * dt)
         assert np.diff(times).max() <= max(dt, 0.1) + dt
-
-
-@pytest.mark.slow
-def test_the_preset_follows_a_path_with_corners_at_a_slow_control_period():
-    """Blocks of as many steps as at 1 ms, of 0.02 s each, led to errors of 0.8 mm here."""
-    scenario = ikgym.scenarios.get("rlitg-hello")
-    (episode,) = rollouts(scenario, baselines.make("rhc_foresight", scenario), [0])
-    assert episode.position_error.max() < 1e-5

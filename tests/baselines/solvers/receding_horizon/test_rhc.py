@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 
-import casadi
 import gymnasium as gym
 import numpy as np
 import pytest
 
 import baselines
 import ikgym
-from baselines.episodes import rollout
-from baselines.policy import Problem
 from baselines.status import Status
-from benchmarks.rivals.casadi_horizon import OPTIONS, CasadiHorizon
+from benchmarks.rivals.casadi_horizon import CasadiHorizon
 from benchmarks.rivals.numpy_horizon import Horizon, plan_cost
 from ikgym.exceptions import InvalidInputError
 from tests.comparison import identical
@@ -140,10 +138,8 @@ def test_other_arms_and_tasks(name, horizon, count):
 @pytest.mark.parametrize(
     "parameters",
     [
-        {"horizon": 31, "move_blocks": 8},
         {"horizon": 31, "move_blocks": 8, "terminal_weight": 20.0},
         {"horizon": 9, "terminal_weight": 0.0},
-        {"horizon": 9, "terminal_weight": 5.0},
         {"horizon": 8, "move_blocks": 1},
         {"horizon": 101, "move_blocks": 12},
     ],
@@ -158,7 +154,7 @@ def test_blocked_and_weighted_horizons(parameters):
 
 
 @pytest.mark.parametrize("blocks", [None, 6])
-@pytest.mark.parametrize("left", [1, 2, 3, 5])
+@pytest.mark.parametrize("left", [1, 5])
 def test_the_horizon_ends_with_the_episode(left, blocks):
     scenario = ikgym.scenarios.get("varga7-fast")
     policy = baselines.make("rhc", scenario, horizon=15, stop_at_end=True, move_blocks=blocks)
@@ -186,75 +182,6 @@ def test_what_is_left_of_the_last_plan_is_optimal():
         _, state = policy.predict(view, state)
         if left < 14:
             assert policy.report(state).iterations.max() == 0
-
-
-@functools.cache
-def descended(name, horizon, count):
-    """Costs that long gradient descent with analytic derivatives reaches from rest."""
-    scenario = ikgym.scenarios.get(name)
-    q, nominal = states_near(scenario, horizon - 1, count, 1e-2, seed=5)
-    descent = baselines.make(
-        "rhc_gradient", scenario, horizon=horizon, gradient="analytic", tolerance=1e-3, iterations=20_000
-    )
-    _, state = descent.predict(observe(descent.problem, q, nominal))
-    plans = q[:, None] + scenario.dt * np.cumsum(state[2], axis=1)
-    return [plan_cost(descent.problem, Horizon(a, b), p) for a, b, p in zip(q, nominal, plans, strict=True)]
-
-
-#: Each scenario and each horizon; those that descend the longest are in the slow run.
-DESCENTS = [
-    pytest.param(name, horizon, marks=pytest.mark.slow if (horizon == 6) == name.endswith("slow") else ())
-    for name in VARGA
-    for horizon in (3, 6)
-]
-
-
-@pytest.mark.parametrize(("name", "horizon"), DESCENTS)
-def test_never_above_gradient_descent(name, horizon):
-    scenario = ikgym.scenarios.get(name)
-    q, nominal = states_near(scenario, horizon - 1, 20, 1e-2, seed=5)
-    costs, *_ = planned(baselines.make("rhc", scenario, horizon=horizon), q, nominal)
-    assert (costs <= np.array(descended(name, horizon, 20)) * (1.0 + RELATIVE) + ABSOLUTE).all()
-
-
-class Bounded:
-    """IPOPT with the limits of joints and velocities: the rival's residual, one more row of constraints."""
-
-    def __init__(self, problem: Problem, knots: int) -> None:
-        self.problem, self.knots = problem, knots
-        self.residual = CasadiHorizon(problem, knots)._residual
-        n, m, e, cost = problem.model.joints, problem.task.size, problem.task.error_size, problem.cost
-        y, t = casadi.SX.sym("y", n, knots), casadi.SX.sym("t", e, knots)
-        start, nominal = casadi.SX.sym("q", n), casadi.SX.sym("nominal", m, knots)
-        total, above, speeds = casadi.SX(0), [], []
-        for k in range(knots):
-            speeds.append(y[:, k] - (y[:, k - 1] if k else 0.0))
-            total += casadi.sum1((speeds[-1] / cost.delta_qdot) ** 4) + casadi.sum1(t[:, k])
-            r = self.residual(start + problem.dt * y[:, k], nominal[:, k])
-            above += [t[:, k] - r**2, t[:, k] - r**3, t[:, k] + r**3]
-        nlp = {
-            "x": casadi.vertcat(casadi.vec(y), casadi.vec(t)),
-            "p": casadi.vertcat(start, casadi.vec(nominal)),
-            "f": total,
-            "g": casadi.vertcat(*above, *speeds),
-        }
-        self.solver = casadi.nlpsol("bounded", "ipopt", nlp, OPTIONS)
-
-    def solve(self, horizon: Horizon, start: np.ndarray) -> tuple[float, bool]:
-        problem, knots, q = self.problem, self.knots, horizon.q
-        y = (start - q) / problem.dt
-        r = np.array(self.residual.map(knots)(start.T, horizon.nominal.T))
-        limit, free = np.tile(problem.velocity_limit, knots), np.full(r.size, np.inf)
-        answer = self.solver(
-            x0=np.concatenate([y.ravel(), np.maximum(r**2, abs(r) ** 3).T.ravel()]),
-            p=np.concatenate([q, horizon.nominal.ravel()]),
-            lbg=np.concatenate([np.zeros(3 * r.size), -limit]),
-            ubg=np.concatenate([np.full(3 * r.size, np.inf), limit]),
-            lbx=np.concatenate([np.tile((problem.model.lower - q) / problem.dt, knots), -free]),
-            ubx=np.concatenate([np.tile((problem.model.upper - q) / problem.dt, knots), free]),
-        )
-        path = q + problem.dt * np.array(answer["x"])[: y.size, 0].reshape(y.shape)
-        return plan_cost(problem, horizon, path), bool(self.solver.stats()["success"])
 
 
 def limited(name, speed=20.0, share=0.0):
@@ -291,11 +218,14 @@ def test_limits_are_kept_and_agree_with_ipopt(scenario, horizon, far):
     assert (plans <= upper + 1e-6).all()
     # Limits that nothing presses on would test nothing.
     assert (abs(speeds) > 1.0 - 1e-6).any() or (np.minimum(plans - lower, upper - plans) < 1e-6).any()
-    solver, compared = Bounded(policy.problem, horizon - 1), 0
+    model, n = policy.problem.model, scenario.joints
+    finite = {"lower": np.maximum(lower, -1e3), "upper": np.minimum(upper, 1e3), "acceleration_limit": np.full(n, 1e9)}
+    bounded = dataclasses.replace(policy.problem, model=model.replace(**finite))
+    solver, compared = CasadiHorizon(bounded, horizon - 1, limited=True), 0
     for cost, state, plan in zip(costs, horizons, plans, strict=True):
-        best, good = solver.solve(state, plan)
-        compared += good
-        assert cost == pytest.approx(best, rel=RELATIVE, abs=ABSOLUTE) or not good
+        best = solver.solve(state, plan)
+        compared += best.converged
+        assert cost == pytest.approx(best.cost, rel=RELATIVE, abs=ABSOLUTE) or not best.converged
     assert compared >= 6
 
 
@@ -321,36 +251,6 @@ def test_an_episode_stays_within_its_limits(iterations, share):
     assert pressed or share > 0.0
 
 
-def test_the_plant_never_holds_it_back():
-    """It knows the limits of its model; damped least squares, which does not, is held back by the very same arm."""
-    scenario = limited("varga7-fast", share=0.1).replace(steps=400)
-    arm = scenario.arm.replace(velocity_limit=np.full(7, 4.5))
-    scenario = scenario.replace(arm=arm, model=arm)
-    policies = baselines.make("rhc", scenario, horizon=8), baselines.make("dls", scenario)
-    aware, unaware = (rollout(scenario, policy, 0) for policy in policies)
-    assert not aware.at_limit.any()
-    assert unaware.at_limit[:, :2].any(axis=0).all()
-    costs = [float((episode.tracking_cost + episode.velocity_cost).sum()) for episode in (aware, unaware)]
-    assert costs[0] < costs[1]
-
-
-def test_a_single_newton_step_from_a_wrong_plan_stays_within_the_limits():
-    """The plan itself may not have come to its limits yet."""
-    scenario = limited("varga7-fast", share=0.1)
-    policy = baselines.make("rhc", scenario, horizon=8, iterations=1)
-    lower, upper = scenario.arm.lower, scenario.arm.upper
-    q, nominal = states_near(scenario, 7, 40, 1e-2, seed=4)
-    _, state = policy.predict(observe(policy.problem, q, nominal))
-    q, nominal = states_near(scenario, 7, 40, 1e-2, seed=6)
-    q = np.clip(q, lower, upper)
-    action, state = policy.predict(observe(policy.problem, q, nominal), state)
-    reached = q + scenario.dt * scenario.velocity_limit * action
-    first = policy.plan(state)[:, 0]
-    assert ((first > upper + 1e-6) | (first < lower - 1e-6)).any()  # otherwise there is nothing to see
-    assert (reached >= lower - 1e-6).all()
-    assert (reached <= upper + 1e-6).all()
-
-
 @functools.cache
 def episode(name, policy="rhc", steps=3000, **parameters):
     """Total cost, Newton steps and statuses of an episode."""
@@ -374,26 +274,6 @@ def test_one_newton_step_a_period_is_nearly_the_optimum():
     assert quick == pytest.approx(converged, rel=0.01)
     assert statuses == {Status.CONVERGED}
     assert set(made[1:]) == {1}
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["varga7-fast", "varga7-slow"])
-def test_one_newton_step_a_period_is_nearly_the_optimum_for_a_whole_episode(name):
-    assert episode(name, iterations=1)[0] == pytest.approx(episode(name)[0], rel=0.01)
-
-
-def test_newton_steps_do_not_grow_with_the_horizon():
-    """Their number, cold and warm; a step itself is linear in the knots."""
-    scenario = ikgym.scenarios.get("varga7-fast")
-    most = []
-    for horizon in (11, 41, 161, 641):
-        policy = baselines.make("rhc", scenario, horizon=horizon)
-        q, nominal = states_near(scenario, policy.preview, 8, 1e-2, seed=2)
-        _, state = policy.predict(observe(policy.problem, q, nominal))
-        assert set(policy.report(state).status) == {Status.CONVERGED}
-        most.append(float(np.median(policy.report(state).iterations)))
-    assert max(most) <= 3.0 * most[0] + 10.0
-    assert np.mean(episode("varga7-fast", steps=800)[1]) < 15.0
 
 
 RESTARTED = {"horizon": 40, "iterations": 1, "move_blocks": 12, "starts": 4, "restart_steps": 5}
@@ -435,47 +315,6 @@ def test_seeds(change, same):
     assert (first == second) == same
 
 
-def test_without_random_guesses_the_seed_changes_nothing():
-    assert episode("varga7-fast", steps=20, seed=0) == episode("varga7-fast", steps=20, seed=9)
-
-
-def test_a_new_episode_clears_the_memory():
-    scenario = ikgym.scenarios.get("varga7-fast")
-    policy = baselines.make("rhc", scenario, **RESTARTED)
-    q, nominal = states_near(scenario, policy.preview, 2, 1e-2)
-    view, other = (observe(policy.problem, q + shift, nominal) for shift in (0.0, 0.05))
-    fresh, first = policy.predict(view)
-    _, used = policy.predict(other, policy.predict(other)[1])
-    again, second = policy.predict(view, used, np.array([True, False]))
-    assert identical(again[0], fresh[0])
-    assert all(identical(a[0], b[0]) for a, b in zip(first, second, strict=True))
-    assert not identical(second[2][1], first[2][1])
-
-
-@pytest.mark.parametrize("name", ["rhc", "rhc_foresight"])
-def test_the_last_steps_of_an_episode(name):
-    more = {"horizon": 20, "stop_at_end": True} if name == "rhc" else {}
-    total, made, statuses = episode("varga7-fast", name, steps=6, **more)
-    assert np.isfinite(total)
-    assert len(made) == 6
-    assert statuses <= {Status.CONVERGED, Status.ITERATION_LIMIT}
-
-
-@pytest.mark.parametrize("parameters", [{}, {"iterations": 1}, RESTARTED])
-def test_disturbed_drives_do_no_harm(parameters):
-    plant = ikgym.Plant(bias=0.5, noise=2.0)
-    scenario = ikgym.scenarios.get("varga7-fast").replace(steps=80, plant=plant)
-    policy = baselines.make("rhc", scenario, **parameters)
-    env = gym.make("RedundantIK-v0", scenario=scenario, preview=policy.preview)
-    observation, _ = env.reset(seed=0)
-    state = None
-    for _ in range(80):
-        action, state = policy.predict(observation, state)
-        observation, *_, info = env.step(action)
-        assert all(np.isfinite(array).all() for array in state)
-        assert info["position_error"] < 0.05
-
-
 def test_nothing_finite_gives_a_nan():
     """From absurdly far away, with targets out of reach, and at the singular home."""
     scenario = ikgym.scenarios.get("varga7-fast")
@@ -510,17 +349,10 @@ def test_status_and_iterations_are_said():
     ("change", "message"),
     [
         ({"horizon": 1}, "horizon: expected a whole number of at least 2, got 1"),
-        ({"iterations": 0}, "iterations: expected a whole number of at least 1, got 0"),
-        ({"move_blocks": 0}, "move_blocks: expected a whole number of at least 1, got 0"),
         ({"move_blocks": 30}, "move_blocks: expected at most horizon - 1 = 29, a knot at each step, got 30"),
         ({"terminal_weight": -1.0}, "terminal_weight: expected a finite number of at least 0"),
-        ({"terminal_weight": np.inf}, "terminal_weight: expected a finite number"),
         ({"stop_at_end": 1}, "stop_at_end: expected True or False, got 1"),
         ({"starts": 0}, "starts: expected a whole number of at least 1"),
-        ({"restart_steps": -1}, "restart_steps: expected a whole number of at least 0"),
-        ({"start_steps": -1}, "start_steps: expected a whole number of at least 0"),
-        ({"recovery_steps": -1}, "recovery_steps: expected a whole number of at least 0"),
-        ({"seed": -1}, "seed: expected a whole number of at least 0"),
         ({"tolerance": 0.0}, "tolerance: expected a finite number above 0"),
     ],
 )

@@ -16,8 +16,8 @@ from baselines.solvers.receding_horizon.task_constraints import (
 from tests.baselines.solvers.receding_horizon.data import constraints, problem, with_tasks
 
 
-@pytest.mark.parametrize("stages", [1, 2, 5])
-@pytest.mark.parametrize("name", ["varga7-fast", "khan8-q1", "zhang3-helix", "zhang6-lspb"])
+@pytest.mark.parametrize("stages", [1, 5])
+@pytest.mark.parametrize("name", ["varga7-fast", "zhang3-helix"])
 def test_gradient_with_task_coordinates(name, stages):
     """On the constraints the derivatives along them are the plain ones, by the chain rule."""
     scenario, q, nominal, qdot = problem(name, stages)
@@ -41,8 +41,8 @@ def test_gradient_with_task_coordinates(name, stages):
         np.testing.assert_allclose(getattr(other, name), exact, atol=3e-3 * max(abs(exact).max(), 1.0))
 
 
-@pytest.mark.parametrize("stages", [1, 2, 5, 20])
-@pytest.mark.parametrize("name", ["varga7-fast", "khan8-q1", "zhang3-helix", "zhang6-lspb"])
+@pytest.mark.parametrize("stages", [1, 20])
+@pytest.mark.parametrize("name", ["varga7-fast", "zhang3-helix"])
 def test_reduced_gradient_with_task_coordinates(name, stages):
     """Against eq. 4 with multipliers by least squares, and against the plain gradient preconditioned."""
     scenario, q, nominal, qdot = problem(name, stages)

@@ -17,9 +17,6 @@ from tests.baselines.solvers.receding_horizon.newton.problems import place
 
 ARMS = ["varga7", "varga7_literal", "khan8", "zhang3", "puma560", "faitli3"]
 TASKS = ikgym.tasks.names()
-everywhere = pytest.mark.parametrize(
-    ("arm", "task", "home"), [(arm, task, home) for arm in ARMS for task in TASKS for home in (False, True)]
-)
 
 
 def scale_of(task):
@@ -74,37 +71,6 @@ def busy(arm, task, home):
     return next(at for at in places if everything_plays(at))
 
 
-@everywhere
-def test_gradient_against_central_differences(arm, task, home):
-    at = busy(arm, task, home)
-    (value, _, _), blocks = at.linearise()
-    assert value == pytest.approx(at.merit(), rel=1e-13)
-    central = differences(at.merit, at.path, 1e-5 * scale_of(task)).reshape(blocks.gradient.shape)
-    np.testing.assert_allclose(blocks.gradient, central, atol=1e-6 * abs(central).max())
-
-
-@everywhere
-def test_hessian_against_central_differences(arm, task, home):
-    at = busy(arm, task, home)
-    _, blocks = at.linearise()
-    central = differences(lambda path: at.linearise(path)[1].gradient.ravel(), at.path, 1e-5 * scale_of(task))
-    # What is left out at slow joints is the least curvature of Φ^U.
-    np.testing.assert_allclose(dense(blocks), central, atol=1e-5 * abs(central).max())
-
-
-@pytest.mark.parametrize("home", [False, True])
-@pytest.mark.parametrize("task", ["position", "skew", "matrix"])
-@pytest.mark.parametrize("arm", ARMS)
-def test_second_order_where_errors_are_large(arm, task, home):
-    """Errors of 0.3, so that the curvature of the kinematics is no longer small beside that of Gauss and Newton."""
-    at = place(arm, task, home=home, delta_x=0.3, limits=False)
-    _, blocks = at.linearise()
-    central = differences(lambda path: at.linearise(path)[1].gradient.ravel(), at.path, 1e-6)
-    largest = abs(central).max()
-    np.testing.assert_allclose(dense(blocks), central, atol=1e-5 * largest)
-    assert abs(dense(blocks, second=False) - central).max() > 1e-3 * largest
-
-
 @pytest.mark.parametrize("task", TASKS)
 @pytest.mark.parametrize("arm", ARMS)
 def test_second_derivatives_of_the_error_alone(arm, task):
@@ -129,6 +95,20 @@ def test_second_derivatives_of_the_error_alone(arm, task):
         np.testing.assert_allclose(symmetric(out), central, atol=2e-5 * max(abs(central).max(), 1.0))
 
 
+@pytest.mark.parametrize("task", TASKS)
+@pytest.mark.parametrize("arm", ARMS)
+def test_derivatives_against_central_differences(arm, task):
+    at = busy(arm, task, home=ARMS.index(arm) % 2 == 0)
+    (value, _, _), blocks = at.linearise()
+    assert value == pytest.approx(at.merit(), rel=1e-13)
+    step = 1e-5 * scale_of(task)
+    central = differences(at.merit, at.path, step).reshape(blocks.gradient.shape)
+    np.testing.assert_allclose(blocks.gradient, central, atol=1e-6 * abs(central).max())
+    central = differences(lambda path: at.linearise(path)[1].gradient.ravel(), at.path, step)
+    # What is left out at slow joints is the least curvature of Φ^U.
+    np.testing.assert_allclose(dense(at.linearise()[1]), central, atol=1e-5 * abs(central).max())
+
+
 @pytest.mark.parametrize("p_x", [1.5, 2.0, 3.5])
 def test_other_exponents(p_x):
     """With P_X up to 2 there is nothing to hold: a kink inwards, or none."""
@@ -142,19 +122,8 @@ def test_other_exponents(p_x):
     assert held[:, : at.error_size].any()
 
 
-def test_a_knot_whose_tracking_does_not_count():
-    at = place("varga7", "skew", terminal=0.0)
-    assert at.grid.tracking[-1] == 0.0
-    _, blocks = at.linearise()
-    central = differences(lambda path: at.linearise(path)[1].gradient.ravel(), at.path, 1e-9)
-    np.testing.assert_allclose(dense(blocks), central, atol=2e-6 * abs(central).max())
-    before = at.merit()
-    at.nominal[at.grid.at[-1] - 1] += 1.0
-    assert at.merit() == before
-
-
 @pytest.mark.parametrize("task", TASKS)
-@pytest.mark.parametrize("arm", ikgym.arms.names())
+@pytest.mark.parametrize("arm", ARMS)
 def test_true_cost_is_that_of_the_horizon(arm, task):
     at = place(arm, task, at=range(1, 7), terminal=1.0, limits=False)
     qdot = np.diff(np.vstack([at.start, at.path]), axis=0) / at.data.dt
@@ -180,7 +149,7 @@ def test_true_cost_is_the_weighted_sum_over_knots_and_blocks(task):
     assert true_cost(at.problem, at.path, at.workspace) == pytest.approx(total, rel=1e-12)
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(2))
 def test_the_merit_never_exceeds_the_cost_and_says_what_it_lacks(seed):
     """Without limits it is a lower bound, whatever the multipliers, and reaches the cost as they are brought up."""
     at = place("varga7", "skew", seed=seed, limits=False)
@@ -194,17 +163,3 @@ def test_the_merit_never_exceeds_the_cost_and_says_what_it_lacks(seed):
     assert value == pytest.approx(true, rel=1e-12)
     assert gap == 0.0
     assert set(abs(at.multipliers[:, : at.error_size]).ravel()) <= {0.0, 1.0}
-
-
-def test_limits_enter_the_gap():
-    at = place("varga7", "skew")
-    at.linearise(advance=True)
-    e = at.error_size
-    assert at.linearise()[0][2] > 0.0
-    at.multipliers[:, e:] = 0.0
-    for limit in (at.data.velocity_limit, at.data.upper):
-        limit[:] = np.inf
-    at.data.lower[:] = -np.inf
-    for _ in range(3):
-        at.linearise(advance=True)
-    assert at.linearise()[0][2] == 0.0

@@ -32,11 +32,6 @@ def test_offsets_rise_to_the_end_by_growing_blocks(horizon):
         assert (np.diff(lengths[:-1]) >= -1).all()  # but for rounding, they grow
 
 
-@pytest.mark.parametrize("blocks", [None, 7, 8, 100])
-def test_offsets_of_a_knot_at_each_step(blocks):
-    assert offsets(7, blocks).tolist() == [1, 2, 3, 4, 5, 6, 7]
-
-
 def test_offsets_grow_geometrically():
     assert offsets(9, 1).tolist() == [9]
     assert offsets(9, 2).tolist() == [1, 9]
@@ -44,19 +39,6 @@ def test_offsets_grow_geometrically():
     lengths = np.diff(offsets(1500, 48)).astype(float)
     ratio = lengths[21:] / lengths[20:-1]
     assert np.ptp(ratio) < 0.15
-
-
-@given(st.integers(1, 3000), st.floats(0.1, 5.0), st.floats(1.0, 400.0))
-def test_evenly_growing_offsets(steps, growth, longest):
-    at = evenly_growing_offsets(steps, growth, longest)
-    assert at.dtype == np.int64
-    assert at[-1] == steps
-    lengths = np.diff(at, prepend=0)
-    assert lengths[0] == 1
-    assert (lengths >= 1).all()
-    assert lengths.max() <= longest + 1.0  # by rounding
-    growing = np.minimum(1.0 + growth * np.arange(len(at)), longest)
-    assert np.allclose(lengths[1:-1], growing[: len(at) - 2], atol=1.0)
 
 
 def test_evenly_growing_offsets_by_hand():
@@ -92,38 +74,10 @@ def test_cut(horizon, left, terminal):
     np.testing.assert_allclose(grid.tracking, wanted, rtol=1e-9)
 
 
-@given(horizons)
-def test_weights_add_up_to_the_steps(horizon):
-    grid = grid_of(offsets(*horizon))
-    # Of the first block, the part that belongs to the present, which nothing can change, is left out.
-    assert grid.tracking.sum() == pytest.approx(horizon[0] - (grid.length[0] - 1) / 2)
-    assert grid.velocity.sum() == horizon[0]
-    if grid.length[0] == 1.0:
-        # A cost that is linear in time is summed exactly, step by step.
-        steps = np.arange(1, horizon[0] + 1)
-        assert grid.tracking @ (3.0 - 0.01 * grid.at) == pytest.approx(np.sum(3.0 - 0.01 * steps), abs=1e-8)
-
-
-def test_blocks_of_one_step_weigh_one():
-    grid = grid_of(range(1, 6))
-    np.testing.assert_array_equal(grid.tracking, 1.0)
-    np.testing.assert_array_equal(grid.velocity, 1.0)
-
-
 def slid(old, path, new, passed=None):
     out = np.full((len(new.at), path.shape[1]), np.nan)
     shift_path(old, path, np.zeros(path.shape[1]) if passed is None else passed, new, out)
     return out
-
-
-@given(horizons.filter(lambda h: h[1] > 1), st.booleans())
-def test_a_path_linear_in_time_slides_exactly(horizon, ends):
-    whole = offsets(*horizon)
-    old = grid_of(whole)
-    new = grid_of(whole, max(horizon[0] - 1, 1)) if ends else old
-    start, slope = np.array([0.3, -2.0]), np.array([1e-3, 0.7])
-    path = start + slope * old.at[:, None]
-    np.testing.assert_allclose(slid(old, path, new), start + slope * (new.at[:, None] + 1), rtol=1e-12, atol=1e-12)
 
 
 @given(horizons.filter(lambda h: h[1] > 1), st.integers(0, 2**31))

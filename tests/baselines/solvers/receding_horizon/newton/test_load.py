@@ -7,9 +7,9 @@ import pytest
 
 from baselines.solvers.receding_horizon.newton import barrier as limited
 from baselines.solvers.receding_horizon.newton.cost import linearise, merit, true_cost
-from tests.baselines.solvers.receding_horizon.newton.interior_point.test_merit import BARRIER
-from tests.baselines.solvers.receding_horizon.newton.interior_point.test_merit import place as limited_place
 from tests.baselines.solvers.receding_horizon.newton.problems import place
+from tests.baselines.solvers.receding_horizon.newton.test_barrier import BARRIER
+from tests.baselines.solvers.receding_horizon.newton.test_barrier import place as limited_place
 from tests.baselines.solvers.receding_horizon.newton.test_cost import differences
 
 PAYLOAD = np.linspace(1e-3, 2e-3, 7)
@@ -25,14 +25,6 @@ def test_a_payload_from_the_start_is_an_arm_that_stands_elsewhere():
     loaded = true_cost(at.problem._replace(load=from_knot(0)), at.path, at.workspace)
     assert loaded == pytest.approx(true_cost(elsewhere, at.path + PAYLOAD, at.workspace), rel=1e-9)
     assert loaded != pytest.approx(true_cost(at.problem, at.path, at.workspace), rel=1e-3)
-
-
-def test_it_counts_from_its_knot_on():
-    at = place("panda", "pose", limits=False)
-    half, whole = (true_cost(at.problem._replace(load=from_knot(k)), at.path, at.workspace) for k in (2, 0))
-    none = true_cost(at.problem._replace(load=from_knot(4)), at.path, at.workspace)
-    assert none == true_cost(at.problem, at.path, at.workspace)
-    assert len({half, whole, none}) == 3
 
 
 def test_the_gradient_with_a_payload_on_the_way():

@@ -8,17 +8,15 @@ import numpy as np
 import pytest
 
 import ikgym
-from baselines.solvers.linear_algebra import inverse_of_factor
 from baselines.solvers.receding_horizon.horizon import ProblemData
 from baselines.solvers.receding_horizon.newton.cost import true_cost
-from baselines.solvers.receding_horizon.newton.minimise import CONVERGED, RAN_OUT, NewtonSettings, minimise
+from baselines.solvers.receding_horizon.newton.minimise import CONVERGED, NewtonSettings, minimise
 from baselines.solvers.receding_horizon.newton.newton_step import newton_step
 from baselines.solvers.receding_horizon.newton.workspace import PathProblem, newton_workspace
 from ikgym import TrackingCost
 from ikgym.arms import Arm
 from ikgym.kernels import tasks as task_kernels
-from ikgym.kernels.linear_algebra import cholesky
-from tests.baselines.solvers.receding_horizon.newton.problems import grid_of, place
+from tests.baselines.solvers.receding_horizon.newton.problems import grid_of
 from tests.baselines.solvers.receding_horizon.newton.test_cost import dense
 
 
@@ -45,7 +43,7 @@ def step_of(blocks, exact, damping):
 
 @pytest.mark.parametrize("damping", [0.0, 0.7])
 @pytest.mark.parametrize("exact", [False, True])
-@pytest.mark.parametrize(("knots", "n"), [(1, 1), (1, 7), (2, 3), (5, 7), (30, 8)])
+@pytest.mark.parametrize(("knots", "n"), [(1, 1), (2, 3), (30, 8)])
 def test_step_against_a_dense_solve(knots, n, exact, damping):
     blocks = random_blocks(knots, n, np.random.default_rng(knots))
     good, step = step_of(blocks, exact, damping)
@@ -63,27 +61,6 @@ def test_what_is_not_convex_is_refused_and_damped(knots):
     assert step_of(blocks, False, -1.01 * least)[0]
     blocks.gradient[:] = blocks.diagonal[:] = np.nan
     assert not step_of(blocks, False, 0.0)[0]
-
-
-@pytest.mark.parametrize("arm", ["varga7", "khan8", "zhang3"])
-def test_step_at_a_path(arm):
-    at = place(arm, "skew")
-    _, blocks = at.linearise()
-    good, step = step_of(blocks, False, 0.0)
-    assert good
-    wanted = np.linalg.solve(dense(blocks, second=False), -blocks.gradient.ravel())
-    np.testing.assert_allclose(step.ravel(), wanted, atol=1e-9 * abs(wanted).max())
-
-
-@pytest.mark.parametrize("n", [1, 2, 7, 12])
-def test_inverse_of_factor(n):
-    half = np.random.default_rng(n).normal(size=(n, n + 2))
-    matrix = half @ half.T + 0.1 * np.eye(n)
-    factor, out = np.tril(matrix), np.full((n, n), np.nan)
-    assert cholesky(factor)
-    inverse_of_factor(factor, out)
-    np.testing.assert_allclose(out, np.linalg.inv(matrix), atol=1e-9)
-    np.testing.assert_array_equal(out, out.T)
 
 
 # One joint that slides along x, both powers 2 for velocities, Δx = Δt Δq̇ = s: with y = (q - q_0) / s and the goal at d,
@@ -148,14 +125,6 @@ def test_limits_of_two_knots_by_hand():
     y, _, outcome, *_ = slider([0.0, 6.0], speed=2.0, tolerance=1e-9)
     assert outcome == CONVERGED
     np.testing.assert_allclose(y[1] - y[0], 2.0, rtol=1e-5)
-
-
-def test_iterations_run_out_and_are_counted():
-    *_, made, value, _, _ = slider(4.0, most=1)
-    assert slider(4.0, most=1)[2] == RAN_OUT
-    assert made == 1
-    assert value > slider(4.0)[4]
-    assert slider(0.0)[2:5] == (CONVERGED, 0, 0.0)
 
 
 @pytest.mark.parametrize("goal", [3.0, 10.0, 30.0])

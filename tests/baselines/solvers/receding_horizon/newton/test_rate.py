@@ -88,12 +88,6 @@ def test_step_against_a_dense_solve(knots, n, exact, damping):
     np.testing.assert_allclose(step.ravel(), np.linalg.solve(matrix, -blocks.gradient.ravel()), atol=1e-11)
 
 
-def test_what_is_not_convex_is_refused():
-    blocks = random_blocks(4, 3, np.random.default_rng(0), convex=False)
-    blocks.far[:] = 0.0
-    assert not pentadiagonal_step(blocks, False, 0.0, np.empty((4, 3, 3)), np.empty((3, 3)), np.empty((4, 3)))
-
-
 def ipopt(policy, horizon, qdot, start):
     """The cheapest plan with changes of velocity, by IPOPT from a plan; its cost, changes apart."""
     problem, knots, h = policy.problem, horizon.knots, horizon.lengths

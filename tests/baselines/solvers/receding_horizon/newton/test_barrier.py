@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from baselines.solvers.receding_horizon.newton.barrier import ANEW, KEPT, Barrier, linearise, merit
+from baselines.solvers.receding_horizon.newton.barrier import ANEW, Barrier, linearise, merit
 from baselines.solvers.receding_horizon.newton.cost import true_cost
-from baselines.solvers.receding_horizon.newton.workspace import GRADIENT, MULTIPLIER, newton_workspace
+from baselines.solvers.receding_horizon.newton.workspace import newton_workspace
 from benchmarks.rivals.numpy_horizon import beyond_limits
-from tests.baselines.solvers.receding_horizon.newton.interior_point.states import (
+from tests.baselines.solvers.receding_horizon.newton.states import (
     draw,
     horizon_of,
     path_problem,
@@ -34,7 +34,7 @@ def place(at=(1, 2, 4, 7), task="pose", braking=True, **changes):
 
 
 @pytest.mark.parametrize("braking", [False, True])
-@pytest.mark.parametrize("at", [(1,), (1, 2), (3, 5, 6), (1, 2, 4, 7)])
+@pytest.mark.parametrize("at", [(1,), (3, 5, 6), (1, 2, 4, 7)])
 @pytest.mark.parametrize("task", ["pose", "position"])
 def test_derivatives_against_central_differences(at, task, braking):
     problem, path, workspace = place(at, task, braking)
@@ -61,20 +61,6 @@ def test_derivatives_against_central_differences(at, task, braking):
     np.testing.assert_allclose(wrong, 0.0, atol=(1e-5 if task == "position" else 1e-2) * abs(central).max())
 
 
-def test_changes_of_velocity_cost_what_they_do_elsewhere():
-    problem, path, workspace = place(rate_weight=0.0)
-    more = problem._replace(rate_weight=3.0)
-    extra = merit(more, path, BARRIER, workspace) - merit(problem, path, BARRIER, workspace)
-    newton = workspace
-    assert extra == pytest.approx(true_cost(more, path, newton) - true_cost(problem, path, newton), rel=1e-9)
-    linearise(problem, path, BARRIER, ANEW, False, workspace)
-    without = workspace.model.gradient.copy()
-    linearise(more, path, BARRIER, ANEW, False, workspace)
-    central = differences(lambda x: merit(more, x, BARRIER, workspace), path, 1e-8).reshape(path.shape)
-    np.testing.assert_allclose(workspace.model.gradient, central, atol=1e-5 * abs(central).max())
-    assert not np.allclose(without, central, rtol=1e-3)
-
-
 @pytest.mark.parametrize("at", [(1, 2, 3), (1, 2, 4, 7)])
 def test_it_tends_to_the_cost_and_the_weighted_excess(at):
     """With μ to 0 what is left is the cost and w times all that is beyond a limit."""
@@ -92,20 +78,6 @@ def test_it_tends_to_the_cost_and_the_weighted_excess(at):
     beyond += (np.maximum(np.maximum(path - arm.upper, arm.lower - path), 0.0) / step).sum()
     assert excess == pytest.approx(beyond, rel=1e-9)
     assert beyond > 0.1
-
-
-def test_multipliers_go_on_as_the_primal_dual_equations_say():
-    """After a full Newton step of a quadratic model they are μ / room; after none they stay."""
-    problem, path, workspace = place()
-    linearise(problem, path, BARRIER, ANEW, False, workspace)
-    before = workspace.barriers[..., MULTIPLIER].copy()
-    np.testing.assert_array_equal(before, workspace.barriers[..., GRADIENT])
-    linearise(problem, path, BARRIER._replace(mu=15.0), KEPT, False, workspace)
-    np.testing.assert_allclose(workspace.barriers[..., MULTIPLIER], before)
-    moved = path + 1e-9
-    linearise(problem, path, BARRIER, ANEW, False, workspace)
-    linearise(problem, moved, BARRIER, 1.0, False, workspace)
-    np.testing.assert_allclose(workspace.barriers[..., MULTIPLIER], workspace.barriers[..., GRADIENT], rtol=1e-3)
 
 
 def test_braking_counts_at_the_last_knot():

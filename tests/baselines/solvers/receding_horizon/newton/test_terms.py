@@ -1,13 +1,16 @@
-"""Kinks and limits held by multipliers: smooth, convex, from below, and exact in the end."""
+"""The smooth terms of kinks and limits: by their definitions, and their derivatives by differences."""
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.optimize import minimize_scalar
 
-from baselines.solvers.receding_horizon.newton.terms import augmented_term
+from baselines.solvers.receding_horizon.newton.terms import augmented_term, primal_dual_curvature, smoothed
 from ikgym.kernels.jit import kernel
 
 LOW, HIGH = -0.7, 1.2
@@ -59,31 +62,6 @@ def test_slope_and_curvature_are_derivatives(x, term):
     assert linear == pytest.approx(slope * (x - bound) if slope else 0.0, abs=1e-12 * size)
 
 
-@given(xs, xs, terms, st.floats(0.0, 1.0))
-def test_is_convex(a, b, term, share):
-    at = term_at(share * a + (1 - share) * b, *term)[0]
-    between = share * term_at(a, *term)[0] + (1 - share) * term_at(b, *term)[0]
-    assert at <= between + 1e-9 * (1.0 + abs(between))
-
-
-@given(xs, kinks)
-def test_a_kink_is_touched_from_below(x, term):
-    beyond = max(x - HIGH, LOW - x, 0.0)
-    value, slope, _, _ = term_at(x, *term)
-    assert value <= beyond + 1e-12
-    # With the multiplier that it answers, again and again, it comes to the kink itself.
-    for _ in range(2000):
-        slope = term_at(x, slope, *term[1:])[1]
-    far = min(abs(x - HIGH), abs(x - LOW))
-    if far > 0.02:
-        assert term_at(x, slope, *term[1:])[0] == pytest.approx(beyond, abs=1e-9)
-
-
-@given(st.floats(LOW, HIGH), terms)
-def test_inside_the_bounds_the_term_vanishes_with_no_multiplier(x, term):
-    assert term_at(x, 0.0, *term[1:]) == (0.0, 0.0, 0.0, 0.0)
-
-
 @pytest.mark.parametrize("largest", [1.0, np.inf])
 @pytest.mark.parametrize(("goal", "wanted"), [(1.6, 0.4), (-1.0, -0.3)])
 def test_multipliers_converge_to_the_minimum_on_the_bound(goal, wanted, largest):
@@ -97,3 +75,27 @@ def test_multipliers_converge_to_the_minimum_on_the_bound(goal, wanted, largest)
         multiplier = term_at(x, multiplier, 5.0, largest)[1]
     assert x == pytest.approx(HIGH if goal > 0.0 else LOW, abs=1e-12)
     assert multiplier == pytest.approx(wanted, abs=1e-12)
+
+
+PLACES = pytest.mark.parametrize("u", [-30.0, -1.0, -1e-3, 0.0, 1e-3, 1.0, 30.0])
+
+
+@PLACES
+@pytest.mark.parametrize(("weight", "mu"), [(1.0, 0.1), (7.0, 0.3), (100.0, 2.0)])
+def test_value_is_the_least_over_what_lies_above(u, weight, mu):
+    def over(above):  # above the larger of 0 and u
+        t = max(0.0, u) + above
+        return weight * t - mu * math.log(weight * t / mu) - mu * math.log(weight * (t - u) / mu)
+
+    best = minimize_scalar(lambda log: over(math.exp(log)), bounds=(-20.0, 5.0), method="bounded").fun
+    assert smoothed(u, weight, mu).value == pytest.approx(best, rel=1e-6, abs=1e-6)
+
+
+@PLACES
+def test_derivatives_against_central_differences(u):
+    weight, mu, h = 3.0, 0.2, 1e-5
+    here, low, high = (smoothed(at, weight, mu) for at in (u, u - h, u + h))
+    assert here.gradient == pytest.approx((high.value - low.value) / (2.0 * h), abs=1e-8)
+    # With the multiplier that the barrier itself has, the primal-dual curvature is its second derivative.
+    curvature = primal_dual_curvature(here, weight, here.gradient)
+    assert curvature == pytest.approx((high.gradient - low.gradient) / (2.0 * h), rel=1e-5, abs=1e-9)

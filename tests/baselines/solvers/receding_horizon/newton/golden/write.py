@@ -1,6 +1,6 @@
 """Writes `horizons.json`: optima of horizons of the Panda within the limits of its joints, by IPOPT.
 
-    python -m tests.baselines.solvers.receding_horizon.newton.interior_point.golden.write    # needs CasADi
+    python -m tests.baselines.solvers.receding_horizon.newton.golden.write    # needs CasADi
 
 A line a state: joint coordinates, joint velocities and the nominal path (see `states.State`), the cost of the plan that
 IPOPT finds from rest at the start, and how many positions, velocities and accelerations of that plan are at a limit.
@@ -16,7 +16,7 @@ import numpy as np
 
 from benchmarks.rivals.casadi_horizon import CasadiHorizon
 from benchmarks.rivals.numpy_horizon import Horizon
-from tests.baselines.solvers.receding_horizon.newton.interior_point.states import (
+from tests.baselines.solvers.receding_horizon.newton.states import (
     DT,
     KNOTS,
     draw,

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import ikgym
-from baselines.solvers.receding_horizon.newton.minimise import CONVERGED, RAN_OUT, STALLED
+from baselines.solvers.receding_horizon.newton.minimise import CONVERGED, STALLED
 from benchmarks.rivals.numpy_horizon import Horizon, beyond_limits, plan_cost
-from tests.baselines.solvers.receding_horizon.newton.interior_point.states import (
+from tests.baselines.solvers.receding_horizon.newton.states import (
     State,
     draw,
     horizon_of,
@@ -74,14 +74,6 @@ def test_optimum_between_uneven_knots_is_ipopts(at, braking):
         assert max(beyond_limits(problem, horizon, path, braking).values()) < 1e-9
 
 
-def test_gauss_newton_finds_the_same_optimum():
-    problem = problem_of()
-    horizon = horizon_of(problem, GOLDEN[3][0])
-    minimum, _ = solved(problem, horizon, exact=False)
-    assert minimum.outcome == CONVERGED
-    assert minimum.cost == pytest.approx(GOLDEN[3][1], rel=1e-6)
-
-
 def test_without_limits_in_reach_it_finds_what_newton_finds():
     """With limits far away the optimum is that of the augmented Lagrangian."""
     from baselines.solvers.receding_horizon.newton.minimise import NewtonSettings, minimise
@@ -112,14 +104,6 @@ def goals(x, knots):
     return nominal
 
 
-def test_far_from_its_goal_an_arm_accelerates_as_it_may():
-    problem = problem_of(slider(), "position")
-    horizon = Horizon(np.zeros(1), goals(0.05, 20), qdot=np.zeros(1))
-    minimum, path = solved(problem, horizon, braking=False, tolerance=1e-10)
-    assert minimum.outcome == CONVERGED
-    np.testing.assert_allclose(np.diff(np.append([0.0, 0.0], path[:, 0]), 2), 10.0 * 2e-3**2, rtol=1e-5)
-
-
 def test_it_stops_before_the_end_of_its_joint():
     """With the goal beyond the limit the arm goes as fast as it can still stop, behind the last knot, too."""
     problem = problem_of(slider(upper=[0.03]), "position")
@@ -145,29 +129,3 @@ def test_where_limits_cannot_be_kept_it_says_so():
     assert minimum.outcome == STALLED
     assert np.isfinite(path).all()
     assert max(beyond_limits(problem, horizon, path).values()) > 0.0
-
-
-def test_a_stop_in_the_last_moment_is_possible():
-    """Braking all the way is the only path within the limits: nothing lies inside of them."""
-    problem = problem_of(slider(upper=[0.2]), "position")
-    horizon = Horizon(np.zeros(1), goals(0.5, 10), qdot=np.full(1, 2.0))
-    minimum, path = solved(problem, horizon)
-    assert minimum.outcome == CONVERGED
-    np.testing.assert_allclose(np.diff(path[:, 0]) / 2e-3, 2.0 - 0.02 * np.arange(2, 11), atol=1e-3)
-
-
-def test_steps_run_out():
-    problem = problem_of()
-    minimum, path = solved(problem, horizon_of(problem, GOLDEN[0][0]), steps=3)
-    assert minimum.outcome == RAN_OUT
-    assert minimum.steps == 3
-    assert np.isfinite(path).all()
-
-
-def test_a_start_at_the_optimum_stays():
-    problem = problem_of()
-    horizon = horizon_of(problem, GOLDEN[1][0])
-    _, best = solved(problem, horizon)
-    minimum, path = solved(problem, horizon, path=best)
-    assert minimum.outcome == CONVERGED
-    np.testing.assert_allclose(path, best, atol=1e-5)
