@@ -11,7 +11,6 @@ machine code by name. The name is the same in all processes, and whoever loads t
 
 from __future__ import annotations
 
-import contextlib
 import functools
 import gc
 import hashlib
@@ -20,7 +19,7 @@ import itertools
 import logging
 import pickle
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
@@ -29,9 +28,7 @@ from typing import Any
 import llvmlite.binding as llvm
 from numba import njit, types
 from numba.core.compiler import Compiler
-from numba.core.compiler_lock import global_compiler_lock
 from numba.core.dispatcher import Dispatcher
-from numba.core.sigutils import normalize_signature
 
 logger = logging.getLogger("ikgym")
 
@@ -46,9 +43,6 @@ _stamps: dict[str, str] = {}
 
 # Stamps of single kernels.
 _stamps_of_kernels: dict[Any, str] = {}
-
-# Not empty while kernels are compiled for other kernels.
-_called_by_kernels: list[None] = []
 
 # Names of kernels for which there is no folder on disk.
 _not_kept: set[str] = set()
@@ -128,17 +122,11 @@ class _Compiler(Compiler):
                 gc.enable()
 
     def define_pipelines(self) -> Any:
-        if _called_by_kernels:
-            self.state.targetctx.create_cpython_wrapper = _no_wrapper
         function = self.state.func_id.func
         if function in _stamps_of_kernels and _find(function.__module__, function.__qualname__, function):
             self.state.func_id.unique_id = _stamps_of_kernels[function][:16]
             self.state.func_id.unique_name = f"{function.__qualname__}${self.state.func_id.unique_id}"
         return super().define_pipelines()  # type: ignore[no-untyped-call]
-
-
-def _no_wrapper(*_: Any, **__: Any) -> None:
-    """In place of numba's wrapper for calls from Python: for a tuple of twenty arrays it took half of the time."""
 
 
 @dataclass(frozen=True)
@@ -161,20 +149,9 @@ class _Callee:
         importlib.import_module(self.module)
         if (compiled := _find(self.module, self.name)) is None:
             raise ImportError(f"{self.module} has no kernel {self.name}.")
-        with _for_kernels():
-            compiled.compile(self.arguments)
+        compiled.compile(self.arguments)
         if compiled.overloads[self.arguments].fndesc.llvm_func_name != self.symbol:
             raise ImportError(f"{self.module}.{self.name} is another one.")
-
-
-@contextlib.contextmanager
-def _for_kernels() -> Iterator[None]:
-    """Within it kernels are compiled to be called by kernels."""
-    _called_by_kernels.append(None)
-    try:
-        yield
-    finally:
-        _called_by_kernels.pop()
 
 
 def _find(module: str, name: str, function: Any = None) -> Any:
@@ -192,7 +169,7 @@ def _linked(compiled: Any) -> Any:
         return compiled
     dispatcher: Any = compiled
     function, engine = compiled.py_func, dispatcher.targetctx.codegen()._engine
-    add, compile_, template = dispatcher.add_overload, dispatcher.compile, dispatcher.get_call_template
+    add, template = dispatcher.add_overload, dispatcher.get_call_template
 
     def add_overload(result: Any) -> None:
         # What a callee needs, its callers need: numba forgets it of what it loads from disk.
@@ -205,37 +182,21 @@ def _linked(compiled: Any) -> Any:
             library._shared_module = llvm.parse_assembly("")
             arguments = tuple(result.fndesc.argtypes)
             library._reload_init.add(_Callee(function.__module__, function.__qualname__, arguments, symbol))
-        if engine.is_symbol_defined(result.fndesc.llvm_cpython_wrapper_name):
-            add(result)
-        else:
-            compiled.overloads[tuple(result.signature.args)] = result
-
-    def compile_for(signature: Any) -> Any:
-        with global_compiler_lock:
-            arguments, _ = normalize_signature(signature)  # type: ignore[no-untyped-call]
-            known: Any = dispatcher.overloads.get(tuple(arguments))
-            if known and not (_called_by_kernels or engine.is_symbol_defined(known.fndesc.llvm_cpython_wrapper_name)):
-                del compiled.overloads[tuple(known.signature.args)]  # compiled once more, to be called from Python
-            return compile_(signature)
+        add(result)
 
     def get_call_template(arguments: Any, named: Any) -> Any:
         # numba would compile a kernel once for each constant that it is called with.
         unliteral: Any = types.unliteral
-        with _for_kernels():
-            return template(tuple(map(unliteral, arguments)), {name: unliteral(kind) for name, kind in named.items()})
+        return template(tuple(map(unliteral, arguments)), {name: unliteral(kind) for name, kind in named.items()})
 
-    dispatcher.add_overload, dispatcher.compile = add_overload, compile_for
-    dispatcher.get_call_template = get_call_template
+    dispatcher.add_overload, dispatcher.get_call_template = add_overload, get_call_template
     disk = getattr(getattr(compiled, "_cache", None), "_impl", None)
     if disk is not None:
         rebuild = disk.rebuild
 
         def rebuilt(context: Any, payload: Any) -> Any:
-            (_, _, (machine_code, _)), names = payload[:2]
-            if (wrapper := names.llvm_cpython_wrapper_name).encode() in machine_code:
-                engine._defined_symbols.add(wrapper)  # numba looks for it in the copy for callers, which is empty
-            elif not _called_by_kernels:
-                return None
+            # numba looks for names in the copy for callers, which is empty.
+            engine._defined_symbols.add(payload[1].llvm_cpython_wrapper_name)
             return rebuild(context, payload)
 
         disk.rebuild = rebuilt
