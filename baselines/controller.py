@@ -100,7 +100,7 @@ class Controller:
 
     @property
     def ahead(self) -> int:
-        """How many poses of the reference the policy looks ahead."""
+        """Number of reference poses that the policy looks ahead."""
         return furthest(self.policy.preview)
 
     @property
@@ -115,7 +115,7 @@ class Controller:
         return self.policy.report(self._state)
 
     def _applied(self, q: FloatArray, command: FloatArray, last: FloatArray) -> FloatArray:
-        """What the limits of the model make of a command. Shapes (n,)."""
+        """A command within the limits of the model. Shapes (n,)."""
         if not len(self._limits):
             return command
         out = np.empty_like(command)

@@ -1,4 +1,4 @@
-"""Kernels: what the steps of all policies share, from the observations to the cut to the velocity limit."""
+"""Kernels shared by all policies, from the observation to the cut at the velocity limit."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Ints = npt.NDArray[np.int64]
 
 _SATURATED, _DIVERGED = int(Status.SATURATED), int(Status.DIVERGED)
 
-#: What the kernel of a step returns for observations that are not finite; else it is what :func:`cut_rows` says.
+#: Result of a step's kernel for observations that are not finite; otherwise that of :func:`cut_rows`.
 REFUSED = 2
 
 # The bits of the exponent: all of them are set in infinities and in what is no number, and nowhere else.
@@ -48,7 +48,7 @@ class Model(NamedTuple):
         chain: The model of the arm.
         kind: The kind of task coordinates, one of those of :mod:`ikgym.kernels.tasks`.
         dt: Δt in [s].
-        unit: What an action of 1 means, in [rad/s] or [m/s]. Shape (n,).
+        unit: Joint velocity of an action of 1, in [rad/s] or [m/s]. Shape (n,).
         lower: Least joint coordinates in [rad] or [m]. Shape (n,).
         upper: Largest joint coordinates in [rad] or [m]. Shape (n,).
         largest: Largest joint velocities in [rad/s] or [m/s]. Shape (n,).

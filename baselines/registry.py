@@ -22,13 +22,13 @@ from ikgym.validation import known_names
 #: The entry points that other packages register policies by: ``name = "module:Class"``.
 GROUP = "ikgym.policies"
 
-#: How a place is written: ``package.module:Class``.
+#: How a import_path is written: ``package.module:Class``.
 PLACE = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*(\.[^\W\d]\w*)*")
 
 _SOLVERS = "baselines.solvers"
 
 #: Names, in the order of tables, and where their classes are.
-_places: dict[str, str] = {
+_import_paths: dict[str, str] = {
     "moore_penrose": f"{_SOLVERS}.resolved_rate.moore_penrose:MoorePenrose",
     "dls": f"{_SOLVERS}.resolved_rate.dls:DampedLeastSquares",
     "jacobian_transpose": f"{_SOLVERS}.resolved_rate.jacobian_transpose:JacobianTranspose",
@@ -74,30 +74,30 @@ _incomplete: dict[str, str] = {
 
 def names() -> tuple[str, ...]:
     """The names of all policies that need no more than a scenario; nothing is imported for them."""
-    return *_places, *(name for name in _entry_points() if name not in _places)
+    return *_import_paths, *(name for name in _entry_points() if name not in _import_paths)
 
 
-def register(name: str, place: str | type[SolverPolicy]) -> None:
+def register(name: str, import_path: str | type[SolverPolicy]) -> None:
     """Adds a policy of your own.
 
     Results have the name that it is registered by, whatever the class calls itself.
 
     Args:
         name: Its new name.
-        place: Where its class is, ``"package.module:Class"``, imported when it is first asked for; or the class.
+        import_path: Where its class is, ``"package.module:Class"``, imported when it is first asked for; or the class.
 
     Raises:
-        InvalidInputError: The name is taken or no name, the place has another form, or the class is no policy.
+        InvalidInputError: The name is taken or no name, the import_path has another form, or the class is no policy.
     """
     if not isinstance(name, str) or not re.fullmatch(r"\w[\w.-]*", name):
         raise InvalidInputError(f"policy: expected a name of letters, digits, '_', '-' and '.', got {name!r}.")
     if name in names() or name in _incomplete:
         raise InvalidInputError(f"The policy {name!r} is registered already.")
-    if isinstance(place, type):
-        _classes[name] = checked_class(place)
-        _places[name] = place_of(place)
+    if isinstance(import_path, type):
+        _classes[name] = checked_class(import_path)
+        _import_paths[name] = place_of(import_path)
     else:
-        _places[name] = _checked(place)
+        _import_paths[name] = _checked(import_path)
 
 
 def get(name: str) -> type[SolverPolicy]:
@@ -105,12 +105,12 @@ def get(name: str) -> type[SolverPolicy]:
 
     Raises:
         UnknownNameError: There is no such policy; the message has the nearest name.
-        InvalidInputError: What it was registered with cannot be imported, or is no policy.
+        InvalidInputError: The registered class cannot be imported, or is no policy.
     """
     if not known(name):
         raise UnknownNameError("policy", name, (*names(), *_incomplete))
     if name not in _classes:
-        _classes[name] = resolve({**_entry_points(), **_places, **_incomplete}[name])
+        _classes[name] = resolve({**_entry_points(), **_import_paths, **_incomplete}[name])
     return _classes[name]
 
 
@@ -120,48 +120,50 @@ def known(name: object) -> bool:
 
 
 def name_of(kind: type[SolverPolicy]) -> str:
-    """What results call a class: the name that it is registered by, else its place."""
-    place = place_of(kind)
-    named = (name for name, where in {**_entry_points(), **_places, **_incomplete}.items() if where == place)
-    return next((name for name in named if get(name) is kind), place)
+    """Name of a class in results: its name in the registry, else its import path."""
+    import_path = place_of(kind)
+    named = (
+        name for name, where in {**_entry_points(), **_import_paths, **_incomplete}.items() if where == import_path
+    )
+    return next((name for name in named if get(name) is kind), import_path)
 
 
 def place_of(kind: type[Any]) -> str:
-    """Where a class is: ``"package.module:Class"``."""
+    """Import path of a class: ``"package.module:Class"``."""
     return f"{kind.__module__}:{kind.__qualname__}"
 
 
-def resolve(place: str) -> type[SolverPolicy]:
-    """The class at a place.
+def resolve(import_path: str) -> type[SolverPolicy]:
+    """The class at a import_path.
 
     Args:
-        place: ``"package.module:Class"``.
+        import_path: ``"package.module:Class"``.
 
     Raises:
         InvalidInputError: It cannot be imported, or is no class of policies.
     """
-    return checked_class(load(place), place)
+    return checked_class(load(import_path), import_path)
 
 
-def load(place: str) -> object:
-    """Whatever is at a place.
+def load(import_path: str) -> object:
+    """Whatever is at a import_path.
 
     Args:
-        place: ``"package.module:attribute"``.
+        import_path: ``"package.module:attribute"``.
 
     Raises:
         InvalidInputError: It has another form, or cannot be imported.
     """
-    module, _, attribute = _checked(place).partition(":")
+    module, _, attribute = _checked(import_path).partition(":")
     try:
         return functools.reduce(getattr, attribute.split("."), importlib.import_module(module))
     except Exception as e:  # whatever the module of somebody else raises
-        raise InvalidInputError(f"Policy {place!r}: cannot be imported: {type(e).__name__}: {e}.") from e
+        raise InvalidInputError(f"Policy {import_path!r}: cannot be imported: {type(e).__name__}: {e}.") from e
 
 
-def imported(place: str) -> object:
-    """What is at a place whose module has been imported; None where it has not, or there is nothing."""
-    module, _, attribute = place.partition(":")
+def imported(import_path: str) -> object:
+    """The object at an import path whose module has been imported; None if it has not, or there is none."""
+    module, _, attribute = import_path.partition(":")
     found: object = sys.modules.get(module)
     for name in attribute.split("."):
         found = getattr(found, name, None)
@@ -173,7 +175,7 @@ def make(name: str, scenario: str | Scenario, **parameters: Any) -> SolverPolicy
 
     Args:
         name: One of :func:`names`, or ``"agent"`` with the `path` of its file.
-        scenario: What is to be tracked, as :func:`ikgym.scenarios.find` takes it. The policy is handed the scenario's
+        scenario: The tracking problem, as :func:`ikgym.scenarios.find` takes it. The policy is handed the scenario's
             model of the arm, not the arm itself.
         **parameters: The policy's own, see its class.
 
@@ -195,31 +197,31 @@ _classes: dict[str, type[SolverPolicy]] = {}
 
 @functools.cache
 def _entry_points() -> dict[str, str]:
-    """What other packages have registered; what has the name of one of ours is theirs to rename.
+    """Policies that other packages have registered, except those with the name of one of ours.
 
     Nothing is checked before it is asked for: one bad entry must not take the other policies away.
     """
-    # Extras behind the place, as in "module:Class [extra]", are for installers.
+    # Extras behind the import_path, as in "module:Class [extra]", are for installers.
     return {one.name: one.value.partition("[")[0].strip() for one in importlib.metadata.entry_points(group=GROUP)}
 
 
-def checked_class(kind: object, place: str | None = None) -> type[SolverPolicy]:
+def checked_class(kind: object, import_path: str | None = None) -> type[SolverPolicy]:
     """The same class.
 
     Raises:
         InvalidInputError: It is none of policies, or is abstract.
     """
-    if place is None:
-        place = place_of(kind) if isinstance(kind, type) else repr(kind)
+    if import_path is None:
+        import_path = place_of(kind) if isinstance(kind, type) else repr(kind)
     if not (isinstance(kind, type) and issubclass(kind, SolverPolicy)):
-        raise InvalidInputError(f"Policy {place!r}: expected a class derived from SolverPolicy, got {kind!r}.")
+        raise InvalidInputError(f"Policy {import_path!r}: expected a class derived from SolverPolicy, got {kind!r}.")
     if inspect.isabstract(kind):
         missing = ", ".join(sorted(kind.__abstractmethods__))
-        raise InvalidInputError(f"Policy {place!r}: the class lacks {missing}.")
+        raise InvalidInputError(f"Policy {import_path!r}: the class lacks {missing}.")
     return kind
 
 
-def _checked(place: object) -> str:
-    if not isinstance(place, str) or not PLACE.fullmatch(place):
-        raise InvalidInputError(f"policy: expected 'package.module:Class', got {place!r}.")
-    return place
+def _checked(import_path: object) -> str:
+    if not isinstance(import_path, str) or not PLACE.fullmatch(import_path):
+        raise InvalidInputError(f"policy: expected 'package.module:Class', got {import_path!r}.")
+    return import_path

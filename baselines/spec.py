@@ -28,7 +28,7 @@ def parse_policy(spec: PolicySpec) -> tuple[str, dict[str, Any]]:
     if isinstance(spec, str):
         name, _, text = spec.partition(":")
         name = name.strip()
-        alone, known = registry.get(name).nameless, registry.get(name).parameter_names()
+        alone, known = registry.get(name).positional, registry.get(name).parameter_names()
         if alone is not None and text.strip() and text.partition("=")[0].strip() not in known:
             parameters: dict[str, Any] = {alone: text.strip()}
         else:
@@ -70,7 +70,7 @@ def parse_parameters(text: str, source: str) -> dict[str, Any]:
 
     Args:
         text: ``"name=value,name=value"``; values are Python's literals, anything else is taken for plain text.
-        source: What it is part of, for the message.
+        source: Its context, for the message.
 
     Raises:
         InvalidInputError: The text has another form, or names one twice.

@@ -1,4 +1,4 @@
-"""How a solve went. A failed solve is data, not an exception."""
+"""Status of a solve. A failed solve is data, not an exception."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 
 class Status(enum.IntEnum):
-    """What a solver says of one step, from good to bad.
+    """Status of a solver in one step, from good to bad.
 
     A row of results has the worst status of its episode.
     """

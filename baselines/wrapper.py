@@ -21,11 +21,11 @@ from ikgym.validation import FloatArray, known_names
 
 
 class InnerStep(NamedTuple):
-    """What the inner policy did in a step.
+    """Results of the inner policy in a step.
 
     Attributes:
         action: Its actions, as `predict` returns them. Shape (B, n).
-        memory: What it remembers, without names.
+        memory: Its memory, without names.
         status: Values of :class:`baselines.status.Status`. Shape (B,).
         iterations: Iterations made. Shape (B,).
     """
@@ -56,7 +56,7 @@ class Wrapper(SolverPolicy, abc.ABC):
     `predict` does. Its memory stands behind the wrapper's own.
 
     Args:
-        problem: What the policy is told of the scenario.
+        problem: The scenario as the policy knows it.
     """
 
     #: The inner policy; None for an agent without a base policy.
@@ -93,7 +93,7 @@ class Wrapper(SolverPolicy, abc.ABC):
 
     @functools.cached_property
     def _own(self) -> tuple[int, Any]:
-        """How many arrays the wrapper's own memory has, and its type."""
+        """Number of arrays in the wrapper's own memory, and its type."""
         own = self.own_memory(1)
         return len(own), type(own)
 
@@ -101,14 +101,14 @@ class Wrapper(SolverPolicy, abc.ABC):
         """The inner policy's step.
 
         Args:
-            batch: What it is shown, see :meth:`SolverPolicy.act`.
+            batch: Its observations, see :meth:`SolverPolicy.act`.
             memory: Its part of the memory.
         """
         assert self.inner is not None
         return InnerStep.of(self.inner, batch, memory)
 
     def solution(self, qdot: FloatArray, own: Memory, step: InnerStep) -> Solution:
-        """What `solve` returns: status and iterations are those of the inner policy.
+        """The result of `solve`: status and iterations are those of the inner policy.
 
         Args:
             qdot: Joint velocities in [rad/s] or [m/s]. Shape (B, n).
@@ -123,7 +123,7 @@ class Wrapper(SolverPolicy, abc.ABC):
         return pack(*self.report(state), remembered(state)[size:])
 
     def diagnostics(self, state: Memory) -> dict[str, FloatArray]:
-        """What the inner policy shows of itself."""
+        """Diagnostics of the inner policy."""
         return {} if self.inner is None else self.inner.diagnostics(self.inner_state(state))
 
 
@@ -132,7 +132,7 @@ class NamedWrapper(Wrapper, abc.ABC):
     """A wrapper that is told by a parameter which policy it wraps.
 
     Args:
-        problem: What the policy is told of the scenario.
+        problem: The scenario as the policy knows it.
         policy: The name of the inner policy.
         options: Its parameters; those left out have its defaults.
 
@@ -164,7 +164,7 @@ class NamedWrapper(Wrapper, abc.ABC):
         object.__setattr__(self, "options", inner.parameters)
 
     def inner_problem(self) -> Problem:
-        """What the inner policy is told of the scenario."""
+        """The scenario as the inner policy knows it."""
         return self.problem
 
     @property

@@ -23,7 +23,7 @@ class Table:
         conditions: How the figures were measured, in sentences.
         columns: The heads of the columns, with their units.
         rows: The figures by name, None for a missing one.
-        skipped: What could not be measured, and why.
+        skipped: Rows that could not be measured, and why.
     """
 
     title: str

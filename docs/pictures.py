@@ -29,7 +29,7 @@ REFERENCE = {"color": style.INK, "ls": (0, (3, 2))}
 
 
 class Track(NamedTuple):
-    """What is drawn of an episode.
+    """Parts of the picture of an episode.
 
     Args:
         q: Joint coordinates in [rad] or [m]. Shape (steps, n).

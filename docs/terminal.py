@@ -30,7 +30,7 @@ def called(arguments: Sequence[str]) -> bool:
 
 @functools.cache
 def manual_of(*words: str) -> str:
-    """What ``ikgym WORDS --help`` prints."""
+    """Output of ``ikgym WORDS --help``."""
     out = io.StringIO()
     with terminal(), contextlib.redirect_stdout(out), contextlib.suppress(SystemExit):
         called([*words, "--help"])

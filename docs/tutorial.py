@@ -41,7 +41,7 @@ def played(text: str, folder: Path) -> str:
 
 
 def _printed(kind: str, content: str, names: dict[str, Any]) -> str:
-    """What a block prints; of a command that fails its message, too."""
+    """Output of a block; of a command that fails its message, too."""
     out, err = io.StringIO(), io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
         if kind == "python":
@@ -57,8 +57,8 @@ def _printed(kind: str, content: str, names: dict[str, Any]) -> str:
 @contextlib.contextmanager
 def _no_names_of_snippets() -> Iterator[None]:
     """The registry of a new process: a command knows no policy that a snippet has registered."""
-    own = {name: place for name, place in registry._places.items() if place.startswith("baselines.")}
-    with mock.patch.object(registry, "_places", own), mock.patch.object(registry, "_classes", {}):
+    own = {name: place for name, place in registry._import_paths.items() if place.startswith("baselines.")}
+    with mock.patch.object(registry, "_import_paths", own), mock.patch.object(registry, "_classes", {}):
         yield
 
 

@@ -229,7 +229,7 @@ class Simulator:
 
     @property
     def true_q(self) -> FloatArray:
-        """Where the arms are, in [rad] or [m], whatever is measured. Shape (N, n)."""
+        """True joint coordinates, in [rad] or [m]. Shape (N, n)."""
         return self._state.q
 
     @property

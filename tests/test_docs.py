@@ -314,7 +314,7 @@ def test_evaluation_snippets_run(capsys, tmp_path, monkeypatch):
 
 
 def test_policies_snippets_run(monkeypatch):
-    monkeypatch.setattr(registry, "_places", dict(registry._places))
+    monkeypatch.setattr(registry, "_import_paths", dict(registry._import_paths))
     monkeypatch.setattr(registry, "_classes", dict(registry._classes))
     own, real, adapting = snippets_of("policies.md")
     names = {"__name__": __name__}

@@ -39,7 +39,7 @@ def differences(one, other):
 @pytest.fixture(autouse=True)
 def names_stay_as_they_were(monkeypatch):
     """A tutorial registers a policy."""
-    monkeypatch.setattr(registry, "_places", dict(registry._places))
+    monkeypatch.setattr(registry, "_import_paths", dict(registry._import_paths))
     monkeypatch.setattr(registry, "_classes", dict(registry._classes))
 
 

@@ -21,7 +21,7 @@ class Bounds:
     Args:
         limits: See :func:`limits_with_braking`. Shape (5, n).
         dt: Δt in [s].
-        velocity_limit: What an action of 1 means, in [rad/s] or [m/s]. Shape (n,).
+        velocity_limit: Joint velocity of an action of 1, in [rad/s] or [m/s]. Shape (n,).
     """
 
     limits: FloatArray

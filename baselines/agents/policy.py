@@ -127,7 +127,7 @@ class Agent(LearnedPolicy):
     given: dataclasses.InitVar[AgentFile | None] = dataclasses.field(default=None, kw_only=True)
 
     name: ClassVar[str] = "agent"
-    nameless: ClassVar[str] = "path"
+    positional: ClassVar[str] = "path"
     decisive: ClassVar[tuple[str, ...]] = ("path",)
 
     def __post_init__(self, given: AgentFile | None) -> None:

@@ -73,11 +73,11 @@ def specification(item: AnyPolicy, *, wrap: Wrap | None = None) -> Specification
     if isinstance(item, tuple) and len(item) == 2 and isinstance(item[0], type) and isinstance(item[1], Mapping):
         return _of_class(item[0], item[1], wrap)
     if (found := parse_place(item)) is not None:
-        place, parameters = found
-        content = registry.load(place)
+        import_path, parameters = found
+        content = registry.load(import_path)
         if isinstance(content, type) and issubclass(content, SolverPolicy):
-            return _of_class(registry.resolve(place), parameters, wrap)
-        return ObjectSpecification(place, place, parameters, wrap)
+            return _of_class(registry.resolve(import_path), parameters, wrap)
+        return ObjectSpecification(import_path, import_path, parameters, wrap)
     if not isinstance(item, (str, tuple)):
         raise InvalidInputError(
             "policy: expected a name, 'package.module:Class', a class, or an object with the predict of "

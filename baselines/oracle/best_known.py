@@ -24,7 +24,7 @@ from ikgym.scenarios import Scenario
 Key = tuple[str, int]
 #: The records that come with the package.
 DATA = pathlib.Path(__file__).parents[1] / "data" / "best_known.json"
-#: What brings them up to date.
+#: The command that updates them.
 UPDATE = "ikgym oracle --update"
 #: A best known cost up to here is rounding: an arm that may move where costs do not count can come to zero, and no
 #: ratio to that means anything.
@@ -43,9 +43,9 @@ class Record:
         scenario: Its name.
         seed: The reset seed.
         cost: The lowest total cost that was found.
-        found_by: What found it, in words.
+        found_by: The method that found it, in words.
         gradient_norm: Norm of the cost's gradient there, in [s/rad] or [s/m].
-        spread: What several starts came to, by name, such as the number of them and the worst.
+        spread: Statistics of the starts by name, such as their number and the worst.
         hash: Of the episode, see :func:`baselines.fingerprints.episode_hash`.
     """
 
@@ -66,7 +66,7 @@ class _Records(NamedTuple):
 
 
 class Scored(Protocol):
-    """What says which episode was played, and what it cost: a :class:`baselines.evaluation.metrics.Row`."""
+    """The identity and cost of an episode: a :class:`baselines.evaluation.metrics.Row`."""
 
     @property
     def scenario(self) -> str: ...  # noqa: D102
@@ -92,7 +92,7 @@ def cost(scenario: Scenario, seed: int, arm_seed: int | None = None) -> float | 
 
 
 def costs(scenario: Scenario, seeds: Iterable[int]) -> list[float | None]:
-    """What :func:`cost` says of several episodes, in one go."""
+    """:func:`cost` of several episodes."""
     if not scenario.plant.ideal:
         return [cost(scenario, seed) for seed in seeds]
     content = fingerprint(scenario)
@@ -111,7 +111,7 @@ def record(records: Iterable[Record], path: pathlib.Path = DATA) -> list[Record]
     """Keeps records that are better than those that are there, or of another content.
 
     Args:
-        records: What was found.
+        records: The records.
         path: The file; it is replaced in one go, and stays as it is if nothing is better. Several processes may write
             into it: each waits for the others.
 

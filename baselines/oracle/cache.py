@@ -26,7 +26,7 @@ from ikgym.validation import FloatArray, whole_number
 
 logger = logging.getLogger("ikgym")
 
-#: What paths are called that the search has found for the episode with an ideal plant.
+#: Name of paths found for the episode with an ideal plant.
 IDEAL = "optimum with an ideal plant"
 #: The environment variable that says where optima are kept.
 VARIABLE = "IKGYM_CACHE"
@@ -49,7 +49,7 @@ def solve(
     arm that moves.
 
     Args:
-        scenario: What is tracked, or its name.
+        scenario: The tracking problem, or its name.
         seed: The reset seed.
         how: How thoroughly is searched.
         arm_seed: Which arm moves; the seed's own if left out.
@@ -84,7 +84,7 @@ def solve(
 
 
 def kept(scenario: Scenario, seed: int, how: Search, arm_seed: int | None = None) -> Optimum | None:
-    """What lies on disk of an episode, see :func:`solve`; None where nothing does."""
+    """The optimum of an episode on disk, see :func:`solve`; None if there is none."""
     known = _read(_place(scenario, seed, how, arm_seed))
     # The name is not part of the content.
     return None if known is None else known.replace(scenario=scenario.name)
@@ -108,7 +108,7 @@ def _same(one: Scenario, other: Scenario) -> bool:
 
 
 def folder() -> pathlib.Path:
-    """Where optima are kept: what the variable IKGYM_CACHE says, or the user's folder for such files."""
+    """Folder of optima: that of the variable IKGYM_CACHE, or the user's cache folder."""
     if given := os.environ.get(VARIABLE):
         return pathlib.Path(given)
     home = pathlib.Path.home()

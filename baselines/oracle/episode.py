@@ -33,7 +33,7 @@ class EpisodeProblem:
     them, which cost nothing, and rests in the last, which counts.
 
     Args:
-        scenario: What is tracked.
+        scenario: The tracking problem.
         seed: The reset seed.
         data: The arm itself, not its model, with its limits of position and velocity.
         start: Joint coordinates at the start in [rad] or [m]. Shape (n,).
@@ -93,7 +93,7 @@ class EpisodeProblem:
         return PathProblem(self.data, grid, self.start, self.nominal, rest, 0.0, change, False, self._load(grid))
 
     def _load(self, grid: Grid) -> FloatArray:
-        """What the payload adds to the zeros of the joints at the knots; (0, n) where there is none. Shape (K, n)."""
+        """Offset of the joint zeros by the payload at the knots; (0, n) where there is none. Shape (K, n)."""
         plant, n = self.scenario.plant, self.scenario.joints
         if not np.any(plant.payload):
             return np.zeros((0, n))

@@ -25,14 +25,14 @@ STEPS, PRECISION = 50, 1e-4
 SLACK = 10.0 * LEFT
 # A branch that gains less than this share is the same path.
 GAIN = 1e-4
-# How often a branch is blended with another path, and how often it comes back to its own; else it goes its own way.
+# Probability that a branch is blended with another path, and that it returns to its own.
 BLENDED, BACK = 0.6, 0.2
 # Knots over which two paths are blended, as a share of all, at most.
 BLEND = 0.3
 
 
 class Improved(NamedTuple):
-    """What became of S paths.
+    """Results of S paths.
 
     Attributes:
         costs: Their costs. Shape (S,).

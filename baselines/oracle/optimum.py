@@ -1,4 +1,4 @@
-"""What a search is asked for, and what it answers."""
+"""Settings and results of a search."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ import numpy as np
 from baselines.oracle.best_known import MARGIN, MEANINGLESS, Record
 from ikgym.validation import FloatArray, Frozen, read_only, whole_number
 
-#: What starts are called that were drawn, and paths that the iterated local search has found.
+#: Names of random starts, and of paths found by iterated local search.
 RANDOM, LOCAL_SEARCH = "random start", "local search"
 SEARCHED = (RANDOM, LOCAL_SEARCH)
 
 
 @dataclasses.dataclass(frozen=True)
 class Search(Frozen):
-    """How thoroughly is searched.
+    """Effort of a search.
 
     Args:
         starts: Random starts, on a coarse time grid.
@@ -48,7 +48,7 @@ class Search(Frozen):
 
 @dataclasses.dataclass(frozen=True)
 class Start:
-    """What came of one start.
+    """Result of one start.
 
     Args:
         kind: Where the path came from, in words.
@@ -76,7 +76,7 @@ class Optimum(Frozen):
         seed: The reset seed.
         q: Joint coordinates after each step, in [rad] or [m]. Shape (steps, n).
         qdot: Joint velocities that lead there, within the velocity limit, in [rad/s] or [m/s]. Shape (steps, n).
-        cost: What the environment charges for them.
+        cost: Their cost in the environment.
         gradient_norm: Norm of the cost's gradient there, by q / Δt, in [s/rad] or [s/m].
         starts: All starts.
         seconds: CPU time that one path took at full resolution, in [s].
@@ -99,12 +99,12 @@ class Optimum(Frozen):
 
     @property
     def found_by(self) -> str:
-        """What kinds of starts led there, to within a millionth of the cost."""
+        """Kinds of starts that led there, to within a millionth of the cost."""
         return "; ".join(dict.fromkeys(one.kind for one in self.starts if self._reached(one)))
 
     @property
     def spread(self) -> dict[str, float]:
-        """How far the starts came.
+        """Statistics of the starts.
 
         ``starts`` on the coarse grid, how many of them came ``within_1_percent`` of the best there without
         local search, the ``median`` and ``worst`` cost of those that keep the limits; paths ``polished`` at

@@ -27,11 +27,11 @@ class Oracle(PrivilegedPath):
     the best path that the search has found; nobody certifies that there is none better.
 
     Args:
-        problem: What the policy is told of the scenario.
+        problem: The scenario as the policy knows it.
         seed: Which episode of a random scenario to play.
         starts: Random starts of the search.
         generations: Generations of its local search, 0 to leave that out.
-        scenario: What is tracked.
+        scenario: The tracking problem.
 
     Raises:
         InvalidInputError: The scenario is random and there is no seed, its drives or sensors are not ideal, or a

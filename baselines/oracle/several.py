@@ -26,7 +26,7 @@ class Wanted:
     """An episode whose best known cost is wanted.
 
     Args:
-        scenario: What is tracked.
+        scenario: The tracking problem.
         draw: Which of its episodes.
         how: How thoroughly is searched.
         policies: Specs of policies whose paths are starts, too.
@@ -105,14 +105,14 @@ def path(scenario: Scenario, seed: int, spec: str) -> FloatArray:
 
 
 def _kept(one: Wanted) -> Optimum | None:
-    """What lies on the disk of this machine."""
+    """Optima on the disk of this machine."""
     if not one.cached or one.policies:
         return None
     return kept(one.scenario, one.draw.seed, one.how, one.draw.arm_seed)
 
 
 def _check(one: Wanted, optimum: Optimum) -> None:
-    """Insists that this machine charges the same for a path."""
+    """Checks that this machine charges the same for a path."""
     episode = EpisodeProblem.of(stripped(one.scenario, one.draw.seed, one.draw.arm_seed), one.draw.seed)
     _, cost = episode.play(optimum.qdot)
     if not math.isclose(cost, optimum.cost, rel_tol=TOLERANCE, abs_tol=MEANINGLESS):

@@ -12,7 +12,7 @@ import numpy as np
 from ikgym.plant import Plant
 from ikgym.scenarios import Scenario
 
-#: What is said where drives and sensors have been left out.
+#: Note where drives and sensors are left out.
 NOTE = "without drives and sensors"
 
 

@@ -1,4 +1,4 @@
-"""What policies are written with: their base, what they are told, see and remember, and what they answer."""
+"""Building blocks of policies: base class, problem, observations, memory and solution."""
 
 from __future__ import annotations
 

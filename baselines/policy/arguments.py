@@ -23,7 +23,7 @@ from ikgym.validation import FloatArray
 
 
 class Report(NamedTuple):
-    """What a solver says of its last step; read from the state by `SolverPolicy.report`."""
+    """Status and iterations of the last step; read from the state by `SolverPolicy.report`."""
 
     status: npt.NDArray[np.int64]
     iterations: npt.NDArray[np.int64]
@@ -42,7 +42,7 @@ def pack(status: npt.NDArray[np.int64], iterations: npt.NDArray[np.int64], memor
     Args:
         status: Values of :class:`baselines.status.Status`. Shape (B,).
         iterations: Iterations made. Shape (B,).
-        memory: What the solver remembers, each array with a leading axis of B.
+        memory: Memory of the solver, each array with a leading axis of B.
     """
     return status, iterations, *memory
 
@@ -53,7 +53,7 @@ def remembered(state: Memory) -> Memory:
 
 
 def signature(example: Memory, rows: int) -> Signature:
-    """What the arrays of a memory of so many rows are to be.
+    """Shapes and types of a memory of so many rows.
 
     Args:
         example: The memory of one row.
@@ -67,7 +67,7 @@ def checked_memory(name: str, state: object, expected: Signature, rows: int) -> 
 
     Args:
         name: The policy's, for messages.
-        state: What is to be a state.
+        state: The alleged state.
         expected: See :func:`signature`.
         rows: B, of the observations that come with it.
 
@@ -156,8 +156,8 @@ class ObservationReader:
 
     Args:
         name: The policy's, for messages.
-        problem: What the policy is told of the scenario.
-        preview: What the policy has to be shown.
+        problem: The scenario as the policy knows it.
+        preview: The preview that the policy needs.
     """
 
     def __init__(self, name: str, problem: Problem, preview: Preview) -> None:

@@ -1,4 +1,4 @@
-"""What a policy is told of a scenario, what it sees, and what it returns."""
+"""Input and output of a policy: problem, observations, solution."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ Memory = tuple[npt.NDArray[Any], ...]
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Problem(Frozen):
-    """What a policy is told of a scenario: its model of the arm, which may differ from the arm that moves.
+    """The scenario as a policy knows it: with the model of the arm, which may differ from the arm that moves.
 
     Args:
         model: The arm as the solver knows it.
         task: The task coordinates.
         cost: The stage cost.
         dt: Δt in [s].
-        velocity_limit: What an action of 1 means, in [rad/s] or [m/s]. Shape (n,).
+        velocity_limit: Joint velocity of an action of 1, in [rad/s] or [m/s]. Shape (n,).
     """
 
     model: Arm
@@ -47,7 +47,7 @@ class Problem(Frozen):
 
     @classmethod
     def of(cls, scenario: Scenario) -> Self:
-        """What a scenario tells."""
+        """The problem of a scenario."""
         return cls(scenario.model, scenario.task, scenario.cost, scenario.dt, scenario.velocity_limit)
 
 
@@ -77,11 +77,11 @@ class Batch(NamedTuple):
 
 
 class Solution(NamedTuple):
-    """What a solver returns.
+    """The result of a solver.
 
     Attributes:
         qdot: Joint velocities in [rad/s] or [m/s]. Shape (B, n).
-        memory: What the solver wants back at the next step, each array with a leading axis of B.
+        memory: Memory for the next step, each array with a leading axis of B.
         status: Values of :class:`Status`. Shape (B,).
         iterations: Iterations made. Shape (B,).
     """

@@ -56,12 +56,12 @@ class SolverPolicy(Frozen, abc.ABC):
     step to step travels through ``state``. It never touches an environment.
 
     Args:
-        problem: What the policy is told of the scenario.
+        problem: The scenario as the policy knows it.
     """
 
     problem: Problem
 
-    #: What messages call the policy; that of the class if left out. Results have the name in the registry.
+    #: Name of the policy in messages; that of the class by default. Results have the name in the registry.
     name: ClassVar[str]
     #: Whether the policy knows more than its observation: a reference, not a contender.
     reference: ClassVar[bool] = False
@@ -78,7 +78,7 @@ class SolverPolicy(Frozen, abc.ABC):
     #: Whether the policy is read from a file, as learned agents are.
     from_file: ClassVar[bool] = False
     #: The parameter that stands alone behind the name, as in ``"agent:PATH"``; None where all of them have to be named.
-    nameless: ClassVar[str | None] = None
+    positional: ClassVar[str | None] = None
     #: Parameters without which nobody can tell whether the policy suits a scenario.
     decisive: ClassVar[tuple[str, ...]] = ()
 
@@ -97,7 +97,7 @@ class SolverPolicy(Frozen, abc.ABC):
         """The policy for a scenario.
 
         Args:
-            scenario: What is to be tracked; only what :class:`Problem` holds is passed on.
+            scenario: The tracking problem; the policy receives its :class:`Problem` only.
             **parameters: The policy's own.
 
         Raises:
@@ -117,12 +117,12 @@ class SolverPolicy(Frozen, abc.ABC):
 
     @property
     def preview(self) -> Preview:
-        """How many steps ahead the policy must be shown, or a tuple of which ones."""
+        """Number of steps ahead that the policy must see, or a tuple of steps."""
         return 1
 
     @property
     def commands(self) -> int:
-        """How many of its last commands the policy must be shown."""
+        """Number of its last commands that the policy must see."""
         return 0
 
     def memory(self, rows: int) -> Memory:
@@ -156,7 +156,7 @@ class SolverPolicy(Frozen, abc.ABC):
             observation: As the environment gives it; single, or all arrays with a leading batch axis B. Its
                 ``nominal`` must show the steps 1, 2, … ahead, or just those of :attr:`preview` where that is a tuple:
                 an environment made with another tuple shows others, which no policy can tell from these.
-            state: What the last call returned; None at the first.
+            state: State that the last call returned; None at the first.
             episode_start: True where an episode begins, and the memory is to be cleared. Shape (B,).
             deterministic: Changes nothing; solvers do not draw at random.
 
@@ -177,7 +177,7 @@ class SolverPolicy(Frozen, abc.ABC):
         return action, after
 
     def act(self, batch: Batch, memory: Memory) -> tuple[npt.NDArray[np.float32], Memory]:
-        """What `predict` does with observations that are known to be good, as policies around other ones may know.
+        """`predict` without checks, for observations that are known to be valid, as in wrappers.
 
         Args:
             batch: The observations, with no more steps ahead than the policy asks for; C-contiguous.
@@ -211,7 +211,7 @@ class SolverPolicy(Frozen, abc.ABC):
         return replace_rows(memory, self.memory(len(rows)), rows) if memory else memory
 
     def diagnostics(self, state: Memory) -> dict[str, FloatArray]:
-        """What a solver can show of how it came to its answer, by name; read from the state that `predict` returned.
+        """Diagnostics of the last solve by name, read from the state that `predict` returned.
 
         Returns:
             Arrays with a leading axis of B; nothing for most solvers.
@@ -225,7 +225,7 @@ class SolverPolicy(Frozen, abc.ABC):
         return ObservationReader(self.name, self.problem, self.preview)
 
     def _answer(self, parts: Parts, single: bool, memory: Memory) -> tuple[npt.NDArray[np.float32], Memory]:
-        """What `predict` returns, for the arrays of an observation and a memory whose shapes are right."""
+        """The result of `predict`, for observations and memory of the right shapes."""
         batch = as_batch(parts, single)
         if not all_finite(*batch[: len(OBSERVED)]):
             raise not_finite()
@@ -256,7 +256,7 @@ class SolverPolicy(Frozen, abc.ABC):
 
     @functools.cached_property
     def _signature(self) -> Callable[[int], Signature]:
-        """What the memory of so many rows is; kept, since `predict` is called with as many again and again."""
+        """Specification of the memory of so many rows; cached, since `predict` often has as many again."""
         return functools.lru_cache(16)(functools.partial(signature, self._example))
 
     @functools.cached_property

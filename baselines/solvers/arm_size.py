@@ -1,4 +1,4 @@
-"""How large an arm is: what parameters with a length in their unit are chosen by where they are left out."""
+"""The size of an arm, from which parameters with a length in their unit take their defaults."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ikgym.kernels import tasks as task_kernels
 from ikgym.tasks import Task
 from ikgym.validation import FloatArray
 
-# What a length in [m] is multiplied by for the square of :func:`radian`, in [m]: measured, see there.
+# Factor from a length in [m] to the square of :func:`radian`, in [m]: measured, see there.
 RADIAN = 0.28
 # ‖∂x/∂q‖² of the orientation's numbers for a joint that turns at 1 rad/s, at most.
 _TURNING = {
@@ -29,7 +29,7 @@ def length(arm: Arm) -> float:
 
 
 def radian(arm: Arm) -> float:
-    """What an error of 1 rad counts as beside one of position, in [m], for steps along Jᵀ.
+    """Weight of an error of 1 rad against one of position, in [m], for steps along Jᵀ.
 
     The square root of length times 0.28 m. Joints turn positions by 0.3 times the length or so, and with that much for
     1 rad both parts of the error would go back equally fast; but in the cost 1 m counts as much as 1 rad, whatever the
@@ -40,11 +40,11 @@ def radian(arm: Arm) -> float:
 
 
 def error_weights(task: Task, metres: float) -> FloatArray:
-    """What the squares of the error's components count, in [m²] of the position's.
+    """Weights of the squares of the error's components, in [m²] of the position's.
 
     Args:
         task: The task coordinates.
-        metres: What 1 rad, or 1 in a rotation matrix, counts as, in [m].
+        metres: Weight of 1 rad, or of 1 in a rotation matrix, in [m].
 
     Returns:
         1 for components of the position, the square of ``metres`` for others. Shape (e,).
@@ -55,7 +55,7 @@ def error_weights(task: Task, metres: float) -> FloatArray:
 
 
 def position_rows(task: Task) -> slice:
-    """Where the position is in an error: first for rotation vectors and axes, last behind parts of a matrix."""
+    """Slice of the position in an error: first for rotation vectors and axes, last behind parts of a matrix."""
     first = task.kind in (task_kernels.POSE, task_kernels.AXIS)
     return slice(0, 3) if first else slice(task.error_size - 3, task.error_size)
 
@@ -66,14 +66,14 @@ def jacobian_bound(arm: Arm, task: Task | None, metres: float = 1.0) -> float:
     Args:
         arm: The arm; its prismatic joints are taken to be at home.
         task: The task coordinates x; None for a position alone.
-        metres: What 1 rad counts as, in [m].
+        metres: Weight of 1 rad, in [m].
     """
     turning = 0.0 if task is None else _TURNING[task.kind] * metres * metres
     return float(np.where(arm.prismatic, 1.0, _levers(arm) ** 2 + turning).sum())
 
 
 def _levers(arm: Arm) -> FloatArray:
-    """How far the tool can be from each joint, in [m]. Shape (n,)."""
+    """Largest distance of the tool from each joint, in [m]. Shape (n,)."""
     links = np.append(np.linalg.norm(arm.offsets[1:], axis=1), np.linalg.norm(arm.tool))
     levers: FloatArray = np.cumsum(links[::-1])[::-1]
     return levers

@@ -1,1 +1,1 @@
-"""What MkDocs runs to make a site of these pages: ``make docs``."""
+"""Programs of MkDocs that make a site of these pages: ``make docs``."""

@@ -1,4 +1,4 @@
-"""What MkDocs calls: pages that are generated, and links that lead out of the folder of the pages."""
+"""Hooks of MkDocs: generated pages, and links out of the folder of the pages."""
 
 from __future__ import annotations
 

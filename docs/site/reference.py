@@ -11,7 +11,7 @@ from baselines import cli
 from baselines.training.methods import METHODS
 from docs.terminal import manual_of
 
-#: What each page of the reference has, by module: its public names, or those that are listed.
+#: Content of each page of the reference, by module: its public names, or those that are listed.
 PAGES: dict[str, dict[str, tuple[str, ...]]] = {
     "ikgym": {
         "ikgym": (),

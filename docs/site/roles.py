@@ -27,7 +27,7 @@ class Roles(griffe.Extension):
 
         Args:
             pkg: The package.
-            loader: What has loaded it.
+            loader: The loader.
         """
         self._collect(pkg)
         self._rewrite(pkg)

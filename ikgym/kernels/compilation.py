@@ -17,7 +17,7 @@ def announced(what: str, patience: float = 2.0) -> Iterator[None]:
     """Says so if what is inside takes long.
 
     Args:
-        what: What is being compiled.
+        what: Name of the compiled part.
         patience: Time after which the user is told, in [s].
     """
     timer = threading.Timer(patience, _tell, [what])

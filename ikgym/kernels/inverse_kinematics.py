@@ -31,7 +31,7 @@ SMALLEST_DAMPING = 1e-13
 
 
 class Ranges(NamedTuple):
-    """Where joint coordinates may be, and where restarts are drawn from, in [rad] or [m].
+    """Ranges of joint coordinates and of restarts, in [rad] or [m].
 
     Attributes:
         lower: Lower limits, -inf where there is none. Shape (n,).
@@ -47,11 +47,11 @@ class Ranges(NamedTuple):
 
 
 class Settings(NamedTuple):
-    """How a pose is looked for.
+    """Settings of a solve.
 
     Attributes:
         tolerance: Largest distance from the pose in [m], and largest angle in [rad].
-        length: What an angle of 1 rad counts as, in [m].
+        length: Weight of an angle of 1 rad, in [m].
         restarts: Random starts after the first one.
         key: Key of the random starts.
     """
@@ -63,7 +63,7 @@ class Settings(NamedTuple):
 
 
 class Work(NamedTuple):
-    """What a solve works in: a posture, its pose, and a step from it; m is 3 without orientation, and 6 with it.
+    """Workspace of a solve: a posture, its pose, and a step from it; m is 3 without orientation, and 6 with it.
 
     Attributes:
         q: Shape (n,).
@@ -250,7 +250,7 @@ def _unwind(prismatic, ranges, start, q):
 
 @kernel
 def _error(pose, length, work):
-    """What ``work.rotation`` and ``work.position`` lack to the pose."""
+    """The error of ``work.rotation`` and ``work.position``."""
     rotation, position = pose
     error = work.error
     for i in range(3):

@@ -32,7 +32,7 @@ from numba.core.dispatcher import Dispatcher
 
 logger = logging.getLogger("ikgym")
 
-# What reading a file of another version, or a damaged one, raises.
+# Errors of reading a file that is damaged or of another version.
 UNREADABLE = (EOFError, pickle.UnpicklingError, ValueError, TypeError, AttributeError, ImportError)
 
 # LLVM inlines hardly any function of more instructions.

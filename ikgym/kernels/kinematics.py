@@ -155,7 +155,7 @@ def forward_and_jacobian_rows(chain, q, rotation, position, jacobian):
 
 @kernel
 def joint_points(chain, q, points):
-    """Where each joint begins and ends, for drawing.
+    """Begin and end of each joint, for drawing.
 
     Args:
         chain: The arm, a :class:`Chain`.

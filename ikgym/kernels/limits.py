@@ -29,8 +29,8 @@ def driven(limits, j, command, last, slack, at_limit, row):
         limits: Shape (4, n).
         j: The joint.
         command: In [rad/s] or [m/s].
-        last: What was applied in the step before, in [rad/s] or [m/s].
-        slack: What a joint may lose without being held back, in [rad/s] or [m/s].
+        last: Velocity applied in the previous step, in [rad/s] or [m/s].
+        slack: Loss of velocity below which a joint does not count as held back, in [rad/s] or [m/s].
         at_limit: Joints held back; those by velocity and by acceleration are counted on. Shape (N, 3).
         row: The arm.
     """
@@ -44,7 +44,7 @@ def driven(limits, j, command, last, slack, at_limit, row):
 
 @inlined
 def stopped(limits, j, here, reached, dt):
-    """Where joint ``j``, which would pass a stop, comes to stand, and the velocity that takes it there.
+    """Final coordinate of joint ``j``, which would pass a stop, and the velocity that leads there.
 
     Args:
         limits: Shape (4, n).
@@ -65,10 +65,10 @@ def applied(limits, q, command, last, dt, out):
     """The joint velocities that limits make of a command, as in a step of the environment.
 
     Args:
-        limits: What :func:`ikgym.arms.limits.limit_rows` gives for an arm that has some. Shape (4, n).
+        limits: Result of :func:`ikgym.arms.limits.limit_rows` for an arm with limits. Shape (4, n).
         q: Joint coordinates in [rad] or [m]. Shape (n,).
         command: Joint velocities in [rad/s] or [m/s]. Shape (n,).
-        last: What was applied in the step before. Shape (n,).
+        last: Velocity applied in the previous step. Shape (n,).
         dt: Δt in [s].
         out: Receives what is applied in this one. Shape (n,).
     """

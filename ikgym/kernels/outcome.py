@@ -1,4 +1,4 @@
-"""What N arms show after a step, in one block of numbers and as arrays."""
+"""Observation and cost of N arms after a step, in one block of numbers and as arrays."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ Floats = npt.NDArray[np.float64]
 
 
 class Outcome(NamedTuple):
-    """What the N arms show after a step: the observation, then what the step cost.
+    """Results of a step of N arms: the observation, then the costs.
 
     Attributes:
         numbers: All of it in one block, which the others are views of; see :func:`outcome`.
@@ -52,7 +52,7 @@ class Outcome(NamedTuple):
     true_pose: Floats
 
 
-#: What a policy sees, see :func:`observation`.
+#: The observation, see :func:`observation`.
 Observation = dict[str, Floats]
 #: Its keys in all scenarios.
 OBSERVED = ("q", "qdot", "pose", "nominal", "remaining")
@@ -61,7 +61,7 @@ SOMETIMES = ("q_age", "pose_age", "commands")
 
 
 def observation(out: Outcome, row: int | None = None) -> Observation:
-    """What a policy sees of all arms, or of one, without a row axis: the observation of the environment."""
+    """The observation of all arms, or of one arm without a row axis."""
     keys = (*OBSERVED, *(key for key in SOMETIMES if getattr(out, key).size))
     return {key: getattr(out, key) if row is None else getattr(out, key)[row] for key in keys}
 

@@ -29,19 +29,19 @@ Flags = npt.NDArray[np.bool_]
 
 
 class Constants(NamedTuple):
-    """What is the same in all rows and at all times.
+    """Constants of all rows and steps.
 
     Attributes:
         kind: The kind of task coordinates, see :mod:`ikgym.kernels.tasks`.
         dt: Δt in [s].
-        velocity_limit: What an action of 1 means, in [rad/s] or [m/s]. Shape (n,).
+        velocity_limit: Joint velocity of an action of 1, in [rad/s] or [m/s]. Shape (n,).
         steps: Steps of an episode.
         point: Where the nominal point that is the target after k steps is among the state's frames.
             Shape (steps + furthest preview + 1,).
         counted: Whether costs count at the k-th step, that is whether it is the last of its point.
             Shape (steps + 1,).
         preview: How many steps ahead the nominal coordinates are shown. Shape (p,).
-        limits: What :func:`ikgym.arms.limits.limit_rows` gives. Shape (4, n), or (0, n) where there are none.
+        limits: Result of :func:`ikgym.arms.limits.limit_rows`. Shape (4, n), or (0, n) where there are none.
     """
 
     kind: int
@@ -55,7 +55,7 @@ class Constants(NamedTuple):
 
 
 class State(NamedTuple):
-    """Where the N arms are, and where they are told to go.
+    """State of the N arms, and their commands.
 
     Attributes:
         actions: Joint velocities as fractions of the velocity limit, finite. Shape (N, n).
@@ -195,7 +195,7 @@ def step(
     made,
     tables,
     scratch,
-    # What is asked for.
+    # The command.
     numbers,
     active,
     moving,
@@ -264,7 +264,7 @@ def _move(constants, state, row, clipped, at_limit):
 
 @inlined
 def commanded(action, velocity_limit, clipped, row):
-    """What an action commands, in [rad/s] or [m/s]; one outside of its box is cut, and ``clipped`` (N,) says so."""
+    """The command of an action in [rad/s] or [m/s]; outside the box it is clipped, and ``clipped`` (N,) is set."""
     if abs(action) > 1.0:
         clipped[row] = 1.0
         action = math.copysign(1.0, action)

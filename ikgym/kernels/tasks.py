@@ -73,7 +73,7 @@ def frame_coordinates(kind, frame, out):
 
 @kernel
 def error(kind, nominal, coordinates, out):
-    """What is missing from coordinates to their nominal values.
+    """The error of task coordinates.
 
     Args:
         kind: One of POSITION, SKEW, MATRIX, POSE and AXIS.
@@ -184,7 +184,7 @@ def error_jacobian(kind, nominal, coordinates, error, jacobian, out):
         nominal: Nominal coordinates. Shape (m,).
         coordinates: Coordinates. Shape (m,).
         error: The error between them. Shape (e,).
-        jacobian: What :func:`jacobian` gave. Shape (e, n).
+        jacobian: Result of :func:`jacobian`. Shape (e, n).
         out: Receives ∂error/∂q. Shape (e, n).
     """
     e, n = jacobian.shape

@@ -19,7 +19,7 @@ ARM_STREAMS = 6
 
 
 class Spread(NamedTuple):
-    """What arms are drawn from.
+    """Distribution of arms.
 
     Attributes:
         offsets: Of the arms one of which is taken, in [m]. Shape (a, n, 3).
@@ -28,7 +28,7 @@ class Spread(NamedTuple):
         tool: Their tool points in [m]. Shape (a, 3).
         tool_rotation: Their tools' orientations. Shape (a, 3, 3).
         zero: Standard deviation of the joints' zeros in [rad] or [m]. Shape (n,).
-        payload: What a payload adds to them in [rad] or [m]. Shape (n,).
+        payload: Offset of the zeros by a payload in [rad] or [m]. Shape (n,).
         link: Standard deviation of each part of an offset and of the tool point, in [m].
         axis: Standard deviation of the tilt of an axis in each of two directions, in [rad].
     """

@@ -10,7 +10,7 @@ from ikgym.kernels.random_numbers import uniform
 
 @inlined
 def remembered(ring, row, step, j):
-    """What joint ``j`` was commanded in an earlier step, 0 before the episode. ``ring`` has shape (N, D, n)."""
+    """The command of joint ``j`` in an earlier step, 0 before the episode. ``ring`` has shape (N, D, n)."""
     return ring[row, step % ring.shape[1], j] if step >= 0 else 0.0
 
 
@@ -26,14 +26,14 @@ def disturbed(velocity, bias, noise, key, counter):
 
 @inlined
 def engaged(play, row, j, backlash, way):
-    """How far the joint follows when its drive turns by ``way`` within the backlash.
+    """Motion of the joint when its drive moves by ``way`` within the backlash.
 
     Args:
         play: How far drives are from the middle of their backlash. Shape (N, n).
         row: The arm.
         j: The joint.
         backlash: Its width in [rad] or [m].
-        way: What the drive turns, in [rad] or [m].
+        way: Motion of the drive, in [rad] or [m].
     """
     half, reached = 0.5 * backlash, play[row, j] + way
     play[row, j] = min(max(reached, -half), half)
@@ -49,7 +49,7 @@ def filtered(drive, row, j, lag, velocity):
         row: The arm.
         j: The joint.
         lag: The share of what is missing that a step makes up for.
-        velocity: What is asked for.
+        velocity: The commanded velocity.
     """
     drive[row, j] += lag * (velocity - drive[row, j])
     return drive[row, j]

@@ -19,7 +19,7 @@ _parts, _more_parts, _size = expanded(parts), expanded(more_parts), inlined(size
 
 
 class Drives(NamedTuple):
-    """What is the same of the drives in all rows.
+    """Drive parameters of all rows.
 
     Attributes:
         bias: In [rad/s] or [m/s]. Shape (n,).
@@ -37,7 +37,7 @@ class Drives(NamedTuple):
 
 
 class Sensors(NamedTuple):
-    """What is the same of the sensors in all rows, by the names of :class:`ikgym.Plant`. ``q_noise`` has shape (n,)."""
+    """Sensor parameters of all rows, by the names of :class:`ikgym.Plant`. ``q_noise`` has shape (n,)."""
 
     q_noise: Floats
     pose_noise: float
@@ -49,7 +49,7 @@ class Sensors(NamedTuple):
 
 
 class PlantState(NamedTuple):
-    """What the plants of N arms are, and what they remember.
+    """Parameters and state of the plants of N arms.
 
     Attributes:
         keys: Of the rows' streams of random numbers. Shape (N, 5).

@@ -17,7 +17,7 @@ from ikgym.vector_env import RedundantIKVectorEnv
 
 @dataclasses.dataclass(frozen=True)
 class Learning(Frozen):
-    """How an environment is wrapped for learning.
+    """Settings of the wrappers for learning.
 
     The defaults suit PPO of Stable-Baselines3 with its own defaults. With a lead of ten steps, a joint within its
     acceleration limit can follow; with |v̂| clipped at 5, an arm that is far off returns gradually. Exploration noise

@@ -144,7 +144,7 @@ def _part(hint: Any) -> type | None:
 
 
 def _meaning(hint: Any) -> str:
-    """How messages describe a value."""
+    """Description of a value for messages."""
     kind, classes = _part(hint), set(typing.get_args(hint))
     if kind is Arm:
         return "the name of an arm or a table" if hint is Arm else "a list of arms"

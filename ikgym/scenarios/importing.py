@@ -12,25 +12,25 @@ from ikgym.exceptions import InvalidInputError, UnknownNameError
 from ikgym.scenarios.scenario import Scenario
 
 
-def imported(place: str) -> Scenario:
+def imported(import_path: str) -> Scenario:
     """The scenario with an import path.
 
     Args:
-        place: ``"package.module:attribute"``. The attribute is a scenario, or is called without arguments to make
+        import_path: ``"package.module:attribute"``. The attribute is a scenario, or is called without arguments to make
             one. Modules in the current folder are found, too.
 
     Raises:
-        InvalidInputError: The place has another form, the module cannot be imported, or there is no scenario at it.
+        InvalidInputError: The import_path has another form, the module cannot be imported, or there is no scenario at it.
         UnknownNameError: The module has no such attribute; the message has the nearest one.
     """
-    name, _, attribute = place.partition(":")
+    name, _, attribute = import_path.partition(":")
     if not attribute.isidentifier() or not all(part.isidentifier() for part in name.split(".")):
-        raise InvalidInputError(f"scenario: expected 'package.module:attribute', got {place!r}.")
+        raise InvalidInputError(f"scenario: expected 'package.module:attribute', got {import_path!r}.")
     with _current_folder():
         try:
             module = importlib.import_module(name)
         except Exception as error:  # whatever the code of others raises
-            raise InvalidInputError(f"Scenario {place!r}: {name} cannot be imported: {_told(error)}") from error
+            raise InvalidInputError(f"Scenario {import_path!r}: {name} cannot be imported: {_told(error)}") from error
         if not hasattr(module, attribute):
             public = [key for key in vars(module) if not key.startswith("_")]
             raise UnknownNameError(f"attribute of {name}", attribute, public)
@@ -39,9 +39,9 @@ def imported(place: str) -> Scenario:
             try:
                 found = found()
             except Exception as error:
-                raise InvalidInputError(f"Scenario {place!r}: making it failed: {_told(error)}") from error
+                raise InvalidInputError(f"Scenario {import_path!r}: making it failed: {_told(error)}") from error
     if not isinstance(found, Scenario):
-        raise InvalidInputError(f"Scenario {place!r}: expected a Scenario or what makes one, got {found!r}.")
+        raise InvalidInputError(f"Scenario {import_path!r}: expected a Scenario or what makes one, got {found!r}.")
     return found
 
 

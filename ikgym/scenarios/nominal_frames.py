@@ -57,7 +57,7 @@ class NominalFrames:
 
     @property
     def slots(self) -> Integers:
-        """Where the target after k steps is in a table. Shape (steps + furthest preview + 1,)."""
+        """Index of the target after k steps in a table. Shape (steps + furthest preview + 1,)."""
         return self._point % self.shape[1]
 
     def begin(self, tables: FloatArray, rows: Integers, episodes: Sequence[Trajectory], steps: Integers) -> None:

@@ -41,7 +41,7 @@ def offsets(preview: Preview) -> tuple[int, ...]:
 
 
 def furthest(preview: Preview) -> int:
-    """How many steps a preview looks ahead.
+    """Number of steps that a preview looks ahead.
 
     Raises:
         InvalidInputError: It is no whole number of at least 0, nor a sequence of them.

@@ -1,4 +1,4 @@
-"""Where an arm stands at the beginning of a path in space."""
+"""Start postures of paths in space."""
 
 from __future__ import annotations
 

@@ -32,7 +32,7 @@ def frames_of(trajectories: Sequence[Trajectory], times: FloatArray, model: Arm)
 
 
 def first_joints_of(trajectories: Sequence[Trajectory]) -> FloatArray | None:
-    """Where episodes of several trajectories begin; None where one does not say so.
+    """Start coordinates of several trajectories; None where one has none.
 
     Returns:
         Joint coordinates in [rad] or [m], bit for bit those of :meth:`Trajectory.first_joints`. Shape (k, n).

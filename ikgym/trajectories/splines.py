@@ -86,7 +86,7 @@ class ArcLength:
         self.lengths: FloatArray = np.concatenate([[0.0], np.cumsum(pieces)])
 
     def parameter(self, s: FloatArray) -> FloatArray:
-        """Where the curve has run for a length ``s`` from its beginning. Shape (k,)."""
+        """Parameter of the curve at the arc length ``s``. Shape (k,)."""
         i = np.clip(np.searchsorted(self.lengths, s, side="right") - 1, 0, len(self._breaks) - 2)
         first, last = self._breaks[i], self._breaks[i + 1]
         share = (s - self.lengths[i]) / (self.lengths[i + 1] - self.lengths[i])

@@ -40,7 +40,7 @@ class TimeLaw(Frozen, abc.ABC):
                 self._settle(**{name: number(name, value, at_least=SMALLEST, at_most=LARGEST)})
 
     def time(self, path: Path) -> float:
-        """How long it takes, in [s].
+        """Duration, in [s].
 
         Raises:
             InvalidInputError: The duration is too short for the speed and the acceleration.

@@ -77,7 +77,7 @@ class Trajectory(Frozen):
         return None
 
     def first_joints(self) -> FloatArray | None:
-        """Where episodes begin, in [rad] or [m]: on the nominal joint path; None where only a scenario can say.
+        """Start coordinates in [rad] or [m], on the nominal joint path; None where they depend on the scenario.
 
         Returns:
             Joint coordinates. Shape (n,).

@@ -49,7 +49,7 @@ class Looking(Still):
 @pytest.fixture(autouse=True)
 def unchanged(monkeypatch):
     """What a test registers is forgotten after it."""
-    monkeypatch.setattr(registry, "_places", dict(registry._places))
+    monkeypatch.setattr(registry, "_import_paths", dict(registry._import_paths))
     monkeypatch.setattr(registry, "_classes", dict(registry._classes))
 
 

@@ -86,7 +86,7 @@ class RecurrentPolicy(Corrected):
 
     name: ClassVar[str] = "recurrent"
     from_file: ClassVar[bool] = True
-    nameless: ClassVar[str] = "path"
+    positional: ClassVar[str] = "path"
     decisive: ClassVar[tuple[str, ...]] = ("path", "any_arm")
     #: As :class:`Calibrated`.
     evaluated: ClassVar[int] = 5

@@ -20,7 +20,7 @@ from ikgym.validation import FloatArray, number
 
 
 class BroydenMemory(NamedTuple):
-    """What is remembered from the step before.
+    """Memory of the previous step.
 
     Attributes:
         nominal: X^N(k), see :class:`baselines.solvers.resolved_rate.base.NominalMemory`. Shape (B, m).
@@ -135,7 +135,7 @@ class Broyden(DampedLeastSquares):
     starts as the model's Jacobian, is lost on a long way or after a singular start.
 
     Args:
-        problem: What the policy is told of the scenario.
+        problem: The scenario as the policy knows it.
         gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
         damping: λ, see :class:`DampedLeastSquares`.
         motion: ε, the length of a joint shift from which half is learnt, in [rad] or [m]; shorter ones say little,

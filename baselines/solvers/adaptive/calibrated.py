@@ -28,16 +28,16 @@ PAUSE = 20
 
 
 class CalibrationMemory(NamedTuple):
-    """What is known of the arm.
+    """Estimate of the arm.
 
     Attributes:
         before: See :class:`Measurement`. Shape (B, h, n).
         age: See :class:`Measurement`. Shape (B, 1).
-        rest: What is not blended in yet of how estimates have changed. Shape (B, 6).
+        rest: Part of the change of the estimate that is not blended in yet. Shape (B, 6).
         parameters: See :mod:`baselines.solvers.adaptive.chain_parameters`. Shape (B, p).
         covariance: Of their errors. Shape (B, p, p).
         quiet: How many measurements ago joint zeros were last taken to have changed suddenly. Shape (B,).
-        surprise: What measurements were farther than expected, added up. Shape (B,).
+        surprise: Sum of the excess of innovations over their expectation. Shape (B,).
     """
 
     before: FloatArray
@@ -59,7 +59,7 @@ class Calibrated(Corrected):
     policy is shown the reference without the deviation F(q, θ) − F(q, 0) at the present q, see :class:`Corrected`.
 
     Args:
-        problem: What the policy is told of the scenario.
+        problem: The scenario as the policy knows it.
         policy: The name of the base policy.
         options: Its parameters; those left out have its defaults.
         history: See :class:`Corrected`.
@@ -218,7 +218,7 @@ def absorb(sensitivity, error, variances, change, covariance):
 
     Args:
         sensitivity: Derivatives by the parameters. Shape (e, p).
-        error: What is missing to what was measured. Shape (e,).
+        error: Difference to the measurement. Shape (e,).
         variances: Of the noises. Shape (e,).
         change: Of the parameters, from 0. Shape (p,).
         covariance: Changed in place. Shape (p, p).

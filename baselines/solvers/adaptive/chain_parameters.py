@@ -58,7 +58,7 @@ def _put(twist, column, linear, angular):
 
 @kernel
 def parameter_twists(chain, q, position, twist):
-    """How the pose moves with the parameters, in the base frame: 3 rows of the position, 3 of the orientation.
+    """Jacobian of the pose by the parameters, in the base frame: 3 rows of the position, 3 of the orientation.
 
     The axes are taken as those of the chain: exact where the tilts are 0, to the first order else.
 

@@ -1,4 +1,4 @@
-"""What policies share that correct the model of another one: it is shown its model's poses and a shifted reference."""
+"""Base of policies that correct the model of a base policy, which sees its model's poses and a shifted reference."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from ikgym.validation import FloatArray, number, whole_number
 
 
 class Measurement(NamedTuple):
-    """What a step has measured, and what is remembered of sensors.
+    """Measurements of a step, and the memory of the sensors.
 
     Attributes:
         new: Whether the pose has not been seen before, and the joints are known where it was measured. Shape (B,).
@@ -115,7 +115,7 @@ class Corrected(NamedWrapper, abc.ABC):
     that plan only some Newton steps, or drives that lag, answer with swings.
 
     Args:
-        problem: What the policy is told of the scenario.
+        problem: The scenario as the policy knows it.
         policy: The name of the base policy.
         options: Its parameters; those left out have its defaults.
         history: How many steps ago a pose may have been measured to be of use, counted from the newest joint
@@ -173,7 +173,7 @@ class Corrected(NamedWrapper, abc.ABC):
 
 @kernel
 def show_rows(chain, kind, q, deviation, nominal, pose, shifted):
-    """What the base policy is shown, row by row.
+    """Observations of the base policy, row by row.
 
     Args:
         chain: The model of the arm.

@@ -96,13 +96,13 @@ def deviation_between(kind, rotation, position, model_rotation, model_position, 
 
 @kernel
 def missing_deviation(kind, measured, modelled, deviation, out):
-    """What is missing from a deviation to that of measured coordinates, a rotation vector in the base frame included.
+    """Difference from a deviation to that of measured coordinates, a rotation vector in the base frame included.
 
     Args:
         kind: Of task coordinates.
         measured: Measured coordinates. Shape (m,).
         modelled: Those of the model at the same joint coordinates. Shape (m,).
-        deviation: What is known of the deviation. Shape (6,).
+        deviation: Estimate of the deviation. Shape (6,).
         out: Receives what is missing. Shape (6,).
     """
     m = measured.shape[0]

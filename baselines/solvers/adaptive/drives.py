@@ -27,7 +27,7 @@ LEAST_VARIANCE = 1e-18
 
 
 class Hypotheses(NamedTuple):
-    """What drives may be like.
+    """Hypotheses about drives.
 
     Attributes:
         delays: In steps, rising by 1. Shape (D,).
@@ -43,7 +43,7 @@ class Hypotheses(NamedTuple):
 
 
 class PredictedMemory(NamedTuple):
-    """What is known of the drives of B arms, and the arms without delay and lag that they follow.
+    """Estimates of the drives of B arms, and the arms without delay and lag that they follow.
 
     Attributes:
         begun: Whether there was a step before. Shape (B,).
@@ -84,7 +84,7 @@ def start_memory(rows: int, sizes: tuple[int, int], hypotheses: Hypotheses, hist
     Args:
         rows: B.
         sizes: n and m, joints of the arm and task coordinates.
-        hypotheses: What drives may be like.
+        hypotheses: Candidates for delay and bandwidth.
         history: H, steps that the paths of simulated drives reach back.
     """
     (n, m), delays, lags = sizes, len(hypotheses.delays), len(hypotheses.lags)
@@ -210,7 +210,7 @@ def mixture(lag, lags):
 
 @kernel
 def past_rows(steps, lags, memory, out):
-    """Where the arms have been, as the hypothesis in use has it.
+    """Past joint coordinates of the arms by the current hypothesis.
 
     Args:
         steps: How many steps before today's command takes effect; at most H - 1. Shape (B,).

@@ -12,17 +12,17 @@ from ikgym.kernels.jit import kernel
 from ikgym.kernels.limits import applied
 from ikgym.validation import FloatArray
 
-#: What share of the largest acceleration is spent to take back an error.
+#: Share of the largest acceleration that corrects an error.
 SHARE = 0.2
 
 
 class Servo(NamedTuple):
-    """How errors are taken back, and within which limits.
+    """Gain and limits of the correction of errors.
 
     Attributes:
         gain: Share of the present error that is taken back in a step.
         dt: Δt in [s].
-        unit: What an action of 1 means, in [rad/s] or [m/s]. Shape (n,).
+        unit: Joint velocity of an action of 1, in [rad/s] or [m/s]. Shape (n,).
         largest: The largest velocities in [rad/s] or [m/s]. Shape (n,).
         change: How much they change at most in a step; inf where there is no limit. Shape (n,).
     """
@@ -84,7 +84,7 @@ def follow_rows(error, wanted, lags, servo, memory, qdot):
             command, last = (target - free) / (a + b), sent[row, j]
             command = min(max(command, last - change[j]), last + change[j])
             qdot[row, j] = min(max(command, -largest[j]), largest[j])
-            # What is sent is a float32 share of the unit.
+            # The command is a float32 share of the unit.
             sent[row, j] = np.float32(qdot[row, j] / unit[j]) * unit[j]
         for f in range(lags.shape[0]):
             for i in range(path.shape[2] - 1, 0, -1):

@@ -19,12 +19,12 @@ from ikgym.validation import FloatArray, number
 
 
 class OffsetMemory(NamedTuple):
-    """What is known of the deviation.
+    """Estimate of the deviation.
 
     Attributes:
         before: See :class:`Measurement`. Shape (B, h, n).
         age: See :class:`Measurement`. Shape (B, 1).
-        rest: What is not blended in yet of how estimates have changed. Shape (B, 6).
+        rest: Part of the change of the estimate that is not blended in yet. Shape (B, 6).
         deviation: See :mod:`baselines.solvers.adaptive.deviation`. Shape (B, 6).
         measured: How many poses have been measured. Shape (B,).
     """
@@ -49,7 +49,7 @@ class OffsetFree(Corrected):
     a small one does the opposite. :class:`Calibrated` learns what is the same in all postures.
 
     Args:
-        problem: What the policy is told of the scenario.
+        problem: The scenario as the policy knows it.
         policy: The name of the base policy.
         options: Its parameters; those left out have its defaults.
         history: See :class:`Corrected`.

@@ -46,7 +46,7 @@ class Predicted(NamedWrapper):
     evidence for others. The memory begins anew with each episode.
 
     Args:
-        problem: What the policy is told of the scenario.
+        problem: The scenario as the policy knows it.
         policy: The name of the base policy.
         options: Its parameters; those left out have its defaults.
         delay: Delay of commands in steps.
@@ -153,7 +153,7 @@ class Predicted(NamedWrapper):
         return off
 
     def _shown(self, batch: Batch, kept: PredictedMemory) -> Batch:
-        """What the base policy sees: the arm that it moves, as late as its command will be."""
+        """Observations of the base policy: the arm that it moves, as late as its command will be."""
         preview, rows, delay = self.inner.preview, len(batch.q), kept.delay
         if rows == 1 and isinstance(preview, int):
             nominal = batch.nominal[:, delay[0] : delay[0] + preview]
@@ -163,7 +163,7 @@ class Predicted(NamedWrapper):
         return Batch(kept.arm_q.copy(), kept.arm_qdot.copy(), self._pose(kept.arm_q) + kept.offset, nominal, remaining)
 
     def _past(self, steps: npt.NDArray[np.int64], kept: PredictedMemory) -> FloatArray:
-        """Where the drives should have brought the arms, see :func:`past_rows`."""
+        """Predicted joint coordinates of the arms, see :func:`past_rows`."""
         out = np.empty_like(kept.sent)
         past_rows(steps, self._hypotheses.lags, tuple(kept), out)
         return out
@@ -175,5 +175,5 @@ class Predicted(NamedWrapper):
 
 
 def _steps(age: FloatArray | None, rows: int) -> npt.NDArray[np.int64]:
-    """How old measurements are, in steps. Shape (B,)."""
+    """Ages of measurements, in steps. Shape (B,)."""
     return np.zeros(rows, dtype=np.int64) if age is None else age[:, 0].astype(np.int64)

@@ -25,9 +25,9 @@ from ikgym.kernels.jit import kernel
 from ikgym.kernels.kinematics import forward_and_jacobian
 from ikgym.validation import FloatArray, as_given, number, per_joint
 
-#: What 𝒩 turns, with the numbers that the kernel knows.
+#: Vectors that 𝒩 rotates, with their numbers in the kernel.
 COUNTER_ROTATIONS = {"none": 0, "joints": 1, "task": 2}
-#: What makes the next joint coordinates of what is measured and wanted.
+#: Deformations of the joint coordinates, with their numbers in the kernel.
 DEFORMATIONS = {"rotation": 0, "contraction": 1}
 #: The paper's λ_a, and what it belongs to.
 PAPERS_SHARE, PAPERS_MODEL, PAPERS_TASK = 5e-4, "khan8_approximate", "matrix"
@@ -36,7 +36,7 @@ _CONVERGED, _LIMIT, _NO_ROTATION = int(Status.CONVERGED), int(Status.ITERATION_L
 
 
 class Angles(NamedTuple):
-    """How far the last step has turned (Fig. 6, 15 and 18); NaN where nothing was.
+    """Angles of the last rotation (Fig. 6, 15 and 18); NaN where there was none.
 
     Attributes:
         counter_rotation: Angle of 𝒩 in [rad], between 0 and π. Shape (B,).
@@ -48,7 +48,7 @@ class Angles(NamedTuple):
 
 
 class RotationMemory(NamedTuple):
-    """What is remembered from the step before.
+    """Memory of the previous step.
 
     Attributes:
         direction: h(n-1), or ℱ (xᴺ - f) where 𝒩 turns task coordinates; zero at the start. Shape (B, n or m).
@@ -137,7 +137,7 @@ def rotation_step(model, numbers, seen, memory, answer):
 
 @kernel
 def _configuration(q, target, point, held, row):
-    """Where the Jacobian is worked out: at q, or where the arm was when the target last changed."""
+    """Point of the Jacobian: q, or the posture at which the target last changed."""
     if held.shape[1] == 0:
         return q
     for i in range(target.shape[0]):
@@ -192,16 +192,16 @@ class AbstractRotation(CompiledPolicy):
     R_a the status is ``not_a_rotation``, and the arm stands still until the target has come nearer.
 
     Args:
-        problem: What the policy is told of the scenario.
+        problem: The scenario as the policy knows it.
         r_a: R_a, the common length of the extended vectors. In the mixed units of J̃ᵀ f, like all that is turned.
         lambda_a: λ_a, the share of the rotation that is applied; with ``"contraction"`` -A F'(ξ*). Above 0. If left
             out, the paper's 5e-4, more on arms shorter than the paper's, so that λ_a ‖J̃‖² is the same, and no more than
             2 / ‖J̃‖², by a bound of ‖J̃‖² from the lengths of the links.
-        epsa: What the listing adds to a norm before it divides by it. Above 0; not printed.
+        epsa: Added to a norm before division, as in the listing. Above 0; not printed.
         q_pp_max: Where the listing limits joint coordinates, by a tanh, in [rad] or [m]; not printed.
         task_weights: The diagonal of ℱ, a number or one a task coordinate. Above 0, at most 1.
         joint_weights: The diagonal of 𝒲, a number or one a joint. Above 0, at most 1.
-        counter_rotation: What 𝒩 turns: ``"joints"``, J̃ᵀ ℱ f and J̃ᵀ ℱ xᴺ; ``"task"``, ℱ f and ℱ xᴺ; or ``"none"``.
+        counter_rotation: Vectors that 𝒩 rotates: ``"joints"``, J̃ᵀ ℱ f and J̃ᵀ ℱ xᴺ; ``"task"``, ℱ f and ℱ xᴺ; or ``"none"``.
         deformation: ``"rotation"``, AdaptiveDeform; or ``"contraction"``, Dineva's iteration (eq. 2.9), in which R_a,
             ``epsa`` and ``q_pp_max`` have no part.
         jacobian: ``"step"``: J̃ belongs to the joint coordinates of each inner iteration. ``"point"``: to those with

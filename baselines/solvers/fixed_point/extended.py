@@ -24,7 +24,7 @@ class FixedPointExtended(PrivilegedPath, FixedPoint):
     trajectories in joint space. h becomes Jᵀ (f(q) - x) + J_ℓᵀ (p_ℓ(q) - p_ℓᴺ), with both points of the model.
 
     Args:
-        problem: What the policy is told of the scenario.
+        problem: The scenario as the policy knows it.
         transformation: ``"transpose"``; nothing else fits a longer x.
         slope: The factor in F; see :class:`FixedPoint`, like all up to the tolerance.
         a: A; if left out, chosen for the longer Jacobian as there for J: -0.815 on the paper's arm, of whose A = -1

@@ -44,7 +44,7 @@ class FixedPoint(CompiledPolicy):
     orientations; the paper, where there are positions only, has none.
 
     Args:
-        problem: What the policy is told of the scenario.
+        problem: The scenario as the policy knows it.
         transformation: ``"transpose"``: h = Jᵀ (f(q) - x), as above. ``"none"``: h = f(q) - x, Dineva's own form
             (Khan 2020, eq. 2.5), which converges where all eigenvalues of F'(ξ*) A J have negative real parts, as
             those of few arms do. ``"sign"``: h = σ (f(q) - x), σ = ±1 (Khan 2020, eq. 2.8; he had no success with it

@@ -16,7 +16,7 @@ from ikgym.kernels.jit import kernel
 from ikgym.kernels.kinematics import Chain, forward, forward_and_jacobian
 from ikgym.validation import FloatArray
 
-#: What is done to f(q) - x before it is added to q, with the numbers that the kernel knows.
+#: Transformations of f(q) - x before it is added to q, with their numbers in the kernel.
 TRANSFORMATIONS = {"transpose": 0, "none": 1, "sign": 2, "sign_by_growth": 3}
 _TRANSPOSE, _SIGN, _BY_GROWTH = (TRANSFORMATIONS[name] for name in ("transpose", "sign", "sign_by_growth"))
 _CONVERGED, _LIMIT, _DIVERGED = int(Status.CONVERGED), int(Status.ITERATION_LIMIT), int(Status.DIVERGED)
@@ -37,7 +37,7 @@ class Contraction(NamedTuple):
 
 
 class FixedPointMemory(NamedTuple):
-    """What the sign variants remember of the last iteration of the step before.
+    """Memory of the sign variants: the last iteration of the previous step.
 
     Attributes:
         previous: With ``"sign"`` f - x, zero where there was none; with ``"sign_by_growth"`` σ and ‖f - x‖, infinite
@@ -58,7 +58,7 @@ class FixedPointNumbers(NamedTuple):
         tolerance: ‖f - x‖ up to which they have converged.
         longest: How far the joints can go in one step, in [rad] or [m]. Shape (n,).
         components: Which component of f - x corrects each joint where there is no Jacobian. Shape (n,).
-        weights: What the squares of the components of f - x count where there is one. Shape (e,).
+        weights: Weights of the squares of the components of f - x, if any. Shape (e,).
         branch: The plain :class:`Chain` to the point of the arm that x is extended by.
         points: Where that point should be at each step of the episode, in [m]. Of no rows if x is not extended, else of
             shape (steps + 1, 3).

@@ -22,7 +22,7 @@ def plane(source, goal, e_a, e_b):
     Between opposite vectors the plane is not determined; one through the coordinate axis furthest from them is taken.
 
     Args:
-        source: What is to be turned, b. Shape (n,), with n of at least 2.
+        source: The vector to be rotated, b. Shape (n,), with n of at least 2.
         goal: Where to, a. Shape (n,).
         e_a: Receives the unit vector of a's part orthogonal to b, or zeros where nothing turns. Shape (n,).
         e_b: Receives the unit vector of b, or zeros. Shape (n,).

@@ -54,7 +54,7 @@ class IterationNumbers(NamedTuple):
 
 
 class DampingMemory(NamedTuple):
-    """What is remembered from the step before; a kernel changes it in place.
+    """Memory of the previous step; a kernel changes it in place.
 
     Attributes:
         damping: λ. Shape (B,).
@@ -133,7 +133,7 @@ class DampedIteration(CompiledPolicy, abc.ABC):
     ``error_ratio`` and ``threshold`` are read literally: what an error does to λ shows in the iteration behind it.
 
     Args:
-        problem: What the policy is told of the scenario.
+        problem: The scenario as the policy knows it.
         rule: The rule for λ.
         damping: λ, or λ of the first iteration, or what is added. In the square of the Jacobian's units, [m²] and
             [1]; at least 0.

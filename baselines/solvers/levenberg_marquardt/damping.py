@@ -102,7 +102,7 @@ def damping_now(law, error, condition, stepped):
         law: The :class:`DampingLaw`.
         error: Norm of the error at this iteration.
         condition: Condition number at this iteration.
-        stepped: What :func:`damping_next` gave at the iteration before.
+        stepped: Result of :func:`damping_next` at the previous iteration.
     """
     if law.kind == LOOKUP:
         return law.dampings[_interval(law.error_bounds, error), _interval(law.condition_bounds, condition)]
@@ -162,14 +162,14 @@ def condition_number(jacobian, rank, scratch):
 
 @expanded
 def condition_scratch(size, n):
-    """What :func:`condition_number` works with. Shapes (max(e, n), min(e, n)) and (min(e, n), min(e, n))."""
+    """Workspace of :func:`condition_number`. Shapes (max(e, n), min(e, n)) and (min(e, n), min(e, n))."""
     narrow = min(size, n)
     return np.empty((max(size, n), narrow)), np.empty((narrow, narrow))
 
 
 @kernel
 def _interval(bounds, value):
-    """How many bounds a value has reached."""
+    """Number of bounds that a value has reached."""
     i = 0
     while i < bounds.shape[0] and value >= bounds[i]:
         i += 1

@@ -110,7 +110,7 @@ class ModelFreeAdaptiveControl(DampedIteration):
     For a ramp of velocity v per period one step with a constant J leaves the error U diag(λ/σ²) Uᵀ v (eq. 10).
 
     Args:
-        problem: What the policy is told of the scenario.
+        problem: The scenario as the policy knows it.
         rule: The rule for λ; it and the ten numbers behind it are those of :class:`DampedIteration`.
         tolerance: δ, norm of the error at which the iteration stops, in the units of the task, [m] and [rad].
         iterations: N_up, most iterations of one period.

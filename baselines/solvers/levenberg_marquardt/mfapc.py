@@ -158,7 +158,7 @@ class ModelFreeAdaptivePredictiveControl(DampedIteration):
     Statuses are those of :class:`baselines.solvers.levenberg_marquardt.mfac.ModelFreeAdaptiveControl`.
 
     Args:
-        problem: What the policy is told of the scenario.
+        problem: The scenario as the policy knows it.
         rule: The rule for λ; it and the ten numbers behind it are those of :class:`DampedIteration`. Its error is
             the norm of (40), its condition number the largest over the horizon (37).
         tolerance: δ, norm of the error at which the iteration stops, in the units of the task, [m] and [rad].

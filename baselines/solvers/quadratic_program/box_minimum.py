@@ -7,7 +7,7 @@ import numpy as np
 from ikgym.kernels.jit import inlined, kernel
 from ikgym.kernels.linear_algebra import cholesky, cholesky_solve
 
-# Where a variable is: free, or at its lower or upper bound. One that is kept was released by rounding alone, and stays
+# State of a variable: free, or at its lower or upper bound. One that is kept was released by rounding alone, and stays
 # at its bound until the others have moved.
 FREE, BOUND, KEPT = 0, 1, 2
 # A slope of this share of its own terms is rounding, and no reason to leave a bound.

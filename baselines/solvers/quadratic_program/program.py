@@ -11,13 +11,13 @@ from baselines.solvers.quadratic_program.velocity_box import braking_speed
 from ikgym.kernels.jit import kernel
 from ikgym.kernels.linear_algebra import cholesky, cholesky_solve
 
-# What a task shift of another length weighs beside one of another direction, and joint motion beside that.
+# Weight of the length of a task shift against its direction, and of joint motion against that.
 SCALING_WEIGHT = 1e-2
 
 
 @kernel
 def motion_weight(jacobian, error, damping, lm_damping, fastest):
-    """What the squares of the joint velocities weigh beside those of the task shift.
+    """Weights of the squares of the joint velocities against those of the task shift.
 
     Args:
         jacobian: J Δt. Shape (e, n).
@@ -59,7 +59,7 @@ def feedback_share(hessian, jacobian, error, change):
     Args:
         hessian: H, see :func:`curvature`.
         jacobian: J Δt. Shape (e, n).
-        error: What would be taken back. Shape (e,).
+        error: The error to be corrected. Shape (e,).
         change: The changes of the velocity in one step to reckon with, in [rad/s] or [m/s]. Shape (n,).
     """
     n = jacobian.shape[1]

@@ -115,7 +115,7 @@ class QuadraticProgram(TaskFeedback):
     weighs more than the motion.
 
     Args:
-        problem: What the policy is told of the scenario, limits of the model among it.
+        problem: The scenario as the policy knows it, with the limits of the model.
         gain: Share of the present error that is taken back in one step; see :class:`TaskFeedback`.
         damping: Weight of the joint motion as a share of that of the task. Above 0.
         lm_damping: How much that grows with the error. At least 0.
@@ -148,7 +148,7 @@ class QuadraticProgram(TaskFeedback):
         self._settle(_pull=read_only(np.array([gains, target])))
 
     def _posture(self) -> tuple[FloatArray, FloatArray]:
-        """Where the joints are led to, and how strongly in [1/s]. Shapes (n,)."""
+        """Target posture of the joints, and gain in [1/s]. Shapes (n,)."""
         model = self.problem.model
         everywhere = np.full(model.joints, self.secondary_gain)
         if self.posture is not None:

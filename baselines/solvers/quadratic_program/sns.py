@@ -159,7 +159,7 @@ class SaturationInNullSpace(TaskFeedback):
     that has lost rank in all joints is scaled only where it loses more.
 
     Args:
-        problem: What the policy is told of the scenario, limits of the model among it.
+        problem: The scenario as the policy knows it, with the limits of the model.
         gain: Share of the present error that is taken back in one step; see :class:`TaskFeedback`.
         damping: Added to the squared singular values of J, as a share of the mean of ‖J_j‖² over the joints j. Smaller
             squares count as lost rank. At least 0; then those below rounding do, and are left out.

@@ -35,7 +35,7 @@ class DescentSettings(NamedTuple):
 
 
 class DescentMemory(NamedTuple):
-    """What a descent remembers of each of B arms.
+    """Memory of the descents of B arms.
 
     Attributes:
         plan: The joint velocities of the horizon, in [rad/s] or [m/s]. Shape (B, HL - 1, n).

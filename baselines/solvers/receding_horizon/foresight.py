@@ -13,7 +13,7 @@ from baselines.solvers.receding_horizon.rhc import RecedingHorizon
 
 # Each block of the plan is so many steps longer than the one before, up to a length.
 GROWTH, LONGEST = 2.0, 100.0
-# What parameters are that are None: of arms without limits, and of those with.
+# Values of parameters that are None: for arms without limits, and with limits.
 FREE = {"horizon": 3001, "iterations": 1, "starts": 23, "restart_steps": 20, "start_steps": 10}
 LIMITED = {"iterations": 3, "starts": 1, "restart_steps": 0, "start_steps": 0}
 # Of arms with limits: how far ahead in [s], and the control period in [s] for which blocks have the lengths above.

@@ -54,7 +54,7 @@ class RecedingHorizonGradient(SolverPolicy):
     status is ``diverged``, the arm is stopped for one step and the memory cleared.
 
     Args:
-        problem: What the policy is told of the scenario.
+        problem: The scenario as the policy knows it.
         horizon: HL, the number of grid points with the present one. At least 2; HL - 1 steps must be shown ahead.
         tolerance: μ, the norm of the gradient below which the descent stops, in [s/rad] or [s/m].
         iterations: Most steps of one descent.
@@ -120,7 +120,7 @@ class RecedingHorizonGradient(SolverPolicy):
         return Solution(changed.plan[:, 0].copy(), changed, status, iterations)
 
     def _start(self, memory: DescentMemory) -> DescentMemory:
-        """Where the descents of this control period start."""
+        """Initial guesses of the descents of this control period."""
         plan, alpha = memory.plan.copy(), memory.alpha.copy()
         if self.warm_start == "shifted":
             plan[:, :-1] = memory.plan[:, 1:]

@@ -62,7 +62,7 @@ class RecedingHorizonLagrange(RecedingHorizonGradient):
     different methods.
 
     Args:
-        problem: What the policy is told of the scenario.
+        problem: The scenario as the policy knows it.
         horizon: HL; see :class:`RecedingHorizonGradient` for this and all that follow.
         tolerance: μ, the norm of the reduced gradient below which the descent stops.
         iterations: Most steps of one descent.

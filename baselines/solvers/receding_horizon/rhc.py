@@ -26,7 +26,7 @@ from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios.preview import FARTHEST
 from ikgym.validation import FloatArray, number, whole_number
 
-# What the kernel's counters and random numbers can hold.
+# Range of the kernel's counters and random numbers.
 MOST = 2**31 - 1
 LEAST = {"starts": 1, "restart_steps": 0, "seed": 0, "start_steps": 0, "recovery_steps": 0}
 
@@ -54,7 +54,7 @@ class RecedingHorizon(CompiledPolicy):
     nothing changes.
 
     Args:
-        problem: What the policy is told of the scenario.
+        problem: The scenario as the policy knows it.
         horizon: HL, the number of grid points with the present one. At least 2; HL - 1 steps must be shown ahead.
         iterations: Newton steps in one control period, at least 30 in the first; None for as many as the optimum takes.
         move_blocks: Knots of the horizon (move blocking); None for one at each of its HL - 1 steps. Fewer are spaced
@@ -78,7 +78,7 @@ class RecedingHorizon(CompiledPolicy):
         recovery_steps: Newton steps in a period instead of ``iterations``, where the one before ended with joint
             velocities beyond their limits; there is no restart candidate then. 0 for no more than
             ``iterations``.
-        rate_weight: What changes of velocity cost in the plan, rate_weight · Σ (q̇_k - q̇_{k-1})² over joints and steps,
+        rate_weight: Cost of changes of velocity in the plan, rate_weight · Σ (q̇_k - q̇_{k-1})² over joints and steps,
             in [cost] / [(rad/s)²] or [cost] / [(m/s)²]; the first change is that from the velocity last applied. The
             score has no such term: smooth velocities have their price. 0 for none.
         tolerance: Relative precision of the horizon's cost at which it counts as minimal.

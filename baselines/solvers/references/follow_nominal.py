@@ -59,7 +59,7 @@ class FollowNominal(PrivilegedPath):
     foresight can do better at the cost.
 
     Args:
-        problem: What the policy is told of the scenario.
+        problem: The scenario as the policy knows it.
         seed: Which episode of a random scenario to play.
         path: The nominal joint coordinates, one row a step, in [rad] or [m]. Shape (steps + 1, n).
 

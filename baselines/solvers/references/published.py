@@ -24,7 +24,7 @@ class Published(FollowNominal):
     act on it as on everybody; see :mod:`ikgym.problems` for what it is without them.
 
     Args:
-        problem: What the policy is told of the scenario.
+        problem: The scenario as the policy knows it.
         seed: Which episode of a random scenario to play.
         path: Joint coordinates, one row a step, in [rad]. Shape (steps + 1, n).
         method: How it was made: ``greedy``, ``cloning`` or ``reinforcement``.
@@ -37,7 +37,7 @@ class Published(FollowNominal):
     method: str = "greedy"
 
     name: ClassVar[str] = "published"
-    nameless: ClassVar[str | None] = "method"
+    positional: ClassVar[str | None] = "method"
     decisive: ClassVar[tuple[str, ...]] = ("method",)
 
     @classmethod

@@ -32,12 +32,12 @@ class Told(NamedWrapper):
     policy is wrapped in ``predicted``, with their delay and bandwidth.
 
     Args:
-        problem: What the policy is told of the scenario.
+        problem: The scenario as the policy knows it.
         policy: The name of the policy that is told.
         options: Its parameters; those left out have its defaults.
         seed: Which episode is played; needed where anything is drawn.
         arm_seed: Which arm moves; the seed's own if left out.
-        scenario: What is tracked.
+        scenario: The tracking problem.
 
     Raises:
         UnknownNameError: There is no such policy, or parameter of it.
@@ -83,7 +83,7 @@ class Told(NamedWrapper):
         return furthest(base) + longest if longest else self.inner.preview
 
     def inner_problem(self) -> Problem:
-        """What the scenario tells, with the arm that moves as the model."""
+        """The problem of the scenario, with the true arm as the model."""
         return self.problem.replace(model=self.drawn.arm)
 
     def solve(self, batch: Batch, memory: Memory) -> Solution:
@@ -97,7 +97,7 @@ class Told(NamedWrapper):
         return self.solution(step.action * self.problem.velocity_limit, own, step)
 
     def _payload(self, batch: Batch) -> FloatArray:
-        """What the payload adds to the zeros of the joints at the end of the step, in [rad] or [m]. Shape (B, n)."""
+        """Offset of the joint zeros by the payload at the end of the step, in [rad] or [m]. Shape (B, n)."""
         plant = self.scenario.plant
         after = self.scenario.steps - batch.remaining + 1.0
         return np.where(after >= plant.payload_step, np.broadcast_to(plant.payload, batch.q.shape[1]), 0.0)

@@ -23,7 +23,7 @@ APPLIED, DEFICIENT = int(Status.APPLIED), int(Status.RANK_DEFICIENT)
 
 
 class NominalMemory(NamedTuple):
-    """What is remembered from the step before.
+    """Memory of the previous step.
 
     Attributes:
         nominal: X^N(k), the nominal task coordinates that the step before was to reach. Shape (B, m).
@@ -43,7 +43,7 @@ class TaskFeedback(CompiledPolicy, abc.ABC):
     to subclasses.
 
     Args:
-        problem: What the policy is told of the scenario.
+        problem: The scenario as the policy knows it.
         gain: Share of the present error that is taken back in one step, K Δt with the feedback gain K in [1/s].
             Above 0; 1 is deadbeat control, 2 the limit of stability. Where commands take effect d steps late, the
             limit is 2 sin(π / (2 (2 d + 1))): 0.62 at 2 steps, 0.13 at 12.

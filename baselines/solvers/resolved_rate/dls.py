@@ -62,7 +62,7 @@ class DampedLeastSquares(ResolvedRate):
     is about λ / σ² of the shift, with σ the singular values of J.
 
     Args:
-        problem: What the policy is told of the scenario.
+        problem: The scenario as the policy knows it.
         gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
         damping: λ, added to J Jᵀ as it is, not squared. In the square of the Jacobian's units, [m²] and [1]. Above 0.
 

@@ -46,7 +46,7 @@ def orthonormal_rows(jacobian, shift, truncation, full_rank, out, deficient):
                         pick, longest = a, square
             if rank == 0:
                 shortest = truncation * truncation * longest
-            # What rounding has left along the rows before: once more is enough.
+            # Rounding leaves parts along the rows before: once more is enough.
             for b in range(rank):
                 _take_off(rest, wanted, pick, basis[b], given[b])
             length = np.sqrt(dot(rest[pick], rest[pick]))
@@ -118,7 +118,7 @@ class GramSchmidt(ResolvedRate):
     coordinates has at most six rows kept; which ones may change from step to step.
 
     Args:
-        problem: What the policy is told of the scenario.
+        problem: The scenario as the policy knows it.
         gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
         truncation: Rows whose remainder is shorter than this share of the longest row are left out. At least 0 and
             below 1. Rows of positions and of orientations are compared as they are, in [m] and [1].

@@ -54,7 +54,7 @@ class MoorePenrose(ResolvedRate):
     Jᵀ (J Jᵀ)⁻¹ of Khan 2020, eq. 2.3 does not exist there.
 
     Args:
-        problem: What the policy is told of the scenario.
+        problem: The scenario as the policy knows it.
         gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
         rank_tolerance: Singular values below this share of the largest count as zero. At least 0, below 1.
 

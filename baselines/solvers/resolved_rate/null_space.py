@@ -125,7 +125,7 @@ class NullSpace(MoorePenrose):
     poses only, where the Jacobian has a null space.
 
     Args:
-        problem: What the policy is told of the scenario.
+        problem: The scenario as the policy knows it.
         gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
         rank_tolerance: Singular values below this share of the largest count as zero. At least 0.
         objective: ``posture`` or ``joint_centring``. If left out, ``joint_centring`` where

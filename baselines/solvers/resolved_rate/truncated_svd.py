@@ -23,7 +23,7 @@ class TruncatedSVD(ResolvedRate):
     ``rank_deficient``.
 
     Args:
-        problem: What the policy is told of the scenario.
+        problem: The scenario as the policy knows it.
         gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
         threshold: Singular values of the task Jacobian below this share of the largest are left out. Between 0
             and 1.

@@ -23,7 +23,7 @@ class WeightedPseudoinverse(MoorePenrose):
     judged without it. With equal weights this is :class:`MoorePenrose`, and it fails where that fails.
 
     Args:
-        problem: What the policy is told of the scenario.
+        problem: The scenario as the policy knows it.
         gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
         rank_tolerance: Singular values below this share of the largest count as zero. At least 0.
         weights: w, above 0; only their ratios count. One number, or one a joint; between revolute and prismatic

@@ -1,4 +1,4 @@
-"""What all solvers of other projects share: how they are imported, what they are asked, and whose objects they use."""
+"""Base of solvers of other projects: their import, their input, and the objects that they reuse."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ WHOLE_POSES = ("pose", "matrix")
 
 
 class Target(NamedTuple):
-    """Where the tool is to be at the end of the step.
+    """Reference pose at the end of the step.
 
     Attributes:
         rotation: Of the tool; what the task leaves free is that of the arm as it stands. Shape (3, 3).
@@ -38,7 +38,7 @@ class Target(NamedTuple):
 
 
 class Seen(NamedTuple):
-    """What a solver is shown of one arm.
+    """Observation of one arm for a solver.
 
     Attributes:
         q: Joint coordinates in [rad] or [m]. Shape (n,).
@@ -54,7 +54,7 @@ class Seen(NamedTuple):
 
 
 class StartMemory(NamedTuple):
-    """Where the episode began.
+    """Start of the episode.
 
     Attributes:
         start: Joint coordinates in [rad] or [m]. Shape (B, n).
@@ -68,7 +68,7 @@ class StartMemory(NamedTuple):
 #: One step: joint velocities, or None where the solver finds none.
 Step = Callable[[Seen], FloatArray | None]
 
-#: What the policies have made of the packages' objects, for each thread: those change from call to call.
+#: The packages' objects of the policies, for each thread: they change from call to call.
 _made = threading.local()
 
 
@@ -81,7 +81,7 @@ class Rival(SolverPolicy, abc.ABC):
     Where a solver finds no joint velocities the arm is stopped for this step, and the status is ``diverged``.
 
     Args:
-        problem: What the policy is told of the scenario.
+        problem: The scenario as the policy knows it.
 
     Raises:
         InvalidInputError: The task is none of :attr:`tasks`, or the package cannot have such an arm.
@@ -91,7 +91,7 @@ class Rival(SolverPolicy, abc.ABC):
     rival: ClassVar[bool] = True
     #: Threads would wait for each other: what the packages do in Python holds the interpreter lock.
     grain: ClassVar[int] = sys.maxsize
-    #: What is imported, and what it is called in :mod:`pip`.
+    #: Imported modules, and their names in :mod:`pip`.
     package: ClassVar[str]
     distribution: ClassVar[str]
     #: Tasks that it can be asked for.

@@ -16,7 +16,7 @@ NO_LIMIT = 1e21
 
 
 def joint_name(i: int) -> str:
-    """What the files call joint i, counted from 0."""
+    """Name of joint i in the files, counted from 0."""
     return f"joint{i + 1}"
 
 

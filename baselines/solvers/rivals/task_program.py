@@ -25,7 +25,7 @@ class TaskProgram(Rival, abc.ABC):
     share of it which takes a second, since the other loses the arm on `panda-singular`.
 
     Args:
-        problem: What the policy is told of the scenario.
+        problem: The scenario as the policy knows it.
         gain: Of the frame task. Above 0, at most 1; 1 is deadbeat control.
         position_cost: Of the frame task, in [1/m].
         orientation_cost: Of the frame task, in [1/rad].

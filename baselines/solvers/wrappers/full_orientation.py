@@ -21,7 +21,7 @@ from ikgym.validation import FloatArray
 
 
 class OrientationMemory(NamedTuple):
-    """What :func:`resolve_orientation` remembers.
+    """Memory of :func:`resolve_orientation`.
 
     Attributes:
         cosines: cos θ of the last two nominal orientations. Shape (B, 2).
@@ -67,7 +67,7 @@ def resolve_orientation(problem: Problem, batch: Batch, memory: OrientationMemor
     Args:
         problem: With the task `skew`.
         batch: Observations, `nominal` at the steps 1, 2, … ahead. Shapes (B, …).
-        memory: What :func:`start_memory` or the last call gave.
+        memory: Result of :func:`start_memory` or of the last call.
 
     Returns:
         The observations as the task `pose` has them, and what is to be remembered.
@@ -136,7 +136,7 @@ class FullOrientation(NamedWrapper):
     This method is of this project.
 
     Args:
-        problem: What the policy is told of the scenario.
+        problem: The scenario as the policy knows it.
         policy: The name of the inner policy.
         options: Its parameters; those left out have its defaults.
 

@@ -17,7 +17,7 @@ from ikgym.validation import FloatArray, number
 
 
 class SmoothedMemory(NamedTuple):
-    """What the filter remembers; the memory of the inner policy stands behind it.
+    """Memory of the filter; that of the inner policy follows it.
 
     Attributes:
         known: Whether the rest is known. Shape (B,).
@@ -54,7 +54,7 @@ class Smoothed(NamedWrapper):
     inner policy. References, which know more than they see, cannot be smoothed.
 
     Args:
-        problem: What the policy is told of the scenario.
+        problem: The scenario as the policy knows it.
         policy: The name of the inner policy.
         options: Its parameters; those left out have its defaults.
         relaxation: Λ in [1/s], above 0 and below 2/Δt.
@@ -98,7 +98,7 @@ class Smoothed(NamedWrapper):
             seen = batch._replace(q=calculated, qdot=qdot, pose=self._pose(calculated))
         step = self.ask(seen, inside)
         velocity = step.action.astype(np.float64) * limit
-        # What is beyond the limit the arm will not do.
+        # The arm does not exceed the limit.
         sent = np.clip(own.smooth, -limit, limit)
         acceleration = lambda_**2 * (calculated - batch.q) - 2.0 * lambda_ * sent  # eq. 16
         kept = SmoothedMemory(

@@ -34,7 +34,7 @@ class Path(Frozen, abc.ABC):
 
     @abc.abstractmethod
     def along(self, s: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Where the path is, and where it leads.
+        """Position and tangent of the path.
 
         Args:
             s: Arc lengths in [m], from 0 to ``length``. Shape (k,).

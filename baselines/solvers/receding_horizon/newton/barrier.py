@@ -25,12 +25,12 @@ from ikgym.kernels import tasks as task_kernels
 from ikgym.kernels.jit import inlined, uncounted
 from ikgym.kernels.kinematics import forward_and_jacobian
 
-# How multipliers come about: from the gradients of the barriers, as they are, or by a step of this length at most.
+# Origin of the multipliers: from the gradients of the barriers, as they are, or by a step of this length at most.
 ANEW, KEPT = -1.0, 0.0
 
 
 class Barrier(NamedTuple):
-    """How smooth the barrier function is.
+    """Smoothness of the barrier function.
 
     Attributes:
         mu: μ, the barrier parameter, in [cost].
@@ -213,7 +213,7 @@ def change_steps(lengths, k):
 
 @inlined
 def braking_way(velocity, per):
-    """How far a joint moves while it brakes, in [rad] or [m], with 1 / q̈_max ``per``; 0 where that is 0."""
+    """Braking distance of a joint, in [rad] or [m], with 1 / q̈_max ``per``; 0 where that is 0."""
     return 0.5 * per * velocity * abs(velocity)
 
 

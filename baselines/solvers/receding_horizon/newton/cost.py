@@ -29,7 +29,7 @@ from ikgym.kernels.kinematics import forward, forward_and_jacobian
 
 
 class Values(NamedTuple):
-    """What a path costs.
+    """Cost of a path.
 
     Attributes:
         merit: The merit function.

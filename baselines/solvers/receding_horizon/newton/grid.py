@@ -128,7 +128,7 @@ def empty_grid(knots):
 
 @uncounted
 def shift_path(old, path, qdot, new, out):
-    """What is left of a path one step later, at the knots of a new grid; past its end it goes on as it ended.
+    """The rest of a path one step later, at the knots of a new grid; past its end its last velocity continues.
 
     Args:
         old: The grid of the path.

@@ -49,7 +49,7 @@ def initial_guess(problem, first, drift, damping, path, workspace):
             task_kernels.error(data.kind, nominal[grid.at[k] - 1], workspace.pose, error)
             task_kernels.jacobian(data.kind, rotation, workspace.geometric, jacobian)
             if correction == 0:
-                # What the drift would do to the task is taken out of the error, and so out of the step.
+                # The effect of the drift on the task is subtracted from the error, and so from the step.
                 span = grid.length[k] * data.dt
                 for i in range(e):
                     error[i] -= span * dot(jacobian[i], drift)

@@ -30,7 +30,7 @@ LEAST_DAMPING, MORE, LESS, MOST_DAMPING = 1e-6, 10.0, 0.1, 1e12
 
 
 class NewtonSettings(NamedTuple):
-    """How far a path is improved.
+    """Stopping criteria of a minimisation.
 
     Attributes:
         exact: Whether to try the Hessian itself where it is positive definite; its Gauss–Newton part otherwise.
@@ -44,7 +44,7 @@ class NewtonSettings(NamedTuple):
 
 
 class Minimum(NamedTuple):
-    """What came of a minimisation.
+    """Result of a minimisation.
 
     Attributes:
         outcome: CONVERGED, RAN_OUT or STALLED.
@@ -60,7 +60,7 @@ class Minimum(NamedTuple):
 
 
 class LineSearch(NamedTuple):
-    """What came of a line search.
+    """Result of a line search.
 
     Attributes:
         accepted: Whether a trial decreased the merit enough.

@@ -31,7 +31,7 @@ from ikgym.kernels.kinematics import Chain
 
 _CONVERGED, _LIMIT, _SATURATED = int(Status.CONVERGED), int(Status.ITERATION_LIMIT), int(Status.SATURATED)
 
-# How exactly a plan keeps the velocity limit, as a share of it.
+# Tolerance of the velocity limit in a plan, as a share of it.
 KEPT = 1e-5
 # Newton steps of the initial plan at least, and of a plan that is to be brought to its optimum.
 STEPS_OF_THE_FIRST, STEPS_TO_THE_OPTIMUM = 30, 300
@@ -42,7 +42,7 @@ RETRY = 4
 
 
 class HorizonMemory(NamedTuple):
-    """What a receding horizon remembers of each of B arms, in two blocks.
+    """Memory of the receding horizons of B arms, in two blocks.
 
     Attributes:
         plans: The plan and, where there is one, the restart candidate, see :func:`plan.plan_in`: joint coordinates at

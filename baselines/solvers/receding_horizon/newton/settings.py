@@ -1,4 +1,4 @@
-"""What the parameters of a receding horizon say to its kernels, and the two blocks of numbers that take it there."""
+"""Settings of a receding horizon for its kernels, in two blocks of numbers."""
 
 from __future__ import annotations
 

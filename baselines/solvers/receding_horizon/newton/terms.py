@@ -217,7 +217,7 @@ def smoothed(u, weight, mu):
 
 @inlined
 def primal_dual_curvature(here, weight, multiplier):
-    """What the primal-dual equations take for φ'', with the λ given."""
+    """Approximation of φ'' in the primal-dual equations, for given λ."""
     by_room = 2.0 * weight * multiplier / here.room
     by_above = 2.0 * weight * (weight - multiplier) / here.above
     return by_room * by_above / (by_room + by_above)

@@ -39,7 +39,7 @@ class PathProblem(NamedTuple):
             none. Shape (n,), for the interior point method, or (0,), for multipliers, which cannot limit them.
         braking: Whether the arm has to be able to stop within its joint limits behind the last knot; read where
             accelerations have a limit.
-        load: What a payload adds to the zeros of the joints at each knot, in [rad] or [m]. Shape (K, n), or (0, n)
+        load: Offset of the joint zeros by a payload at each knot, in [rad] or [m]. Shape (K, n), or (0, n)
             where there is none.
     """
 
@@ -96,7 +96,7 @@ class QuadraticModel(NamedTuple):
     Attributes:
         gradient: Shape (K, n).
         diagonal: Gauss–Newton part of the diagonal blocks, lower triangles. Shape (K, n, n).
-        second: What is missing to the Hessian itself: Σ gradient_i ∂²error_i, lower triangles. Shape (K, n, n).
+        second: Second-order part of the Hessian: Σ gradient_i ∂²error_i, lower triangles. Shape (K, n, n).
         coupling: The block between a knot and the one before is diagonal: its negative. Shape (K, n).
         far: The block between a knot and the one two before, diagonal as well. Shape (K, n).
         beside: Scratch of :mod:`newton_step`: blocks beside the diagonal, filled up. Shape (K, n, n).
