@@ -20,7 +20,7 @@ def imported(import_path: str) -> Scenario:
             one. Modules in the current folder are found, too.
 
     Raises:
-        InvalidInputError: The import_path has another form, the module cannot be imported, or there is no scenario at it.
+        InvalidInputError: The path has another form, the module cannot be imported, or it leads to no scenario.
         UnknownNameError: The module has no such attribute; the message has the nearest one.
     """
     name, _, attribute = import_path.partition(":")

@@ -137,20 +137,6 @@ def test_a_large_callee_is_compiled_once_and_its_name_linked(tmp_path):
     assert linked(tmp_path, scale=2.0) == (round(two, 6), [1, 1, 1])
 
 
-def test_a_kernel_that_kernels_have_called_can_be_called_from_python(tmp_path):
-    """It is compiled once more then, and found on disk with and without what Python needs."""
-    assert linked(tmp_path, scale=1.0)[1] == [1, 1, 1]
-    (tmp_path / "run2.py").write_text("import numpy as np\nfrom middle import middle\n" + LINKED.split("\n", 2)[2])
-    code = (
-        "import numpy as np\nfrom caller import outer\nfrom callee import scaled\n{first}\n"
-        "print(scaled(np.ones(99)) == outer(np.ones(99)) - 1.0, *scaled.stats.cache_misses.values())"
-    )
-    for first, misses in ("outer(np.ones(99))", "1"), ("outer(np.ones(99))", ""), ("", ""):
-        line = [sys.executable, "-c", code.format(first=first)]
-        done = subprocess.run(line, cwd=tmp_path, env=os.environ, capture_output=True, text=True, check=True)
-        assert done.stdout.split() == ["True", *misses.split()]
-
-
 def test_a_kernel_is_compiled_once_for_all_constants(no_folder):
     @kernel
     def power(x, k):

@@ -201,7 +201,8 @@ class AbstractRotation(CompiledPolicy):
         q_pp_max: Where the listing limits joint coordinates, by a tanh, in [rad] or [m]; not printed.
         task_weights: The diagonal of ℱ, a number or one a task coordinate. Above 0, at most 1.
         joint_weights: The diagonal of 𝒲, a number or one a joint. Above 0, at most 1.
-        counter_rotation: Vectors that 𝒩 rotates: ``"joints"``, J̃ᵀ ℱ f and J̃ᵀ ℱ xᴺ; ``"task"``, ℱ f and ℱ xᴺ; or ``"none"``.
+        counter_rotation: Vectors that 𝒩 rotates: ``"joints"``, J̃ᵀ ℱ f and J̃ᵀ ℱ xᴺ; ``"task"``, ℱ f and ℱ xᴺ; or
+            ``"none"``.
         deformation: ``"rotation"``, AdaptiveDeform; or ``"contraction"``, Dineva's iteration (eq. 2.9), in which R_a,
             ``epsa`` and ``q_pp_max`` have no part.
         jacobian: ``"step"``: J̃ belongs to the joint coordinates of each inner iteration. ``"point"``: to those with
