@@ -55,7 +55,7 @@ def thinned(log: TrajectoryLog, size: int) -> dict[str, Any]:
 
 
 def limits(log: TrajectoryLog) -> npt.NDArray[np.uint8]:
-    """Which limit each joint is at: :data:`FREE`, :data:`ACCELERATION`, :data:`VELOCITY` or :data:`STOP`; (k, n)."""
+    """Which limit each joint is at: ``FREE``, ``ACCELERATION``, ``VELOCITY`` or ``STOP``; (k, n)."""
     out = np.full(log["q"].shape, FREE, dtype=np.uint8)
     if "qddot" in log:
         out[np.abs(log["qddot"]) >= (1.0 - AT_LIMIT) * log["acceleration_limit"]] = ACCELERATION
