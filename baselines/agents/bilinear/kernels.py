@@ -7,7 +7,7 @@ import numpy as np
 from baselines.agents.bilinear.damped_kernels import held_rows
 from baselines.agents.bilinear.rates import metric_rows, rate_rows
 from baselines.agents.network import forward_rows
-from ikgym.kernels.jit import inlined, kernel
+from ikgym.kernels.jit import inlined, inner, kernel
 from ikgym.rl.feature_kernels import context_rows, mean_twists
 from ikgym.rl.twists import is_turned, turn, turn_gradient, twist, twist_size
 
@@ -72,7 +72,7 @@ def seen_twist(kind, turned, axis, angle, pose, nominal, error, due):
         turn(axis, -angle, due)
 
 
-@kernel
+@inner
 def action_rows(scene, velocity_limit, q, pose, nominal, output, out):
     """Actions from (G, h), row by row: q̇ = G v + h s.
 
