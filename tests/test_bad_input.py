@@ -220,7 +220,7 @@ REFUSED = [
     ("upper", lambda: RandomJointSpline([0, 1], [1], 1, 1, 1)),
     ("velocity_limit", lambda: RandomJointSpline([0], [1], 0, 1, 1)),
     *((name, lambda name=name, x=x: SPLINE.replace(**{name: x})) for name, x in (
-        ("spans", 2), ("margin", 1.0), ("scale", (0.5, 1.5)),
+        ("spans", 2), ("spans", 200_000_000), ("margin", 1.0), ("scale", (0.5, 1.5)),
     )),
     ("lower", lambda: RandomJointSpline.within(VARGA, 2.0)),
     ("feasible", lambda: PANDA_LINE.replace(trajectory=SPLINE.replace(velocity_limit=3 * ONES))),

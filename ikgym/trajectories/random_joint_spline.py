@@ -18,6 +18,8 @@ from ikgym.validation import LARGEST, SMALLEST, FloatArray, frozen_array, number
 
 # Moves of less than this share of the largest count as none, so that nothing is divided by 0.
 TINY = 1e-12
+# Most spans: each draw needs memory for all of them.
+MOST_SPANS = 10_000
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -35,7 +37,7 @@ class RandomJointSpline(Trajectory):
         velocity_limit: Largest speeds in [rad/s] or [m/s]. A number, or shape (n,).
         acceleration_limit: Largest accelerations in [rad/s²] or [m/s²]. A number, or shape (n,).
         duration: From rest to rest, in [s].
-        spans: Pieces of the spline; more of them make a livelier and a slower motion.
+        spans: Pieces of the spline; more of them make a livelier and a slower motion. From 3 to 10 000.
         margin: The share of every limit that is not used, of positions at either end of half of the range.
         scale: Each joint moves by the share U(scale) of the motion that its limits allow.
 
@@ -71,7 +73,7 @@ class RandomJointSpline(Trajectory):
             velocity_limit=_positive("velocity_limit", self.velocity_limit, n),
             acceleration_limit=_positive("acceleration_limit", self.acceleration_limit, n),
             duration=number("duration", self.duration, at_least=SMALLEST, at_most=LARGEST),
-            spans=whole_number("spans", self.spans, at_least=3),
+            spans=whole_number("spans", self.spans, at_least=3, at_most=MOST_SPANS),
             margin=number("margin", self.margin, at_least=0.0, at_most=0.99),
             scale=(low, high),
         )

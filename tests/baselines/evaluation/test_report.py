@@ -10,7 +10,7 @@ import baselines
 import ikgym
 from baselines.episodes import Seeds, rollout
 from baselines.evaluate import evaluate
-from baselines.evaluation import report
+from baselines.evaluation import report, run
 from baselines.evaluation.export import trajectory_log
 from baselines.evaluation.jobs import Skipped
 from baselines.evaluation.metrics import Row
@@ -207,12 +207,27 @@ def test_the_log_has_the_accelerations_of_the_steps_from_rest():
     assert "qddot" not in trajectory_log(ikgym.scenarios.get("varga7-fast").replace(steps=8), Seeds(0), episode)
 
 
-def test_a_damaged_log_is_named(tmp_path):
-    evaluate("faitli3-regular", "dls", steps=5, out=tmp_path, plots=False)
+def test_a_damaged_log_is_named_before_anything_is_played(tmp_path, monkeypatch):
+    given = {"scenarios": "faitli3-regular", "steps": 5, "out": tmp_path}
+    evaluate(**given, policies="dls", plots=False)
+    monkeypatch.setattr(run, "run", None)
     (file,) = tmp_path.glob("series/*/*.npz")
+    with np.load(file) as arrays:
+        log = dict(arrays)
+    spoilt = [
+        ({"other": np.zeros(3)}, "There is no array of a log 'other'"),
+        ({name: array for name, array in log.items() if name != "nominal"}, "in the array nominal, got shape None"),
+        (log | {"nominal": np.zeros(3)}, r"of shape \('k', 'm'\) in the array nominal, got shape \(3,\)"),
+        (log | {"q": log["q"][:-1]}, "of the array q does not fit the others"),
+        (log | {"time": log["time"].astype(str)}, "expected numbers of shape"),
+    ]
+    for arrays, message in spoilt:
+        np.savez(file, **arrays)
+        with pytest.raises(ResultsError, match=rf"{re.escape(str(file))} is damaged, .*{message}"):
+            evaluate(**given, policies=["dls", "moore_penrose"], resume=True)
     file.write_bytes(b"nothing")
     with pytest.raises(ResultsError, match=re.escape(str(file))):
-        evaluate("faitli3-regular", "dls", steps=5, out=tmp_path, resume=True)
+        evaluate(**given, policies="dls", resume=True)
 
 
 def log_of(steps=60, coordinates=6, joints=7, **changes):
