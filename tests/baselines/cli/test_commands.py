@@ -244,7 +244,7 @@ def test_the_table_stands_before_the_plots_and_the_readme_has_the_command(tmp_pa
     arguments = ["evaluate", "--policies", "dls", "--steps", "5", "--out", str(tmp_path / "out")]
     assert main(arguments) == 0
     printed = capsys.readouterr()
-    assert "left out at 80 characters a line: p99, misses" in printed.out
+    assert "left out at 80 characters a line: tracking, p99, misses" in printed.out
     assert max(map(len, printed.out.split("\n\nwritten to")[0].splitlines())) <= 80
     assert "ikgym evaluate --policies dls --steps 5" in (tmp_path / "out" / "README.md").read_text(encoding="utf-8")
 
