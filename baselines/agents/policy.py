@@ -118,10 +118,10 @@ class LearnedPolicy(SolverPolicy):
     def solve(self, batch: Batch, memory: Memory) -> Solution:
         """See :meth:`SolverPolicy.solve`."""
         assert isinstance(memory, AgentMemory)
-        held, orientation = Held(memory.values.copy(), memory.left.copy()), memory[len(Held._fields) :]
+        held = Held(memory.values.copy(), memory.left.copy())
+        orientation = full_orientation.OrientationMemory(memory.cosines, memory.known)
         if self._resolves:
-            known = full_orientation.OrientationMemory(*orientation)
-            batch, orientation = full_orientation.resolve_orientation(self.problem, batch, known)
+            batch, orientation = full_orientation.resolve_orientation(self.problem, batch, orientation)
             batch = batch._replace(nominal=batch.nominal.take(np.array(self._offsets) - 1, axis=1))
         processing, network = self.file.processing, self.file.network
         assert isinstance(processing, (Bilinear, Relative))
