@@ -53,8 +53,14 @@ class LearnedPolicy(SolverPolicy):
     tuple of steps ahead; observations that show 1, 2, … up to the furthest of them are accepted, too. An agent trained
     on whole poses also plays scenarios that show skew coordinates: their orientation is resolved by
     :func:`baselines.solvers.wrappers.full_orientation.resolve_orientation`, which needs all steps up to the furthest.
+
+    Args:
+        problem: The part of the scenario that the policy knows.
+        interval: Steps from one evaluation of the network to the next; that of its training if left out. What follows
+            from the network is held in between, with feedback in every step.
     """
 
+    interval: int | None = None
     #: The agent in the file.
     file: AgentFile = dataclasses.field(init=False, repr=False)
     #: The problem as the agent sees it: with whole poses if it was trained on them.
@@ -65,12 +71,11 @@ class LearnedPolicy(SolverPolicy):
     grain: ClassVar[int] = 32
     from_file: ClassVar[bool] = True
 
-    def _take(self, file: AgentFile, interval: int | None, *, any_arm: bool = False) -> None:
+    def _take(self, file: AgentFile, *, any_arm: bool = False) -> None:
         """Uses the agent of a file.
 
         Args:
             file: The file.
-            interval: Steps from one evaluation of the network to the next; None for that of its training.
             any_arm: Whether it may control an arm that it was not trained for.
 
         Raises:
@@ -90,7 +95,7 @@ class LearnedPolicy(SolverPolicy):
                 f"{shape[0]} and {shape[1]}."
             )
         trained: int = file.processing.interval  # type: ignore[attr-defined]
-        steps = whole_number("interval", trained if interval is None else interval, at_least=1)
+        steps = whole_number("interval", trained if self.interval is None else self.interval, at_least=1)
         for field, value in {"file": file, "seen": seen, "bounds": Bounds.of(seen), "interval": steps}.items():
             object.__setattr__(self, field, value)
 
@@ -126,6 +131,7 @@ class LearnedPolicy(SolverPolicy):
         processing, network = self.file.processing, self.file.network
         assert isinstance(processing, (Bilinear, Relative))
         assert isinstance(network, Network)
+        assert self.interval is not None
         fractions = processing.act(self.seen, batch, network, self.interval, held)
         if self.bounds is not None:
             self.bounds.keep(batch, fractions)
@@ -143,8 +149,7 @@ class Agent(LearnedPolicy):
         path: The file.
         hash: The first twelve digits of the agent's hash; another agent is refused. Results contain the actual ones.
         any_arm: Whether it may control an arm that it was not trained for.
-        interval: Steps from one evaluation of the network to the next; that of its training if left out. G and h are
-            held in between, with feedback in every step.
+        interval: See :class:`LearnedPolicy`.
         given: An agent in memory, in place of a file.
 
     Raises:
@@ -155,7 +160,6 @@ class Agent(LearnedPolicy):
     path: str = ""
     hash: str | None = None
     any_arm: bool = False
-    interval: int | None = None
     given: dataclasses.InitVar[AgentFile | None] = dataclasses.field(default=None, kw_only=True)
 
     name: ClassVar[str] = "agent"
@@ -165,7 +169,7 @@ class Agent(LearnedPolicy):
     def __post_init__(self, given: AgentFile | None) -> None:
         flag("any_arm", self.any_arm)
         file = given or agent_at(self.path, self.hash, (Bilinear, Relative))
-        self._take(file, self.interval, any_arm=self.any_arm)
+        self._take(file, any_arm=self.any_arm)
         object.__setattr__(self, "path", os.fspath(self.path))
         object.__setattr__(self, "hash", file.digits)
 
@@ -177,21 +181,20 @@ class AgentAlone(LearnedPolicy):
     Args:
         problem: The part of the scenario that the policy knows.
         hash: The first twelve digits of its hash, which distinguishes its results from those of a successor.
-        interval: Steps from one evaluation of the network to the next; on validation episodes 8 cost 0.3 % (0.2 to
-            0.5 %) more than 1.
+        interval: See :class:`LearnedPolicy`. On validation episodes 8, as in the training, cost 0.3 % (0.2 to 0.5 %)
+            more than 1.
 
     Raises:
         InvalidInputError: The file has another hash, or the scenario does not fit the agent.
     """
 
     hash: str = "25357e60147d"
-    interval: int = 8
 
     name: ClassVar[str] = "agent_alone"
 
     def __post_init__(self) -> None:
         file = agent_at(FOLDER / f"{self.name}.safetensors", self.hash, (Bilinear,))
-        self._take(dataclasses.replace(file, source=self.name), self.interval)
+        self._take(dataclasses.replace(file, source=self.name))
 
 
 def agent_at(path: str | os.PathLike[str], digits: str | None, kinds: Sequence[type[Processing]]) -> AgentFile:
