@@ -199,13 +199,14 @@ class APG(ActorOnly):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        self._whole("hold", "segment_steps")
         self._set("offsets", self.processing.offsets)
         self._set("damping", self.processing.damping)
         if self.init is not None:
             self._set("init", pathlib.Path(self.init))
         if not isinstance(self.window, tuple) or not self.window:
             raise InvalidInputError(f"window: expected whole numbers, got {self.window!r}.")
-        self._whole("hold", "segment_steps", "window")
+        self._whole("window")
         for steps in self.window:
             if steps % self.hold or self.segment_steps % steps:
                 raise InvalidInputError(
@@ -218,7 +219,7 @@ class APG(ActorOnly):
     @property
     def processing(self) -> Bilinear:
         """The features and the law of the agent."""
-        return Bilinear(self.offsets, self.damping)
+        return Bilinear(self.offsets, self.damping, self.hold)
 
     def window_of(self, segment: int) -> int:
         """The window of a segment, counted from 0."""
