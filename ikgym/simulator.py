@@ -268,7 +268,8 @@ class Simulator:
             self._nominal.look_ahead(self._state.frames, rows, self._state.step[rows] + 1)
 
     def _run(self, active: npt.NDArray[np.bool_], numbers: FloatArray, *, moving: bool) -> None:
-        in_chunks(lambda start, stop: self._rows(active, numbers, moving, start, stop), self.rows, GRAIN_STEP)
+        grain = GRAIN_STEP * self.rows // max(int(np.count_nonzero(active)), 1)
+        in_chunks(lambda start, stop: self._rows(active, numbers, moving, start, stop), self.rows, grain)
 
     def _rows(self, active: npt.NDArray[np.bool_], numbers: FloatArray, moving: bool, start: int, stop: int) -> None:
         if self._motions:
