@@ -285,7 +285,7 @@ REFUSED = [
     ("Did you mean 'reset_mask'", lambda: reset_rows(resetmask=np.ones(2, dtype=bool))),
     ("Did you mean 'SameStep'", lambda: ikgym.RedundantIKVectorEnv(2, autoreset_mode="SamStep")),
     ("num_envs", lambda: ikgym.RedundantIKVectorEnv(0)),
-    ("render a single one", lambda: ikgym.RedundantIKVectorEnv(2, render_mode="rgb_array")),
+    ("shows a single one", lambda: ikgym.RedundantIKVectorEnv(2, render_mode="human")),
     ("num_envs", lambda: ikgym.sb3.RedundantIKVecEnv(0)),
     ("two steps ahead", lambda: ikgym.rl.make(FAST, preview=1)),
     ("lost_distance", lambda: ikgym.rl.make(FAST, lost_distanc=1.0)),
