@@ -128,14 +128,16 @@ def signed(name: str, value: float) -> float:
     return number(name, value, at_least=-LARGEST, at_most=LARGEST)
 
 
-def whole_number(name: str, value: int, *, at_least: int) -> int:
-    """A whole number not below a bound.
+def whole_number(name: str, value: int, *, at_least: int, at_most: int | None = None) -> int:
+    """A whole number within its bounds.
 
     Raises:
-        InvalidInputError: The value is no whole number, or below the bound.
+        InvalidInputError: The value is no whole number, or outside the bounds.
     """
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < at_least:
-        raise InvalidInputError(f"{name}: expected a whole number of at least {at_least}, got {shortened(value)}.")
+    whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
+    if not whole or value < at_least or (at_most is not None and value > at_most):
+        bound = f" of at least {at_least}" if at_most is None else f" from {at_least} to {at_most}"
+        raise InvalidInputError(f"{name}: expected a whole number{bound}, got {shortened(value)}.")
     return int(value)
 
 
