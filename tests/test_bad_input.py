@@ -206,7 +206,7 @@ REFUSED = [
     ("of length 1.41421", lambda: OrientationThrough([[1, 0, 0, 0], [1, 1, 0, 0]])),
     ("half a turn", lambda: OrientationThrough([[1, 0, 0, 0], [0, 1, 0, 0]])),
     ("quaternions", lambda: PathTrajectory(LINE, Quintic(1, 1), OrientationThrough(QUATERNIONS))),
-    ("at least 2", lambda: paths.SplinePath([[0, 0, 0]])),
+    ("from 2 to", lambda: paths.SplinePath([[0, 0, 0]])),
     ("apart", lambda: paths.SplinePath([[1, 0, 0], [0, 0, 0], [0, 0, 0]])),
     *(("straight back", lambda make=make: make()) for make in (
         lambda: paths.SplinePath(STRAIGHT_BACK), lambda: paths.Polyline(STRAIGHT_BACK, 0.1),

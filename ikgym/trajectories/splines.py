@@ -8,10 +8,13 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
+from ikgym.kernels.cubic_splines import solve_tridiagonal
 from ikgym.validation import FloatArray
 
 # Gauss-Legendre rule for the length of a piece of a curve.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(7)
+# Pieces whose lengths are computed at a time: memory for long curves.
+_TOGETHER = 2**11
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -41,7 +44,8 @@ class CubicSpline:
         if not at_rest:
             diagonal[[0, -1]], upper[0], lower[-1] = 2.0, 1.0, 1.0
             right[[0, -1]] = 3.0 * secants[[0, -1]]
-        return cls(knots, values, _tridiagonal(lower, diagonal, upper, right))
+        solve_tridiagonal(lower, diagonal, upper, right)
+        return cls(knots, values, right)
 
     def __call__(self, at: FloatArray, derivative: int = 0) -> FloatArray:
         """The curve, or its first or second derivative. ``at``: shape (...,). Returns shape (..., d)."""
@@ -60,18 +64,6 @@ class CubicSpline:
         return out
 
 
-def _tridiagonal(lower: FloatArray, diagonal: FloatArray, upper: FloatArray, right: FloatArray) -> FloatArray:
-    """Solves a diagonally dominant tridiagonal system. ``right``: shape (k, d)."""
-    diagonal, right = diagonal.copy(), right.copy()
-    for i in range(1, len(diagonal)):
-        factor = lower[i] / diagonal[i - 1]
-        diagonal[i] -= factor * upper[i - 1]
-        right[i] -= factor * right[i - 1]
-    for i in range(len(diagonal) - 2, -1, -1):
-        right[i] -= upper[i] / diagonal[i + 1] * right[i + 1]
-    return right / diagonal[:, None]
-
-
 class ArcLength:
     """The length of a curve as a function of its parameter, and the other way round.
 
@@ -82,8 +74,10 @@ class ArcLength:
 
     def __init__(self, speed: Callable[[FloatArray], FloatArray], breaks: FloatArray) -> None:
         self._speed, self._breaks = speed, breaks
-        pieces = self._between(breaks[:-1], breaks[1:])
-        self.lengths: FloatArray = np.concatenate([[0.0], np.cumsum(pieces)])
+        starts = range(0, len(breaks) - 1, _TOGETHER)
+        parts = [breaks[i : i + _TOGETHER + 1] for i in starts]
+        pieces = [self._between(part[:-1], part[1:]) for part in parts]
+        self.lengths: FloatArray = np.concatenate([[0.0], np.cumsum(np.concatenate(pieces))])
 
     def parameter(self, s: FloatArray) -> FloatArray:
         """Parameter of the curve at the arc length ``s``. Shape (k,)."""

@@ -10,6 +10,7 @@ import numpy as np
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 from ikgym.trajectories.orientations import aligned_quaternions, matrices
+from ikgym.trajectories.paths.path import check_count
 from ikgym.trajectories.splines import CubicSpline
 from ikgym.trajectories.trajectory import Trajectory
 from ikgym.validation import LARGEST, FloatArray, frozen_array
@@ -28,8 +29,8 @@ class TimedWaypoints(Trajectory):
             alone. Shape (k, 4).
 
     Raises:
-        InvalidInputError: There are fewer than two waypoints, the times do not rise, a shape is wrong, or a quaternion
-            has not the length 1.
+        InvalidInputError: There are fewer than two waypoints or too many, the times do not rise, a shape is wrong, or a
+            quaternion has not the length 1.
     """
 
     times: FloatArray
@@ -38,8 +39,7 @@ class TimedWaypoints(Trajectory):
 
     def __post_init__(self) -> None:
         times = frozen_array("times", self.times, (None,), at_most=LARGEST)
-        if len(times) < 2:
-            raise InvalidInputError(f"times: expected at least 2 waypoints, got {len(times)}.")
+        check_count("times", times)
         if times[0] < 0.0:
             raise InvalidInputError(f"times: expected times from 0 on, got {times[0]:g} s as the first.")
         if (np.diff(times) <= 0.0).any():

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import csv
+import io
+import itertools
+import math
 import os
 
 import numpy as np
@@ -13,11 +16,14 @@ from ikgym.files import read_user_file
 from ikgym.trajectories.orientations import Orientation, OrientationThrough
 from ikgym.trajectories.path_trajectory import PathTrajectory
 from ikgym.trajectories.paths import Path, Polyline, SplinePath
+from ikgym.trajectories.paths.path import MOST_POINTS
 from ikgym.trajectories.time_laws import TIME_LAWS
 from ikgym.trajectories.timed_waypoints import TimedWaypoints
 from ikgym.trajectories.trajectory import Trajectory
-from ikgym.validation import LARGEST, FloatArray, frozen_array, known_name
+from ikgym.validation import LARGEST, FloatArray, frozen_array, known_name, shortened
 
+#: Largest size of a file in bytes.
+MOST_BYTES = 2**26
 POSITION, QUATERNION, TIME = ("x", "y", "z"), ("qw", "qx", "qy", "qz"), "t"
 
 
@@ -83,7 +89,8 @@ def from_csv(
 
     Args:
         file: Its first line names the columns, in any order: ``x, y, z`` in [m], ``qw, qx, qy, qz`` where there are
-            orientations, and ``t`` in [s] where there are times. Each further line is a waypoint.
+            orientations, and ``t`` in [s] where there are times. Each further line is a waypoint; there are at most
+            200 000 of them.
         speed: See :func:`through`.
         acceleration: See :func:`through`.
         corner_radius: See :func:`through`.
@@ -114,19 +121,20 @@ def from_csv(
 
 def _columns(file: str | os.PathLike[str]) -> dict[str, FloatArray]:
     """The columns of a file by their names."""
-    content = read_user_file(file)
+    lines = io.TextIOWrapper(io.BytesIO(read_user_file(file, MOST_BYTES)), "utf-8-sig")
     try:
-        rows = list(csv.reader(content.decode("utf-8-sig").splitlines(), skipinitialspace=True))
+        rows = list(itertools.islice(csv.reader(lines, skipinitialspace=True), MOST_POINTS + 2))
     except (ValueError, csv.Error) as error:
         raise InvalidInputError(f"{file}: expected a CSV file: {error}.") from None
+    if len(rows) > MOST_POINTS + 1:
+        raise InvalidInputError(f"{file}: expected at most {MOST_POINTS} waypoints, got more lines than that.")
     # Lines are counted as an editor does; those without anything may only stand at the end.
     while rows and not any(cell.strip() for cell in rows[-1]):
         rows.pop()
     names = [cell.strip() for cell in rows[0]] if rows else []
     _check_names(file, names)
-    values = [[_value(file, line, *cell) for cell in _cells(file, line, names, row)] for line, row in _lines(rows)]
-    table = np.array(values, dtype=np.float64).reshape(-1, len(names))
-    return {name: table[:, i] for i, name in enumerate(names)}
+    table = np.array([_values(file, line, names, row) for line, row in enumerate(rows[1:], start=2)], dtype=np.float64)
+    return dict(zip(names, table.reshape(-1, len(names)).T, strict=True))
 
 
 def _check_names(file: object, names: list[str]) -> None:
@@ -143,22 +151,17 @@ def _check_names(file: object, names: list[str]) -> None:
         raise InvalidInputError(f"{file}: expected each column once, got {', '.join(names)}.")
 
 
-def _lines(rows: list[list[str]]) -> list[tuple[int, list[str]]]:
-    return list(enumerate(rows[1:], start=2))
-
-
-def _cells(file: object, line: int, names: list[str], row: list[str]) -> list[tuple[str, str]]:
+def _values(file: object, line: int, names: list[str], row: list[str]) -> list[float]:
+    """The numbers of a line."""
     if len(row) != len(names):
         raise InvalidInputError(f"{file}, line {line}: expected {len(names)} values, got {len(row)}.")
-    return list(zip(names, row, strict=True))
-
-
-def _value(file: object, line: int, name: str, cell: str) -> float:
-    try:
-        value = float(cell)
-    except ValueError:
-        value = np.nan
-    if not np.isfinite(value):
-        got = repr(cell) if cell.strip() else "nothing"
-        raise InvalidInputError(f"{file}, line {line}, column {name}: expected a finite number, got {got}.")
-    return value
+    values = []
+    for name, cell in zip(names, row, strict=True):
+        try:
+            values.append(float(cell))
+        except ValueError:
+            values.append(math.nan)
+        if not math.isfinite(values[-1]):
+            got = shortened(cell) if cell.strip() else "nothing"
+            raise InvalidInputError(f"{file}, line {line}, column {name}: expected a finite number, got {got}.")
+    return values

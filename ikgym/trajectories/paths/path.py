@@ -84,11 +84,10 @@ def points_of(name: str, value: npt.ArrayLike) -> FloatArray:
     """Two points or more, of which no two that follow each other are the same. Shape (k, 3).
 
     Raises:
-        InvalidInputError: There are fewer, or one is repeated; the message says which.
+        InvalidInputError: There are fewer, or too many, or one is repeated; the message says which.
     """
     points = frozen_array(name, value, (None, 3), at_most=LARGEST)
-    if len(points) < 2:
-        raise InvalidInputError(f"{name}: expected at least 2 points, got {len(points)}.")
+    check_count(name, points)
     gaps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     if (gaps < SHORTEST).any():
         i = int(np.argmin(gaps))
@@ -99,5 +98,17 @@ def points_of(name: str, value: npt.ArrayLike) -> FloatArray:
     return points
 
 
+def check_count(name: str, points: FloatArray) -> None:
+    """Checks that there are at least 2 waypoints, and not too many.
+
+    Raises:
+        InvalidInputError: There are fewer, or more.
+    """
+    if not 2 <= len(points) <= MOST_POINTS:
+        raise InvalidInputError(f"{name}: expected from 2 to {MOST_POINTS} waypoints, got {len(points)}.")
+
+
+#: Most waypoints: they are read and made into a path within 10 s.
+MOST_POINTS = 200_000
 #: Points that follow each other are at least this far apart, in [m].
 SHORTEST = 1e-9

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ikgym.exceptions import InvalidInputError
-from ikgym.trajectories.paths.path import Outline, Path, points_of, settle_placement
+from ikgym.trajectories.paths.path import MOST_POINTS, Outline, Path, points_of, settle_placement
 from ikgym.validation import LARGEST, SMALLEST, FloatArray, number, whole_number
 
 # Corners that turn by less than this, in [rad], are none.
@@ -117,29 +117,27 @@ class Polyline(Path):
     @functools.cached_property
     def _pieces(self) -> Pieces:
         lengths, directions, angles, taken = self._turns
-        begin, starts, tangents, normals, curvatures, corners = [0.0], [], [], [], [], []
-
-        def add(start: FloatArray, tangent: FloatArray, normal: FloatArray, curvature: float, length: float) -> None:
-            starts.append(start)
-            tangents.append(tangent)
-            normals.append(normal)
-            curvatures.append(curvature)
-            begin.append(begin[-1] + length)
-
-        before = 0.0
-        for i, direction in enumerate(directions):
-            after = float(taken[i]) if i < len(taken) else 0.0
-            straight = max(float(lengths[i]) - before - after, 0.0)
-            add(self.points[i] + before * direction, direction, np.zeros(3), 0.0, straight)
-            if i < len(taken):
-                bend = float(angles[i]) * self.corner_radius
-                corners.append(begin[-1] + 0.5 * bend)
-                if bend > 0.0:
-                    inward = directions[i + 1] - np.cos(angles[i]) * direction
-                    inward /= np.linalg.norm(inward)
-                    add(self.points[i + 1] - after * direction, direction, inward, 1.0 / self.corner_radius, bend)
-            before = after
-        return Pieces(*map(np.array, (begin, starts, tangents, normals, curvatures, corners)))
+        # In turn a line and the arc behind it; the last line has none, nor have corners that do not turn.
+        before, after = np.concatenate([[0.0], taken]), np.concatenate([taken, [0.0]])
+        bends = np.concatenate([angles * self.corner_radius, [0.0]])
+        inward = np.zeros_like(directions)
+        for i in np.flatnonzero(bends > 0.0):
+            normal = directions[i + 1] - np.cos(angles[i]) * directions[i]
+            inward[i] = normal / np.linalg.norm(normal)
+        lines = self.points[:-1] + before[:, None] * directions
+        arcs = self.points[1:] - after[:, None] * directions
+        straight = np.maximum(lengths - before - after, 0.0)
+        ends = np.concatenate([[0.0], np.cumsum(np.column_stack([straight, bends]))])
+        kept = np.column_stack([np.ones(len(lines), dtype=bool), bends > 0.0]).ravel()
+        curvature = np.column_stack([np.zeros(len(lines)), np.full(len(lines), 1.0 / self.corner_radius)])
+        return Pieces(
+            begin=np.append(ends[:-1][kept], ends[-1]),
+            start=np.stack([lines, arcs], axis=1).reshape(-1, 3)[kept],
+            tangent=np.repeat(directions, 2, axis=0)[kept],
+            normal=np.stack([np.zeros_like(inward), inward], axis=1).reshape(-1, 3)[kept],
+            curvature=curvature.ravel()[kept],
+            corner=ends[1:-2:2] + 0.5 * bends[:-1],
+        )
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -201,7 +199,7 @@ class Raster(Outline):
 
     def __post_init__(self) -> None:
         settle_placement(self)
-        self._settle(lines=whole_number("lines", self.lines, at_least=2))
+        self._settle(lines=whole_number("lines", self.lines, at_least=2, at_most=MOST_POINTS // 2))
         for name in ("width", "height"):
             self._settle(**{name: number(name, getattr(self, name), at_least=SMALLEST, at_most=LARGEST)})
         most = 0.5 * min(self.height / (self.lines - 1), self.width)

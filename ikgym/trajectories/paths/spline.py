@@ -8,6 +8,7 @@ import functools
 import numpy as np
 
 from ikgym.exceptions import InvalidInputError
+from ikgym.kernels.cubic_splines import extremes
 from ikgym.trajectories.paths.path import Path, points_of
 from ikgym.trajectories.splines import ArcLength, CubicSpline
 from ikgym.validation import FloatArray
@@ -31,28 +32,27 @@ class SplinePath(Path):
     """
 
     points: FloatArray
+    _curvature: float = dataclasses.field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         self._settle(points=points_of("points", self.points))
-        speed = np.linalg.norm(self._spline(_refined(self._spline.knots, SAMPLES), 1), axis=1)
-        if speed.min() < LEAST_SPEED:
-            i = round(int(np.argmin(speed)) / SAMPLES)
+        least, i, curvature = extremes(self._spline.knots, self._spline.values, self._spline.slopes, SAMPLES)
+        if least < LEAST_SPEED:
             raise InvalidInputError(
                 f"points: expected a curve that nowhere turns straight back, got one that does near number {i}, "
                 f"{self.points[i].tolist()}."
             )
+        self._settle(_curvature=curvature)
 
     @property
     def length(self) -> float:
         """See :attr:`Path.length`."""
         return float(self._arc.lengths[-1])
 
-    @functools.cached_property
+    @property
     def curvature(self) -> float:
         """The largest of 128 samples between two points. See :attr:`Path.curvature`."""
-        u = _refined(self._spline.knots, SAMPLES)
-        first, second = self._spline(u, 1), self._spline(u, 2)
-        return float((np.linalg.norm(np.cross(first, second), axis=1) / np.linalg.norm(first, axis=1) ** 3).max())
+        return self._curvature
 
     @property
     def stations(self) -> FloatArray:
