@@ -64,7 +64,7 @@ class Repeat(RunOptions):
 
 RULES = (
     Rule(("--workers",), lambda given: given.options.cluster is None, "with --cluster"),
-    Rule(("--workers",), lambda given: len(given.options.seeds) > 1 or given.options.workers < 2, "on one seed"),
+    Rule(("--workers",), lambda given: len(set(given.options.seeds)) > 1 or given.options.workers < 2, "on one seed"),
     Rule(
         ("--group-size", "--n-epochs", "--clip-range", "--gamma", "--log-std-init", "--log-std-end"),
         lambda given: given.config.estimator == "ppo",

@@ -28,6 +28,7 @@ Estimator = Literal["analytic", "ppo"]
 
 #: Upper bounds, so that a typing error gives a message and does not exhaust the memory.
 MOST_ARMS, MOST_LAYERS, MOST_NEURONS = 10_000, 10, 2048
+MOST_WINDOW = 10_000
 MOST_RATE = 1e30  # weights are float32
 
 
@@ -206,7 +207,8 @@ class APG(ActorOnly):
             self._set("init", pathlib.Path(self.init))
         if not isinstance(self.window, tuple) or not self.window:
             raise InvalidInputError(f"window: expected whole numbers, got {self.window!r}.")
-        self._whole("window")
+        self._whole("hold", "segment_steps")
+        self._whole("window", at_most=MOST_WINDOW)
         for steps in self.window:
             if steps % self.hold or self.segment_steps % steps:
                 raise InvalidInputError(

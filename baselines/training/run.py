@@ -29,7 +29,7 @@ from baselines.training.folder import FORMAT, Checkpoint, Folder
 from baselines.training.methods import new_trainer
 from baselines.training.randomness import deterministic_torch, reseed
 from baselines.training.trainers.base import SegmentMetrics
-from baselines.training.validation import Score, validate
+from baselines.training.validation import Score, bound, validate
 
 #: Weights above this have diverged.
 LARGEST = 1e9
@@ -104,7 +104,8 @@ class _Run:
     def begin(self, *, resume: bool, overwrite: bool) -> None:
         identity = {part: self._about[part] for part in ("method", "seed", "config", "scenario", "versions")}
         reseed(self._seed, None)
-        self._trainer = new_trainer(self._config, self._scenario, self._seed)  # may refuse: before files are replaced
+        self._trainer = new_trainer(self._config, self._scenario, self._seed)
+        bound(self._trainer.agent(), self._scenario)  # whatever is refused, is refused before files are replaced
         there = self._folder.prepare(identity, resume=resume, overwrite=overwrite)
         if there is not None:
             self._about["command"] = there.get("command", self._about["command"])

@@ -75,10 +75,19 @@ def validation_seeds(scenario: Scenario, episodes: int) -> tuple[int, ...]:
     return scenarios.seeds("validation", episodes if random else 1)
 
 
+def bound(agent: AgentFile, scenario: Scenario) -> Agent | RecurrentPolicy:
+    """An agent as a policy for a scenario.
+
+    Raises:
+        IkgymError: The scenario or its base policy does not fit the agent.
+    """
+    kind = RecurrentPolicy if isinstance(agent.processing, Recurrent) else Agent
+    return kind(Problem.of(scenario), given=agent)
+
+
 def validate(agent: AgentFile, scenario: Scenario, episodes: int) -> Score:
     """The score of an agent, see :func:`score`."""
-    kind: Any = RecurrentPolicy if isinstance(agent.processing, Recurrent) else Agent
-    policy = kind(Problem.of(scenario), given=agent)
+    policy = bound(agent, scenario)
     return score(policy, scenario, episodes, policy.preview)
 
 

@@ -19,6 +19,7 @@ from baselines.training.config import Reinforcement
 from baselines.training.exporting import exported
 from baselines.training.randomness import episode_seed, sequence
 from baselines.training.trainers.base import SegmentMetrics, Trainer
+from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
 from ikgym.validation import known_names
 
@@ -37,7 +38,7 @@ class SB3Trainer(Trainer):
 
     Raises:
         UnknownNameError: The algorithm has no such setting.
-        InvalidInputError: Agents do not support the observation, such as a history.
+        InvalidInputError: The algorithm refuses a setting, or agents do not support the observation, such as a history.
     """
 
     def __init__(self, config: Reinforcement, scenario: Scenario, seed: int) -> None:
@@ -52,7 +53,11 @@ class SB3Trainer(Trainer):
         if isinstance(noise := settings.get("action_noise"), (int, float)):
             joints = np.ones(scenario.joints)
             settings["action_noise"] = NormalActionNoise(0.0 * joints, noise * joints)
-        self._take(self._kind("MlpPolicy", self._envs, device="cpu", **settings))
+        try:
+            model = self._kind("MlpPolicy", self._envs, device="cpu", **settings)
+        except (AssertionError, TypeError, ValueError) as e:  # Stable-Baselines3's own checks
+            raise InvalidInputError(f"set: {config.method} refuses {', '.join(config.settings)}: {e}") from e
+        self._take(model)
 
     @property
     def steps(self) -> int:  # type: ignore[override]

@@ -101,6 +101,7 @@ def test_files_that_cannot_be_repeated(content, message, tmp_path, capsys):
         (["apg", *TINY[2:], "--scenario", "varga"], "There is no scenario 'varga'"),
         (["apg", *TINY, "--workers", "0"], "workers: expected a whole number of at least 1, got 0"),
         (["apg", *TINY, "--seeds", "-1"], "seeds: expected a whole number of at least 0, got -1"),
+        (["apg", "--window", "1000000000"], "window: expected a whole number from 1 to 10000, got 1000000000."),
         (["apg", "--window", "7"], "window: expected multiples of hold"),
         (["apg", *TINY, "--init", "nowhere.safetensors"], "Cannot read nowhere.safetensors"),
         (["repeat", "nowhere.json"], "Cannot read nowhere.json"),
@@ -116,12 +117,24 @@ def test_errors_are_one_line_and_exit_code_2(arguments, message, tmp_path, capsy
     assert len(error.splitlines()) == 1
 
 
-def test_refused_settings_replace_no_run(tmp_path, capsys):
-    """Settings of an algorithm are refused by its trainer."""
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["ppo", "--set", "n_step=3"], "Did you mean 'n_steps'?"),
+        (["ppo", "--set", "n_steps=-3"], "set: ppo refuses n_steps=-3: `n_steps * n_envs` must be greater than 1"),
+        (["ppo", "--set", "n_steps=few"], "set: ppo refuses n_steps=few"),
+        (["ppo", "--learning", "preview=0"], "preview: expected a whole number of at least 1"),
+        (["observe", "--base-policy", "dlss"], "There is no policy 'dlss'. Did you mean 'dls'?"),
+        (["apg", "--scenario", "panda-field"], "expected an ideal plant with a known gradient"),
+    ],
+)
+def test_what_a_trainer_refuses_replaces_no_run(arguments, message, tmp_path, capsys):
     (tmp_path / "seed-0").mkdir()
     (tmp_path / "seed-0" / "run.json").write_text("{}")
-    assert main(["ppo", "--preset", "smoke", "--set", "n_step=3", "--overwrite", "--out", str(tmp_path)]) == 2
-    assert "Did you mean 'n_steps'?" in capsys.readouterr().err
+    assert main([*arguments, "--preset", "smoke", "--no-progress", "--overwrite", "--out", str(tmp_path)]) == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert len(error.splitlines()) == 1
     assert (tmp_path / "seed-0" / "run.json").read_text() == "{}"
 
 
