@@ -2,7 +2,8 @@
 
 Trains ``PPO("MlpPolicy", ikgym.sb3.make_vec("panda-random", 8))`` of Stable-Baselines3 for some minutes of CPU time,
 and prints how well episodes of the split `validation` are followed: the median of their largest position errors after
-the first 0.2 s. Time in which the machine did something else does not count.
+the first 0.2 s, that of `dls` on the same episodes, and the geometric mean of the costs divided by those of `dls`. Time
+in which the machine did something else does not count.
 """
 
 from __future__ import annotations
@@ -18,7 +19,10 @@ import tyro
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 
+import baselines
 import ikgym.sb3
+from baselines.episodes import rollouts
+from baselines.evaluation.summary import geometric_mean
 from baselines.spec import parse_parameters
 from ikgym import rl, scenarios
 from ikgym.validation import FloatArray
@@ -52,18 +56,28 @@ class Command:
         return {name: value for text in self.change for name, value in parse_parameters(text, "--change").items()}
 
 
-def largest_errors(
+def played(
     model: Any, scenario: str, split: str, episodes: int, changes: Mapping[str, Any] | None = None
-) -> FloatArray:
-    """The largest position error of each episode after the first 0.2 s, in [m]. Shape (episodes,)."""
+) -> tuple[FloatArray, FloatArray]:
+    """The largest position error of each episode after the first 0.2 s, in [m], and its cost. Shapes (episodes,)."""
     envs = rl.make_vec(scenario, episodes, autoreset_mode="Disabled", **{**(changes or {}), "lost_distance": None})
     observation, _ = envs.reset(seed=scenarios.SPLITS[split].start)
-    worst, found = np.zeros(episodes), scenarios.get(scenario)
+    worst, cost, found = np.zeros(episodes), np.zeros(episodes), scenarios.get(scenario)
     for step in range(found.steps):
         observation, *_, infos = envs.step(model.predict(observation, deterministic=True)[0])
+        cost += infos["tracking_cost"] + infos["velocity_cost"]
         if (step + 1) * found.dt > SETTLED:
             worst = np.maximum(worst, infos["position_error"])
-    return worst
+    return worst, cost
+
+
+def yardstick(scenario: str, split: str, episodes: int) -> tuple[FloatArray, FloatArray]:
+    """The same as :func:`played` of `dls`."""
+    found = scenarios.get(scenario)
+    several = rollouts(found, baselines.make("dls", found), scenarios.seeds(split, episodes))
+    settled = round(SETTLED / found.dt)
+    errors = [one.position_error[settled:].max() for one in several]
+    return np.array(errors), np.array([(one.tracking_cost + one.velocity_cost).sum() for one in several])
 
 
 class Watch(BaseCallback):
@@ -88,10 +102,12 @@ class Watch(BaseCallback):
     def show(self, split: str) -> None:
         """Prints the present errors in one line."""
         command = self._command
-        worst = 1e3 * largest_errors(self.model, command.scenario, split, command.episodes, command.changes)
-        median, p90 = np.median(worst), np.percentile(worst, 90.0)
+        worst, cost = played(self.model, command.scenario, split, command.episodes, command.changes)
+        median, p90 = 1e3 * np.median(worst), 1e3 * np.percentile(worst, 90.0)
+        beside, least = yardstick(command.scenario, split, command.episodes)
         done = f"{self._spent / 60.0:6.2f} min {self.num_timesteps:9d} steps"
-        print(f"{done}  {split}: median {median:8.2f} mm, 9 of 10 {p90:8.2f} mm", flush=True)
+        print(f"{done}  {split}: median {median:8.2f} mm, 9 of 10 {p90:8.2f} mm", end="; ")
+        print(f"dls {1e3 * np.median(beside):.4f} mm; cost × {geometric_mean(cost / least):.4g}", flush=True)
 
 
 def main(command: Command) -> None:

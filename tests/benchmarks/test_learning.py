@@ -23,11 +23,14 @@ class Transposed:
 
 
 def test_a_linear_law_of_the_features_follows_paths_to_centimetres():
-    followed = learning.largest_errors(Transposed(0.5, 0.5), "panda-random", "validation", 8)
-    lost = learning.largest_errors(Transposed(0.0, 0.0), "panda-random", "validation", 8)
-    assert followed.shape == (8,)
+    followed, cost = learning.played(Transposed(0.5, 0.5), "panda-random", "validation", 8)
+    lost, _ = learning.played(Transposed(0.0, 0.0), "panda-random", "validation", 8)
+    exact, least = learning.yardstick("panda-random", "validation", 8)
+    assert followed.shape == cost.shape == (8,)
     assert np.median(followed) < 0.03
     assert np.median(lost) > 0.15
+    assert np.median(exact) < 1e-4
+    assert (cost > least).all()
 
 
 @pytest.mark.usefixtures("one_thread")
@@ -39,7 +42,11 @@ def test_training_stops_in_time_and_prints_errors(monkeypatch, capsys):
         return PPO(policy, envs, n_steps=8, batch_size=16, n_epochs=1, **parameters)
 
     monkeypatch.setattr(learning, "PPO", short)
-    monkeypatch.setattr(learning, "largest_errors", lambda *a: given.append(a[-1]) or np.array([0.01, 0.03]))
+    found = np.array([0.01, 0.03]), np.array([2.0, 8.0])
+    monkeypatch.setattr(learning, "played", lambda *a: given.append(a[-1]) or found)
+    monkeypatch.setattr(learning, "yardstick", lambda *a: (np.array([1e-5, 3e-5]), np.array([1.0, 1.0])))
     learning.main(learning.Command(minutes=0.001, episodes=2, every=1000, change=("share=0.5", "history=2")))
     assert given == 2 * [{"share": 0.5, "history": 2}]
-    assert capsys.readouterr().out.count("validation: median    20.00 mm") == 2
+    printed = capsys.readouterr().out
+    assert printed.count("validation: median    20.00 mm") == 2
+    assert printed.count("dls 0.0200 mm; cost × 4\n") == 2

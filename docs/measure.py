@@ -1,0 +1,149 @@
+"""Measures tables of `docs/results` anew: ``python -m docs.measure pose cost_time agents_interval``.
+
+A table says by its lines what is played: scenario, policy, episodes and seeds. To add a policy, add a line with these
+columns; --new measures those alone, without times. Each policy is timed in two episodes, on one core of a machine that
+does nothing else. A killed measurement continues where it was. Agents that were trained are read from
+``runs/NAME/seed-*``, the untrained ones are written there; a line whose scenario or agent is not here stays as it is.
+Then ``python -m docs.tables`` and ``python -m docs.pictures`` write the page.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import itertools
+import sys
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import tyro
+
+import baselines
+import ikgym
+from baselines import registry
+from baselines.agents.files import save_agent
+from baselines.episodes import rollouts
+from baselines.evaluate import evaluate
+from baselines.evaluation.plots.comparison import front
+from baselines.evaluation.records import from_csv, records, to_csv
+from baselines.evaluation.summary import geometric_interval, geometric_mean
+from baselines.files import write
+from baselines.oracle import best_known
+
+RESULTS = Path(__file__).parent / "results"
+#: What was measured lies here until the end, and agents are found here.
+WORK, RUNS = Path("results") / "measure", Path("runs")
+#: Agents as they are before their training, and their training seeds.
+UNTRAINED, SEEDS = "untrained", range(5)
+#: The intervals of `agents_interval`, its agent, scenario and episodes.
+INTERVALS, AGENT, SCENARIO, EPISODES = (1, 2, 4, 8, 16, 32, 64), "agent_alone", "varga7-pose-random", 256
+
+#: Columns of a table that depend on the machine.
+TIMES = ("time_p50_us", "time_p99_us")
+Line = dict[str, Any]
+
+
+@dataclasses.dataclass(frozen=True)
+class Command:
+    """Measures tables of docs/results anew."""
+
+    tables: Annotated[tuple[str, ...], tyro.conf.Positional]
+    """Names of CSV files without their end: pose, cost_time, skew, agents_interval."""
+    new: bool = False
+    """Measure only lines that have no cost ratio yet, and no times."""
+
+
+def measured(name: str, *, only_new: bool) -> list[Line]:
+    """The lines of a table, scenario by scenario, from low to high cost ratios."""
+    old = list(map(dict, from_csv((RESULTS / f"{name}.csv").read_text(encoding="utf-8"))))
+    new: list[Line] = []
+    for scenario, here in itertools.groupby(old, lambda line: line["scenario"]):
+        lines = list(here)
+        todo = [line for line in lines if not (only_new and line["cost_ratio"])]
+        todo = [line for line in todo if scenario in ikgym.scenarios.names() and policies(line)]
+        left = [line for line in lines if line not in todo]
+        if left and not only_new:
+            print(f"{name}, {scenario}: {', '.join(one['policy'] for one in left)}: as before", file=sys.stderr)
+        found = list(itertools.chain(*(_played(name, scenario, some) for some in _by_episodes(todo))))
+        if only_new:
+            found = [one | dict.fromkeys(TIMES) for one in found]
+        found = sorted([*found, *left], key=lambda one: float(one["cost_ratio"]))
+        if "front" in lines[0]:
+            best = front(found)
+            found = [{**one, "front": "yes" if one in best else "no"} for one in found]
+        new += found
+    columns = dict.fromkeys(itertools.chain(*new))
+    return [{column: line.get(column) for column in columns} for line in new]
+
+
+def policies(line: Line) -> list[str]:
+    """The policies whose results make a line: one, or one for each seed; none where an agent is missing."""
+    name, seeds = line["policy"], int(line["seeds"] or 1)
+    if not registry.known(name.partition(":")[0]):
+        return [f"agent:{file}" for file in sorted((RUNS / name).glob("seed-*/agent.safetensors"))]
+    if seeds == 1:
+        return [name]
+    return [f"{name}{',' if ':' in name else ':'}seed={seed}" for seed in range(seeds)]
+
+
+def _by_episodes(lines: Sequence[Line]) -> Iterable[list[Line]]:
+    """Lines with the same number of episodes."""
+    for number in sorted({int(line["episodes"]) for line in lines}):
+        yield [line for line in lines if int(line["episodes"]) == number]
+
+
+def _played(name: str, scenario: str, lines: Sequence[Line]) -> list[Line]:
+    """Lines with the same scenario and number of episodes, measured."""
+    episodes = int(lines[0]["episodes"])
+    played = [policy for line in lines for policy in policies(line)]
+    folder = WORK / f"{name}-{scenario}-{episodes}"
+    options: Any = {"episodes": episodes, "timed": 2, "out": folder, "resume": True, "plots": False, "report": False}
+    return records(evaluate(scenario, played, progress=True, **options), [line["policy"] for line in lines])
+
+
+def untrained() -> None:
+    """Writes the agents of apg as they are before the first segment of their training."""
+    from baselines.training.config import APG
+    from baselines.training.methods import configure, new_trainer
+
+    config = configure(APG, "standard")
+    for seed in SEEDS:
+        file = RUNS / UNTRAINED / f"seed-{seed}" / "agent.safetensors"
+        if not file.exists():
+            file.parent.mkdir(parents=True, exist_ok=True)
+            save_agent(file, new_trainer(config, config.make_scenario(), seed).agent())
+
+
+def intervals(*, only_new: bool) -> list[Line]:
+    """Cost and times of an agent over the steps from one evaluation of its network to the next."""
+    scenario, seeds = ikgym.scenarios.get(SCENARIO), ikgym.scenarios.seeds("test", EPISODES)
+    known, first, out = np.array(best_known.costs(scenario, seeds), dtype=np.float64), None, []
+    for interval in INTERVALS:
+        policy: Any = baselines.make(AGENT, scenario, interval=interval)
+        total = np.array([(one.tracking_cost + one.velocity_cost).sum() for one in rollouts(scenario, policy, seeds)])
+        first = total if first is None else first
+        low, high = geometric_interval(total / known)
+        line: Line = {"interval": interval, "cost_ratio": geometric_mean(total / known), "low": low, "high": high}
+        line |= {"times_every_step": geometric_mean(total / first)}
+        line |= dict(
+            zip(("times_every_step_low", "times_every_step_high"), geometric_interval(total / first), strict=True)
+        )
+        timed = np.concatenate([one.time_ns[1:] for one in rollouts(scenario, policy, seeds[:2], timed=True)]) / 1e3
+        times = {"time_mean_us": timed.mean(), "time_p99_us": np.percentile(timed, 99), "time_max_us": timed.max()}
+        out.append({**line, **{key: None if only_new else float(value) for key, value in times.items()}})
+    return out
+
+
+def main(command: Command) -> None:
+    """Writes the tables."""
+    untrained()
+    for name in command.tables:
+        make = intervals if name == "agents_interval" else functools.partial(measured, name)
+        new = make(only_new=command.new)
+        write(RESULTS / f"{name}.csv", to_csv(new).encode())
+
+
+if __name__ == "__main__":
+    main(tyro.cli(Command))
