@@ -18,6 +18,7 @@ from typing import Annotated, Protocol, TypeVar
 import numpy as np
 import tyro
 
+from baselines.workers import MOST
 from ikgym.exceptions import IkgymError, InvalidInputError, UnknownNameError
 from ikgym.validation import FloatArray, whole_number
 
@@ -141,7 +142,7 @@ def run_resumable(
     """Reads the options of a command that writes into the folder of ``--out``, and does its work.
 
     Args:
-        kind: The type of the options; `workers` and `episodes`, if there are such, must be at least 1.
+        kind: The type of the options; `workers` and `episodes`, if there are such, are checked.
         arguments: The words after the command; those of the process if left out.
         prog: The name of the command.
         manual: Gives the text of ``--help`` above the options for that name.
@@ -156,9 +157,9 @@ def run_resumable(
         nonlocal out
         options = parse(kind, given, prog=prog, description=manual(prog))
         out = options.out
-        for name in ("workers", "episodes"):
+        for name, most in (("workers", MOST), ("episodes", None)):
             if (value := getattr(options, name, None)) is not None:
-                whole_number(name, value, at_least=1)
+                whole_number(name, value, at_least=1, at_most=most)
         find_own_modules()
         work(options, shlex.join([*prog.split(), *given]))
         return 0

@@ -151,7 +151,7 @@ def test_parameters_within_another_and_under_a_condition():
     ("text", "error", "message"),
     [
         ("dls = 3", InvalidInputError, "expected a table of ranges"),
-        ("[dls", InvalidInputError, "not TOML"),
+        ("[dls", InvalidInputError, "expected TOML"),
         ("[dls]\ngain = {}", InvalidInputError, r"\[dls\] gain: expected low and high, or choices"),
         ("[dls]\ngain = { low = 1.0, high = 0.5 }", InvalidInputError, "expected low and high, or choices"),
         ("[dls]\ngain = { low = 0.0, high = 0.5, log = true }", InvalidInputError, "expected low and high, or choices"),
@@ -178,6 +178,7 @@ def test_invalid_ranges(tmp_path, text, error, message):
         ({"--policies": "dlss"}, "There is no policy 'dlss'. Did you mean 'dls'?"),
         ({"--policies": "rhc_foresight"}, "There are no ranges for the parameters of 'rhc_foresight'"),
         ({"--seed": "-1"}, "seed: expected a whole number of at least 0, got -1."),
+        ({"--workers": "9" * 24}, "workers: expected a whole number from 1 to 1000, got 9"),
         ({"--ranges": "nowhere.toml"}, "Cannot read nowhere.toml"),
     ],
 )

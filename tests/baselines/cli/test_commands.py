@@ -65,7 +65,11 @@ def test_help_of_each_command(word, capsys):
         (["scenarios", "varga7-fats"], "There is no scenario 'varga7-fats'. Did you mean 'varga7-fast'?"),
         (["evaluate", "--policies", "dlss"], "There is no policy 'dlss'. Did you mean 'dls'?"),
         (["evaluate", "--steps", "0"], "steps: expected a whole number of at least 1, got 0."),
-        (["evaluate", "--workers", "0"], "workers: expected a whole number of at least 1, got 0."),
+        (["evaluate", "--workers", "0"], "workers: expected a whole number from 1 to 1000, got 0."),
+        *(
+            ([*command, "--workers", "9" * 24, "--out", "x"], "workers: expected a whole number from 1 to 1000, got 9")
+            for command in (["evaluate"], ["robustness"], ["train", "apg"], ["train", "observe"])
+        ),
         (["oracle", "--scenarios", "varga7-fats"], "There is no scenario 'varga7-fats'. Did you mean 'varga7-fast'?"),
         (["oracle", "--knots", "0"], "knots: expected a whole number of at least 1, got 0."),
         (["oracle", "--starts", "-1"], "starts: expected a whole number of at least 0, got -1."),
