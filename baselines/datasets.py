@@ -22,7 +22,7 @@ from baselines.episodes import add_up
 from baselines.evaluation.jobs import Job, Options, plan
 from baselines.evaluation.metrics import describe
 from baselines.evaluation.policies import AnyPolicy
-from baselines.files import ResultsError, locked, resumed, write_json
+from baselines.files import ResultsError, locked, reading, resumed, write_json
 from baselines.fingerprints import fingerprint
 from ikgym import scenarios
 from ikgym.env import RedundantIKEnv
@@ -31,6 +31,8 @@ from ikgym.scenarios import Preview, Scenario
 
 #: Episodes that are written together; they are lost if the process is killed before.
 BLOCK = 16
+#: One number a step of an episode.
+COLUMNS = ("rewards", "terminations", "truncations", "tracking_cost", "velocity_cost")
 
 
 def write(
@@ -64,7 +66,7 @@ def write(
             depend on each other, or Minari does not accept the name of the folder.
         ResultsError: The folder cannot be written, or holds another data set.
     """
-    name, jobs = out.resolve().name, _jobs(scenario, policy, episodes, split, preview)
+    name, jobs = out.absolute().name, _jobs(scenario, policy, episodes, split, preview)
     try:
         parse_dataset_id(name)
     except (ValueError, TypeError):
@@ -90,6 +92,8 @@ def write(
         write_json(out / "dataset.json", about)
         if data.exists():
             return
+        for number in range(0, episodes, BLOCK):
+            _check(blocks / f"{number:06}", jobs[number : number + BLOCK])
         with tqdm(total=episodes, disable=not progress, file=sys.stderr, unit="episode", dynamic_ncols=True) as bar:
             for number in range(0, episodes, BLOCK):
                 block = blocks / f"{number:06}"
@@ -143,6 +147,27 @@ def _environment(job: Job) -> gym.Env[Any, Any]:
 def _storage(env: gym.Env[Any, Any], folder: pathlib.Path) -> MinariStorage:
     spaces = {"observation_space": env.observation_space, "action_space": env.action_space}
     return MinariStorage.new(folder.absolute(), env_spec=env.spec, **spaces)
+
+
+def _check(block: pathlib.Path, jobs: Sequence[Job]) -> None:
+    """Checks the episodes of a block that was written before, if there is one.
+
+    Raises:
+        ResultsError: It cannot be read, or has other arrays.
+    """
+    if not block.exists():
+        return
+    steps, env = jobs[0].scenario.steps, _environment(jobs[0])
+    spaces: Any = env.observation_space
+    expected = {name: (steps + 1, *space.shape) for name, space in spaces.items()}
+    expected |= {"actions": (steps, *(env.action_space.shape or ())), **dict.fromkeys(COLUMNS, (steps,))}
+    with reading(block, "Begin anew with --overwrite."):
+        storage = MinariStorage.read(block)
+        for _, one in zip(jobs, storage.get_episodes(range(storage.total_episodes)), strict=True):
+            arrays = {**one, **one["observations"], **one["infos"]}
+            for name, shape in expected.items():
+                if arrays[name].shape != shape:
+                    raise ValueError(f"expected {name} of shape {shape}, got {arrays[name].shape}")
 
 
 def _record(jobs: Sequence[Job], folder: pathlib.Path) -> None:

@@ -11,6 +11,7 @@ import logging
 import os
 import pathlib
 import sys
+import tempfile
 import time
 from collections.abc import Iterator, Mapping
 from typing import Any, TypeVar
@@ -187,6 +188,20 @@ def check_flags(file: pathlib.Path, *, resume: bool, overwrite: bool) -> None:
         raise ResultsError(
             f"{file} already exists: continue with --resume, replace it with --overwrite, or choose another folder."
         )
+
+
+def check_writable(folder: pathlib.Path) -> None:
+    """Creates a folder if it does not exist, and a file in it for a moment: better now than after hours of work.
+
+    Raises:
+        ResultsError: It cannot be written.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as e:
+        raise ResultsError(f"Cannot write into {folder}: {e.strerror or e}.") from None
 
 
 @contextlib.contextmanager

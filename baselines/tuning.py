@@ -145,6 +145,9 @@ def searches(
     seeds, ranges = scenarios.seeds(SPLIT, episodes), {**read(RANGES), **({} if file is None else read(file))}
     whole_number("seed", seed, at_least=0)
     found = [Search(scenario, spec, of(spec, ranges), seeds, seed) for spec in policies or ranges]
+    names = [one.spec.partition(":")[0] for one in found]
+    if file is not None and not any(spec.partition(":")[0] in names for spec in read(file)):
+        raise InvalidInputError(f"{file}: expected ranges of a solver that is searched, {', '.join(policies)}.")
     if not policies:
         found = [one for one in found if _suits(one)]
     for one in found:
@@ -298,6 +301,8 @@ def _begin(file: pathlib.Path, search: Search) -> None:
         changes = ", ".join(f"{name} ({known.get(name)!r} there, {search.about[name]!r} here)" for name in names)
         raise ResultsError(f"{file} has another search of {search.spec}: {changes}. Choose another folder.")
     study.set_user_attr("about", search.about)
+    for trial in study.get_trials(deepcopy=False, states=[TrialState.COMPLETE]):
+        trial.user_attrs["settings"]  # a lost line is noticed here
     for trial in study.get_trials(deepcopy=False, states=[TrialState.RUNNING]):  # of a process that was killed
         study.tell(trial.number, state=TrialState.FAIL)
 

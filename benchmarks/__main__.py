@@ -10,12 +10,13 @@ import sys
 import tyro
 
 from baselines.files import write
-from benchmarks import environments, horizons, policies, poses
+from benchmarks import environments, horizons, policies, poses, resets
 from benchmarks.measuring import FULL, QUICK
 from benchmarks.table import Table, page
 
 SECTIONS = {
     "environments": environments.tables,
+    "resets": resets.tables,
     "kinematics": poses.tables,
     "policies": policies.tables,
     "horizons": horizons.tables,

@@ -8,6 +8,7 @@ import gymnasium as gym
 import numpy as np
 
 import baselines
+from baselines.solvers.rivals.base import Rival
 from benchmarks.measuring import FULL, Effort
 from benchmarks.table import Table
 
@@ -28,6 +29,7 @@ POLICIES: dict[str, dict[str, tuple[str, dict[str, object]]]] = {
             {"horizon": 3, "rule": "constant", "damping": 1e-3, "iterations": 10, "tolerance": 0.0},
         ),
     },
+    "panda-circle": {name: (name, {}) for name in ("dls", "qp", "sns", "pink", "mink")},
 }
 
 
@@ -38,30 +40,47 @@ def tables(effort: Effort = FULL) -> list[Table]:
 
 def _table(scenario: str, effort: Effort) -> Table:
     times = {label: _episode(scenario, *policy, effort.steps) for label, policy in POLICIES[scenario].items()}
+    columns = ("median [µs]", "99th percentile [µs]", "× env.step", "library [µs]")
+    # Without the column of libraries where there is none.
+    shown = columns if any(figures[-1] for figures in times.values()) else columns[:-1]
     return Table(
         f"One predict in {scenario}",
         f"One arm, the first {effort.steps} steps of an episode, one policy after the other; × env.step: the median "
-        "over that of a step of the environment through `gym.make`, in turn with the calls.",
-        ("median [µs]", "99th percentile [µs]", "× env.step"),
-        {label: (1e6 * p50, 1e6 * p99, ratio) for label, (p50, p99, ratio) in times.items()},
+        "over that of a step of the environment through `gym.make`, in turn with the calls; library: the median of the "
+        "calls of another project's library alone, in turn with `predict`, which contains them.",
+        shown,
+        {
+            label: (1e6 * p50, 1e6 * p99, ratio, library and 1e6 * library)[: len(shown)]
+            for label, (p50, p99, ratio, library) in times.items()
+        },
     )
 
 
-def _episode(scenario: str, name: str, parameters: dict[str, object], steps: int) -> tuple[float, float, float]:
-    """Median and 99th percentile of the time of a call, in [s], and the median over that of a step."""
+def _episode(
+    scenario: str, name: str, parameters: dict[str, object], steps: int
+) -> tuple[float, float, float, float | None]:
+    """Median and 99th percentile of the time of a call, in [s], the median over that of a step, and a library's own."""
     policy = baselines.make(name, scenario, **parameters)
     env = gym.make("RedundantIK-v0", scenario=scenario, preview=policy.preview)
     usual = gym.make("RedundantIK-v0", scenario=scenario)  # its step takes no longer if a policy looks far ahead
     observation, _ = env.reset(seed=0)
     usual.reset(seed=0)
     policy.predict(observation)
-    state, times = None, np.empty((2, steps))
+    rival = policy if isinstance(policy, Rival) else None
+    library = rival and rival.make_step()
+    state, start, times = None, observation["q"].copy(), np.zeros((3, steps))
     for k in range(steps):
         begin = time.perf_counter()
         action, state = policy.predict(observation, state)
         between = time.perf_counter()
         usual.step(action)
-        times[:, k] = between - begin, time.perf_counter() - between
+        times[:2, k] = between - begin, time.perf_counter() - between
+        if rival and library:
+            q, qdot, pose, nominal = (observation[key] for key in ("q", "qdot", "pose", "nominal"))
+            seen = rival.seen(q, qdot, start, pose, nominal[0])
+            begin = time.perf_counter()
+            library(seen)
+            times[2, k] = time.perf_counter() - begin
         observation, *_ = env.step(action)
-    predicting, stepping = np.median(times, axis=1)
-    return float(predicting), float(np.quantile(times[0], 0.99)), float(predicting / stepping)
+    predicting, stepping, alone = map(float, np.median(times, axis=1))
+    return predicting, float(np.quantile(times[0], 0.99)), predicting / stepping, alone or None

@@ -13,7 +13,7 @@ from unittest import mock
 from baselines.cli import main
 
 #: Characters of a line.
-COLUMNS = 110
+COLUMNS = 120
 
 
 @contextlib.contextmanager

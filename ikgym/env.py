@@ -15,11 +15,11 @@ from ikgym.exceptions import InvalidInputError, ResetNeededError
 from ikgym.kernels.outcome import OBSERVED as OBSERVED
 from ikgym.kernels.outcome import Observation, observation
 from ikgym.options import checked_distance, checked_options
+from ikgym.pictures import Pictures
 from ikgym.scenarios import Preview, Scenario
 from ikgym.scenarios.entering import has_joint_path
 from ikgym.simulator import Simulator
 from ikgym.spaces import action_space, observation_space
-from ikgym.validation import FloatArray
 
 #: The keys of `info` after a step; the orientation error is there where the task has an orientation.
 REPORTED = ("tracking_cost", "velocity_cost", "position_error", "orientation_error", "clipped", "at_limit", "time")
@@ -156,7 +156,7 @@ class RedundantIKEnv(gym.Env[Any, Any]):
         self._resumed: int | None = None
         self._entered = has_joint_path(self.scenario)
         self._has_orientation = self.scenario.task.has_orientation
-        self._renderer: Any = None if render_mode is None else _renderer(self.scenario, render_mode)
+        self._pictures = None if render_mode is None else Pictures(self._simulator, 0, render_mode)
 
     @property
     def preview(self) -> tuple[int, ...]:
@@ -200,11 +200,8 @@ class RedundantIKEnv(gym.Env[Any, Any]):
         self._simulator.reset(np.ones(1, dtype=np.bool_), [self.np_random], starts, arm_seeds, steps=steps)
         self._step, self._ended, self._resumed = 0 if steps is None else int(steps[0]), False, None
         out = self._simulator.observe()
-        if self._renderer is not None:
-            self._renderer.begin(self._simulator.nominal_positions(0), self._steps * self._dt)
-            self._draw_later(
-                self._simulator.true_q[0].copy(), float(out.position_error[0]), float(out.orientation_error[0])
-            )
+        if self._pictures is not None:
+            self._pictures.begin(float(out.position_error[0]), float(out.orientation_error[0]))
         return observation(out, 0), {}
 
     def step(self, action: npt.NDArray[np.float32]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
@@ -233,8 +230,8 @@ class RedundantIKEnv(gym.Env[Any, Any]):
         info["clipped"] = clipped > 0.0
         info["at_limit"] = held
         info["time"] = self._step * self._dt
-        if self._renderer is not None:
-            self._draw_later(self._simulator.true_q[0].copy(), position, orientation)
+        if self._pictures is not None:
+            self._pictures.add(position, orientation)
         lost, over = self.lost_distance is not None and position > self.lost_distance, self._step == self._steps
         if lost and not over and self._entered:
             self._resumed = self._step
@@ -250,30 +247,17 @@ class RedundantIKEnv(gym.Env[Any, Any]):
         Raises:
             ResetNeededError: There is no episode yet.
         """
-        if self._renderer is None:
+        if self._pictures is None:
             gym.logger.warn("render() draws nothing without a render_mode; give one to gym.make().")
             return None
         if self._step < 0:
             raise ResetNeededError("render() needs an episode: call reset() first.")
-        picture: npt.NDArray[np.uint8] | None = self._renderer.draw()
-        return picture
+        return self._pictures.draw()
 
     def close(self) -> None:
         """Closes the window, if there is one."""
-        if self._renderer is not None:
-            self._renderer.close()
-
-    def _draw_later(self, q: FloatArray, position_error: float, orientation_error: float) -> None:
-        self._renderer.add(q, position_error, orientation_error, self._step * self._dt)
-        if self.render_mode == "human":
-            self._renderer.draw()
-
-
-def _renderer(scenario: Scenario, mode: str) -> Any:
-    # matplotlib is slow to import, and most environments never draw.
-    from ikgym.rendering import Renderer
-
-    return Renderer(scenario.arm, mode, title=scenario.name, has_orientation=scenario.task.has_orientation)
+        if self._pictures is not None:
+            self._pictures.close()
 
 
 def limited(spec: EnvSpec | None, scenario: Scenario) -> EnvSpec | None:

@@ -14,7 +14,7 @@ _SHARED: dict[str, Callable[[Any, int], Any]] = {
     "observation_space": lambda envs, _: envs.single_observation_space,
     "action_space": lambda envs, _: envs.single_action_space,
     "metadata": lambda *_: RedundantIKEnv.metadata,
-    "render_mode": lambda *_: None,
+    "render_mode": lambda envs, _: envs.render_mode,
     "np_random": lambda envs, row: envs.generator(row)[0],
     "np_random_seed": lambda envs, row: envs.generator(row)[1],
 }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from copy import deepcopy
 from typing import Any
 
@@ -224,18 +225,29 @@ class LearningVecEnv(RedundantIKVecEnv):
         num_envs: N.
         scenario: A scenario or its name, see `ikgym.scenarios.find`.
         learning: The parameters of the wrappers.
+        render_mode: None or `"rgb_array"`.
 
     Raises:
         UnknownNameError: There is no such scenario.
         InvalidInputError: A value is refused.
     """
 
-    def __init__(self, num_envs: int, scenario: str | Scenario, learning: rl.Learning) -> None:
+    def __init__(
+        self, num_envs: int, scenario: str | Scenario, learning: rl.Learning, render_mode: str | None = None
+    ) -> None:
         self.learning = learning
-        self._take(learning.arms(scenario, num_envs, AutoresetMode.SAME_STEP))
+        mode = AutoresetMode.SAME_STEP
+        self._take(learning.arms(scenario, num_envs, autoreset_mode=mode, render_mode=render_mode))
+
+    def get_images(self) -> Sequence[npt.NDArray[np.uint8] | None]:
+        """One picture a row, for `VecVideoRecorder` and `render()`."""
+        pictures: Sequence[npt.NDArray[np.uint8] | None] = self._envs.render()
+        return pictures
 
 
-def make_vec(scenario: str | Scenario, num_envs: int = 1, **changes: Any) -> LearningVecEnv:
+def make_vec(
+    scenario: str | Scenario, num_envs: int = 1, *, render_mode: str | None = None, **changes: Any
+) -> LearningVecEnv:
     """N arms, wrapped for learning, for Stable-Baselines3.
 
     >>> from stable_baselines3 import PPO
@@ -244,13 +256,14 @@ def make_vec(scenario: str | Scenario, num_envs: int = 1, **changes: Any) -> Lea
     Args:
         scenario: A scenario or its name, see `ikgym.scenarios.find`.
         num_envs: N.
+        render_mode: None or `"rgb_array"`.
         changes: Fields of :class:`ikgym.rl.Learning` with other values than the default.
 
     Raises:
         UnknownNameError: There is no such scenario or field.
         InvalidInputError: A value is refused.
     """
-    return LearningVecEnv(num_envs, scenario, rl.Learning().replace(**changes))
+    return LearningVecEnv(num_envs, scenario, rl.Learning().replace(**changes), render_mode)
 
 
 def _plain(value: Any) -> Any:

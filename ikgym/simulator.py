@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from ikgym.arms.limits import limit_rows
 from ikgym.exceptions import InvalidInputError
-from ikgym.kernels import simulation
+from ikgym.kernels import simulation, splines
 from ikgym.kernels.compilation import announced
 from ikgym.kernels.outcome import OBSERVED, Outcome, more_size, observation, outcome, size
 from ikgym.kernels.outcome import Observation as Observation
@@ -21,11 +21,11 @@ from ikgym.parallel import in_chunks
 from ikgym.plant import step as plant_step
 from ikgym.plant.rows import PlantRows, checked_arm_seeds
 from ikgym.scenarios import Scenario
-from ikgym.scenarios.entering import checked_starts, checked_steps, on_path
+from ikgym.scenarios.entering import checked_starts, checked_steps, first_states
 from ikgym.scenarios.nominal_frames import MEMORY, NominalFrames
 from ikgym.scenarios.preview import FARTHEST as FARTHEST
 from ikgym.scenarios.preview import Preview, offsets
-from ikgym.trajectories import Trajectory
+from ikgym.scenarios.spline_frames import SplineFrames, draws_splines
 from ikgym.validation import FloatArray, shortened, whole_number
 
 # Rows worth a thread of their own: below, handing over costs more than it saves.
@@ -56,14 +56,15 @@ class Simulator:
     ) -> None:
         joints, coordinates = scenario.joints, scenario.task.size
         commands = whole_number("commands", commands, at_least=0)
-        ideal = scenario.plant.ideal and not commands
+        ideal, self._late = scenario.plant.ideal and not commands, scenario.plant.late
         self._action_shape = (joints,) if rows is None else (rows, joints)
         # One arm has no rows that do not step, whose outcome would have to be zero.
         self._new = np.empty if rows is None else np.zeros
         rows = 1 if rows is None else rows
         self.scenario, self.rows, self._limited = scenario, rows, scenario.arm.limited
         self.preview = offsets(preview)
-        self._nominal = NominalFrames(scenario, rows, self.preview, memory)
+        frames = SplineFrames if draws_splines(scenario) else NominalFrames
+        self._nominal: Any = frames(scenario, rows, self.preview, memory)
         shown = size(joints, coordinates, len(self.preview))
         if not ideal:
             shown += more_size(joints, coordinates, commands)
@@ -98,7 +99,7 @@ class Simulator:
         places = {key: slice(int(part.flat[0]), int(part.flat[-1]) + 1) for key, part in seen.items()}
         self._parts, self._nominal_shape = [places[key] for key in OBSERVED], seen["nominal"].shape
         self._more = [(key, places[key], seen[key].shape) for key in places if key not in OBSERVED]
-        self._constants = self._taken_apart()
+        self._take_apart()
         self._all = np.ones(rows, dtype=np.bool_)
         self._own_start = np.zeros(rows, dtype=np.bool_)
         with announced("the simulation kernels"):
@@ -109,7 +110,7 @@ class Simulator:
         self.__dict__.update(state)
         # Copied, read-only arrays can be written to: the kernels would be compiled once more for them.
         self._shared = self._shared._replace(velocity_limit=self.scenario.velocity_limit)
-        self._constants = self._taken_apart()
+        self._take_apart()
 
     def reset(
         self,
@@ -132,24 +133,29 @@ class Simulator:
         """
         scenario, state = self.scenario, self._state
         rows = np.flatnonzero(active)
+        if len(rows) == 0:
+            return
         episodes = scenario.trajectory.samples([generators[row] for row in rows.tolist()])
-        if len(rows):
-            state.q[rows] = scenario.first_q_of(episodes) if starts is None else starts[rows]
+        steps = np.zeros(len(rows), dtype=np.int64) if steps is None else steps[rows]
         if self._plant is not None:
             self._plant.begin(rows, generators, arm_seeds, noise_seeds)
-            if starts is None and scenario.jogs and len(rows):
-                state.q[rows] = scenario.jogged(state.q[rows], self._plant.chains(rows))
-        self._own_start[active] = starts is None
-        state.qdot[active] = 0.0
-        state.step[active] = 0
-        if steps is None:
-            steps = np.zeros(self.rows, dtype=np.int64)
+        if starts is None:
+            chains = self._plant.chains(rows[steps == 0]) if self._plant is not None else ()
+            states = first_states(scenario, self._nominal.point, episodes, steps, chains)
+            state.q[rows], state.qdot[rows] = states
+        else:
+            state.q[rows], state.qdot[rows] = starts[rows], 0.0
+        self._own_start[rows] = starts is None
+        state.step[rows] = 0
         if scenario.random:
-            self._nominal.begin(state.frames, rows, episodes, steps[rows])
-        entered = rows[steps[rows] > 0]
-        if len(entered):
-            shared = dict(zip(rows.tolist(), episodes, strict=True))
-            self._enter(entered, [shared[row] for row in entered.tolist()], steps[entered], starts)
+            self._nominal.begin(state.frames, rows, episodes, steps)
+        if self._plant is not None and steps.any():
+            # Sensors and drives remember an arm that has always been as it is now: its first measurement, everywhere.
+            entered, active = rows[steps > 0], np.zeros(self.rows, dtype=np.bool_)
+            active[entered] = True
+            self._run(active, self._new(self._count), moving=False)
+            self._plant.settle(entered, state.qdot[entered], steps[steps > 0])
+        state.step[rows] = steps
 
     def checked_starts(self, q: npt.ArrayLike | None) -> FloatArray | None:
         """Starts chosen by the user, see :func:`ikgym.scenarios.entering.checked_starts`."""
@@ -208,8 +214,7 @@ class Simulator:
         """
         self._accept(action, self._all)
         numbers = np.empty(self._count)
-        step = simulation.step if self._plant is None else plant_step.step
-        step(*self._constants, numbers, self._all, True, 0, 1)
+        self._rows(self._all, numbers, True, 0, 1)
         q, qdot, pose, nominal, remaining = self._parts
         seen = {
             "q": numbers[q],
@@ -225,7 +230,8 @@ class Simulator:
 
     def nominal_positions(self, row: int) -> FloatArray:
         """The nominal positions of a row's episode in [m], one a step. Shape (steps + 1, 3)."""
-        return self._nominal.positions(row)
+        positions: FloatArray = self._nominal.positions(row)
+        return positions
 
     @property
     def true_q(self) -> FloatArray:
@@ -236,25 +242,6 @@ class Simulator:
     def steps_made(self) -> npt.NDArray[np.int64]:
         """Steps made in each row's episode. Shape (N,)."""
         return self._state.step
-
-    def _enter(
-        self,
-        rows: npt.NDArray[np.int64],
-        episodes: Sequence[Trajectory],
-        steps: npt.NDArray[np.int64],
-        starts: FloatArray | None,
-    ) -> None:
-        """Enters episodes that have begun: on their joint path in its motion, or at a start at rest."""
-        state = self._state
-        if starts is None:
-            state.q[rows], state.qdot[rows] = on_path(self.scenario, episodes, steps)
-        if self._plant is not None:
-            # Sensors and drives remember an arm that has always been as it is now: its first measurement, everywhere.
-            active = np.zeros(self.rows, dtype=np.bool_)
-            active[rows] = True
-            self._run(active, self._new(self._count), moving=False)
-            self._plant.settle(rows, state.qdot[rows], steps)
-        state.step[rows] = steps
 
     def _accept(self, actions: npt.ArrayLike, active: npt.NDArray[np.bool_]) -> None:
         """Takes actions over, if they are good, and prepares the active rows for their step."""
@@ -281,19 +268,24 @@ class Simulator:
             self._nominal.look_ahead(self._state.frames, rows, self._state.step[rows] + 1)
 
     def _run(self, active: npt.NDArray[np.bool_], numbers: FloatArray, *, moving: bool) -> None:
-        step = simulation.step if self._plant is None else plant_step.step
-        in_chunks(
-            lambda start, stop: step(*self._constants, numbers, active, moving, start, stop),
-            self.rows,
-            GRAIN_STEP,
-        )
+        grain = GRAIN_STEP * self.rows // max(int(np.count_nonzero(active)), 1)
+        in_chunks(lambda start, stop: self._rows(active, numbers, moving, start, stop), self.rows, grain)
 
-    def _taken_apart(self) -> tuple[Any, ...]:
+    def _rows(self, active: npt.NDArray[np.bool_], numbers: FloatArray, moving: bool, start: int, stop: int) -> None:
+        if self._motions:
+            splines.complete(*self._motions, active, moving, start, stop)
+        step = simulation.step if self._plant is None else plant_step.step
+        step(*self._constants, numbers, active, moving, start, stop)
+
+    def _take_apart(self) -> None:
         """The constant arguments of a step: single arrays for :func:`simulation.step`, tuples for that of a plant."""
-        plant, cost = self._plant, self.scenario.cost.parameters
-        if plant is not None:
-            return self._shared, cost, plant.drives, plant.sensors, plant.arms, self._state, plant.state
-        return *self.scenario.arm.chain, *self._shared, *self.scenario.cost.parameters, *self._state
+        plant, cost, state = self._plant, self.scenario.cost.parameters, self._state
+        if plant is None:
+            self._constants: tuple[Any, ...] = *self.scenario.arm.chain, *self._shared, *cost, *state
+        else:
+            self._constants = self._shared, cost, plant.drives, plant.sensors, plant.arms, state, plant.state
+        splines = isinstance(self._nominal, SplineFrames)
+        self._motions = (*self._nominal.arguments(), state.frames, state.step) if splines else ()
 
     def _outcome(self, numbers: FloatArray) -> Outcome:
-        return outcome(numbers, *self._shape, late=self.scenario.plant.late)
+        return outcome(numbers, *self._shape, late=self._late)

@@ -136,9 +136,30 @@ def whole_number(name: str, value: int, *, at_least: int, at_most: int | None = 
     """
     whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
     if not whole or value < at_least or (at_most is not None and value > at_most):
-        bound = f" of at least {at_least}" if at_most is None else f" from {at_least} to {at_most}"
-        raise InvalidInputError(f"{name}: expected a whole number{bound}, got {shortened(value)}.")
+        bounds = f"of at least {at_least}" if at_most is None else f"from {at_least} to {at_most}"
+        raise InvalidInputError(f"{name}: expected a whole number {bounds}, got {shortened(value)}.")
     return int(value)
+
+
+def check_sizes(name: str, value: object) -> None:
+    """Checks that no number is absurdly large or small, in sequences, tables and the fields of dataclasses, too.
+
+    Raises:
+        InvalidInputError: One is not 0 and outside ±[SMALLEST, LARGEST], or not a number.
+    """
+    if dataclasses.is_dataclass(value):
+        for field in dataclasses.fields(value):
+            check_sizes(field.name, getattr(value, field.name))
+    elif isinstance(value, Mapping):
+        for key, one in value.items():
+            check_sizes(f"{name}: {key}", one)
+    elif isinstance(value, (tuple, list)):
+        for one in value:
+            check_sizes(name, one)
+    elif isinstance(value, (int, float)) and value != 0 and not SMALLEST <= abs(value) <= LARGEST:
+        raise InvalidInputError(
+            f"{name}: expected 0, or an absolute value from {SMALLEST:g} to {LARGEST:g}, got {shortened(value)}."
+        )
 
 
 def one_a_row(name: str, given: Any, rows: int) -> list[int | None]:

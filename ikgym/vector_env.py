@@ -17,16 +17,16 @@ from gymnasium.vector.utils import batch_space
 from ikgym import scenarios
 from ikgym.env import OPTIONS, RedundantIKEnv, limited
 from ikgym.exceptions import InvalidInputError, ResetNeededError
+from ikgym.infos import Infos, infos_of, last_observations
 from ikgym.kernels.outcome import Observation, Outcome, observation
 from ikgym.options import checked_distance, checked_mask, checked_mode, checked_options, checked_seeds
+from ikgym.pictures import Pictures
 from ikgym.rows import ArmRow
 from ikgym.scenarios import Preview, Scenario
 from ikgym.scenarios.entering import has_joint_path
 from ikgym.simulator import Simulator
 from ikgym.spaces import action_space, observation_space
 from ikgym.validation import BoolArray, FloatArray, whole_number
-
-Infos = dict[str, Any]
 
 
 class _Class(type):
@@ -63,7 +63,8 @@ class RedundantIKVectorEnv(
         scenario: A scenario or its name, see `ikgym.scenarios.find`.
         preview: Steps ahead at which the nominal coordinates are shown.
         autoreset_mode: A mode of Gymnasium, or its value such as ``"SameStep"``.
-        render_mode: None; only a single environment renders.
+        render_mode: None or `"rgb_array"`: :meth:`render` draws each row, which Gymnasium's `RecordVideo` of vector
+            environments puts side by side.
         max_episode_steps: None or the scenario's own number of steps, as Gymnasium hands it over from a `spec`.
         commands: h, the number of past commands shown.
         lost_distance: Position error in [m] beyond which an episode ends; None for never.
@@ -85,13 +86,15 @@ class RedundantIKVectorEnv(
         commands: int = 0,
         lost_distance: float | None = None,
     ) -> None:
-        if render_mode is not None:
+        if render_mode not in (None, "rgb_array"):
             raise InvalidInputError(
-                f"render_mode: expected None for the vector environment, got {render_mode!r}; render a single one."
+                f"render_mode: expected None or 'rgb_array' for the vector environment, got {render_mode!r}; a window "
+                "shows a single one."
             )
         self.num_envs = whole_number("num_envs", num_envs, at_least=1)
         self.autoreset_mode = checked_mode(autoreset_mode)
-        self.metadata = {**RedundantIKEnv.metadata, "autoreset_mode": self.autoreset_mode}
+        own = {"render_modes": ["rgb_array"], "autoreset_mode": self.autoreset_mode}
+        self.metadata = RedundantIKEnv.metadata | own
         self.scenario = scenarios.find(scenario)
         if max_episode_steps not in (None, self.scenario.steps):
             raise InvalidInputError(
@@ -110,6 +113,9 @@ class RedundantIKVectorEnv(
         self._resumed = np.zeros(self.num_envs, dtype=np.int64)
         self._generators: list[np.random.Generator | None] = [None] * self.num_envs
         self._seeds: list[int | None] = [None] * self.num_envs
+        self.render_mode = render_mode
+        drawn = 0 if render_mode is None else self.num_envs
+        self._pictures = [Pictures(self._simulator, row, "rgb_array") for row in range(drawn)]
         self._begun = np.zeros(self.num_envs, dtype=np.bool_)
         self._ended = np.zeros(self.num_envs, dtype=np.bool_)
 
@@ -167,13 +173,16 @@ class RedundantIKVectorEnv(
             raise ResetNeededError("The first reset must begin episodes in all rows: leave out the reset_mask.")
         starts = self._simulator.checked_starts(options.get("q"))
         arm_seeds = self._simulator.checked_arm_seeds(options.get("arm_seed"))
-        resumed = [int(k) if s is None else 0 for k, s in zip(self._resumed, seeds, strict=True)]
-        steps = self._simulator.checked_steps(options.get("step", None if "q" in options else resumed))
-        for row in np.flatnonzero(mask).tolist():
-            if seeds[row] is not None:
-                self._generators[row], self._seeds[row] = seeding.np_random(seeds[row])
+        steps = self._simulator.checked_steps(options.get("step"))
+        if not {"q", "step"} & options.keys():
+            steps = np.where([seed is None for seed in seeds], self._resumed, 0)
+        for row, one in enumerate(seeds):
+            if one is not None and mask[row]:
+                self._generators[row], self._seeds[row] = seeding.np_random(one)
         self._begin(mask, starts, arm_seeds, steps)
-        return observation(self._simulator.observe()), {}
+        out = self._simulator.observe()
+        self._record(out, begun=mask, rows=mask)
+        return observation(out), {}
 
     def step(self, actions: npt.NDArray[np.float32]) -> tuple[Observation, FloatArray, BoolArray, BoolArray, Infos]:
         """One step of all arms; see the single environment for the returned values.
@@ -203,15 +212,29 @@ class RedundantIKVectorEnv(
         same_step = self.autoreset_mode is AutoresetMode.SAME_STEP and bool(ended.any())
         infos: Infos = {}
         if same_step:
-            infos["final_obs"], infos["_final_obs"] = _rows_of(observation(out), ended), ended.copy()
-            infos["final_info"], infos["_final_info"] = self._infos(out, ended), ended.copy()
-        infos.update(self._infos(out, stepping & ~ended if same_step else stepping))
+            infos["final_obs"], infos["_final_obs"] = last_observations(observation(out), ended), ended.copy()
+            infos["final_info"], infos["_final_info"] = infos_of(out, ended, made, self.scenario), ended.copy()
+        infos.update(infos_of(out, stepping & ~ended if same_step else stepping, made, self.scenario))
         beginning = ended if same_step else waiting
         if beginning.any():
             self._begin(beginning, steps=self._resumed.copy())
             self._simulator.observe(beginning, out)
+        self._record(out, begun=beginning, rows=self._begun)
         self._ended = np.zeros_like(ended) if same_step else ended
         return observation(out), rewards, lost, over, infos
+
+    def render(self) -> tuple[Any, ...] | None:
+        """One picture a row, see :meth:`ikgym.RedundantIKEnv.render`; None without a `render_mode`.
+
+        Raises:
+            ResetNeededError: There are no episodes yet.
+        """
+        if self.render_mode is None:
+            gym.logger.warn("render() draws nothing without a render_mode; give one to gym.make_vec().")
+            return None
+        if not self._begun.all():
+            raise ResetNeededError("render() needs episodes: call reset() first.")
+        return tuple(one.draw() for one in self._pictures)
 
     def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
         """Attributes of the rows; callable ones are called, as in `SyncVectorEnv`.
@@ -268,33 +291,9 @@ class RedundantIKVectorEnv(
         self._begun |= mask
         self._ended = self._ended & ~mask
 
-    def _infos(self, out: Outcome, rows: BoolArray) -> Infos:
-        """The infos of some rows in the layout of Gymnasium's vector environments; zero in the others."""
-        if not rows.any():
-            return {}
-        columns = {
-            "tracking_cost": out.tracking_cost,
-            "velocity_cost": out.velocity_cost,
-            "position_error": out.position_error,
-            "orientation_error": out.orientation_error,
-            "clipped": out.clipped > 0.0,
-            "time": self._simulator.steps_made * self.scenario.dt,
-        }
-        if not self.scenario.task.has_orientation:
-            del columns["orientation_error"]
-        infos: Infos = {}
-        for key, column in columns.items():
-            infos[key] = np.where(rows, column, column.dtype.type(0))
-            infos[f"_{key}"] = rows.copy()
-        infos["at_limit"], infos["_at_limit"] = np.zeros((self.num_envs, 3), dtype=np.int64), rows.copy()
-        if self.scenario.arm.limited:
-            infos["at_limit"] += (out.at_limit * rows[:, None]).astype(np.int64)
-        return infos
-
-
-def _rows_of(observation: Observation, rows: BoolArray) -> npt.NDArray[np.object_]:
-    """One observation a row, in the layout of `final_obs`; None in the other rows."""
-    out = np.full(len(rows), None, dtype=object)
-    for row in np.flatnonzero(rows):
-        out[row] = {key: value[row].copy() for key, value in observation.items()}
-    return out
+    def _record(self, out: Outcome, *, begun: BoolArray, rows: BoolArray) -> None:
+        """Records the states of some rows for their pictures, if there are some; those that have begun start anew."""
+        for row, pictures in enumerate(self._pictures):
+            if rows[row]:
+                take = pictures.begin if begun[row] else pictures.add
+                take(float(out.position_error[row]), float(out.orientation_error[row]))

@@ -220,7 +220,7 @@ REFUSED = [
     ("upper", lambda: RandomJointSpline([0, 1], [1], 1, 1, 1)),
     ("velocity_limit", lambda: RandomJointSpline([0], [1], 0, 1, 1)),
     *((name, lambda name=name, x=x: SPLINE.replace(**{name: x})) for name, x in (
-        ("spans", 2), ("margin", 1.0), ("scale", (0.5, 1.5)),
+        ("spans", 2), ("spans", 200_000_000), ("margin", 1.0), ("scale", (0.5, 1.5)),
     )),
     ("lower", lambda: RandomJointSpline.within(VARGA, 2.0)),
     ("feasible", lambda: PANDA_LINE.replace(trajectory=SPLINE.replace(velocity_limit=3 * ONES))),
@@ -285,7 +285,7 @@ REFUSED = [
     ("Did you mean 'reset_mask'", lambda: reset_rows(resetmask=np.ones(2, dtype=bool))),
     ("Did you mean 'SameStep'", lambda: ikgym.RedundantIKVectorEnv(2, autoreset_mode="SamStep")),
     ("num_envs", lambda: ikgym.RedundantIKVectorEnv(0)),
-    ("render a single one", lambda: ikgym.RedundantIKVectorEnv(2, render_mode="rgb_array")),
+    ("shows a single one", lambda: ikgym.RedundantIKVectorEnv(2, render_mode="human")),
     ("num_envs", lambda: ikgym.sb3.RedundantIKVecEnv(0)),
     ("two steps ahead", lambda: ikgym.rl.make(FAST, preview=1)),
     ("lost_distance", lambda: ikgym.rl.make(FAST, lost_distanc=1.0)),

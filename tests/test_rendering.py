@@ -39,7 +39,7 @@ def move(env, fraction=0.5):
 
 
 def renderer_of(env):
-    return env.unwrapped._renderer
+    return env.unwrapped._pictures.renderer
 
 
 def artist(env, name):
@@ -276,9 +276,9 @@ def test_copies_draw_the_episode_on_a_figure_of_their_own():
     move(env), move(fresh)
     picture = env.render()
     twin = pickle.loads(pickle.dumps(env))
-    assert twin._renderer.figure is None
+    assert renderer_of(twin).figure is None
     for each in (env, twin, fresh):
         move(each)
     np.testing.assert_array_equal(twin.render(), fresh.render())
     assert not np.array_equal(picture, env.render())
-    assert twin._renderer.figure is not env._renderer.figure
+    assert renderer_of(twin).figure is not renderer_of(env).figure

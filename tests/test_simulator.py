@@ -56,6 +56,8 @@ def random_scenarios():
         "bent": drawn.replace(trajectory=Bent(drawn.trajectory.amplitude)),
         "wanderer": wanderer,
         "noisy": drawn.replace(plant=ikgym.Plant(noise=0.3)),
+        "splines": ikgym.scenarios.get("panda-random").replace(steps=60),
+        "splines-held": ikgym.scenarios.get("panda-payload").replace(steps=60, iterations_per_point=(3, 2)),
     }
 
 
@@ -68,7 +70,8 @@ def test_blocks_of_nominal_frames_are_the_whole_table_bit_for_bit(name, preview)
     points = int(scenario.points(preview)[-1]) + 1
     ahead = in_blocks.preview[-1]
     assert whole._state.frames.shape[1] == points
-    assert in_blocks._state.frames.shape[1] == (2 * ahead if ahead < points else points)
+    little = ahead + 1 if name.startswith("splines") else 2 * ahead
+    assert in_blocks._state.frames.shape[1] == (little if ahead < points else points)
     rng, generators = np.random.default_rng(4), [[np.random.default_rng(i) for i in range(ROWS)] for _ in range(2)]
     active = np.ones(ROWS, dtype=bool)
     for k in range(150):
@@ -83,9 +86,10 @@ def test_blocks_of_nominal_frames_are_the_whole_table_bit_for_bit(name, preview)
         assert identical(whole.nominal_positions(row), in_blocks.nominal_positions(row))
 
 
-def test_blocks_show_the_episodes_nominals():
+@pytest.mark.parametrize("name", ["sinusoids", "splines"])
+def test_blocks_show_the_episodes_nominals(name):
     """Against the public scenario, which knows nothing of blocks."""
-    scenario = random_scenarios()["sinusoids"]
+    scenario = random_scenarios()[name]
     simulator = Simulator(scenario, 2, 3, memory=0)
     simulator.reset(np.ones(2, dtype=bool), [seeding.np_random(seed)[0] for seed in (5, 6)])
     for k in range(1, scenario.steps + 1):
@@ -94,6 +98,18 @@ def test_blocks_show_the_episodes_nominals():
             assert identical(shown[row], scenario.nominal(seed, 3)[k + 1 : k + 4])
     for row, seed in enumerate((5, 6)):
         assert identical(simulator.nominal_positions(row), scenario.nominal(seed)[:, -3:])
+
+
+def test_episodes_along_splines_begin_with_the_frames_that_are_shown_alone():
+    """The others are computed in the steps that need them: most episodes of an agent that explores are short."""
+    simulator = Simulator(ikgym.scenarios.get("panda-random"), 2, (10, 40, 100))
+    generators = [np.random.default_rng(i) for i in range(2)]
+    simulator.reset(np.ones(2, dtype=bool), generators)
+    simulator.observe()
+    known = simulator._state.frames.any(axis=2)
+    assert [np.flatnonzero(row).tolist() for row in known] == 2 * [[0, 10, 40, 100]]
+    simulator.step(np.zeros((2, 7)))
+    assert simulator._state.frames.any(axis=2).sum() == 2 * 8
 
 
 def test_threads_do_not_disturb_each_other(monkeypatch):
@@ -109,7 +125,7 @@ def test_threads_do_not_disturb_each_other(monkeypatch):
     assert identical(outcomes[100], outcomes[rows])
 
 
-@pytest.mark.parametrize("name", ["varga7-fast", "varga7-random", "varga7-random-long"])
+@pytest.mark.parametrize("name", ["varga7-fast", "varga7-random", "varga7-random-long", "panda-random"])
 def test_many_arms_take_little_memory(name):
     """All arrays of a simulator of 16,384 arms, and one outcome."""
     simulator = Simulator(ikgym.scenarios.get(name), 16_384, 2)
@@ -120,7 +136,7 @@ def test_many_arms_take_little_memory(name):
 ENVS = [
     functools.partial(make, scenario=scenario)
     for make in (ikgym.RedundantIKEnv, functools.partial(ikgym.RedundantIKVectorEnv, 3))
-    for scenario in ("varga7-random", limited(), panda(ALL))
+    for scenario in ("varga7-random", "panda-random", limited(), panda(ALL))
 ]
 
 

@@ -136,13 +136,16 @@ def _parsed(source: str, content: bytes, kinds: Mapping[str, type[Processing]]) 
     if about["format"] != FORMAT:
         raise ValueError(f"expected format {FORMAT}, got {about['format']!r}")
     claimed = about.pop("hash")
-    kind = about["processing"].get("kind")
+    described: Any = about["processing"]
+    if not isinstance(described, dict):
+        raise ValueError(f"processing: expected a table, got {described!r}")
+    kind: Any = described.get("kind")
     if kind not in kinds:
         raise ResultsError(f"{source}: expected an agent of the kind {' or '.join(kinds)}, got {kind!r}.")
     for part, names in _PARTS.items():
         if not all(isinstance(about[part][name], (str, int)) for name in names):
             raise ValueError(f"{part}: expected {', '.join(names)}, got {about[part]!r}")
-    processing = kinds[kind].from_json(about["processing"])
+    processing = kinds[kind].from_json(described)
     network = kinds[kind].network.from_json(about["network"], tensors)
     found = _digest(network, about)
     if found != claimed:

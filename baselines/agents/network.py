@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ikgym.exceptions import InvalidInputError
-from ikgym.kernels.jit import kernel
+from ikgym.kernels.jit import inner, kernel
 from ikgym.validation import Frozen, known_name
 
 Singles = npt.NDArray[np.float32]
@@ -186,7 +186,7 @@ def forward_rows(weights, biases, sizes, activation, squash, features, out):
             out[row, j] = value
 
 
-@kernel
+@inner
 def multiply_add(matrix, x, y):
     """``y += W x`` with Wᵀ flat: shapes (inputs outputs,), (inputs,), (outputs,)."""
     n, i = y.shape[0], 0
@@ -205,7 +205,7 @@ def multiply_add(matrix, x, y):
             y[j] += x[rest] * w[j]
 
 
-@kernel
+@inner
 def activate(activation, y):
     """The activation, in place. Shape (outputs,)."""
     for j in range(y.shape[0]):

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from typing import Any, ClassVar, Protocol, Self
+from typing import Any, ClassVar, NamedTuple, Protocol, Self
 
 import numpy as np
 import numpy.typing as npt
 
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios.preview import offsets as checked_offsets
-from ikgym.validation import Frozen, known_names
+from ikgym.validation import FloatArray, Frozen, known_names
 
 
 class NetworkLike(Protocol):
@@ -55,6 +55,18 @@ class Processing(Frozen):
         """
         known_names("field of the processing", values, ["kind", *_fields(cls)])
         return cls(**{name: tuple(v) if isinstance(v, list) else v for name, v in values.items() if name != "kind"})
+
+
+class Held(NamedTuple):
+    """The result of a network, held until its next evaluation.
+
+    Attributes:
+        values: Shape (B, k).
+        left: Steps until the next evaluation. Shape (B,).
+    """
+
+    values: FloatArray
+    left: npt.NDArray[np.int64]
 
 
 def check_offsets(offsets: tuple[int, ...]) -> tuple[tuple[int, ...], npt.NDArray[np.int64]]:

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.agents.network import Network, forward_rows
-from baselines.agents.processing import Processing, check_offsets
+from baselines.agents.processing import Held, Processing, check_offsets
 from baselines.policy import Batch, Problem
 from ikgym.kernels.jit import kernel
 from ikgym.kernels.outcome import OBSERVED
@@ -48,6 +48,8 @@ class Relative(Processing):
 
     kind: ClassVar[str] = "relative"
     network: ClassVar = Network
+    #: Steps for which an action was held in the training.
+    interval: ClassVar[int] = 1
 
     def __post_init__(self) -> None:
         known_name("squash", self.squash, get_args(Squash))
@@ -66,18 +68,33 @@ class Relative(Processing):
         """The number of network outputs: one a joint."""
         return problem.model.joints
 
-    def act(self, problem: Problem, batch: Batch, network: Network) -> FloatArray:
-        """Actions as fractions of the velocity limit, possibly beyond the box. Shape (B, n)."""
+    def held(self, problem: Problem) -> int:
+        """The number of values that are held between evaluations of the network: its outputs."""
+        return problem.model.joints
+
+    def act(self, problem: Problem, batch: Batch, network: Network, interval: int, held: Held) -> FloatArray:
+        """Actions as fractions of the velocity limit, possibly beyond the box.
+
+        Args:
+            problem: The problem as the agent sees it.
+            batch: The observations.
+            network: The network.
+            interval: Steps from one evaluation of the network to the next.
+            held: The outputs of the last evaluation; changed in place.
+
+        Returns:
+            Shape (B, n).
+        """
         out = np.empty(batch.q.shape)
         ahead = problem.task.kind, problem.model.chain, problem.dt, self._ahead, self.furthest
         meaning = self.squash == "tanh", self.gain, self.largest, problem.velocity_limit
-        law_rows(ahead, meaning, network.constants, tuple(batch[: len(OBSERVED)]), out)
+        law_rows(ahead, meaning, network.constants, tuple(batch[: len(OBSERVED)]), interval, *held, out)
         return out
 
 
 @kernel
-def law_rows(ahead, meaning, network, batch, out):
-    """Features, network and actions, row by row.
+def law_rows(ahead, meaning, network, batch, interval, held, left, out):
+    """Features, network where it is due, and actions, row by row.
 
     Args:
         ahead: The first five arguments of :func:`ikgym.rl.feature_kernels.observe_rows`.
@@ -85,6 +102,9 @@ def law_rows(ahead, meaning, network, batch, out):
             velocity limit in [rad/s] or [m/s], of shape (n,).
         network: The first five arguments of :func:`baselines.agents.network.forward_rows`.
         batch: q, q̇, pose, reference and steps left, as for `observe_rows`.
+        interval: Steps from one evaluation of the network to the next.
+        held: The outputs of the last evaluation, replaced where one is due. Shape (B, n).
+        left: Steps until the next evaluation, counted down. Shape (B,).
         out: Receives fractions of the velocity limit. Shape (B, n).
     """
     kind, chain, dt, offsets, furthest = ahead
@@ -93,10 +113,14 @@ def law_rows(ahead, meaning, network, batch, out):
     q, qdot, pose, nominal, remaining = batch
     features, unit = np.empty((q.shape[0], sizes[0]), np.float32), np.empty(q.shape[0])
     observe_rows(kind, chain, dt, offsets, furthest, q, qdot, pose, nominal, remaining, features, unit)
-    output = np.empty(q.shape, np.float32)
-    forward_rows(weights, biases, sizes, activation, squash, features, output)
+    output = np.empty((1, q.shape[1]), np.float32)
     for row in range(q.shape[0]):
+        if left[row] == 0:
+            left[row] = interval
+            forward_rows(weights, biases, sizes, activation, squash, features[row : row + 1], output)
+            held[row] = output[0]
+        left[row] -= 1
         for j in range(q.shape[1]):
-            a = gain * float(output[row, j])
+            a = gain * held[row, j]
             a = largest * math.tanh(a / largest) if squashed else min(max(a, -largest), largest)
             out[row, j] = a * unit[row] / velocity_limit[j]

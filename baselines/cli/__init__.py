@@ -7,7 +7,7 @@ import sys
 from collections.abc import Callable, Sequence
 
 from baselines.cli import shell
-from ikgym.exceptions import UnknownNameError
+from ikgym.exceptions import InvalidInputError, UnknownNameError
 
 #: A summary of each command, and the module with its function ``main``.
 COMMANDS = {
@@ -61,15 +61,17 @@ def _command(word: str) -> Callable[[Sequence[str]], int]:
         UnknownNameError: There is no such command; the message has the nearest name.
     """
     if word in ("-h", "--help", "--version"):
-        return lambda _: _print_about(word)
+        return lambda others: _print_about(word, others)
     if word not in COMMANDS:
         raise UnknownNameError("command", word, COMMANDS)
     function: Callable[[Sequence[str]], int] = importlib.import_module(COMMANDS[word][1]).main
     return function
 
 
-def _print_about(word: str) -> int:
+def _print_about(word: str, others: Sequence[str]) -> int:
     import ikgym
 
+    if others:
+        raise InvalidInputError(f"{word}: expected nothing after it, got {' '.join(others)}.")
     print(ikgym.__version__ if word == "--version" else manual())
     return 0

@@ -10,6 +10,7 @@ from typing import Annotated
 import tyro
 
 from baselines.cli import shell
+from baselines.cli.parsing import Rule, varies
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -32,6 +33,9 @@ class Options:
     """Continue with the data set in the folder."""
     overwrite: bool = False
     """Replace the data set in the folder."""
+
+
+RULES = (Rule(("--split",), lambda given: varies(given.scenario), "on a scenario that is the same at every reset"),)
 
 
 def manual(prog: str) -> str:
@@ -59,12 +63,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         The exit code: 0, 2 after an expected error, 130 after Ctrl-C.
     """
     program = "ikgym dataset"
-    return shell.run_resumable(Options, arguments, program, manual, _work)
+    return shell.run_resumable(Options, arguments, program, manual, _work, RULES)
 
 
 def _work(options: Options, _: str) -> None:
     from baselines import datasets  # imports Minari, an extra
 
     datasets.write(**{field.name: getattr(options, field.name) for field in dataclasses.fields(options)}, progress=True)
-    folder = options.out.resolve()
-    print(f'{options.out}: MINARI_DATASETS_PATH={options.out.parent}, minari.load_dataset("{folder.name}")')
+    name = options.out.absolute().name
+    print(f'{options.out}: MINARI_DATASETS_PATH={options.out.parent}, minari.load_dataset("{name}")')

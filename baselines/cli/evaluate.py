@@ -5,19 +5,21 @@ from __future__ import annotations
 import dataclasses
 import inspect
 import re
-from collections.abc import Sequence
-from typing import Annotated
+from collections.abc import Callable, Mapping, Sequence
+from typing import Annotated, ClassVar
 
 import tyro
 
 from baselines import registry
 from baselines.cli import shell
+from baselines.cli.parsing import Rule, varies
 from baselines.evaluation import report, test_sets
 from baselines.evaluation.jobs import Options
 from baselines.evaluation.metrics import Row
 from baselines.evaluation.results import PAGE
 from baselines.evaluation.run import carry_out
 from ikgym import scenarios
+from ikgym.scenarios import Scenario
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -30,6 +32,45 @@ class Arguments(Options):
     policies: Annotated[tuple[str, ...], tyro.conf.arg(metavar="POLICY …")] = ("all",)
     """Policies as NAME or NAME:PARAMETER=VALUE,PARAMETER=VALUE, agent:PATH for an agent in a file, MODULE:CLASS for
     one of your own, also of a module in the current folder, or: all."""
+
+    #: What is played if neither scenarios nor test sets are given.
+    fallback: ClassVar[Mapping[str, tuple[str, ...]]] = {"scenarios": ("varga7-fast",)}
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not (self.scenarios or self.test_sets):
+            for name, value in self.fallback.items():
+                object.__setattr__(self, name, value)
+
+    def played(self) -> list[Scenario]:
+        """The scenarios, those of test sets included.
+
+        Raises:
+            UnknownNameError: There is no such scenario or test set.
+        """
+        names = scenarios.names() if "all" in self.scenarios else self.scenarios
+        return [*map(scenarios.find, names), *(test_sets.get(name).scenario for name in self.test_sets)]
+
+
+def _any(test: Callable[[Scenario], bool]) -> Callable[[Arguments], bool]:
+    return lambda given: any(map(test, given.played()))
+
+
+#: Processes of this machine, or a cluster.
+ONE_KIND = Rule(("--workers",), lambda given: given.cluster is None, "with --cluster")
+RULES = (
+    Rule(("--resume", "--overwrite", "--plots", "--report"), lambda given: given.out is not None, "without --out"),
+    Rule(
+        ("--episodes", "--split", "--steps", "--noise-seeds"),
+        lambda given: not given.test_sets,
+        "with --test-sets, which define what is played",
+    ),
+    Rule(("--episodes", "--split"), _any(varies), "on scenarios that are the same at every reset"),
+    Rule(("--noise-seeds",), _any(lambda scenario: scenario.plant.noisy), "on plants without noise"),
+    Rule(("--pairs",), _any(lambda scenario: not scenario.plant.ideal), "on ideal plants"),
+    ONE_KIND,
+    Rule(("--cluster",), lambda given: given.timed != "all", "with --timed all, since timed episodes are played here"),
+)
 
 
 def manual(prog: str) -> str:
@@ -86,13 +127,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         The exit code: 0, 2 after an expected error, 130 after Ctrl-C.
     """
     program = shell.program("evaluate", "python -m baselines.evaluate")
-    return shell.run_resumable(Arguments, arguments, program, manual, _work)
+    return shell.run_resumable(Arguments, arguments, program, manual, _work, RULES)
 
 
 def _work(given: Arguments, command: str) -> None:
-    scenarios = given.scenarios or (() if given.test_sets else ("varga7-fast",))
     carry_out(
-        dataclasses.replace(given, scenarios=scenarios, progress=True),
+        dataclasses.replace(given, progress=True),
         command=command,
         show=lambda rows: print(report.table(rows, rows.skipped, width=shell.width()), flush=True),
     )

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import pathlib
-from collections.abc import Sequence
-from typing import Annotated, Literal
+from collections.abc import Mapping, Sequence
+from typing import Annotated, ClassVar, Literal
 
 import tyro
 
 from baselines.cli import shell
-from baselines.cli.evaluate import Arguments
+from baselines.cli.evaluate import RULES, Arguments
 from baselines.evaluation import records
 from baselines.evaluation.results import Rows, slug
 from baselines.evaluation.run import carry_out
@@ -37,6 +37,8 @@ class Options(Arguments):
     """Episodes of each policy that are played alone and timed."""
     plots: bool = False
     """Draw the plots of evaluate, too."""
+
+    fallback: ClassVar[Mapping[str, tuple[str, ...]]] = {"test_sets": (MAIN,)}
 
 
 def manual(prog: str) -> str:
@@ -93,15 +95,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         The exit code: 0, 2 after an expected error, 130 after Ctrl-C.
     """
-    return shell.run_resumable(Options, arguments, "ikgym leaderboard", manual, _work)
+    return shell.run_resumable(Options, arguments, "ikgym leaderboard", manual, _work, RULES)
 
 
 def _work(given: Options, command: str) -> None:
     if given.scenarios and given.test_sets:
         raise InvalidInputError("expected --test-sets or --scenarios; got both.")
-    sets = given.test_sets or (() if given.scenarios else (MAIN,))
-    options = dataclasses.replace(given, test_sets=sets, progress=True)
-    rows = carry_out(options, command=command)
+    rows = carry_out(dataclasses.replace(given, progress=True), command=command)
     print(compare(rows, given.policies, given.out))
     for one in rows.skipped:
         print(f"skipped: {one.policy} in {one.scenario}: {one.reason}")

@@ -12,6 +12,7 @@ import tyro
 from tqdm import tqdm
 
 from baselines.cli import shell
+from baselines.cli.parsing import Rule, parse
 from baselines.episodes import Seeds
 from baselines.evaluation import test_sets as known_sets
 from baselines.oracle import best_known
@@ -19,7 +20,7 @@ from baselines.oracle.best_known import MARGIN, MEANINGLESS
 from baselines.oracle.cache import VARIABLE
 from baselines.oracle.episode import EpisodeProblem
 from baselines.oracle.optimum import Optimum, Search
-from baselines.oracle.several import Wanted, find_all
+from baselines.oracle.several import Wanted, check_policies, find_all
 from baselines.oracle.stripped import NOTE, stripped, strips
 from baselines.workers import ALONE, Workers
 from ikgym import scenarios as scenario_registry
@@ -54,6 +55,16 @@ class Options:
     check: bool = False
     """Compare the records with the optima, which are played again; the exit code is 1 if a record is missing, stale or
     off by more than a millionth."""
+
+
+RULES = (
+    Rule(("--chains", "--rounds"), lambda given: given.search.generations > 0, "with --generations 0"),
+    Rule(
+        ("--knots", "--seed"),
+        lambda given: given.search.starts + given.search.generations > 0,
+        "with --starts 0 --generations 0",
+    ),
+)
 
 
 def manual() -> str:
@@ -139,6 +150,8 @@ def optima(
         cache: Whether to read and write the cache on disk.
         workers: The workers.
     """
+    wanted = [Wanted(scenario, draw, how, tuple(policies), cache) for scenario, draw in todo]
+    check_policies(wanted)
     with tqdm(
         total=len(todo),
         file=sys.stderr,
@@ -153,7 +166,6 @@ def optima(
             bar.set_description(f"{one.scenario.name}, seed {one.draw.seed} ({done + 1}/{len(todo)})", refresh=False)
             bar.update(share)
 
-        wanted = [Wanted(scenario, draw, how, tuple(policies), cache) for scenario, draw in todo]
         for one, optimum in find_all(wanted, workers, tick):
             done += 1
             bar.update(done - bar.n)
@@ -207,7 +219,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _carry_out(arguments: Sequence[str]) -> int:
-    options = shell.parse(Options, arguments, prog="ikgym oracle", description=manual())
+    options = parse(Options, arguments, prog="ikgym oracle", description=manual(), rules=RULES)
     kept, wrong = 0, 0
     todo = episodes(options.scenarios, options.test_sets, options.seeds)
     workers = Workers(cluster=options.cluster)

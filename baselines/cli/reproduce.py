@@ -18,6 +18,7 @@ import tyro
 
 from baselines.canonical import jsonable
 from baselines.cli import shell
+from baselines.cli.parsing import parse
 from baselines.evaluation.metrics import describe
 from baselines.evaluation.plots.style import png
 from baselines.files import locked, write
@@ -147,7 +148,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _carry_out(arguments: Sequence[str]) -> int:
-    options = shell.parse(Options, arguments, prog=PROGRAM, description=manual())
+    options = parse(Options, arguments, prog=PROGRAM, description=manual())
     findings = reproduce(
         options.paper, figures=options.figure or None, out=options.out, steps=options.steps, progress=True
     )

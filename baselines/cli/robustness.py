@@ -12,6 +12,8 @@ import tyro
 from tqdm import tqdm
 
 from baselines.cli import shell
+from baselines.cli.evaluate import ONE_KIND
+from baselines.cli.parsing import Rule, varies
 from baselines.episodes import Seeds
 from baselines.evaluation import records
 from baselines.evaluation.metrics import Row
@@ -51,6 +53,12 @@ class Options:
     """Processes that play episodes."""
     cluster: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
     """Play on a cluster: ray, at the address in RAY_ADDRESS."""
+
+
+RULES = (
+    ONE_KIND,
+    Rule(("--episodes",), lambda given: varies(given.scenario), "on a scenario that is the same at every reset"),
+)
 
 
 def manual(prog: str) -> str:
@@ -119,7 +127,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         The exit code: 0, 2 after an expected error, 130 after Ctrl-C.
     """
-    return shell.run_resumable(Options, arguments, "ikgym robustness", manual, _work)
+    return shell.run_resumable(Options, arguments, "ikgym robustness", manual, _work, RULES)
 
 
 def _work(options: Options, command: str) -> None:

@@ -1,10 +1,9 @@
-"""The base of all commands: reading arguments, exit codes, and the commands that list a registry."""
+"""The base of all commands: exit codes, and the commands that list a registry."""
 
 from __future__ import annotations
 
 import contextlib
 import dataclasses
-import io
 import os
 import pathlib
 import re
@@ -18,23 +17,13 @@ from typing import Annotated, Protocol, TypeVar
 import numpy as np
 import tyro
 
+from baselines.cli.parsing import Rule, parse
 from baselines.workers import MOST
-from ikgym.exceptions import IkgymError, InvalidInputError, UnknownNameError
+from ikgym.exceptions import IkgymError, UnknownNameError
 from ikgym.validation import FloatArray, whole_number
 
 #: The console command in front of all others.
 CONSOLE = "ikgym"
-
-#: Patterns in messages of tyro, and plainer texts.
-PLAINER = (
-    (r"no type matching (?:\{None\}\|)?(\S+) could be instantiated from \['(.*?)'\].*", r"expected \1, got '\2'"),
-    (r"invalid literal for int\(\) with base 10: ", "expected a whole number, got "),
-    (r"could not convert string to float: ", "expected a number, got "),
-    (r"Expected 1 values", "Expected one"),
-    (r"Error parsing [A-Z]\w+: ", ""),
-    (r" Arguments are applied to the directly preceding subcommand.*", ""),
-    (r"(Missing from .*?: --\S+).*", r"\1"),
-)
 
 #: The extra that installs a package.
 EXTRAS = {
@@ -61,7 +50,6 @@ class Resumable(Protocol):
     def out(self) -> pathlib.Path | None: ...  # noqa: D102
 
 
-T = TypeVar("T")
 P = TypeVar("P", bound=Resumable)
 
 
@@ -73,29 +61,6 @@ def program(name: str, otherwise: str) -> str:
         otherwise: Its name if Python runs its module, such as ``"python -m baselines.evaluate"``.
     """
     return f"{CONSOLE} {name}" if pathlib.Path(sys.argv[0]).stem == CONSOLE else otherwise
-
-
-def parse(kind: type[T], arguments: Sequence[str], *, prog: str, description: str) -> T:
-    """Reads the words after a command.
-
-    Args:
-        kind: The type of the options, for :func:`tyro.cli`.
-        arguments: The words.
-        prog: The name of the command.
-        description: The text of ``--help`` above the options.
-
-    Raises:
-        InvalidInputError: An option is unknown, missing or refused; the message is one line.
-        SystemExit: With 0 after ``--help``.
-    """
-    said = io.StringIO()
-    try:
-        with contextlib.redirect_stderr(said):
-            return tyro.cli(kind, prog=prog, description=description, args=list(arguments))
-    except SystemExit as e:
-        if e.code:
-            raise InvalidInputError(f"{_in_one_line(said.getvalue())} See {prog} --help.") from None
-        raise
 
 
 def run(work: Callable[[], int], stopped: Callable[[], str] = lambda: "Stopped.") -> int:
@@ -138,15 +103,17 @@ def run_resumable(
     prog: str,
     manual: Callable[[str], str],
     work: Callable[[P, str], None],
+    rules: Iterable[Rule] = (),
 ) -> int:
     """Reads the options of a command that writes into the folder of ``--out``, and does its work.
 
     Args:
-        kind: The type of the options; `workers` and `episodes`, if there are such, are checked.
+        kind: The type of the options; `workers`, `episodes` and `trials`, if there are such, are checked.
         arguments: The words after the command; those of the process if left out.
         prog: The name of the command.
         manual: Gives the text of ``--help`` above the options for that name.
         work: Called with the options and the whole command line.
+        rules: See :func:`parse`.
 
     Returns:
         The exit code, see :func:`run`.
@@ -155,23 +122,16 @@ def run_resumable(
 
     def both() -> int:
         nonlocal out
-        options = parse(kind, given, prog=prog, description=manual(prog))
+        options = parse(kind, given, prog=prog, description=manual(prog), rules=rules)
         out = options.out
-        for name, most in (("workers", MOST), ("episodes", None)):
+        for name, most in (("workers", MOST), ("episodes", None), ("trials", None)):
             if (value := getattr(options, name, None)) is not None:
                 whole_number(name, value, at_least=1, at_most=most)
-        find_own_modules()
         work(options, shlex.join([*prog.split(), *given]))
         return 0
 
     kept = "Stopped. Finished work is in {}; continue with --resume."
     return run(both, lambda: "Stopped." if out is None else kept.format(out))
-
-
-def find_own_modules() -> None:
-    """Lets modules in the current folder be imported, which a console command does not search."""
-    if (here := str(pathlib.Path.cwd())) not in sys.path:
-        sys.path.append(here)
 
 
 def listing(title: str, names: Iterable[str]) -> str:
@@ -282,24 +242,3 @@ def _filled(part: str, most: int) -> str:
     indent = len(part) - len(part.lstrip())
     hanging = indent + 2 if part.lstrip().startswith("- ") else indent + 4 if indent else 0
     return textwrap.fill(part, most, subsequent_indent=" " * hanging, break_on_hyphens=False)
-
-
-def _in_one_line(box: str) -> str:
-    """The message in a box of tyro's: the mistake, and the names that are available."""
-    sections: list[list[str]] = [[]]
-    for line in re.sub(r"\x1b\[[0-9;]*m", "", box).splitlines():
-        row = line.strip("│ ")
-        if not row.strip("─-"):
-            sections.append([])
-        elif not row.startswith(("╭", "╰")):
-            sections[-1].append(row)
-    # Where nothing but ASCII can be printed there is no frame that holds the title: it is a section.
-    texts = [" ".join(section) for section in sections if section][0 if "╭" in box else 1 :]
-    message, more = (*texts, "", "")[:2]
-    for pattern, plain in PLAINER:
-        message = re.sub(pattern, plain, message)
-    if listed := re.match(r"Available subcommands: ([\w, -]+)", more):
-        message += f". Available: {listed[1].strip()}"
-    if near := re.match(r"Perhaps you meant:? (\S+)", more):
-        message += f". Did you mean {near[1]!r}?"
-    return message if message.endswith(("?", ".")) else f"{message}."

@@ -15,6 +15,8 @@ from typing import Annotated, Any, Generic, TypeVar, Union
 import tyro
 
 from baselines.cli import shell
+from baselines.cli.parsing import Rule, varies
+from baselines.cli.parsing import parse as parse_options
 from baselines.training import methods
 from baselines.training.config import Config, TrainingError
 from baselines.training.folder import read_run
@@ -22,7 +24,7 @@ from baselines.training.seeds import RunOptions, SeedResult, train_seeds
 from baselines.workers import Workers
 from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError, MissingDependencyError
-from ikgym.validation import whole_number
+from ikgym.validation import known_name, whole_number
 
 PROGRAM = "train.py"
 
@@ -58,6 +60,28 @@ class Repeat(RunOptions):
 
     run: Annotated[tyro.conf.Positional[pathlib.Path], tyro.conf.arg(metavar="RUN_JSON")]
     """The run.json of a run."""
+
+
+RULES = (
+    Rule(("--workers",), lambda given: given.options.cluster is None, "with --cluster"),
+    Rule(("--workers",), lambda given: len(given.options.seeds) > 1 or given.options.workers < 2, "on one seed"),
+    Rule(
+        ("--group-size", "--n-epochs", "--clip-range", "--gamma", "--log-std-init", "--log-std-end"),
+        lambda given: given.config.estimator == "ppo",
+        "without --estimator ppo",
+    ),
+    Rule(("--learning-rate-end", "--log-std-end"), lambda given: given.config.segments > 1, "in one segment"),
+    Rule(
+        ("--reset-distance",),
+        lambda given: len(given.config.window) > 1,
+        "with one --window, which is also the last: see --reset-distance-end",
+    ),
+    Rule(
+        ("--validation-episodes",),
+        lambda given: varies(given.config.scenario),
+        "on a scenario that is the same at every reset",
+    ),
+)
 
 
 def manual() -> str:
@@ -143,15 +167,18 @@ def parse(arguments: Sequence[str]) -> Command[Any] | Repeat:
     """The command in a command line.
 
     Raises:
-        UnknownNameError: There is no such preset, or the method has no option of the preset.
-        InvalidInputError: A value is refused, an option is unknown, or there is no method.
+        UnknownNameError: There is no such method or preset, or the method has no option of the preset.
+        InvalidInputError: A value is refused, an option is unknown or has no effect, or there is no method.
         SystemExit: With 0 after ``--help``.
     """
     if not arguments:
         with contextlib.suppress(SystemExit):
             parse(["--help"])
-        raise InvalidInputError(f"expected a method, one of {', '.join(methods.METHODS)}, or repeat; got none.")
-    chosen = next((argument for argument in arguments if argument in methods.METHODS), None)
+    chosen = arguments[0] if arguments else "none"
+    if not arguments or (chosen.startswith("-") and chosen not in ("-h", "--help")):
+        raise InvalidInputError(f"expected a method, one of {', '.join(methods.METHODS)}, or repeat; got {chosen}.")
+    if not chosen.startswith("-"):
+        known_name("method", chosen, (*methods.METHODS, "repeat"))
     preset = _value_of("--preset", arguments)
     kinds: list[Any] = []
     for name, kind in methods.METHODS.items():
@@ -160,7 +187,9 @@ def parse(arguments: Sequence[str]) -> Command[Any] | Repeat:
         kinds.append(Annotated[generic[kind], tyro.conf.subcommand(name, default=default, description=summary)])
     kinds.append(Annotated[Repeat, tyro.conf.subcommand("repeat")])
     any_of_them: Any = Union[tuple(kinds)]  # noqa: UP007  # made at run time
-    command: Command[Any] | Repeat = shell.parse(any_of_them, arguments, prog=_program(), description=manual())
+    command: Command[Any] | Repeat = parse_options(
+        any_of_them, arguments, prog=_program(), description=manual(), rules=RULES
+    )
     return command
 
 
@@ -184,7 +213,8 @@ def _train(command: Command[Any], text: str) -> int:
     for result in results:
         if result.error:
             print(f"error: seed {result.seed}: {result.error}", file=sys.stderr)
-    print(f"\nwritten to {options.out}")
+    if not all(result.error for result in results):
+        print(f"\nwritten to {options.out}")
     return 2 if any(result.error for result in results) else 0
 
 

@@ -12,6 +12,8 @@ import tyro
 from tqdm import tqdm
 
 from baselines.cli import shell
+from baselines.cli.parsing import Rule, parse, varies
+from baselines.files import check_writable
 from baselines.viewer.film import check_ffmpeg, checked_width, moments, pictures, write_video
 from baselines.viewer.replay import Stage, play_all
 from ikgym.exceptions import InvalidInputError
@@ -41,6 +43,9 @@ class Options:
     """Width of one policy's picture, which is half as high. Several policies stand in two columns."""
 
 
+RULES = (Rule(("--seed",), lambda given: varies(given.scenario), "on a scenario that is the same at every reset"),)
+
+
 def manual() -> str:
     """The text of ``--help`` above the options."""
     prog = PROGRAM
@@ -63,17 +68,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
         The exit code: 0, 2 after an expected error, 130 after Ctrl-C.
     """
     arguments = sys.argv[1:] if arguments is None else list(arguments)
-    return shell.run(lambda: _film(shell.parse(Options, arguments, prog=PROGRAM, description=manual())))
+    return shell.run(lambda: _film(parse(Options, arguments, prog=PROGRAM, description=manual(), rules=RULES)))
 
 
 def _film(options: Options) -> int:
-    shell.find_own_modules()
     check_ffmpeg()  # before episodes are played
     if options.out.suffix != ".mp4":
         raise InvalidInputError(f"out: expected a file that ends in .mp4, got {str(options.out)!r}.")
     width = checked_width(options.width)
     stage = Stage.of(options.scenario, options.seed, options.steps)
     steps = moments(stage, options.fps, options.speed)
+    check_writable(options.out.absolute().parent)
     replays = play_all(stage, options.policy)
     content = tqdm(
         pictures(stage, replays, steps, width=width),

@@ -12,6 +12,7 @@ from typing import Annotated, Any
 import tyro
 
 from baselines.cli import shell
+from baselines.cli.parsing import Rule, parse, varies
 from baselines.viewer.replay import Stage
 from baselines.viewer.session import Session
 from ikgym.arms import Arm
@@ -38,6 +39,9 @@ class Options:
     """Address to listen on; with 0.0.0.0, users of other machines can connect and move the arms."""
     port: Annotated[int, tyro.conf.arg(metavar="PORT")] = 8080
     """Port to listen on; 0 for a free one."""
+
+
+RULES = (Rule(("--seed",), lambda given: varies(given.scenario), "on a scenario that is the same at every reset"),)
 
 
 def manual() -> str:
@@ -67,8 +71,7 @@ def main(arguments: Sequence[str] | None = None, stop: threading.Event | None = 
     arguments = sys.argv[1:] if arguments is None else list(arguments)
 
     def work() -> int:
-        options = shell.parse(Options, arguments, prog=PROGRAM, description=manual())
-        shell.find_own_modules()
+        options = parse(Options, arguments, prog=PROGRAM, description=manual(), rules=RULES)
         # Before episodes are played: extras may be missing, or the port taken.
         from baselines.viewer.server import Viewer, free_port, serving
 

@@ -156,6 +156,38 @@ def trajectory_log(scenario: Scenario, seeds: Seeds, episode: Episode) -> Trajec
     return log | {"frame": frames, **_arm_in_space(scenario, seeds, log["q"][frames], after[frames])}
 
 
+#: The axes of the arrays of a log; those that have names of one letter are of the same length in all arrays.
+AXES: Mapping[str, tuple[str | int, ...]] = {
+    **dict.fromkeys(("nominal", "pose"), ("k", "m")),
+    **dict.fromkeys(("q", "qdot", "nominal_q", "qddot"), ("k", "n")),
+    **dict.fromkeys(("time", "position_error", "orientation_error"), ("k",)),
+    **dict.fromkeys(("prismatic", "lower", "upper", "velocity_limit", "acceleration_limit"), ("n",)),
+    "frame": ("f",),
+    "joint_points": ("f", "n", 2, 3),
+    "tool": ("f", 3),
+    "tool_rotation": ("f", 3, 3),
+}
+OPTIONAL = ("orientation_error", "qddot", "acceleration_limit", "nominal_q")
+
+
+def check_log(log: Mapping[str, npt.NDArray[Any]]) -> None:
+    """Checks names, shapes and types of the arrays of a log that was read.
+
+    Raises:
+        ValueError: One is missing, unknown or not numeric, or lengths do not fit together.
+    """
+    known_names("array of a log", log, tuple(AXES))
+    lengths: dict[str | int, int] = {2: 2, 3: 3}
+    for name, axes in AXES.items():
+        if name not in log and name in OPTIONAL:
+            continue
+        shape = log[name].shape if name in log else None
+        if shape is None or log[name].dtype.kind not in "fiub" or len(shape) != len(axes):
+            raise ValueError(f"expected numbers of shape {axes} in the array {name}, got shape {shape}")
+        if any(lengths.setdefault(axis, length) != length for axis, length in zip(axes, shape, strict=True)):
+            raise ValueError(f"the shape {shape} of the array {name} does not fit the others")
+
+
 def frame_rows(rows: int, most: int) -> npt.NDArray[np.int64]:
     """At most so many rows, evenly spread; the last one always."""
     count = min(rows, most)

@@ -96,8 +96,8 @@ class Options:
             object.__setattr__(self, "out", pathlib.Path(self.out))
         elif self.export:
             raise InvalidInputError("export: expected a folder for the files, `out` or --out; got none.")
-        for name in ("episodes", "noise_seeds"):
-            whole_number(name, getattr(self, name), at_least=1)
+        whole_number("episodes", self.episodes, at_least=1)
+        whole_number("noise_seeds", self.noise_seeds, at_least=1, at_most=10_000)
         if self.steps is not None:
             whole_number("steps", self.steps, at_least=1)
         if self.timed != "all":

@@ -17,6 +17,7 @@ import numpy as np
 import ikgym
 from baselines.canonical import canonical
 from baselines.episodes import Episode, Seeds, add_up
+from baselines.evaluation.limits import BOUNDS, at_limits
 from baselines.status import Status
 from ikgym.arms import Arm
 from ikgym.parallel import cores
@@ -29,6 +30,8 @@ Key = tuple[str, str, str, Seeds, int]
 TIME_COLUMNS = ("time_first_us", "time_p50_us", "time_p99_us", "deadline_misses")
 #: An arm is lost if its position error exceeds this, in [m], at any time, or its orientation error this, in [rad].
 LOST_POSITION, LOST_ORIENTATION = 0.05, 0.3
+#: A path was followed if the errors of all steps that count are at most so large, in [m] and [rad].
+FOLLOWED_POSITION, FOLLOWED_ORIENTATION = 1e-3, 1e-3
 
 
 @dataclasses.dataclass(frozen=True)
@@ -56,17 +59,19 @@ class Row:
         qdot_rms: Root mean square over steps and joints, in [rad/s] or [m/s].
         qdot_total_variation: Σ_k Σ_j |q̇_j(k+1) − q̇_j(k)|, in [rad/s] or [m/s].
         qddot_peak: Largest |q̇_j(k+1) − q̇_j(k)| / Δt, from rest at the start, in [rad/s²] or [m/s²].
-        steps_at_joint_limit: Steps in which a stop held a joint back.
-        steps_at_velocity_limit: Steps in which the velocity limit of the arm held a joint back.
-        steps_at_acceleration_limit: Steps in which the acceleration limit of the arm held a joint back.
+        steps_at_joint_limit: Steps with a joint at a limit of its coordinate, see :mod:`baselines.evaluation.limits`.
+        steps_at_velocity_limit: Steps with a joint at its velocity limit.
+        steps_at_acceleration_limit: Steps with a joint at its acceleration limit.
         joint_limit_margin_min: Smallest distance of a joint from a limit of its coordinate, in [rad] or [m]; None where
             the arm has no such limit.
+        followed: Whether the path was followed, see :func:`followed`.
+        solver_status: The worst status that the solver reported; unknown for policies that report none. It does not
+            say whether the path was followed.
         time_p50_us: Median wall time of one call of the policy, in [µs], over all but the first, which often does more
             than the others (and is taken only where there is no other). None, like all times, where the episode was
             played together with others.
         time_p99_us: Its 99th percentile, in [µs].
         deadline_misses: Calls, but for the first, that took longer than the scenario's Δt.
-        status: The worst status of the episode; unknown for policies that report none.
         machine: Processor and versions, see :func:`describe`.
         iterations: Mean iterations of the policy in one step; None where they are not known.
         status_counts: Number of steps that ended with each status.
@@ -100,10 +105,11 @@ class Row:
     steps_at_velocity_limit: int
     steps_at_acceleration_limit: int
     joint_limit_margin_min: float | None
+    followed: bool
+    solver_status: str
     time_p50_us: float | None
     time_p99_us: float | None
     deadline_misses: int | None
-    status: str
     machine: dict[str, Any]
     iterations: float | None
     status_counts: dict[str, int]
@@ -147,8 +153,17 @@ def lost(position_error: float, orientation_error: float | None) -> bool:
         position_error: The largest of the episode, in [m].
         orientation_error: Likewise, in [rad]; None where the scenario has no orientation.
     """
-    turned = orientation_error is not None and not orientation_error <= LOST_ORIENTATION
-    return turned or not position_error <= LOST_POSITION
+    return not _within(LOST_POSITION, LOST_ORIENTATION, position_error, orientation_error)
+
+
+def followed(position_error: float, orientation_error: float | None) -> bool:
+    """Whether a path was followed, within 1 mm and 1 mrad; the arguments are those of :func:`lost`."""
+    return _within(FOLLOWED_POSITION, FOLLOWED_ORIENTATION, position_error, orientation_error)
+
+
+def _within(distance: float, angle: float, position_error: float, orientation_error: float | None) -> bool:
+    """Whether errors are at most so large; NaN is not."""
+    return position_error <= distance and (orientation_error is None or orientation_error <= angle)
 
 
 def key(scenario: str, policy: str, parameters: Mapping[str, Any], seeds: Seeds, steps: int) -> Key:
@@ -175,7 +190,11 @@ def measure(
     timed, later = len(episode.time_ns) > 0, episode.time_ns[1:] if len(episode.time_ns) > 1 else episode.time_ns
     counted = scenario.counted()[1:]
     angles = episode.orientation_error[counted] if scenario.task.has_orientation else None
-    held = (episode.at_limit > 0.0).sum(axis=0).tolist()
+    position_error = float(episode.position_error[counted].max())
+    orientation_error = None if angles is None else float(angles.max())
+    qddot = np.diff(episode.qdot, axis=0, prepend=0.0) / scenario.dt
+    limits = {name: getattr(scenario.arm, name) for name in BOUNDS}
+    at = at_limits({"q": episode.q, "qdot": episode.qdot, "qddot": qddot, **limits})
     statuses = collections.Counter(episode.status.tolist())
     worst = Status(max(statuses))
     return Row(
@@ -188,22 +207,23 @@ def measure(
         tracking_cost=float(add_up(episode.tracking_cost)),
         velocity_cost=float(add_up(episode.velocity_cost)),
         cost_ratio=None if best_known is None else total / best_known,
-        position_error_max=float(episode.position_error[counted].max()),
+        position_error_max=position_error,
         position_error_rms=_rms(episode.position_error[counted]),
-        orientation_error_max=None if angles is None else float(angles.max()),
+        orientation_error_max=orientation_error,
         orientation_error_rms=None if angles is None else _rms(angles),
         qdot_peak=float(np.abs(episode.qdot).max()),
         qdot_rms=_rms(episode.qdot),
         qdot_total_variation=float(np.abs(np.diff(episode.qdot, axis=0)).sum()),
-        qddot_peak=float(np.abs(np.diff(episode.qdot, axis=0, prepend=0.0)).max() / scenario.dt),
-        steps_at_joint_limit=held[0],
-        steps_at_velocity_limit=held[1],
-        steps_at_acceleration_limit=held[2],
+        qddot_peak=float(np.abs(qddot).max()),
+        steps_at_joint_limit=int(at.stop.any(axis=1).sum()),
+        steps_at_velocity_limit=int(at.velocity.any(axis=1).sum()),
+        steps_at_acceleration_limit=int(at.acceleration.any(axis=1).sum()),
         joint_limit_margin_min=_margin(scenario.arm, episode.q),
+        followed=followed(position_error, orientation_error),
+        solver_status=worst.label,
         time_p50_us=float(np.percentile(later, 50)) / 1e3 if timed else None,
         time_p99_us=float(np.percentile(later, 99)) / 1e3 if timed else None,
         deadline_misses=int((later > 1e9 * scenario.dt).sum()) if timed else None,
-        status=worst.label,
         machine=dict(machine),
         iterations=None if worst is Status.UNKNOWN else float(episode.iterations.mean()),
         status_counts={Status(status).label: count for status, count in sorted(statuses.items())},

@@ -11,7 +11,7 @@ from urllib.parse import quote
 
 from baselines.canonical import canonical
 from baselines.evaluation.jobs import Skipped
-from baselines.evaluation.metrics import LOST_ORIENTATION, LOST_POSITION, Row
+from baselines.evaluation.metrics import FOLLOWED_ORIENTATION, FOLLOWED_POSITION, LOST_ORIENTATION, LOST_POSITION, Row
 from baselines.evaluation.summary import Paired, Spread, Summary, by_scenario, is_reference, summarise
 from baselines.evaluation.table import NOTHING, Column, code, escaped, fitting, markdown, number, plain
 from baselines.oracle import best_known
@@ -23,7 +23,7 @@ Pictures = Mapping[str, Sequence[tuple[str, pathlib.PurePath]]]
 #: The group of plots that show all policies.
 OVERVIEW = "overview"
 REFERENCE_NOTE = "* reference: has privileged information"
-STOP_NOTE = "† ran into a stop: a limit of a joint's coordinate held it back"
+STOP_NOTE = "† a joint was at a stop, a limit of its coordinate"
 
 
 def _policy(summary: Summary) -> str:
@@ -49,6 +49,9 @@ ERRORS = (
         drop=1,
     ),
     Column("q̇ peak", "", lambda s: s.largest("qdot_peak"), about="largest joint velocity, in rad/s or m/s", drop=2),
+    Column(
+        "q̈ peak", "", lambda s: s.largest("qddot_peak"), about="largest joint acceleration, in rad/s² or m/s²", drop=3
+    ),
 )
 TIMES = (
     Column("p50", "[µs]", lambda s: s.median("time_p50_us"), about="median time of a call after the first"),
@@ -57,16 +60,23 @@ TIMES = (
 )
 LOST = Column("lost", "", lambda s: s.lost, about="episodes in which the arm was lost")
 EPISODES = Column("episodes", "", lambda s: s.episodes, about="number of episodes; more than one of a random scenario")
-STATUS = Column("status", "", lambda s: s.status, about="the worst of the episodes")
+FOLLOWED = Column(
+    "followed",
+    "",
+    lambda s: s.followed,
+    text=lambda s: f"{s.followed} of {len(s.rows)}" if len(s.rows) > 1 else "yes" if s.followed else "no",
+    about=f"errors of at most {1e3 * FOLLOWED_POSITION:g} mm and {1e3 * FOLLOWED_ORIENTATION:g} mrad in all steps",
+)
+STATUS = Column("solver", "status", lambda s: s.solver_status, about="the worst that the solver reported in any step")
 #: The columns of the table of all policies.
 COLUMNS = (
     POLICY,
     TOTAL,
-    Column("tracking", "cost", lambda s: s.mean("tracking_cost"), drop=3),
-    Column("velocity", "cost", lambda s: s.mean("velocity_cost"), drop=4),
+    Column("tracking", "cost", lambda s: s.mean("tracking_cost"), drop=4),
     RATIO,
     *ERRORS,
     *TIMES,
+    FOLLOWED,
     STATUS,
 )
 
@@ -206,10 +216,15 @@ def remarks(rows: Sequence[Row]) -> list[str]:
         "cost ratio: total cost / best known cost, – where none is known; p50, p99: time of a call after the first; "
         "misses: such calls longer than Δt"
     )
-    notes.append("pos, ori: position and orientation error; q̇ peak in rad/s, in m/s for prismatic joints")
+    notes.append(
+        "pos, ori: position and orientation error; q̇, q̈ peak: joint velocity and acceleration in rad/s and rad/s², in "
+        "m/s and m/s² for prismatic joints"
+    )
+    small = f"{1e3 * FOLLOWED_POSITION:g} mm and {1e3 * FOLLOWED_ORIENTATION:g} mrad of error"
+    notes.append(f"followed: at most {small} in all steps; solver status: the worst that the solver reported")
     if any(summary.episodes > 1 for summary in summaries):
         notes.append(
-            "several episodes: costs and cost ratio are geometric means, errors, q̇ peak, p99 and status the worst, p50 "
+            "several episodes: costs and cost ratio are geometric means, errors, peaks, p99 and status the worst, p50 "
             "the median, misses the sum; times are those of episodes that were played alone; lost: episodes with more "
             f"than {1e3 * LOST_POSITION:g} mm or {LOST_ORIENTATION:g} rad of error at some time"
         )

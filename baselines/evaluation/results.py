@@ -8,7 +8,6 @@ import hashlib
 import io
 import pathlib
 import re
-import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -18,10 +17,20 @@ import numpy.typing as npt
 import ikgym
 from baselines.canonical import canonical
 from baselines.episodes import Episode
-from baselines.evaluation.export import FORMATS, Format, trajectory_log
+from baselines.evaluation.export import FORMATS, Format, check_log, trajectory_log
 from baselines.evaluation.jobs import Job, Options, Skipped
 from baselines.evaluation.metrics import Row
-from baselines.files import ResultsError, check_flags, from_json, read_arrays, read_json, reading, write, write_json
+from baselines.files import (
+    ResultsError,
+    check_flags,
+    check_writable,
+    from_json,
+    read_arrays,
+    read_json,
+    reading,
+    write,
+    write_json,
+)
 from ikgym.scenarios import SPLITS
 from ikgym.scenarios.preview import furthest
 
@@ -76,14 +85,12 @@ class Results:
                 "an import path such as 'package.module:make_policy', or choose --overwrite."
             )
         check_flags(self._file, resume=options.resume, overwrite=options.overwrite)
-        try:  # better now than after hours of work
-            directory.mkdir(parents=True, exist_ok=True)
-            with tempfile.TemporaryFile(dir=directory):
-                pass
-        except OSError as e:
-            raise ResultsError(f"Cannot write into {directory}: {e.strerror or e}.") from None
+        check_writable(directory)
         self._rows = {row.key: row for row in read_rows(self._file)} if options.resume and self._file.exists() else {}
         _check_comparable(self._file, list(self._rows.values()), jobs, machine)
+        for file, row in {self.series_file(row): row for row in self._rows.values()}.items():
+            if file.exists():
+                self.series(row)  # a damaged log is refused before anything is played
         if options.overwrite:
             self._clear()
 
@@ -165,7 +172,11 @@ class Results:
         Raises:
             ResultsError: The file is missing or damaged.
         """
-        return read_arrays(self.series_file(row), "Delete it and run again with --resume.")
+        file, advice = self.series_file(row), "Delete it and run again with --resume."
+        log = read_arrays(file, advice)
+        with reading(file, advice):
+            check_log(log)
+        return log
 
     def _clear(self) -> None:
         """Removes the files of an earlier evaluation."""

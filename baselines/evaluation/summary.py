@@ -148,9 +148,14 @@ class Summary:
         return sum(row.lost for row in self.rows)
 
     @property
-    def status(self) -> str:
-        """The worst status."""
-        return max((row.status for row in self.rows), key=lambda status: Status[status.upper()])
+    def followed(self) -> int:
+        """Number of rows in which the path was followed."""
+        return sum(row.followed for row in self.rows)
+
+    @property
+    def solver_status(self) -> str:
+        """The worst status that the solver reported."""
+        return max((row.solver_status for row in self.rows), key=lambda status: Status[status.upper()])
 
     @property
     def reference(self) -> bool:

@@ -75,8 +75,8 @@ class Tracking:
         return Motion.of(*self._played)
 
     @property
-    def status(self) -> Status:
-        """The worst status."""
+    def solver_status(self) -> Status:
+        """The worst status that the solver reported."""
         return Status(int(self.statuses.max()))
 
     def columns(self) -> dict[str, npt.NDArray[Any]]:
@@ -93,7 +93,7 @@ class Tracking:
         out["orientation_error [rad]"] = self.orientation_error
         out["tracking_cost [1]"] = self.tracking_cost
         out["velocity_cost [1]"] = self.velocity_cost
-        out["status"] = np.array([Status(status).label for status in self.statuses.tolist()])
+        out["solver_status"] = np.array([Status(status).label for status in self.statuses.tolist()])
         return out
 
     def to_csv(self, file: str | os.PathLike[str]) -> None:

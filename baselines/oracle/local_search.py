@@ -17,7 +17,7 @@ from baselines.solvers.receding_horizon.newton.interior_point import LEFT, cost_
 from baselines.solvers.receding_horizon.newton.minimise import NewtonSettings
 from baselines.solvers.receding_horizon.newton.workspace import knot_workspace, newton_workspace
 from ikgym.kernels import tasks as task_kernels
-from ikgym.kernels.jit import expanded, kernel
+from ikgym.kernels.jit import expanded, inner, kernel
 
 # Newton steps of a branch, and the relative precision that ends them before.
 STEPS, PRECISION = 50, 1e-4
@@ -142,7 +142,7 @@ def branch_off(problem, draws, path, partners, drift, branch, workspace):
             _blend(branch, path, off + 1.5 * length, length, branch)
 
 
-@kernel
+@inner
 def _blend(a, b, middle, width, out):
     """Goes over from path ``a`` to path ``b`` around the knot ``middle``; ``out`` may be one of them."""
     for k in range(out.shape[0]):

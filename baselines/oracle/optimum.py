@@ -13,6 +13,8 @@ from ikgym.validation import FloatArray, Frozen, read_only, whole_number
 #: Names of random starts, and of paths found by iterated local search.
 RANDOM, LOCAL_SEARCH = "random start", "local search"
 SEARCHED = (RANDOM, LOCAL_SEARCH)
+#: Most random starts: all their paths are in memory at the same time.
+MOST_STARTS = 100_000
 
 
 @dataclasses.dataclass(frozen=True)
@@ -20,7 +22,7 @@ class Search(Frozen):
     """Effort of a search.
 
     Args:
-        starts: Random starts, on a coarse time grid.
+        starts: Random starts, on a coarse time grid; at most 100 000.
         chains: Paths that the local search goes on with, the best of all starts.
         generations: How often these learn of each other's progress; 0 leaves the local search out.
         rounds: Branches of each path in a generation.
@@ -43,7 +45,8 @@ class Search(Frozen):
     def __post_init__(self) -> None:
         for name, value in dict(vars(self)).items():
             least = 0 if name in ("starts", "generations", "seed") else 1
-            object.__setattr__(self, name, whole_number(name, value, at_least=least))
+            most = MOST_STARTS if name == "starts" else None
+            object.__setattr__(self, name, whole_number(name, value, at_least=least, at_most=most))
 
 
 @dataclasses.dataclass(frozen=True)

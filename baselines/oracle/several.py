@@ -15,6 +15,7 @@ from baselines.oracle.cache import keep, kept, solve
 from baselines.oracle.episode import EpisodeProblem, path_of
 from baselines.oracle.optimum import Optimum, Search
 from baselines.oracle.stripped import stripped
+from baselines.policy import SolverPolicy
 from baselines.spec import parse_policy
 from baselines.workers import ALONE, TOLERANCE, WorkerError, Workers, finished
 from ikgym.scenarios import Scenario
@@ -98,10 +99,26 @@ def find_all(
             yield one, optimum
 
 
+def check_policies(wanted: Sequence[Wanted]) -> None:
+    """Checks policies on one episode of each scenario, before anything is played.
+
+    Raises:
+        UnknownNameError: There is no such policy or parameter.
+        InvalidInputError: A policy does not suit a scenario.
+    """
+    for one in {one.scenario.name: one for one in wanted}.values():
+        for spec in one.policies:
+            _made(stripped(one.scenario, one.draw.seed, one.draw.arm_seed), spec)
+
+
 def path(scenario: Scenario, seed: int, spec: str) -> FloatArray:
     """The joint coordinates of an episode that a policy plays, in [rad] or [m]. Shape (steps, n)."""
+    return path_of(_made(scenario, spec), scenario, seed)
+
+
+def _made(scenario: Scenario, spec: str) -> SolverPolicy:
     name, parameters = parse_policy(spec)
-    return path_of(registry.make(name, scenario, **parameters), scenario, seed)
+    return registry.make(name, scenario, **parameters)
 
 
 def _kept(one: Wanted) -> Optimum | None:

@@ -19,7 +19,7 @@ Verdict = Literal["reproduced", "contradicted", "depends", "not testable"]
 #: Measured figures by name, with the unit at the end of the name: ``{"largest error [mm]": 1.3}``.
 Figures = Mapping[str, float | Sequence[float]]
 
-_SCALES = {"%": 1e2, "mm": 1e3, "mrad": 1e3, "µm": 1e6, "ms": 1e3}
+_SCALES = {"%": 1e2, "mm": 1e3, "mrad": 1e3, "µm": 1e6, "ms": 1e3, "µs": 1e6}
 
 
 class Finding(NamedTuple):
@@ -129,11 +129,12 @@ class Paper:
     claims: tuple[Claim, ...]
 
 
-def claims_of(module: ModuleType) -> tuple[Claim, ...]:
-    """The claims of ``claims.toml`` beside a module, each tested by the module's function of the same name.
+def claims_of(*modules: ModuleType) -> tuple[Claim, ...]:
+    """The claims of ``claims.toml`` beside some modules, each tested by the function of the same name in one of them.
 
     Args:
-        module: The module, such as :mod:`baselines.papers.varga.claims`.
+        *modules: The modules, such as :mod:`baselines.papers.varga.claims`.
     """
-    text = pathlib.Path(str(module.__file__)).with_suffix(".toml").read_text(encoding="utf-8")
-    return tuple(Claim(name, test=vars(module)[name], **record) for name, record in tomllib.loads(text).items())
+    text = pathlib.Path(str(modules[0].__file__)).with_name("claims.toml").read_text(encoding="utf-8")
+    tests = {name: value for module in modules for name, value in vars(module).items()}
+    return tuple(Claim(name, test=tests[name], **record) for name, record in tomllib.loads(text).items())

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ikgym.kernels import tasks as task_kernels
-from ikgym.kernels.jit import expanded, kernel
+from ikgym.kernels.jit import expanded, inner
 
 
 @expanded
@@ -14,7 +14,7 @@ def pose_arrays(n, m):
     return np.empty((3, 3)), np.empty(3), np.empty((6, n)), np.empty(m)
 
 
-@kernel
+@inner
 def task_shift(kind, gain, pose, target, present, error, shift):
     """Δx = (X^N(k+1) - X^N(k)) + gain (X^N(k) - x(k)) of one row; ``error`` (e,) receives the last difference."""
     task_kernels.error(kind, target, present, shift)

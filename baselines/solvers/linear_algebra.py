@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from ikgym.kernels.jit import inlined, kernel
+from ikgym.kernels.jit import inlined, inner, kernel
 
 # Pivots below this share of the largest diagonal element are rounding: J has lost rank, or nearly so, and λ is too
 # small to count. Singular values tell which; solving on would amplify the rounding.
@@ -25,7 +25,7 @@ def dot(a, b):
     return total
 
 
-@kernel
+@inner
 def inverse_of_factor(factor, out):
     """(L Lᵀ)⁻¹, both triangles: ``factor`` (m, m) from :func:`cholesky` is destroyed; ``out`` (m, m)."""
     m = factor.shape[0]
@@ -45,7 +45,7 @@ def inverse_of_factor(factor, out):
             out[i, j] = out[j, i] = total
 
 
-@kernel
+@inner
 def orthogonal_columns(columns, rotations):
     """Singular value decomposition in place, by one-sided Jacobi rotations (Hestenes).
 
@@ -92,7 +92,7 @@ def orthogonal_columns(columns, rotations):
             return
 
 
-@kernel
+@inner
 def pseudoinverse_rows(jacobian, shift, tolerance, full_rank, out, deficient):
     """Δq = J⁺ Δx by singular values, row by row.
 
@@ -127,7 +127,7 @@ def singular_values(columns, left, squares):
             squares[a] += columns[k, a] * columns[k, a]
 
 
-@kernel
+@inner
 def inverted(columns, left, squares, damping, smallest, shift, out):
     """Δq = V Σ (Σ² + λ)⁻¹ Uᵀ Δx, which is J⁺ Δx without damping, see :func:`singular_values`.
 
@@ -157,7 +157,7 @@ def inverted(columns, left, squares, damping, smallest, shift, out):
     return rank
 
 
-@kernel
+@inner
 def damped_step(jacobian, error, damping, gram, x, out):
     """One damped step Δq = Jᵀ (J Jᵀ + λ I)⁻¹ e, in the small space (Zhang 2020, eq. 5 and 13).
 
@@ -184,7 +184,7 @@ def damped_step(jacobian, error, damping, gram, x, out):
     return True
 
 
-@kernel
+@inner
 def damped_gram(jacobian, damping, out):
     """The lower triangle of J Jᵀ + λ I: shapes (e, n), a number, (e, e)."""
     e, n = jacobian.shape
@@ -196,7 +196,7 @@ def damped_gram(jacobian, damping, out):
             out[a, b] = total
 
 
-@kernel
+@inner
 def ldl(matrix):
     """L D Lᵀ in place: L below the diagonal, D⁻¹ on it; from the lower triangle of ``matrix`` (e, e).
 
@@ -221,7 +221,7 @@ def ldl(matrix):
     return True
 
 
-@kernel
+@inner
 def ldl_solve(factor, x):
     """Solves L D Lᵀ x = b in place; ``factor`` (e, e) from :func:`ldl`, ``x`` (e,) is b before."""
     e = x.shape[0]
@@ -235,7 +235,7 @@ def ldl_solve(factor, x):
             x[i] -= factor[k, i] * x[k]
 
 
-@kernel
+@inner
 def ldl_scaled_inverse(factor, scale, out):
     """Gives scale · (L D Lᵀ)⁻¹: shapes (e, e); ``factor`` from :func:`ldl` is destroyed."""
     e = factor.shape[0]
@@ -254,7 +254,7 @@ def ldl_scaled_inverse(factor, scale, out):
             out[a, b] = out[b, a] = scale * total
 
 
-@kernel
+@inner
 def transposed_product(jacobian, vector, out):
     """Jᵀ x: shapes (e, n), (e,), (n,)."""
     e, n = jacobian.shape

@@ -20,7 +20,7 @@ from ikgym import scenarios, tasks
 from ikgym.exceptions import IkgymError, InvalidInputError
 from ikgym.rl import Learning
 from ikgym.scenarios import Scenario
-from ikgym.validation import Frozen, flag, known_names, number, whole_number
+from ikgym.validation import Frozen, check_sizes, flag, known_names, number, whole_number
 
 Activation = Literal["silu", "relu", "tanh", "elu"]
 #: How `observe` estimates its gradient.
@@ -67,7 +67,8 @@ class Config(Frozen):
     """Keep the agent with the best validation score (geometric mean of the costs) instead of the last one."""
 
     def __post_init__(self) -> None:
-        self._whole("segments", "evaluate_every", "validation_episodes")
+        self._whole("segments", "evaluate_every")
+        self._whole("validation_episodes", at_most=len(scenarios.SPLITS["validation"]))
         self._whole("n_envs", at_most=MOST_ARMS)
         if self.steps is not None:
             self._whole("steps")
@@ -107,9 +108,8 @@ class Config(Frozen):
         for name in names:
             value = getattr(self, name)
             several = isinstance(value, tuple)
-            checked = tuple(whole_number(name, each, at_least=at_least) for each in (value if several else (value,)))
-            if at_most is not None and max(checked) > at_most:
-                raise InvalidInputError(f"{name}: expected a whole number from 1 to {at_most}, got {max(checked)}.")
+            each = value if several else (value,)
+            checked = tuple(whole_number(name, one, at_least=at_least, at_most=at_most) for one in each)
             self._set(name, checked if several else checked[0])
 
     def _numbers(self, *names: str, **bounds: float) -> None:
@@ -199,13 +199,14 @@ class APG(ActorOnly):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        self._whole("hold", "segment_steps")
         self._set("offsets", self.processing.offsets)
         self._set("damping", self.processing.damping)
         if self.init is not None:
             self._set("init", pathlib.Path(self.init))
         if not isinstance(self.window, tuple) or not self.window:
             raise InvalidInputError(f"window: expected whole numbers, got {self.window!r}.")
-        self._whole("hold", "segment_steps", "window")
+        self._whole("window")
         for steps in self.window:
             if steps % self.hold or self.segment_steps % steps:
                 raise InvalidInputError(
@@ -218,7 +219,7 @@ class APG(ActorOnly):
     @property
     def processing(self) -> Bilinear:
         """The features and the law of the agent."""
-        return Bilinear(self.offsets, self.damping)
+        return Bilinear(self.offsets, self.damping, self.hold)
 
     def window_of(self, segment: int) -> int:
         """The window of a segment, counted from 0."""
@@ -370,15 +371,18 @@ def _parsed(option: str, settings: tuple[str, ...]) -> dict[str, Any]:
     """Values by name, read as Python literals, or else as strings.
 
     Raises:
-        InvalidInputError: A setting does not have the form NAME=VALUE.
+        InvalidInputError: A setting does not have the form NAME=VALUE, its name is given twice, or a number is absurd.
     """
     out: dict[str, Any] = {}
     for setting in settings:
         name, equals, text = str(setting).partition("=")
         if not name or not equals:
             raise InvalidInputError(f"{option}: expected NAME=VALUE, got {setting!r}.")
+        if name in out:
+            raise InvalidInputError(f"{option}: {name} is given twice.")
         try:
             out[name] = ast.literal_eval(text)
         except (ValueError, SyntaxError):
             out[name] = text
+        check_sizes(name, out[name])
     return out

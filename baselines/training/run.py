@@ -103,9 +103,9 @@ class _Run:
 
     def begin(self, *, resume: bool, overwrite: bool) -> None:
         identity = {part: self._about[part] for part in ("method", "seed", "config", "scenario", "versions")}
-        there = self._folder.prepare(identity, resume=resume, overwrite=overwrite)
         reseed(self._seed, None)
-        self._trainer = new_trainer(self._config, self._scenario, self._seed)
+        self._trainer = new_trainer(self._config, self._scenario, self._seed)  # may refuse: before files are replaced
+        there = self._folder.prepare(identity, resume=resume, overwrite=overwrite)
         if there is not None:
             self._about["command"] = there.get("command", self._about["command"])
             if self._folder.checkpoint.exists():

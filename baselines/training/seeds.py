@@ -18,6 +18,7 @@ from baselines.training.config import Config
 from baselines.training.folder import Folder
 from baselines.workers import ALONE, TRIES, WorkerError, Workers, finished
 from ikgym.exceptions import IkgymError
+from ikgym.validation import number
 
 if TYPE_CHECKING:  # the command line is read without PyTorch
     from baselines.training.validation import Score
@@ -37,6 +38,9 @@ class RunOptions:
     """Shortest time between two checkpoints; there are none within a segment."""
     progress: bool = True
     """Show a progress bar."""
+
+    def __post_init__(self) -> None:
+        number("checkpoint_every", self.checkpoint_every, at_least=0.0)
 
     def folder(self, seed: int) -> pathlib.Path:
         """The folder of a run."""

@@ -23,6 +23,8 @@ Picture = npt.NDArray[np.uint8]
 NARROWEST, WIDEST = 480, 3840
 # Widths are multiples of it: a video takes even sizes, and pictures are half as high as wide.
 STEP = 4
+# Most pictures of a video: about an hour.
+MOST_PICTURES = 100_000
 
 
 def moments(stage: Stage, fps: float, speed: float) -> npt.NDArray[np.int64]:
@@ -37,11 +39,24 @@ def moments(stage: Stage, fps: float, speed: float) -> npt.NDArray[np.int64]:
         Numbers of steps, rising. Shape (pictures,).
 
     Raises:
-        InvalidInputError: One of them is not above 0.
+        InvalidInputError: One of them is outside its range, or there would be too many pictures.
     """
     steps = stage.scenario.steps
-    between = number("speed", speed, above=0.0) / number("fps", fps, above=0.0) / stage.scenario.dt
+    between = number("speed", speed, above=0.0) / checked_fps(fps) / stage.scenario.dt
+    if steps > MOST_PICTURES * between:
+        raise InvalidInputError(
+            f"fps, speed: expected at most {MOST_PICTURES} pictures, got fps {fps:g} and speed {speed:g}."
+        )
     return np.append(np.rint(np.arange(0.0, steps, between)), steps).astype(np.int64)
+
+
+def checked_fps(fps: float) -> float:
+    """Pictures a second.
+
+    Raises:
+        InvalidInputError: They are not from 0.1 to 1000.
+    """
+    return number("fps", fps, at_least=0.1, at_most=1000.0)
 
 
 def checked_width(width: int) -> int:
@@ -50,7 +65,7 @@ def checked_width(width: int) -> int:
     Raises:
         InvalidInputError: It is no multiple of 4 from 480 to 3840.
     """
-    if whole_number("width", width, at_least=NARROWEST) > WIDEST or width % STEP:
+    if whole_number("width", width, at_least=NARROWEST, at_most=WIDEST) % STEP:
         raise InvalidInputError(f"width: expected a multiple of {STEP} from {NARROWEST} to {WIDEST} [px], got {width}.")
     return width
 

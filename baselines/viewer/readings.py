@@ -30,7 +30,7 @@ class Reading(NamedTuple):
         manipulability: Yoshikawa's w = √det(J Jᵀ), of the linear rows where the task has no orientation.
         share: The same as a share of the largest among random postures, between 0 and 1.
         margins: Distances of the joints from their nearest limit in [rad] or [m], inf without limits. Shape (n,).
-        joints: Colours of the n joints: :data:`FREE`, :data:`NEAR` or :data:`AT`.
+        joints: Colours of the n joints: ``FREE``, ``NEAR`` or ``AT``.
         tool: Colour of the tool: from vermilion in a singular posture to bluish green in the best one.
     """
 

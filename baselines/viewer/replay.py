@@ -13,6 +13,8 @@ from gymnasium.utils import seeding
 from tqdm import tqdm
 
 import baselines
+from baselines.episodes import Seeds
+from baselines.evaluation.policies import bind
 from ikgym import scenarios
 from ikgym.arms import Arm
 from ikgym.arms.inverse import LENGTH_OF_RADIAN
@@ -111,8 +113,10 @@ def play_all(stage: Stage, policies: Sequence[str]) -> list[Replay]:
     """
     if not policies:
         raise InvalidInputError("policy: expected at least one, got none.")
-    replays = []
-    for policy in tqdm(list(dict.fromkeys(policies)), disable=None, file=sys.stderr, unit="policy"):
+    wanted, replays = list(dict.fromkeys(policies)), []
+    for policy in wanted:  # all are checked before one plays
+        bind(policy, stage.scenario, Seeds(stage.seed))
+    for policy in tqdm(wanted, disable=None, file=sys.stderr, unit="policy"):
         made = baselines.track(stage.scenario, policy, seed=stage.seed)
         position = np.append(stage.errors[0], made.position_error)
         orientation = np.append(stage.errors[1], made.orientation_error)

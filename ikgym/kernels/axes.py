@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 
-from ikgym.kernels.jit import inlined, kernel
+from ikgym.kernels.jit import inlined, inner, kernel
 
 #: The desired axis at which the two directions are not continuous.
 SINGULAR = (6.0 / 11.0, 6.0 / 11.0, 7.0 / 11.0)
@@ -53,7 +53,7 @@ def _parts(nominal, actual):
     return vx * x + vy * y + vz * z, -(ux * x + uy * y + uz * z), cosine
 
 
-@kernel
+@inner
 def direction_error(nominal, actual):
     """The rotation vector that takes an axis to the desired one by the shortest way, along the two directions across.
 
@@ -74,7 +74,7 @@ def direction_error(nominal, actual):
     return factor * first, factor * second
 
 
-@kernel
+@inner
 def direction_error_jacobian(nominal, actual, jacobian, out):
     """Derivative of :func:`direction_error` by the joint coordinates.
 

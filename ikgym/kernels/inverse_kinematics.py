@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ikgym.kernels.jit import kernel
+from ikgym.kernels.jit import inner, kernel
 from ikgym.kernels.kinematics import Chain, forward, forward_and_jacobian
 from ikgym.kernels.linear_algebra import cholesky, cholesky_solve
 from ikgym.kernels.random_numbers import uniform
@@ -134,7 +134,7 @@ def inverse_rows(
         converged[row] = _inverse(chain, ranges, (rotation[row], position[row]), start[row], settings, work, q[row])
 
 
-@kernel
+@inner
 def _inverse(chain, ranges, pose, start, settings, work, q):
     """The posture for one pose into ``q``; returns whether it meets the pose."""
     best = math.inf
@@ -201,7 +201,7 @@ def _step(ranges, damping, work):
         work.q[j] += work.step[j]
 
 
-@kernel
+@inner
 def _gram(damping, work):
     """J Jᵀ + λ, its lower triangle."""
     jacobian, gram = work.jacobian, work.gram
@@ -213,7 +213,7 @@ def _gram(damping, work):
             gram[i, k] = total
 
 
-@kernel
+@inner
 def _hold(ranges, work):
     """Takes the joints that would pass a limit to it, and their part off the error; returns whether there are any."""
     q, step, jacobian = work.q, work.step, work.jacobian
@@ -233,7 +233,7 @@ def _hold(ranges, work):
     return passed
 
 
-@kernel
+@inner
 def _unwind(prismatic, ranges, start, q):
     """Takes full turns off the joints, as the limits allow, so that they end near the start; whether it took any."""
     turn, unwound = 2.0 * math.pi, False
@@ -274,7 +274,7 @@ def _row(row, rotation):
     )
 
 
-@kernel
+@inner
 def _met(error, settings):
     """Whether position and orientation both are within the tolerance."""
     most = settings.tolerance * settings.tolerance
@@ -286,7 +286,7 @@ def _met(error, settings):
     return angle <= most * settings.length * settings.length
 
 
-@kernel
+@inner
 def _squared(vector):
     total = 0.0
     for i in range(vector.shape[0]):

@@ -15,6 +15,7 @@ import functools
 import gc
 import hashlib
 import importlib
+import inspect
 import itertools
 import logging
 import pickle
@@ -57,8 +58,13 @@ def kernel(function: Any) -> Any:
     return _cached(function, _nrt=True)  # else taken over from a caller that is uncounted
 
 
+def inner(function: Any) -> Any:
+    """Like :func:`kernel`, to be called by kernels: the wrapper for Python takes as long as the kernel to compile."""
+    return _cached(function, _nrt=True, no_cpython_wrapper=True)
+
+
 def uncounted(function: Any) -> Any:
-    """Like :func:`kernel`, without counting references: for inner loops that are handed arrays in named tuples.
+    """Like :func:`inner`, without counting references: for inner loops that are handed arrays in named tuples.
 
     numba counts the references of all arrays of a tuple, atomically, wherever it is passed on or a field is read: for
     paths of 2 knots this took half the time of a Newton step. An uncounted kernel allocates nothing, which numba
@@ -67,12 +73,12 @@ def uncounted(function: Any) -> Any:
     Args:
         function: Takes arrays, numbers and tuples of them, and returns numbers.
     """
-    return _cached(function, _nrt=False)
+    return _cached(function, _nrt=False, no_cpython_wrapper=True)
 
 
 def inlined(function: Any) -> Any:
     """Like :func:`uncounted`, and copied into its callers by LLVM, so that constant arguments become constants."""
-    return _cached(function, _nrt=False, forceinline=True)
+    return _cached(function, _nrt=False, no_cpython_wrapper=True, forceinline=True)
 
 
 def expanded(function: Any) -> Any:
@@ -170,6 +176,9 @@ def _linked(compiled: Any) -> Any:
     dispatcher: Any = compiled
     function, engine = compiled.py_func, dispatcher.targetctx.codegen()._engine
     add, template = dispatcher.add_overload, dispatcher.get_call_template
+    called_by_python = not compiled.targetoptions.get("no_cpython_wrapper", False)
+    if not called_by_python:
+        dispatcher._compile_for_args = lambda *arguments: _entry(compiled)._compile_for_args(*arguments)
 
     def add_overload(result: Any) -> None:
         # What a callee needs, its callers need: numba forgets it of what it loads from disk.
@@ -182,7 +191,10 @@ def _linked(compiled: Any) -> Any:
             library._shared_module = llvm.parse_assembly("")
             arguments = tuple(result.fndesc.argtypes)
             library._reload_init.add(_Callee(function.__module__, function.__qualname__, arguments, symbol))
-        add(result)
+        if called_by_python:
+            add(result)
+        else:
+            compiled.overloads[tuple(result.signature.args)] = result
 
     def get_call_template(arguments: Any, named: Any) -> Any:
         # numba would compile a kernel once for each constant that it is called with.
@@ -196,11 +208,19 @@ def _linked(compiled: Any) -> Any:
 
         def rebuilt(context: Any, payload: Any) -> Any:
             # numba looks for names in the copy for callers, which is empty.
-            engine._defined_symbols.add(payload[1].llvm_cpython_wrapper_name)
+            if called_by_python:
+                engine._defined_symbols.add(payload[1].llvm_cpython_wrapper_name)
             return rebuild(context, payload)
 
         disk.rebuild = rebuilt
     return compiled
+
+
+@functools.cache
+def _entry(compiled: Any) -> Any:
+    """A kernel that only calls another one, which has no wrapper for calls from Python."""
+    names = ", ".join(inspect.signature(compiled.py_func).parameters)
+    return njit(eval(f"lambda {names}: kernel({names})", {"kernel": compiled}))
 
 
 def _has_arrays(kind: Any) -> bool:

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import math
 
-from ikgym.kernels.jit import kernel
+from ikgym.kernels.jit import inner
 
 
-@kernel
+@inner
 def cholesky(matrix):
     """Cholesky factorisation in place: the lower triangle of ``matrix`` (m, m) becomes L with L Lᵀ = matrix.
 
@@ -34,7 +34,7 @@ def cholesky(matrix):
     return True
 
 
-@kernel
+@inner
 def cholesky_solve(factor, rhs):
     """Solves L Lᵀ x = rhs in place; ``factor`` (m, m) from :func:`cholesky`, ``rhs`` (m,) becomes x."""
     m = rhs.shape[0]

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from ikgym.kernels.jit import inlined, kernel
+from ikgym.kernels.jit import inlined, inner, kernel
 
 
 @kernel
@@ -59,7 +59,7 @@ def quaternion(rotation):
     )
 
 
-@kernel
+@inner
 def quaternion_of(first, second, third):
     """:func:`quaternion` of a matrix given by its rows, three numbers each, by Shepperd's choice of the largest part.
 
@@ -115,7 +115,7 @@ def rotation_vector(rotation):
     return out
 
 
-@kernel
+@inner
 def vector_factor(w, x, y, z):
     """By what the vector part of a unit quaternion with w >= 0 must be multiplied to be the rotation vector."""
     sine = math.sqrt(x * x + y * y + z * z)

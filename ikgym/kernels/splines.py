@@ -1,69 +1,163 @@
-"""Kernels of cubic splines, linear in the number of knots."""
+"""Kernels: joint motions along cubic B-splines, their random control points, and the nominal frames along them."""
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
-from ikgym.kernels.jit import kernel
+from ikgym.kernels.jit import inlined, kernel, uncounted
+from ikgym.kernels.kinematics import Chain, forward
+
+# Moves of less than this share of the largest count as none, so that nothing is divided by 0.
+TINY = 1e-12
+
+
+@inlined
+def _spline(control, time, duration, out):
+    """A uniform cubic B-spline, constant beyond its ends.
+
+    Args:
+        control: Control points in [rad] or [m]. Shape (c, n).
+        time: In [s].
+        duration: In [s].
+        out: Receives the joint coordinates in [rad] or [m]. Shape (n,).
+    """
+    spans = control.shape[0] - 3
+    at = min(max(time / duration, 0.0), 1.0) * spans
+    i = min(int(at), spans - 1)
+    u = at - i
+    rest = 1.0 - u
+    for j in range(out.shape[0]):
+        inner = (4.0 + u * u * (3.0 * u - 6.0)) * control[i + 1, j]
+        inner += (4.0 + rest * rest * (3.0 * rest - 6.0)) * control[i + 2, j]
+        out[j] = (rest * rest * rest * control[i, j] + inner + u * u * u * control[i + 3, j]) / 6.0
 
 
 @kernel
-def solve_tridiagonal(lower, diagonal, upper, right):
-    """Solves a diagonally dominant tridiagonal system in place.
-
-    Args:
-        lower: Entries left of the diagonal; the first has no meaning. Shape (k,).
-        diagonal: Changed. Shape (k,).
-        upper: Entries right of the diagonal; the last has no meaning. Shape (k,).
-        right: Becomes the solution. Shape (k, d).
-    """
-    k, d = right.shape
-    for i in range(1, k):
-        factor = lower[i] / diagonal[i - 1]
-        diagonal[i] -= factor * upper[i - 1]
-        for j in range(d):
-            right[i, j] -= factor * right[i - 1, j]
-    for i in range(k - 2, -1, -1):
-        for j in range(d):
-            right[i, j] -= upper[i] / diagonal[i + 1] * right[i + 1, j]
-    for i in range(k):
-        for j in range(d):
-            right[i, j] /= diagonal[i]
+def spline_rows(control, times, duration, out):
+    """Several splines: ``control`` (k, c, n), each at ``times`` (k, t) in [s] of its own; ``out`` (k, t, n)."""
+    for row in range(times.shape[0]):
+        for i in range(times.shape[1]):
+            _spline(control[row], times[row, i], duration, out[row, i])
 
 
 @kernel
-def extremes(knots, values, slopes, samples):
-    """The least speed and the largest curvature of a cubic spline in space.
+def control_rows(drawn, lower, upper, fastest, hardest, low, high, out):
+    """Control points of random motions within limits, see :class:`ikgym.trajectories.RandomJointSpline`.
 
     Args:
-        knots: Shape (k,).
-        values: Shape (k, 3).
-        slopes: Derivatives at the knots. Shape (k, 3).
-        samples: Points between two knots that are looked at.
-
-    Returns:
-        The least speed by the parameter, the index of the interval where it occurs, and the largest curvature.
+        drawn: Numbers that are uniform in (0, 1): of starts, of shares, and of spans − 2 moves. Shape (k, spans, n).
+        lower: Lowest control points in [rad] or [m]. Shape (n,).
+        upper: Highest control points. Shape (n,).
+        fastest: Largest differences of control points. Shape (n,).
+        hardest: Largest second differences. Shape (n,).
+        low: The smallest share of the motion within the limits.
+        high: The largest one.
+        out: Receives the control points. Shape (k, spans + 3, n).
     """
-    least, slowest, largest = math.inf, 0, 0.0
-    first, second = np.empty(3), np.empty(3)
-    for i in range(len(knots) - 1):
-        h = knots[i + 1] - knots[i]
-        for sample in range(samples + 1):
-            u = sample / samples
+    spans = drawn.shape[1]
+    for row in range(drawn.shape[0]):
+        for j in range(drawn.shape[2]):
+            first, moves, control = (
+                lower[j] + drawn[row, 0, j] * (upper[j] - lower[j]),
+                drawn[row, :, j],
+                out[row, :, j],
+            )
+            up = down = steepest = sharpest = before = 0.0
+            control[0] = 0.0
+            for i in range(spans + 2):
+                # The first two moves and the last two are none: rest, with no acceleration, at both ends.
+                move = 2.0 * moves[i] - 1.0 if 2 <= i < spans else 0.0
+                control[i + 1] = control[i] + move
+                up, down = max(up, control[i + 1]), max(down, -control[i + 1])
+                steepest, sharpest = max(steepest, abs(move)), max(sharpest, abs(move - before))
+                before = move
+            largest = min(
+                (upper[j] - first) / max(up, TINY),
+                (first - lower[j]) / max(down, TINY),
+                fastest[j] / max(steepest, TINY),
+                hardest[j] / max(sharpest, TINY),
+            )
+            size = (low + drawn[row, 1, j] * (high - low)) * largest
+            for i in range(spans + 3):
+                control[i] = min(max(first + size * control[i], lower[j]), upper[j])  # rounding
+
+
+@kernel
+def complete(
+    # Chain of the model.
+    offsets,
+    axes,
+    prismatic,
+    tool,
+    tool_rotation,
+    # The motions.
+    control,
+    duration,
+    dt,
+    first,
+    point,
+    preview,
+    # The tables, changed in place.
+    known,
+    tables,
+    # The command.
+    made,
+    active,
+    moving,
+    start,
+    stop,
+):
+    """Computes the nominal frames that rows need in their next step and that are not in their tables yet.
+
+    The tuples are taken apart for the reason of :func:`ikgym.kernels.simulation.step`, before which this is called.
+
+    Args:
+        offsets: Of the model's :class:`Chain`, as the next four.
+        axes: See there.
+        prismatic: See there.
+        tool: See there.
+        tool_rotation: See there.
+        control: Control points of the rows' motions in [rad] or [m]. Shape (N, c, n).
+        duration: Of the motions, in [s].
+        dt: Δt in [s].
+        first: Number of the first point of the rows' episodes, all points of all their episodes being counted on.
+            Shape (N,).
+        point: Number of the target after k steps, from the first one of an episode. Shape (steps + furthest
+            preview + 1,).
+        preview: How many steps ahead the nominal coordinates are shown. Shape (p,).
+        known: Numbers of the points whose frames are in the tables. Shape (N, slots).
+        tables: The frames. Shape (N, slots, 12 or 3).
+        made: Steps made in the episodes. Shape (N,).
+        active: The rows that are meant. Shape (N,).
+        moving: Whether they are about to move, or are observed where they are.
+        start: The first row.
+        stop: The row after the last.
+    """
+    chain = Chain(offsets, axes, prismatic, tool, tool_rotation)
+    q, frame = np.empty(control.shape[2]), np.empty(12)
+    rotation, position, next_step = frame[:9].reshape(3, 3), frame[9:], 1 if moving else 0
+    for row in range(start, stop):
+        if active[row]:
+            motion, row_known, table, k = control[row], known[row], tables[row], made[row] + next_step
+            _complete(chain, motion, duration, dt, first[row], point[k], row_known, table, q, rotation, position)
+            for i in range(preview.shape[0]):
+                at = point[k + preview[i]]
+                _complete(chain, motion, duration, dt, first[row], at, row_known, table, q, rotation, position)
+
+
+@uncounted
+def _complete(chain, motion, duration, dt, first, point, known, table, q, rotation, position):
+    """The frame of one point, if its table does not have it."""
+    slot = point % known.shape[0]
+    if known[slot] == first + point:
+        return
+    known[slot] = first + point
+    _spline(motion, float(point) * dt, duration, q)
+    forward(chain, q, rotation, position)
+    width = table.shape[1]
+    if width == 12:
+        for i in range(3):
             for j in range(3):
-                secant = (values[i + 1, j] - values[i, j]) / h
-                a, b = slopes[i, j], slopes[i + 1, j]
-                c, d = 3.0 * secant - 2.0 * a - b, a + b - 2.0 * secant
-                first[j] = a + u * (2.0 * c + 3.0 * u * d)
-                second[j] = (2.0 * c + 6.0 * u * d) / h
-            speed = math.sqrt(first[0] * first[0] + first[1] * first[1] + first[2] * first[2])
-            if speed < least:
-                least, slowest = speed, i
-            x = first[1] * second[2] - first[2] * second[1]
-            y = first[2] * second[0] - first[0] * second[2]
-            z = first[0] * second[1] - first[1] * second[0]
-            if speed > 0.0:
-                largest = max(largest, math.sqrt(x * x + y * y + z * z) / speed**3)
-    return least, slowest, largest
+                table[slot, 3 * i + j] = rotation[i, j]
+    for i in range(3):
+        table[slot, width - 3 + i] = position[i]

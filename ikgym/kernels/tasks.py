@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from ikgym.kernels.axes import across, direction_error, direction_error_jacobian
-from ikgym.kernels.jit import inlined, kernel
+from ikgym.kernels.jit import inlined, inner, kernel
 from ikgym.kernels.kinematics import forward
 from ikgym.kernels.rotations import quaternion_of, vector_factor
 
@@ -53,7 +53,7 @@ def coordinates(kind, rotation, position, out):
         out[m - 3 + i] = position[i]
 
 
-@kernel
+@inner
 def frame_coordinates(kind, frame, out):
     """:func:`coordinates` of a frame of shape (12,), or (3,) where there is no orientation."""
     m, width = out.shape[0], frame.shape[0]
@@ -158,7 +158,7 @@ def jacobian(kind, rotation, geometric, out):
             out[e - 3 + i, j] = geometric[i, j]
 
 
-@kernel
+@inner
 def coordinate_jacobian(kind, rotation, geometric, out):
     """Derivative of the task coordinates themselves. ``out`` (m, n); else as :func:`jacobian`."""
     if kind == AXIS:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ikgym.kernels.jit import inlined, kernel
+from ikgym.kernels.jit import inlined, inner, kernel
 from ikgym.kernels.random_numbers import normal, share, stream
 
 Floats = npt.NDArray[np.float64]
@@ -143,7 +143,7 @@ def _to_unit(vector):
         vector[c] /= length
 
 
-@kernel
+@inner
 def _begin_at(j, zero, prismatic, offsets, axes, tool, tool_rotation, turned):
     """Makes a chain have a joint's coordinate ``zero`` where the joint's encoder says 0.
 

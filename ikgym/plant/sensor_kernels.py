@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from ikgym.kernels import tasks as task_kernels
-from ikgym.kernels.jit import inlined, kernel
+from ikgym.kernels.jit import inlined, inner
 from ikgym.kernels.random_numbers import normal, share
 
 # The streams of the key of an episode's noises. The first is the key itself.
@@ -81,7 +81,7 @@ def measure_pose(sensors, keys, kind, step, rotation, position, kept, shown):
     return late
 
 
-@kernel
+@inner
 def blur(distance, angle, keys, kind, step, rotation, position):
     """Shifts a position by a normal vector, and turns an orientation by another one.
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from ikgym.kernels import tasks as task_kernels
-from ikgym.kernels.jit import kernel
+from ikgym.kernels.jit import inner, kernel
 from ikgym.kernels.kinematics import forward_and_jacobian
 from ikgym.rl.twists import is_turned, turn, twist, twist_size
 
@@ -27,7 +27,7 @@ RADIAN = 0.25
 CONTEXT = 0.3
 
 
-@kernel
+@inner
 def mean_twists(kind, dt, offsets, nominal, error, out):
     """The mean velocities between reference poses ahead.
 
@@ -52,7 +52,7 @@ def mean_twists(kind, dt, offsets, nominal, error, out):
     return SLOWEST + math.sqrt(square / out.size)
 
 
-@kernel
+@inner
 def feature_row(kind, prismatic, axis, q, ahead, speed, remaining, out):
     """The features of one arm, as :class:`ikgym.rl.AgentObservation` lists them.
 
@@ -83,7 +83,7 @@ def feature_row(kind, prismatic, axis, q, ahead, speed, remaining, out):
     out[at], out[at + 1] = math.log(speed), min(remaining / STEPS_LEFT, 1.0)
 
 
-@kernel
+@inner
 def context_rows(kind, prismatic, axis, dt, offsets, q, nominal, remaining, out, speed):
     """:func:`feature_row` of N arms: posture, twists ahead, their speed, and steps left.
 
@@ -105,7 +105,7 @@ def context_rows(kind, prismatic, axis, dt, offsets, q, nominal, remaining, out,
         feature_row(kind, prismatic, axis, q[row], ahead, speed[row], remaining[row, 0], out[row])
 
 
-@kernel
+@inner
 def command_unit(kind, lead, furthest, pose, nominal, speed, error, due):
     """The required twist, normalised, and the unit of velocities.
 
@@ -144,7 +144,7 @@ def radian(chain):
     return RADIAN * length if length > 0.0 else 1.0
 
 
-@kernel
+@inner
 def along_joints(kind, chain, metres, q, due, rotation, position, jacobians, out):
     """Each joint's column of the Jacobian times the required twist.
 
@@ -176,7 +176,7 @@ def along_joints(kind, chain, metres, q, due, rotation, position, jacobians, out
             out[first // 3 * n + j] = min(max(product, -MOST), MOST)
 
 
-@kernel
+@inner
 def seen_jacobian(kind, chain, q, joints, rotation, position, out):
     """The geometric Jacobian from the frame in which twists are seen: that of joint 1, as if it stood at 0.
 

@@ -47,16 +47,14 @@ class Learning(Frozen):
     history: int = 1
     commands: int = 0
 
-    def arm(self, scenario: str | Scenario) -> gym.Env[Any, Any]:
-        """One arm of a scenario, wrapped."""
-        env: gym.Env[Any, Any] = self._wrap(RedundantIKEnv(scenario, **self._arguments()), wrappers)
+    def arm(self, scenario: str | Scenario, **options: Any) -> gym.Env[Any, Any]:
+        """One arm of a scenario, wrapped; the options are those of :class:`ikgym.RedundantIKEnv`."""
+        env: gym.Env[Any, Any] = self._wrap(RedundantIKEnv(scenario, **self._arguments(), **options), wrappers)
         return env
 
-    def arms(self, scenario: str | Scenario, num_envs: int, autoreset_mode: str | AutoresetMode) -> Any:
-        """N arms of a scenario, wrapped."""
-        return self._wrap(
-            RedundantIKVectorEnv(num_envs, scenario, autoreset_mode=autoreset_mode, **self._arguments()), vector
-        )
+    def arms(self, scenario: str | Scenario, num_envs: int, **options: Any) -> Any:
+        """N arms of a scenario, wrapped; the options are those of :class:`ikgym.RedundantIKVectorEnv`."""
+        return self._wrap(RedundantIKVectorEnv(num_envs, scenario, **self._arguments(), **options), vector)
 
     def _arguments(self) -> dict[str, Any]:
         """Arguments of the environment."""
@@ -70,18 +68,19 @@ class Learning(Frozen):
         return env if self.history == 1 else kinds.History(env, self.history)
 
 
-def make(scenario: str | Scenario, **changes: Any) -> gym.Env[Any, Any]:
+def make(scenario: str | Scenario, *, render_mode: str | None = None, **changes: Any) -> gym.Env[Any, Any]:
     """One arm, wrapped for learning.
 
     Args:
         scenario: A scenario or its name, see `ikgym.scenarios.find`.
+        render_mode: None, `"human"` (a window) or `"rgb_array"`.
         changes: Fields of :class:`Learning` that differ from their defaults.
 
     Raises:
         UnknownNameError: There is no such scenario or field.
         InvalidInputError: A value is refused.
     """
-    return Learning().replace(**changes).arm(scenario)
+    return Learning().replace(**changes).arm(scenario, render_mode=render_mode)
 
 
 def make_vec(
@@ -89,6 +88,7 @@ def make_vec(
     num_envs: int = 1,
     *,
     autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+    render_mode: str | None = None,
     **changes: Any,
 ) -> gym.vector.VectorEnv[Any, Any, Any]:
     """N arms, wrapped for learning and stepped by one kernel; bit for bit a `SyncVectorEnv` of :func:`make`.
@@ -97,11 +97,15 @@ def make_vec(
         scenario: A scenario or its name, see `ikgym.scenarios.find`.
         num_envs: N.
         autoreset_mode: A mode of Gymnasium, or its value such as ``"SameStep"``.
+        render_mode: None or `"rgb_array"`.
         changes: Fields of :class:`Learning` that differ from their defaults.
 
     Raises:
         UnknownNameError: There is no such scenario, mode or field.
         InvalidInputError: A value is refused.
     """
-    envs: gym.vector.VectorEnv[Any, Any, Any] = Learning().replace(**changes).arms(scenario, num_envs, autoreset_mode)
+    learning = Learning().replace(**changes)
+    envs: gym.vector.VectorEnv[Any, Any, Any] = learning.arms(
+        scenario, num_envs, autoreset_mode=autoreset_mode, render_mode=render_mode
+    )
     return envs

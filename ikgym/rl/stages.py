@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,8 @@ from ikgym.exceptions import InvalidInputError
 from ikgym.rl.feature_kernels import log_rewards
 from ikgym.rl.view import FURTHEST, AgentView
 from ikgym.validation import BoolArray, FloatArray, number, shortened, whole_number
+
+Rows = npt.NDArray[np.int64]
 
 
 class Stage:
@@ -39,15 +42,15 @@ class Stage:
         """The observation of N rows after a reset; where no episode has begun, it is the one of the last step."""
         return self.observation(observation, begun)
 
-    def last_observation(self, row: int, observation: Any) -> Any:
-        """The last observation of a row whose next episode has begun in the same step.
+    def last_observations(self, rows: Rows, observations: Sequence[Any]) -> Sequence[Any]:
+        """The last observations of rows whose next episodes have begun in the same step.
 
         Args:
-            row: Which one.
-            observation: From the environment, without a row axis.
+            rows: Which ones. Shape (k,).
+            observations: From the environment, without a row axis.
         """
-        del row
-        return observation
+        del rows
+        return observations
 
     def action(self, actions: FloatArray) -> FloatArray:
         """The environment's actions. Shapes (N, n)."""
@@ -70,10 +73,11 @@ class FeatureStage(Stage):
         del begun
         return self._view.see(observation)
 
-    def last_observation(self, row: int, observation: Any) -> Any:
-        """The features of one row. Shape (f,)."""
-        del row
-        return self._view.see(one_row(observation))[0]
+    def last_observations(self, rows: Rows, observations: Sequence[Any]) -> Sequence[Any]:
+        """The features of these rows. Shapes (f,)."""
+        del rows
+        features = self._view.see({key: np.array([one[key] for one in observations]) for key in observations[0]})
+        return list(features)
 
 
 class UnitStage(Stage):
@@ -136,9 +140,10 @@ class HistoryStage(Stage):
         self._kept[begun] = observation[begun, None]
         return self._kept.reshape(len(observation), -1).copy()
 
-    def last_observation(self, row: int, observation: Any) -> Any:
-        """The last observation of an episode and those before it. Shape (length · f,)."""
-        return np.concatenate([observation, self._kept[row, :-1].ravel()])
+    def last_observations(self, rows: Rows, observations: Sequence[Any]) -> Sequence[Any]:
+        """The last observation of each episode and those before it. Shapes (length · f,)."""
+        before = self._kept[rows, :-1].reshape(len(rows), -1)
+        return list(np.concatenate([np.stack(observations), before], axis=1))
 
 
 def one_row(observation: Any) -> Any:

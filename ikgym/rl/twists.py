@@ -6,7 +6,7 @@ import math
 
 from ikgym.kernels import tasks as task_kernels
 from ikgym.kernels.axes import across
-from ikgym.kernels.jit import inlined, kernel
+from ikgym.kernels.jit import inlined, inner, kernel
 
 
 @inlined
@@ -15,13 +15,13 @@ def error_kind(kind):
     return task_kernels.POSE if kind == task_kernels.MATRIX else kind
 
 
-@inlined
+@kernel
 def twist_size(kind):
     """w, the components of a twist."""
     return 3 if kind == task_kernels.POSITION else 6
 
 
-@inlined
+@kernel
 def is_turned(kind, prismatic):
     """Whether twists are expressed in the frame of joint 1, which makes them independent of its angle.
 
@@ -63,7 +63,7 @@ def twist(kind, nominal, coordinates, error, out):
         task_kernels.error(error_kind(kind), nominal, coordinates, out)
 
 
-@kernel
+@inner
 def error_gradient(kind, nominal, gradient, out):
     """From the gradient by a twist to that by the error of the task that it is made of.
 
@@ -97,7 +97,7 @@ def turn(axis, angle, vectors):
         vectors[i + 2] = c * z + s * (ax * y - ay * x) + along * az
 
 
-@kernel
+@inner
 def turn_gradient(axis, turned, gradient):
     """The derivative of a function of ``turn(axis, -angle, …)`` by the angle.
 

@@ -30,7 +30,9 @@ class ArmsWrapper(VectorWrapper[Any, Any, Any, Any, Any]):
     def __init__(self, env: Any, *args: Any, **parameters: Any) -> None:
         super().__init__(env)
         self._stage = type(self).stage(env, *args, **parameters)
-        self._ended = np.zeros(self.num_envs, dtype=np.bool_)
+        # An attribute as well as an entry of the metadata, as Gymnasium's SyncVectorEnv has it.
+        self.autoreset_mode: AutoresetMode = self.metadata["autoreset_mode"]
+        self._ended = self._none = np.zeros(self.num_envs, dtype=np.bool_)
         if self._stage.observation_space is not None:
             self.single_observation_space = self._stage.observation_space
             self.observation_space = batch_space(self.single_observation_space, self.num_envs)
@@ -62,15 +64,14 @@ class ArmsWrapper(VectorWrapper[Any, Any, Any, Any, Any]):
         if self._stage.action_space is not None:
             actions = self._stage.action(checked_actions(actions, self.action_space))
         observation, rewards, terminated, truncated, infos = self.env.step(actions)
-        rewards, ended, mode = self._stage.reward(rewards), terminated | truncated, self.metadata["autoreset_mode"]
-        begun = np.zeros_like(ended)
-        if mode is AutoresetMode.NEXT_STEP:
+        rewards, ended, begun = self._stage.reward(rewards), terminated | truncated, self._none
+        if self.autoreset_mode is AutoresetMode.NEXT_STEP:
             begun = self._ended
             rewards[begun] = 0.0  # these rows have begun an episode, and taken no step
-        elif mode is AutoresetMode.SAME_STEP:
-            begun = ended
-            for row in np.flatnonzero(ended).tolist():
-                infos["final_obs"][row] = self._stage.last_observation(row, infos["final_obs"][row])
+        elif self.autoreset_mode is AutoresetMode.SAME_STEP and "final_obs" in infos:
+            begun, rows, final = ended, np.flatnonzero(ended), infos["final_obs"]
+            for row, last in zip(rows, self._stage.last_observations(rows, final[rows]), strict=True):
+                final[row] = last
         self._ended = ended
         return self._stage.observation(observation, begun), rewards, terminated, truncated, infos
 

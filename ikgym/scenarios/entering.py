@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from ikgym.exceptions import InvalidInputError
+from ikgym.kernels.kinematics import Chain
 from ikgym.scenarios.scenario import Scenario
-from ikgym.trajectories import Trajectory
+from ikgym.trajectories import Trajectory, joint_paths_of
 from ikgym.validation import FloatArray, float_array, one_a_row, shortened
 
 Steps = npt.NDArray[np.int64]
@@ -79,13 +80,17 @@ def checked_steps(given: Any, rows: int, scenario: Scenario) -> Steps | None:
     return np.array(checked, dtype=np.int64)
 
 
-def on_path(scenario: Scenario, episodes: Sequence[Trajectory], steps: Steps) -> tuple[FloatArray, FloatArray]:
-    """Reference joint paths after some steps, and their velocities in the last of these.
+def first_states(
+    scenario: Scenario, points: Steps, episodes: Sequence[Trajectory], steps: Steps, chains: Iterable[Chain]
+) -> tuple[FloatArray, FloatArray]:
+    """The arms' first states in episodes: at rest at the start, or on the reference joint path after some steps.
 
     Args:
         scenario: The tracking problem.
+        points: Its points, of `Scenario.points`.
         episodes: Trajectories of the k episodes.
-        steps: At least 1 each. Shape (k,).
+        steps: Steps after which they are entered, or 0. Shape (k,).
+        chains: Where the scenario jogs: the arms that move, of the episodes that are not entered.
 
     Returns:
         Joint coordinates in [rad] or [m], and joint velocities in [rad/s] or [m/s], none beyond what the arm can have
@@ -94,10 +99,15 @@ def on_path(scenario: Scenario, episodes: Sequence[Trajectory], steps: Steps) ->
     Raises:
         InvalidInputError: The arm cannot be there; the message names the joint.
     """
-    points = scenario.points()
-    at = np.stack([points[steps - 1], points[steps]], axis=1) * scenario.dt
-    paths = np.stack([one.joint_path(times) for one, times in zip(episodes, at, strict=True)])  # type: ignore[misc]
-    q: FloatArray = paths[:, 1]
-    scenario.arm.check_posture(f"Reference joint path of scenario {scenario.name!r}", q)
-    limit = scenario.largest_qdot
-    return q, np.clip((q - paths[:, 0]) / scenario.dt, -limit, limit)
+    entered, shape = steps > 0, (len(steps), scenario.joints)
+    q, qdot = np.empty(shape) if entered.all() else scenario.first_q_of(episodes), np.zeros(shape)
+    if scenario.jogs and not entered.all():
+        q[~entered] = scenario.jogged(q[~entered], chains)
+    if entered.any():
+        times = points[np.array([steps - 1, steps])].T.astype(np.float64) * scenario.dt
+        paths = joint_paths_of(episodes, times)[entered]
+        q[entered] = paths[:, 1]
+        scenario.arm.check_posture(f"Reference joint path of scenario {scenario.name!r}", paths[:, 1])
+        limit = scenario.largest_qdot
+        qdot[entered] = np.clip((paths[:, 1] - paths[:, 0]) / scenario.dt, -limit, limit)
+    return q, qdot

@@ -35,16 +35,16 @@ class NominalFrames:
 
     def __init__(self, scenario: Scenario, rows: int, ahead: tuple[int, ...], memory: int) -> None:
         self._scenario = scenario
-        self._point = scenario.points(ahead)
+        self.point = scenario.points(ahead)
         width = 12 if scenario.task.has_orientation else 3
-        points = int(self._point[-1]) + 1
+        points = int(self.point[-1]) + 1
         tables = rows if scenario.random else 1
         affordable = memory // (8 * width * rows) if scenario.random else points
         # Rows know all of their points, or two blocks of them: the next one takes the place of the one before.
         self._block = points if points <= affordable else min(points, max(affordable // 2, ahead[-1]))
         self.in_blocks = self._block < points
         self.shape = (tables, self._block * (2 if self.in_blocks else 1), width)
-        self._last_block = self._point[ahead[-1] :] // self._block
+        self._last_block = self.point[ahead[-1] :] // self._block
 
     def allocate(self) -> FloatArray:
         """The tables, of :attr:`shape`, when there is memory for them; that of a fixed scenario is filled."""
@@ -58,7 +58,7 @@ class NominalFrames:
     @property
     def slots(self) -> Integers:
         """Index of the target after k steps in a table. Shape (steps + furthest preview + 1,)."""
-        return self._point % self.shape[1]
+        return self.point % self.shape[1]
 
     def begin(self, tables: FloatArray, rows: Integers, episodes: Sequence[Trajectory], steps: Integers) -> None:
         """Begins new episodes of a random scenario.
@@ -71,7 +71,7 @@ class NominalFrames:
         """
         for row, episode in zip(rows.tolist(), episodes, strict=True):
             self._episodes[row] = episode
-        self._blocks_known[rows] = self._point[steps] // self._block
+        self._blocks_known[rows] = self.point[steps] // self._block
         self.look_ahead(tables, rows, steps)
 
     def look_ahead(self, tables: FloatArray, rows: Integers, steps: Integers) -> None:
@@ -82,7 +82,7 @@ class NominalFrames:
 
     def positions(self, row: int) -> FloatArray:
         """The nominal positions of a row's episode in [m], one a step. Shape (steps + 1, 3)."""
-        point = self._point[: self._scenario.steps + 1]
+        point = self.point[: self._scenario.steps + 1]
         episode = self._episodes[row if self._scenario.random else 0]
         positions: FloatArray = self._scenario.frames(episode, int(point[-1]) + 1)[point, -3:]
         return positions

@@ -188,7 +188,7 @@ class Scenario(Frozen, Reference):
         start: FloatArray = self.jogged(q[None], [self.drawn_plant(seed, arm_seed).arm.chain])[0]
         return start
 
-    @property
+    @functools.cached_property
     def jogs(self) -> bool:
         """Whether episodes begin at the first pose of the arm that moves, which is not that of the data sheet."""
         return self.start is None and self.plant.other_arm
@@ -252,7 +252,7 @@ class Scenario(Frozen, Reference):
         within = farthest(self.arm)
         return np.where(np.isfinite(within), within, reachable)
 
-    @property
+    @functools.cached_property
     def starts_nominally(self) -> bool:
         """Whether the trajectory determines the start: on its joint path, or at a published start."""
         return self.start is None and self.trajectory.first_joints_bound() is not None

@@ -7,9 +7,9 @@ one of them, and gives a fixed trajectory back as it is.
 from __future__ import annotations
 
 from ikgym.trajectories import paths
-from ikgym.trajectories.batch import first_joints_of, frames_of
+from ikgym.trajectories.batch import first_joints_of, frames_of, joint_paths_of
 from ikgym.trajectories.helix import Helix
-from ikgym.trajectories.joint_spline import JointSpline
+from ikgym.trajectories.joint_spline import JointSpline, JointSplines
 from ikgym.trajectories.orientations import AlongPath, FixedOrientation, OrientationThrough, Turning
 from ikgym.trajectories.path_trajectory import PathTrajectory
 from ikgym.trajectories.published_path import PublishedPath, RandomPublishedPath
@@ -27,6 +27,7 @@ __all__ = [
     "FixedOrientation",
     "Helix",
     "JointSpline",
+    "JointSplines",
     "OrientationThrough",
     "PathTrajectory",
     "PublishedPath",
@@ -44,6 +45,7 @@ __all__ = [
     "first_joints_of",
     "frames_of",
     "from_csv",
+    "joint_paths_of",
     "paths",
     "through",
 ]

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ikgym.arms import Arm
-from ikgym.trajectories.joint_spline import JointSpline, splines_at
+from ikgym.trajectories.joint_spline import JointSplines
 from ikgym.trajectories.sinusoid import Sinusoid, waves
 from ikgym.trajectories.trajectory import Trajectory, frames_along
 from ikgym.validation import FloatArray
@@ -44,16 +44,31 @@ def first_joints_of(trajectories: Sequence[Trajectory]) -> FloatArray | None:
     return None if any(row is None for row in rows) else np.stack(typing.cast(list[FloatArray], rows))
 
 
+def joint_paths_of(trajectories: Sequence[Trajectory], times: FloatArray) -> FloatArray:
+    """The joint paths of several trajectories that have one, each at times of its own.
+
+    Args:
+        trajectories: One a row.
+        times: Times in [s]. Shape (k, t).
+
+    Returns:
+        Joint coordinates in [rad] or [m], bit for bit those of :meth:`Trajectory.joint_path`. Shape (k, t, n).
+    """
+    path = _paths(trajectories, times)
+    if path is not None:
+        return path
+    rows = [trajectory.joint_path(row) for trajectory, row in zip(trajectories, times, strict=True)]
+    return np.stack(typing.cast(list[FloatArray], rows))
+
+
 def _paths(trajectories: Sequence[Trajectory], times: FloatArray) -> FloatArray | None:
     """Joint paths of shape (k, t, n), where all are of a kind that random scenarios draw by the thousands."""
+    if isinstance(trajectories, JointSplines):
+        return trajectories.joint_paths(times)
     kinds = set(map(type, trajectories))
     if kinds == {Sinusoid} and all(s.sigmoid is None for s in typing.cast(Sequence[Sinusoid], trajectories)):
         sinusoids = typing.cast(Sequence[Sinusoid], trajectories)
         motions = np.array([(s.amplitude, s.frequency, s.phase, s.offset) for s in sinusoids])
         amplitude, frequency, phase, offset = motions.swapaxes(0, 1)[:, :, None]
         return waves(times[..., None], amplitude, frequency, phase, offset, None)
-    splines = typing.cast(Sequence[JointSpline], trajectories)
-    if kinds == {JointSpline} and len({s.control.shape for s in splines}) == 1:
-        durations = np.array([[s.duration] for s in splines])
-        return splines_at(np.array([s.control for s in splines]), times, durations)
     return None

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from ikgym.exceptions import InvalidInputError
+from ikgym.kernels.splines import spline_rows
 from ikgym.trajectories.trajectory import Trajectory
 from ikgym.validation import LARGEST, SMALLEST, FloatArray, frozen_array, number
 
@@ -45,7 +48,7 @@ class JointSpline(Trajectory):
 
     def joint_path(self, times: FloatArray) -> FloatArray:
         """See :meth:`Trajectory.joint_path`."""
-        path: FloatArray = splines_at(self.control[None], times[None], self.duration)[0]
+        path: FloatArray = _splines_at(self.control[None], times[None], self.duration)[0]
         return path
 
     def joint_bound(self) -> FloatArray:
@@ -54,23 +57,31 @@ class JointSpline(Trajectory):
         return bound
 
 
-def splines_at(control: FloatArray, times: FloatArray, duration: FloatArray | float) -> FloatArray:
-    """Uniform cubic B-splines, constant beyond their ends.
+class JointSplines(Sequence[JointSpline]):
+    """The motions of several episodes, which begin by the thousands: each is an object only where one is asked for.
 
     Args:
-        control: Shape (k, c, n).
-        times: In [s]. Shape (k, t).
-        duration: In [s]. A number, or shape (k, 1).
-
-    Returns:
-        Joint coordinates. Shape (k, t, n).
+        control: Control points in [rad] or [m], as those of :class:`JointSpline`. Shape (k, c, n).
+        duration: T in [s].
     """
-    spans = control.shape[1] - 3
-    at = np.clip(times / duration, 0.0, 1.0) * spans
-    i = np.minimum(at.astype(np.int64), spans - 1)
-    u = (at - i)[..., None]
-    rest, row = 1.0 - u, np.arange(len(control))[:, None]
-    c0, c1, c2, c3 = (control[row, i + k] for k in range(4))
-    inner = (4.0 + u * u * (3.0 * u - 6.0)) * c1 + (4.0 + rest * rest * (3.0 * rest - 6.0)) * c2
-    out: FloatArray = (rest * rest * rest * c0 + inner + u * u * u * c3) / 6.0
+
+    def __init__(self, control: FloatArray, duration: float) -> None:
+        self.control, self.duration = control, duration
+
+    def __len__(self) -> int:
+        return len(self.control)
+
+    def __getitem__(self, row: Any) -> Any:
+        return JointSpline(self.control[row], self.duration)
+
+    def joint_paths(self, times: FloatArray) -> FloatArray:
+        """The joint path of each motion at times of its own, of shape (k, t): see :meth:`Trajectory.joint_path`."""
+        return _splines_at(self.control, times, self.duration)
+
+
+def _splines_at(control: FloatArray, times: FloatArray, duration: float) -> FloatArray:
+    """Joint coordinates of k splines. Shapes (k, c, n), (k, t) and (k, t, n)."""
+    out = np.empty((*times.shape, control.shape[2]))
+    # Copied, since kernels would compile anew for arrays that are read-only.
+    spline_rows(np.array(control, order="C"), np.array(times, order="C"), duration, out)
     return out

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import typing
 from collections.abc import Sequence
 from typing import Self
@@ -12,12 +13,13 @@ import numpy.typing as npt
 
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
-from ikgym.trajectories.joint_spline import JointSpline
+from ikgym.kernels.splines import control_rows
+from ikgym.trajectories.joint_spline import JointSpline, JointSplines
 from ikgym.trajectories.trajectory import Trajectory
 from ikgym.validation import LARGEST, SMALLEST, FloatArray, frozen_array, number, per_joint, whole_number
 
-# Moves of less than this share of the largest count as none, so that nothing is divided by 0.
-TINY = 1e-12
+# Most spans: each draw needs memory for all of them.
+MOST_SPANS = 10_000
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -35,7 +37,7 @@ class RandomJointSpline(Trajectory):
         velocity_limit: Largest speeds in [rad/s] or [m/s]. A number, or shape (n,).
         acceleration_limit: Largest accelerations in [rad/s²] or [m/s²]. A number, or shape (n,).
         duration: From rest to rest, in [s].
-        spans: Pieces of the spline; more of them make a livelier and a slower motion.
+        spans: Pieces of the spline; more of them make a livelier and a slower motion. From 3 to 10 000.
         margin: The share of every limit that is not used, of positions at either end of half of the range.
         scale: Each joint moves by the share U(scale) of the motion that its limits allow.
 
@@ -71,7 +73,7 @@ class RandomJointSpline(Trajectory):
             velocity_limit=_positive("velocity_limit", self.velocity_limit, n),
             acceleration_limit=_positive("acceleration_limit", self.acceleration_limit, n),
             duration=number("duration", self.duration, at_least=SMALLEST, at_most=LARGEST),
-            spans=whole_number("spans", self.spans, at_least=3),
+            spans=whole_number("spans", self.spans, at_least=3, at_most=MOST_SPANS),
             margin=number("margin", self.margin, at_least=0.0, at_most=0.99),
             scale=(low, high),
         )
@@ -101,14 +103,17 @@ class RandomJointSpline(Trajectory):
 
     def sample(self, rng: np.random.Generator) -> JointSpline:
         """See :meth:`Trajectory.sample`. Draws starts, then scales, then moves, joint by joint each."""
-        return self.samples([rng])[0]
+        motion: JointSpline = self.samples([rng])[0]
+        return motion
 
-    def samples(self, generators: Sequence[np.random.Generator]) -> list[JointSpline]:
+    def samples(self, generators: Sequence[np.random.Generator]) -> JointSplines:
         """See :meth:`Trajectory.samples`; all of them are computed at once."""
         n = len(self.lower)
-        drawn = np.array([rng.random((self.spans, n)) for rng in generators])
-        controls = self._controls(drawn[:, 0], drawn[:, 1], 2.0 * drawn[:, 2:] - 1.0)
-        return [JointSpline(control, self.duration) for control in controls]
+        drawn, control = np.empty((len(generators), self.spans, n)), np.empty((len(generators), self.spans + 3, n))
+        for numbers, rng in zip(drawn, generators, strict=True):
+            rng.random(out=numbers)
+        control_rows(drawn, *self._bounds, *self.scale, control)
+        return JointSplines(control, self.duration)
 
     def joint_bound(self) -> FloatArray:
         """See :meth:`Trajectory.joint_bound`; true for all that may be drawn."""
@@ -130,38 +135,13 @@ class RandomJointSpline(Trajectory):
                     f"{getattr(model, name)[i]:g}, so that each draw is feasible, got {getattr(self, name)[i]:g}."
                 )
 
-    def _controls(self, start: FloatArray, share: FloatArray, moves: FloatArray) -> FloatArray:
-        """Control points from numbers that are uniform in (0, 1), or (-1, 1) for the moves.
-
-        Args:
-            start: Shape (k, n).
-            share: Shape (k, n).
-            moves: Shape (k, spans - 2, n).
-
-        Returns:
-            Shape (k, spans + 3, n).
-        """
+    @functools.cached_property
+    def _bounds(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Bounds of control points, of their differences and of their second differences. Shapes (n,)."""
         step, usable = self.duration / self.spans, 1.0 - self.margin
         room = 0.5 * self.margin * (self.upper - self.lower)
-        lower, upper = self.lower + room, self.upper - room
-        first = lower + start * (upper - lower)
-        # The first two moves and the last two are none: rest, with no acceleration, at both ends.
-        steps = np.pad(moves, ((0, 0), (2, 2), (0, 0)))
-        away = np.cumsum(np.pad(steps, ((0, 0), (1, 0), (0, 0))), axis=1)
         fastest, hardest = usable * step * self.velocity_limit, usable * step**2 * self.acceleration_limit
-        largest = np.minimum.reduce(
-            [
-                (upper - first) / np.maximum(away.max(axis=1), TINY),
-                (first - lower) / np.maximum(-away.min(axis=1), TINY),
-                fastest / np.maximum(np.abs(steps).max(axis=1), TINY),
-                hardest / np.maximum(np.abs(np.diff(steps, axis=1)).max(axis=1), TINY),
-            ]
-        )
-        low, high = self.scale
-        size = (low + share * (high - low)) * largest
-        control = first[:, None] + size[:, None] * away
-        out: FloatArray = np.clip(control, lower, upper)  # rounding
-        return out
+        return self.lower + room, self.upper - room, fastest, hardest
 
 
 def _positive(name: str, value: npt.ArrayLike, n: int) -> FloatArray:

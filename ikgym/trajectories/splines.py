@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
-from ikgym.kernels.splines import solve_tridiagonal
+from ikgym.kernels.cubic_splines import solve_tridiagonal
 from ikgym.validation import FloatArray
 
 # Gauss-Legendre rule for the length of a piece of a curve.

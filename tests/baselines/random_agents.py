@@ -9,6 +9,7 @@ import numpy as np
 
 from baselines.agents.files import agent_of, save_agent
 from baselines.agents.network import Network
+from baselines.agents.processing import Held
 from baselines.agents.relative import Relative
 from baselines.policy import Problem
 
@@ -31,6 +32,11 @@ def random_agent(scenario, *, zero=False, hidden=(16, 9), seed=0, training=None,
     processing, problem = processing or Relative(OFFSETS, furthest=5.0, largest=2.0), Problem.of(scenario)
     sizes = (processing.size(problem), *hidden, processing.outputs(problem))
     return agent_of(network(sizes, zero=zero, seed=seed), processing, scenario, training)
+
+
+def nothing_held(processing, problem, rows):
+    """What is held before the first evaluation of a network."""
+    return Held(np.zeros((rows, processing.held(problem))), np.zeros(rows, dtype=np.int64))
 
 
 def write_agent(file, scenario, **options):

@@ -143,6 +143,7 @@ def untimed(row):
         ("nowhere", "RAY_ADDRESS: expected HOST:PORT or auto, got 'nowhere'"),
         ("ray://127.0.0.1:1", "expected HOST:PORT or auto, got 'ray://127.0.0.1:1'"),
         ("127.0.0.1:99999", "No cluster of Ray can be reached at RAY_ADDRESS=127.0.0.1:99999"),
+        (64 * "a" + ":1", "No cluster of Ray can be reached at RAY_ADDRESS=aaa"),
         ("closed", r"No cluster of Ray can be reached at .* \(Connection refused\)"),
     ],
 )

@@ -104,7 +104,7 @@ def test_a_registered_class_is_a_policy_like_others():
     assert baselines.get("still") is Still
     assert isinstance(baselines.make("still", "zhang3-helix"), Still)
     rows = evaluate("zhang3-helix", ["still"], steps=3)
-    assert [(row.policy, row.status) for row in rows] == [("still", "applied")]
+    assert [(row.policy, row.solver_status) for row in rows] == [("still", "applied")]
     assert "still" in {job.policy for job in planned("zhang3-helix", "all", steps=2).jobs}
 
 

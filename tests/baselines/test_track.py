@@ -25,7 +25,7 @@ def test_it_is_the_episode_of_the_evaluation_and_of_gymnasium():
     (row,) = evaluate("varga7-random", "rhc_gradient", steps=STEPS)
     assert (track.scenario, track.policy, track.seed) == ("varga7-random", "rhc_gradient", 2_000_000)
     assert track.parameters == row.parameters
-    assert (track.total_cost, track.status.label) == (row.total_cost, row.status)
+    assert (track.total_cost, track.solver_status.label) == (row.total_cost, row.solver_status)
     assert track.position_error.max() == row.position_error_max
 
     scenario = ikgym.scenarios.get("varga7-random").replace(steps=STEPS)
@@ -51,7 +51,7 @@ def test_shapes_and_arrays_that_stay_as_they_are():
     for name in ("times", "position_error", "tracking_cost", "velocity_cost", "statuses"):
         assert getattr(track, name).shape == (STEPS,)
     assert np.isnan(track.orientation_error).all()
-    assert track.status is Status(track.statuses.max())
+    assert track.solver_status is Status(track.statuses.max())
     with pytest.raises(ValueError, match="read-only"):
         track.q[0] = 1.0
     with pytest.raises(AttributeError):
@@ -73,7 +73,7 @@ def test_csv_has_units_and_every_digit(tmp_path, scenario):
         *(f"qdot{j} [{unit}/s]" for j, unit in enumerate(units, 1)),
     ]
     assert names[-5:] == [
-        "position_error [m]", "orientation_error [rad]", "tracking_cost [1]", "velocity_cost [1]", "status",
+        "position_error [m]", "orientation_error [rad]", "tracking_cost [1]", "velocity_cost [1]", "solver_status",
     ]  # fmt: skip
     size = track.pose.shape[1]
     assert [name for name in names if name.startswith("pose")] == [
@@ -81,7 +81,7 @@ def test_csv_has_units_and_every_digit(tmp_path, scenario):
     ]
     np.testing.assert_array_equal([float(row["q1 [rad]"]) for row in rows], track.q[:, 0])
     np.testing.assert_array_equal([float(row[f"nominal{size} [m]"]) for row in rows], track.nominal[:, -1])
-    assert rows[0]["status"] == Status(int(track.statuses[0])).label
+    assert rows[0]["solver_status"] == Status(int(track.statuses[0])).label
     empty = {row["orientation_error [rad]"] == "" for row in rows}
     assert empty == {not ikgym.scenarios.get(scenario).task.has_orientation}
     with pytest.raises(ResultsError, match="Cannot write"):
@@ -103,7 +103,7 @@ def test_whatever_can_be_evaluated_can_be_tracked():
             return np.zeros(3, dtype=np.float32), None
 
     track = baselines.track("zhang3-helix", Still(), steps=STEPS)
-    assert (track.policy, track.parameters, track.status) == ("Still", {}, Status.UNKNOWN)
+    assert (track.policy, track.parameters, track.solver_status) == ("Still", {}, Status.UNKNOWN)
     assert not track.qdot.any()
     scenario = ikgym.scenarios.get("zhang3-helix")
     assert baselines.track(scenario, baselines.make("dls", scenario), steps=3).policy == "dls"

@@ -94,9 +94,12 @@ def test_only_the_same_search_is_resumed(tmp_path):
         run(tmp_path, 1)
     with pytest.raises(ResultsError, match=r"another search of dls: seed \(0 there, 1 here\)"):
         run(tmp_path, 1, resume=True, seed=1)
-    (tmp_path / JOURNAL).write_text("{}\n[]\n")
-    with pytest.raises(ResultsError, match="is damaged"):
-        run(tmp_path, 1, resume=True)
+    lines = (tmp_path / JOURNAL).read_text().splitlines(keepends=True)
+    lost = [line for line in lines if '"settings"' not in line]
+    for damaged in (["{}\n[]\n"], [*lines, "3\n"], [*lines, "null\n"], [*lines, '{"op_code": 99}\n'], lost):
+        (tmp_path / JOURNAL).write_text("".join(damaged))
+        with pytest.raises(ResultsError, match="is damaged"):
+            run(tmp_path, 1, resume=True)
     assert run(tmp_path, 1, overwrite=True)[0]["tried"] == 2
 
 
@@ -170,6 +173,13 @@ def test_invalid_ranges(tmp_path, text, error, message):
         tuning.searches(SHORT, [text[1:].partition("]")[0]], file)
 
 
+def test_ranges_of_solvers_that_are_not_searched(tmp_path):
+    (tmp_path / "ranges.toml").write_text("[mfac]\ndamping = { low = 0.1, high = 1.0 }")
+    with pytest.raises(InvalidInputError, match="expected ranges of a solver that is searched, dls"):
+        tuning.searches(SHORT, ["dls"], tmp_path / "ranges.toml")
+    tuning.searches(SHORT, ["dls", "mfac"], tmp_path / "ranges.toml")
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
@@ -178,8 +188,10 @@ def test_invalid_ranges(tmp_path, text, error, message):
         ({"--policies": "dlss"}, "There is no policy 'dlss'. Did you mean 'dls'?"),
         ({"--policies": "rhc_foresight"}, "There are no ranges for the parameters of 'rhc_foresight'"),
         ({"--seed": "-1"}, "seed: expected a whole number of at least 0, got -1."),
-        ({"--workers": "9" * 24}, "workers: expected a whole number from 1 to 1000, got 9"),
+        ({"--workers": "1000000000000"}, "workers: expected a whole number from 1 to 1000, got 1000000000000"),
         ({"--ranges": "nowhere.toml"}, "Cannot read nowhere.toml"),
+        ({"--ranges": str(RANGES), "--policies": "rhc:horizon=7"}, "There are no ranges"),
+        ({"--trials": "0"}, "trials: expected a whole number of at least 1, got 0."),
     ],
 )
 def test_the_command_reports_mistakes_before_anything_is_written(changes, message, tmp_path, monkeypatch, capsys):

@@ -19,7 +19,7 @@ from tests.baselines.losing import LosingCluster
 
 FAR = Workers(cluster="ray")
 EVALUATE = (
-    *("evaluate", "--scenarios", "varga7-random", "--episodes", "400", "--no-plots", "--workers", "2"),
+    *("evaluate", "--scenarios", "varga7-random", "--episodes", "400", "--workers", "2"),
     *("--policies", "rhc:horizon=100,starts=1"),
 )
 # Segments enough that nobody is done before it is stopped.

@@ -10,7 +10,7 @@ import pytest
 import baselines
 import ikgym
 from baselines.policy import Problem
-from benchmarks import environments, horizon_solvers, horizons, measuring, policies, poses
+from benchmarks import environments, horizon_solvers, horizons, measuring, policies, poses, resets
 from benchmarks.rivals.numpy_horizon import Horizon, plan_cost
 
 
@@ -38,6 +38,12 @@ def test_environments_step():
         assert all(isinstance(why, str) for why in skipped)
         for call in calls.values():
             call()
+
+
+def test_random_actions_lose_the_track_where_they_may():
+    (table,) = resets.tables(measuring.QUICK)
+    assert list(table.rows) == ["N = 3"]
+    assert all(value > 0.0 for value in table.rows["N = 3"])
 
 
 def test_both_kinematics_are_of_the_same_arm():

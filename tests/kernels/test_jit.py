@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 from ikgym.kernels import compilation, jit
-from ikgym.kernels.jit import kernel, uncounted
+from ikgym.kernels.jit import inner, kernel, uncounted
 
 CALLEE = "from {jit}\nSCALE = {scale}\n@kernel\ndef scaled(x):\n    return SCALE * x\n"
 CALLER = (
@@ -148,6 +148,27 @@ def test_a_kernel_is_compiled_once_for_all_constants(no_folder):
 
     assert sums(2.0) == 12.0
     assert len(power.signatures) == 1
+
+
+def test_python_calls_an_inner_kernel_through_another_kernel(no_folder):
+    @inner
+    def scaled(x, factor):
+        return x * factor
+
+    assert (scaled(np.ones(3), 2.0) == 2.0).all()
+    assert scaled(1.0, 3.0) == 3.0
+    assert not any(scaled.inspect_llvm(kinds).count("@_ZN7cpython") for kinds in scaled.signatures)
+
+
+@pytest.mark.parametrize("policy", ["dls", "qp", "mfac", "rhc_foresight", "calibrated", "agent_alone"])
+def test_no_policy_calls_an_inner_kernel_from_python(policy):
+    """It would be compiled in each process."""
+    code = (
+        "import baselines, ikgym.kernels.jit as jit\n"
+        f"baselines.track('varga7-fast', {policy!r}, steps=2)\n"
+        "print(jit._entry.cache_info().currsize)"
+    )
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "0\n"
 
 
 def test_an_uncounted_kernel_returns_no_array(no_folder):

@@ -50,6 +50,7 @@ def test_native_is_sync_of_singles_bit_for_bit(name, distance, mode):
     scenario, changes = short(name), {"lost_distance": distance, "history": 2, "commands": 2}
     native = rl.make_vec(scenario, N, autoreset_mode=mode, **changes)
     sync = SyncVectorEnv([lambda: rl.make(scenario, **changes)] * N, autoreset_mode=mode)
+    assert native.autoreset_mode is sync.autoreset_mode is mode  # TorchRL asks the wrapper itself
     assert native.single_observation_space == sync.single_observation_space
     assert native.single_action_space == sync.single_action_space
     actions = np.random.default_rng(0).uniform(-5.0, 5.0, (50, N, 7)).astype(np.float32)

@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.solvers.linear_algebra import damped_gram, ldl, ldl_scaled_inverse
-from ikgym.kernels.jit import expanded, inlined, kernel
+from ikgym.kernels.jit import expanded, inlined, inner, kernel
 from ikgym.rl.feature_kernels import seen_jacobian
 from ikgym.rl.twists import is_turned, twist_size
 
@@ -112,7 +112,7 @@ def held_gradient_rows(kind, chain, damping, q, output, by_held, by_output, by_q
             by_q[row, 0] = 0.0
 
 
-@kernel
+@inner
 def invert(kind, chain, damping, q, given, found):
     """Fills an :class:`Inverse`; an output that is NaN leads to NaN.
 
@@ -160,7 +160,7 @@ def tool_motion(jacobian, given, moved):
             moved[a] += jacobian[a, j] * given[j * (w + 1) + w]
 
 
-@kernel
+@inner
 def through_null_motion(found, given, moved, by_moved, by):
     """From the gradient with respect to G' and h' = h - G' (J h) to those with respect to G', h and J h.
 
@@ -191,7 +191,7 @@ def from_logarithm(number):
     return math.exp(min(max(number, -LARGEST), LARGEST))
 
 
-@kernel
+@inner
 def through_inverse(found, damping, by, by_logarithms, by_jacobian):
     """From the gradient B with respect to G' to those with respect to λ, U and J.
 
@@ -228,7 +228,7 @@ def through_inverse(found, damping, by, by_logarithms, by_jacobian):
         by_logarithms[1 + j] = metric[j] * by_metric
 
 
-@kernel
+@inner
 def jacobian_gradient(jacobian, by, out):
     """From the gradient with respect to the geometric Jacobian to that with respect to the joint coordinates.
 

@@ -7,7 +7,7 @@ import numpy as np
 from baselines.agents.bilinear.damped_kernels import held_rows
 from baselines.agents.bilinear.rates import metric_rows, rate_rows
 from baselines.agents.network import forward_rows
-from ikgym.kernels.jit import inlined, kernel
+from ikgym.kernels.jit import inlined, inner, kernel
 from ikgym.rl.feature_kernels import context_rows, mean_twists
 from ikgym.rl.twists import is_turned, turn, turn_gradient, twist, twist_size
 
@@ -72,7 +72,7 @@ def seen_twist(kind, turned, axis, angle, pose, nominal, error, due):
         turn(axis, -angle, due)
 
 
-@kernel
+@inner
 def action_rows(scene, velocity_limit, q, pose, nominal, output, out):
     """Actions from (G, h), row by row: q̇ = G v + h s.
 
@@ -100,8 +100,8 @@ def action_rows(scene, velocity_limit, q, pose, nominal, output, out):
 
 
 @kernel
-def law_rows(scene, damping, velocity_limit, network, batch, out):
-    """Features, network and actions, row by row.
+def law_rows(scene, damping, velocity_limit, network, batch, interval, held, left, out):
+    """Features and network where they are due, and actions, row by row.
 
     Args:
         scene: Kind of task coordinates, the arm, Δt in [s], and the offsets.
@@ -109,19 +109,26 @@ def law_rows(scene, damping, velocity_limit, network, batch, out):
         velocity_limit: Shape (n,).
         network: The first five arguments of :func:`baselines.agents.network.forward_rows`.
         batch: q, q̇, pose, reference at the offsets and steps left. Shape (B, …).
+        interval: Steps from one evaluation of the network to the next.
+        held: (G, h) of the last evaluation, replaced where one is due. Shape (B, n (w + 1)).
+        left: Steps until the next evaluation, counted down. Shape (B,).
         out: Receives fractions of the velocity limit. Shape (B, n).
     """
     kind, chain, dt, offsets = scene
     q, _, pose, nominal, remaining = batch
     weights, biases, sizes, activation, squash = network
-    features, speed = np.empty((q.shape[0], sizes[0]), np.float32), np.empty(q.shape[0])
-    seen_rows(kind, chain, dt, offsets, damping > 0.0, q, nominal, remaining, features, speed)
-    output = np.empty((q.shape[0], sizes[sizes.shape[0] - 1]), np.float32)
-    forward_rows(weights, biases, sizes, activation, squash, features, output)
-    if damping > 0.0:
-        held = np.empty((q.shape[0], q.shape[1] * (twist_size(kind) + 1)))
-        metric_rows(kind, chain.prismatic, offsets.shape[0] - 1, features, output)
-        held_rows(kind, chain, damping, q, output, held)
-        action_rows(scene, velocity_limit, q, pose, nominal, held, out)
-    else:
-        action_rows(scene, velocity_limit, q, pose, nominal, output, out)
+    features, speed = np.empty((1, sizes[0]), np.float32), np.empty(1)
+    output = np.empty((1, sizes[sizes.shape[0] - 1]), np.float32)
+    for row in range(q.shape[0]):
+        if left[row] == 0:
+            left[row] = interval
+            own = slice(row, row + 1)
+            seen_rows(kind, chain, dt, offsets, damping > 0.0, q[own], nominal[own], remaining[own], features, speed)
+            forward_rows(weights, biases, sizes, activation, squash, features, output)
+            if damping > 0.0:
+                metric_rows(kind, chain.prismatic, offsets.shape[0] - 1, features, output)
+                held_rows(kind, chain, damping, q[own], output, held[own])
+            else:
+                held[row] = output[0]
+        left[row] -= 1
+    action_rows(scene, velocity_limit, q, pose, nominal, held, out)

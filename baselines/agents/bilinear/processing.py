@@ -11,13 +11,13 @@ import numpy.typing as npt
 
 from baselines.agents.bilinear.kernels import law_rows
 from baselines.agents.network import Network
-from baselines.agents.processing import Processing, check_offsets
+from baselines.agents.processing import Held, Processing, check_offsets
 from baselines.policy import Batch, Problem
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels import tasks as task_kernels
 from ikgym.kernels.outcome import OBSERVED
 from ikgym.rl.twists import shown_joints, twist_size
-from ikgym.validation import FloatArray, number
+from ikgym.validation import FloatArray, number, whole_number
 
 
 @dataclasses.dataclass(frozen=True)
@@ -54,13 +54,16 @@ class Bilinear(Processing):
     Args:
         offsets: o, steps ahead at which the reference is seen, rising from 1, at least two.
         damping: λ at a network output of 0, above 0; None for G and h alone.
+        interval: Steps for which (G, h) were held in the training, and are held where a policy says nothing else.
 
     Raises:
-        InvalidInputError: Offsets do not rise from 1, or the damping is not above 0.
+        InvalidInputError: Offsets do not rise from 1, the damping is not above 0, or the interval is no whole number
+            from 1.
     """
 
     offsets: tuple[int, ...] = (1, 10, 40, 80, 130, 200, 300, 450, 650, 900)
     damping: float | None = None
+    interval: int = 8
 
     #: The offsets as kernels take them.
     _ahead: npt.NDArray[np.int64] = dataclasses.field(init=False, repr=False, compare=False)
@@ -73,7 +76,8 @@ class Bilinear(Processing):
         if offsets[0] != 1:
             raise InvalidInputError(f"offsets: expected steps ahead that rise from 1, got {self.offsets}.")
         damping = None if self.damping is None else number("damping", self.damping, above=0.0)
-        for field, value in {"offsets": offsets, "damping": damping, "_ahead": ahead}.items():
+        interval = whole_number("interval", self.interval, at_least=1)
+        for field, value in {"offsets": offsets, "damping": damping, "interval": interval, "_ahead": ahead}.items():
             object.__setattr__(self, field, value)
 
     def to_json(self) -> dict[str, Any]:
@@ -114,10 +118,26 @@ class Bilinear(Processing):
             )
         return n * (int(twist_size(kind)) + 1) + (0 if self.damping is None else 1 + n)
 
-    def act(self, problem: Problem, batch: Batch, network: Network) -> FloatArray:
-        """Actions as fractions of the velocity limit, possibly beyond the box. Shape (B, n)."""
+    def held(self, problem: Problem) -> int:
+        """The number of values that are held between evaluations of the network: those of G and h."""
+        return problem.model.joints * (int(twist_size(problem.task.kind)) + 1)
+
+    def act(self, problem: Problem, batch: Batch, network: Network, interval: int, held: Held) -> FloatArray:
+        """Actions as fractions of the velocity limit, possibly beyond the box.
+
+        Args:
+            problem: The problem as the agent sees it.
+            batch: The observations.
+            network: The network.
+            interval: Steps from one evaluation of the network to the next.
+            held: G and h of the last evaluation; changed in place.
+
+        Returns:
+            Shape (B, n).
+        """
         out = np.empty(batch.q.shape)
         scene = problem.task.kind, problem.model.chain, problem.dt, self._ahead
         damping = 0.0 if self.damping is None else self.damping
-        law_rows(scene, damping, problem.velocity_limit, network.constants, tuple(batch[: len(OBSERVED)]), out)
+        observed = tuple(batch[: len(OBSERVED)])
+        law_rows(scene, damping, problem.velocity_limit, network.constants, observed, interval, *held, out)
         return out

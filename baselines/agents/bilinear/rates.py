@@ -20,7 +20,7 @@ import numpy as np
 
 from baselines.solvers.linear_algebra import damped_step
 from ikgym.kernels import tasks as task_kernels
-from ikgym.kernels.jit import kernel
+from ikgym.kernels.jit import inner
 from ikgym.kernels.kinematics import forward_and_jacobian
 from ikgym.kernels.limits import within
 from ikgym.rl.feature_kernels import CONTEXT
@@ -36,7 +36,7 @@ EXPONENT, AT_REST = 0.3, 0.1
 LITTLE = 1e-6
 
 
-@kernel
+@inner
 def rate_rows(kind, chain, dt, offsets, q, nominal, speed, features):
     """Appends the joint rates between the offsets to features, in units of the speed of the reference ahead.
 
@@ -70,7 +70,7 @@ def rate_rows(kind, chain, dt, offsets, q, nominal, speed, features):
                     features[row, first + (i - 1) * n + j] = CONTEXT * step[j] / unit
 
 
-@kernel
+@inner
 def metric_rows(kind, prismatic, twists, features, output):
     """Adds the logarithm of the metric to the last outputs of a network, row by row.
 

@@ -11,7 +11,7 @@ from baselines.solvers.adaptive.calibrated import absorb
 from baselines.solvers.adaptive.chain_parameters import changed_chain, parameter_twists
 from baselines.solvers.adaptive.deviation import deviation_between
 from ikgym.kernels import tasks as task_kernels
-from ikgym.kernels.jit import kernel
+from ikgym.kernels.jit import inner, kernel
 from ikgym.kernels.kinematics import forward
 
 #: Number of features: the six components of the innovation; its components of position and orientation along the
@@ -141,7 +141,7 @@ def filter_rows(chain, network, rule, observed, first, known, deviation, old):
             write_deviation(chain, parameters, q[row], parts, deviation[row])
 
 
-@kernel
+@inner
 def tune(network, measured, steps, covariance, hidden, variances):
     """The variances of a measurement, from the network.
 
@@ -173,7 +173,7 @@ def tune(network, measured, steps, covariance, hidden, variances):
         covariance[i, i] += change
 
 
-@kernel
+@inner
 def write_deviation(chain, parameters, q, parts, out):
     """The deviation of an arm with some parameters. Shapes: (p,), (n,), those of :func:`changed_chain`, (6,)."""
     rotation, position, model_rotation, model_position = np.empty((3, 3)), np.empty(3), np.empty((3, 3)), np.empty(3)

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from baselines.agents.network import Singles, check_tensors, multiply_add
 from ikgym.exceptions import InvalidInputError
-from ikgym.kernels.jit import inlined, kernel
+from ikgym.kernels.jit import inlined, inner
 from ikgym.validation import Frozen
 
 #: The parts of a layer: from its inputs and from its own state to reset gate, update gate and candidate.
@@ -88,7 +88,7 @@ def _sigmoid(x):
     return _ONE / (_ONE + np.float32(math.exp(-x)))
 
 
-@kernel
+@inner
 def step_network(packed, sizes, x, hidden, out):
     """One step: h ← (1 - z) n + z h with the gates r, z = σ(W x + U h + b) and n = tanh(W x + b + r (U h + b)).
 

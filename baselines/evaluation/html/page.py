@@ -38,14 +38,15 @@ COLUMNS = (
     *(
         Column(f"at {limit}", "", functools.partial(Summary.total, column=f"steps_at_{kind}_limit"), about=about)
         for limit, kind, about in (
-            ("stop", "joint", "steps in which a stop held a joint back"),
-            ("q̇ limit", "velocity", "steps in which a velocity limit held a joint back"),
-            ("q̈ limit", "acceleration", "steps in which an acceleration limit held a joint back"),
+            ("stop", "joint", "steps with a joint at a stop"),
+            ("q̇ limit", "velocity", "steps with a joint at its velocity limit"),
+            ("q̈ limit", "acceleration", "steps with a joint at its acceleration limit"),
         )
     ),
     *report.TIMES,
     report.EPISODES,
     report.LOST,
+    report.FOLLOWED,
     report.STATUS,
 )
 

@@ -10,12 +10,11 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.evaluation.export import FRAMES, TrajectoryLog, frame_rows
+from baselines.evaluation.limits import BOUNDS, at_limits
 from ikgym.validation import FloatArray
 
 #: Bytes that the series of a page may take together, as far as each of them has :data:`FEWEST` rows.
 BUDGET, FEWEST = 5_000_000, 50
-#: Tolerance of limits: in [rad] or [m] for a stop, relative for other limits.
-AT_LIMIT = 1e-6
 #: Limits of a joint, from the least to the most severe; the page has a colour for each number.
 FREE, ACCELERATION, VELOCITY, STOP = range(4)
 
@@ -49,18 +48,16 @@ def thinned(log: TrajectoryLog, size: int) -> dict[str, Any]:
     if "joint_points" in log:
         arrays["points"], out["joint_ends"] = _links(log, picked)
         arrays["rotation"] = log["tool_rotation"][picked].reshape(-1, 9)
-    bounds = ("lower", "upper", "velocity_limit", "acceleration_limit")
-    out |= {name: _listed(log[name]) for name in bounds if name in log}
+    out |= {name: _listed(log[name]) for name in BOUNDS if name in log}
     return out | {"arrays": {name: encoded(values) for name, values in arrays.items()}}
 
 
 def limits(log: TrajectoryLog) -> npt.NDArray[np.uint8]:
-    """Which limit each joint is at: :data:`FREE`, :data:`ACCELERATION`, :data:`VELOCITY` or :data:`STOP`; (k, n)."""
+    """Which limit each joint is at: ``FREE``, ``ACCELERATION``, ``VELOCITY`` or ``STOP``; (k, n)."""
     out = np.full(log["q"].shape, FREE, dtype=np.uint8)
-    if "qddot" in log:
-        out[np.abs(log["qddot"]) >= (1.0 - AT_LIMIT) * log["acceleration_limit"]] = ACCELERATION
-    out[np.abs(log["qdot"]) >= (1.0 - AT_LIMIT) * log["velocity_limit"]] = VELOCITY
-    out[(log["q"] <= log["lower"] + AT_LIMIT) | (log["q"] >= log["upper"] - AT_LIMIT)] = STOP
+    at = at_limits(log)
+    for joints, limit in ((at.acceleration, ACCELERATION), (at.velocity, VELOCITY), (at.stop, STOP)):
+        out[joints] = limit
     return out
 
 

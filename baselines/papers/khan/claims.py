@@ -1,21 +1,15 @@
 """Khan and Tar 2020: the tests of the claims in ``claims.toml``, each function named after its claim.
 
-One short function a claim: 35 of them in one file, so that each is found by the name of its claim.
+Those of sections 2 and 5 are in modules of their own.
 """
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
-from baselines.papers.comparisons import SAME, YANK, differ, extent, larger, rms
-from baselines.papers.faitli.episodes import STRETCHED, TRAJECTORIES, short, singular_places
+from baselines.papers.comparisons import SAME, differ, extent, larger
 from baselines.papers.khan.episodes import (
     BLOCKED,
-    CLOSED_LOOPS,
-    DEVIATIONS,
-    LAMBDAS,
     LOOSE,
     METHOD,
     PATHS,
@@ -26,17 +20,13 @@ from baselines.papers.khan.episodes import (
     at_points,
     errors,
     errors_of_variants,
-    manufactured_arms,
     no_worse,
     sound,
     spectra,
-    three_seconds,
     turned,
 )
-from baselines.papers.khan.section_2 import PLANAR, SIGNS, best, distortions, one_sign, planar_signs, turning
-from baselines.papers.paper import Figures, Finding, scaled
+from baselines.papers.paper import Figures, Finding
 from baselines.papers.runs import Runs
-from ikgym import Plant
 from ikgym.validation import FloatArray
 
 
@@ -236,157 +226,8 @@ def j_prev_a(runs: Runs) -> Finding:
     return Finding(no_worse(runs, held, {}), errors_of_variants(runs, held, {}))
 
 
-def _compensates(runs: Runs, error: str, unit: str) -> Finding:
-    """Errors beside those of the exact arm that is driven by the model's joint coordinates."""
-    holds: dict[str, bool] = {}
-    figures: dict[str, list[float]] = {}
-    for name, path in PATHS.items():
-        scenario = runs.scenario(path)
-        longer = scenario.replace(iterations_per_point=(60,) * 10 + (50,), steps=600 + 5 * max(scenario.steps - 600, 0))
-        runs_of = {
-            "uncorrected": errors(runs, scenario, "follow_nominal"),
-            "as printed": errors(runs, scenario),
-            "50 inner steps": errors(runs, longer),
-            "λ_a = 3e-3": errors(runs, scenario, **LAMBDAS["λ_a = 3e-3"]),
-        }
-        uncorrected, *corrected = (getattr(e, error) for e in runs_of.values())
-        holds |= {f"{name}, {how}": e < uncorrected for how, e in zip(list(runs_of)[1:], corrected, strict=True)}
-        figures[name] = [uncorrected, *corrected]
-    return Finding(holds, scaled(figures, unit))
-
-
-def compensates_position(runs: Runs) -> Finding:
-    """Position errors."""
-    return _compensates(runs, "position", "mm")
-
-
-def compensates_orientation(runs: Runs) -> Finding:
-    """Orientation errors."""
-    return _compensates(runs, "angle", "rad")
-
-
-def precise_model(runs: Runs) -> Finding:
-    """Errors with an exact model beside those with the approximate one."""
-    figures: dict[str, Any] = {}
-    holds = True
-    for name, path in PATHS.items():
-        scenario = runs.scenario(path)
-        exact = scenario.replace(arm=scenario.model, model=scenario.model)
-        precise, other = errors(runs, exact), errors(runs, path)
-        holds &= sound(runs, exact, {}) and not precise.worse(other)
-        figures[f"{name} [mm]"] = 1e3 * precise.position, 1e3 * other.position
-        figures[f"{name} [rad]"] = precise.angle, other.angle
-    return Finding(holds, figures)
-
-
 def no_inversion(runs: Runs) -> Finding:
     """Counted by hand in eq. 3.16 and the listing of AdaptiveDeform: products and norms only."""
     del runs
     factorisations = 0
     return Finding(factorisations == 0, {"factorisations": factorisations, "Jacobians": 1, "measured poses": 1})
-
-
-def no_exploration(runs: Runs) -> Finding:
-    """Measured poses of a step, counted by hand: each of the three policies sees one observation a step."""
-    poses = dict.fromkeys((METHOD, *CLOSED_LOOPS), 1)
-    positions = {name: errors(runs, Q7Q8, name).position for name in poses}
-    return Finding(all(poses[name] > poses[METHOD] for name in CLOSED_LOOPS), poses, scaled(positions, "mm"))
-
-
-def less_hectic(runs: Runs) -> Finding:
-    """Peak joint velocities and travel beside two closed loops."""
-    peaks, more = {}, {}
-    for name in (METHOD, *CLOSED_LOOPS):
-        episode = runs.play(Q7Q8, name)
-        peaks[name] = float(np.abs(episode.qdot).max())
-        more[f"{name}, after point 10 [rad/s]"] = float(np.abs(episode.qdot[600:]).max(initial=0.0))
-        more[f"{name}, travel [rad]"] = float(np.abs(np.diff(episode.q, axis=0)).sum())
-    return Finding(all(peaks[METHOD] < peaks[name] for name in CLOSED_LOOPS), scaled(peaks, "rad/s"), more)
-
-
-def compensates_manufacturing(runs: Runs) -> Finding:
-    """As the claims on compensation, with arms that differ from the model by errors of several sizes."""
-    path, holds, figures = three_seconds(runs), {}, {}
-    for size in DEVIATIONS:
-        arms = manufactured_arms(path, size)
-        left = [errors(runs, arm, "follow_nominal").position for arm in arms]
-        figures[f"{1e3 * size:g}:"] = [*left]
-        for how, variant in LAMBDAS.items():
-            mine = [errors(runs, arm, **variant).position for arm in arms]
-            holds[f"{1e3 * size:g} mm, {how}"] = all(a < b for a, b in zip(mine, left, strict=True))
-            figures[f"{1e3 * size:g}:"] += mine
-    return Finding(holds, scaled(figures, "mm"))
-
-
-def needs_precise_measurement(runs: Runs) -> Finding:
-    """Whether an error grows with noise in the measured pose."""
-    path, figures = three_seconds(runs), {}
-    holds: dict[str, bool] = {}
-    plants = (Plant(), *(Plant(pose_noise=size, pose_rotation_noise=size) for size in DEVIATIONS))
-    for how, variant in LAMBDAS.items():
-        exact, *noisy = settled = [errors(runs, path.replace(plant=plant), **variant) for plant in plants]
-        holds |= {f"{1e3 * size:g} mm, {how}": e.worse(exact) for size, e in zip(DEVIATIONS, noisy, strict=True)}
-        figures[f"{how} [mm]"] = [1e3 * e.position for e in settled]
-        figures[f"{how} [rad]"] = [e.angle for e in settled]
-    return Finding(holds, figures)
-
-
-def stagnation(runs: Runs) -> Finding:
-    """Mean speed of the joint that inversion moves fastest, in the steps in which inversion yanks."""
-    figures = {}
-    for scenario in singular_places(runs):
-        method, inversion = (np.abs(runs.play(scenario, p).qdot) for p in ("fixed_point", "moore_penrose"))
-        joint = int(inversion.max(axis=0).argmax())
-        yanked = inversion[:, joint] > YANK * np.median(inversion.max(axis=1))
-        if yanked.any():
-            speeds = [float(qdot[yanked, joint].mean()) for qdot in (inversion, method)]
-            figures[f"{short(scenario.name)}, q{joint + 1}"] = speeds
-    holds = bool(figures) and all(YANK * method < inversion for inversion, method in figures.values())
-    stretched = {p: float(np.abs(runs.play(STRETCHED, p).qdot).max()) for p in ("fixed_point", "moore_penrose")}
-    return Finding(holds, scaled(figures, "rad/s"), stretched)
-
-
-def damping_distorts(runs: Runs) -> Finding:
-    """Errors away from singular points."""
-    policies = ("moore_penrose", "dls", "fixed_point")
-    errors = {policy: rms(runs.play(TRAJECTORIES[1], policy).position_error) for policy in policies}
-    return Finding(errors["dls"] > errors["moore_penrose"], scaled(errors, "µm"))
-
-
-def distortion(runs: Runs) -> Finding:
-    """Exponents of μ and λ_min in the relative distortion of the nominal velocities."""
-    mu, least, relative = distortions(runs)
-    design = np.stack([np.ones_like(mu), np.log(mu), np.log(least)], axis=1)
-    _, of_mu, of_least = np.linalg.lstsq(design, np.log(relative), rcond=None)[0]
-    holds = bool(abs(of_mu - 1.0) < 0.2 and abs(of_least + 1.0) < 0.2)
-    quantiles = np.quantile(relative * least / mu, (0.05, 0.95)).tolist()
-    return Finding(holds, {"μ": float(of_mu), "λ_min": float(of_least)}, {"distortion λ_min/μ": quantiles})
-
-
-def two_joints(runs: Runs) -> Finding:
-    """Share of all configurations with the real parts of both eigenvalues of one sign."""
-    positive, negative = planar_signs(runs)
-    return Finding(max(positive, negative) < 1.0, scaled({"positive": positive, "negative": negative}, "%"))
-
-
-def sign_works_for_two_joints(runs: Runs) -> Finding:
-    """The best run over A of both readings of σ, and without σ, on two paths of the planar arm."""
-    bent = {t: best(runs, runs.scenario(PLANAR), t) for t in (*SIGNS, "none")}
-    wide = {t: best(runs, turning(runs), t) for t in (*SIGNS, "none")}
-    wrong = {t: best(runs, runs.scenario(PLANAR), t, values=(-1.0,)) for t in SIGNS}
-    figures: dict[str, Any] = {"bent [mm]": [1e3 * one.error for one in bent.values()]}
-    figures["turning [mm]"] = [1e3 * one.error for one in wide.values()]
-    more = {f"A, {name}": [one.a for one in tried.values()] for name, tried in (("bent", bent), ("turning", wide))}
-    more["A = -1 [m]"] = [one.error for one in wrong.values()]
-    return Finding({reading: bent[reading].success for reading in SIGNS}, figures, more)
-
-
-def sign_variant(runs: Runs) -> Finding:
-    """The best run over A of both readings of σ, with 3 joints."""
-    holds, figures, more = {}, {}, {}
-    for scenario in (*map(runs.scenario, TRAJECTORIES), one_sign(runs)):
-        tried = [best(runs, scenario, t) for t in SIGNS]
-        holds[short(scenario.name)] = not any(one.success for one in tried)
-        figures[short(scenario.name)] = [one.error for one in tried]
-        more[f"A, {short(scenario.name)}"] = [one.a for one in tried]
-    return Finding(holds, scaled(figures, "mm"), more)

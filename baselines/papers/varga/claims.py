@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from typing import Any
 
 import numpy as np
 
@@ -27,6 +28,7 @@ from baselines.papers.varga.episodes import (
     nominal_path,
     slow,
     smooth,
+    time_of_step,
     variation,
     without_start,
 )
@@ -65,14 +67,13 @@ def limit_reached(runs: Runs) -> Finding:
 
 
 def offline_only(runs: Runs) -> Finding:
-    """Time of a step with the stop test, with all iterations, and interpreted."""
-    start = Runs(min(runs.steps or 100, 100))
-    episodes = {
-        "with the stop test": fast(runs),
-        "450 iterations": start.play(FAST, METHOD, tolerance=0.0),
-        "analytic gradients": start.play(FAST, METHOD, tolerance=0.0, gradient="analytic"),
+    """Processor time of a step with the stop test, with all iterations, and interpreted."""
+    descents: dict[str, dict[str, Any]] = {
+        "with the stop test": {},
+        "450 iterations": {"tolerance": 0.0},
+        "analytic gradients": {"tolerance": 0.0, "gradient": "analytic"},
     }
-    times = {label: 1e-9 * float(np.median(episode.time_ns)) for label, episode in episodes.items()}
+    times = {label: time_of_step(runs, **parameters) for label, parameters in descents.items()}
     times["in NumPy"] = _interpreted(runs) * 450
     more = {
         "share over 1 ms": float((fast(runs).time_ns > 1e6).mean()),
@@ -82,26 +83,22 @@ def offline_only(runs: Runs) -> Finding:
 
 
 def _interpreted(runs: Runs, iterations: int = 15) -> float:
-    """Time of one iteration of the interpreted descent in [s]."""
+    """Processor time of one iteration of the interpreted descent in [s]."""
     scenario = runs.scenario(FAST)
     q, nominal = np.zeros(scenario.joints), scenario.nominal()[1:3]  # the path starts at home
     times = []
     for _ in range(3):
-        begin = time.perf_counter()
+        begin = time.thread_time()
         descend(scenario, q, nominal, iterations)
-        times.append(time.perf_counter() - begin)
+        times.append(time.thread_time() - begin)
     return min(times) / iterations
 
 
 def time_proportional(runs: Runs) -> Finding:
-    """Time per gradient in the calls with the fewest and the most; a descent takes one more than it has iterations."""
-    episode = fast(runs)
-    gradients = episode.iterations + 1.0
-    micros = 1e-3 * episode.time_ns / gradients
-    few, many = np.percentile(gradients, (10, 90))
-    a, b = (float(np.median(micros[part])) for part in (gradients <= few, gradients >= many))
-    more = {"fewest, up to": float(few), "most, from": float(many)}
-    return Finding(not larger(max(a, b), min(a, b)), {"fewest [µs]": a, "most [µs]": b}, more)
+    """Time per iteration in steps of 50 to 450 iterations."""
+    numbers = (50, 150, 250, 350, 450)
+    times = [time_of_step(runs, tolerance=0.0, iterations=number) / number for number in numbers]
+    return Finding(not larger(max(times), min(times)), scaled({"": times}, "µs"))
 
 
 def multipliers_cost_more(runs: Runs) -> Finding:

@@ -19,6 +19,8 @@ from ikgym.trajectories import StraightLine
 from ikgym.validation import FloatArray
 
 HELIX, LINE = "zhang3-helix", "zhang6-lspb"
+#: Paths past singular points.
+SINGULAR = ("faitli3-stretched", "faitli3-shoulder")
 SETTLED = 60  # samples after which the transient of example 1 has died away
 
 
@@ -48,6 +50,11 @@ def iterative(runs: Runs, **numbers: Any) -> Episode:
 def settled_from(episode: Episode) -> int:
     """The first sample after the transient; in a short trial the middle one."""
     return min(SETTLED, len(episode.q) // 2)
+
+
+def settled_error(episode: Episode) -> float:
+    """The largest position error after the transient, in [m]."""
+    return float(episode.position_error[settled_from(episode) :].max())
 
 
 def _joints(scenario: Scenario, episode: Episode) -> FloatArray:

@@ -14,7 +14,7 @@ from baselines.solvers.arm_task import task_shift
 from baselines.solvers.resolved_rate.base import APPLIED, NominalMemory, finish
 from baselines.solvers.resolved_rate.dls import DampedLeastSquares, damped_rows
 from ikgym.kernels import tasks as task_kernels
-from ikgym.kernels.jit import kernel
+from ikgym.kernels.jit import inner, kernel
 from ikgym.kernels.kinematics import forward_and_jacobian
 from ikgym.validation import FloatArray, number
 
@@ -73,7 +73,7 @@ def broyden_step(model, numbers, seen, memory, answer):
             q_before[row, j] = q[row, j]
 
 
-@kernel
+@inner
 def learn_rows(model, numbers, q, pose, memory):
     """Estimates B of the Jacobian, row by row.
 
@@ -110,7 +110,7 @@ def learn_rows(model, numbers, q, pose, memory):
     return estimate
 
 
-@kernel
+@inner
 def _learn(jacobian, moved, square, error, learnt):
     """Broyden's formula for one row: shapes (e, n), (n,), a number, (e,), which is overwritten, and (e, n)."""
     for a in range(error.shape[0]):

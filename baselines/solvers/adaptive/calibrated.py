@@ -14,7 +14,7 @@ from baselines.solvers.adaptive.chain_parameters import changed_chain, parameter
 from baselines.solvers.adaptive.corrected import Corrected, Measurement
 from baselines.solvers.adaptive.deviation import deviation_between
 from ikgym.kernels import tasks as task_kernels
-from ikgym.kernels.jit import kernel
+from ikgym.kernels.jit import inner, kernel
 from ikgym.kernels.kinematics import forward
 from ikgym.validation import FloatArray, flag, number
 
@@ -212,7 +212,7 @@ def improve(arm, kind, rule, q, pose, parameters, covariance):
     return surprise, jumped
 
 
-@kernel
+@inner
 def absorb(sensitivity, error, variances, change, covariance):
     """The update by all components of an error, one after the other, since their noises are independent.
 
@@ -238,7 +238,7 @@ def absorb(sensitivity, error, variances, change, covariance):
     return surprise
 
 
-@kernel
+@inner
 def gain_of(row, variance, curvature, covariance, gain):
     """The Kalman gain for one number, y = h · x + noise, by which the covariance shrinks.
 

@@ -12,11 +12,11 @@ import math
 import numpy as np
 
 from ikgym.kernels.axes import across
-from ikgym.kernels.jit import inlined, kernel
+from ikgym.kernels.jit import inlined, inner
 from ikgym.kernels.kinematics import Chain
 
 
-@kernel
+@inner
 def changed_chain(chain, parameters, offsets, axes, tool):
     """The chain with the parameters but for the joint zeros; its parts become those arrays of (n, 3), (n, 3), (3,)."""
     n = axes.shape[0]
@@ -56,7 +56,7 @@ def _put(twist, column, linear, angular):
         twist[k, column], twist[3 + k, column] = linear[k], angular[k]
 
 
-@kernel
+@inner
 def parameter_twists(chain, q, position, twist):
     """Jacobian of the pose by the parameters, in the base frame: 3 rows of the position, 3 of the orientation.
 

@@ -13,14 +13,14 @@ import numpy as np
 
 from ikgym.kernels import tasks as task_kernels
 from ikgym.kernels.axes import across
-from ikgym.kernels.jit import inlined, kernel
+from ikgym.kernels.jit import inlined, inner
 from ikgym.kernels.rotations import rodrigues, rotation_vector
 from ikgym.kernels.tasks import AXIS, MATRIX, POSE, POSITION, SKEW
 
 SIZE = 6
 
 
-@kernel
+@inner
 def turned_by(x, y, z):
     """The rotation matrix of a rotation vector."""
     angle = math.sqrt(x * x + y * y + z * z)
@@ -39,7 +39,7 @@ def product(first, second, out):
             out[i, j] = first[i, 0] * second[0, j] + first[i, 1] * second[1, j] + first[i, 2] * second[2, j]
 
 
-@kernel
+@inner
 def add_deviation(kind, deviation, sign, coordinates, out):
     """Moves task coordinates by a deviation, or back.
 
@@ -66,7 +66,7 @@ def add_deviation(kind, deviation, sign, coordinates, out):
             product(turn, seen[:9].reshape(3, 3), moved[:9].reshape(3, 3))
 
 
-@kernel
+@inner
 def deviation_between(kind, rotation, position, model_rotation, model_position, out):
     """The deviation from the pose of a model to another one.
 
@@ -94,7 +94,7 @@ def deviation_between(kind, rotation, position, model_rotation, model_position, 
         out[3:] = rotation_vector(turn)
 
 
-@kernel
+@inner
 def missing_deviation(kind, measured, modelled, deviation, out):
     """Difference from a deviation to that of measured coordinates, a rotation vector in the base frame included.
 
@@ -120,7 +120,7 @@ def missing_deviation(kind, measured, modelled, deviation, out):
         out[3], out[4], out[5] = x * ax + y * bx, x * ay + y * by, x * az + y * bz
 
 
-@kernel
+@inner
 def move_deviation(kind, change, deviation):
     """Adds what is missing, or a share of it, to a deviation, in place: the product of rotations. Shapes (6,)."""
     for i in range(3):

@@ -21,7 +21,7 @@ from baselines.status import Status
 from ikgym import arms, tasks
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels import tasks as task_kernels
-from ikgym.kernels.jit import kernel
+from ikgym.kernels.jit import inner, kernel
 from ikgym.kernels.kinematics import forward_and_jacobian
 from ikgym.validation import FloatArray, as_given, number, per_joint
 
@@ -135,7 +135,7 @@ def rotation_step(model, numbers, seen, memory, answer):
             goal[j] = (goal[j] - q[row, j]) / dt
 
 
-@kernel
+@inner
 def _configuration(q, target, point, held, row):
     """Point of the Jacobian: q, or the posture at which the target last changed."""
     if held.shape[1] == 0:
@@ -150,7 +150,7 @@ def _configuration(q, target, point, held, row):
     return held[row]
 
 
-@kernel
+@inner
 def _turn_back(now, last, e_a, e_b, actual, desired):
     """Applies the 𝒩 that turns a vector into its last direction, and returns the angle."""
     angle = plane(now, last, e_a, e_b)

@@ -12,7 +12,7 @@ from baselines.solvers.arm_task import pose_arrays
 from baselines.solvers.linear_algebra import dot
 from baselines.status import Status
 from ikgym.kernels import tasks as task_kernels
-from ikgym.kernels.jit import kernel
+from ikgym.kernels.jit import inner, kernel
 from ikgym.kernels.kinematics import Chain, forward, forward_and_jacobian
 from ikgym.validation import FloatArray
 
@@ -149,7 +149,7 @@ def fixed_point_step(model, numbers, seen, memory, answer):
                 previous[row, 1] = math.inf
 
 
-@kernel
+@inner
 def _contract(function, a, h, q):
     """Eq. 1; where h = 0 its limit, which is to stay."""
     norm = math.sqrt(dot(h, h))
@@ -160,7 +160,7 @@ def _contract(function, a, h, q):
         q[j] += amount * (h[j] / norm)
 
 
-@kernel
+@inner
 def _add_transposed(jacobian, missing, h):
     """Adds Jᵀ (f - x) to h, with ``missing`` = x - f of shape (e,); the joints past J's columns have no part."""
     for i in range(jacobian.shape[0]):
@@ -168,7 +168,7 @@ def _add_transposed(jacobian, missing, h):
             h[j] -= jacobian[i, j] * missing[i]
 
 
-@kernel
+@inner
 def _keep_direction(h, previous):
     """Khan 2020, eq. 2.8: turns h about where it points away from the one before, which it then replaces."""
     sign = -1.0 if dot(h, previous) < 0.0 else 1.0
@@ -177,7 +177,7 @@ def _keep_direction(h, previous):
         h[j] *= sign
 
 
-@kernel
+@inner
 def _turn_where_grown(h, previous):
     """The other reading of eq. 2.8: σ changes where ‖h‖ has grown; both are remembered."""
     length = math.sqrt(dot(h, h))

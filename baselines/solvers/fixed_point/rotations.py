@@ -9,13 +9,13 @@ from __future__ import annotations
 import math
 
 from baselines.solvers.linear_algebra import dot
-from ikgym.kernels.jit import kernel
+from ikgym.kernels.jit import inner, kernel
 
 # A unit vector this close to another one, or to its opposite, spans no plane with it: what is left is rounding.
 PARALLEL = 1e-15
 
 
-@kernel
+@inner
 def plane(source, goal, e_a, e_b):
     """The plane and the angle of the rotation that turns one vector into the direction of another.
 
@@ -78,7 +78,7 @@ def turn(e_a, e_b, angle, vector):
         vector[i] += along_a * e_a[i] + along_b * e_b[i]
 
 
-@kernel
+@inner
 def adaptive_deform(actual, deformed, desired, rule, extended, out):
     """The function AdaptiveDeform of section 4.1: a share of the rotation from B to A, applied to C.
 
@@ -115,7 +115,7 @@ def adaptive_deform(actual, deformed, desired, rule, extended, out):
     return angle
 
 
-@kernel
+@inner
 def _make_orthogonal(vector, unit):
     """Takes from a vector its part along a unit vector and gives it length 1; returns both parts' lengths."""
     along = dot(vector, unit)
@@ -128,7 +128,7 @@ def _make_orthogonal(vector, unit):
     return along, rest
 
 
-@kernel
+@inner
 def _extend(vector, radius, out):
     """Appends what makes the length R_a; False where the vector is too long for that."""
     n = vector.shape[0]

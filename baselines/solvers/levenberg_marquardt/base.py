@@ -13,7 +13,7 @@ from baselines.policy.compiled import CompiledPolicy
 from baselines.policy.parameters import parameter
 from baselines.solvers.levenberg_marquardt.damping import DampingLaw, checked_parameters, damping_law
 from baselines.status import Status
-from ikgym.kernels.jit import kernel
+from ikgym.kernels.jit import inner, kernel
 from ikgym.validation import FloatArray, flag, number, whole_number
 
 CONVERGED, APPLIED, LIMIT = int(Status.CONVERGED), int(Status.APPLIED), int(Status.ITERATION_LIMIT)
@@ -65,7 +65,7 @@ class DampingMemory(NamedTuple):
     error: FloatArray
 
 
-@kernel
+@inner
 def stop_run_away(here, start, longest, status):
     """Marks a row that has not converged as diverged where a joint has left what it can reach in one period.
 

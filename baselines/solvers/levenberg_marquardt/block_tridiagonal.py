@@ -11,10 +11,10 @@ apart, which is the shortcut (38).
 from __future__ import annotations
 
 from baselines.solvers.linear_algebra import damped_gram, ldl, ldl_scaled_inverse, ldl_solve, transposed_product
-from ikgym.kernels.jit import inlined, kernel
+from ikgym.kernels.jit import inlined, inner
 
 
-@kernel
+@inner
 def damped_horizon_step(jacobians, differences, damping, scratch, out):
     """ΔQ = Dᵀ (D Dᵀ + λ M)⁻¹ d, by blocks from the end of the horizon to its beginning and back.
 

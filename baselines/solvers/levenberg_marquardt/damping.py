@@ -16,7 +16,7 @@ import numpy as np
 from baselines.solvers.linear_algebra import orthogonal_columns
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
-from ikgym.kernels.jit import expanded, kernel
+from ikgym.kernels.jit import expanded, inner, kernel
 from ikgym.validation import FloatArray, flag, float_array, frozen_array, known_name, number
 
 LOOKUP, PROPORTIONAL, STEPPED = 0, 1, 2
@@ -94,7 +94,7 @@ RULES: Mapping[str, Rule] = MappingProxyType(
 )
 
 
-@kernel
+@inner
 def damping_now(law, error, condition, stepped):
     """λ(k)_(i).
 
@@ -111,7 +111,7 @@ def damping_now(law, error, condition, stepped):
     return stepped
 
 
-@kernel
+@inner
 def damping_next(law, damping, error, error_before):
     """λ(k)_(i+1) of a stepped law (14), (18), (44); of others λ as it is.
 
@@ -131,7 +131,7 @@ def damping_next(law, damping, error, error_before):
     return min(law.growth * damping, LARGEST)
 
 
-@kernel
+@inner
 def condition_number(jacobian, rank, scratch):
     """cond(J): the largest singular value over the ``rank``-th, infinite where that is 0.
 

@@ -31,7 +31,7 @@ from baselines.solvers.levenberg_marquardt.damping import (
 )
 from baselines.solvers.linear_algebra import dot, pseudoinverse_rows
 from ikgym.kernels import tasks as task_kernels
-from ikgym.kernels.jit import kernel
+from ikgym.kernels.jit import inner, kernel
 from ikgym.kernels.kinematics import forward, forward_and_jacobian
 from ikgym.validation import whole_number
 
@@ -128,7 +128,7 @@ def _difference(residuals, out):
             out[j, a] = residuals[j, a] - (residuals[j - 1, a] if j > 0 else 0.0)
 
 
-@kernel
+@inner
 def _apply(steps, path, here):
     """The predicted path (56), the first point of which is the next iterate (57), (41)."""
     for k in range(here.shape[0]):

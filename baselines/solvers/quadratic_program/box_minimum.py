@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ikgym.kernels.jit import inlined, kernel
+from ikgym.kernels.jit import inlined, inner, kernel
 from ikgym.kernels.linear_algebra import cholesky, cholesky_solve
 
 # State of a variable: free, or at its lower or upper bound. One that is kept was released by rounding alone, and stays
@@ -17,7 +17,7 @@ MOST = 20
 NONE = -1
 
 
-@kernel
+@inner
 def box_minimum(hessian, linear, lower, upper, x):
     """The x between bounds that minimises ½ xᵀ H x - gᵀ x, by the active set of Stark and Parker (1995).
 
@@ -89,7 +89,7 @@ def _solve(hessian, linear, x, state, factor, target):
     return True
 
 
-@kernel
+@inner
 def _cut(target, lower, upper, x, state):
     """Cuts the target to the box, and says whether it was within."""
     inside = True
@@ -100,7 +100,7 @@ def _cut(target, lower, upper, x, state):
     return inside
 
 
-@kernel
+@inner
 def _advance(target, lower, upper, x, state):
     """Goes to the target, or as far as the first bound, and says whether the target was reached."""
     share, first = 1.0, NONE
@@ -121,7 +121,7 @@ def _advance(target, lower, upper, x, state):
     return False
 
 
-@kernel
+@inner
 def _most_held_back(hessian, linear, lower, upper, x, state):
     """The variable whose release lowers the function the most, by its own slope and curvature; NONE at the optimum."""
     found, most = NONE, 0.0

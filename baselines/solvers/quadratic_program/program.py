@@ -8,14 +8,14 @@ import numpy as np
 
 from baselines.solvers.linear_algebra import transposed_product
 from baselines.solvers.quadratic_program.velocity_box import braking_speed
-from ikgym.kernels.jit import kernel
+from ikgym.kernels.jit import inner, kernel
 from ikgym.kernels.linear_algebra import cholesky, cholesky_solve
 
 # Weight of the length of a task shift against its direction, and of joint motion against that.
 SCALING_WEIGHT = 1e-2
 
 
-@kernel
+@inner
 def motion_weight(jacobian, error, damping, lm_damping, fastest):
     """Weights of the squares of the joint velocities against those of the task shift.
 
@@ -50,7 +50,7 @@ def curvature(jacobian, weight, hessian):
         hessian[i, i] += weight
 
 
-@kernel
+@inner
 def feedback_share(hessian, jacobian, error, change):
     """The share of an error that can be taken back at once, if the joints are to brake in time when it is gone.
 
@@ -88,7 +88,7 @@ def goal(jacobian, shift, weight, preferred, linear):
             linear[j] += jacobian[a, j] * shift[a]
 
 
-@kernel
+@inner
 def goal_to_scale(jacobian, shift, weight, preferred, hessian, linear):
     """The same where the task shift is s Δx: s ‖Δx‖, between 0 and ‖Δx‖, is one more variable, the last.
 
@@ -119,7 +119,7 @@ def goal_to_scale(jacobian, shift, weight, preferred, hessian, linear):
     return length
 
 
-@kernel
+@inner
 def held_back(jacobian, shift, weight, preferred, qdot, lower, upper):
     """Whether a joint stands at a bound, and the task error that is left weighs more than the joint motion."""
     e, n = jacobian.shape

@@ -13,7 +13,7 @@ from baselines.solvers.quadratic_program.limits import limits_with_braking
 from baselines.solvers.quadratic_program.velocity_box import velocity_box
 from baselines.solvers.resolved_rate.base import APPLIED, TaskFeedback, add_feedback, task_motion
 from baselines.status import Status
-from ikgym.kernels.jit import kernel
+from ikgym.kernels.jit import inner, kernel
 from ikgym.validation import FloatArray, number
 
 SATURATED = int(Status.SATURATED)
@@ -22,7 +22,7 @@ NONE = -1
 ROUNDING = 1e-12
 
 
-@kernel
+@inner
 def saturate(jacobian, shift, damping, lower, upper, qdot):
     """The algorithm for one arm.
 
@@ -68,7 +68,7 @@ def saturate(jacobian, shift, damping, lower, upper, qdot):
     return made, best < 1.0
 
 
-@kernel
+@inner
 def decompose(jacobian, free, square, columns, left, squares):
     """Singular values of J without the joints that are not free, squared, (J W)ᵀ = (V Σ) Uᵀ, and its rank.
 

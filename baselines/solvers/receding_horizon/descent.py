@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.status import Status
-from ikgym.kernels.jit import kernel
+from ikgym.kernels.jit import inner, kernel
 
 _CONVERGED, _LIMIT, DIVERGED = int(Status.CONVERGED), int(Status.ITERATION_LIMIT), int(Status.DIVERGED)
 GOES_ON = -1
@@ -46,7 +46,7 @@ class DescentMemory(NamedTuple):
     alpha: npt.NDArray[np.float64]
 
 
-@kernel
+@inner
 def stop_test(value, norm, settings, step):
     """Whether to stop before step number ``step``: a value of :class:`Status`, or GOES_ON."""
     if not (np.isfinite(value) and np.isfinite(norm)):
@@ -56,7 +56,7 @@ def stop_test(value, norm, settings, step):
     return _LIMIT if step == settings.steps else GOES_ON
 
 
-@kernel
+@inner
 def adapted(alpha, norm, last_norm, settings):
     """α for the next step: larger where the norm fell, smaller where it rose, within its bounds; as it is at first."""
     if last_norm == 0.0:
@@ -78,7 +78,7 @@ def squares(x):
     return total
 
 
-@kernel
+@inner
 def take_step(x, alpha, gradient):
     """One step x − α g, in place; shapes (HL - 1, width)."""
     for i in range(x.shape[0]):
@@ -86,7 +86,7 @@ def take_step(x, alpha, gradient):
             x[i, j] -= alpha * gradient[i, j]
 
 
-@kernel
+@inner
 def stop_if_diverged(status, value, first_value, limit, qdot):
     """Finds out a blow-up that looks like convergence, and clears the plan after any; gives a :class:`Status`.
 

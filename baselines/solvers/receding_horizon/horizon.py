@@ -13,7 +13,7 @@ import numpy.typing as npt
 from ikgym.kernels import cost as cost_kernels
 from ikgym.kernels import tasks as task_kernels
 from ikgym.kernels.cost import CostParameters
-from ikgym.kernels.jit import kernel
+from ikgym.kernels.jit import inner, kernel
 from ikgym.kernels.kinematics import Chain, forward, forward_and_jacobian
 
 Floats = npt.NDArray[np.float64]
@@ -41,7 +41,7 @@ class ProblemData(NamedTuple):
     velocity_limit: Floats
 
 
-@kernel
+@inner
 def horizon_cost(data, q, nominal, qdot):
     """Φ, the sum of the stage costs over the horizon.
 
@@ -58,7 +58,7 @@ def horizon_cost(data, q, nominal, qdot):
     return _roll(data, q.copy(), nominal, qdot, 0, stages, frame_workspace(data.kind, nominal))
 
 
-@kernel
+@inner
 def difference_gradient(data, q, nominal, qdot, delta, gradient):
     """∂Φ/∂q̇ by forward differences of ``delta`` (Varga 2021, section IV), and Φ; arguments as above.
 
@@ -85,7 +85,7 @@ def difference_gradient(data, q, nominal, qdot, delta, gradient):
     return total
 
 
-@kernel
+@inner
 def _roll(data, here, nominal, qdot, first, stages, workspace):
     """Goes from ``here`` through the stages from ``first`` on, and sums their costs, which ``stages`` receives."""
     chain, kind, cost, dt = data.chain, data.kind, data.cost, data.dt
@@ -102,14 +102,14 @@ def _roll(data, here, nominal, qdot, first, stages, workspace):
     return total
 
 
-@kernel
+@inner
 def frame_workspace(kind, nominal):
     """Orientation (3, 3), position (3,), task coordinates (m,) and error (e,) of a grid point."""
     m = nominal.shape[1]
     return np.empty((3, 3)), np.empty(3), np.empty(m), np.empty(task_kernels.error_size(kind, m))
 
 
-@kernel
+@inner
 def analytic_gradient(data, q, nominal, qdot, gradient):
     """∂Φ/∂q̇ by the chain rule, and Φ; arguments as in :func:`difference_gradient`."""
     steps, n = qdot.shape
@@ -135,7 +135,7 @@ def analytic_gradient(data, q, nominal, qdot, gradient):
     return total
 
 
-@kernel
+@inner
 def analytic_state_gradient(data, nominal, q, qdot, by_q, by_qdot):
     """∂Φ/∂q(2 … HL) and ∂Φ/∂q̇(1 … HL - 1) with states and velocities taken for independent, and Φ.
 
@@ -154,7 +154,7 @@ def analytic_state_gradient(data, nominal, q, qdot, by_q, by_qdot):
     return total
 
 
-@kernel
+@inner
 def difference_state_gradient(data, nominal, q, qdot, delta, by_q, by_qdot):
     """:func:`analytic_state_gradient` by forward differences: ``delta`` in q̇, Δt ``delta`` in q.
 
@@ -199,7 +199,7 @@ class _GradientWorkspace(NamedTuple):
     error_jacobian: Floats
 
 
-@kernel
+@inner
 def gradient_workspace(kind, nominal, n):
     """Arrays of one grid point, for the derivatives by n joint coordinates."""
     rotation, position, pose, error = frame_workspace(kind, nominal)
@@ -223,7 +223,7 @@ def linearise(kind, nominal, workspace):
     )
 
 
-@kernel
+@inner
 def _tracking_gradient(data, nominal, workspace, gradient):
     """Φ^X of one grid point, and its derivative by the joint coordinates there, which ``gradient`` (n,) receives."""
     error, by_error, error_jacobian = workspace.error, workspace.gradient, workspace.error_jacobian

@@ -30,7 +30,7 @@ from baselines.solvers.receding_horizon.task_constraints import (
     task_system,
 )
 from ikgym.exceptions import InvalidInputError
-from ikgym.kernels.jit import kernel
+from ikgym.kernels.jit import inner, kernel
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -143,7 +143,7 @@ def reduce_rows(with_tasks, data, settings, q, nominal, memory, status, iteratio
             alpha[row] = settings.alpha_min
 
 
-@kernel
+@inner
 def factorise(dt, diagonal, ratio):
     """L D Lᵀ of Δt² A Aᵀ of one joint, which has 1 + Δt², then 2 + Δt² on its diagonal and −1 beside it.
 
@@ -157,7 +157,7 @@ def factorise(dt, diagonal, ratio):
             diagonal[i] += ratio[i]
 
 
-@kernel
+@inner
 def reduce_gradient(dt, diagonal, ratio, multipliers, by_q, by_qdot):
     """Turns ∇Φ into the reduced gradient, along which no constraint changes.
 

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from baselines.solvers.receding_horizon.horizon import frame_workspace, gradient_workspace, linearise
 from ikgym.kernels import cost as cost_kernels
 from ikgym.kernels import tasks as task_kernels
-from ikgym.kernels.jit import kernel
+from ikgym.kernels.jit import inner, kernel
 from ikgym.kernels.kinematics import forward, forward_and_jacobian
 
 Floats = npt.NDArray[np.float64]
@@ -49,14 +49,14 @@ class TaskSystem(NamedTuple):
     multipliers: Floats
 
 
-@kernel
+@inner
 def task_system(steps, e, n):
     """A :class:`TaskSystem` of so many stages, components of the error and joints."""
     s = steps * (n + e)
     return TaskSystem(np.empty((steps, e, n)), np.zeros((s, s)), np.empty(s))
 
 
-@kernel
+@inner
 def kinematic_errors(data, nominal, q, errors):
     """ε(q); ``errors`` (HL - 1, e) receives it, other arguments as in :func:`analytic_task_gradient`."""
     workspace = frame_workspace(data.kind, nominal)
@@ -73,7 +73,7 @@ def _error(data, nominal, q, workspace, error):
     task_kernels.error(data.kind, nominal, pose, error)
 
 
-@kernel
+@inner
 def reduced_task_gradient(data, nominal, difference, x, system, gradient):
     """The reduced gradient by all unknowns, and Φ, infinite where the system of the multipliers cannot be solved.
 
@@ -95,7 +95,7 @@ def reduced_task_gradient(data, nominal, difference, x, system, gradient):
     return value if reduce_task_gradient(data.dt, system, gradient) else np.inf
 
 
-@kernel
+@inner
 def analytic_task_gradient(data, nominal, x, jacobian, gradient):
     """∂Φ/∂E and ∂Φ/∂q̇ with all unknowns taken for independent, so that ∂Φ/∂q is 0; ∂ε/∂q, and Φ.
 
@@ -114,7 +114,7 @@ def analytic_task_gradient(data, nominal, x, jacobian, gradient):
     return total
 
 
-@kernel
+@inner
 def difference_task_gradient(data, nominal, x, delta, jacobian, gradient):
     """:func:`analytic_task_gradient` by forward differences: ``delta`` in q̇, Δt ``delta`` in E and q."""
     (steps, n), e, small = x.q.shape, x.errors.shape[1], data.dt * delta
@@ -144,7 +144,7 @@ def difference_task_gradient(data, nominal, x, delta, jacobian, gradient):
     return total
 
 
-@kernel
+@inner
 def reduce_task_gradient(dt, system, gradient):
     """Turns ∇Φ into the reduced gradient ∇Φ + Aᵀλ, along which the constraints stagnate: A Aᵀ λ = −A ∇Φ.
 
@@ -177,7 +177,7 @@ def reduce_task_gradient(dt, system, gradient):
     return True
 
 
-@kernel
+@inner
 def _assemble(dt, jacobian, gram):
     """The lower triangle of A Aᵀ within its band; beyond it ``gram`` is not touched."""
     steps, e, n = jacobian.shape
@@ -201,7 +201,7 @@ def _assemble(dt, jacobian, gram):
                 gram[at + n + a, at + n + b] = total
 
 
-@kernel
+@inner
 def _solve_banded(matrix, width, rhs):
     """Solves a symmetric system in place by Cholesky; False where it is not positive definite.
 

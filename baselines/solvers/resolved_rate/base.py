@@ -15,7 +15,7 @@ from baselines.policy.parameters import parameter
 from baselines.status import Status
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels import tasks as task_kernels
-from ikgym.kernels.jit import kernel, uncounted
+from ikgym.kernels.jit import inner, uncounted
 from ikgym.kernels.kinematics import forward_and_jacobian
 from ikgym.validation import FloatArray, number
 
@@ -83,7 +83,7 @@ class ResolvedRate(TaskFeedback, abc.ABC):
     """
 
 
-@kernel
+@inner
 def task_motion(chain, kind, seen, memory):
     """Task Jacobians, the motion of the reference, and the present errors; the reference is remembered.
 

@@ -10,7 +10,7 @@ import numpy as np
 from baselines.policy.parameters import parameter
 from baselines.solvers.linear_algebra import damped_gram, transposed_product
 from baselines.solvers.resolved_rate.base import APPLIED, ResolvedRate, add_feedback, finish, task_motion
-from ikgym.kernels.jit import kernel
+from ikgym.kernels.jit import inner, kernel
 from ikgym.kernels.linear_algebra import cholesky, cholesky_solve
 from ikgym.validation import number
 
@@ -27,7 +27,7 @@ class DampedNumbers(NamedTuple):
     damping: float
 
 
-@kernel
+@inner
 def damped_rows(jacobian, shift, damping, out):
     """Δq = Jᵀ (J Jᵀ + λ I)⁻¹ Δx, row by row: shapes (B, e, n), (B, e), a number, (B, n)."""
     e = jacobian.shape[1]

@@ -10,11 +10,11 @@ import numpy as np
 from baselines.policy.parameters import parameter
 from baselines.solvers.linear_algebra import dot
 from baselines.solvers.resolved_rate.base import ResolvedRate, add_feedback, finish, say_deficient, task_motion
-from ikgym.kernels.jit import kernel
+from ikgym.kernels.jit import inner, kernel
 from ikgym.validation import number
 
 
-@kernel
+@inner
 def orthonormal_rows(jacobian, shift, truncation, full_rank, out, deficient):
     """Δq along the orthonormalised rows of J, row by row of the batch.
 
@@ -65,7 +65,7 @@ def orthonormal_rows(jacobian, shift, truncation, full_rank, out, deficient):
         deficient[row] = rank < full_rank
 
 
-@kernel
+@inner
 def _take_off(rest, wanted, a, unit, given):
     """Takes the part along a unit vector off a row, and what that part makes off the row's demand."""
     part = dot(rest[a], unit)

@@ -17,11 +17,11 @@ from baselines.solvers.resolved_rate.base import (
     say_deficient,
     task_motion,
 )
-from ikgym.kernels.jit import kernel
+from ikgym.kernels.jit import inner, kernel
 from ikgym.validation import FloatArray, number, read_only
 
 
-@kernel
+@inner
 def transpose_rows(jacobian, shift, weights, tolerance, out, stuck):
     """Δq = α Jᵀ W² Δx row by row, and whether that is 0.
 

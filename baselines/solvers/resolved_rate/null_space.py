@@ -16,13 +16,13 @@ from baselines.solvers.resolved_rate.moore_penrose import MoorePenrose
 from ikgym.arms import Arm
 from ikgym.arms.limits import middle
 from ikgym.exceptions import InvalidInputError
-from ikgym.kernels.jit import kernel
+from ikgym.kernels.jit import inner, kernel
 from ikgym.validation import FloatArray, as_given, number, per_joint, read_only
 
 OBJECTIVES = ("posture", "joint_centring")
 
 
-@kernel
+@inner
 def task_rows(jacobian, velocity, out):
     """J q̇ row by row: shapes (B, e, n), (B, n), (B, e)."""
     for row in range(jacobian.shape[0]):
@@ -93,7 +93,7 @@ def move_rows(numbers, q, jacobian, shift, out, status):
     status[:] = APPLIED
 
 
-@kernel
+@inner
 def objective_rows(numbers, q, out):
     """The secondary objective's z / K row by row.
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import abc
 import dataclasses
-import functools
 import importlib
 import sys
 import threading
@@ -19,6 +18,7 @@ from baselines.policy import Batch, Memory, Solution, SolverPolicy, statuses
 from baselines.status import Status
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError, MissingDependencyError
+from ikgym.kernels.kinematics import forward
 from ikgym.validation import FloatArray
 
 #: Tasks whose coordinates are a whole pose: a rotation, row by row, and a position.
@@ -26,10 +26,12 @@ WHOLE_POSES = ("pose", "matrix")
 
 
 class Target(NamedTuple):
-    """Reference pose at the end of the step.
+    """Pose of the model at the end of the step.
+
+    It is the model's present pose, moved as the tool has to move from its measured pose to the reference.
 
     Attributes:
-        rotation: Of the tool; what the task leaves free is that of the arm as it stands. Shape (3, 3).
+        rotation: Of the tool; the task leaves it free to stay as it is. Shape (3, 3).
         position: In [m]. Shape (3,).
     """
 
@@ -44,7 +46,7 @@ class Seen(NamedTuple):
         q: Joint coordinates in [rad] or [m]. Shape (n,).
         qdot: Joint velocities last applied, in [rad/s] or [m/s]. Shape (n,).
         start: Joint coordinates at the start of the episode. Shape (n,).
-        target: Where the tool is to be.
+        target: Where the model's tool is to be.
     """
 
     q: FloatArray
@@ -76,9 +78,10 @@ _made = threading.local()
 class Rival(SolverPolicy, abc.ABC):
     """Base of the solvers of other projects.
 
-    The target is the reference pose of the next step, which holds the motion of the reference already: nothing is to be
-    fed forward besides. Poses are worked out by the package from the model, and the measured pose is not looked at.
-    Where a solver finds no joint velocities the arm is stopped for this step, and the status is ``diverged``.
+    The target leads from the measured pose to the reference pose of the next step, which holds the motion of the
+    reference already: nothing is to be fed forward besides. Packages work out poses from the model, so the target is
+    corrected by the difference of the model's pose from the measured one, see :class:`Target`. Where a solver finds no
+    joint velocities the arm is stopped for this step, and the status is ``diverged``.
 
     Args:
         problem: The scenario as the policy knows it.
@@ -136,18 +139,34 @@ class Rival(SolverPolicy, abc.ABC):
     def solve(self, batch: Batch, memory: Memory) -> Solution:
         """See :meth:`SolverPolicy.solve`; row by row."""
         start, known = memory
-        step, rows = self._step(), len(batch.q)
-        start = np.where(known[:, None], start, batch.q)
-        qdot, status = np.zeros(batch.q.shape), statuses(rows)
-        for row in range(rows):
-            target = self._target(batch.nominal[row, 0], batch.q[row])
-            found = step(Seen(batch.q[row], batch.qdot[row], start[row], target))
+        start, step = np.where(known[:, None], start, batch.q), self._step()
+        qdot, status = np.zeros(batch.q.shape), statuses(len(start))
+        for row, observed in enumerate(zip(batch.q, batch.qdot, start, batch.pose, batch.nominal[:, 0], strict=True)):
+            found = step(self.seen(*observed))
             if found is None:
                 status[row] = Status.DIVERGED
             else:
                 qdot[row] = found
-        kept = StartMemory(start, np.ones(rows, dtype=np.bool_))
-        return Solution(qdot, kept, status, np.ones(rows, dtype=np.int64))
+        kept = StartMemory(start, np.ones(len(start), dtype=np.bool_))
+        return Solution(qdot, kept, status, np.ones(len(start), dtype=np.int64))
+
+    def seen(self, q: FloatArray, qdot: FloatArray, start: FloatArray, pose: FloatArray, nominal: FloatArray) -> Seen:
+        """The observation of one arm for a solver.
+
+        Args:
+            q: See :class:`Seen`, as `qdot` and `start`.
+            qdot: Likewise.
+            start: Likewise.
+            pose: Measured task coordinates. Shape (m,).
+            nominal: Reference task coordinates of the next step. Shape (m,).
+        """
+        rotation, position = np.empty((3, 3)), np.empty(3)
+        forward(self.problem.model.chain, q, rotation, position)
+        if self.problem.task.name in WHOLE_POSES:
+            rotation = nominal[:9].reshape(3, 3) @ pose[:9].reshape(3, 3).T @ rotation
+        elif self.problem.task.name == "axis":
+            rotation = turn(pose[:3], nominal[:3]) @ rotation
+        return Seen(q, qdot, start, Target(rotation, position + (nominal[-3:] - pose[-3:])))
 
     def _step(self) -> Step:
         made = _made.__dict__.setdefault("steps", weakref.WeakKeyDictionary())
@@ -156,28 +175,10 @@ class Rival(SolverPolicy, abc.ABC):
         step: Step = made[self]
         return step
 
-    @functools.cached_property
-    def _target(self) -> Callable[[FloatArray, FloatArray], Target]:
-        """Turns reference coordinates and joint coordinates into a target."""
-        if self.problem.task.name in WHOLE_POSES:
-            return lambda nominal, q: Target(nominal[:9].reshape(3, 3), nominal[9:])
-        forward, axis = self.problem.model.forward, self.problem.task.name == "axis"
 
-        def target(nominal: FloatArray, q: FloatArray) -> Target:
-            rotation = forward(q)[0]
-            return Target(turned(rotation, nominal[:3]) if axis else rotation, nominal[-3:])
-
-        return target
-
-
-def turned(rotation: FloatArray, axis: FloatArray) -> FloatArray:
-    """A rotation, turned by the shortest way so that its z axis is another one.
-
-    Args:
-        rotation: A rotation matrix. Shape (3, 3).
-        axis: The z axis to be, a unit vector that is not opposite to the present one. Shape (3,).
-    """
-    across = np.cross(rotation[:, 2], axis)
+def turn(axis: FloatArray, other: FloatArray) -> FloatArray:
+    """The rotation that turns a unit vector into another one, not opposite to it, by the shortest way. Shape (3, 3)."""
+    across = np.cross(axis, other)
     skew = np.array([[0.0, -across[2], across[1]], [across[2], 0.0, -across[0]], [-across[1], across[0], 0.0]])
-    out: FloatArray = rotation + skew @ rotation + skew @ skew @ rotation / (1.0 + rotation[:, 2] @ axis)
+    out: FloatArray = np.eye(3) + skew + skew @ skew / (1.0 + axis @ other)
     return out

@@ -39,14 +39,15 @@ class Arms:
         scenario: The scenario.
         rows: N.
         offsets: Steps ahead at which the reference is seen.
+        hold: Largest number of steps of :meth:`rows`.
     """
 
-    def __init__(self, scenario: Scenario, rows: int, offsets: tuple[int, ...]) -> None:
+    def __init__(self, scenario: Scenario, rows: int, offsets: tuple[int, ...], hold: int) -> None:
         n, m = scenario.joints, scenario.task.size
-        self._scenario, self._offsets = scenario, np.array(offsets)
-        self._counted = np.append(scenario.counted(), np.zeros(offsets[-1], dtype=np.bool_))
+        self._scenario, self._offsets, self._furthest = scenario, np.array(offsets), max(offsets[-1], hold)
+        self._counted = np.append(scenario.counted(), np.zeros(self._furthest, dtype=np.bool_))
         self._every = np.arange(rows)[:, None]
-        self._nominal = np.empty((rows, scenario.steps + offsets[-1] + 1, m))
+        self._nominal = np.empty((rows, scenario.steps + self._furthest + 1, m))
         # The reference joint path; NaN without one.
         self._path = np.full((rows, scenario.steps + 1, n), np.nan)
         self.q, self.qdot = torch.zeros(rows, n, dtype=torch.float64), torch.zeros(rows, n, dtype=torch.float64)
@@ -162,7 +163,7 @@ class Arms:
     def _load_row(self, row: int, seed: int) -> None:
         """The reference of an arm's episode."""
         scenario = self._scenario
-        self._nominal[row] = scenario.nominal(seed, int(self._offsets[-1]))
+        self._nominal[row] = scenario.nominal(seed, self._furthest)
         path = scenario.nominal_joint_path(seed)
         if path is None:
             self._path[row], self.usual[row] = np.nan, 1.0

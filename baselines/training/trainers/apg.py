@@ -51,7 +51,7 @@ class APGTrainer(ActorTrainer):
             _load_weights(policy, config)
         super().__init__(config, scenario, seed, policy, copy.deepcopy(policy))
         self._updates = 0
-        self._arms = Arms(scenario, config.n_envs, config.offsets)
+        self._arms = Arms(scenario, config.n_envs, config.offsets, config.hold)
         self._farthest = config.reset_distance
         self._arms.spread(np.random.default_rng(sequence(seed, None)))
         self._far = np.zeros(config.n_envs)

@@ -8,7 +8,7 @@ import functools
 import numpy as np
 
 from ikgym.exceptions import InvalidInputError
-from ikgym.kernels.splines import extremes
+from ikgym.kernels.cubic_splines import extremes
 from ikgym.trajectories.paths.path import Path, points_of
 from ikgym.trajectories.splines import ArcLength, CubicSpline
 from ikgym.validation import FloatArray

@@ -97,6 +97,10 @@ def parts(file):
     [
         (lambda t, a: a.update(format=1), "expected format 2, got 1"),
         (lambda t, a: a.pop("network"), "'network'"),
+        *(
+            (lambda t, a, x=x: a.update(processing=x), f"processing: expected a table, got {x!r}")
+            for x in (None, "relative", True)
+        ),
         (lambda t, a: a["processing"].update(kind="raw"), "kind bilinear or relative or recurrent, got 'raw'"),
         (lambda t, a: a["processing"].update(future=1), "no field of the processing 'future'"),
         (lambda t, a: a["processing"].update(offsets=[2, 1]), "rising steps ahead"),

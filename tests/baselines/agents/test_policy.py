@@ -36,7 +36,7 @@ KINDS = {
     "relative": Relative(OFFSETS, 5.0, 2.0),
     "relative, tanh": Relative(OFFSETS, 5.0, 2.0, 0.7, "tanh"),
     "bilinear": Bilinear(OFFSETS),
-    "bilinear, damped": Bilinear(OFFSETS, 1e-2),
+    "bilinear, damped": Bilinear(OFFSETS, 1e-2, interval=2),
 }
 contract = pytest.mark.parametrize("processing", KINDS.values(), ids=KINDS)
 
@@ -46,9 +46,9 @@ def file(tmp_path):
     return write_agent(tmp_path / "mine.safetensors", FAST)
 
 
-def agent_on(scenario, processing=None, trained_on=None):
+def agent_on(scenario, processing=None, trained_on=None, **parameters):
     given = random_agent(trained_on or scenario, processing=processing)
-    return Agent(Problem.of(scenario), given=given)
+    return Agent(Problem.of(scenario), given=given, **parameters)
 
 
 def observations(scenario, preview, rows, seed=0):
@@ -105,6 +105,20 @@ def test_threads_change_nothing(monkeypatch, processing):
     assert len(threads) > 1
 
 
+@contract
+def test_the_network_is_evaluated_at_intervals(processing):
+    """Every third step after the start of an episode, row by row; with feedback in between."""
+    every, third = (agent_on(WHOLE, processing, interval=steps) for steps in (1, 3))
+    assert agent_on(WHOLE, processing).interval == processing.interval
+    starts = [(True, True), (False, False), (False, True), (False, False), (False, False)]
+    due = [(True, True), (False, False), (False, True), (True, False), (False, False)]
+    state = None
+    for observation, start, wanted in zip(observations(WHOLE, every.preview, 2), starts, due, strict=True):
+        action, state = third.predict(observation, state, start)
+        now, _ = every.predict(observation)
+        assert [identical(*rows) for rows in zip(action, now, strict=True)] == list(wanted)
+
+
 def test_relative_agents_act_as_their_environment():
     """Actions of the network in the environment for learning are those of the agent in the bare one."""
     processing = Relative((2, 10, 30), 5.0, 2.0)
@@ -122,7 +136,7 @@ def test_relative_agents_act_as_their_environment():
 
 def test_parameters_and_copies(file):
     policy = baselines.make("agent", FAST, path=file)
-    assert policy.parameters == {"path": file, "hash": policy.file.digits, "any_arm": False}
+    assert policy.parameters == {"path": file, "hash": policy.file.digits, "any_arm": False, "interval": 1}
     observation = next(observations(FAST, policy.preview, 2))
     for other in (
         baselines.make("agent", FAST, **policy.parameters),
@@ -167,6 +181,7 @@ def test_scenarios_that_do_not_fit(tmp_path, file):
         ({"path": 5}, ResultsError, "path: expected the file of an agent, got 5"),
         ({"hash": "abc"}, InvalidInputError, "hash: expected .*, got 'abc'"),
         ({"any_arm": 1}, InvalidInputError, "any_arm: expected true or false"),
+        ({"interval": 0}, InvalidInputError, "interval: expected a whole number of at least 1, got 0"),
     ],
 )
 def test_bad_parameters(file, parameters, error, message):
@@ -198,7 +213,7 @@ def test_evaluation(file, tmp_path):
 def test_the_agent_of_the_package():
     policy = baselines.make("agent_alone", RANDOM)
     assert type(policy) is AgentAlone
-    assert policy.parameters == {"hash": policy.file.digits}
+    assert policy.parameters == {"hash": policy.file.digits, "interval": 8}
     assert "agent_alone" in baselines.names()
     assert "agent" not in baselines.names()
     with pytest.raises(InvalidInputError, match="hash: expected"):

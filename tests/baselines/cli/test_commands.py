@@ -56,6 +56,10 @@ def test_help_of_each_command(word, capsys):
     assert "python -m" not in text.replace("python -m pip", "")
 
 
+HUGE = "1" + 23 * "0"
+SIZE = "expected 0, or an absolute value from 1e-12 to 1e+12"
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -67,12 +71,15 @@ def test_help_of_each_command(word, capsys):
         (["evaluate", "--steps", "0"], "steps: expected a whole number of at least 1, got 0."),
         (["evaluate", "--workers", "0"], "workers: expected a whole number from 1 to 1000, got 0."),
         *(
-            ([*command, "--workers", "9" * 24, "--out", "x"], "workers: expected a whole number from 1 to 1000, got 9")
-            for command in (["evaluate"], ["robustness"], ["train", "apg"], ["train", "observe"])
+            (
+                [*command, "--workers", "1000000000000", "--out", "x"],
+                "workers: expected a whole number from 1 to 1000, got 1000000000000",
+            )
+            for command in (["evaluate"], ["robustness"], ["train", "apg", "--seeds", "0", "1"])
         ),
         (["oracle", "--scenarios", "varga7-fats"], "There is no scenario 'varga7-fats'. Did you mean 'varga7-fast'?"),
         (["oracle", "--knots", "0"], "knots: expected a whole number of at least 1, got 0."),
-        (["oracle", "--starts", "-1"], "starts: expected a whole number of at least 0, got -1."),
+        (["oracle", "--starts", "-1"], "starts: expected a whole number from 0 to 100000, got -1."),
         (["oracle", "--generations", "-1"], "generations: expected a whole number of at least 0, got -1."),
         (["oracle", "--scenarios", "varga7-random", "--seeds", "-1"], "seeds: expected a whole number of at least 0"),
         (["reproduce", "--paper", "vagra"], "There is no paper 'vagra'. Did you mean 'varga'?"),
@@ -83,13 +90,38 @@ def test_help_of_each_command(word, capsys):
         (["evaluate", "--steps", "few"], "Error parsing --steps: expected INT, got 'few'. See ikgym evaluate --help."),
         (["oracle", "--knots", "few"], "Error parsing --knots: expected a whole number, got 'few'."),
         (["reproduce", "--papers", "khan"], "Did you mean '--paper'? See ikgym reproduce --help."),
-        (["train", "pp"], "Available: ppo, sac, td3, apg, observe, repeat. See ikgym train --help."),
+        (
+            ["train", "pop", "--out", "x"],
+            "no method 'pop'. Did you mean 'ppo'? Available: ppo, sac, td3, apg, observe,",
+        ),
+        (["train", "--out", "x"], "expected a method, one of ppo, sac, td3, apg, observe, or repeat; got --out."),
         (["train", "ppo"], "Missing from ikgym train ppo: --out."),
         (["arms", "--name", "varga7"], "See ikgym arms --help."),
         (["arms", "none.urdf"], "Cannot read none.urdf"),
         (["scenarios", "none.toml"], "Cannot read none.toml"),
         (["arms", "mine.toml"], "There is no arm 'mine.toml'."),
         (["train", "ppo", "--preset", "smok", "--out", "x"], "There is no preset 'smok'. Did you mean 'smoke'?"),
+        (["train", "apg", "--preset", "smoke", "--preset", "quick", "--out", "x"], "--preset is given twice"),
+        (["train", "apg", "--preset", "smoke", "--out", ""], "--out: expected a value, got an empty text."),
+        (["train", "apg", "--preset", "smoke", "--out", "x", "--seeds", HUGE], f"seeds: {SIZE}, got {HUGE}."),
+        (
+            ["train", "apg", "--out", "x", "--validation-episodes", "1000001"],
+            "expected a whole number from 1 to 1000000",
+        ),
+        (["train", "apg", "--out", "x", "--checkpoint-every", "nan"], "checkpoint_every: expected a finite number"),
+        (["train", "ppo", "--out", "x", "--set", "learning_rate=1e300"], f"learning_rate: {SIZE}, got 1e+300."),
+        (["train", "ppo", "--out", "x", "--set", "gamma=0", "gamma=1"], "set: gamma is given twice."),
+        (["evaluate", "--episodes", HUGE], f"episodes: {SIZE}, got {HUGE}."),
+        (["evaluate", "--scenarios", "panda-camera", "--noise-seeds", "1000000000000"], "number from 1 to 10000, got"),
+        (
+            ["oracle", "--starts", "1000000000000"],
+            "starts: expected a whole number from 0 to 100000, got 1000000000000.",
+        ),
+        (["oracle", "--scenarios", "varga7-random", "--seeds", HUGE], f"seeds: {SIZE}, got {HUGE}."),
+        (["oracle", "--scenarios", "varga7-fast", "--policies", "dls", "dlss"], "There is no policy 'dlss'."),
+        (["robustness", "--out", "x", "--severities", "1e300"], f"severities: {SIZE}, got 1e+300."),
+        (["reproduce", "--out", ""], "--out: expected a value, got an empty text."),
+        (["--version", "now"], "--version: expected nothing after it, got now."),
     ],
 )
 def test_a_mistake_is_one_line_and_ends_with_2(arguments, message, capsys, tmp_path, monkeypatch):
@@ -99,6 +131,57 @@ def test_a_mistake_is_one_line_and_ends_with_2(arguments, message, capsys, tmp_p
     assert message in error
     assert error.startswith("error: ")
     assert error.count("\n") == 1
+    assert not list(tmp_path.iterdir())
+
+
+FIXED = "on a scenario that is the same at every reset"
+APG, OBSERVE = (["train", method, "--preset", "smoke", "--out", "x"] for method in ("apg", "observe"))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "option", "otherwise"),
+    [
+        *((["evaluate"], option, "without --out") for option in (
+            "--resume", "--overwrite", "--no-plots", "--no-report",
+        )),
+        *((["evaluate", "--test-sets", "varga7-random"], f"{option}=1", "with --test-sets") for option in (
+            "--episodes", "--steps", "--noise-seeds",
+        )),
+        (["evaluate", "--test-sets", "varga7-random"], "--split=test", "with --test-sets"),
+        (["evaluate"], "--episodes=2", "on scenarios that are the same at every reset"),
+        (["evaluate", "--scenarios", "panda-line"], "--split=train", "on scenarios that are the same at every reset"),
+        (["evaluate", "--scenarios", "panda-bus"], "--noise-seeds=2", "on plants without noise"),
+        (["evaluate", "--test-sets", "varga7-random"], "--pairs", "on ideal plants"),
+        (["evaluate", "--cluster", "ray"], "--workers=2", "with --cluster"),
+        (["evaluate", "--timed", "all"], "--cluster=ray", "with --timed all"),
+        (["leaderboard", "--out", "x"], "--episodes=2", "with --test-sets"),
+        (["leaderboard", "--out", "x", "--scenarios", "varga7-fast"], "--pairs", "on ideal plants"),
+        (["robustness", "--out", "x", "--cluster", "ray"], "--workers=2", "with --cluster"),
+        (["robustness", "--out", "x", "--scenario", "varga7-fast"], "--episodes=2", FIXED),
+        (["dataset", "--scenario=varga7-fast", "--policy=dls", "--episodes=1", "--out=x-v0"], "--split=train", FIXED),
+        (["video", "--out", "x.mp4"], "--seed=1", FIXED),
+        (["view"], "--seed=1", FIXED),
+        (["oracle", "--generations", "0"], "--chains=1", "with --generations 0"),
+        (["oracle", "--generations", "0"], "--rounds=1", "with --generations 0"),
+        (["oracle", "--starts", "0", "--generations", "0"], "--knots=1", "with --starts 0 --generations 0"),
+        (["oracle", "--starts", "0", "--generations", "0"], "--seed=1", "with --starts 0 --generations 0"),
+        (APG, "--workers=2", "on one seed"),
+        ([*APG, "--seeds", "0", "1", "--cluster", "ray"], "--workers=2", "with --cluster"),
+        ([*APG, "--window", "64"], "--reset-distance=1", "with one --window"),
+        ([*APG, "--segments", "1"], "--learning-rate-end=1", "in one segment"),
+        ([*APG, "--scenario", "varga7-fast"], "--validation-episodes=2", FIXED),
+        (OBSERVE, "--group-size=2", "without --estimator ppo"),
+        *((OBSERVE, f"{option}=1", "without --estimator ppo") for option in (
+            "--n-epochs", "--clip-range", "--gamma", "--log-std-init", "--log-std-end",
+        )),
+        ([*OBSERVE, "--estimator", "ppo", "--segments", "1"], "--log-std-end=-1", "in one segment"),
+    ],
+)  # fmt: skip
+def test_an_option_without_effect_is_refused(arguments, option, otherwise, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main([*arguments, option]) == 2
+    assert capsys.readouterr().err.startswith(f"error: {option.partition('=')[0]} has no effect {otherwise}")
+    assert not list(tmp_path.iterdir())
 
 
 SCENARIOS = (*ikgym.scenarios.names(), *ikgym.scenarios.problems_from_elsewhere())
@@ -168,7 +251,7 @@ def test_the_table_stands_before_the_plots_and_the_readme_has_the_command(tmp_pa
     arguments = ["evaluate", "--policies", "dls", "--steps", "5", "--out", str(tmp_path / "out")]
     assert main(arguments) == 0
     printed = capsys.readouterr()
-    assert "left out at 80 characters a line: p99, misses" in printed.out
+    assert "left out at 80 characters a line: tracking, p99, misses" in printed.out
     assert max(map(len, printed.out.split("\n\nwritten to")[0].splitlines())) <= 80
     assert "ikgym evaluate --policies dls --steps 5" in (tmp_path / "out" / "README.md").read_text(encoding="utf-8")
 
@@ -187,6 +270,7 @@ def test_a_command_imports_what_the_command_line_names():
     assert {"quadratic_program"} <= solvers <= {"quadratic_program", "resolved_rate", "arm_task", "linear_algebra"}
     assert {name for name in modules if name.startswith("baselines.cli.")} == {
         "baselines.cli.evaluate",
+        "baselines.cli.parsing",
         "baselines.cli.shell",
     }
 

@@ -1,8 +1,7 @@
-"""What all commands share: one line for a mistake, and how they end."""
+"""How commands end: exit codes, missing extras, closed pipes."""
 
 from __future__ import annotations
 
-import dataclasses
 import subprocess
 import sys
 
@@ -12,55 +11,11 @@ from baselines.cli import shell
 from ikgym.exceptions import InvalidInputError
 
 
-@dataclasses.dataclass(frozen=True)
-class Options:
-    """What a command takes."""
-
-    number: int = 1
-    share: float | None = None
-    name: str = ""
-
-
-@dataclasses.dataclass(frozen=True)
-class Needy:
-    """What a command takes that needs something."""
-
-    out: str
-    """A folder."""
-
-
 def failing(error):
     def work():
         raise error
 
     return work
-
-
-@pytest.mark.parametrize(
-    ("kind", "arguments", "message"),
-    [
-        (Options, ["--numbr", "2"], "Unrecognized options: --numbr, 2. Did you mean '--number'? See it --help."),
-        (Options, ["--number", "x"], "Error parsing --number: expected a whole number, got 'x'. See it --help."),
-        (Options, ["--share", "x"], "Error parsing --share: expected FLOAT, got 'x'. See it --help."),
-        (Options, ["--name"], "Missing value for argument '--name'. Expected one. See it --help."),
-        (Options, ["all"], "Unrecognized options: all. See it --help."),
-        (Needy, [], "Missing from it: --out. See it --help."),
-    ],
-)
-@pytest.mark.parametrize("columns", ["40", "200"])
-def test_a_mistake_is_one_line(kind, arguments, message, columns, monkeypatch):
-    monkeypatch.setenv("COLUMNS", columns)
-    with pytest.raises(InvalidInputError) as refused:
-        shell.parse(kind, arguments, prog="it", description="Does something.")
-    assert str(refused.value) == message
-
-
-def test_help_and_good_arguments(capsys):
-    assert shell.parse(Options, ["--number", "3"], prog="it", description="") == Options(3)
-    with pytest.raises(SystemExit) as ended:
-        shell.parse(Options, ["--help"], prog="it", description="Does something.")
-    assert ended.value.code == 0
-    assert "Does something." in capsys.readouterr().out
 
 
 def test_exit_codes(capsys):

@@ -224,13 +224,13 @@ def test_files(tmp_path):
     with (tmp_path / "results.csv").open(encoding="utf-8", newline="") as file:
         table = list(csv.DictReader(file))
     assert tuple(table[0]) == COLUMNS
-    assert COLUMNS[:25] == (
+    assert COLUMNS[:26] == (
         "scenario", "policy", "parameters", "seed", "steps", "total_cost", "tracking_cost", "velocity_cost",
         "cost_ratio",
         "position_error_max", "position_error_rms", "orientation_error_max", "orientation_error_rms", "qdot_peak",
         "qdot_rms", "qdot_total_variation", "qddot_peak", "steps_at_joint_limit", "steps_at_velocity_limit",
-        "steps_at_acceleration_limit", "joint_limit_margin_min", "time_p50_us", "time_p99_us", "deadline_misses",
-        "status",
+        "steps_at_acceleration_limit", "joint_limit_margin_min", "followed", "solver_status", "time_p50_us",
+        "time_p99_us", "deadline_misses",
     )  # fmt: skip
     for cells, row in zip(table, rows, strict=True):
         assert float(cells["total_cost"]) == row.total_cost

@@ -11,7 +11,9 @@ import baselines
 import ikgym
 from baselines.episodes import Episode, Seeds, rollout
 from baselines.evaluate import evaluate
-from baselines.evaluation.metrics import TIME_COLUMNS, Row, lost, measure
+from baselines.evaluation.export import trajectory_log
+from baselines.evaluation.html.series import ACCELERATION, VELOCITY, limits
+from baselines.evaluation.metrics import TIME_COLUMNS, Row, followed, lost, measure
 from baselines.evaluation.summary import Spread, summarise
 from baselines.files import from_json
 from baselines.status import Status
@@ -38,8 +40,8 @@ def restored(values):
 
 def handmade(steps=4, **changes):
     arrays = {
-        "q": np.zeros((steps, 2)),
-        "qdot": np.zeros((steps, 2)),
+        "q": np.zeros((steps, 3)),
+        "qdot": np.zeros((steps, 3)),
         "pose": np.zeros((steps, 3)),
         "tracking_cost": np.zeros(steps),
         "velocity_cost": np.zeros(steps),
@@ -98,16 +100,30 @@ def test_limits_are_in_the_row(wrap):
     (row,) = evaluate(which, Pushing(), wrap=wrap)
     env = gym.make("RedundantIK-v0", scenario=which, preview=1)
     seen, _ = env.reset(seed=row.seed)
-    held, margin, last, change = np.zeros(3, dtype=int), np.inf, np.zeros(7), 0.0
+    at, margin, last, change = np.zeros(3, dtype=int), np.inf, np.zeros(7), 0.0
     for _ in range(40):
-        seen, *_, info = env.step(Pushing().predict(seen)[0])
-        held += info["at_limit"] > 0
+        seen, *_ = env.step(Pushing().predict(seen)[0])
+        arm, qddot = which.arm, (seen["qdot"] - last) / which.dt
+        stops = np.minimum(seen["q"] - arm.lower, arm.upper - seen["q"]) <= 0.0
+        fast, hard = np.abs(seen["qdot"]) >= arm.velocity_limit, np.abs(qddot) >= (1.0 - 1e-9) * arm.acceleration_limit
+        at += [stops.any(), fast.any(), hard.any()]
         margin = min(margin, (seen["q"] - which.arm.lower).min(), (which.arm.upper - seen["q"]).min())
         change, last = max(change, np.abs(seen["qdot"] - last).max()), seen["qdot"]
-    assert (held > 0).all()
-    assert [row.steps_at_joint_limit, row.steps_at_velocity_limit, row.steps_at_acceleration_limit] == held.tolist()
+    assert (at > 0).all()
+    assert [row.steps_at_joint_limit, row.steps_at_velocity_limit, row.steps_at_acceleration_limit] == at.tolist()
     assert row.joint_limit_margin_min == margin == 0.0
     assert row.qddot_peak == pytest.approx(change / which.dt)
+
+
+def test_a_joint_at_its_limit_counts_though_its_policy_keeps_the_limit():
+    """No limit holds back a joint of `qp`, and the replay shows them at their limits."""
+    which = ikgym.scenarios.get("panda-fast")
+    episode = rollout(which, baselines.make("qp", which), 0)
+    assert not episode.at_limit.any()
+    row, shown = row_of(which, episode), limits(trajectory_log(which, Seeds(0), episode))
+    assert row.steps_at_velocity_limit == (shown == VELOCITY).any(axis=1).sum() > 20
+    assert row.steps_at_acceleration_limit >= (shown == ACCELERATION).any(axis=1).sum() > 20
+    assert not row.followed
 
 
 def test_the_warm_up_call_leaves_no_trace_in_the_episode():
@@ -194,7 +210,7 @@ def test_held_points_count_at_their_last_step_only():
 
 
 def test_numbers_of_a_handmade_episode():
-    qdot = [[1.0, 0.0], [-2.0, 0.0], [-2.0, 0.5], [0.0, 0.5]]
+    qdot = [[1.0, 0.0, 0.0], [-2.0, 0.0, 0.0], [-2.0, 0.5, 0.0], [0.0, 0.5, 0.0]]
     times = [1_000, 2_000, 3_000, 1_000_000_001]
     status = [Status.CONVERGED, Status.DIVERGED, Status.CONVERGED, Status.ITERATION_LIMIT]
     row = row_of(
@@ -210,13 +226,13 @@ def test_numbers_of_a_handmade_episode():
         ),
     )
     assert row.qdot_peak == 2.0
-    assert row.qdot_rms == pytest.approx(math.sqrt(9.5 / 8))
+    assert row.qdot_rms == pytest.approx(math.sqrt(9.5 / 12))
     assert row.qdot_total_variation == pytest.approx(3.0 + 0.5 + 2.0)
     assert row.time_first_us == 1.0
     assert row.time_p50_us == pytest.approx(3.0)
     assert row.time_p99_us == pytest.approx(np.percentile(times[1:], 99) / 1e3)
     assert row.deadline_misses == 1
-    assert row.status == "diverged"
+    assert (row.solver_status, row.followed) == ("diverged", False)
     assert row.status_counts == {"converged": 2, "iteration_limit": 1, "diverged": 1}
     assert row.iterations == 3.0
     assert row.position_error_max == 4.0
@@ -273,7 +289,8 @@ def test_summaries():
             time_p50_us=time,
             time_p99_us=2 * time,
             deadline_misses=seed,
-            status=status,
+            solver_status=status,
+            followed=error < 0.2,
         )
         for seed, cost, error, time, status in (
             (1, 1.0, 0.3, 5.0, "converged"),
@@ -289,7 +306,7 @@ def test_summaries():
     assert first.largest("position_error_max") == 0.3
     assert first.largest("orientation_error_max") is None
     assert (first.median("time_p50_us"), first.largest("time_p99_us"), first.total("deadline_misses")) == (6.0, 14.0, 6)
-    assert first.status == "rank_deficient"
+    assert (first.solver_status, first.followed) == ("rank_deficient", 1)
     assert first.cost_ratio is None
 
 
@@ -300,6 +317,23 @@ def test_rows_of_different_content_are_not_put_together(change):
     with pytest.raises(InvalidInputError, match="results of 'zhang3-helix' cannot be put together"):
         summarise([base, other])
     assert len(summarise([base, dataclasses.replace(other, scenario="another")])) == 2
+
+
+@pytest.mark.parametrize(
+    ("position", "angle", "expected"),
+    [
+        (1e-3, 1e-3, True),
+        (1e-3, None, True),
+        (1.01e-3, None, False),
+        (0.0, 1.01e-3, False),
+        (math.nan, 0.0, False),
+        (0.0, math.nan, False),
+    ],
+)
+def test_followed_by_position_and_orientation(position, angle, expected):
+    assert followed(position, angle) is expected
+    row = row_of(position_scenario(), handmade(position_error=[0.0, 0.0, position, 0.0]))
+    assert row.followed is followed(position, None)
 
 
 @pytest.mark.parametrize(

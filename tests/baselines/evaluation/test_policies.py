@@ -82,7 +82,7 @@ def here(name):
 
 def numbers(row):
     """What does not depend on who is asked."""
-    told = {"policy", "parameters", "status", "status_counts", "iterations", *TIME_COLUMNS}
+    told = {"policy", "parameters", "solver_status", "status_counts", "iterations", *TIME_COLUMNS}
     return {name: value for name, value in row.to_json().items() if name not in told}
 
 
@@ -148,7 +148,7 @@ def test_an_object_with_a_predict_is_scored_as_a_solver_is(solved):
     model = Borrowed()
     (row,) = evaluate(HELIX, model, steps=STEPS)
     assert numbers(row) == numbers(solved)
-    assert (row.policy, row.parameters, row.status) == ("Borrowed", {}, "unknown")
+    assert (row.policy, row.parameters, row.solver_status) == ("Borrowed", {}, "unknown")
     assert row.status_counts == {"unknown": STEPS}
     assert row.iterations is None
     assert row.time_p50_us > 0
@@ -170,7 +170,7 @@ def test_an_object_with_a_predict_is_scored_as_a_solver_is(solved):
 )
 def test_places_classes_and_factories(solved, policy, name, parameters):
     (row,) = evaluate(HELIX, policy, steps=STEPS)
-    assert (row.policy, row.parameters, row.status) == (name, parameters, "unknown")
+    assert (row.policy, row.parameters, row.solver_status) == (name, parameters, "unknown")
     assert numbers(row) == numbers(solved)
 
 
@@ -349,7 +349,7 @@ def test_models_of_stable_baselines3():
     plain = PPO("MultiInputPolicy", env, **options)
     flat = PPO("MlpPolicy", gym.wrappers.FlattenObservation(env), **options)
     (row,) = evaluate(HELIX, plain, steps=STEPS, preview=2)
-    assert (row.policy, row.status) == ("PPO", "unknown")
+    assert (row.policy, row.solver_status) == ("PPO", "unknown")
     observation, _ = env.reset(seed=0)
     total = 0.0
     for _ in range(STEPS):

@@ -10,7 +10,7 @@ import baselines
 import ikgym
 from baselines.episodes import Seeds, rollout
 from baselines.evaluate import evaluate
-from baselines.evaluation import report
+from baselines.evaluation import report, run
 from baselines.evaluation.export import trajectory_log
 from baselines.evaluation.jobs import Skipped
 from baselines.evaluation.metrics import Row
@@ -42,10 +42,11 @@ BASE = Row(
     steps_at_velocity_limit=0,
     steps_at_acceleration_limit=0,
     joint_limit_margin_min=None,
+    followed=False,
+    solver_status="converged",
     time_p50_us=16.21,
     time_p99_us=28.79,
     deadline_misses=1,
-    status="converged",
     machine={"cpu": "A | B", "cores": 2, "ikgym": "0.1.0"},
     iterations=1.0,
     status_counts={"converged": 3000},
@@ -83,7 +84,7 @@ def test_table():
     text = report.table([BASE, REFERENCE])
     lines = text.split("\n")
     assert lines[0] == "varga7-fast: 3000 steps"
-    cells = "dls 1.423e7 301.2 1.423e7 – 1.416 16.88 13.31 16.21 28.79 1 converged"
+    cells = "dls 1.423e7 301.2 – 1.416 16.88 13.31 500.0 16.21 28.79 1 no converged"
     assert lines[4].split() == cells.split()
     assert lines[5].startswith("follow_nominal *")
     assert "* reference: has privileged information" in text
@@ -92,10 +93,14 @@ def test_table():
     assert "episodes" not in text
 
 
-def test_a_policy_that_ran_into_a_stop_is_marked():
+def test_a_policy_with_a_joint_at_a_stop_is_marked():
     stopped = row(policy="moore_penrose", parameters={}, steps_at_joint_limit=3)
     text = report.table([BASE, stopped, dataclasses.replace(REFERENCE, steps_at_joint_limit=1)])
-    assert [line.split("  ")[0] for line in text.split("\n")[4:7]] == ["dls", "moore_penrose †", "follow_nominal * †"]
+    assert [line.partition("1.423e7")[0].strip() for line in text.split("\n")[4:7]] == [
+        "dls",
+        "moore_penrose †",
+        "follow_nominal * †",
+    ]
     assert report.STOP_NOTE in text
     assert "†" not in report.table([BASE, row(policy="moore_penrose", steps_at_velocity_limit=3)])
     assert summarise([stopped, dataclasses.replace(stopped, seed=1)])[0].total("steps_at_joint_limit") == 6
@@ -105,6 +110,7 @@ def test_several_episodes_are_put_together():
     costs = {2_000_000: 10.0, 2_000_001: 1000.0, 2_000_002: 1e6}
     text = report.table([row(scenario="varga7-random", seed=seed, total_cost=cost) for seed, cost in costs.items()])
     assert text.startswith("varga7-random: 3 episodes of 3000 steps")
+    assert text.split("\n")[4].endswith("0 of 3  converged")
     assert "total cost over the episodes of varga7-random" in text
     (line,) = (line for line in text.split("\n") if "2000002" in line)
     assert re.split(r"\s{2,}", line) == ["dls", "3", "2154", "1000", "8.002e5", "1.000e6", "2000002", "0"]
@@ -121,13 +127,15 @@ def test_several_episodes_are_judged_by_their_cost_ratio_where_it_is_known():
     assert "total cost over" not in text
     line = [line for line in text.split("\n") if line.startswith("dls")][-1]
     assert re.split(r"\s{2,}", line) == ["dls", "3", "2.000", "2.000", "3.600", "4.000", "8", "1"]
-    assert re.split(r"\s{2,}", text.split("\n")[4])[4] == "2.000"
+    assert re.split(r"\s{2,}", text.split("\n")[4])[3] == "2.000"
     assert "Cost ratio over the episodes:" in report.readme(rows, command="c", date=DATE)
     assert "total cost over" in report.table([*rows, row(scenario="varga7-random", seed=10)])
 
 
 WIDE = [
-    row(status="iteration_limit", total_cost=1.2345e-100, tracking_cost=1.2345e-100, position_error_max=1.2345e-9),
+    row(
+        solver_status="iteration_limit", total_cost=1.2345e-100, tracking_cost=1.2345e-100, position_error_max=1.2345e-9
+    ),
     row(policy="rhc_gradient", parameters={"horizon": 50, "alpha_max": 1.2345e-5, "alpha_factor": 1.234}),
     REFERENCE,
 ]
@@ -143,11 +151,11 @@ def test_lines_fit_the_width(width):
 def test_columns_that_do_not_fit_are_named():
     narrow, wide = report.table(WIDE, width=80), report.table(WIDE, width=200)
     assert "left out" not in wide
-    (note,) = [line for line in narrow.splitlines() if line.startswith("left out at 80 characters a line: ")]
-    gone, head = note.partition(": ")[2].split(", "), narrow.splitlines()[1].split()
+    note = " ".join(narrow.partition("left out at 80 characters a line: ")[2].split())
+    gone, head = note.split(", "), narrow.splitlines()[1].split()
     assert gone[-1] == "misses"
     assert not set(gone).intersection(head)
-    assert {"policy", "total", "status", "p50"} <= set(head)
+    assert {"policy", "total", "followed", "solver", "p50"} <= set(head)
 
 
 def test_labels_say_what_is_not_the_default():
@@ -186,7 +194,7 @@ def test_readme():
     assert "`damping=0.001`" in text
     tables = [line for line in text.split("\n") if line.startswith("|")]
     heads = {len(re.findall(r"(?<!\\)\|", line)) for line in tables}
-    assert heads == {13, 4}  # twelve columns of results, three of parameters
+    assert heads == {14, 4}  # thirteen columns of results, three of parameters
 
 
 HOSTILE = (
@@ -240,12 +248,27 @@ def test_the_log_has_the_accelerations_of_the_steps_from_rest():
     assert "qddot" not in trajectory_log(ikgym.scenarios.get("varga7-fast").replace(steps=8), Seeds(0), episode)
 
 
-def test_a_damaged_log_is_named(tmp_path):
-    evaluate("faitli3-regular", "dls", steps=5, out=tmp_path, plots=False)
+def test_a_damaged_log_is_named_before_anything_is_played(tmp_path, monkeypatch):
+    given = {"scenarios": "faitli3-regular", "steps": 5, "out": tmp_path}
+    evaluate(**given, policies="dls", plots=False)
+    monkeypatch.setattr(run, "run", None)
     (file,) = tmp_path.glob("series/*/*.npz")
+    with np.load(file) as arrays:
+        log = dict(arrays)
+    spoilt = [
+        ({"other": np.zeros(3)}, "There is no array of a log 'other'"),
+        ({name: array for name, array in log.items() if name != "nominal"}, "in the array nominal, got shape None"),
+        (log | {"nominal": np.zeros(3)}, r"of shape \('k', 'm'\) in the array nominal, got shape \(3,\)"),
+        (log | {"q": log["q"][:-1]}, "of the array q does not fit the others"),
+        (log | {"time": log["time"].astype(str)}, "expected numbers of shape"),
+    ]
+    for arrays, message in spoilt:
+        np.savez(file, **arrays)
+        with pytest.raises(ResultsError, match=rf"{re.escape(str(file))} is damaged, .*{message}"):
+            evaluate(**given, policies=["dls", "moore_penrose"], resume=True)
     file.write_bytes(b"nothing")
     with pytest.raises(ResultsError, match=re.escape(str(file))):
-        evaluate("faitli3-regular", "dls", steps=5, out=tmp_path, resume=True)
+        evaluate(**given, policies="dls", resume=True)
 
 
 def log_of(steps=60, coordinates=6, joints=7, **changes):

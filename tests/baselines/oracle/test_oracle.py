@@ -346,7 +346,7 @@ class TestPolicy:
         (lambda: solve("varga7-fsat"), UnknownNameError, "Did you mean 'varga7-fast'"),
         (lambda: solve("varga7-random", -1), InvalidInputError, "seed: expected a whole number of at least 0"),
         (lambda: solve(short(), 0.5), InvalidInputError, "seed: expected a whole number of at least 0"),
-        (lambda: Search(starts=-1), InvalidInputError, "starts: expected a whole number of at least 0, got -1"),
+        (lambda: Search(starts=-1), InvalidInputError, "starts: expected a whole number from 0 to 100000, got -1"),
         (lambda: Search(polished=0), InvalidInputError, "polished: expected a whole number of at least 1"),
         (lambda: Search(knots=2.5), InvalidInputError, "knots: expected a whole number"),
         (lambda: solve(short(), arm_seed=1), InvalidInputError, "arm"),

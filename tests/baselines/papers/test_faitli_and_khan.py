@@ -1,9 +1,10 @@
-"""Faitli and Khan: yanks near the shoulder axis, which both speak of, and one threshold for like claims."""
+"""Faitli and Khan: yanks near the shoulder axis, which both speak of, one threshold for like claims, and conditions."""
 
 from __future__ import annotations
 
 import pathlib
 import re
+import types
 
 import numpy as np
 import pytest
@@ -12,7 +13,8 @@ from baselines.papers.comparisons import YANK
 from baselines.papers.faitli import claims as faitli
 from baselines.papers.faitli.episodes import past_shoulder, solved, speeds, yank
 from baselines.papers.khan import claims as khan
-from baselines.papers.khan.episodes import Errors
+from baselines.papers.khan import section_2, section_5
+from baselines.papers.khan.episodes import CLOSED_LOOPS, METHOD, Errors
 from baselines.papers.runs import Runs
 from baselines.solvers import fixed_point, resolved_rate
 
@@ -32,7 +34,7 @@ def test_inversion_yanks_one_millimetre_from_the_axis_and_the_fixed_point_does_n
 @pytest.mark.slow
 def test_both_claims_on_yanks_name_the_same_places():
     runs = Runs()
-    yanks, stagnation = faitli.no_yanks(runs), khan.stagnation(runs)
+    yanks, stagnation = faitli.no_yanks(runs), section_2.stagnation(runs)
     assert yanks.verdict == stagnation.verdict == "reproduced"
     yanked = {name for name, (inversion, _) in yanks.figures.items() if inversion > YANK}
     assert {name.partition(", ")[0] for name in stagnation.figures} == yanked
@@ -65,3 +67,42 @@ def test_a_degraded_error_has_not_remained(monkeypatch, growth, largest, visible
         "beside the run without W": not degraded,
         "beside the extent": not visible,
     }
+
+
+def test_singular_points_are_counted_on_each_calculated_path():
+    """The stretched path, whose joint paths separate, crosses none."""
+    found = faitli.zero_eigenvalues(Runs())
+    assert found.verdict == "depends"
+    assert found.holds == {"stretched": False, "regular": False, "shoulder": True}
+    assert found.figures == {"stretched": [0, 6], "regular": [0, 0], "shoulder": [2, 2]}
+
+
+def test_the_transpose_lags_with_more_joints_than_coordinates_on_the_fast_path():
+    found = faitli.not_square(Runs())
+    assert found.verdict == "depends"
+    assert [where for where, holds in found.holds.items() if holds] == [
+        "varga7-slow, 10, position",
+        "varga7-slow, 50, position",
+        "varga7-slow, 50, orientation",
+        "varga7-fast, 50, position",
+    ]
+    np.testing.assert_allclose(found.figures["[mm]"], [1.7, 1.77, 157.0, 35.1], rtol=0.01)
+
+
+@pytest.mark.parametrize(
+    ("probing", "wanted"),
+    [((), "depends"), (CLOSED_LOOPS, "reproduced"), (CLOSED_LOOPS[:1], "depends"), ((METHOD,), "contradicted")],
+)
+def test_an_exploration_is_seen_in_the_motion(monkeypatch, probing, wanted):
+    """One step for each joint in turn, the others at rest, between steps of all."""
+
+    def play(_path, policy):
+        qdot = np.ones((20, 8))
+        if policy in probing:
+            qdot[4:12] = np.eye(8)
+        return types.SimpleNamespace(qdot=qdot)
+
+    monkeypatch.setattr(section_5, "errors", lambda *_: Errors(0.0, 0.0, 0.0, 0.0))
+    found = section_5.no_exploration(types.SimpleNamespace(play=play))
+    assert found.verdict == wanted
+    assert [name.removesuffix(" [%]") for name, share in found.figures.items() if share == 40.0] == list(probing)

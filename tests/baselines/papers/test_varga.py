@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+import time
 import types
 
 import numpy as np
@@ -11,7 +13,7 @@ import baselines
 import ikgym
 from baselines.papers.runs import Runs
 from baselines.papers.varga import claims
-from baselines.papers.varga.episodes import fluctuation, largest_jump, nominal_angles
+from baselines.papers.varga.episodes import fluctuation, largest_jump, nominal_angles, time_of_step
 from baselines.papers.varga.figures import busiest
 from baselines.papers.varga.interpreted import descend
 from baselines.status import Status
@@ -56,6 +58,28 @@ def test_the_descent_is_tested_in_all_readings(bad, printed, limit):
         assert runs.played == ALL
         assert finding.verdict == wanted
         assert sorted(np.ravel(list(finding.figures.values()))) == [0.0] * (8 - len(bad)) + [100.0] * len(bad)
+
+
+@pytest.mark.parametrize(("overhead", "wanted"), [(0.0, "reproduced"), (50.0, "contradicted")])
+def test_times_are_compared_from_50_to_450_iterations(monkeypatch, overhead, wanted):
+    """Proportional times, and times with an overhead of 50 iterations, twice as long at 50 as proportional ones."""
+    asked = []
+
+    def time_of_step(_runs, tolerance, iterations):
+        asked.append((tolerance, iterations))
+        return 1e-5 * (iterations + overhead)
+
+    monkeypatch.setattr(claims, "time_of_step", time_of_step)
+    assert claims.time_proportional(Runs()).verdict == wanted
+    assert asked == [(0.0, iterations) for iterations in (50, 150, 250, 350, 450)]
+
+
+def test_the_time_of_a_step_is_that_of_the_processor(monkeypatch):
+    """Each reading of a clock that is replaced is 1 ms later."""
+    clock = itertools.count()
+    monkeypatch.setattr(time, "thread_time", lambda: 1e-3 * next(clock))
+    assert time_of_step(Runs(steps=5), iterations=50) == pytest.approx(1e-3)
+    assert next(clock) == 10
 
 
 @pytest.mark.parametrize("name", ["varga7-fast", "varga7-literal-slow"])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from baselines.papers.runs import Runs
-from baselines.papers.zhang import claims
+from baselines.papers.zhang import claims, section_4, section_5
 from baselines.papers.zhang.targets import SHARES, TARGETS, at_rest, drawn
 from baselines.registry import make
 from baselines.status import Status
@@ -41,6 +41,15 @@ def test_rule_18_is_decided_by_values_that_are_not_printed(trial):
     assert min(shares[2] for shares in found.figures.values()) >= 99.5
 
 
+def test_rule_14_holds_with_some_of_the_values_that_are_not_printed(whole):
+    """The pair of (44) meets none of the stretched targets, all of which λ = 0 meets."""
+    found = claims.rule_14(whole)
+    assert found.verdict == "depends"
+    assert found.holds == {"1.1, 1.02": False, "2, 2": True, "10, 10": True}
+    undamped, of_44, *others = found.figures["stretched [%]"]
+    assert (undamped, of_44, min(others)) == (100.0, 0.0, 100.0)
+
+
 def test_mfac_is_levenberg_marquardt_and_another_damping_is_not(trial, monkeypatch):
     assert claims.levenberg_marquardt(trial).verdict == "reproduced"
     steps = claims.sugihara
@@ -62,16 +71,16 @@ def test_damping_tolerates_a_wrong_model(trial):
 @pytest.mark.parametrize(
     ("claim", "wanted"),
     [
-        (claims.inverse_of_18, "depends"),
+        (section_5.inverse_of_18, "depends"),
         (claims.error_and_change_of_j, "reproduced"),
         (claims.error_and_condition, "depends"),
         (claims.fastest_without_damping, "depends"),
-        (claims.one_formula, "depends"),
-        (claims.held_points, "depends"),
-        (claims.excellent, "reproduced"),
-        (claims.closer_tracking, "reproduced"),
-        (claims.printed_angle, "depends"),
-        (claims.switch_at_33, "contradicted"),
+        (section_4.one_formula, "depends"),
+        (section_4.held_points, "depends"),
+        (section_5.excellent, "reproduced"),
+        (section_4.closer_tracking, "reproduced"),
+        (section_5.printed_angle, "depends"),
+        (section_5.switch_at_33, "contradicted"),
     ],
 )
 def test_verdicts(whole, claim, wanted):

@@ -58,7 +58,7 @@ def test_gradient_of_a_window_is_that_of_its_loss(inverse, hold):
 
 def test_costs_are_weighted_by_those_of_their_episode():
     """Their gradient is that of the logarithm of the cost of the whole episode, the prior included."""
-    arms = Arms(CONFIG.make_scenario(), 3, (1, 2, 10))
+    arms = Arms(CONFIG.make_scenario(), 3, (1, 2, 10), 8)
     arms.usual, arms.spent[:], arms.played[:] = np.array([1.0, 2.0, 3.0]), [5.0, 0.0, 90.0], [10.0, 0.0, 30.0]
     costs = torch.tensor([[4.0, 1.0, 0.5], [0.1, 7.0, 40.0]], dtype=torch.float64, requires_grad=True)
     for cost in costs:

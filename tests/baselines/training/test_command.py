@@ -98,20 +98,31 @@ def test_files_that_cannot_be_repeated(content, message, tmp_path, capsys):
     [
         (["apg", "--preset", "smok"], "There is no preset 'smok'. Did you mean 'smoke'?"),
         (["ppo", "--preset", "quick"], "The preset quick is for apg, not for ppo"),
-        (["apg", *TINY, "--scenario", "varga"], "There is no scenario 'varga'"),
+        (["apg", *TINY[2:], "--scenario", "varga"], "There is no scenario 'varga'"),
         (["apg", *TINY, "--workers", "0"], "workers: expected a whole number from 1 to 1000, got 0"),
         (["apg", *TINY, "--seeds", "-1"], "seeds: expected a whole number of at least 0, got -1"),
-        (["apg", *TINY, "--window", "7"], "window: expected multiples of hold"),
+        (["apg", "--window", "7"], "window: expected multiples of hold"),
         (["apg", *TINY, "--init", "nowhere.safetensors"], "Cannot read nowhere.safetensors"),
         (["repeat", "nowhere.json"], "Cannot read nowhere.json"),
     ],
 )
 def test_errors_are_one_line_and_exit_code_2(arguments, message, tmp_path, capsys):
     assert main([*arguments, "--out", str(tmp_path)]) == 2
-    error = capsys.readouterr().err
+    printed = capsys.readouterr()
+    error = printed.err
     assert message in error
+    assert "written to" not in printed.out
     assert error.startswith("error: ")
     assert len(error.splitlines()) == 1
+
+
+def test_refused_settings_replace_no_run(tmp_path, capsys):
+    """Settings of an algorithm are refused by its trainer."""
+    (tmp_path / "seed-0").mkdir()
+    (tmp_path / "seed-0" / "run.json").write_text("{}")
+    assert main(["ppo", "--preset", "smoke", "--set", "n_step=3", "--overwrite", "--out", str(tmp_path)]) == 2
+    assert "Did you mean 'n_steps'?" in capsys.readouterr().err
+    assert (tmp_path / "seed-0" / "run.json").read_text() == "{}"
 
 
 def test_no_method(capsys):

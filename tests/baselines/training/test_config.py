@@ -18,7 +18,7 @@ REFUSED = [
     (APG, {"windo": 3}, "no option of apg 'windo'. Did you mean 'window'"),
     (APG, {"activation": "sili"}, "Did you mean 'silu'"),
     (APG, {"hidden": []}, "hidden: expected 1 to 10 layers"),
-    (APG, {"hidden": [8, 0]}, "hidden: expected a whole number of at least 1, got 0"),
+    (APG, {"hidden": [8, 0]}, "hidden: expected a whole number from 1 to 2048, got 0"),
     (APG, {"hidden": [8, 10**6]}, "hidden: expected a whole number from 1 to 2048, got 1000000"),
     (APG, {"n_envs": 10**7}, "n_envs: expected a whole number from 1 to 10000"),
     (APG, {"offsets": [2, 5]}, "offsets: expected steps ahead that rise from 1"),

@@ -23,6 +23,7 @@ CASES = {
     **{method: tiny(method) for method in METHODS},
     "apg, damped": tiny("apg", damping=4e-4),
     "apg, skew, end within a segment": tiny("apg", task="skew", steps=20),
+    "apg, held for longer than it sees": tiny("apg", offsets=(1, 2)),
     "observe, ppo": tiny("observe", estimator="ppo"),
     "sac, gSDE": tiny("sac", settings=("learning_starts=40", "buffer_size=200", "use_sde=True")),
 }

@@ -83,16 +83,22 @@ def test_a_video_that_breaks_off_leaves_the_old_one(tmp_path):
     ("options", "message"),
     [
         (["--out", "x.gif"], "out: expected a file that ends in .mp4"),
-        (["--policy", "dlss"], "Did you mean 'dls'?"),
         *((["--width", width], "width: expected") for width in ("476", "481", "3844")),
         (["--fps", "0"], "fps: expected"),
+        (["--fps", "1e6"], "fps: expected a finite number from 0.1 to 1000, got 1000000.0."),
+        (["--fps", "1e300"], "fps: expected 0, or an absolute value from 1e-12 to 1e+12, got 1e+300."),
         (["--speed", "-1"], "speed: expected"),
+        (["--speed", "1e-300"], "speed: expected 0, or an absolute value from 1e-12 to 1e+12, got 1e-300."),
+        (["--speed", "1e-9"], "fps, speed: expected at most 100000 pictures, got fps 30 and speed 1e-09."),
+        (["--seed", "1" + 23 * "0"], "seed: expected 0, or an absolute value"),
+        (["--policy", "dls", "dlss"], "Did you mean 'dls'?"),  # before dls is played
     ],
 )
 def test_mistakes(options, message, capsys, tmp_path, monkeypatch):
     pytest.importorskip("moviepy")
     monkeypatch.chdir(tmp_path)
-    assert main(["video", "--steps", "2", "--out", "x.mp4", *options]) == 2
+    out = [] if "--out" in options else ["--out", "x.mp4"]
+    assert main(["video", "--steps", "2", *out, *options]) == 2
     assert message in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
 

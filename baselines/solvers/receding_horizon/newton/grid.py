@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ikgym.kernels.jit import expanded, kernel, uncounted
+from ikgym.kernels.jit import expanded, inner, uncounted
 
 Floats = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
@@ -119,7 +119,7 @@ def first_knots(grid, knots):
     return Grid(grid.at[:knots], grid.length[:knots], grid.tracking[:knots], grid.velocity[:knots])
 
 
-@kernel
+@inner
 def empty_grid(knots):
     """A grid to be filled by :func:`cut`."""
     weights = np.empty((3, knots))

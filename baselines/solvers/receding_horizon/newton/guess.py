@@ -8,7 +8,7 @@ import numpy as np
 
 from baselines.solvers.linear_algebra import damped_step, dot
 from ikgym.kernels import tasks as task_kernels
-from ikgym.kernels.jit import inlined, kernel, uncounted
+from ikgym.kernels.jit import inlined, inner, kernel, uncounted
 from ikgym.kernels.kinematics import forward_and_jacobian
 
 # Damped steps that bring the arm from one knot to the next.
@@ -21,7 +21,7 @@ DRIFTS = (1.0, 10.0)
 STREAM = 256
 
 
-@kernel
+@inner
 def initial_guess(problem, first, drift, damping, path, workspace):
     """Goes from knot to knot by damped least squares, drifting in the null space of the task.
 

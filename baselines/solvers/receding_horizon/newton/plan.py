@@ -12,7 +12,7 @@ from baselines.solvers.receding_horizon.newton.guess import DAMPING, STREAM, dra
 from baselines.solvers.receding_horizon.newton.interior_point import cost_within, minimise_path
 from baselines.solvers.receding_horizon.newton.minimise import NewtonSettings
 from baselines.solvers.receding_horizon.newton.workspace import NewtonWorkspace, newton_workspace
-from ikgym.kernels.jit import expanded, kernel, uncounted
+from ikgym.kernels.jit import expanded, inner, uncounted
 
 Floats = npt.NDArray[np.float64]
 
@@ -62,7 +62,7 @@ class PlanWorkspace(NamedTuple):
     old_grid: Grid
 
 
-@kernel
+@inner
 def plan_workspace(kind, m, knots, n, width, limited):
     """The workspace for plans of ``knots`` knots and ``width`` multipliers a knot; see :func:`newton_workspace`."""
     kept = plan_in(np.empty(knots * (n + width)), knots, n)
@@ -97,7 +97,7 @@ def shift_plan(old_grid, plan, grid, workspace):
             plan.path[k, j] = shifted[k, j]
 
 
-@kernel
+@inner
 def initial_plan(problem, settings, plan, workspace):
     """The initial plan of an episode: the cheapest of several initial guesses, each a few Newton steps on.
 
@@ -136,7 +136,7 @@ def _guess(problem, settings, first, damping, path, workspace):
         slow_down(problem, path)
 
 
-@kernel
+@inner
 def try_start(problem, settings, steps, plan, cost, number, workspace):
     """Improves a random guess by some Newton steps; it replaces the plan where it is cheaper.
 
@@ -163,7 +163,7 @@ def try_start(problem, settings, steps, plan, cost, number, workspace):
     return minimum.steps
 
 
-@kernel
+@inner
 def branch_off(problem, settings, plan, anew, number, candidate, workspace):
     """Begins a restart candidate: the plan up to a random knot, and from there on a random guess.
 
@@ -185,7 +185,7 @@ def branch_off(problem, settings, plan, anew, number, candidate, workspace):
     _guess(problem, settings, branch, damping, candidate.path[:knots], workspace)
 
 
-@kernel
+@inner
 def improve_candidate(problem, settings, rate, plan, cost, candidate, age, workspace):
     """Improves a restart candidate by some Newton steps; it replaces the plan where it is cheaper.
 
@@ -217,7 +217,7 @@ def improve_candidate(problem, settings, rate, plan, cost, candidate, age, works
     return minimum.steps
 
 
-@kernel
+@inner
 def _copy(plan, out):
     out.path[:] = plan.path
     out.multipliers[:] = plan.multipliers

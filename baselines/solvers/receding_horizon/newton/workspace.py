@@ -10,7 +10,7 @@ import numpy.typing as npt
 from baselines.solvers.receding_horizon.horizon import ProblemData
 from baselines.solvers.receding_horizon.newton.grid import Grid
 from ikgym.kernels import tasks as task_kernels
-from ikgym.kernels.jit import expanded, kernel
+from ikgym.kernels.jit import expanded, inner
 
 Floats = npt.NDArray[np.float64]
 
@@ -161,7 +161,7 @@ def joints_at(problem, path, k, knot):
 # Arrays of the same shape are parts of one: an allocation takes 40 ns, and all of them once took 0.9 µs of a `predict`.
 
 
-@kernel
+@inner
 def knot_workspace(kind, m, n):
     """The workspace of one knot, for task coordinates of ``m`` numbers and ``n`` joints."""
     e = task_kernels.error_size(kind, m)
@@ -183,7 +183,7 @@ def knot_workspace(kind, m, n):
     )
 
 
-@kernel
+@inner
 def newton_workspace(kind, m, knots, n, limited=False):
     """The workspace for paths of up to ``knots`` knots, task coordinates of ``m`` numbers and ``n`` joints.
 

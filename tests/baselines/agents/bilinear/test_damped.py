@@ -10,6 +10,7 @@ from baselines.agents.bilinear.processing import Bilinear
 from baselines.agents.network import Network
 from ikgym.exceptions import InvalidInputError
 from tests.baselines.agents.bilinear.test_bilinear import OFFSETS, ROWS, batch_of, outputs, problem_of, qdot
+from tests.baselines.random_agents import nothing_held
 
 DAMPING = 4e-3
 DAMPED = Bilinear(OFFSETS, DAMPING)
@@ -86,7 +87,8 @@ def test_an_untrained_network_is_damped_least_squares():
     near = batch.q + np.random.default_rng(2).normal(scale=1e-4, size=batch.q.shape)
     batch = batch._replace(nominal=np.stack([problem.task.coordinates(*arm.forward(near))] * 3, 1))
     sizes = DAMPED.size(problem), DAMPED.outputs(problem)
-    actions = DAMPED.act(problem, batch, Network((np.zeros(sizes[::-1]),), (np.zeros(sizes[1]),), "silu", "linear"))
+    net = Network((np.zeros(sizes[::-1]),), (np.zeros(sizes[1]),), "silu", "linear")
+    actions = DAMPED.act(problem, batch, net, 1, nothing_held(DAMPED, problem, len(batch.q)))
     moved = batch.q + problem.dt * actions * problem.velocity_limit
     after = problem.task.error(batch.nominal[:, 0], problem.task.coordinates(*arm.forward(moved)))
     before = problem.task.error(batch.nominal[:, 0], batch.pose)

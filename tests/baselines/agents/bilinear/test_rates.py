@@ -14,7 +14,7 @@ from baselines.training.gradients.law import Law
 from ikgym import scenarios
 from ikgym.rl.twists import twist
 from tests.baselines.agents.bilinear.test_bilinear import OFFSETS, ROWS, batch_of, features, problem_of, qdot
-from tests.baselines.random_agents import network
+from tests.baselines.random_agents import network, nothing_held
 
 DAMPED = Bilinear(OFFSETS, 1e-3)
 TWISTS = len(OFFSETS) - 1
@@ -99,6 +99,6 @@ def test_one_call_is_the_parts_of_the_law(arm, task, damping):
         held = np.empty((ROWS, Bilinear(OFFSETS).outputs(problem)))
         held_rows(kind, chain, damping, batch.q, output, held)
         output = held
-    found = processing.act(problem, batch, net)
+    found = processing.act(problem, batch, net, 1, nothing_held(processing, problem, ROWS))
     np.testing.assert_allclose(found, qdot(problem, batch, output) / problem.velocity_limit, rtol=1e-15)
     assert np.ptp(found) > 0.0

@@ -1,0 +1,141 @@
+"""Reading the words after a command; whatever is wrong with them is refused in one line, before anything is done."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import io
+import pathlib
+import re
+import sys
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, TypeVar
+
+import tyro
+
+from ikgym import scenarios
+from ikgym.exceptions import InvalidInputError
+from ikgym.scenarios import Scenario
+from ikgym.validation import check_sizes
+
+#: Patterns in messages of tyro, and plainer texts.
+PLAINER = (
+    (r"no type matching (?:\{None\}\|)?(\S+) could be instantiated from \['(.*?)'\].*", r"expected \1, got '\2'"),
+    (r"invalid literal for int\(\) with base 10: ", "expected a whole number, got "),
+    (r"could not convert string to float: ", "expected a number, got "),
+    (r"Expected 1 values", "Expected one"),
+    (r"Error parsing [A-Z]\w+: ", ""),
+    (r" Arguments are applied to the directly preceding subcommand.*", ""),
+    (r"(Missing from .*?: --\S+).*", r"\1"),
+)
+
+
+T = TypeVar("T")
+
+
+@dataclasses.dataclass(frozen=True)
+class Rule:
+    """Options that have an effect only together with others.
+
+    Args:
+        names: The options, such as ``"--resume"``.
+        used: Whether they have an effect, given all options of the command.
+        otherwise: When they have none, such as "without --out", for the message.
+    """
+
+    names: tuple[str, ...]
+    used: Callable[[Any], bool]
+    otherwise: str
+
+
+def parse(kind: type[T], arguments: Sequence[str], *, prog: str, description: str, rules: Iterable[Rule] = ()) -> T:
+    """Reads the words after a command. Modules in the current folder can be imported from then on.
+
+    Args:
+        kind: The type of the options, for :func:`tyro.cli`.
+        arguments: The words.
+        prog: The name of the command.
+        description: The text of ``--help`` above the options.
+        rules: Options that are refused where they have no effect.
+
+    Raises:
+        InvalidInputError: An option is unknown, missing, repeated, refused or without effect, or its value is empty or
+            far beyond any sensible size; the message is one line.
+        UnknownNameError: A rule looks at a scenario that does not exist.
+        SystemExit: With 0 after ``--help``.
+    """
+    given = _given(arguments)
+    find_own_modules()
+    said = io.StringIO()
+    try:
+        with contextlib.redirect_stderr(said):
+            options = tyro.cli(kind, prog=prog, description=description, args=list(arguments))
+    except SystemExit as e:
+        if e.code:
+            raise InvalidInputError(f"{_in_one_line(said.getvalue())} See {prog} --help.") from None
+        raise
+    check_sizes("", options)
+    for rule in rules:
+        for name in rule.names:
+            if name in given and not rule.used(options):
+                raise InvalidInputError(f"{given[name]} has no effect {rule.otherwise}.")
+    return options
+
+
+def varies(scenario: str | Scenario) -> bool:
+    """Whether the episodes of a scenario differ from reset to reset.
+
+    Raises:
+        UnknownNameError: There is no such scenario.
+        InvalidInputError: Its file or module gives none.
+    """
+    found = scenarios.find(scenario)
+    return found.random or found.plant.random
+
+
+def find_own_modules() -> None:
+    """Lets modules in the current folder be imported, which a console command does not search."""
+    if (here := str(pathlib.Path.cwd())) not in sys.path:
+        sys.path.append(here)
+
+
+def _given(arguments: Sequence[str]) -> dict[str, str]:
+    """The options as they are spelt in the help, and as they were given.
+
+    Raises:
+        InvalidInputError: One is given twice, or has an empty text as its value.
+    """
+    out: dict[str, str] = {}
+    last = "the command"
+    for word in arguments:
+        option, equals, value = word.partition("=")
+        if not word or (option.startswith("--") and equals and not value):
+            raise InvalidInputError(f"{option or last}: expected a value, got an empty text.")
+        if not option.startswith("--"):
+            continue
+        name = option.replace("_", "-").replace("--no-", "--", 1)
+        if name in out:
+            raise InvalidInputError(f"{option} is given twice: expected each option once, with all of its values.")
+        out[name], last = option, option
+    return out
+
+
+def _in_one_line(box: str) -> str:
+    """The message in a box of tyro's: the mistake, and the names that are available."""
+    sections: list[list[str]] = [[]]
+    for line in re.sub(r"\x1b\[[0-9;]*m", "", box).splitlines():
+        row = line.strip("│ ")
+        if not row.strip("─-"):
+            sections.append([])
+        elif not row.startswith(("╭", "╰")):
+            sections[-1].append(row)
+    # Where nothing but ASCII can be printed there is no frame that holds the title: it is a section.
+    texts = [" ".join(section) for section in sections if section][0 if "╭" in box else 1 :]
+    message, more = (*texts, "", "")[:2]
+    for pattern, plain in PLAINER:
+        message = re.sub(pattern, plain, message)
+    if listed := re.match(r"Available subcommands: ([\w, -]+)", more):
+        message += f". Available: {listed[1].strip()}"
+    if near := re.match(r"Perhaps you meant:? (\S+)", more):
+        message += f". Did you mean {near[1]!r}?"
+    return message if message.endswith(("?", ".")) else f"{message}."

@@ -1,0 +1,73 @@
+"""The nominal frames of N episodes along joint splines, each computed when a step first needs it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ikgym.scenarios.scenario import Scenario
+from ikgym.trajectories import JointSplines, RandomJointSpline, Trajectory
+from ikgym.validation import FloatArray
+
+Integers = npt.NDArray[np.int64]
+
+
+class SplineFrames:
+    """Tables of frames that :func:`ikgym.kernels.splines.complete` fills in, so that an episode begins in no time.
+
+    Args:
+        scenario: The scenario, whose trajectory is a `RandomJointSpline`.
+        rows: N.
+        ahead: Steps ahead that are shown, rising.
+        memory: Most memory for the frames of all rows, in bytes. Where all points would take more, later ones take the
+            place of earlier ones; a table always has room for all that is shown at once.
+    """
+
+    in_blocks = False
+
+    def __init__(self, scenario: Scenario, rows: int, ahead: tuple[int, ...], memory: int) -> None:
+        self._scenario = scenario
+        self.point = scenario.points(ahead)
+        self._points, width = int(self.point[-1]) + 1, 12 if scenario.task.has_orientation else 3
+        affordable = memory // (8 * width * rows)
+        self.shape = (rows, min(self._points, max(affordable, ahead[-1] + 1)), width)
+        self._preview = np.array(ahead, dtype=np.int64)
+
+    def allocate(self) -> FloatArray:
+        """The tables, of :attr:`shape`, when there is memory for them."""
+        rows, slots, _ = self.shape
+        spline: Any = self._scenario.trajectory
+        self._motions = JointSplines(np.zeros((rows, spline.spans + 3, self._scenario.joints)), spline.duration)
+        self._first, self._known = np.zeros(rows, dtype=np.int64), np.full((rows, slots), -1)
+        return np.zeros(self.shape)
+
+    @property
+    def slots(self) -> Integers:
+        """Index of the target after k steps in a table. Shape (steps + furthest preview + 1,)."""
+        return self.point % self.shape[1]
+
+    def begin(self, tables: FloatArray, rows: Integers, episodes: Sequence[Trajectory], steps: Integers) -> None:
+        """Begins new episodes; the arguments are those of `NominalFrames.begin`."""
+        del tables, steps
+        self._motions.control[rows] = episodes.control  # type: ignore[attr-defined]  # JointSplines
+        self._first[rows] += self._points
+
+    def arguments(self) -> tuple[Any, ...]:
+        """The first arguments of the kernel."""
+        motions, scenario = self._motions, self._scenario
+        shown = motions.control, motions.duration, scenario.dt, self._first, self.point, self._preview, self._known
+        return *scenario.model.chain, *shown
+
+    def positions(self, row: int) -> FloatArray:
+        """The nominal positions of a row's episode in [m], one a step. Shape (steps + 1, 3)."""
+        point = self.point[: self._scenario.steps + 1]
+        positions: FloatArray = self._scenario.frames(self._motions[row], int(point[-1]) + 1)[point, -3:]
+        return positions
+
+
+def draws_splines(scenario: Scenario) -> bool:
+    """Whether the episodes of a scenario are joint splines; a subclass may draw others."""
+    return type(scenario.trajectory) is RandomJointSpline
