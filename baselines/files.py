@@ -20,10 +20,12 @@ import numpy as np
 import numpy.typing as npt
 
 from ikgym import files
-from ikgym.exceptions import IkgymError
+from ikgym.exceptions import IkgymError, InvalidInputError
 
 logger = logging.getLogger("ikgym")
 
+#: Largest size in bytes of a file that is read.
+LARGEST = 2**32
 #: The file in a folder that is locked. It holds the number of the process that writes into the folder.
 LOCK = ".lock"
 # Seconds between two attempts to get a lock.
@@ -59,6 +61,22 @@ def write_json(file: pathlib.Path, value: object) -> None:
     write(file, (json.dumps(value, indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode())
 
 
+def read_bytes(file: pathlib.Path, most: int = LARGEST) -> bytes:
+    """The content of a file, see :func:`ikgym.files.read_user_file`.
+
+    Args:
+        file: The file.
+        most: Largest size in bytes.
+
+    Raises:
+        ResultsError: It cannot be read.
+    """
+    try:
+        return files.read_user_file(file, most)
+    except InvalidInputError as e:
+        raise ResultsError(str(e)) from None
+
+
 def read_json(file: pathlib.Path, advice: str = "") -> Any:
     """The value in a JSON file.
 
@@ -70,7 +88,7 @@ def read_json(file: pathlib.Path, advice: str = "") -> Any:
         ResultsError: It cannot be read, or is not JSON.
     """
     with reading(file, advice):
-        return json.loads(file.read_bytes())
+        return json.loads(read_bytes(file))
 
 
 def read_arrays(file: pathlib.Path, advice: str = "") -> dict[str, npt.NDArray[Any]]:
@@ -83,7 +101,7 @@ def read_arrays(file: pathlib.Path, advice: str = "") -> dict[str, npt.NDArray[A
     Raises:
         ResultsError: It cannot be read, or is damaged.
     """
-    with reading(file, advice), np.load(io.BytesIO(file.read_bytes()), allow_pickle=False) as arrays:
+    with reading(file, advice), np.load(io.BytesIO(read_bytes(file)), allow_pickle=False) as arrays:
         return dict(arrays)
 
 

@@ -18,7 +18,6 @@ import json
 import operator
 import os
 import pathlib
-import tomllib
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -32,13 +31,13 @@ from optuna.trial import FrozenTrial, Trial, TrialState
 from baselines import registry
 from baselines.canonical import DIGITS, canonical, rounded
 from baselines.episodes import add_up, rollouts
-from baselines.files import ResultsError, check_flags, reading
+from baselines.files import ResultsError, check_flags, read_bytes, reading
 from baselines.fingerprints import fingerprint
 from baselines.spec import parse_policy
 from baselines.workers import Workers, finished
 from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError
-from ikgym.files import read_user_file
+from ikgym.files import read_user_toml
 from ikgym.scenarios import Scenario
 from ikgym.validation import known_names, whole_number
 
@@ -175,10 +174,7 @@ def read(file: pathlib.Path) -> dict[str, dict[str, Range]]:
         InvalidInputError: The file cannot be read, or a range is invalid.
         UnknownNameError: A range has an unknown key.
     """
-    try:
-        tables = tomllib.loads(read_user_file(file).decode())
-    except (ValueError, RecursionError) as e:
-        raise InvalidInputError(f"{file} is not TOML: {e}.") from None
+    tables = read_user_toml(file)
     for spec, table in tables.items():
         for name, line in table.items() if isinstance(table, dict) else [("", table)]:
             if not isinstance(line, dict):
@@ -265,27 +261,28 @@ def run(
         For each solver: `spec`, best `settings`, number of trials `tried`, cost by `default` and when `tuned`.
 
     Raises:
+        InvalidInputError: There are too many workers, or none.
         ResultsError: There is a journal and neither flag is given, or it is of another search, or damaged.
         WorkerError: A worker died.
     """
-    file = folder / JOURNAL
+    file, crew = folder / JOURNAL, Workers(workers)
     check_flags(file, resume=resume, overwrite=overwrite)
     if overwrite:
         file.unlink(missing_ok=True)
     pathlib.Path(f"{file}.lock").unlink(missing_ok=True)  # of a process that was killed
     with reading(file, "Begin again with --overwrite."):
         if file.exists():  # without a line that was not written to its end
-            content = file.read_bytes()
+            content = read_bytes(file)
             os.truncate(file, content.rfind(b"\n") + 1)
         for one in wanted:
             _begin(file, one)
-    units = [(file, one, trials, worker) for one in wanted for worker in range(workers)]
-    if workers == 1:
+    units = [(file, one, trials, worker) for one in wanted for worker in range(crew.number)]
+    if crew.here:
         for unit in units:
             _work(unit)
     else:
         # Not retried: a killed process may leave the journal locked.
-        with contextlib.closing(finished(_work, units, Workers(workers), tries=1)) as done:
+        with contextlib.closing(finished(_work, units, crew, tries=1)) as done:
             for _, future in done:
                 future.result()
     return [_best(_study(file, one), one) for one in wanted]

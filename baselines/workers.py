@@ -30,8 +30,8 @@ TRIES = 3
 #: Relative difference that is allowed between costs on different kinds of processors. On processors of one kind they
 #: are identical, bit for bit.
 TOLERANCE = 1e-6
-#: Most tasks of a cluster at the same time.
-MOST_TASKS = 1000
+#: Most processes of this machine, and most tasks of a cluster at the same time.
+MOST = 1000
 #: The environment variable with the address of the cluster.
 ADDRESS = "RAY_ADDRESS"
 #: How a cluster is started, for messages.
@@ -64,7 +64,7 @@ class Workers:
         cluster: The kind of cluster, one of :data:`CLUSTERS`; it takes precedence over the number.
 
     Raises:
-        InvalidInputError: The number is not a whole number of at least 1.
+        InvalidInputError: The number is not a whole number from 1 to :data:`MOST`.
         UnknownNameError: There is no such kind of cluster.
     """
 
@@ -72,7 +72,7 @@ class Workers:
     cluster: str | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "number", whole_number("workers", self.number, at_least=1))
+        object.__setattr__(self, "number", whole_number("workers", self.number, at_least=1, at_most=MOST))
         if self.cluster is not None:
             known_name("cluster", self.cluster, CLUSTERS)
 
@@ -118,7 +118,7 @@ def finished(
         MissingDependencyError: Ray is not installed.
         ClusterError: The cluster cannot be reached.
     """
-    started, number = (_processes, workers.number) if workers.cluster is None else (_tasks, MOST_TASKS)
+    started, number = (_processes, workers.number) if workers.cluster is None else (_tasks, MOST)
     with started() as call, contextlib.ExitStack() as stack:
         threads = ThreadPoolExecutor(max(1, min(number, len(units))), thread_name_prefix="worker")
         stack.callback(threads.shutdown, wait=False, cancel_futures=True)

@@ -4,9 +4,17 @@ from __future__ import annotations
 
 import os
 import pathlib
+import re
 import stat
+import tomllib
+from typing import Any
 
 from ikgym.exceptions import InvalidInputError
+
+#: Largest size of a TOML file in bytes.
+LARGEST_TOML = 2**24
+# The time of `tomllib` grows with the square of the number of names in a dotted key.
+_LONG_KEY = re.compile(rb"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){50}""")
 
 
 def write(file: pathlib.Path, content: bytes) -> None:
@@ -56,3 +64,18 @@ def read_user_file(file: str | os.PathLike[str], most: int = 2**28) -> bytes:
         raise
     except (OSError, TypeError, ValueError) as e:  # such as a path with a null byte
         raise InvalidInputError(f"Cannot read {file}: {getattr(e, 'strerror', None) or e}.") from None
+
+
+def read_user_toml(file: str | os.PathLike[str]) -> dict[str, Any]:
+    """The content of a TOML file of a user.
+
+    Raises:
+        InvalidInputError: It cannot be read, see :func:`read_user_file`, or is no TOML.
+    """
+    content = read_user_file(file, LARGEST_TOML)
+    if _LONG_KEY.search(content):
+        raise InvalidInputError(f"{file}: expected keys of at most 50 names, got one with more dots.")
+    try:
+        return tomllib.loads(content.decode())
+    except (ValueError, RecursionError) as error:
+        raise InvalidInputError(f"{file}: expected TOML in UTF-8, got a fault: {error}.") from None

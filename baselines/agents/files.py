@@ -14,10 +14,9 @@ from safetensors.numpy import load, save
 import ikgym
 from baselines.agents.processing import NetworkLike, Processing
 from baselines.canonical import canonical
-from baselines.files import ResultsError, reading, write
+from baselines.files import ResultsError, read_bytes, reading, write
 from baselines.fingerprints import arm_fingerprint, fingerprint
 from ikgym.exceptions import InvalidInputError
-from ikgym.files import read_user_file
 from ikgym.kernels import cost as cost_kernels
 from ikgym.scenarios import Scenario
 
@@ -25,6 +24,8 @@ from ikgym.scenarios import Scenario
 FORMAT: Final = 2
 #: The key of the JSON text in the metadata of the file.
 KEY: Final = "ikgym"
+#: Largest size of a file in bytes.
+MOST_BYTES = 2**28
 #: Digits of a hash that identify an agent in results.
 DIGITS = 12
 #: Strings and numbers that every file contains.
@@ -123,12 +124,8 @@ def load_agent(file: pathlib.Path, kinds: Sequence[type[Processing]]) -> AgentFi
     Raises:
         ResultsError: There is no such file, it is damaged, or it has another format.
     """
-    try:
-        content = read_user_file(file)
-    except InvalidInputError as e:
-        raise ResultsError(str(e)) from None
     with reading(file):
-        return _parsed(str(file), content, {kind.kind: kind for kind in kinds})
+        return _parsed(str(file), read_bytes(file, MOST_BYTES), {kind.kind: kind for kind in kinds})
 
 
 def _parsed(source: str, content: bytes, kinds: Mapping[str, type[Processing]]) -> AgentFile:

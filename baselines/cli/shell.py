@@ -18,6 +18,7 @@ import numpy as np
 import tyro
 
 from baselines.cli.parsing import Rule, parse
+from baselines.workers import MOST
 from ikgym.exceptions import IkgymError, UnknownNameError
 from ikgym.validation import FloatArray, whole_number
 
@@ -107,7 +108,7 @@ def run_resumable(
     """Reads the options of a command that writes into the folder of ``--out``, and does its work.
 
     Args:
-        kind: The type of the options; `workers`, `episodes` and `trials`, if there are such, must be at least 1.
+        kind: The type of the options; `workers`, `episodes` and `trials`, if there are such, are checked.
         arguments: The words after the command; those of the process if left out.
         prog: The name of the command.
         manual: Gives the text of ``--help`` above the options for that name.
@@ -123,9 +124,9 @@ def run_resumable(
         nonlocal out
         options = parse(kind, given, prog=prog, description=manual(prog), rules=rules)
         out = options.out
-        for name in ("workers", "episodes", "trials"):
+        for name, most in (("workers", MOST), ("episodes", None), ("trials", None)):
             if (value := getattr(options, name, None)) is not None:
-                whole_number(name, value, at_least=1)
+                whole_number(name, value, at_least=1, at_most=most)
         work(options, shlex.join([*prog.split(), *given]))
         return 0
 

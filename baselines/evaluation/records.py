@@ -18,7 +18,7 @@ from baselines import registry
 from baselines.canonical import canonical, jsonable
 from baselines.evaluation.metrics import Row
 from baselines.evaluation.summary import Summary, by_seed, geometric_interval, geometric_mean, summarise
-from baselines.evaluation.table import NOTHING, grid, number
+from baselines.evaluation.table import NOTHING, code, escaped, grid, number
 from baselines.oracle import best_known
 from baselines.spec import parse_policy
 from ikgym.exceptions import InvalidInputError
@@ -181,10 +181,10 @@ def _cell(line: Record, name: str) -> str:
     if _ends(name, "low"):
         return f"{number(float(value))} … {number(float(line[name.removesuffix('low') + 'high']))}"
     if name in CODE:
-        return "`" + str(value).replace("|", "\\|") + "`"
+        return code(str(value)).replace("|", "\\|")
     found = _value(value)
     if found is None:
-        return str(value)
+        return escaped(str(value))
     if found.is_integer() and "." not in str(value):
         return f"{found:,.0f}"
     if name.endswith("_percent"):

@@ -13,7 +13,7 @@ from baselines.canonical import canonical
 from baselines.evaluation.jobs import Skipped
 from baselines.evaluation.metrics import FOLLOWED_ORIENTATION, FOLLOWED_POSITION, LOST_ORIENTATION, LOST_POSITION, Row
 from baselines.evaluation.summary import Paired, Spread, Summary, by_scenario, is_reference, summarise
-from baselines.evaluation.table import NOTHING, Column, escaped, fitting, markdown, number, plain
+from baselines.evaluation.table import NOTHING, Column, code, escaped, fitting, markdown, number, plain
 from baselines.oracle import best_known
 
 #: Characters that a line of the printed tables may have.
@@ -125,7 +125,7 @@ def readme(
     out = ["# Results", ""]
     parameters = ["| scenario | policy | parameters |", "|---|---|---|"]
     for scenario, summaries in by_scenario(rows).items():
-        out += [f"## {heading(scenario, summaries)}", "", markdown(COLUMNS, summaries), ""]
+        out += [f"## {escaped(heading(scenario, summaries))}", "", markdown(COLUMNS, summaries), ""]
         if spread := _spread(summaries):
             out += [f"{_score(summaries).capitalize()} over the episodes:", "", markdown(spread, summaries), ""]
         for group, files in (pictures or {}).get(scenario, {}).items():
@@ -136,14 +136,14 @@ def readme(
                 out += [f"![{escaped(caption)}]({quote(file.as_posix())})", "", f"*{escaped(caption)}.*", ""]
             out += ["</details>", ""] if collapsed else []
         for one in summaries:
-            values = ", ".join(f"`{name}={value}`" for name, value in one.first.parameters.items()) or NOTHING
+            values = ", ".join(code(f"{name}={value}") for name, value in one.first.parameters.items()) or NOTHING
             values = values.replace("|", "\\|")  # nothing else has a meaning in code
             parameters.append(f"| {escaped(scenario)} | {escaped(one.label)} | {values} |")
     out += ["## Notes", "", *(f"- {escaped(note)}" for note in remarks(rows)), ""]
     if skipped:
         out += ["Skipped, since the policy does not suit the scenario:", ""]
-        out += [f"- {s.policy} in {s.scenario}: {escaped(s.reason)}" for s in skipped] + [""]
-    out += ["## Parameters", "", *parameters, "", "## Conditions", "", f"- command: `{command}`"]
+        out += [f"- {escaped(f'{s.policy} in {s.scenario}: {s.reason}')}" for s in skipped] + [""]
+    out += ["## Parameters", "", *parameters, "", "## Conditions", "", f"- command: {code(command)}"]
     out += [f"- finished: {date:%Y-%m-%d %H:%M} UTC", *(f"- {escaped(one)}" for one in machines(rows))]
     out.append(
         "- Times are those of single calls on one thread, without the first call and without garbage collection."

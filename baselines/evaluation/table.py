@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
 from collections.abc import Callable, Iterable, Sequence
 from html import escape
 
@@ -141,8 +142,15 @@ def html(columns: Sequence[Column], summaries: Sequence[Summary]) -> str:
 
 
 def escaped(text: str) -> str:
-    """A text for a cell in Markdown."""
-    return text.replace("|", "\\|").replace("*", "\\*")
+    """A text that Markdown, and MDX, shows letter by letter in one line; tags and expressions in it do not run."""
+    return re.sub(r"[\\`*{}\[\]<>&#|~!$]|(?<![^\W_])_|_(?![^\W_])", r"\\\g<0>", " ".join(text.split()))
+
+
+def code(text: str) -> str:
+    """A text as code in Markdown, in one line."""
+    line = " ".join(text.split())
+    fence = "`" * (1 + max(map(len, re.findall("`+", line)), default=0))
+    return f"{fence} {line} {fence}" if "`" in line else f"{fence}{line}{fence}"
 
 
 def grid(head: Sequence[str], lines: Iterable[Sequence[str]], *, text: Sequence[int] = ()) -> str:

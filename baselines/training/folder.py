@@ -18,7 +18,7 @@ import pathlib
 from collections.abc import Mapping
 from typing import Any
 
-from baselines.files import ResultsError, read_json, reading, resumed, write
+from baselines.files import ResultsError, read_bytes, read_json, reading, resumed, write
 
 #: The version of `run.json` and of `checkpoint.pt`.
 FORMAT = 3
@@ -121,7 +121,7 @@ class Checkpoint:
         import torch
 
         with reading(file, "Begin anew with --overwrite."):
-            content = torch.load(io.BytesIO(_payload(file.read_bytes())), map_location="cpu", weights_only=True)
+            content = torch.load(io.BytesIO(_payload(read_bytes(file))), map_location="cpu", weights_only=True)
             if content.pop("format") != FORMAT:
                 raise ValueError("it has another format")
             return cls(**content)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import importlib
 import pathlib
-import tomllib
 from typing import TYPE_CHECKING, Any
 
 from baselines.training.config import APG, PPO, SAC, TD3, Config, Observe
 from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.files import read_user_toml
 from ikgym.scenarios import Scenario
 
 if TYPE_CHECKING:  # the command line is read without PyTorch
@@ -49,7 +49,7 @@ def new_trainer(config: Config, scenario: Scenario, seed: int) -> Trainer:
 
 def preset_names() -> tuple[str, ...]:
     """The presets that come with the training."""
-    return tuple(_read(PRESETS))
+    return tuple(read_user_toml(PRESETS))
 
 
 def configure(kind: type[Config], preset: str | None) -> Config:
@@ -66,17 +66,10 @@ def configure(kind: type[Config], preset: str | None) -> Config:
     if preset is None:
         return kind()
     if preset.endswith(".toml"):
-        return kind.from_json(_read(pathlib.Path(preset)))
-    tables = _read(PRESETS)
+        return kind.from_json(read_user_toml(preset))
+    tables = read_user_toml(PRESETS)
     if preset not in tables:
         raise UnknownNameError("preset", preset, tables)
     if kind.method not in tables[preset]:
         raise InvalidInputError(f"The preset {preset} is for {', '.join(tables[preset])}, not for {kind.method}.")
     return kind.from_json(tables[preset][kind.method])
-
-
-def _read(file: pathlib.Path) -> dict[str, Any]:
-    try:
-        return tomllib.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as e:
-        raise InvalidInputError(f"Cannot read the preset {file}: {e}.") from None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import io
 import pathlib
 from typing import Any, NamedTuple
 
@@ -13,7 +14,10 @@ import yourdfpy
 from baselines.viewer.readings import FREE, Colour, Reading
 from baselines.viewer.replay import size
 from ikgym.arms import Arm
+from ikgym.arms.urdf import MAX_BYTES
+from ikgym.arms.urdf_check import parse
 from ikgym.exceptions import InvalidInputError
+from ikgym.files import read_user_file
 from ikgym.validation import FloatArray
 
 # Radii and half a length, as shares of the arm's reach.
@@ -21,6 +25,10 @@ LINK, JOINT, JOINT_HALF, TOOL, RAIL = 0.016, 0.026, 0.034, 0.026, 0.009
 # Largest difference in [m], or in entries of a rotation, between the tools of an arm and of its URDF file. Files that
 # have 1.57 for half of π are off by more than a millimetre.
 TOLERANCE = 5e-3
+#: Formats of meshes. Archives, and glTF, can describe more vertices than any memory holds.
+FORMATS = ("dae", "obj", "ply", "stl")
+#: Most bytes of all meshes of an arm together, and most links and shapes of its URDF file.
+MOST_BYTES, MOST_PARTS = 2**27, 2000
 
 
 class Shape(NamedTuple):
@@ -103,6 +111,53 @@ def joint_frames(arm: Arm, q: FloatArray) -> tuple[FloatArray, FloatArray]:
     return positions, np.hstack([np.cos(half)[:, None], np.sin(half)[:, None] * arm.axes])
 
 
+class _Model(yourdfpy.URDF):  # type: ignore[misc]  # yourdfpy has no types
+    """A model whose meshes are read within bounds.
+
+    Args:
+        robot: The content of the URDF file.
+        folder: The folder of the file; meshes are searched for where the file says.
+    """
+
+    def __init__(self, robot: Any, folder: pathlib.Path) -> None:
+        self._left = MOST_BYTES
+        super().__init__(robot, filename_handler=functools.partial(yourdfpy.filename_handler_magic, dir=folder))
+
+    def _geometry2trimeshscene(self, geometry: Any, load_file: bool, force_mesh: bool, skip_materials: bool) -> Any:
+        """The method of yourdfpy that opens meshes."""
+        if geometry.mesh is None:
+            return super()._geometry2trimeshscene(geometry, load_file, force_mesh, skip_materials)
+        file = pathlib.Path(self._filename_handler(fname=geometry.mesh.filename))
+        if not file.is_file():
+            return None
+        if (kind := file.suffix[1:].lower()) not in FORMATS:
+            raise InvalidInputError(f"{file}: expected a mesh of the formats {', '.join(FORMATS)}, got {kind!r}")
+        content = read_user_file(file, self._left)
+        self._left -= len(content)
+        # Nodes of COLLADA that are instances of nodes that are instances: a kilobyte makes a billion meshes.
+        if kind == "dae" and any(element.tag.endswith("instance_node") for element in parse(content).iter()):
+            raise InvalidInputError(f"{file}: expected a COLLADA file without <instance_node>")
+        scene = trimesh.load(
+            io.BytesIO(content), kind, resolver=_Folder(str(file)), force="scene", skip_materials=skip_materials
+        )
+        for one in scene.geometry.values():
+            if not isinstance(one, trimesh.Trimesh) or one.vertices.shape[1:] != (3,):
+                raise InvalidInputError(f"{file}: expected triangles in space, got a {type(one).__name__}")
+        return scene if geometry.mesh.scale is None else scene.scaled(geometry.mesh.scale)
+
+
+class _Folder(trimesh.resolvers.FilePathResolver):  # type: ignore[misc]  # trimesh has no types here
+    """The files that a mesh refers to, such as materials and pictures: those in its folder."""
+
+    def get(self, name: str) -> bytes:
+        """The content of a file."""
+        folder = pathlib.Path(self.parent).resolve()
+        file = (folder / name.strip()).resolve()
+        if not file.is_relative_to(folder):
+            raise FileNotFoundError(name)
+        return read_user_file(file, MOST_BYTES)
+
+
 def read_urdf(file: pathlib.Path, arm: Arm) -> list[Shape]:
     """The meshes in a URDF file, if it describes the arm.
 
@@ -111,13 +166,16 @@ def read_urdf(file: pathlib.Path, arm: Arm) -> list[Shape]:
         arm: An arm with joints of the same names and the same motion between base and tool.
 
     Raises:
-        InvalidInputError: The file cannot be read, has no visible shapes, lacks joints, or moves differently.
+        InvalidInputError: The file or a mesh cannot be read, or is too large; it has no visible shapes, lacks joints,
+            or moves differently.
     """
-    if not file.is_file():
-        raise InvalidInputError(f"urdf: expected a file, got {str(file)!r}.")
+    content = read_user_file(file, MAX_BYTES)
     try:
-        handler = functools.partial(yourdfpy.filename_handler_magic, dir=file.parent)
-        model = yourdfpy.URDF.load(str(file), filename_handler=handler)
+        parts = sum(element.tag in ("link", "visual") for element in parse(content).iter())
+        if parts > MOST_PARTS:
+            raise InvalidInputError(f"expected at most {MOST_PARTS} links and shapes, got {parts}")
+        robot = yourdfpy.URDF.load(io.BytesIO(content), build_scene_graph=False, load_meshes=False).robot
+        model = _Model(robot, file.parent)
     except Exception as e:  # the parser and the readers of meshes raise anything
         raise InvalidInputError(f"urdf: {file} cannot be read ({e}).") from e
     if not model.scene.geometry:

@@ -15,10 +15,11 @@ import numpy as np
 import viser
 from viser.transforms import SO3
 
+from baselines.evaluation.table import escaped
 from baselines.viewer.arms import Shape
 from baselines.viewer.readings import slider_range
 from baselines.viewer.scene import Scene
-from baselines.viewer.session import Mode, Session, Shown, escaped
+from baselines.viewer.session import Mode, Session, Shown
 from ikgym.exceptions import InvalidInputError
 
 # Updates of the scene and of the readings per second.

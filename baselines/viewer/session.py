@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import enum
-import re
 import time
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
+from baselines.evaluation.table import escaped
 from baselines.status import Status
 from baselines.viewer.following import Approach, follower
 from baselines.viewer.readings import Reader, Reading
@@ -182,8 +182,3 @@ class Session:
         if np.isfinite(one.cost):
             lines.append(f"- cost so far {one.cost:.4g}")
         return "\n".join(lines)
-
-
-def escaped(text: str) -> str:
-    """A name as Markdown shows it letter by letter: viser would run what stands in braces."""
-    return re.sub(r"([\\`*_{}\[\]<>&#|~!])", r"\\\1", " ".join(text.split()))

@@ -69,7 +69,7 @@ def read_chain(data: bytes, base: str | None, tip: str | None) -> tuple[str, lis
         InvalidInputError: The file is no URDF, or has no chain of readable joints from base to tip.
         UnknownNameError: There is no such link.
     """
-    robot = _parse(data)
+    robot = parse(data)
     if robot.tag != "robot":
         raise InvalidInputError(f"expected the root element <robot>, got <{robot.tag}>.")
     if any("xacro" in element.tag for element in robot):
@@ -89,7 +89,12 @@ def read_chain(data: bytes, base: str | None, tip: str | None) -> tuple[str, lis
     return _attribute("robot", robot, "name"), joints
 
 
-def _parse(data: bytes) -> Element:
+def parse(data: bytes) -> Element:
+    """The root of an XML document.
+
+    Raises:
+        InvalidInputError: It is no XML, or has a DOCTYPE.
+    """
     guard = expat.ParserCreate()
     guard.StartDoctypeDeclHandler = _refuse_doctype
     try:

@@ -17,6 +17,7 @@ from collections.abc import Callable
 
 from ikgym import problems
 from ikgym.exceptions import InvalidInputError
+from ikgym.files import read_user_toml
 from ikgym.registry import Registry
 from ikgym.scenarios import files
 from ikgym.scenarios.importing import imported
@@ -71,7 +72,7 @@ def load(file: str | os.PathLike[str]) -> Scenario:
         UnknownNameError: There is no such key, arm, task or kind of trajectory; the message has the nearest one.
         MissingDependencyError: An arm comes from a URDF file, and Pinocchio is not installed.
     """
-    table = files.read_table(file)
+    table = read_user_toml(file)
     with files.located("", file):
         base = get(table.pop("like")) if "like" in table else None
         fields = files.arguments(Scenario, table, pathlib.Path(file).parent, like=base is not None)

@@ -7,7 +7,6 @@ import dataclasses
 import inspect
 import os
 import pathlib
-import tomllib
 import typing
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
@@ -40,21 +39,6 @@ CHOICES: dict[type, Mapping[str, Callable[..., Any]]] = {
 PARTS = (Arm, Task, TrackingCost, Plant, *CHOICES)
 #: Classes in the annotations of texts.
 TEXTS = {str, type(None), os.PathLike[str]}
-#: Largest size of a file in bytes.
-LARGEST = 2**24
-
-
-def read_table(file: str | os.PathLike[str]) -> Table:
-    """The content of a TOML file.
-
-    Raises:
-        InvalidInputError: The file cannot be read, or is no TOML.
-    """
-    content = files.read_user_file(file, LARGEST)
-    try:
-        return tomllib.loads(content.decode())
-    except (ValueError, RecursionError) as error:
-        raise InvalidInputError(f"{file}: expected TOML in UTF-8, got a fault: {error}.") from None
 
 
 def arguments(

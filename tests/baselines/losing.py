@@ -20,7 +20,7 @@ class LosingCluster:
         self._numbers = itertools.count()
         monkeypatch.setattr(workers, "connect", lambda: None)
         monkeypatch.setattr(workers, "_tasks", lambda: contextlib.nullcontext(self._call))
-        monkeypatch.setattr(workers, "MOST_TASKS", 1)
+        monkeypatch.setattr(workers, "MOST", 1)
 
     def _call(self, function, unit):
         self.units.append(unit)

@@ -6,6 +6,7 @@ The suite tries a few of each; the environment variable IKGYM_FUZZ says how many
 from __future__ import annotations
 
 import contextlib
+import functools
 import os
 import pathlib
 import tempfile
@@ -14,10 +15,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from baselines import tuning
 from baselines.agents.files import load_agent
 from baselines.agents.relative import Relative
-from ikgym import scenarios
+from baselines.evaluation.results import read_rows
+from baselines.solvers.rivals.model_files import urdf
+from baselines.training.config import APG
+from baselines.training.methods import configure
+from ikgym import arms, scenarios
 from ikgym.exceptions import IkgymError
+from ikgym.trajectories import from_csv
 from tests.baselines.random_agents import write_agent
 
 EXAMPLES = int(os.environ.get("IKGYM_FUZZ", "25"))
@@ -31,6 +38,43 @@ BYTES = st.lists(
     min_size=1,
     max_size=3,
 )
+
+
+#: Waypoints with times, and without.
+TIMED = b"x, y, z, qw, qx, qy, qz, t\n1, 2, 3, 1, 0, 0, 0, 0\n4, 5.5, 6, 0.8, 0.6, 0, 0, 1.25\n7, 8, 9, 1, 0, 0, 0, 3\n"
+TIMELESS = b"x,y,z\n1,2,3\n4,5.5,6\n7,8,9e-1\n"
+#: Functions that read a file of a user, by the endings of the files.
+READERS = {
+    "scenario.toml": scenarios.load,
+    "preset.toml": lambda file: configure(APG, str(file)),
+    "ranges.toml": tuning.read,
+    "points.csv": from_csv,
+    "arm.urdf": arms.from_urdf,
+    "it.safetensors": lambda file: load_agent(file, (Relative,)),
+    "results.json": read_rows,
+}
+
+
+@pytest.mark.parametrize("name", [*READERS, "meshes.urdf"])
+@pytest.mark.parametrize("kind", ["pipe", "device", "folder", "sparse"])
+def test_only_regular_files_of_a_bounded_size_are_opened(name, kind, tmp_path):
+    file, message = tmp_path / name, "expected a regular file"
+    if kind == "pipe":
+        os.mkfifo(file)  # opened like others, it waits for a writer
+    elif kind == "device":
+        file.symlink_to("/dev/zero")
+    elif kind == "folder":
+        file.mkdir()
+        message = "Is a directory|expected a regular file"
+    else:
+        file.touch()
+        os.truncate(file, 2**40)
+        message = "expected at most [0-9]+ bytes, got 1099511627776"
+    read = READERS.get(name)
+    if read is None:  # what the viewer shows
+        read = functools.partial(pytest.importorskip("baselines.viewer.arms").read_urdf, arm=arms.get("panda"))
+    with pytest.raises(IkgymError, match=f"Cannot read .*{name}: ({message})"):
+        read(file)
 
 
 def spliced(content, cuts):
@@ -58,7 +102,21 @@ def agent(tmp_path_factory):
 @settings(max_examples=EXAMPLES)
 @given(cuts=BYTES)
 def test_agents(agent, cuts):
-    tried("it.safetensors", spliced(agent, cuts), lambda file: load_agent(file, (Relative,)))
+    tried("it.safetensors", spliced(agent, cuts), READERS["it.safetensors"])
+
+
+@settings(max_examples=EXAMPLES)
+@given(cuts=BYTES, timed=st.booleans())
+def test_waypoints(cuts, timed):
+    content, given = (TIMED, {}) if timed else (TIMELESS, {"speed": 1.0, "acceleration": 1.0})
+    tried("points.csv", spliced(content, cuts), lambda file: from_csv(file, **given))
+
+
+@settings(max_examples=EXAMPLES)
+@given(cuts=BYTES)
+def test_robots(cuts):
+    pytest.importorskip("pinocchio")
+    tried("arm.urdf", spliced(urdf(arms.get("planar2")).encode(), cuts), arms.from_urdf)
 
 
 @settings(max_examples=EXAMPLES)

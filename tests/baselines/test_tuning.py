@@ -154,7 +154,7 @@ def test_parameters_within_another_and_under_a_condition():
     ("text", "error", "message"),
     [
         ("dls = 3", InvalidInputError, "expected a table of ranges"),
-        ("[dls", InvalidInputError, "not TOML"),
+        ("[dls", InvalidInputError, "expected TOML"),
         ("[dls]\ngain = {}", InvalidInputError, r"\[dls\] gain: expected low and high, or choices"),
         ("[dls]\ngain = { low = 1.0, high = 0.5 }", InvalidInputError, "expected low and high, or choices"),
         ("[dls]\ngain = { low = 0.0, high = 0.5, log = true }", InvalidInputError, "expected low and high, or choices"),
@@ -188,6 +188,7 @@ def test_ranges_of_solvers_that_are_not_searched(tmp_path):
         ({"--policies": "dlss"}, "There is no policy 'dlss'. Did you mean 'dls'?"),
         ({"--policies": "rhc_foresight"}, "There are no ranges for the parameters of 'rhc_foresight'"),
         ({"--seed": "-1"}, "seed: expected a whole number of at least 0, got -1."),
+        ({"--workers": "1000000000000"}, "workers: expected a whole number from 1 to 1000, got 1000000000000"),
         ({"--ranges": "nowhere.toml"}, "Cannot read nowhere.toml"),
         ({"--ranges": str(RANGES), "--policies": "rhc:horizon=7"}, "There are no ranges"),
         ({"--trials": "0"}, "trials: expected a whole number of at least 1, got 0."),

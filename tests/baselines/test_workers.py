@@ -19,7 +19,7 @@ from tests.baselines.losing import LosingCluster
 
 FAR = Workers(cluster="ray")
 EVALUATE = (
-    *("evaluate", "--scenarios", "varga7-random", "--episodes", "400", "--no-plots", "--workers", "2"),
+    *("evaluate", "--scenarios", "varga7-random", "--episodes", "400", "--workers", "2"),
     *("--policies", "rhc:horizon=100,starts=1"),
 )
 # Segments enough that nobody is done before it is stopped.
@@ -121,8 +121,9 @@ def test_workers_are_checked():
     assert Workers().here
     assert not Workers(2).here
     assert not FAR.here
-    with pytest.raises(InvalidInputError, match="workers: expected a whole number of at least 1, got 0"):
-        Workers(0)
+    for number in (0, 1001, 10**23):
+        with pytest.raises(InvalidInputError, match=f"workers: expected a whole number from 1 to 1000, got {number}"):
+            Workers(number)
     with pytest.raises(UnknownNameError, match=r"There is no cluster 'rya'\. Did you mean 'ray'\? Available: ray\."):
         Workers(cluster="rya")
 

@@ -292,6 +292,8 @@ BAD = [
     ({"name": None}, "name: expected a text"),
     ({"name": "'"}, "expected TOML in UTF-8"),
     ({"dt": "[" * 10**5}, "expected TOML"),
+    ({"a." * 10**5 + "a": "1"}, "expected keys of at most 50 names"),
+    ({"'a' . \"b c\" . " * 10**5 + "a": "1"}, "expected keys of at most 50 names"),
     ({"dt": "2026-01-01"}, "dt: expected numbers, got datetime"),
     ({"velocity_limit": None}, "velocity_limit: expected a number, or one a joint"),
     ({"velocity_limit": "true"}, "velocity_limit: expected numbers"),

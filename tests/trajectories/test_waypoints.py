@@ -102,7 +102,7 @@ def test_the_largest_file_takes_seconds(given, tmp_path):
         ("x,y,z\n1,2,3\n", "points.csv: points: expected from 2 to 200000 waypoints, got 1"),
         ("x,y,z\n", "points.csv: points: expected from 2 to 200000 waypoints, got 0"),
         ("x,y,z\n1,2,0\0\n", "line 2, column z: expected a finite number, got"),
-        ("x,y,z\n1,2," + "3" * 2**17 + "\n", "expected a CSV file: field larger than"),
+        ("x,y,z\n1,2," + "3" * 2**18 + "\n", "expected a CSV file: field larger than"),
         ("x,y,z\n" + "\n" * 10**7, "expected at most 200000 waypoints, got more"),
         (HEAD + "1,2,3,1,0,0,0,0\n", "points.csv: times: expected from 2 to 200000 waypoints, got 1"),
         (HEAD + "1,2,3,1,0,0,0,0\n4,5,6,1,0,0,0,0\n", "rise, got 0 s and 0 s as numbers 0 and 1"),

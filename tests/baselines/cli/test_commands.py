@@ -69,7 +69,14 @@ SIZE = "expected 0, or an absolute value from 1e-12 to 1e+12"
         (["scenarios", "varga7-fats"], "There is no scenario 'varga7-fats'. Did you mean 'varga7-fast'?"),
         (["evaluate", "--policies", "dlss"], "There is no policy 'dlss'. Did you mean 'dls'?"),
         (["evaluate", "--steps", "0"], "steps: expected a whole number of at least 1, got 0."),
-        (["evaluate", "--workers", "0"], "workers: expected a whole number of at least 1, got 0."),
+        (["evaluate", "--workers", "0"], "workers: expected a whole number from 1 to 1000, got 0."),
+        *(
+            (
+                [*command, "--workers", "1000000000000", "--out", "x"],
+                "workers: expected a whole number from 1 to 1000, got 1000000000000",
+            )
+            for command in (["evaluate"], ["robustness"], ["train", "apg", "--seeds", "0", "1"])
+        ),
         (["oracle", "--scenarios", "varga7-fats"], "There is no scenario 'varga7-fats'. Did you mean 'varga7-fast'?"),
         (["oracle", "--knots", "0"], "knots: expected a whole number of at least 1, got 0."),
         (["oracle", "--starts", "-1"], "starts: expected a whole number from 0 to 100000, got -1."),

@@ -129,7 +129,7 @@ def test_text_is_never_run():
         ("varga7-fast", [("dls", 3)], {}, InvalidInputError, "expected 'name:parameter=value' or"),
         ("varga7-fast", "dls", {"episodes": 0}, InvalidInputError, "episodes: expected a whole number of at least 1"),
         ("varga7-fast", "dls", {"steps": 0}, InvalidInputError, "steps: expected a whole number of at least 1, got 0"),
-        ("varga7-fast", "dls", {"workers": 0}, InvalidInputError, "workers: expected a whole number of at least 1"),
+        ("varga7-fast", "dls", {"workers": 0}, InvalidInputError, "workers: expected a whole number from 1 to 1000"),
         ("varga7-fast", "dls", {"preview": 0}, InvalidInputError, "preview: expected a whole number of at least 1"),
         ("varga7-fast", "dls", {"timed": 0}, InvalidInputError, "timed: expected a whole number of at least 1, got 0"),
         ("varga7-fast", "dls", {"noise_seeds": 0}, InvalidInputError, "noise_seeds: expected a whole number"),

@@ -16,7 +16,7 @@ from baselines.evaluation.jobs import Skipped
 from baselines.evaluation.metrics import Row
 from baselines.evaluation.plots import joints, style, tracking
 from baselines.evaluation.summary import summarise
-from baselines.evaluation.table import number
+from baselines.evaluation.table import code, escaped, number
 from baselines.files import ResultsError
 from tests.baselines.making import circle
 
@@ -175,6 +175,12 @@ def test_labels_say_what_is_not_the_default():
     ]
 
 
+def test_text_for_markdown():
+    assert escaped("rhc:options={'a': 1}\n<b>_x*") == "rhc:options=\\{'a': 1\\} \\<b\\>\\_x\\*"
+    assert escaped("moore_penrose __x__") == r"moore_penrose \_\_x\_\_"
+    assert [code(text) for text in ("a b", "`a` | b", "``")] == ["`a b`", "`` `a` | b ``", "``` `` ```"]
+
+
 def test_readme():
     pictures = {"varga7-fast": {report.OVERVIEW: [("Costs", pathlib.PurePath("plots/a b/cost.png"))]}}
     text = report.readme([BASE, REFERENCE], command="python -m x", date=DATE, pictures=pictures)
@@ -189,6 +195,33 @@ def test_readme():
     tables = [line for line in text.split("\n") if line.startswith("|")]
     heads = {len(re.findall(r"(?<!\\)\|", line)) for line in tables}
     assert heads == {14, 4}  # thirteen columns of results, three of parameters
+
+
+HOSTILE = (
+    "<script>run()</script> <img src=x onerror=run()> {run()} `{run()}` [x](javascript:run()) ![x](x) *x* _x_ | &lt;"
+)
+
+
+def test_nothing_in_a_name_is_markup_in_the_readme():
+    """Read by a parser of Markdown: all of it is text or code."""
+    markdown_it = pytest.importorskip("markdown_it")
+    rows = [row(scenario=f"{HOSTILE}\n\n# x", policy=f"x:{HOSTILE}", parameters={HOSTILE: HOSTILE}, cost_ratio=0.5)]
+    rows.append(dataclasses.replace(rows[0], seed=1))
+    skipped = [Skipped(HOSTILE, HOSTILE, HOSTILE)]
+    pictures = {rows[0].scenario: {report.OVERVIEW: [(HOSTILE, pathlib.PurePath("plots/cost.png"))]}}
+    text = report.readme(rows, skipped, command=HOSTILE, date=DATE, pictures=pictures)
+    blocks = markdown_it.MarkdownIt("commonmark").enable("table").parse(text)
+    parts = [part for block in blocks for part in (block, *(block.children or ()))]
+    kinds = {part.type for part in parts}
+    assert not kinds & {"html_block", "html_inline", "link_open", "strong_open"}
+    assert [part.attrs["src"] for part in parts if part.type == "image"] == ["plots/cost.png"]
+    assert [part.content for part in parts if part.type == "heading_open" and part.tag == "h1"] == [""]
+    assert sum(part.content == HOSTILE for part in parts if part.type == "code_inline") == 1
+    plain = "".join(part.content for part in parts if part.type in ("text", "text_special", "code_inline"))
+    assert plain.count("{run()}") == plain.count("<script>run()</script>") * 2
+    # MDX, which evaluates what is in braces, sees none.
+    bare = re.sub(r"(`+).*?(?<!`)\1(?!`)", "", text)
+    assert not re.search(r"(?<!\\)[{<]", bare)
 
 
 # Plots

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 
 import numpy as np
 import pytest
@@ -73,8 +74,13 @@ def test_presets(tmp_path):
     with pytest.raises(IkgymError, match="no option of apg 'windo'"):
         configure(APG, str(tmp_path / "mine.toml"))
     (tmp_path / "mine.toml").write_text("window = \n")
-    for name in ("mine.toml", "none.toml"):
-        with pytest.raises(InvalidInputError, match=f"Cannot read the preset .*{name}"):
+    os.mkfifo(tmp_path / "pipe.toml")
+    for name, message in (
+        ("mine.toml", "mine.toml: expected TOML"),
+        ("none.toml", "Cannot read .*none.toml: No such file"),
+        ("pipe.toml", "Cannot read .*pipe.toml: expected a regular file"),
+    ):
+        with pytest.raises(InvalidInputError, match=message):
             configure(APG, str(tmp_path / name))
     with pytest.raises(IkgymError, match=r"no method 'pp'\. Did you mean 'ppo'"):
         get("pp")

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import io
+import os
+import zipfile
+
 import numpy as np
 import pytest
 
@@ -108,18 +112,71 @@ def test_meshes_move_with_the_arm(arm, server, tmp_path):
         np.testing.assert_allclose(place(drawn._frames[: shape.frame]).translation(), joint, atol=1e-6)
 
 
+def mesh(folder, name, content):
+    """A URDF file with a mesh of that content."""
+    (folder / name).write_bytes(content)
+    return urdf(folder, shape=f'<mesh filename="{name}"/>')
+
+
+def zipped(content):
+    """An archive."""
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("link.dae", content)
+    return stream.getvalue()
+
+
+def text(file, old, new):
+    file.write_text(file.read_text().replace(old, new))
+    return file
+
+
+BOMB = zipped(b" " * 10**8)
+#: Each node consists of the one before it, twice.
+TWICE = '<node id="{}"><instance_node url="#{}"/><instance_node url="#{}"/></node>'
+NODES = "".join(TWICE.format(i + 1, i, i) for i in range(40))
+DAE = f'<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema"><library_nodes>{NODES}</library_nodes></COLLADA>'
+
+
 def test_other_files_are_refused(arm, tmp_path):
     broken = tmp_path / "broken.urdf"
     broken.write_text("<robot")
+    points = trimesh.PointCloud(np.eye(3)).export(file_type="ply")
     for file, message in (
-        (lambda: tmp_path / "nowhere.urdf", "expected a file"),
+        (lambda: tmp_path / "nowhere.urdf", "Cannot read .*nowhere.urdf: No such file"),
         (lambda: broken, "cannot be read"),
         (lambda: urdf(tmp_path, length=1.1), "moves differently"),
         (lambda: urdf(tmp_path, joints=("shoulder", "wrist")), "no joint 'elbow'"),
         (lambda: urdf(tmp_path, shape=""), "no visible shapes"),
+        (lambda: urdf(tmp_path, shape='<mesh filename="none.stl"/>'), "no visible shapes"),
+        *((lambda x=x: mesh(tmp_path, x, BOMB), "formats dae, obj, ply, stl") for x in ("a.zip", "a.zae", "a.3mf")),
+        (lambda: mesh(tmp_path, "a.dae", BOMB), "expected XML"),
+        (lambda: mesh(tmp_path, "a.dae", DAE.encode("utf-16")), "without <instance_node>"),
+        (lambda: mesh(tmp_path, "a.ply", points), "expected triangles in space, got a PointCloud"),
+        (lambda: text(urdf(tmp_path), "<link", "<link/>" * 2000 + "<link"), "at most 2000 links and shapes"),
+        (lambda: text(urdf(tmp_path), "<robot", "<!DOCTYPE x><robot"), "no DOCTYPE"),
     ):
         with pytest.raises(InvalidInputError, match=message):
             arms.read_urdf(file(), arm)
+
+
+def test_all_meshes_together_are_bounded(arm, tmp_path, monkeypatch):
+    size = (urdf(tmp_path).parent / "link.stl").stat().st_size
+    monkeypatch.setattr(arms, "MOST_BYTES", 2 * size)
+    assert len(arms.read_urdf(tmp_path / "two.urdf", arm)) == 2
+    monkeypatch.setattr(arms, "MOST_BYTES", 2 * size - 1)
+    with pytest.raises(InvalidInputError, match=f"link.stl: expected at most {size - 1} bytes, got {size}"):
+        arms.read_urdf(tmp_path / "two.urdf", arm)
+
+
+def test_materials_beside_a_mesh_are_read_if_they_are_files(arm, tmp_path):
+    box = trimesh.creation.box((1.0, 0.1, 0.1)).export(file_type="obj").encode()
+    (tmp_path / "red.mtl").write_text("newmtl red\nKd 1 0 0\n")
+    os.mkfifo(tmp_path / "pipe.mtl")
+    for name, red in (("red.mtl", True), ("pipe.mtl", False), ("/dev/zero", False)):
+        content = f"mtllib {name}\nusemtl red\n".encode() + box
+        shape = arms.read_urdf(mesh(tmp_path, "a.obj", content), arm)[0]
+        assert (shape.mesh.visual.kind == "texture" and shape.mesh.visual.material.diffuse[0] == 255) == red
 
 
 def test_an_arm_from_a_file_is_shown_with_its_meshes_if_there_are_any(tmp_path, capsys):

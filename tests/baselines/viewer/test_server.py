@@ -159,7 +159,7 @@ def test_a_port_in_use_is_an_error(capsys):
     [
         (["--policy", "dlss"], "Did you mean 'dls'?"),
         (["--port", "70000"], "port: expected"),
-        (["--urdf", "nowhere.urdf"], "urdf: expected a file"),
+        (["--urdf", "nowhere.urdf"], "Cannot read nowhere.urdf"),
     ],
 )
 def test_mistakes(options, message, capsys):

@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 import baselines
+from baselines.evaluation.table import escaped
 from baselines.viewer import session as sessions
 from baselines.viewer.following import Approach, Follower
 from baselines.viewer.replay import Stage, play_all
-from baselines.viewer.session import PLAYS_ONLY, Mode, Session, escaped
+from baselines.viewer.session import PLAYS_ONLY, Mode, Session
 from ikgym.exceptions import IkgymError
 from ikgym.kernels.rotations import geodesic_angle, rodrigues
 
@@ -212,7 +213,3 @@ def test_privileged_information_plays_only():
     np.testing.assert_array_equal(reference.q, session.stage.start)
     assert np.abs(solver.q - session.stage.start).max() > 0.0
     assert "from its limit" not in session.text(session.shown())  # an arm without limits
-
-
-def test_names_are_shown_letter_by_letter():
-    assert escaped("rhc:options={'a': 1}\n<b>_x*") == "rhc:options=\\{'a': 1\\} \\<b\\>\\_x\\*"

@@ -6,7 +6,7 @@ from baselines.evaluate import evaluate
 from tests.limited import limited
 
 #: A name that must not become markup.
-NASTY = '<script>alert(1)</script> & "co\'"'
+NASTY = '<script>alert(1)</script> <img src=x onerror=alert(2)> {alert(3)} & "co\'"'
 STEPS, EPISODES = 450, 3
 
 

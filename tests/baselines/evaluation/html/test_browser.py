@@ -1,31 +1,21 @@
 """The page in a real browser: no errors, and it sorts, filters, plays, and fits a phone."""
 
 import contextlib
-import shutil
 
 import pytest
 
 from baselines.evaluation.results import PAGE
 from tests.baselines.evaluation.html.conftest import NASTY
+from tests.chromium import READY, chromium
 
-NAMES = ("chromium", "chromium-browser", "google-chrome")
-FLAGS = (
-    "--headless", "--no-sandbox", "--no-first-run", "--disable-background-networking", "--disable-sync",
-    "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
-)  # fmt: skip
-READY = 120_000
 #: The plots are left out, which take the processor a while.
 TABLE_ALONE = "globalThis.requestAnimationFrame = () => 0"
 
 
 @pytest.fixture(scope="module")
 def browser():
-    sync_api = pytest.importorskip("playwright.sync_api", reason="no playwright: pip install 'ikgym[dev]'")
-    found = next(filter(None, map(shutil.which, NAMES)), None)
-    if found is None:
-        pytest.skip(f"no browser: none of {', '.join(NAMES)} is installed")
-    with sync_api.sync_playwright() as playwright:
-        yield playwright.chromium.launch(executable_path=found, args=FLAGS, timeout=READY)
+    with chromium() as made:
+        yield made
 
 
 @contextlib.contextmanager
