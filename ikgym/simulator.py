@@ -140,7 +140,7 @@ class Simulator:
         if self._plant is not None:
             self._plant.begin(rows, generators, arm_seeds, noise_seeds)
         if starts is None:
-            chains = self._plant.chains(rows[steps == 0]) if self._plant is not None else ()
+            chains = None if self._plant is None else self._plant.chains(rows[steps == 0])
             states = first_states(scenario, self._nominal.point, episodes, steps, chains)
             state.q[rows], state.qdot[rows] = states
         else:
