@@ -25,11 +25,13 @@ from ikgym.scenarios.entering import checked_starts, checked_steps, first_states
 from ikgym.scenarios.nominal_frames import MEMORY, NominalFrames
 from ikgym.scenarios.preview import FARTHEST as FARTHEST
 from ikgym.scenarios.preview import Preview, offsets
-from ikgym.scenarios.spline_frames import SplineFrames, draws_splines
+from ikgym.scenarios.spline_frames import SplineFrames, frames_of_rows
 from ikgym.validation import FloatArray, shortened, whole_number
 
 # Rows worth a thread of their own: below, handing over costs more than it saves.
 GRAIN_STEP = 256
+# Steps for which one arm alone computes frames at once: a call of the kernel takes as long as eight frames.
+AT_ONCE = 8
 # Joints held back of an arm without limits: a copy takes less time than a fresh array.
 NONE_HELD = np.zeros(3, dtype=np.int64)
 
@@ -63,8 +65,7 @@ class Simulator:
         rows = 1 if rows is None else rows
         self.scenario, self.rows, self._limited = scenario, rows, scenario.arm.limited
         self.preview = offsets(preview)
-        frames = SplineFrames if draws_splines(scenario) else NominalFrames
-        self._nominal: Any = frames(scenario, rows, self.preview, memory)
+        self._nominal = frames_of_rows(scenario, rows, self.preview, memory, AT_ONCE)
         shown = size(joints, coordinates, len(self.preview))
         if not ideal:
             shown += more_size(joints, coordinates, commands)
@@ -140,12 +141,12 @@ class Simulator:
         if self._plant is not None:
             self._plant.begin(rows, generators, arm_seeds, noise_seeds)
         if starts is None:
-            chains = self._plant.chains(rows[steps == 0]) if self._plant is not None else ()
+            chains = None if self._plant is None else self._plant.chains(rows[steps == 0])
             states = first_states(scenario, self._nominal.point, episodes, steps, chains)
             state.q[rows], state.qdot[rows] = states
         else:
             state.q[rows], state.qdot[rows] = starts[rows], 0.0
-        self._own_start[rows] = starts is None
+        self._own_start[rows], self._ready = starts is None, 0
         state.step[rows] = 0
         if scenario.random:
             self._nominal.begin(state.frames, rows, episodes, steps)
@@ -214,7 +215,11 @@ class Simulator:
         """
         self._accept(action, self._all)
         numbers = np.empty(self._count)
-        self._rows(self._all, numbers, True, 0, 1)
+        made = int(self._state.step[0])
+        if self._motions and made >= self._ready:
+            self._ready = made + AT_ONCE
+            splines.complete(*self._motions, self._all, True, AT_ONCE, 0, 1)
+        self._step(numbers, self._all, True, 0, 1)
         q, qdot, pose, nominal, remaining = self._parts
         seen = {
             "q": numbers[q],
@@ -230,8 +235,7 @@ class Simulator:
 
     def nominal_positions(self, row: int) -> FloatArray:
         """The nominal positions of a row's episode in [m], one a step. Shape (steps + 1, 3)."""
-        positions: FloatArray = self._nominal.positions(row)
-        return positions
+        return self._nominal.positions(row)
 
     @property
     def true_q(self) -> FloatArray:
@@ -263,7 +267,7 @@ class Simulator:
             raise InvalidInputError(
                 f"action{where}: expected finite numbers, got {accepted[bad].tolist()}. The state is as it was."
             )
-        if self._nominal.in_blocks:
+        if isinstance(self._nominal, NominalFrames) and self._nominal.in_blocks:
             rows = np.flatnonzero(active)
             self._nominal.look_ahead(self._state.frames, rows, self._state.step[rows] + 1)
 
@@ -273,9 +277,12 @@ class Simulator:
 
     def _rows(self, active: npt.NDArray[np.bool_], numbers: FloatArray, moving: bool, start: int, stop: int) -> None:
         if self._motions:
-            splines.complete(*self._motions, active, moving, start, stop)
+            splines.complete(*self._motions, active, moving, 1, start, stop)
+        self._step(numbers, active, moving, start, stop)
+
+    def _step(self, *command: Any) -> None:
         step = simulation.step if self._plant is None else plant_step.step
-        step(*self._constants, numbers, active, moving, start, stop)
+        step(*self._constants, *command)
 
     def _take_apart(self) -> None:
         """The constant arguments of a step: single arrays for :func:`simulation.step`, tuples for that of a plant."""
@@ -284,8 +291,8 @@ class Simulator:
             self._constants: tuple[Any, ...] = *self.scenario.arm.chain, *self._shared, *cost, *state
         else:
             self._constants = self._shared, cost, plant.drives, plant.sensors, plant.arms, state, plant.state
-        splines = isinstance(self._nominal, SplineFrames)
-        self._motions = (*self._nominal.arguments(), state.frames, state.step) if splines else ()
+        nominal, more = self._nominal, (state.frames, state.step)
+        self._motions = (*nominal.arguments(), *more) if isinstance(nominal, SplineFrames) else ()
 
     def _outcome(self, numbers: FloatArray) -> Outcome:
         return outcome(numbers, *self._shape, late=self._late)

@@ -207,7 +207,6 @@ class APG(ActorOnly):
             self._set("init", pathlib.Path(self.init))
         if not isinstance(self.window, tuple) or not self.window:
             raise InvalidInputError(f"window: expected whole numbers, got {self.window!r}.")
-        self._whole("hold", "segment_steps")
         self._whole("window", at_most=MOST_WINDOW)
         for steps in self.window:
             if steps % self.hold or self.segment_steps % steps:

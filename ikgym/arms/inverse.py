@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Iterable
 from contextlib import nullcontext
 from typing import Any
 
@@ -18,7 +17,7 @@ from ikgym import parallel
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.compilation import announced
 from ikgym.kernels.inverse_kinematics import Ranges, Settings, inverse_rows
-from ikgym.kernels.kinematics import Chain
+from ikgym.kernels.kinematics import Chain, stacked
 from ikgym.validation import BoolArray, FloatArray, float_array, number, rotation_matrices, whole_number
 
 # 1 rad weighs as much as this share of the arm's length; shares from 0.1 to 0.8 differ by less than a fifth.
@@ -54,7 +53,7 @@ def inverse(
         arm.check_posture("start", starts)
     lead = _lead(rotations.shape, positions.shape, starts.shape)
     targets = _rows(rotations, lead, 2), _rows(positions, lead, 1), _rows(starts, lead, 1)
-    constants = *arm.chain, *ranges, *settings
+    constants = *stacked(arm.chain), *ranges, *settings
     q, converged = np.empty((len(targets[1]), arm.joints)), np.empty(len(targets[1]), dtype=np.bool_)
 
     def work(first: int, last: int) -> None:
@@ -66,12 +65,12 @@ def inverse(
     return q.reshape(*lead, arm.joints), converged.reshape(lead)[()]
 
 
-def alike(arm: Any, chains: Iterable[Chain], q: FloatArray, *, oriented: bool) -> FloatArray:
+def alike(arm: Any, chains: Chain, q: FloatArray, *, oriented: bool) -> FloatArray:
     """Joint coordinates that give other arms the poses of an arm, the nearest within its limits.
 
     Args:
         arm: The arm with the known postures.
-        chains: The k other arms, nearly the same.
+        chains: The k other arms, nearly the same, with a leading axis of k; or one for all, with an axis of 1.
         q: The arm's joint coordinates within its limits, in [rad] or [m]. Shape (k, n).
         oriented: Whether orientations matter.
 
@@ -84,12 +83,8 @@ def alike(arm: Any, chains: Iterable[Chain], q: FloatArray, *, oriented: bool) -
     if not oriented:
         rotations = np.empty((len(q), 0, 0))
     out, converged = np.empty(q.shape), np.empty(len(q), dtype=np.bool_)
-    for row, chain in enumerate(chains):
-        one = slice(row, row + 1)
-        inverse_rows(
-            *map(_locked, chain), *ranges, *NEARBY._replace(length=length),
-            rotations[one], positions[one], np.array(q[one]), out[one], converged[one],
-        )  # fmt: skip
+    settings = NEARBY._replace(length=length)
+    inverse_rows(*map(_locked, chains), *ranges, *settings, rotations, positions, np.array(q), out, converged)
     return np.clip(np.round(out, DECIMALS), arm.lower, arm.upper)
 
 

@@ -111,12 +111,12 @@ def inverse_rows(
 ):
     """Joint coordinates for N poses, each worked out by itself.
 
-    The first arguments are a :class:`ikgym.kernels.kinematics.Chain`, :class:`Ranges` and :class:`Settings`.
+    The first arguments are a :class:`ikgym.kernels.kinematics.Chain`, :class:`Ranges` and :class:`Settings`. The arrays
+    of the chain, but for ``prismatic``, have a leading axis for arms: N of them, or one for all poses.
     ``rotation`` (N, 3, 3), of shape (N, 0, 0) where orientations do not matter, and ``position`` (N, 3) in [m] are the
     poses of the tool in the base frame, ``start`` (N, n) is where to begin, within the limits. ``q`` (N, n) receives
     the joint coordinates, the nearest that were found where the pose is not met, and ``converged`` (N,) whether it is.
     """
-    chain = Chain(offsets, axes, prismatic, tool, tool_rotation)
     ranges = Ranges(lower, upper, first, last)
     settings = Settings(tolerance, length, restarts, key)
     n, m = q.shape[1], 6 if rotation.shape[1] else 3
@@ -131,6 +131,8 @@ def inverse_rows(
         np.empty(m),
     )
     for row in range(q.shape[0]):
+        arm = row if offsets.shape[0] > 1 else 0
+        chain = Chain(offsets[arm], axes[arm], prismatic, tool[arm], tool_rotation[arm])
         converged[row] = _inverse(chain, ranges, (rotation[row], position[row]), start[row], settings, work, q[row])
 
 

@@ -35,6 +35,12 @@ class Chain(NamedTuple):
     tool_rotation: npt.NDArray[np.float64]
 
 
+def stacked(chain: Chain) -> Chain:
+    """An arm with a leading axis of 1 for arms, one for all poses; ``prismatic`` has none."""
+    offsets, axes, prismatic, tool, tool_rotation = chain
+    return Chain(offsets[None], axes[None], prismatic, tool[None], tool_rotation[None])
+
+
 @kernel
 def forward(chain, q, rotation, position):
     """Forward kinematics of one configuration.

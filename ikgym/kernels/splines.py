@@ -2,13 +2,30 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
+import numpy.typing as npt
 
 from ikgym.kernels.jit import inlined, kernel, uncounted
 from ikgym.kernels.kinematics import Chain, forward
 
+Floats = npt.NDArray[np.float64]
+Integers = npt.NDArray[np.int64]
+
 # Moves of less than this share of the largest count as none, so that nothing is divided by 0.
 TINY = 1e-12
+
+
+class Motions(NamedTuple):
+    """Motions of N episodes, and the points of them that a step needs; see :func:`complete`."""
+
+    control: Floats
+    duration: float
+    dt: float
+    first: Integers
+    point: Integers
+    preview: Integers
 
 
 @inlined
@@ -104,10 +121,11 @@ def complete(
     made,
     active,
     moving,
+    count,
     start,
     stop,
 ):
-    """Computes the nominal frames that rows need in their next step and that are not in their tables yet.
+    """Computes the nominal frames that rows need in their next steps and that are not in their tables yet.
 
     The tuples are taken apart for the reason of :func:`ikgym.kernels.simulation.step`, before which this is called.
 
@@ -130,29 +148,52 @@ def complete(
         made: Steps made in the episodes. Shape (N,).
         active: The rows that are meant. Shape (N,).
         moving: Whether they are about to move, or are observed where they are.
+        count: How many steps.
         start: The first row.
         stop: The row after the last.
     """
     chain = Chain(offsets, axes, prismatic, tool, tool_rotation)
-    q, frame = np.empty(control.shape[2]), np.empty(12)
-    rotation, position, next_step = frame[:9].reshape(3, 3), frame[9:], 1 if moving else 0
-    for row in range(start, stop):
-        if active[row]:
-            motion, row_known, table, k = control[row], known[row], tables[row], made[row] + next_step
-            _complete(chain, motion, duration, dt, first[row], point[k], row_known, table, q, rotation, position)
-            for i in range(preview.shape[0]):
-                at = point[k + preview[i]]
-                _complete(chain, motion, duration, dt, first[row], at, row_known, table, q, rotation, position)
+    motions = Motions(control, duration, dt, first, point, preview)
+    _rows(
+        chain,
+        motions,
+        known,
+        tables,
+        np.empty(control.shape[2]),
+        np.empty(12),
+        made,
+        active,
+        moving,
+        count,
+        start,
+        stop,
+    )
 
 
 @uncounted
-def _complete(chain, motion, duration, dt, first, point, known, table, q, rotation, position):
-    """The frame of one point, if its table does not have it."""
-    slot = point % known.shape[0]
-    if known[slot] == first + point:
+def _rows(chain, motions, known, tables, q, frame, made, active, moving, count, start, stop):
+    """The rows of :func:`complete`, with its scratch."""
+    rotation, position, next_step = frame[:9].reshape(3, 3), frame[9:], 1 if moving else 0
+    point, preview = motions.point, motions.preview
+    steps = point.shape[0] - 1 - preview[preview.shape[0] - 1]
+    for row in range(start, stop):
+        if active[row]:
+            k = made[row] + next_step
+            for step in range(k, min(k + count, steps + 1)):
+                _complete(chain, motions, row, point[step], known[row], tables[row], q, rotation, position)
+                for i in range(preview.shape[0]):
+                    at = point[step + preview[i]]
+                    _complete(chain, motions, row, at, known[row], tables[row], q, rotation, position)
+
+
+@inlined
+def _complete(chain, motions, row, point, known, table, q, rotation, position):
+    """The frame of one point of a row, if its table does not have it."""
+    slot, number = point % known.shape[0], motions.first[row] + point
+    if known[slot] == number:
         return
-    known[slot] = first + point
-    _spline(motion, float(point) * dt, duration, q)
+    known[slot] = number
+    _spline(motions.control[row], float(point) * motions.dt, motions.duration, q)
     forward(chain, q, rotation, position)
     width = table.shape[1]
     if width == 12:

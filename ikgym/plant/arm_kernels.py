@@ -71,11 +71,11 @@ def draw_arms(spread, keys, rows, arms):
         arms: An :class:`Arms`, which receives them.
     """
     n = spread.prismatic.shape[0]
-    turned = np.empty((3, 3))
+    turned, payload = np.empty((3, 3)), np.any(spread.payload)
     for i in range(keys.shape[0]):
         key, row = keys[i], rows[i]
         which = int(share(stream(key, WHICH), np.uint64(0)) * spread.offsets.shape[0])
-        for loaded in range(2):
+        for loaded in range(2 if payload else 1):
             offsets, axes = arms.offsets[row, loaded], arms.axes[row, loaded]
             tool, tool_rotation = arms.tool[row, loaded], arms.tool_rotation[row, loaded]
             for j in range(n):
@@ -91,6 +91,9 @@ def draw_arms(spread, keys, rows, arms):
                     zero += spread.payload[j]
                 if zero != 0.0:
                     _begin_at(j, zero, spread.prismatic, offsets, axes, tool, tool_rotation, turned)
+        if not payload:
+            arms.offsets[row, 1], arms.axes[row, 1] = arms.offsets[row, 0], arms.axes[row, 0]
+            arms.tool[row, 1], arms.tool_rotation[row, 1] = arms.tool[row, 0], arms.tool_rotation[row, 0]
 
 
 @kernel
@@ -109,6 +112,21 @@ def draw_loops(bandwidth, delay, keys, drawn_bandwidth, drawn_delay):
         if bandwidth[0] < bandwidth[1]:
             drawn_bandwidth[i] += (bandwidth[1] - bandwidth[0]) * share(stream(keys[i], BANDWIDTH), np.uint64(0))
         drawn_delay[i] = delay[0] + int((delay[1] - delay[0] + 1) * share(stream(keys[i], DELAY), np.uint64(0)))
+
+
+@kernel
+def stream_rows(keys, rows, out):
+    """The keys of the noises of some rows: the first is that of the episode.
+
+    Args:
+        keys: One a row. Shape (k,).
+        rows: Which rows they are. Shape (k,).
+        out: Receives the keys. Shape (N, streams).
+    """
+    for i in range(keys.shape[0]):
+        out[rows[i], 0] = keys[i]
+        for number in range(1, out.shape[1]):
+            out[rows[i], number] = stream(keys[i], np.uint64(ARM_STREAMS + number))
 
 
 @inlined

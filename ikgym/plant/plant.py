@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from collections.abc import Sequence
 from typing import Any, Self
@@ -174,7 +175,7 @@ class Plant(Frozen):
                 f"{name!r} draws none: {self}."
             )
 
-    @property
+    @functools.cached_property
     def ideal(self) -> bool:
         """Whether all effects are off."""
         driven = self.bandwidth != math.inf or self.longest_command_delay > 0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy.typing as npt
 from ikgym.arms import Arm
 from ikgym.kernels.kinematics import Chain
 from ikgym.kernels.random_numbers import stream
-from ikgym.plant.arm_kernels import ARM_STREAMS
+from ikgym.plant.arm_kernels import stream_rows
 from ikgym.plant.checks import PerJoint
 from ikgym.plant.draw import Draws, arm_key, episode_key
 from ikgym.plant.plant import Plant
@@ -127,17 +127,14 @@ class PlantRows:
         self.state.lag[rows] = -np.expm1(-2.0 * np.pi * bandwidths * self._dt)
         if noise_seeds is not None:
             keys = [noise_key(key, noise_seeds[row]) for key, row in zip(keys, rows.tolist(), strict=True)]
-        self.state.keys[rows, 0] = keys
-        for number in range(1, STREAMS):
-            self.state.keys[rows, number] = [stream(np.uint64(key), ARM_STREAMS + number) for key in keys]
+        stream_rows(np.array(keys, dtype=np.uint64), rows, self.state.keys)
         for changed in (self.state.drive, self.state.play):
             changed[rows] = 0.0
 
-    def chains(self, rows: npt.NDArray[np.int64]) -> Iterator[Chain]:
-        """The arms of some rows without their payload, one after the other."""
-        for row in rows.tolist():
-            offsets, axes, tool, tool_rotation = (part[row, 0] for part in self.arms)
-            yield Chain(offsets, axes, self.drives.prismatic, tool, tool_rotation)
+    def chains(self, rows: npt.NDArray[np.int64]) -> Chain:
+        """The arms of some rows without their payload, with a leading axis of k."""
+        offsets, axes, tool, tool_rotation = (part[rows, 0] for part in self.arms)
+        return Chain(offsets, axes, self.drives.prismatic, tool, tool_rotation)
 
     def settle(self, rows: npt.NDArray[np.int64], qdot: FloatArray, steps: npt.NDArray[np.int64]) -> None:
         """Fills the histories of rows with their first measurement and a velocity, as after a long time of both.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -81,7 +81,7 @@ def checked_steps(given: Any, rows: int, scenario: Scenario) -> Steps | None:
 
 
 def first_states(
-    scenario: Scenario, points: Steps, episodes: Sequence[Trajectory], steps: Steps, chains: Iterable[Chain]
+    scenario: Scenario, points: Steps, episodes: Sequence[Trajectory], steps: Steps, chains: Chain | None
 ) -> tuple[FloatArray, FloatArray]:
     """The arms' first states in episodes: at rest at the start, or on the reference joint path after some steps.
 
@@ -90,7 +90,7 @@ def first_states(
         points: Its points, of `Scenario.points`.
         episodes: Trajectories of the k episodes.
         steps: Steps after which they are entered, or 0. Shape (k,).
-        chains: Where the scenario jogs: the arms that move, of the episodes that are not entered.
+        chains: The arms that move, of the episodes that are not entered; None where the plant is ideal.
 
     Returns:
         Joint coordinates in [rad] or [m], and joint velocities in [rad/s] or [m/s], none beyond what the arm can have
@@ -101,7 +101,7 @@ def first_states(
     """
     entered, shape = steps > 0, (len(steps), scenario.joints)
     q, qdot = np.empty(shape) if entered.all() else scenario.first_q_of(episodes), np.zeros(shape)
-    if scenario.jogs and not entered.all():
+    if chains is not None and scenario.jogs and not entered.all():
         q[~entered] = scenario.jogged(q[~entered], chains)
     if entered.any():
         times = points[np.array([steps - 1, steps])].T.astype(np.float64) * scenario.dt

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any, Self
 
 import numpy as np
@@ -15,7 +15,7 @@ from ikgym.arms import Arm
 from ikgym.arms.limits import farthest, velocity_scale
 from ikgym.cost import TrackingCost
 from ikgym.exceptions import InvalidInputError
-from ikgym.kernels.kinematics import Chain
+from ikgym.kernels.kinematics import Chain, stacked
 from ikgym.plant import DrawnPlant, Plant
 from ikgym.plant.draw import Draws, arm_key, episode_key
 from ikgym.scenarios import checks, files, starts
@@ -185,7 +185,7 @@ class Scenario(Frozen, Reference):
         q = self.first_q(self.episode(seed))
         if not self.jogs:
             return q
-        start: FloatArray = self.jogged(q[None], [self.drawn_plant(seed, arm_seed).arm.chain])[0]
+        start: FloatArray = self.jogged(q[None], stacked(self.drawn_plant(seed, arm_seed).arm.chain))[0]
         return start
 
     @functools.cached_property
@@ -193,12 +193,12 @@ class Scenario(Frozen, Reference):
         """Whether episodes begin at the first pose of the arm that moves, which is not that of the data sheet."""
         return self.start is None and self.plant.other_arm
 
-    def jogged(self, q: FloatArray, chains: Iterable[Chain]) -> FloatArray:
+    def jogged(self, q: FloatArray, chains: Chain) -> FloatArray:
         """Starts of other arms: each at the pose at which the arm of the data sheet would begin.
 
         Args:
             q: Starts of the arm of the data sheet in [rad] or [m]. Shape (k, n).
-            chains: The k arms that move.
+            chains: The k arms that move, see :func:`ikgym.arms.inverse.alike`.
 
         Returns:
             Joint coordinates in [rad] or [m], as near to the poses as the arms get within the limits. Shape (k, n).

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ikgym.scenarios.nominal_frames import NominalFrames
 from ikgym.scenarios.scenario import Scenario
 from ikgym.trajectories import JointSplines, RandomJointSpline, Trajectory
 from ikgym.validation import FloatArray
@@ -22,18 +23,15 @@ class SplineFrames:
         scenario: The scenario, whose trajectory is a `RandomJointSpline`.
         rows: N.
         ahead: Steps ahead that are shown, rising.
-        memory: Most memory for the frames of all rows, in bytes. Where all points would take more, later ones take the
-            place of earlier ones; a table always has room for all that is shown at once.
+        count: For how many steps frames are computed at once.
     """
 
-    in_blocks = False
-
-    def __init__(self, scenario: Scenario, rows: int, ahead: tuple[int, ...], memory: int) -> None:
+    def __init__(self, scenario: Scenario, rows: int, ahead: tuple[int, ...], count: int) -> None:
         self._scenario = scenario
         self.point = scenario.points(ahead)
         self._points, width = int(self.point[-1]) + 1, 12 if scenario.task.has_orientation else 3
-        affordable = memory // (8 * width * rows)
-        self.shape = (rows, min(self._points, max(affordable, ahead[-1] + 1)), width)
+        # From the target to the furthest that is shown: those of whole episodes would not stay in the cache.
+        self.shape = (rows, ahead[-1] + count, width)
         self._preview = np.array(ahead, dtype=np.int64)
 
     def allocate(self) -> FloatArray:
@@ -68,6 +66,10 @@ class SplineFrames:
         return positions
 
 
-def draws_splines(scenario: Scenario) -> bool:
-    """Whether the episodes of a scenario are joint splines; a subclass may draw others."""
-    return type(scenario.trajectory) is RandomJointSpline
+def frames_of_rows(
+    scenario: Scenario, rows: int, ahead: tuple[int, ...], memory: int, count: int
+) -> SplineFrames | NominalFrames:
+    """The nominal frames of N episodes, see the two classes; a subclass of `RandomJointSpline` may draw others."""
+    if type(scenario.trajectory) is RandomJointSpline:
+        return SplineFrames(scenario, rows, ahead, count)
+    return NominalFrames(scenario, rows, ahead, memory)
