@@ -59,6 +59,13 @@ def test_both_kinematics_are_of_the_same_arm():
         call()
 
 
+def test_libraries_are_timed_beside_their_policies():
+    (with_libraries,) = (one for one in policies.tables(measuring.QUICK) if one.columns[-1] == "library [µs]")
+    times = {name: (row[0], row[-1]) for name, row in with_libraries.rows.items()}
+    assert times["qp"][1] is None
+    assert all(times[name][1] > 0.0 for name in ("pink", "mink"))
+
+
 def test_policies_are_those_of_their_scenarios():
     for scenario, labelled in policies.POLICIES.items():
         for name, parameters in labelled.values():
