@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from tqdm import tqdm
 
 from baselines.evaluation.plots import comparison, joints, style, tracking
+from baselines.evaluation.plots.style import literal
 from baselines.evaluation.records import records
 from baselines.evaluation.report import OVERVIEW, Pictures
 from baselines.evaluation.results import Results, slug
@@ -55,10 +56,10 @@ def _figures(results: Results, scenario: str, summaries: Sequence[Summary]) -> I
     """Groups, file names, captions and figures of one scenario."""
     lines = records([row for summary in summaries for row in summary.rows])
     references = {one.label: f"{one.label} *" for one in summaries if one.reference}
-    lines = [{**line, "policy": references.get(line["policy"], line["policy"])} for line in lines]
+    lines = [{**line, "policy": literal(references.get(line["policy"], line["policy"]))} for line in lines]
     if any(line["time_p99_us"] is not None for line in lines):
         caption = f"Cost against the 99th percentile of the time per step in {scenario}"
-        yield OVERVIEW, "cost-time", caption, comparison.cost_time(lines, scenario)
+        yield OVERVIEW, "cost-time", caption, comparison.cost_time(lines, literal(scenario))
 
     # The seed says which episode is shown, where there are others.
     seed = summaries[0].first.seed
@@ -67,11 +68,11 @@ def _figures(results: Results, scenario: str, summaries: Sequence[Summary]) -> I
     pages = [logs[i : i + tracking.MOST] for i in range(0, len(logs), tracking.MOST)]
     for number, page in enumerate(pages, 1):
         caption = f"Nominal and actual task coordinates, and errors, in {episode}"
-        named = [(one.label + " *" * one.reference, log) for one, log in page]
-        figure = tracking.draw(f"{episode}: task coordinates and errors", named)
+        named = [(literal(one.label + " *" * one.reference), log) for one, log in page]
+        figure = tracking.draw(literal(f"{episode}: task coordinates and errors"), named)
         yield OVERVIEW, f"tracking{f'-{number}' if len(pages) > 1 else ''}", caption, figure
     for one, log in logs:
         for quantity in joints.QUANTITIES:
             if quantity.column in log:
                 title = f"{quantity.name} of {one.label} in {episode}"
-                yield JOINTS, f"{quantity.file}-{slug(one.label)}", title, joints.draw(title, log, quantity)
+                yield JOINTS, f"{quantity.file}-{slug(one.label)}", title, joints.draw(literal(title), log, quantity)
