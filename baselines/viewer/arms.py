@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import functools
+import graphlib
 import io
+import math
 import pathlib
 from typing import Any, NamedTuple
 
@@ -134,9 +136,8 @@ class _Model(yourdfpy.URDF):  # type: ignore[misc]  # yourdfpy has no types
             raise InvalidInputError(f"{file}: expected a mesh of the formats {', '.join(FORMATS)}, got {kind!r}")
         content = read_user_file(file, self._left)
         self._left -= len(content)
-        # Nodes of COLLADA that are instances of nodes that are instances: a kilobyte makes a billion meshes.
-        if kind == "dae" and any(element.tag.endswith("instance_node") for element in parse(content).iter()):
-            raise InvalidInputError(f"{file}: expected a COLLADA file without <instance_node>")
+        if kind == "dae" and _nodes(parse(content)) > MOST_PARTS:
+            raise InvalidInputError(f"{file}: expected at most {MOST_PARTS} nodes, those of <instance_node> included")
         scene = trimesh.load(
             io.BytesIO(content), kind, resolver=_Folder(str(file)), force="scene", skip_materials=skip_materials
         )
@@ -144,6 +145,22 @@ class _Model(yourdfpy.URDF):  # type: ignore[misc]  # yourdfpy has no types
             if not isinstance(one, trimesh.Trimesh) or one.vertices.shape[1:] != (3,):
                 raise InvalidInputError(f"{file}: expected triangles in space, got a {type(one).__name__}")
         return scene if geometry.mesh.scale is None else scene.scaled(geometry.mesh.scale)
+
+
+def _nodes(root: Any) -> float:
+    """The nodes of a COLLADA file; one may be made of instances of others, so that a kilobyte makes a billion."""
+    nodes = [element for element in root.iter() if element.tag.endswith("node") and "instance" not in element.tag]
+    parts = {
+        node.get("id", number): [one.get("url", "")[1:] for one in node.iter() if one.tag.endswith("instance_node")]
+        for number, node in enumerate(nodes)
+    }
+    sizes: dict[Any, int] = {}
+    try:
+        for name in graphlib.TopologicalSorter(parts).static_order():
+            sizes[name] = 1 + sum(sizes[part] for part in parts.get(name, ()))
+    except graphlib.CycleError:
+        return math.inf
+    return sum(sizes.values())
 
 
 class _Folder(trimesh.resolvers.FilePathResolver):  # type: ignore[misc]  # trimesh has no types here
