@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from ikgym.arms.limits import limit_rows
 from ikgym.exceptions import InvalidInputError
-from ikgym.kernels import simulation, splines
+from ikgym.kernels import motions, simulation
 from ikgym.kernels.compilation import announced
 from ikgym.kernels.outcome import OBSERVED, Outcome, more_size, observation, outcome, size
 from ikgym.kernels.outcome import Observation as Observation
@@ -22,10 +22,10 @@ from ikgym.plant import step as plant_step
 from ikgym.plant.rows import PlantRows, checked_arm_seeds
 from ikgym.scenarios import Scenario
 from ikgym.scenarios.entering import checked_starts, checked_steps, first_states
+from ikgym.scenarios.motion_frames import MotionFrames, frames_of_rows
 from ikgym.scenarios.nominal_frames import MEMORY, NominalFrames
 from ikgym.scenarios.preview import FARTHEST as FARTHEST
 from ikgym.scenarios.preview import Preview, offsets
-from ikgym.scenarios.spline_frames import SplineFrames, frames_of_rows
 from ikgym.validation import FloatArray, shortened, whole_number
 
 # Rows worth a thread of their own: below, handing over costs more than it saves.
@@ -218,7 +218,7 @@ class Simulator:
         made = int(self._state.step[0])
         if self._motions and made >= self._ready:
             self._ready = made + AT_ONCE
-            splines.complete(*self._motions, self._all, True, AT_ONCE, 0, 1)
+            motions.complete(*self._motions, self._all, True, AT_ONCE, 0, 1)
         self._step(numbers, self._all, True, 0, 1)
         q, qdot, pose, nominal, remaining = self._parts
         seen = {
@@ -277,7 +277,7 @@ class Simulator:
 
     def _rows(self, active: npt.NDArray[np.bool_], numbers: FloatArray, moving: bool, start: int, stop: int) -> None:
         if self._motions:
-            splines.complete(*self._motions, active, moving, 1, start, stop)
+            motions.complete(*self._motions, active, moving, 1, start, stop)
         self._step(numbers, active, moving, start, stop)
 
     def _step(self, *command: Any) -> None:
@@ -292,7 +292,7 @@ class Simulator:
         else:
             self._constants = self._shared, cost, plant.drives, plant.sensors, plant.arms, state, plant.state
         nominal, more = self._nominal, (state.frames, state.step)
-        self._motions = (*nominal.arguments(), *more) if isinstance(nominal, SplineFrames) else ()
+        self._motions = (*nominal.arguments(), *more) if isinstance(nominal, MotionFrames) else ()
 
     def _outcome(self, numbers: FloatArray) -> Outcome:
         return outcome(numbers, *self._shape, late=self._late)

@@ -70,10 +70,10 @@ def test_blocks_of_nominal_frames_are_the_whole_table_bit_for_bit(name, preview)
     points = int(scenario.points(preview)[-1]) + 1
     ahead = in_blocks.preview[-1]
     sizes = [simulator._state.frames.shape[1] for simulator in (whole, in_blocks)]
-    if name.startswith("splines"):  # never whole
-        assert sizes == 2 * [ahead + simulator_module.AT_ONCE]
-    else:
+    if name in {"bent", "wanderer"}:
         assert sizes == [points, 2 * ahead if ahead < points else points]
+    else:  # never whole
+        assert sizes == 2 * [ahead + simulator_module.AT_ONCE]
     rng, generators = np.random.default_rng(4), [[np.random.default_rng(i) for i in range(ROWS)] for _ in range(2)]
     active = np.ones(ROWS, dtype=bool)
     for k in range(150):
@@ -102,9 +102,10 @@ def test_blocks_show_the_episodes_nominals(name):
         assert identical(simulator.nominal_positions(row), scenario.nominal(seed)[:, -3:])
 
 
-def test_episodes_along_splines_begin_with_the_frames_that_are_shown_alone():
+@pytest.mark.parametrize("name", ["panda-random", "varga7-random"])
+def test_episodes_begin_with_the_frames_that_are_shown_alone(name):
     """The others are computed in the steps that need them: most episodes of an agent that explores are short."""
-    simulator = Simulator(ikgym.scenarios.get("panda-random"), 2, (10, 40, 100))
+    simulator = Simulator(ikgym.scenarios.get(name), 2, (10, 40, 100))
     generators = [np.random.default_rng(i) for i in range(2)]
     simulator.reset(np.ones(2, dtype=bool), generators)
     simulator.observe()

@@ -9,7 +9,8 @@ from __future__ import annotations
 from ikgym.trajectories import paths
 from ikgym.trajectories.batch import first_joints_of, frames_of, joint_paths_of
 from ikgym.trajectories.helix import Helix
-from ikgym.trajectories.joint_spline import JointSpline, JointSplines
+from ikgym.trajectories.joint_motions import JointMotions
+from ikgym.trajectories.joint_spline import JointSpline
 from ikgym.trajectories.orientations import AlongPath, FixedOrientation, OrientationThrough, Turning
 from ikgym.trajectories.path_trajectory import PathTrajectory
 from ikgym.trajectories.published_path import PublishedPath, RandomPublishedPath
@@ -26,8 +27,8 @@ __all__ = [
     "AlongPath",
     "FixedOrientation",
     "Helix",
+    "JointMotions",
     "JointSpline",
-    "JointSplines",
     "OrientationThrough",
     "PathTrajectory",
     "PublishedPath",

@@ -8,8 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ikgym.arms import Arm
-from ikgym.trajectories.joint_spline import JointSplines
-from ikgym.trajectories.sinusoid import Sinusoid, waves
+from ikgym.trajectories.joint_motions import JointMotions
 from ikgym.trajectories.trajectory import Trajectory, frames_along
 from ikgym.validation import FloatArray
 
@@ -63,12 +62,4 @@ def joint_paths_of(trajectories: Sequence[Trajectory], times: FloatArray) -> Flo
 
 def _paths(trajectories: Sequence[Trajectory], times: FloatArray) -> FloatArray | None:
     """Joint paths of shape (k, t, n), where all are of a kind that random scenarios draw by the thousands."""
-    if isinstance(trajectories, JointSplines):
-        return trajectories.joint_paths(times)
-    kinds = set(map(type, trajectories))
-    if kinds == {Sinusoid} and all(s.sigmoid is None for s in typing.cast(Sequence[Sinusoid], trajectories)):
-        sinusoids = typing.cast(Sequence[Sinusoid], trajectories)
-        motions = np.array([(s.amplitude, s.frequency, s.phase, s.offset) for s in sinusoids])
-        amplitude, frequency, phase, offset = motions.swapaxes(0, 1)[:, :, None]
-        return waves(times[..., None], amplitude, frequency, phase, offset, None)
-    return None
+    return trajectories.joint_paths(times) if isinstance(trajectories, JointMotions) else None

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from ikgym.exceptions import InvalidInputError
-from ikgym.kernels.splines import spline_rows
+from ikgym.trajectories.joint_motions import JointMotions, paths_of
 from ikgym.trajectories.trajectory import Trajectory
 from ikgym.validation import LARGEST, SMALLEST, FloatArray, frozen_array, number
 
@@ -48,7 +47,7 @@ class JointSpline(Trajectory):
 
     def joint_path(self, times: FloatArray) -> FloatArray:
         """See :meth:`Trajectory.joint_path`."""
-        path: FloatArray = _splines_at(self.control[None], times[None], self.duration)[0]
+        path: FloatArray = paths_of(self.control[None], times[None], self.duration)[0]
         return path
 
     def joint_bound(self) -> FloatArray:
@@ -57,31 +56,8 @@ class JointSpline(Trajectory):
         return bound
 
 
-class JointSplines(Sequence[JointSpline]):
-    """The motions of several episodes, which begin by the thousands: each is an object only where one is asked for.
-
-    Args:
-        control: Control points in [rad] or [m], as those of :class:`JointSpline`. Shape (k, c, n).
-        duration: T in [s].
-    """
-
-    def __init__(self, control: FloatArray, duration: float) -> None:
-        self.control, self.duration = control, duration
-
-    def __len__(self) -> int:
-        return len(self.control)
+class JointSplines(JointMotions):
+    """Several splines; the parameters are their control points in [rad] or [m], as those of :class:`JointSpline`."""
 
     def __getitem__(self, row: Any) -> Any:
-        return JointSpline(self.control[row], self.duration)
-
-    def joint_paths(self, times: FloatArray) -> FloatArray:
-        """The joint path of each motion at times of its own, of shape (k, t): see :meth:`Trajectory.joint_path`."""
-        return _splines_at(self.control, times, self.duration)
-
-
-def _splines_at(control: FloatArray, times: FloatArray, duration: float) -> FloatArray:
-    """Joint coordinates of k splines. Shapes (k, c, n), (k, t) and (k, t, n)."""
-    out = np.empty((*times.shape, control.shape[2]))
-    # Copied, since kernels would compile anew for arrays that are read-only.
-    spline_rows(np.array(control, order="C"), np.array(times, order="C"), duration, out)
-    return out
+        return JointSpline(self.parameters[row], self.duration)

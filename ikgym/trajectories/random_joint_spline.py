@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
-from ikgym.kernels.splines import control_rows
+from ikgym.kernels.motions import control_rows
 from ikgym.trajectories.joint_spline import JointSpline, JointSplines
 from ikgym.trajectories.trajectory import Trajectory
 from ikgym.validation import LARGEST, SMALLEST, FloatArray, frozen_array, number, per_joint, whole_number

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import typing
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from ikgym.exceptions import InvalidInputError
+from ikgym.trajectories.joint_motions import JointMotions, paths_of
 from ikgym.trajectories.trajectory import Trajectory
 from ikgym.validation import LARGEST, FloatArray, frozen_array, number, per_joint
 
@@ -44,7 +47,10 @@ class Sinusoid(Trajectory):
 
     def joint_path(self, times: FloatArray) -> FloatArray:
         """See :meth:`Trajectory.joint_path`."""
-        return waves(times[:, None], self.amplitude, self.frequency, self.phase, self.offset, self.sigmoid)
+        offset = self.offset if self.sigmoid is None else np.zeros(len(self.amplitude))
+        parameters = np.array([[self.amplitude, self.frequency, self.phase, offset]])
+        wave: FloatArray = paths_of(parameters, times[None], 0.0)[0]
+        return wave if self.sigmoid is None else self.sigmoid * wave / (1.0 + np.abs(wave)) + self.offset
 
     def joint_bound(self) -> FloatArray:
         """See :meth:`Trajectory.joint_bound`."""
@@ -83,25 +89,28 @@ class RandomSinusoid(Trajectory):
 
     def sample(self, rng: np.random.Generator) -> Sinusoid:
         """See :meth:`Trajectory.sample`. Draws scales, then frequencies, then phases."""
-        n = len(self.amplitude)
-        scale, frequency, phase = (rng.uniform(*limits, n) for limits in (self.scale, self.frequency, self.phase))
-        return Sinusoid(self.amplitude * scale, frequency, phase)
+        motion: Sinusoid = self._drawn([rng])[0]
+        return motion
+
+    def samples(self, generators: Sequence[np.random.Generator]) -> Sequence[Trajectory]:
+        """See :meth:`Trajectory.samples`; all of them are computed at once, but for a subclass that may draw others."""
+        return self._drawn(generators) if type(self) is RandomSinusoid else super().samples(generators)
 
     def joint_bound(self) -> FloatArray:
         """See :meth:`Trajectory.joint_bound`; true for all that may be drawn."""
         return np.abs(self.amplitude) * max(map(abs, self.scale))
 
+    def _drawn(self, generators: Sequence[np.random.Generator]) -> Sinusoids:
+        drawn, limits = np.empty((len(generators), 3, len(self.amplitude))), (self.scale, self.frequency, self.phase)
+        for numbers, rng in zip(drawn, generators, strict=True):
+            rng.random(out=numbers)
+        scale, frequency, phase = (low + (high - low) * drawn[:, i] for i, (low, high) in enumerate(limits))
+        amplitude = self.amplitude * scale
+        return Sinusoids(np.stack([amplitude, frequency, phase, np.zeros(amplitude.shape)], axis=1))
 
-def waves(
-    times: FloatArray,
-    amplitude: FloatArray,
-    frequency: FloatArray | float,
-    phase: FloatArray | float,
-    offset: FloatArray | float,
-    sigmoid: float | None,
-) -> FloatArray:
-    """Joint coordinates of one sinusoid or of many: all that is given broadcasts."""
-    wave: FloatArray = amplitude * np.sin(times * frequency + phase)
-    if sigmoid is not None:
-        wave = sigmoid * wave / (1.0 + np.abs(wave))
-    return wave + offset
+
+class Sinusoids(JointMotions):
+    """Several sinusoids; the parameters are their amplitudes, frequencies, phases and offsets."""
+
+    def __getitem__(self, row: Any) -> Any:
+        return Sinusoid(*self.parameters[row])

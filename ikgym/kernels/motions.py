@@ -1,7 +1,8 @@
-"""Kernels: joint motions along cubic B-splines, their random control points, and the nominal frames along them."""
+"""Kernels: joint motions, random control points of splines, and the nominal frames along motions."""
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -49,12 +50,29 @@ def _spline(control, time, duration, out):
         out[j] = (rest * rest * rest * control[i, j] + inner + u * u * u * control[i + 3, j]) / 6.0
 
 
+@inlined
+def _at(motion, time, duration, out):
+    """A motion at one time: a spline, or where the duration is 0 a sinusoid; see :func:`motion_rows`."""
+    if duration > 0.0:
+        _spline(motion, time, duration, out)
+    else:
+        for j in range(out.shape[0]):
+            out[j] = motion[0, j] * math.sin(time * motion[1, j] + motion[2, j]) + motion[3, j]
+
+
 @kernel
-def spline_rows(control, times, duration, out):
-    """Several splines: ``control`` (k, c, n), each at ``times`` (k, t) in [s] of its own; ``out`` (k, t, n)."""
+def motion_rows(motions, times, duration, out):
+    """Several motions, each at times of its own.
+
+    Args:
+        motions: Control points of splines; or amplitudes, frequencies, phases and offsets of sinusoids. (k, c, n).
+        times: In [s]. Shape (k, t).
+        duration: Of the splines, in [s]; 0 for sinusoids.
+        out: Receives the joint coordinates in [rad] or [m]. Shape (k, t, n).
+    """
     for row in range(times.shape[0]):
         for i in range(times.shape[1]):
-            _spline(control[row], times[row, i], duration, out[row, i])
+            _at(motions[row], times[row, i], duration, out[row, i])
 
 
 @kernel
@@ -135,8 +153,8 @@ def complete(
         prismatic: See there.
         tool: See there.
         tool_rotation: See there.
-        control: Control points of the rows' motions in [rad] or [m]. Shape (N, c, n).
-        duration: Of the motions, in [s].
+        control: The rows' motions, see :func:`motion_rows`. Shape (N, c, n).
+        duration: See there.
         dt: Δt in [s].
         first: Number of the first point of the rows' episodes, all points of all their episodes being counted on.
             Shape (N,).
@@ -193,7 +211,7 @@ def _complete(chain, motions, row, point, known, table, q, rotation, position):
     if known[slot] == number:
         return
     known[slot] = number
-    _spline(motions.control[row], float(point) * motions.dt, motions.duration, q)
+    _at(motions.control[row], float(point) * motions.dt, motions.duration, q)
     forward(chain, q, rotation, position)
     width = table.shape[1]
     if width == 12:

@@ -1,4 +1,4 @@
-"""The nominal frames of N episodes along joint splines, each computed when a step first needs it."""
+"""The nominal frames of N episodes along joint motions, each computed when a step first needs it."""
 
 from __future__ import annotations
 
@@ -10,24 +10,27 @@ import numpy.typing as npt
 
 from ikgym.scenarios.nominal_frames import NominalFrames
 from ikgym.scenarios.scenario import Scenario
-from ikgym.trajectories import JointSplines, RandomJointSpline, Trajectory
+from ikgym.trajectories import JointMotions, Trajectory
 from ikgym.validation import FloatArray
 
 Integers = npt.NDArray[np.int64]
 
 
-class SplineFrames:
-    """Tables of frames that :func:`ikgym.kernels.splines.complete` fills in, so that an episode begins in no time.
+class MotionFrames:
+    """Tables of frames that :func:`ikgym.kernels.motions.complete` fills in, so that an episode begins in no time.
 
     Args:
-        scenario: The scenario, whose trajectory is a `RandomJointSpline`.
+        scenario: The scenario.
+        motions: Motions that its trajectory draws.
         rows: N.
         ahead: Steps ahead that are shown, rising.
         count: For how many steps frames are computed at once.
     """
 
-    def __init__(self, scenario: Scenario, rows: int, ahead: tuple[int, ...], count: int) -> None:
-        self._scenario = scenario
+    def __init__(
+        self, scenario: Scenario, motions: JointMotions, rows: int, ahead: tuple[int, ...], count: int
+    ) -> None:
+        self._scenario, self._motions = scenario, motions
         self.point = scenario.points(ahead)
         self._points, width = int(self.point[-1]) + 1, 12 if scenario.task.has_orientation else 3
         # From the target to the furthest that is shown: those of whole episodes would not stay in the cache.
@@ -37,8 +40,7 @@ class SplineFrames:
     def allocate(self) -> FloatArray:
         """The tables, of :attr:`shape`, when there is memory for them."""
         rows, slots, _ = self.shape
-        spline: Any = self._scenario.trajectory
-        self._motions = JointSplines(np.zeros((rows, spline.spans + 3, self._scenario.joints)), spline.duration)
+        self._motions = self._motions.blank(rows)
         self._first, self._known = np.zeros(rows, dtype=np.int64), np.full((rows, slots), -1)
         return np.zeros(self.shape)
 
@@ -50,13 +52,13 @@ class SplineFrames:
     def begin(self, tables: FloatArray, rows: Integers, episodes: Sequence[Trajectory], steps: Integers) -> None:
         """Begins new episodes; the arguments are those of `NominalFrames.begin`."""
         del tables, steps
-        self._motions.control[rows] = episodes.control  # type: ignore[attr-defined]  # JointSplines
+        self._motions.parameters[rows] = episodes.parameters  # type: ignore[attr-defined]  # JointMotions
         self._first[rows] += self._points
 
     def arguments(self) -> tuple[Any, ...]:
         """The first arguments of the kernel."""
         motions, scenario = self._motions, self._scenario
-        shown = motions.control, motions.duration, scenario.dt, self._first, self.point, self._preview, self._known
+        shown = motions.parameters, motions.duration, scenario.dt, self._first, self.point, self._preview, self._known
         return *scenario.model.chain, *shown
 
     def positions(self, row: int) -> FloatArray:
@@ -68,8 +70,9 @@ class SplineFrames:
 
 def frames_of_rows(
     scenario: Scenario, rows: int, ahead: tuple[int, ...], memory: int, count: int
-) -> SplineFrames | NominalFrames:
-    """The nominal frames of N episodes, see the two classes; a subclass of `RandomJointSpline` may draw others."""
-    if type(scenario.trajectory) is RandomJointSpline:
-        return SplineFrames(scenario, rows, ahead, count)
+) -> MotionFrames | NominalFrames:
+    """The nominal frames of N episodes, see the two classes."""
+    motions = scenario.trajectory.samples([])
+    if isinstance(motions, JointMotions):
+        return MotionFrames(scenario, motions, rows, ahead, count)
     return NominalFrames(scenario, rows, ahead, memory)
