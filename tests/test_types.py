@@ -9,7 +9,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 SOURCES = [*ROOT.glob("ikgym/**/*.py"), *ROOT.glob("baselines/**/*.py"), *ROOT.glob("benchmarks/**/*.py")]
-KERNELS = {"kernel", "uncounted", "inlined", "expanded", "njit"}
+KERNELS = {"kernel", "inner", "uncounted", "inlined", "expanded", "njit"}
 
 
 def untyped(source: str) -> list[str]:
