@@ -59,3 +59,13 @@ def test_new_lines_are_measured_and_the_others_stay(tmp_path, monkeypatch):
     assert float(every["broyden"]["cost_ratio"]) > 1.0
     assert every["dls"]["time_p99_us"] > 0.0
     assert every["mine"]["cost_ratio"] == "7.5"
+
+
+def test_intervals_have_costs_and_times(monkeypatch):
+    monkeypatch.setattr(measure, "INTERVALS", (1, 64))
+    monkeypatch.setattr(measure, "EPISODES", 3)
+    every, seldom = measure.intervals(only_new=False)
+    assert (every["interval"], every["times_every_step"]) == (1, 1.0)
+    assert seldom["times_every_step"] > 1.0
+    assert seldom["time_mean_us"] < every["time_mean_us"] <= every["time_max_us"]
+    assert measure.intervals(only_new=True)[1] == seldom | dict.fromkeys(["time_mean_us", "time_p99_us", "time_max_us"])
