@@ -12,6 +12,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import itertools
+import shutil
 import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -143,6 +144,8 @@ def main(command: Command) -> None:
         make = intervals if name == "agents_interval" else functools.partial(measured, name)
         new = make(only_new=command.new)
         write(RESULTS / f"{name}.csv", to_csv(new).encode())
+        for folder in WORK.glob(f"{name}-*"):  # or the next measurement would have these times
+            shutil.rmtree(folder)
 
 
 if __name__ == "__main__":
