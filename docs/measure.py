@@ -1,10 +1,10 @@
 """Measures tables of `docs/results` anew: ``python -m docs.measure pose cost_time agents_interval``.
 
 A table says by its lines what is played: scenario, policy, episodes and seeds. To add a policy, add a line with these
-columns; --new measures those alone, without times. Each policy is timed in two episodes, on one core of a machine that
-does nothing else. A killed measurement continues where it was. Agents that were trained are read from
-``runs/NAME/seed-*``, the untrained ones are written there; a line whose scenario or agent is not here stays as it is.
-Then ``python -m docs.tables`` and ``python -m docs.pictures`` write the page.
+columns; --new measures those alone, without times, and --times the times alone. Each policy is timed in two episodes,
+on one core of a machine that does nothing else. A killed measurement continues where it was. Agents that were trained
+are read from ``runs/NAME/seed-*``, the untrained ones are written there; a line whose scenario or agent is not here
+stays as it is. Then ``python -m docs.tables`` and ``python -m docs.pictures`` write the page.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import itertools
+import shutil
 import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -40,8 +41,8 @@ UNTRAINED, SEEDS = "untrained", range(5)
 #: The intervals of `agents_interval`, its agent, scenario and episodes.
 INTERVALS, AGENT, SCENARIO, EPISODES = (1, 2, 4, 8, 16, 32, 64), "agent_alone", "varga7-pose-random", 256
 
-#: Columns of a table that depend on the machine.
-TIMES = ("time_p50_us", "time_p99_us")
+#: Columns of a table that depend on the machine, and the episodes in which they are measured.
+TIMES, TIMED = ("time_p50_us", "time_p99_us"), 2
 Line = dict[str, Any]
 
 
@@ -53,9 +54,11 @@ class Command:
     """Names of CSV files without their end: pose, cost_time, skew, agents_interval."""
     new: bool = False
     """Measure only lines that have no cost ratio yet, and no times."""
+    times: bool = False
+    """Measure only the times; costs stay."""
 
 
-def measured(name: str, *, only_new: bool) -> list[Line]:
+def measured(name: str, *, only_new: bool = False, only_times: bool = False) -> list[Line]:
     """The lines of a table, scenario by scenario, from low to high cost ratios."""
     old = list(map(dict, from_csv((RESULTS / f"{name}.csv").read_text(encoding="utf-8"))))
     new: list[Line] = []
@@ -66,7 +69,12 @@ def measured(name: str, *, only_new: bool) -> list[Line]:
         left = [line for line in lines if line not in todo]
         if left and not only_new:
             print(f"{name}, {scenario}: {', '.join(one['policy'] for one in left)}: as before", file=sys.stderr)
-        found = list(itertools.chain(*(_played(name, scenario, some) for some in _by_episodes(todo))))
+        if only_times:
+            timed = _played(name, scenario, todo, TIMED) if todo else []
+            found = [line | {column: new[column] for column in TIMES} for line, new in zip(todo, timed, strict=True)]
+        else:
+            parts = _by_episodes(todo)
+            found = list(itertools.chain(*(_played(name, scenario, some, int(some[0]["episodes"])) for some in parts)))
         if only_new:
             found = [one | dict.fromkeys(TIMES) for one in found]
         found = sorted([*found, *left], key=lambda one: float(one["cost_ratio"]))
@@ -94,12 +102,18 @@ def _by_episodes(lines: Sequence[Line]) -> Iterable[list[Line]]:
         yield [line for line in lines if int(line["episodes"]) == number]
 
 
-def _played(name: str, scenario: str, lines: Sequence[Line]) -> list[Line]:
-    """Lines with the same scenario and number of episodes, measured."""
-    episodes = int(lines[0]["episodes"])
+def _played(name: str, scenario: str, lines: Sequence[Line], episodes: int) -> list[Line]:
+    """Lines with the same scenario, measured."""
     played = [policy for line in lines for policy in policies(line)]
     folder = WORK / f"{name}-{scenario}-{episodes}"
-    options: Any = {"episodes": episodes, "timed": 2, "out": folder, "resume": True, "plots": False, "report": False}
+    options: Any = {
+        "episodes": episodes,
+        "timed": TIMED,
+        "out": folder,
+        "resume": True,
+        "plots": False,
+        "report": False,
+    }
     return records(evaluate(scenario, played, progress=True, **options), [line["policy"] for line in lines])
 
 
@@ -116,23 +130,28 @@ def untrained() -> None:
             save_agent(file, new_trainer(config, config.make_scenario(), seed).agent())
 
 
-def intervals(*, only_new: bool) -> list[Line]:
+def intervals(*, only_new: bool = False, only_times: bool = False) -> list[Line]:
     """Cost and times of an agent over the steps from one evaluation of its network to the next."""
     scenario, seeds = ikgym.scenarios.get(SCENARIO), ikgym.scenarios.seeds("test", EPISODES)
+    old = from_csv((RESULTS / "agents_interval.csv").read_text(encoding="utf-8")) if only_times else []
     known, first, out = np.array(best_known.costs(scenario, seeds), dtype=np.float64), None, []
-    for interval in INTERVALS:
+    for number, interval in enumerate(INTERVALS):
         policy: Any = baselines.make(AGENT, scenario, interval=interval)
-        total = np.array([(one.tracking_cost + one.velocity_cost).sum() for one in rollouts(scenario, policy, seeds)])
-        first = total if first is None else first
-        low, high = geometric_interval(total / known)
-        line: Line = {"interval": interval, "cost_ratio": geometric_mean(total / known), "low": low, "high": high}
-        line |= {"times_every_step": geometric_mean(total / first)}
-        line |= dict(
-            zip(("times_every_step_low", "times_every_step_high"), geometric_interval(total / first), strict=True)
-        )
-        timed = np.concatenate([one.time_ns[1:] for one in rollouts(scenario, policy, seeds[:2], timed=True)]) / 1e3
-        times = {"time_mean_us": timed.mean(), "time_p99_us": np.percentile(timed, 99), "time_max_us": timed.max()}
-        out.append({**line, **{key: None if only_new else float(value) for key, value in times.items()}})
+        line: Line = {"interval": interval}
+        if only_times:
+            line = dict(old[number])
+        else:
+            played = rollouts(scenario, policy, seeds)
+            total = np.array([(one.tracking_cost + one.velocity_cost).sum() for one in played])
+            first = total if first is None else first
+            for name, ratios in {"cost_ratio": total / known, "times_every_step": total / first}.items():
+                prefix = "" if name == "cost_ratio" else f"{name}_"
+                low, high = geometric_interval(ratios)
+                line |= {name: geometric_mean(ratios), f"{prefix}low": low, f"{prefix}high": high}
+        timed = [one.time_ns[1:] for one in rollouts(scenario, policy, seeds[:TIMED], timed=True)]
+        micros = np.concatenate(timed) / 1e3
+        times = {"time_mean_us": micros.mean(), "time_p99_us": np.percentile(micros, 99), "time_max_us": micros.max()}
+        out.append(line | {key: None if only_new else float(value) for key, value in times.items()})
     return out
 
 
@@ -141,8 +160,10 @@ def main(command: Command) -> None:
     untrained()
     for name in command.tables:
         make = intervals if name == "agents_interval" else functools.partial(measured, name)
-        new = make(only_new=command.new)
+        new = make(only_new=command.new, only_times=command.times)
         write(RESULTS / f"{name}.csv", to_csv(new).encode())
+        for folder in WORK.glob(f"{name}-*"):  # or the next measurement would have these times
+            shutil.rmtree(folder)
 
 
 if __name__ == "__main__":

@@ -55,7 +55,26 @@ def test_new_lines_are_measured_and_the_others_stay(tmp_path, monkeypatch):
     assert (high["policy"], high["cost_ratio"]) == ("mine", "7.5")
     assert (new["policy"], new["time_p99_us"]) == ("dls", None)
     assert new["cost_ratio"] == pytest.approx(1.9148, rel=1e-4)
-    every = {one["policy"]: one for one in measure.measured("some", only_new=False)}
+    every = {one["policy"]: one for one in measure.measured("some")}
     assert float(every["broyden"]["cost_ratio"]) > 1.0
     assert every["dls"]["time_p99_us"] > 0.0
     assert every["mine"]["cost_ratio"] == "7.5"
+
+
+def test_times_are_measured_alone(tmp_path, monkeypatch):
+    for name in ("RESULTS", "WORK", "RUNS"):
+        monkeypatch.setattr(measure, name, tmp_path)
+    (tmp_path / "some.csv").write_text(HEAD + "mine,varga7-fast,1,1,1.5,3,no\ndls,varga7-fast,1,1,0.5,,yes\n")
+    new, old = measure.measured("some", only_times=True)
+    assert (new["policy"], new["cost_ratio"], old["time_p99_us"]) == ("dls", "0.5", "3")
+    assert new["time_p99_us"] > 0.0
+
+
+def test_intervals_have_costs_and_times(monkeypatch):
+    monkeypatch.setattr(measure, "INTERVALS", (1, 64))
+    monkeypatch.setattr(measure, "EPISODES", 3)
+    every, seldom = measure.intervals(only_new=False)
+    assert (every["interval"], every["times_every_step"]) == (1, 1.0)
+    assert seldom["times_every_step"] > 1.0
+    assert seldom["time_mean_us"] < every["time_mean_us"] <= every["time_max_us"]
+    assert measure.intervals(only_new=True)[1] == seldom | dict.fromkeys(["time_mean_us", "time_p99_us", "time_max_us"])

@@ -73,13 +73,19 @@ def _label(row: Row, given: Mapping[str, tuple[str, dict[str, Any]]]) -> str | N
     """The folder of an agent's training seeds, or the policy as text that names most of the parameters; else None."""
     if seed := re.search(r"([^/\\]+)[/\\]seed-\d+[/\\]", str(row.parameters.get("path", ""))):
         return seed[1]
-    there = {name: canonical(value) for name, value in row.parameters.items()}
     alike = {
         text: len(parameters)
         for text, (name, parameters) in given.items()
-        if name == row.policy and all(there.get(key) == canonical(jsonable(value)) for key, value in parameters.items())
+        if name == row.policy and _has(row.parameters, jsonable(parameters))
     }
     return max(alike, key=alike.__getitem__, default=None)
+
+
+def _has(there: Any, given: Any) -> bool:
+    """Whether a value is the given one; of tables, such as the options of an inner policy, the given keys count."""
+    if isinstance(there, Mapping) and isinstance(given, Mapping):
+        return all(key in there and _has(there[key], value) for key, value in given.items())
+    return canonical(there) == canonical(given)
 
 
 def _lowest(rows: Iterable[Row]) -> dict[int, float]:

@@ -63,6 +63,14 @@ class TestRecords:
         rows += episodes(row, (3.0,), policy="rhc", parameters=short)
         assert [line["policy"] for line in records.records(rows, given)] == given
 
+    def test_the_options_of_an_inner_policy_tell_lines_apart(self, row):
+        given = ["smoothed:options={'horizon': 3}", "smoothed:options={'horizon': 9}"]
+        rows = []
+        for cost, horizon in ((2.0, 3), (3.0, 9)):
+            parameters = {"options": {"horizon": horizon, "iterations": 1}}
+            rows += episodes(row, (cost,), policy="smoothed", parameters=parameters)
+        assert [line["policy"] for line in records.records(rows, given)] == given
+
 
 class TestFiles:
     LINES = (
