@@ -70,8 +70,8 @@ def measured(name: str, *, only_new: bool = False, only_times: bool = False) -> 
         if left and not only_new:
             print(f"{name}, {scenario}: {', '.join(one['policy'] for one in left)}: as before", file=sys.stderr)
         if only_times:
-            timed = _played(name, scenario, todo, TIMED) if todo else []
-            found = [line | {column: new[column] for column in TIMES} for line, new in zip(todo, timed, strict=True)]
+            timed = {one["policy"]: one for one in (_played(name, scenario, todo, TIMED) if todo else [])}
+            found = [line | {column: timed[line["policy"]][column] for column in TIMES} for line in todo]
         else:
             parts = _by_episodes(todo)
             found = list(itertools.chain(*(_played(name, scenario, some, int(some[0]["episodes"])) for some in parts)))

@@ -64,10 +64,13 @@ def test_new_lines_are_measured_and_the_others_stay(tmp_path, monkeypatch):
 def test_times_are_measured_alone(tmp_path, monkeypatch):
     for name in ("RESULTS", "WORK", "RUNS"):
         monkeypatch.setattr(measure, name, tmp_path)
-    (tmp_path / "some.csv").write_text(HEAD + "mine,varga7-fast,1,1,1.5,3,no\ndls,varga7-fast,1,1,0.5,,yes\n")
-    new, old = measure.measured("some", only_times=True)
-    assert (new["policy"], new["cost_ratio"], old["time_p99_us"]) == ("dls", "0.5", "3")
-    assert new["time_p99_us"] > 0.0
+    (tmp_path / "some.csv").write_text(
+        HEAD + "mine,varga7-fast,1,1,3.5,3,no\nrhc,varga7-fast,1,1,2.5,,no\ndls,varga7-fast,1,1,0.5,,yes\n"
+    )
+    dls, rhc, old = measure.measured("some", only_times=True)
+    assert (dls["policy"], rhc["policy"], old["policy"]) == ("dls", "rhc", "mine")
+    assert (dls["cost_ratio"], old["time_p99_us"]) == ("0.5", "3")
+    assert 0.0 < dls["time_p99_us"] < rhc["time_p99_us"]
 
 
 def test_intervals_have_costs_and_times(monkeypatch):
