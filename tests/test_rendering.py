@@ -20,8 +20,9 @@ STEPS = 12  # the longest command delay of a scenario, at least
 
 @pytest.fixture(autouse=True)
 def no_figure_left():
+    before = plt.get_fignums()  # of other tests
     yield
-    assert plt.get_fignums() == []
+    assert plt.get_fignums() == before
 
 
 def short(name="varga7-fast", steps=STEPS):
