@@ -1,4 +1,7 @@
-"""Plays episodes and records them: the one loop behind evaluation, leaderboard, oracle, training, viewer and papers."""
+"""Plays episodes and records them: the one loop behind evaluation, leaderboard, oracle, training, viewer and papers.
+
+One file, although long: single episodes and batches share the timing, the records and the checks of a policy's answer.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""A solver as a policy: the signature of Stable-Baselines3's `predict`, and memory that travels through `state`."""
+"""A solver as a policy: the signature of Stable-Baselines3's `predict`, and memory that travels through `state`.
+
+One file, although long: it is the whole path of a `predict`, from its arguments to its answer.
+"""
 
 from __future__ import annotations
 
