@@ -15,7 +15,7 @@ from baselines.agents.bilinear.processing import Bilinear
 from baselines.agents.bounds import Bounds
 from baselines.agents.files import AgentFile, load_agent
 from baselines.agents.network import Network
-from baselines.agents.processing import Held, Processing
+from baselines.agents.processing import Acting, Held, Processing
 from baselines.agents.relative import Relative
 from baselines.files import ResultsError
 from baselines.fingerprints import arm_fingerprint
@@ -84,8 +84,10 @@ class LearnedPolicy(SolverPolicy):
         skew = (file.about["task"]["name"], self.problem.task.name) == ("pose", "skew")
         seen = full_orientation.full_problem(self.problem) if skew else self.problem
         check_scenario(file, seen, any_arm=any_arm)
+        processing = file.processing
+        assert isinstance(processing, Acting)
         try:
-            needed = file.processing.size(seen), file.processing.outputs(seen)  # type: ignore[attr-defined]
+            needed = processing.size(seen), processing.outputs(seen)
         except InvalidInputError as e:
             raise InvalidInputError(f"Agent {file.source}: {e}") from None
         shape = file.network.sizes[0], file.network.sizes[-1]  # type: ignore[attr-defined]
@@ -94,7 +96,7 @@ class LearnedPolicy(SolverPolicy):
                 f"Agent {file.source}: expected a network from {needed[0]} features to {needed[1]} outputs, got "
                 f"{shape[0]} and {shape[1]}."
             )
-        trained: int = file.processing.interval  # type: ignore[attr-defined]
+        trained = processing.interval
         steps = whole_number("interval", trained if self.interval is None else self.interval, at_least=1)
         for field, value in {"file": file, "seen": seen, "bounds": Bounds.of(seen), "interval": steps}.items():
             object.__setattr__(self, field, value)
@@ -116,8 +118,9 @@ class LearnedPolicy(SolverPolicy):
 
     def memory(self, rows: int) -> Memory:
         """Nothing held, and an evaluation of the network due."""
-        size: int = self.file.processing.held(self.seen)  # type: ignore[attr-defined]
-        held = Held(np.zeros((rows, size)), np.zeros(rows, dtype=np.int64))
+        processing = self.file.processing
+        assert isinstance(processing, Acting)
+        held = Held(np.zeros((rows, processing.held(self.seen))), np.zeros(rows, dtype=np.int64))
         return AgentMemory(*held, *full_orientation.start_memory(rows))
 
     def solve(self, batch: Batch, memory: Memory) -> Solution:
@@ -129,7 +132,7 @@ class LearnedPolicy(SolverPolicy):
             batch, orientation = full_orientation.resolve_orientation(self.problem, batch, orientation)
             batch = batch._replace(nominal=batch.nominal.take(np.array(self._offsets) - 1, axis=1))
         processing, network = self.file.processing, self.file.network
-        assert isinstance(processing, (Bilinear, Relative))
+        assert isinstance(processing, Acting)
         assert isinstance(network, Network)
         assert self.interval is not None
         fractions = processing.act(self.seen, batch, network, self.interval, held)

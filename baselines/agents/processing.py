@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import abc
 import dataclasses
 from collections.abc import Mapping
 from typing import Any, ClassVar, NamedTuple, Protocol, Self
@@ -9,6 +10,8 @@ from typing import Any, ClassVar, NamedTuple, Protocol, Self
 import numpy as np
 import numpy.typing as npt
 
+from baselines.agents.network import Network
+from baselines.policy import Batch, Problem
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios.preview import offsets as checked_offsets
 from ikgym.validation import FloatArray, Frozen, known_names
@@ -67,6 +70,40 @@ class Held(NamedTuple):
 
     values: FloatArray
     left: npt.NDArray[np.int64]
+
+
+class Acting(Processing, abc.ABC):
+    """The processing of an agent whose network is evaluated at intervals, and that acts in every step."""
+
+    #: Steps from one evaluation of the network to the next in the training.
+    interval: int
+
+    @abc.abstractmethod
+    def size(self, problem: Problem) -> int:
+        """The number of features."""
+
+    @abc.abstractmethod
+    def outputs(self, problem: Problem) -> int:
+        """The number of network outputs."""
+
+    @abc.abstractmethod
+    def held(self, problem: Problem) -> int:
+        """The number of values that are held between evaluations of the network."""
+
+    @abc.abstractmethod
+    def act(self, problem: Problem, batch: Batch, network: Network, interval: int, held: Held) -> FloatArray:
+        """Actions as fractions of the velocity limit, possibly beyond the box.
+
+        Args:
+            problem: The problem as the agent sees it.
+            batch: The observations.
+            network: The network.
+            interval: Steps from one evaluation of the network to the next.
+            held: The values of the last evaluation; changed in place.
+
+        Returns:
+            Shape (B, n).
+        """
 
 
 def check_offsets(offsets: tuple[int, ...]) -> tuple[tuple[int, ...], npt.NDArray[np.int64]]:

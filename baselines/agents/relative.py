@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.agents.network import Network, forward_rows
-from baselines.agents.processing import Held, Processing, check_offsets
+from baselines.agents.processing import Acting, Held, check_offsets
 from baselines.policy import Batch, Problem
 from ikgym.kernels.jit import kernel
 from ikgym.kernels.outcome import OBSERVED
@@ -22,7 +22,7 @@ Squash = Literal["clip", "tanh"]
 
 
 @dataclasses.dataclass(frozen=True)
-class Relative(Processing):
+class Relative(Acting):
     """Joint velocities in units of the remaining twist, from the features of :class:`ikgym.rl.AgentObservation`.
 
     The velocity of a joint is a · s (0.2 + |v̂|), with a = gain · (network output), kept within ±largest.
@@ -49,7 +49,7 @@ class Relative(Processing):
     kind: ClassVar[str] = "relative"
     network: ClassVar = Network
     #: Steps for which an action was held in the training.
-    interval: ClassVar[int] = 1
+    interval = 1
 
     def __post_init__(self) -> None:
         known_name("squash", self.squash, get_args(Squash))
@@ -73,18 +73,7 @@ class Relative(Processing):
         return problem.model.joints
 
     def act(self, problem: Problem, batch: Batch, network: Network, interval: int, held: Held) -> FloatArray:
-        """Actions as fractions of the velocity limit, possibly beyond the box.
-
-        Args:
-            problem: The problem as the agent sees it.
-            batch: The observations.
-            network: The network.
-            interval: Steps from one evaluation of the network to the next.
-            held: The outputs of the last evaluation; changed in place.
-
-        Returns:
-            Shape (B, n).
-        """
+        """See :meth:`Acting.act`."""
         out = np.empty(batch.q.shape)
         ahead = problem.task.kind, problem.model.chain, problem.dt, self._ahead, self.furthest
         meaning = self.squash == "tanh", self.gain, self.largest, problem.velocity_limit
