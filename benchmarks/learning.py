@@ -9,6 +9,7 @@ in which the machine did something else does not count.
 from __future__ import annotations
 
 import dataclasses
+import functools
 import time
 from collections.abc import Mapping
 from typing import Annotated, Any
@@ -71,6 +72,7 @@ def played(
     return worst, cost
 
 
+@functools.cache
 def yardstick(scenario: str, split: str, episodes: int) -> tuple[FloatArray, FloatArray]:
     """The same as :func:`played` of `dls`."""
     found = scenarios.get(scenario)

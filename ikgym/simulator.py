@@ -215,8 +215,7 @@ class Simulator:
         """
         self._accept(action, self._all)
         numbers = np.empty(self._count)
-        made = int(self._state.step[0])
-        if self._motions and made >= self._ready:
+        if self._motions and (made := int(self._state.step[0])) >= self._ready:
             self._ready = made + AT_ONCE
             motions.complete(*self._motions, self._all, True, AT_ONCE, 0, 1)
         self._step(numbers, self._all, True, 0, 1)

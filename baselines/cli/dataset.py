@@ -10,7 +10,7 @@ from typing import Annotated
 import tyro
 
 from baselines.cli import shell
-from baselines.cli.parsing import Rule, varies
+from baselines.cli.parsing import if_random
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -35,7 +35,7 @@ class Options:
     """Replace the data set in the folder."""
 
 
-RULES = (Rule(("--split",), lambda given: varies(given.scenario), "on a scenario that is the same at every reset"),)
+RULES = (if_random("--split"),)
 
 
 def manual(prog: str) -> str:

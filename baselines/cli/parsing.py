@@ -93,6 +93,11 @@ def varies(scenario: str | Scenario) -> bool:
     return found.random or found.plant.random
 
 
+def if_random(name: str, scenario: Callable[[Any], str | Scenario] = lambda given: given.scenario) -> Rule:
+    """The rule for an option that chooses among the episodes of a scenario."""
+    return Rule((name,), lambda given: varies(scenario(given)), "on a scenario that is the same at every reset")
+
+
 def find_own_modules() -> None:
     """Lets modules in the current folder be imported, which a console command does not search."""
     if (here := str(pathlib.Path.cwd())) not in sys.path:

@@ -13,7 +13,7 @@ from tqdm import tqdm
 
 from baselines.cli import shell
 from baselines.cli.evaluate import ONE_KIND
-from baselines.cli.parsing import Rule, varies
+from baselines.cli.parsing import if_random
 from baselines.episodes import Seeds
 from baselines.evaluation import records
 from baselines.evaluation.metrics import Row
@@ -55,10 +55,7 @@ class Options:
     """Play on a cluster: ray, at the address in RAY_ADDRESS."""
 
 
-RULES = (
-    ONE_KIND,
-    Rule(("--episodes",), lambda given: varies(given.scenario), "on a scenario that is the same at every reset"),
-)
+RULES = (ONE_KIND, if_random("--episodes"))
 
 
 def manual(prog: str) -> str:

@@ -15,7 +15,7 @@ from typing import Annotated, Any, Generic, TypeVar, Union
 import tyro
 
 from baselines.cli import shell
-from baselines.cli.parsing import Rule, varies
+from baselines.cli.parsing import Rule, if_random
 from baselines.cli.parsing import parse as parse_options
 from baselines.training import methods
 from baselines.training.config import Config, TrainingError
@@ -76,11 +76,7 @@ RULES = (
         lambda given: len(given.config.window) > 1,
         "with one --window, which is also the last: see --reset-distance-end",
     ),
-    Rule(
-        ("--validation-episodes",),
-        lambda given: varies(given.config.scenario),
-        "on a scenario that is the same at every reset",
-    ),
+    if_random("--validation-episodes", lambda given: given.config.scenario),
 )
 
 

@@ -12,7 +12,7 @@ import tyro
 from tqdm import tqdm
 
 from baselines.cli import shell
-from baselines.cli.parsing import Rule, parse, varies
+from baselines.cli.parsing import if_random, parse
 from baselines.files import check_writable
 from baselines.viewer.film import check_ffmpeg, checked_width, moments, pictures, write_video
 from baselines.viewer.replay import Stage, play_all
@@ -43,7 +43,7 @@ class Options:
     """Width of one policy's picture, which is half as high. Several policies stand in two columns."""
 
 
-RULES = (Rule(("--seed",), lambda given: varies(given.scenario), "on a scenario that is the same at every reset"),)
+RULES = (if_random("--seed"),)
 
 
 def manual() -> str:

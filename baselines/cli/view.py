@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import tyro
 
 from baselines.cli import shell
-from baselines.cli.parsing import Rule, parse, varies
+from baselines.cli.parsing import if_random, parse
 from baselines.viewer.replay import Stage
 from baselines.viewer.session import Session
 from ikgym.arms import Arm
@@ -41,7 +41,7 @@ class Options:
     """Port to listen on; 0 for a free one."""
 
 
-RULES = (Rule(("--seed",), lambda given: varies(given.scenario), "on a scenario that is the same at every reset"),)
+RULES = (if_random("--seed"),)
 
 
 def manual() -> str:

@@ -172,20 +172,8 @@ def complete(
     """
     chain = Chain(offsets, axes, prismatic, tool, tool_rotation)
     motions = Motions(control, duration, dt, first, point, preview)
-    _rows(
-        chain,
-        motions,
-        known,
-        tables,
-        np.empty(control.shape[2]),
-        np.empty(12),
-        made,
-        active,
-        moving,
-        count,
-        start,
-        stop,
-    )
+    q, frame = np.empty(control.shape[2]), np.empty(12)
+    _rows(chain, motions, known, tables, q, frame, made, active, moving, count, start, stop)
 
 
 @uncounted
