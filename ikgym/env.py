@@ -15,7 +15,6 @@ from ikgym.exceptions import InvalidInputError, ResetNeededError
 from ikgym.kernels.outcome import OBSERVED as OBSERVED
 from ikgym.kernels.outcome import Observation, observation
 from ikgym.options import checked_distance, checked_options
-from ikgym.pictures import Pictures
 from ikgym.scenarios import Preview, Scenario
 from ikgym.scenarios.entering import has_joint_path
 from ikgym.simulator import Simulator
@@ -156,7 +155,11 @@ class RedundantIKEnv(gym.Env[Any, Any]):
         self._resumed: int | None = None
         self._entered = has_joint_path(self.scenario)
         self._has_orientation = self.scenario.task.has_orientation
-        self._pictures = None if render_mode is None else Pictures(self._simulator, 0, render_mode)
+        self._pictures: Pictures | None = None
+        if render_mode is not None:
+            from ikgym.rendering.pictures import Pictures  # matplotlib is slow to import
+
+            self._pictures = Pictures(self._simulator, 0, render_mode)
 
     @property
     def preview(self) -> tuple[int, ...]:

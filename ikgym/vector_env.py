@@ -17,11 +17,9 @@ from gymnasium.vector.utils import batch_space
 from ikgym import scenarios
 from ikgym.env import OPTIONS, RedundantIKEnv, limited
 from ikgym.exceptions import InvalidInputError, ResetNeededError
-from ikgym.infos import Infos, infos_of, last_observations
 from ikgym.kernels.outcome import Observation, Outcome, observation
 from ikgym.options import checked_distance, checked_mask, checked_mode, checked_options, checked_seeds
-from ikgym.pictures import Pictures
-from ikgym.rows import ArmRow
+from ikgym.rows import ArmRow, Infos, infos_of, last_observations
 from ikgym.scenarios import Preview, Scenario
 from ikgym.scenarios.entering import has_joint_path
 from ikgym.simulator import Simulator
@@ -114,8 +112,11 @@ class RedundantIKVectorEnv(
         self._generators: list[np.random.Generator | None] = [None] * self.num_envs
         self._seeds: list[int | None] = [None] * self.num_envs
         self.render_mode = render_mode
-        drawn = 0 if render_mode is None else self.num_envs
-        self._pictures = [Pictures(self._simulator, row, "rgb_array") for row in range(drawn)]
+        self._pictures: list[Pictures] = []
+        if render_mode is not None:
+            from ikgym.rendering.pictures import Pictures  # matplotlib is slow to import
+
+            self._pictures = [Pictures(self._simulator, row, render_mode) for row in range(self.num_envs)]
         self._begun = np.zeros(self.num_envs, dtype=np.bool_)
         self._ended = np.zeros(self.num_envs, dtype=np.bool_)
 

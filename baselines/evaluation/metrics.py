@@ -17,9 +17,9 @@ import numpy as np
 import ikgym
 from baselines.canonical import canonical
 from baselines.episodes import Episode, Seeds, add_up
-from baselines.evaluation.limits import BOUNDS, at_limits
 from baselines.status import Status
 from ikgym.arms import Arm
+from ikgym.arms.limits import BOUNDS, at_limits
 from ikgym.parallel import cores
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray
@@ -59,7 +59,7 @@ class Row:
         qdot_rms: Root mean square over steps and joints, in [rad/s] or [m/s].
         qdot_total_variation: Σ_k Σ_j |q̇_j(k+1) − q̇_j(k)|, in [rad/s] or [m/s].
         qddot_peak: Largest |q̇_j(k+1) − q̇_j(k)| / Δt, from rest at the start, in [rad/s²] or [m/s²].
-        steps_at_joint_limit: Steps with a joint at a limit of its coordinate, see :mod:`baselines.evaluation.limits`.
+        steps_at_joint_limit: Steps with a joint at a limit of its coordinate, see :func:`ikgym.arms.limits.at_limits`.
         steps_at_velocity_limit: Steps with a joint at its velocity limit.
         steps_at_acceleration_limit: Steps with a joint at its acceleration limit.
         joint_limit_margin_min: Smallest distance of a joint from a limit of its coordinate, in [rad] or [m]; None where

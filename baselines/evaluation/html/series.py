@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.evaluation.export import FRAMES, TrajectoryLog, frame_rows
-from baselines.evaluation.limits import BOUNDS, at_limits
+from ikgym.arms.limits import BOUNDS, at_limits
 from ikgym.validation import FloatArray
 
 #: Bytes that the series of a page may take together, as far as each of them has :data:`FEWEST` rows.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from ikgym.rendering.renderer import Renderer
 from ikgym.simulator import Simulator
 
 
@@ -18,9 +19,6 @@ class Pictures:
     """
 
     def __init__(self, simulator: Simulator, row: int, mode: str) -> None:
-        # matplotlib is slow to import, and most environments never draw.
-        from ikgym.rendering import Renderer
-
         scenario = simulator.scenario
         self._simulator, self._row, self._human = simulator, row, mode == "human"
         self.renderer = Renderer(scenario.arm, mode, title=scenario.name, has_orientation=scenario.task.has_orientation)
