@@ -14,10 +14,12 @@ import functools
 import itertools
 import shutil
 import sys
+import time
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
+import gymnasium as gym
 import numpy as np
 import tyro
 
@@ -40,6 +42,9 @@ WORK, RUNS = Path("results") / "measure", Path("runs")
 UNTRAINED, SEEDS = "untrained", range(5)
 #: The intervals of `agents_interval`, its agent, scenario and episodes.
 INTERVALS, AGENT, SCENARIO, EPISODES = (1, 2, 4, 8, 16, 32, 64), "agent_alone", "varga7-pose-random", 256
+
+#: Steps over which times in batches are taken: a multiple of all intervals.
+BATCHED = 256
 
 #: Columns of a table that depend on the machine, and the episodes in which they are measured.
 TIMES, TIMED = ("time_p50_us", "time_p99_us"), 2
@@ -151,8 +156,23 @@ def intervals(*, only_new: bool = False, only_times: bool = False) -> list[Line]
         timed = [one.time_ns[1:] for one in rollouts(scenario, policy, seeds[:TIMED], timed=True)]
         micros = np.concatenate(timed) / 1e3
         times = {"time_mean_us": micros.mean(), "time_p99_us": np.percentile(micros, 99), "time_max_us": micros.max()}
+        times["time_batch_us"] = _batch_time(scenario, policy, seeds)
         out.append(line | {key: None if only_new else float(value) for key, value in times.items()})
     return out
+
+
+def _batch_time(scenario: ikgym.Scenario, policy: Any, seeds: Sequence[int]) -> float:
+    """The mean time of an arm in [µs] where `predict` is called for all episodes at once."""
+    envs: Any = gym.make_vec("RedundantIK-v0", num_envs=len(seeds), scenario=scenario, preview=policy.preview)
+    observation, _ = envs.reset(seed=list(seeds))
+    state, spent = None, 0.0
+    for step in range(-BATCHED, BATCHED):  # the first half is not counted
+        begin = time.perf_counter()
+        action, state = policy.predict(observation, state)
+        spent += (time.perf_counter() - begin) * (step >= 0)
+        observation, *_ = envs.step(action)
+    envs.close()
+    return 1e6 * spent / (BATCHED * len(seeds))
 
 
 def main(command: Command) -> None:
