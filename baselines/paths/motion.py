@@ -16,15 +16,9 @@ from ikgym.scenarios import Scenario
 from ikgym.simulator import Simulator
 from ikgym.validation import FloatArray
 
-#: Most steps of a survey: longer paths are sampled at larger intervals.
-MOST_STEPS = 4000
-#: A survey allows joint velocities of so many times the limit, since it asks what the path demands.
-BEYOND = 30.0
-
-
 @dataclasses.dataclass(frozen=True, eq=False)
 class Motion:
-    """Motions of `qp` along a path, from N starts.
+    """Motions of `qp` along a path, from N starts and within all limits of the arm.
 
     Args:
         times: From the start on, in [s]. Shape (k + 1,).
@@ -39,6 +33,11 @@ class Motion:
     position_error: FloatArray
     orientation_error: FloatArray
     held_back: FloatArray
+
+    def of(self, row: int) -> Motion:
+        """The motion from one of the starts."""
+        errors = (x[:, row : row + 1] for x in (self.position_error, self.orientation_error, self.held_back))
+        return Motion(self.times, self.q[:, row : row + 1], *errors)
 
 
 def path_duration(scenario: Scenario) -> float:
@@ -61,18 +60,11 @@ def ideal(scenario: Scenario, **changes: object) -> Scenario:
     return scenario.replace(**{"model": scenario.arm, **usual, "steps": max(steps, 2), **changes})
 
 
-def without_rates(scenario: Scenario, most: int = MOST_STEPS) -> Scenario:
-    """The scenario on an arm whose joints are as fast as the path asks; their stops stay."""
-    arm = scenario.arm.replace(velocity_limit=None, acceleration_limit=None)
-    dt = max(scenario.dt, path_duration(scenario) / most)
-    return ideal(scenario, arm=arm, model=arm, velocity_limit=BEYOND * scenario.largest_qdot, dt=dt)
-
-
 def played(scenario: Scenario, starts: FloatArray) -> Motion:
     """`qp` on a scenario.
 
     Args:
-        scenario: A result of :func:`ideal` or :func:`without_rates`.
+        scenario: A result of :func:`ideal`.
         starts: Joint coordinates in [rad] or [m]. Shape (N, n).
     """
     policy, rows = registry.make("qp", scenario), len(starts)

@@ -24,7 +24,7 @@ def starts(scenario: Scenario) -> FloatArray:
     Redundant joints stand where `qp` leads them, so that they are at rest when the path begins.
 
     Args:
-        scenario: A result of :func:`without_rates`.
+        scenario: A result of :func:`baselines.paths.motion.ideal`.
     """
     own = scenario.first_q(scenario.trajectory)
     found = solutions(scenario)

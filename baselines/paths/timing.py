@@ -72,6 +72,12 @@ class Timing:
     progress: FloatArray
     rates: FloatArray
 
+    @classmethod
+    def uniform(cls, duration: float, factor: float) -> Timing:
+        """So many times the duration in [s], everywhere alike."""
+        ends = np.array([0.0, duration])
+        return cls(factor * ends, ends, np.full(2, 1.0 / factor))
+
     @property
     def duration(self) -> float:
         """In [s]."""
