@@ -69,6 +69,7 @@ RULES = (
     Rule(("--episodes", "--split"), _any(varies), "on scenarios that are the same at every reset"),
     Rule(("--noise-seeds",), _any(lambda scenario: scenario.plant.noisy), "on plants without noise"),
     Rule(("--pairs",), _any(lambda scenario: not scenario.plant.ideal), "on ideal plants"),
+    Rule(("--accelerations",), lambda given: bool(given.export), "without --export"),
     ONE_KIND,
     Rule(("--cluster",), lambda given: given.timed != "all", "with --timed all, since timed episodes are played here"),
 )

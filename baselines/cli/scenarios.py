@@ -58,8 +58,8 @@ def _path(scenario: Scenario) -> dict[str, object]:
         return {}
     out: dict[str, object] = {}
     if (time := durations.duration(scenario.trajectory)) is not None:
-        out["path takes"] = f"{time:.3g} s, the episode {scenario.steps * scenario.dt:.3g} s"
-        out["path takes"] += f": {scenario.cut_off:.3g} s are cut off" if scenario.cut_off else ""
+        cut = f": {scenario.cut_off:.3g} s are cut off" if scenario.cut_off else ""
+        out["path takes"] = f"{time:.3g} s, the episode {scenario.steps * scenario.dt:.3g} s{cut}"
     return out | {"within reach": _reach(scenario)}
 
 

@@ -141,7 +141,7 @@ def readme(
             parameters.append(f"| {escaped(scenario)} | {escaped(one.label)} | {values} |")
     out += ["## Notes", "", *(f"- {escaped(note)}" for note in remarks(rows)), ""]
     if skipped:
-        out += ["Skipped, since the policy does not suit the scenario:", ""]
+        out += ["Skipped:", ""]
         out += [f"- {escaped(f'{s.policy} in {s.scenario}: {s.reason}')}" for s in skipped] + [""]
     out += ["## Parameters", "", *parameters, "", "## Conditions", "", f"- command: {code(command)}"]
     out += [f"- finished: {date:%Y-%m-%d %H:%M} UTC", *(f"- {escaped(one)}" for one in machines(rows))]
