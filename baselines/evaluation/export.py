@@ -1,10 +1,10 @@
-"""An episode as files: the trajectory log behind plots, joint motions as tables, and messages for ROS 2."""
+"""An episode as files: the trajectory log behind plots, joint motions as tables, and as messages for ROS 2."""
 
 from __future__ import annotations
 
 import csv
+import importlib.util
 import io
-import json
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, NamedTuple
 
@@ -12,6 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.episodes import Episode, Seeds
+from baselines.evaluation.motion import Motion, joint_trajectory, mcap
+from baselines.evaluation.motion.played import by_joint
+from ikgym.exceptions import MissingDependencyError
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray, known_names
 
@@ -19,26 +22,6 @@ from ikgym.validation import FloatArray, known_names
 FRAMES = 400
 #: Arrays by name, see :func:`trajectory_log`.
 TrajectoryLog = dict[str, npt.NDArray[Any]]
-
-
-class Motion(NamedTuple):
-    """The joint motion of an episode, from its start.
-
-    Attributes:
-        times: From 0, in [s]. Shape (steps + 1,).
-        q: Joint coordinates at these times, in [rad] or [m]. Shape (steps + 1, n).
-        qdot: Joint velocities of the step that ends then, 0 at the start, in [rad/s] or [m/s]. Shape (steps + 1, n).
-    """
-
-    times: FloatArray
-    q: FloatArray
-    qdot: FloatArray
-
-    @classmethod
-    def of(cls, scenario: Scenario, seeds: Seeds, episode: Episode) -> Motion:
-        """The motion of an episode."""
-        q = np.vstack([scenario.start_of(seeds.seed, seeds.arm_seed), episode.q])
-        return cls(scenario.times(scenario.steps + 1), q, np.vstack([np.zeros(scenario.joints), episode.qdot]))
 
 
 def table(columns: Mapping[str, npt.NDArray[Any]]) -> bytes:
@@ -51,52 +34,30 @@ def table(columns: Mapping[str, npt.NDArray[Any]]) -> bytes:
     return text.getvalue().encode()
 
 
-def motion_table(scenario: Scenario, seeds: Seeds, episode: Episode) -> bytes:
+def motion_table(scenario: Scenario, seeds: Seeds, episode: Episode, accelerations: bool = False) -> bytes:
     """The joint motion as CSV: times, joint coordinates and velocities, from the start, with units in the head."""
-    times, q, qdot = Motion.of(scenario, seeds, episode)
-    columns: dict[str, npt.NDArray[Any]] = {"time [s]": times}
-    for values, per in ((q, ""), (qdot, "/s")):
-        for joint, (name, prismatic) in enumerate(zip(scenario.arm.joint_names, scenario.arm.prismatic, strict=True)):
-            columns[f"{name} [{'m' if prismatic else 'rad'}{per}]"] = values[:, joint]
-    return table(columns)
-
-
-def joint_trajectory(scenario: Scenario, seeds: Seeds, episode: Episode) -> bytes:
-    """The joint motion as a `trajectory_msgs/msg/JointTrajectory` in JSON, which `ros2 topic pub` reads.
-
-    The header's time of 0 means at once. Accelerations and efforts are left to the controller: a velocity is that of a
-    whole step, and so has none.
-    """
-    times, q, qdot = Motion.of(scenario, seeds, episode)
-    points = zip(times.tolist(), q.tolist(), qdot.tolist(), strict=True)
-    message = {
-        "header": {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""},
-        "joint_names": list(scenario.arm.joint_names),
-        "points": [
-            {
-                "positions": positions,
-                "velocities": velocities,
-                "accelerations": [],
-                "effort": [],
-                "time_from_start": dict(zip(("sec", "nanosec"), divmod(round(1e9 * time), 10**9), strict=True)),
-            }
-            for time, positions, velocities in points
-        ],
+    motion = Motion.of(scenario, seeds, episode)
+    columns = {
+        "time [s]": motion.times,
+        **by_joint(scenario.arm, motion.q),
+        **by_joint(scenario.arm, motion.qdot, "/s"),
     }
-    return (json.dumps(message, ensure_ascii=False, allow_nan=False) + "\n").encode()
+    return table(columns | (by_joint(scenario.arm, motion.qddot, "/s²") if accelerations else {}))
 
 
 class Format(NamedTuple):
-    """A kind of file: the suffix of its name, and its content."""
+    """A kind of file: the suffix of its name, and its content, with accelerations or without."""
 
     suffix: str
-    content: Callable[[Scenario, Seeds, Episode], bytes]
+    content: Callable[[Scenario, Seeds, Episode, bool], bytes]
+    package: str = ""
 
 
 #: Formats of joint motions by name.
 FORMATS: Mapping[str, Format] = {
     "csv": Format(".csv", motion_table),
     "joint-trajectory": Format(".json", joint_trajectory),
+    "mcap": Format(".mcap", mcap, "rosbags"),
 }
 
 
@@ -105,9 +66,13 @@ def formats(names: str | Iterable[str]) -> tuple[str, ...]:
 
     Raises:
         UnknownNameError: There is no format of a name.
+        MissingDependencyError: The package of a format is not installed.
     """
     given = (names,) if isinstance(names, str) else tuple(names)
     known_names("format of export", given, tuple(FORMATS))
+    for name in given:
+        if (package := FORMATS[name].package) and importlib.util.find_spec(package) is None:
+            raise MissingDependencyError(f'Format {name!r} needs {package}: pip install "ikgym[paths]"')
     return tuple(dict.fromkeys(given))
 
 
@@ -122,9 +87,10 @@ def trajectory_log(scenario: Scenario, seeds: Seeds, episode: Episode) -> Trajec
     Returns:
         ``time`` in [s], of shape (k,), and over it ``nominal`` and ``pose`` (k, m), ``q`` and ``qdot`` (k, n),
         ``position_error`` and, where there is one, ``orientation_error`` (k,); ``nominal_q`` (k, n) where there is a
-        nominal joint path; ``prismatic``, which joints are prismatic, and the limits ``lower``, ``upper`` and
-        ``velocity_limit`` of the arm, infinite where there is none, all of shape (n,). If there are limits of
-        acceleration, ``acceleration_limit`` (n,), and ``qddot`` (k, n): the change of q̇ in the step by Δt, from rest.
+        nominal joint path; ``joint_names``; ``prismatic``, which joints are prismatic, and the limits ``lower``,
+        ``upper`` and ``velocity_limit`` of the arm, infinite where there is none, all of shape (n,). If there are
+        limits of acceleration, ``acceleration_limit`` (n,), and ``qddot`` (k, n): the change of q̇ in the step by Δt,
+        from rest.
         For replays, at f <= :data:`FRAMES` of these steps, whose rows are ``frame`` (f,): ``joint_points``
         (f, n, 2, 3), the ends of the joints of the arm that moves, and ``tool`` (f, 3), both in [m], and
         ``tool_rotation`` (f, 3, 3).
@@ -138,6 +104,7 @@ def trajectory_log(scenario: Scenario, seeds: Seeds, episode: Episode) -> Trajec
         "q": episode.q[kept],
         "qdot": episode.qdot[kept],
         "position_error": episode.position_error[kept],
+        "joint_names": np.array(scenario.arm.joint_names),
         "prismatic": np.array(scenario.arm.prismatic, dtype=np.bool_),
         "lower": scenario.arm.lower,
         "upper": scenario.arm.upper,
@@ -161,7 +128,7 @@ AXES: Mapping[str, tuple[str | int, ...]] = {
     **dict.fromkeys(("nominal", "pose"), ("k", "m")),
     **dict.fromkeys(("q", "qdot", "nominal_q", "qddot"), ("k", "n")),
     **dict.fromkeys(("time", "position_error", "orientation_error"), ("k",)),
-    **dict.fromkeys(("prismatic", "lower", "upper", "velocity_limit", "acceleration_limit"), ("n",)),
+    **dict.fromkeys(("joint_names", "prismatic", "lower", "upper", "velocity_limit", "acceleration_limit"), ("n",)),
     "frame": ("f",),
     "joint_points": ("f", "n", 2, 3),
     "tool": ("f", 3),
@@ -174,7 +141,7 @@ def check_log(log: Mapping[str, npt.NDArray[Any]]) -> None:
     """Checks names, shapes and types of the arrays of a log that was read.
 
     Raises:
-        ValueError: One is missing, unknown or not numeric, or lengths do not fit together.
+        ValueError: One is missing, unknown or of another type, or lengths do not fit together.
     """
     known_names("array of a log", log, tuple(AXES))
     lengths: dict[str | int, int] = {2: 2, 3: 3}
@@ -182,8 +149,9 @@ def check_log(log: Mapping[str, npt.NDArray[Any]]) -> None:
         if name not in log and name in OPTIONAL:
             continue
         shape = log[name].shape if name in log else None
-        if shape is None or log[name].dtype.kind not in "fiub" or len(shape) != len(axes):
-            raise ValueError(f"expected numbers of shape {axes} in the array {name}, got shape {shape}")
+        kinds, what = ("U", "texts") if name == "joint_names" else ("fiub", "numbers")
+        if shape is None or log[name].dtype.kind not in kinds or len(shape) != len(axes):
+            raise ValueError(f"expected {what} of shape {axes} in the array {name}, got shape {shape}")
         if any(lengths.setdefault(axis, length) != length for axis, length in zip(axes, shape, strict=True)):
             raise ValueError(f"the shape {shape} of the array {name} does not fit the others")
 

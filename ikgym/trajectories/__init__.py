@@ -15,6 +15,7 @@ from ikgym.trajectories.orientations import AlongPath, FixedOrientation, Orienta
 from ikgym.trajectories.path_trajectory import PathTrajectory
 from ikgym.trajectories.published_path import PublishedPath, RandomPublishedPath
 from ikgym.trajectories.random_joint_spline import RandomJointSpline
+from ikgym.trajectories.retimed import RetimedTrajectory
 from ikgym.trajectories.sinusoid import RandomSinusoid, Sinusoid
 from ikgym.trajectories.straight_line import StraightLine
 from ikgym.trajectories.time_laws import Quintic, TimeLaw, Trapezoidal
@@ -36,6 +37,7 @@ __all__ = [
     "RandomJointSpline",
     "RandomPublishedPath",
     "RandomSinusoid",
+    "RetimedTrajectory",
     "Sinusoid",
     "StraightLine",
     "TimeLaw",
@@ -63,4 +65,5 @@ KINDS: dict[str, type[Trajectory]] = {
     "timed_waypoints": TimedWaypoints,
     "published_path": PublishedPath,
     "random_published_path": RandomPublishedPath,
+    "retimed": RetimedTrajectory,
 }

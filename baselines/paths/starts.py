@@ -1,0 +1,77 @@
+"""Start branches: the postures in which an arm can begin a path."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from baselines.paths.motion import ideal, played
+from ikgym.arms import Arm
+from ikgym.scenarios import Scenario
+from ikgym.trajectories import RetimedTrajectory
+from ikgym.validation import FloatArray
+
+#: Random postures from which the first pose is searched, and the most branches that are kept.
+SEARCHES, BRANCHES = 256, 12
+#: Branches differ by at least this angle in one joint in [rad], or this share of the arm's length.
+APART = 0.2
+#: Time and control period in [s] in which redundant joints come to rest at the first pose.
+SETTLING, PERIOD = 12.0, 0.1
+
+
+def starts(scenario: Scenario) -> FloatArray:
+    """Joint coordinates at the first pose of a path, one a branch, the scenario's own first; shape (N, n).
+
+    Redundant joints stand where `qp` leads them, so that they are at rest when the path begins.
+
+    Args:
+        scenario: A result of :func:`baselines.paths.motion.ideal`.
+    """
+    own = scenario.first_q(scenario.trajectory)
+    found = solutions(scenario)
+    settled = played(_held(scenario), _middlemost(scenario.arm, found))
+    still = settled.q[-1][settled.position_error[-1] < 1e-6]
+    return _distinct(scenario.arm, np.vstack([own[None], still, found]))
+
+
+def solutions(scenario: Scenario) -> FloatArray:
+    """Joint coordinates within the limits at the first pose, from random postures. Shape (k, n)."""
+    arm = scenario.arm
+    frame = scenario.frames(scenario.trajectory, 1)[0]
+    rotation = frame[:9].reshape(3, 3) if scenario.task.error_size >= 6 else None
+    lower, upper = _ranges(arm)
+    random = np.random.default_rng(0).uniform(lower, upper, (SEARCHES, arm.joints))
+    q, converged = arm.inverse(rotation, frame[-3:], start=random, tolerance=1e-9, restarts=0)
+    return q[converged]
+
+
+def _held(scenario: Scenario) -> Scenario:
+    """The first pose, held."""
+    ends = np.array([0.0, SETTLING])
+    held = RetimedTrajectory(scenario.trajectory, ends, np.zeros(2), np.zeros(2))
+    return ideal(scenario, trajectory=held, dt=PERIOD)
+
+
+def _ranges(arm: Arm) -> tuple[FloatArray, FloatArray]:
+    """Ranges of random postures: the limits, or a turn about 0."""
+    span = np.where(arm.prismatic, arm.reach(np.zeros(arm.joints)), np.pi)
+    lower = np.where(np.isfinite(arm.lower), arm.lower, np.where(np.isfinite(arm.upper), arm.upper - 2 * span, -span))
+    return lower, np.where(np.isfinite(arm.upper), arm.upper, lower + 2 * span)
+
+
+def _middlemost(arm: Arm, q: FloatArray) -> FloatArray:
+    """The same postures, joints turned by full turns as near to the middle of their limits as they can be."""
+    lower, upper = _ranges(arm)
+    turns = np.where(arm.prismatic, 0.0, np.round((q - 0.5 * (lower + upper)) / (2 * np.pi)))
+    return q - 2 * np.pi * turns
+
+
+def _distinct(arm: Arm, q: FloatArray) -> FloatArray:
+    """Postures that differ from each other, each the farthest from those before. Shape (N, n)."""
+    size = np.where(arm.prismatic, arm.reach(np.zeros(arm.joints)) or 1.0, 1.0)
+    chosen, distance = [0], np.full(len(q), np.inf)
+    while len(chosen) < BRANCHES:
+        distance = np.minimum(distance, np.abs((q - q[chosen[-1]]) / size).max(axis=1))
+        if distance.max() < APART:
+            break
+        chosen.append(int(np.argmax(distance)))
+    return q[chosen]

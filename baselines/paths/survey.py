@@ -1,0 +1,180 @@
+"""Whether a path can be driven, from which starts, and how fast."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+
+import numpy as np
+
+from baselines.paths.motion import Motion, ideal, path_duration, played
+from baselines.paths.starts import starts
+from baselines.paths.timing import JointPath, Limits, Timing, shortest
+from ikgym.scenarios import Scenario
+from ikgym.validation import FloatArray
+
+#: Errors in [m] and [rad] within which a pose of the path counts as reached.
+REACHED = 1e-3
+#: Errors in [m] and [rad] within which `qp` follows a path.
+FOLLOWED = 5e-5, 5e-4
+#: Shares of the limits of velocity and acceleration that a timing uses.
+USED = 0.985, 0.96
+#: The path is played in the time asked for, then in so many times the time before, until half of the branches reach all
+#: of it, or none gets farther than before by this share.
+SLOWER, PLAYS, FARTHER = 1.6, 8, 0.005
+#: Steps of such a play: a longer path is sampled at larger intervals, a shorter one at smaller ones.
+FEWEST_STEPS, MOST_STEPS = 1000, 4000
+#: Timings that take no more than so many times what is asked count as the same. Joints nearer to a stop than the first
+#: of these rooms, in [rad] or [m], are braked by it; more than the second is no better.
+SLOWING, NARROW, ENOUGH = 1.02, 0.02, 0.3
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Branch:
+    """A joint motion along the path from one start.
+
+    Args:
+        start: Joint coordinates in [rad] or [m]. Shape (n,).
+        slowing: How many times the time asked for the motion took, the first one that reaches the whole path.
+        reached: Share of the path's poses that are reached before the first that is not.
+        position_error: The largest in [m].
+        orientation_error: The largest in [rad]; 0 where the task has no orientation.
+        velocity: The largest joint velocities of this motion, were it as fast as asked, in [rad/s] or [m/s]. Shape (n,).
+        acceleration: The same of accelerations in [rad/s²] or [m/s²]. Shape (n,).
+        room: The least distance of each joint from its stops in [rad] or [m], inf where there is none. Shape (n,).
+        shortest: The shortest timing of this motion in which all limits hold; None if poses are missed.
+        asked: The same, nowhere faster than asked.
+    """
+
+    start: FloatArray
+    slowing: float
+    reached: float
+    position_error: float
+    orientation_error: float
+    velocity: FloatArray
+    acceleration: FloatArray
+    room: FloatArray
+    shortest: Timing | None
+    asked: Timing | None
+
+    @property
+    def whole(self) -> bool:
+        """Whether the arm reaches the whole path and some timing keeps the limits."""
+        return self.asked is not None and self.shortest is not None
+
+    def rank(self) -> tuple[float, ...]:
+        """The smaller, the better: by share of the path, time as asked, room to the stops, shortest time."""
+        if self.asked is None or self.shortest is None:
+            return -self.reached, self.position_error
+        slowing = max(self.asked.duration / self.asked.progress[-1], SLOWING)
+        room = float(self.room.min())
+        return -2.0, float(room < NARROW), round(slowing, 2), -min(round(room, 1), ENOUGH), self.shortest.duration
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Survey:
+    """The start branches of a path.
+
+    Args:
+        scenario: The scenario.
+        duration: The time that is asked for, in [s].
+        branches: The best first.
+    """
+
+    scenario: Scenario
+    duration: float
+    branches: tuple[Branch, ...]
+
+    @property
+    def best(self) -> Branch:
+        """The branch that comes to the end in the shortest time, or else the farthest."""
+        return self.branches[0]
+
+    @functools.cached_property
+    def as_asked(self) -> Motion:
+        """The motion of `qp` from the best start, within all limits and in the time that is asked for."""
+        return played(ideal(self.scenario, start=self.best.start), self.best.start[None])
+
+    @property
+    def drivable(self) -> bool:
+        """Whether `qp` follows the path from the best start, in the time that is asked for and within all limits."""
+        return self.best.whole and self.best.slowing == 1.0 and follows(self.as_asked)
+
+
+def follows(motion: Motion) -> bool:
+    """Whether all poses are met within :data:`FOLLOWED`, and no limit of the arm holds back a joint."""
+    errors = motion.position_error.max(), motion.orientation_error.max()
+    return bool(errors[0] <= FOLLOWED[0] and errors[1] <= FOLLOWED[1] and not motion.held_back.any())
+
+
+def survey(scenario: Scenario) -> Survey:
+    """Follows a path from several start branches, and times each of them.
+
+    Branches are postures at the first pose: the scenario's own start, and others from random postures. From each of
+    them `qp` plays the path in the time asked for and, while it misses poses, slower.
+
+    Args:
+        scenario: A scenario whose path is the same at every reset. Its plant is taken to be ideal.
+
+    Raises:
+        InvalidInputError: The path is random, or its first pose is out of reach.
+        ModuleNotFoundError: toppra is not installed.
+    """
+    duration, plain = path_duration(scenario), ideal(scenario)
+    remaining, branches, farthest = starts(plain), [], 0.0
+    half = 0.5 * len(remaining)
+    for play in range(PLAYS):
+        timing = Timing.uniform(duration, SLOWER**play)
+        motion = _motion(plain, timing, remaining)
+        shares = _shares(motion)
+        done = shares == 1.0
+        hopeless = play > 0 and not branches and shares.max() < farthest + FARTHER
+        last = hopeless or len(branches) + done.sum() >= half or play == PLAYS - 1
+        branches += [branch_of(scenario, motion.of(row), timing) for row in np.flatnonzero(done | last)]
+        remaining, farthest = remaining[~done], shares.max()
+        if last:
+            break
+    return Survey(scenario, duration, tuple(sorted(branches, key=Branch.rank)))
+
+
+def _motion(plain: Scenario, timing: Timing, starts: FloatArray) -> Motion:
+    """A play with a number of steps that a survey can afford."""
+    dt = timing.duration / min(max(timing.duration / plain.dt, FEWEST_STEPS), MOST_STEPS)
+    return played(ideal(plain, trajectory=timing.of(plain.trajectory), start=starts[0], dt=dt), starts)
+
+
+def _shares(motion: Motion) -> FloatArray:
+    """The shares of the path that are reached before the first pose that is not. Shape (N,)."""
+    missed = (motion.position_error > REACHED) | (motion.orientation_error > REACHED)
+    shares: FloatArray = np.where(missed.any(axis=0), np.argmax(missed, axis=0) / len(missed), 1.0)
+    return shares
+
+
+def branch_of(scenario: Scenario, motion: Motion, timing: Timing) -> Branch:
+    """A branch from the motion of one start.
+
+    Args:
+        scenario: The scenario.
+        motion: Played in the timing.
+        timing: The timing.
+    """
+    q, dt, arm = motion.q[:, 0], motion.times[1], scenario.arm
+    slowing = timing.duration / float(timing.progress[-1])
+    reached = float(_shares(motion)[0])
+    timings: list[Timing | None] = [None, None]
+    if reached == 1.0:
+        path = JointPath.of(timing.of(scenario.trajectory).base_times(motion.times), q, scenario.largest_qdot)
+        limits = USED[0] * scenario.largest_qdot, USED[1] * arm.acceleration_limit, scenario.dt
+        timings = [shortest(path, Limits(*limits, rate)) for rate in (np.inf, 1.0)]
+    return Branch(
+        start=q[0],
+        slowing=slowing,
+        reached=reached,
+        position_error=float(motion.position_error.max()),
+        orientation_error=float(motion.orientation_error.max()),
+        velocity=np.abs(np.diff(q, axis=0)).max(axis=0) / dt * slowing,
+        acceleration=np.abs(np.diff(q, n=2, axis=0)).max(axis=0) / dt**2 * slowing**2,
+        room=np.minimum(q - arm.lower, arm.upper - q).min(axis=0),
+        shortest=timings[0],
+        asked=timings[1],
+    )

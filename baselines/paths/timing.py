@@ -1,0 +1,146 @@
+"""The shortest time for a joint path within limits of velocity and acceleration, by TOPP-RA (Pham and Pham 2018)."""
+
+from __future__ import annotations
+
+import dataclasses
+import logging
+
+import numpy as np
+import numpy.typing as npt
+
+from ikgym.trajectories import RetimedTrajectory, Trajectory
+from ikgym.validation import FloatArray
+
+#: Grid points of a path.
+POINTS = 300
+#: No limit, in terms of the velocity limit: reached within this time in [s].
+AT_ONCE = 1e-5
+#: A rest at both ends lets the rate grow without bounds there; it is at most so many times the average one.
+FASTEST = 6.0
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class JointPath:
+    """Joint coordinates over the time of a trajectory, at grid points.
+
+    Args:
+        progress: Times of the trajectory in [s], rising from 0. Shape (k,).
+        q: Joint coordinates in [rad] or [m]. Shape (k, n).
+    """
+
+    progress: FloatArray
+    q: FloatArray
+
+    @classmethod
+    def of(cls, progress: FloatArray, q: FloatArray, fastest: FloatArray) -> JointPath:
+        """A path with points where joints move and where time goes by.
+
+        Args:
+            progress: Shape (k,).
+            q: Shape (k, n).
+            fastest: Velocity limits in [rad/s] or [m/s], which say how much of a motion a joint's is. Shape (n,).
+        """
+        moved = np.append(0.0, np.cumsum(np.max(np.abs(np.diff(q, axis=0)) / fastest, axis=1)))
+        along = moved / max(moved[-1], 1e-12) + progress / progress[-1]
+        chosen = np.unique(np.searchsorted(along, np.linspace(0.0, along[-1], POINTS)).clip(0, len(q) - 1))
+        rising = chosen[np.append(True, np.diff(progress[chosen]) > 1e-9 * progress[-1])]
+        return cls(progress[rising], q[rising])
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Limits:
+    """Limits that a timing keeps.
+
+    Args:
+        velocity: In [rad/s] or [m/s]. Shape (n,).
+        acceleration: In [rad/s²] or [m/s²], inf where there is none. Shape (n,).
+        dt: The control period in [s].
+        rate: Largest rate of the new time against the old one; inf for none.
+    """
+
+    velocity: FloatArray
+    acceleration: FloatArray
+    dt: float
+    rate: float = np.inf
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Timing:
+    """A trajectory's time over a new one; see :class:`ikgym.trajectories.RetimedTrajectory`. Shapes (k,)."""
+
+    times: FloatArray
+    progress: FloatArray
+    rates: FloatArray
+
+    @classmethod
+    def uniform(cls, duration: float, factor: float) -> Timing:
+        """So many times the duration in [s], everywhere alike."""
+        ends = np.array([0.0, duration])
+        return cls(factor * ends, ends, np.full(2, 1.0 / factor))
+
+    @property
+    def duration(self) -> float:
+        """In [s]."""
+        return float(self.times[-1])
+
+    def slower(self, factor: float) -> Timing:
+        """The same in so many times the time."""
+        return Timing(self.times * factor, self.progress, self.rates / factor)
+
+    def of(self, trajectory: Trajectory) -> RetimedTrajectory:
+        """A trajectory in this time."""
+        return RetimedTrajectory(trajectory, self.times, self.progress, self.rates)
+
+
+def shortest(path: JointPath, limits: Limits) -> Timing | None:
+    """The shortest timing of a joint path; None where there is none, as where a joint moves and time stands still.
+
+    Args:
+        path: The path.
+        limits: What holds.
+    """
+    import toppra
+
+    logging.getLogger("toppra").setLevel(logging.ERROR)
+    moved = np.abs(np.diff(path.q, axis=0)) / limits.velocity
+    fastest = min(limits.rate, FASTEST * path.progress[-1] / max(float(moved.max(axis=1).sum()), 1e-12))
+    # The rate is the velocity of one more coordinate: the progress itself.
+    curve = toppra.SplineInterpolator(path.progress, np.column_stack([path.q, path.progress]))
+    bounds = np.append(limits.velocity, fastest)
+    hardest = np.append(np.minimum(limits.acceleration, limits.velocity / AT_ONCE), fastest / AT_ONCE)
+    constraints = [toppra.constraint.JointVelocityConstraint(bounds)]
+    constraints += [toppra.constraint.JointAccelerationConstraint(hardest)]
+    search = _search()(constraints, curve, gridpoints=path.progress, solver_wrapper="seidel")
+    ends = [_at_rest(curve(path.progress[i], 1)[:-1], limits, fastest) for i in (0, -1)]
+    first = search.compute_controllable_sets(0.0, ends[1])[0]
+    if np.isnan(first).any():
+        return None
+    start = min(ends[0], 0.999 * float(np.sqrt(first[1])))
+    rates = search.compute_parameterization(start, ends[1])[1]
+    return None if rates is None or np.isnan(rates).any() else _timing(path.progress, rates)
+
+
+def _at_rest(slope: FloatArray, limits: Limits, most: float) -> float:
+    """The largest rate at an end: from rest or to rest within a control period."""
+    change = np.minimum(limits.acceleration * limits.dt, limits.velocity)
+    return float(np.min(change / np.maximum(np.abs(slope), change / most)))
+
+
+def _timing(progress: FloatArray, rates: FloatArray) -> Timing | None:
+    mean = 0.5 * (rates[1:] + rates[:-1])
+    if (mean <= 0.0).any():
+        return None
+    return Timing(np.append(0.0, np.cumsum(np.diff(progress) / mean)), progress, rates)
+
+
+def _search() -> type:
+    from toppra.algorithm import TOPPRA
+
+    class FreeEnd(TOPPRA):  # type: ignore[misc]  # toppra has no types
+        """A search in which the path may end slower than said."""
+
+        def compute_controllable_sets(self, sdmin: float, sdmax: float) -> npt.NDArray[np.float64]:
+            sets: npt.NDArray[np.float64] = super().compute_controllable_sets(0.0, sdmax)
+            return sets
+
+    return FreeEnd
