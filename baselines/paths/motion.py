@@ -16,6 +16,7 @@ from ikgym.scenarios import Scenario
 from ikgym.simulator import Simulator
 from ikgym.validation import FloatArray
 
+
 @dataclasses.dataclass(frozen=True, eq=False)
 class Motion:
     """Motions of `qp` along a path, from N starts and within all limits of the arm.
@@ -76,6 +77,7 @@ def played(scenario: Scenario, starts: FloatArray) -> Motion:
         action, state = policy.predict(observation(out), state)
         out = simulator.step(action)
         q.append(out.true_q)
-        errors.append((out.position_error, np.nan_to_num(out.orientation_error), out.at_limit.sum(axis=-1)))
+        errors.append((out.position_error, out.orientation_error, out.at_limit))
+    position, orientation, at_limit = (np.array(column) for column in zip(*errors, strict=True))
     times = scenario.dt * np.arange(scenario.steps + 1, dtype=np.float64)
-    return Motion(times, np.array(q), *np.array(errors, dtype=np.float64).transpose(1, 0, 2))
+    return Motion(times, np.array(q), position, np.nan_to_num(orientation), at_limit.sum(axis=-1))
