@@ -18,7 +18,7 @@ from baselines.paths.speeds import Speeds, speed_limit
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
-from ikgym.validation import FloatArray
+from ikgym.validation import FloatArray, whole_number
 
 PROGRAM = f"{shell.CONSOLE} path"
 #: Most branches in the table.
@@ -33,6 +33,8 @@ class Options(OwnPath):
     """Writes the scenario that can be driven: the best start, slower where a limit binds."""
     fastest: bool = False
     """Times the path as fast as the limits allow, not only as fast as asked."""
+    branch: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
+    """Takes the start in this line of the table; collisions are known to you alone."""
 
 
 def manual() -> str:
@@ -52,6 +54,9 @@ def main(arguments: Sequence[str]) -> int:
     if options.retime is not None and options.retime.suffix != ".toml":
         raise InvalidInputError(f"--retime: expected a file that ends in .toml, got {str(options.retime)!r}.")
     found = survey(scenario_of(options))
+    if options.branch is not None:
+        row = whole_number("--branch", options.branch, at_least=1, at_most=len(found.branches)) - 1
+        found = dataclasses.replace(found, branches=found.branches[row : row + 1])
     driven = retime(found, fastest=options.fastest) if found.best.whole else None
     print("\n".join([*_head(found), "", _table(found), "", *_verdict(found, driven)]))
     if options.retime is not None:
