@@ -56,7 +56,8 @@ def _likely(arm: Arm, rotation: FloatArray | None, position: FloatArray) -> str:
 
 
 def _rotation(w: float, x: float, y: float, z: float) -> FloatArray:
-    return matrices(np.array([[w, x, y, z]]))[0]
+    rotation: FloatArray = matrices(np.array([[w, x, y, z]]))[0]
+    return rotation
 
 
 def distances(arm: Arm, q: FloatArray, rotation: FloatArray | None, position: FloatArray) -> tuple[float, float]:

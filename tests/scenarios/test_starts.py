@@ -91,13 +91,13 @@ def written(tmp_path, rows, columns="x, y, z, qw, qx, qy, qz"):
     return ikgym.trajectories.from_csv(file, speed=0.1, acceleration=1.0)
 
 
-# At the height of the base a Panda points its tool down, not up.
-LOW = [(0.6, 0.0, 0.02), (0.6, 0.1, 0.02)]
+# Below its base a Panda points its tool down, not up.
+LOW = [(0.6, 0.0, -0.1), (0.6, 0.1, -0.1)]
 
 
 def test_positions_in_millimetres_are_named(tmp_path):
     far = [(*(1000.0 * x for x in point), 0, 1, 0, 0) for point in LOW]
-    with pytest.raises(InvalidInputError, match=r"it is 600\.\d* m away, and the arm 1\.\d+ m long: .* in \[mm\]"):
+    with pytest.raises(InvalidInputError, match=r"it is 60[08]\.\d* m away, and the arm 1\.\d+ m long: .* in \[mm\]"):
         scenario(trajectory=written(tmp_path, far))
 
 
