@@ -16,6 +16,7 @@ from ikgym.scenarios import Scenario
 from ikgym.simulator import Simulator
 from ikgym.validation import FloatArray
 
+
 @dataclasses.dataclass(frozen=True, eq=False)
 class Motion:
     """Motions of `qp` along a path, from N starts and within all limits of the arm.
