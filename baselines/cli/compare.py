@@ -23,7 +23,7 @@ PROGRAM = f"{shell.CONSOLE} compare"
 class Arguments(PathOptions):
     """Arguments of the command line."""
 
-    files: Annotated[tyro.conf.Positional[tuple[str, ...]], tyro.conf.arg(metavar="ROBOT PATH.csv | SCENARIO")]
+    files: Annotated[tyro.conf.Positional[tuple[str, ...]], tyro.conf.arg(metavar="ROBOT PATH.csv | SCENARIO")] = ()
     """A robot, FILE.urdf or an arm of the catalogue, and its path; or a scenario, FILE.toml or its name."""
 
     def chosen(self) -> Scenario:
@@ -42,7 +42,7 @@ class Arguments(PathOptions):
 
 RULES = (
     Rule(PATH_OPTIONS, lambda given: len(given.files) > 1, "with a scenario, which states it itself"),
-    Rule(URDF_OPTIONS, lambda given: given.files[0].endswith(".urdf"), "without a URDF file"),
+    Rule(URDF_OPTIONS, lambda given: any(name.endswith(".urdf") for name in given.files), "without a URDF file"),
 )
 
 

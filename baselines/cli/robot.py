@@ -78,6 +78,7 @@ class PathOptions(RobotOptions):
         )
 
 
-#: Options that have an effect on a URDF file alone, and those that a scenario file states itself.
+#: Options that have an effect with a URDF file alone, and those that a scenario file states itself.
 URDF_OPTIONS = ("--base", "--tip", "--tool")
-PATH_OPTIONS = (*URDF_OPTIONS, "--acceleration", "--dt", "--speed")
+ROBOT_OPTIONS = (*URDF_OPTIONS, "--acceleration")
+PATH_OPTIONS = (*ROBOT_OPTIONS, "--dt", "--speed")
