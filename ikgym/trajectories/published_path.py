@@ -44,6 +44,11 @@ class PublishedPath(Trajectory):
         """The waypoints of the problem."""
         return problems.waypoints(self.problem)
 
+    @property
+    def duration(self) -> float:
+        """The time of the last waypoint, in [s]."""
+        return self._timed.duration
+
     def frames(self, times: FloatArray, model: Arm) -> FloatArray:
         """See :meth:`Trajectory.frames`."""
         return self._timed.frames(times, model)

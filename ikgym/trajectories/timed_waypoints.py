@@ -56,6 +56,11 @@ class TimedWaypoints(Trajectory):
             self._settle(quaternions=aligned_quaternions("quaternions", quaternions))
         self._settle(has_orientation=self.quaternions is not None)
 
+    @property
+    def duration(self) -> float:
+        """The time of the last waypoint, in [s]."""
+        return float(self.times[-1])
+
     def frames(self, times: FloatArray, model: Arm) -> FloatArray:
         """See :meth:`Trajectory.frames`."""
         del model
