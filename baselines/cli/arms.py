@@ -67,7 +67,7 @@ def _shown(name: str, given: Arguments) -> str:
 
 def _from_urdf(name: str, tip: str | None, given: Arguments) -> str:
     """The arm of a URDF file, and how a scenario file names it."""
-    arm = dataclasses.replace(given, tip=tip).arm(name)
+    arm = dataclasses.replace(given, tip=tip).robot(name)
     title = name if tip is None else f"{name} to {tip}"
     return f"{_table(title, arm)}\n\n{_scenario_table(name, tip, given, arm)}"
 

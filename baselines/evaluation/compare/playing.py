@@ -58,12 +58,13 @@ class Comparison:
         return "\n".join([plain(columns, summarise(self.rows), width), "", *below, "", last])
 
 
-def _solver(row: Row) -> str:
+def solver_of(row: Row) -> str:
+    """The solver of a row, also of one with late drives."""
     return str(row.parameters["policy"] if row.policy == WRAPPER else row.policy)
 
 
 COLUMNS = (
-    Column("solver", "", lambda one: _solver(one.first)),
+    Column("solver", "", lambda one: solver_of(one.first)),
     Column("path", "", lambda one: one.first.scenario),
     *report.ERRORS,
     Column("at stop", "[steps]", lambda one: one.total("steps_at_joint_limit")),
@@ -112,9 +113,9 @@ def _retimed(scenario: Scenario, notes: list[str]) -> Retimed | None:
     except (InvalidInputError, ModuleNotFoundError) as error:
         notes.append(f"not retimed: {error}")
         return None
-    notes.append(f"retimed: from the best start, in {found.duration:.4g} s; asked for are {found.asked:.4g} s")
+    notes.append(f"retimed: from the best start, in {found.duration:.4g} s where {found.asked:.4g} s were asked for")
     return found
 
 
 def _by_solver(rows: Iterable[Row], path: str) -> Rows:
-    return {_solver(row): row for row in rows if row.scenario == path}
+    return {solver_of(row): row for row in rows if row.scenario == path}

@@ -11,9 +11,9 @@ from baselines.evaluation.metrics import Row
 PREFERRED = ("qp", "sns", "rhc_foresight", "dls", "pink", "mink")
 #: Share of the control period that the median call may take. Its 99th percentile, on a computer without real time, is
 #: that of other programs.
-SHARE = 0.25
+SHARE = 0.5
 #: How many times the least joint acceleration of a solver counts as calm.
-CALM = 2.0
+CALM = 3.0
 
 #: One row a solver, by its name.
 Rows = Mapping[str, Row]
@@ -38,7 +38,8 @@ class Recommendation:
     def __str__(self) -> str:
         if self.solver is None:
             return f"Recommended: none of these solvers. {self.reason}"
-        return f"Recommended: {self.solver}{' on the retimed path' * self.retimed}. {self.reason}"
+        path = " on the retimed path, which ikgym path --retime writes" * self.retimed
+        return f"Recommended: {self.solver}{path}. {self.reason}"
 
 
 def fault(row: Row, dt: float) -> str:
@@ -73,7 +74,7 @@ def recommend(as_it_is: Rows, retimed: Rows, late: Rows, dt: float) -> Recommend
 
     1. The path is taken as it is if a solver follows it, else retimed.
     2. Of the solvers that follow it, those are kept that follow with late drives, if any do.
-    3. Of these, those are kept whose largest joint acceleration is at most twice the least.
+    3. Of these, those are kept whose largest joint acceleration is at most three times the least.
     4. Of these, the first is taken in the order of :data:`PREFERRED`.
 
     Args:
@@ -85,15 +86,17 @@ def recommend(as_it_is: Rows, retimed: Rows, late: Rows, dt: float) -> Recommend
     slower = needs_retiming(as_it_is, retimed, dt)
     rows = retimed if slower else as_it_is
     able = followers(rows, dt)
+    missed = f"No solver follows the path{' as it is' * bool(retimed)}: {_first_fault(as_it_is, dt)}."
     if not able:
-        return Recommendation(None, False, False, f"As it is, {_faults(rows, dt)}.")
+        return Recommendation(None, False, False, missed)
     robust = [name for name in able if name in followers(late, dt)]
     kept = robust or able
     least = min(rows[name].qddot_peak for name in kept)
     solver = next(name for name in kept if rows[name].qddot_peak <= CALM * least)
-    reasons = [f"No solver follows the path as it is: {_faults(as_it_is, dt)}."] * slower
+    reasons = [missed] * slower
     reasons += [f"{name} {_drawback(name, rows, late, dt, least)}." for name in _before(solver, rows)]
-    reasons.append(f"{solver} follows the path{', with late drives too' if robust else ', but not with late drives'}.")
+    also = f"with late drives too, as predicted:policy={solver}" if robust else "but not with late drives"
+    reasons.append(f"{solver} follows the path, {also}.")
     return Recommendation(solver, slower, bool(robust), " ".join(reasons))
 
 
@@ -111,5 +114,6 @@ def _drawback(name: str, rows: Rows, late: Rows, dt: float, least: float) -> str
     return f"needs {rows[name].qddot_peak / least:.3g} times the acceleration of the calmest"
 
 
-def _faults(rows: Rows, dt: float) -> str:
-    return "; ".join(f"{name} {fault(rows[name], dt)}" for name in PREFERRED if name in rows)
+def _first_fault(rows: Rows, dt: float) -> str:
+    name = next(name for name in PREFERRED if name in rows)
+    return f"{name} {fault(rows[name], dt)}"

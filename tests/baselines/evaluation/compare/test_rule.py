@@ -12,7 +12,7 @@ GOOD = dataclasses.replace(
     BASE, followed=True, position_error_max=1e-6, orientation_error_max=1e-6, qddot_peak=1.0, time_p50_us=20.0
 )
 MISSES = {"followed": False, "position_error_max": 0.0123, "orientation_error_max": None}
-STOPPED, SLOW, HARSH = {"steps_at_joint_limit": 1}, {"time_p50_us": 1001.0}, {"qddot_peak": 2.1}
+STOPPED, SLOW, HARSH = {"steps_at_joint_limit": 1}, {"time_p50_us": 2001.0}, {"qddot_peak": 3.1}
 
 
 def rows(**changes):
@@ -26,7 +26,7 @@ ALL_MISS = rows(qp=MISSES, sns=MISSES, dls=MISSES)
 def test_qp_is_taken_where_nothing_stands_in_the_way():
     chosen = recommend(rows(), rows(), rows(), DT)
     assert (chosen.solver, chosen.retimed, chosen.late) == ("qp", False, True)
-    assert str(chosen) == "Recommended: qp. qp follows the path, with late drives too."
+    assert str(chosen) == "Recommended: qp. qp follows the path, with late drives too, as predicted:policy=qp."
 
 
 @pytest.mark.parametrize(
@@ -34,8 +34,8 @@ def test_qp_is_taken_where_nothing_stands_in_the_way():
     [
         (MISSES, "qp errs by 12.3 mm."),
         (STOPPED, "qp has a joint at a stop."),
-        (SLOW, "qp takes 1001 µs a call of a period of 4000 µs."),
-        (HARSH, "qp needs 2.1 times the acceleration of the calmest."),
+        (SLOW, "qp takes 2001 µs a call of a period of 4000 µs."),
+        (HARSH, "qp needs 3.1 times the acceleration of the calmest."),
     ],
 )
 def test_the_next_one_is_taken_where_qp_has_a_fault(change, reason):
@@ -45,7 +45,7 @@ def test_the_next_one_is_taken_where_qp_has_a_fault(change, reason):
 
 
 def test_limits_of_the_rule_belong_to_what_is_allowed():
-    edge = {"qddot_peak": 2.0, "time_p50_us": 1000.0}
+    edge = {"qddot_peak": 3.0, "time_p50_us": 2000.0}
     assert recommend(rows(qp=edge), {}, rows(), DT).solver == "qp"
 
 
@@ -67,19 +67,18 @@ def test_a_path_is_retimed_only_where_no_solver_follows_it():
     assert (chosen.solver, chosen.retimed) == ("dls", False)
     chosen = recommend(ALL_MISS, rows(sns=MISSES), rows(), DT)
     assert (chosen.solver, chosen.retimed) == ("qp", True)
-    assert str(chosen).startswith(
-        "Recommended: qp on the retimed path. No solver follows the path as it is: qp errs by"
-    )
+    assert str(chosen).startswith("Recommended: qp on the retimed path, which ikgym path --retime writes. No solver")
+    assert "No solver follows the path as it is: qp errs by 12.3 mm. qp follows" in chosen.reason
 
 
 def test_no_solver_is_an_answer():
     chosen = recommend(ALL_MISS, rows(qp=STOPPED, sns=MISSES, dls=SLOW), rows(), DT)
     assert (chosen.solver, chosen.retimed) == (None, False)
-    assert str(chosen).startswith("Recommended: none of these solvers. As it is, qp errs by 12.3 mm; sns errs")
+    assert str(chosen).endswith("none of these solvers. No solver follows the path as it is: qp errs by 12.3 mm.")
+    assert recommend(ALL_MISS, {}, rows(), DT).reason == "No solver follows the path: qp errs by 12.3 mm."
 
 
 def test_faults_state_both_errors():
-    assert (
-        fault(dataclasses.replace(GOOD, followed=False, orientation_error_max=2e-3), DT) == "errs by 0.001 mm, 2 mrad"
-    )
+    turned = dataclasses.replace(GOOD, followed=False, orientation_error_max=2e-3)
+    assert fault(turned, DT) == "errs by 0.001 mm, 2 mrad"
     assert PREFERRED[0] == "qp"
