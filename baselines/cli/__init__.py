@@ -21,7 +21,7 @@ COMMANDS = {
     "robustness": ("map the cost of policies over severities of an imperfect plant", "baselines.cli.robustness"),
     "view": ("show policies side by side in a browser, live and in an episode", "baselines.cli.view"),
     "video": ("write an episode as a video", "baselines.cli.video"),
-    "path": ("say whether an arm can drive a path, from which start and how fast", "baselines.cli.path"),
+    "path": ("say whether a path can be driven, from which start, how fast", "baselines.cli.path"),
     "oracle": ("search best known costs", "baselines.cli.oracle"),
     "arms": ("list the arms, or show some", "baselines.cli.arms"),
     "scenarios": ("list the scenarios, or show some", "baselines.cli.scenarios"),

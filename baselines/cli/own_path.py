@@ -90,7 +90,8 @@ def accelerated(arm: Arm, given: tuple[float, ...]) -> Arm:
 
 
 def _from_csv(options: OwnPath) -> Scenario:
-    arm, speed, law = arm_of(options), options.speed, {}
+    arm, speed = arm_of(options), options.speed
+    law: dict[str, Any] = {}
     if speed is not None:
         usual = number("--speed", speed, above=0.0) / SPEEDING_UP
         law = {"speed": speed, "acceleration": options.tool_acceleration or usual}

@@ -15,10 +15,11 @@ from baselines.cli.own_path import RULES, OwnPath, scenario_of
 from baselines.cli.parsing import parse
 from baselines.paths import Branch, Retimed, Survey, retime, survey
 from baselines.paths.speeds import Speeds, speed_limit
+from baselines.paths.survey import REACHED
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
-from ikgym.validation import FloatArray
+from ikgym.validation import FloatArray, whole_number
 
 PROGRAM = f"{shell.CONSOLE} path"
 #: Most branches in the table.
@@ -33,6 +34,8 @@ class Options(OwnPath):
     """Writes the scenario that can be driven: the best start, slower where a limit binds."""
     fastest: bool = False
     """Times the path as fast as the limits allow, not only as fast as asked."""
+    branch: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
+    """Takes the start in this line of the table; collisions are known to you alone."""
 
 
 def manual() -> str:
@@ -52,6 +55,9 @@ def main(arguments: Sequence[str]) -> int:
     if options.retime is not None and options.retime.suffix != ".toml":
         raise InvalidInputError(f"--retime: expected a file that ends in .toml, got {str(options.retime)!r}.")
     found = survey(scenario_of(options))
+    if options.branch is not None:
+        row = whole_number("--branch", options.branch, at_least=1, at_most=len(found.branches)) - 1
+        found = dataclasses.replace(found, branches=found.branches[row : row + 1])
     driven = retime(found, fastest=options.fastest) if found.best.whole else None
     print("\n".join([*_head(found), "", _table(found), "", *_verdict(found, driven)]))
     if options.retime is not None:
@@ -89,9 +95,11 @@ def _no_acceleration(found: Survey) -> list[str]:
     arm = found.scenario.arm
     if np.isfinite(arm.acceleration_limit).all():
         return []
-    joint = int(np.argmax(np.where(np.isfinite(arm.acceleration_limit), 0.0, found.best.acceleration)))
-    peak = f"{found.best.acceleration[joint]:.3g} {_unit(arm, joint)}/s² at {arm.joint_names[joint]}"
-    return [f"  acceleration limits are not stated: velocities alone are checked; peak {peak}; see --acceleration"]
+    line = "  acceleration limits are not stated (see --acceleration): velocities alone are checked"
+    if found.best.whole:
+        joint = int(np.argmax(np.where(np.isfinite(arm.acceleration_limit), 0.0, found.best.acceleration)))
+        line += f", peak {found.best.acceleration[joint]:.3g} {_unit(arm, joint)}/s² at {arm.joint_names[joint]}"
+    return [line]
 
 
 def _table(found: Survey) -> str:
@@ -102,7 +110,8 @@ def _table(found: Survey) -> str:
 
 def _row(number: int, branch: Branch, scenario: Scenario) -> tuple[str, ...]:
     arm = scenario.arm
-    missed = f"{100 * branch.reached:.0f} %, misses {1e3 * branch.position_error:.3g} mm"
+    far, turned = branch.position_error, branch.orientation_error
+    missed = f"{100 * branch.reached:.0f} %, misses {_small(far, 'm') if far > REACHED else _small(turned, 'rad')}"
     joint, room = int(np.argmin(branch.room)), float(branch.room.min())
     return (
         str(number),
@@ -113,6 +122,11 @@ def _row(number: int, branch: Branch, scenario: Scenario) -> tuple[str, ...]:
         "–" if branch.shortest is None else f"{branch.shortest.duration:.3g} s",
         shell.numbers(np.round(branch.start, 2)),
     )
+
+
+def _small(value: float, unit: str) -> str:
+    """A number in thousandths of its unit."""
+    return f"{1e3 * value:.2g} m{unit}"
 
 
 def _share(arm: Arm, shares: FloatArray) -> str:
@@ -129,9 +143,9 @@ def _verdict(found: Survey, driven: Retimed | None) -> list[str]:
     if driven is None:
         return _unreached(found)
     motion, start = driven.motion, shell.numbers(np.round(driven.motion.q[0, 0], 4))
-    how = f"qp follows within {1e3 * motion.position_error.max():.2g} mm"
+    how = f"qp follows within {_small(motion.position_error.max(), 'm')}"
     if found.scenario.task.has_orientation:
-        how += f" and {1e3 * motion.orientation_error.max():.2g} mrad"
+        how += f" and {_small(motion.orientation_error.max(), 'rad')}"
     speed = f"at up to {Speeds.of(driven.scenario).linear:.3g} m/s"
     if found.drivable:
         can = "It can be driven as it is"

@@ -38,13 +38,26 @@ def starts(scenario: Scenario) -> FloatArray:
 
 def solutions(scenario: Scenario) -> FloatArray:
     """Joint coordinates within the limits at the first pose, from random postures. Shape (k, n)."""
-    arm = scenario.arm
+    arm, rng = scenario.arm, np.random.default_rng(0)
     frame = scenario.frames(scenario.trajectory, 1)[0]
-    rotation = frame[:9].reshape(3, 3) if scenario.task.error_size >= 6 else None
-    lower, upper = _ranges(arm)
-    random = np.random.default_rng(0).uniform(lower, upper, (SEARCHES, arm.joints))
+    rotation = _rotations(frame, scenario.task.error_size, rng)
+    random = rng.uniform(*_ranges(arm), (SEARCHES, arm.joints))
     q, converged = arm.inverse(rotation, frame[-3:], start=random, tolerance=1e-9, restarts=0)
     return q[converged]
+
+
+def _rotations(frame: FloatArray, errors: int, rng: np.random.Generator) -> FloatArray | None:
+    """Rotations of the tool that will do; None where all will, and random ones about its z axis where that is free."""
+    if errors < 5:
+        return None
+    rotation = frame[:9].reshape(3, 3)
+    if errors > 5:
+        return rotation
+    angle = rng.uniform(-np.pi, np.pi, SEARCHES)
+    c, s, zero = np.cos(angle), np.sin(angle), np.zeros(SEARCHES)
+    turns = np.array([[c, -s, zero], [s, c, zero], [zero, zero, zero + 1.0]]).transpose(2, 0, 1)
+    turned: FloatArray = rotation @ turns
+    return turned
 
 
 def _held(scenario: Scenario) -> Scenario:

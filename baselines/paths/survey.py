@@ -38,6 +38,7 @@ class Branch:
 
     Args:
         start: Joint coordinates in [rad] or [m]. Shape (n,).
+        given: Whether the scenario states this start.
         slowing: How many times the time asked for the motion took, the first one that reaches the whole path.
         reached: Share of the path's poses that are reached before the first that is not.
         position_error: The largest in [m].
@@ -50,6 +51,7 @@ class Branch:
     """
 
     start: FloatArray
+    given: bool
     slowing: float
     reached: float
     position_error: float
@@ -66,12 +68,13 @@ class Branch:
         return self.asked is not None and self.shortest is not None
 
     def rank(self) -> tuple[float, ...]:
-        """The smaller, the better: by share of the path, time as asked, room to the stops, shortest time."""
+        """The smaller, the better: by share of the path, time as asked, a given start, room, shortest time."""
         if self.asked is None or self.shortest is None:
             return -self.reached, self.position_error
         slowing = max(self.asked.duration / self.asked.progress[-1], SLOWING)
         room = float(self.room.min())
-        return -2.0, float(room < NARROW), round(slowing, 2), -min(round(room, 1), ENOUGH), self.shortest.duration
+        enough = min(round(room, 1), ENOUGH)
+        return -2.0, room < NARROW, round(slowing, 2), not self.given, -enough, self.shortest.duration
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -181,6 +184,7 @@ def branch_of(scenario: Scenario, motion: Motion, timing: Timing) -> Branch:
         timings = [shortest(path, Limits(*limits, rate)) for rate in (np.inf, 1.0)]
     return Branch(
         start=q[0],
+        given=scenario.start is not None and bool((q[0] == scenario.start).all()),
         slowing=slowing,
         reached=reached,
         position_error=float(motion.position_error.max()),
