@@ -12,6 +12,7 @@ from ikgym.exceptions import InvalidInputError, UnknownNameError
 #: A summary of each command, and the module with its function ``main``.
 COMMANDS = {
     "evaluate": ("play policies on scenarios: table, files and plots", "baselines.cli.evaluate"),
+    "compare": ("recommend a solver for an arm and a path", "baselines.cli.compare"),
     "train": ("train an agent", "baselines.cli.train"),
     "tune": ("search settings of solvers", "baselines.cli.tune"),
     "dataset": ("write episodes as a Minari data set", "baselines.cli.dataset"),

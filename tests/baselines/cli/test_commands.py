@@ -34,7 +34,7 @@ def test_it_is_installed():
 def test_help_lists_the_commands(arguments, capsys):
     assert main(arguments) == 0
     text = capsys.readouterr().out
-    learning, scoring = "evaluate train tune dataset", "reproduce leaderboard robustness view video path oracle"
+    learning, scoring = "evaluate compare train tune dataset", "reproduce leaderboard robustness view video path oracle"
     words = f"{learning} {scoring} arms scenarios policies".split()
     assert re.findall(r"^  (\w+)  ", text, re.MULTILINE) == words
     assert max(map(len, text.splitlines())) <= 80
@@ -101,6 +101,14 @@ SIZE = "expected 0, or an absolute value from 1e-12 to 1e+12"
         (["arms", "mine.toml"], "Cannot read mine.toml"),
         (["arms", "mine.xacro"], "There is no arm 'mine.xacro'."),
         (["arms", "panda", "--tip", "hand"], "--tip has no effect without a URDF file."),
+        (["compare"], "required"),
+        (
+            ["compare", "varga7-random"],
+            "Expected a path that is the same at every reset, got scenario 'varga7-random'.",
+        ),
+        (["compare", "panda", "none.csv", "--speed", "1"], "Cannot read none.csv"),
+        (["compare", "pandas", "none.csv", "--speed", "1"], "There is no arm 'pandas'. Did you mean 'panda'?"),
+        (["compare", "panda-line", "--tip", "hand"], "--tip has no effect without a CSV file."),
         (["train", "ppo", "--preset", "smok", "--out", "x"], "There is no preset 'smok'. Did you mean 'smoke'?"),
         (["train", "apg", "--preset", "smoke", "--preset", "quick", "--out", "x"], "--preset is given twice"),
         (["train", "apg", "--preset", "smoke", "--out", ""], "--out: expected a value, got an empty text."),
@@ -143,7 +151,7 @@ APG, OBSERVE = (["train", method, "--preset", "smoke", "--out", "x"] for method 
     ("arguments", "option", "otherwise"),
     [
         *((["evaluate"], option, "without --out") for option in (
-            "--resume", "--overwrite", "--no-report",
+            "--resume", "--overwrite", "--plots", "--no-report",
         )),
         *((["evaluate", "--test-sets", "varga7-random"], f"{option}=1", "with --test-sets") for option in (
             "--episodes", "--steps", "--noise-seeds",
