@@ -142,7 +142,7 @@ APG, OBSERVE = (["train", method, "--preset", "smoke", "--out", "x"] for method 
     ("arguments", "option", "otherwise"),
     [
         *((["evaluate"], option, "without --out") for option in (
-            "--resume", "--overwrite", "--no-plots", "--no-report",
+            "--resume", "--overwrite", "--no-report",
         )),
         *((["evaluate", "--test-sets", "varga7-random"], f"{option}=1", "with --test-sets") for option in (
             "--episodes", "--steps", "--noise-seeds",
@@ -247,11 +247,11 @@ def test_files_are_shown_like_members(tmp_path, monkeypatch, capsys):
     assert "within reach" not in capsys.readouterr().out
 
 
-def test_the_table_stands_before_the_plots_and_the_readme_has_the_command(tmp_path, capsys):
+def test_the_table_fits_the_terminal_and_the_readme_has_the_command(tmp_path, capsys):
     arguments = ["evaluate", "--policies", "dls", "--steps", "5", "--out", str(tmp_path / "out")]
     assert main(arguments) == 0
     printed = capsys.readouterr()
-    assert "left out at 80 characters a line: tracking, p99, misses" in printed.out
+    assert "left out at 80 characters a line: p99, misses" in printed.out
     assert max(map(len, printed.out.split("\n\nwritten to")[0].splitlines())) <= 80
     assert "ikgym evaluate --policies dls --steps 5" in (tmp_path / "out" / "README.md").read_text(encoding="utf-8")
 
