@@ -18,6 +18,7 @@ import ikgym
 from baselines.canonical import canonical
 from baselines.episodes import Episode
 from baselines.evaluation.export import FORMATS, Format, check_log, trajectory_log
+from baselines.evaluation.free_timing import as_long
 from baselines.evaluation.jobs import Job, Options, Skipped
 from baselines.evaluation.metrics import Row
 from baselines.files import (
@@ -128,7 +129,7 @@ class Results:
                 np.savez_compressed(file, allow_pickle=False, **trajectory_log(job.scenario, job.seeds, episode))
                 write(self.series_file(row), file.getvalue())
             for kind in self._export:
-                write(self.export_file(row, kind), kind.content(job.scenario, job.seeds, episode))
+                write(self.export_file(row, kind), kind.content(as_long(job.scenario, episode), job.seeds, episode))
         self.save()
 
     def save(self) -> None:
