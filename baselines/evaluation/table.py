@@ -134,7 +134,10 @@ def html(columns: Sequence[Column], summaries: Sequence[Summary]) -> str:
     out += [f'<th scope="col" title="{escape(about)}">{escape(title)}</th>' for title, about in heads]
     out.append("</tr></thead><tbody>")
     for place, summary in enumerate(summaries):
-        name, scenario = escape(summary.label + " *" * summary.reference + " ‡" * summary.free_timing), escape(summary.first.scenario)
+        name, scenario = (
+            escape(summary.label + " *" * summary.reference + " ‡" * summary.free_timing),
+            escape(summary.first.scenario),
+        )
         out += [
             f'<tr><td class="pick"><input type="checkbox" value="{place}" aria-label="{name} in {scenario}: show in '
             f'the plots"></td><th scope="row" class="name">{name}</th><td>{scenario}</td>'

@@ -10,9 +10,10 @@ import numpy as np
 
 from baselines.policy import Memory
 from baselines.policy.parameters import parameter
+from baselines.solvers.linear_algebra import dot
 from baselines.solvers.quadratic_program.base import QuadraticProgramNumbers, VelocityProgram
 from baselines.solvers.quadratic_program.box_minimum import box_minimum
-from baselines.solvers.quadratic_program.path_memory import PathMemory, moved, moves_around, remember
+from baselines.solvers.quadratic_program.path_memory import PathMemory, moved, moves_around, remember, slope
 from baselines.solvers.quadratic_program.path_speed import SEGMENTS, joint_path_ahead, path_speed
 from baselines.solvers.quadratic_program.program import (
     SCALING_WEIGHT,
@@ -39,6 +40,9 @@ FEWEST = 4
 SOLVES = 2
 # What is aimed at for the speed of the reference, since the damping takes something off, and what is no progress.
 AMPLE, STUCK = 1.05, 1e-6
+# The speed that no limit of the path ahead goes below, the error in [m] or [rad] at which the reference waits for the
+# arm, and a short part of a step.
+CRAWL, AWAY, SHORT = 1e-3, 0.01, 0.1
 
 
 class PathNumbers(NamedTuple):
@@ -72,7 +76,7 @@ def path_step(model, numbers, seen, memory, answer):
     motion, missing, shift = np.empty(e), np.empty(e), np.empty(e)
     for row in range(q.shape[0]):
         samples, steps, progress = memory.samples[row], memory.steps[row], memory.progress[row]
-        remember(samples, steps, seen.pose[row], seen.nominal[row])
+        remember(samples, steps, seen.nominal[row])
         speed = _path_ahead(
             model, numbers, samples, progress, memory.speed[row], seen.pose[row], q[row], jac, motion, missing
         )
@@ -87,7 +91,7 @@ def path_step(model, numbers, seen, memory, answer):
         if program.braking_share > 0.0:
             missing *= feedback_share(hessian, jac, missing, program.braking_share * limits[CHANGE])
         least = min(max(steps + 1.0 - latest - progress, 0.0), 1.0)
-        aim = speed = speed if speed < 1.0 else AMPLE
+        aim = speed
         for _ in range(SOLVES):
             length = goal_along_path(jac, motion, missing, SCALING_WEIGHT * weight, preferred, aim, hessian, linear)
             lower[n], upper[n] = least * length, length
@@ -123,7 +127,7 @@ def _path_ahead(model, numbers, samples, progress, last, pose, q, jacobian, moti
         missing: Receives the error against the reference at this progress. Shape (e,).
 
     Returns:
-        The speed from which the arm can slow down in time, in steps of the reference by steps.
+        The speed to aim at, in steps of the reference by steps; above 1 where nothing is in the way.
     """
     first, (e, n) = int(progress), jacobian.shape
     part = progress - first
@@ -131,16 +135,15 @@ def _path_ahead(model, numbers, samples, progress, last, pose, q, jacobian, moti
     rotation, position, geometric = np.empty((3, 3)), np.empty(3), np.empty((6, n))
     moves_around(model.kind, samples, first, moves)
     moved(moves, part, passed)
-    joint_path_ahead(model, numbers.program, samples, first, passed, q, numbers.stride, tangents)
+    tasks.error(model.kind, samples[first % samples.shape[0]], pose, missing)
+    missing += passed
+    slope(moves, part, SHORT, motion)
+    joint_path_ahead(model, numbers.program, samples, first, passed, motion, q, numbers.stride, tangents)
     speed = path_speed(tangents, numbers.stride, part, last, numbers.fastest, numbers.change)
+    slope(moves, part, max(speed, SHORT), motion)  # that of this step
+    speed = (max(speed, CRAWL) if speed < 1.0 else AMPLE) * max(1.0 - math.sqrt(dot(missing, missing)) / AWAY, 0.0)
     forward_and_jacobian(model.chain, q, rotation, position, geometric)
     tasks.jacobian(model.kind, rotation, geometric, jacobian)
-    tasks.error(model.kind, samples[first % samples.shape[0]], pose, missing)
-    chord = max(speed, 0.1)  # the motion in this step, not the tangent at its start
-    moved(moves, part + chord, motion)
-    for a in range(e):
-        motion[a] = (motion[a] - passed[a]) / chord
-        missing[a] += passed[a]
     return speed
 
 
@@ -155,7 +158,8 @@ class PathFollowing(VelocityProgram):
 
     s* is the largest speed from which the arm can come to rest where the view ends, within the limits of velocity and
     acceleration (:func:`path_speed`), along the joint path of the smallest joint motions. Samples of the reference are
-    remembered until they are passed, and are joined by a cubic spline. The path begins where the arm is.
+    remembered until they are passed, and are joined by a cubic spline. The farther the arm is off the path, the slower is
+    the progress; from 1 cm or 0.01 rad on there is none until the arm is back.
 
     The status is ``saturated`` where a joint stands at a bound and the error that is left weighs more than the motion,
     and where the arm is as late as it may be, and is led on at full speed.

@@ -29,18 +29,17 @@ class PathMemory(NamedTuple):
 
 
 @inner
-def remember(samples, steps, pose, nominal):
-    """Stores what is shown of the reference; the path begins where the arm is.
+def remember(samples, steps, nominal):
+    """Stores what is shown of the reference; sample 0, which is not shown, is taken to be the same as sample 1.
 
     Args:
         samples: Shape (L, m).
         steps: Steps made.
-        pose: Measured task coordinates. Shape (m,).
         nominal: The samples ``steps`` + 1, ``steps`` + 2, … Shape (p, m).
     """
-    for a in range(pose.shape[0]):
+    for a in range(samples.shape[1]):
         if steps == 0:
-            samples[0, a] = pose[a]
+            samples[0, a] = nominal[0, a]
         for i in range(nominal.shape[0]):
             samples[(steps + 1 + i) % samples.shape[0], a] = nominal[i, a]
 
@@ -57,8 +56,18 @@ def moves_around(kind, samples, first, moves):
     """
     length = samples.shape[0]
     for i in range(4):
-        there = max(first + i, 1)  # nothing was before sample 0
+        there = max(first + i, 1)
         tasks.error(kind, samples[there % length], samples[(there - 1) % length], moves[i])
+
+
+@inner
+def slope(moves, part, steps, out):
+    """Mean motion of the reference in one step, from a part of a step on: ``steps`` at most 1, ``out`` (e,)."""
+    passed = np.empty(out.shape[0])
+    moved(moves, part, passed)
+    moved(moves, part + steps, out)
+    for a in range(out.shape[0]):
+        out[a] = (out[a] - passed[a]) / steps
 
 
 @inner

@@ -18,7 +18,7 @@ SEGMENTS = 20
 
 
 @inner
-def joint_path_ahead(model, program, samples, first, done, q, stride, tangents):
+def joint_path_ahead(model, program, samples, first, done, now, q, stride, tangents):
     """Tangents of the joint path along the reference ahead: the smallest joint motions in one step of the reference.
 
     Args:
@@ -27,6 +27,7 @@ def joint_path_ahead(model, program, samples, first, done, q, stride, tangents):
         samples: Samples of the reference, see :class:`PathMemory`. Shape (L, m).
         first: Number of the last sample that was passed.
         done: Motion of the reference since then. Shape (e,).
+        now: Its motion in one step now. Shape (e,).
         q: Joint coordinates in [rad] or [m]. Shape (n,).
         stride: Steps from one sample that is looked at to the next.
         tangents: Receives the tangents, in [rad] or [m], at the place of the arm and at the samples. Shape (s, n).
@@ -41,6 +42,7 @@ def joint_path_ahead(model, program, samples, first, done, q, stride, tangents):
         tasks.error(model.kind, samples[(here + stride) % length], samples[here % length], way)
         if i == 0:
             way -= done
+            move[:] = now
         forward_and_jacobian(model.chain, ahead, rotation, position, geometric)
         tasks.jacobian(model.kind, rotation, geometric, jacobian)
         weigh_rotation(model.kind, program.rotation_weight, jacobian, move, way)
@@ -73,24 +75,28 @@ def path_speed(tangents, stride, part, last, fastest, change):
     Returns:
         Steps of the reference in a step of time, from 0 to 1.
     """
-    square, end, steps = 0.0, tangents.shape[0] - 1, stride - part
+    square, end, first = 0.0, tangents.shape[0] - 1, stride - part
     for i in range(end, 0, -1):
-        square = min(
-            1.0, square + 2.0 * stride * _change(tangents[i], tangents[min(i + 1, end)], stride, square, -1.0, change)
-        )
-        square = min(square, _ceiling(tangents[i - 1], tangents[i], stride, fastest, change))
-    square = min(1.0, square + 2.0 * steps * _change(tangents[0], tangents[min(1, end)], steps, square, -1.0, change))
-    return min(math.sqrt(square), last + _change(tangents[0], tangents[min(1, end)], steps, last * last, 1.0, change))
+        square = min(1.0, _largest_square(tangents[i], tangents[min(i + 1, end)], stride, square, change))
+        square = min(square, _ceiling(tangents[i - 1], tangents[i], stride if i > 1 else first, fastest, change))
+    here, there = tangents[0], tangents[min(1, end)]
+    square = min(1.0, _largest_square(here, there, first, square, change))
+    gained = 0.5 * (_largest_square(there, here, first, last * last, change) - last * last) / first
+    return min(math.sqrt(square), last + max(gained, 0.0))
 
 
 @inner
-def _change(tangent, behind, steps, square, sign, change):
-    """How fast the speed can grow (1) or fall (-1) from one place to the next, in steps of the reference by steps²."""
+def _largest_square(tangent, other, steps, square, change):
+    """The largest square of the speed at a place, for that at another one so many steps of the reference away.
+
+    The joint velocities t ṡ change by less than the time between the places allows: with ṡ₀ ṡ₁ ≈ (ṡ₀² + ṡ₁²) / 2,
+    |(t₁ - 3 t₀) ṡ₀² + (3 t₁ - t₀) ṡ₁²| is at most 4 h times the largest change in one step.
+    """
     most = math.inf
     for j in range(tangent.shape[0]):
-        slope, bend = 0.5 * (tangent[j] + behind[j]), (behind[j] - tangent[j]) / steps
-        if slope != 0.0:
-            most = min(most, (change[j] - sign * math.copysign(1.0, slope) * bend * square) / abs(slope))
+        own, behind = other[j] - 3.0 * tangent[j], 3.0 * other[j] - tangent[j]
+        if own != 0.0:
+            most = min(most, (4.0 * steps * change[j] - math.copysign(1.0, own) * behind * square) / abs(own))
     return max(most, 0.0)
 
 
