@@ -25,8 +25,8 @@ OVERVIEW = "overview"
 REFERENCE_NOTE = "* reference: has privileged information"
 STOP_NOTE = "† a joint was at a stop, a limit of its coordinate"
 TIMING_NOTE = (
-    "‡ free timing: slower where limits bind; path time: when the end of the path was reached, – if it was not; path err: "
-    "largest distance from the reference at the policy's own progress; all else is on the clock of the scenario"
+    "‡ free timing: slower where limits bind; path time: when the end of the path was reached, – if it was not; path "
+    "err: largest distance from the reference at the policy's own progress; all else is on the clock of the scenario"
 )
 
 

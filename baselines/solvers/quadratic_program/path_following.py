@@ -158,8 +158,8 @@ class PathFollowing(VelocityProgram):
 
     s* is the largest speed from which the arm can come to rest where the view ends, within the limits of velocity and
     acceleration (:func:`path_speed`), along the joint path of the smallest joint motions. Samples of the reference are
-    remembered until they are passed, and are joined by a cubic spline. The farther the arm is off the path, the slower is
-    the progress; from 1 cm or 0.01 rad on there is none until the arm is back.
+    remembered until they are passed, and are joined by a cubic spline. Off the path the progress is slower; from 1 cm
+    or 0.01 rad on the reference waits for the arm.
 
     The status is ``saturated`` where a joint stands at a bound and the error that is left weighs more than the motion,
     and where the arm is as late as it may be, and is led on at full speed.
