@@ -11,6 +11,7 @@ from baselines.episodes import Seeds, add_up, rollout
 from baselines.evaluate import evaluate
 from baselines.evaluation import report
 from baselines.evaluation.free_timing import reference_at
+from baselines.evaluation.records import records
 from tests.baselines.solvers.quadratic_program.paths import circle
 
 TASKS = ("pose", "axis", "position", "matrix", "skew")
@@ -78,6 +79,13 @@ def test_tables_mark_the_kind_and_others_have_no_such_columns():
     assert "‡" not in plain
     assert "path" not in plain.split("\n", 1)[1]
     assert rows[0].path_time is None
+    qp, free = sorted(records(rows), key=lambda line: line["policy"])
+    assert (qp["path_time_s"], free["path_time_s"]) == (None, rows[1].path_time)
+    assert (qp["path_error_mm"], free["path_error_mm"]) == (
+        1e3 * rows[0].position_error_max,
+        1e3 * rows[1].path_position_error,
+    )
+    assert "path_time_s" not in records(rows[:1])[0]
 
 
 def test_the_motion_that_is_exported_goes_on_to_the_end_of_the_path(tmp_path):
