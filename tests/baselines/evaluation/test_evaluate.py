@@ -345,23 +345,6 @@ def test_what_cannot_be_compared_is_not_gone_on_with(tmp_path, change, options, 
 
 
 @pytest.mark.parametrize(
-    ("content", "message"),
-    [
-        ("", "is damaged, or was written by another version: Expecting value"),
-        ("{}", "expected a list of rows, got dict"),
-        ('[{"scenario": "a"}]', "in row 0 the key 'policy' is missing"),
-    ],
-)
-def test_damaged_results_are_named_and_kept(tmp_path, content, message):
-    file = tmp_path / "results.json"
-    file.write_bytes(content.encode("utf-8", "surrogateescape"))
-    with pytest.raises(ResultsError, match=message) as caught:
-        run_all(tmp_path, resume=True)
-    assert str(file) in str(caught.value)
-    assert file.read_bytes() == content.encode("utf-8", "surrogateescape")
-
-
-@pytest.mark.parametrize(
     "change",
     [
         lambda row: {name: value for name, value in row.items() if name != "iterations"},

@@ -16,7 +16,6 @@ from baselines.files import ResultsError
 from baselines.training import run, seeds
 from baselines.training.config import APG, PPO
 from baselines.training.folder import FORMAT
-from baselines.training.methods import METHODS
 from baselines.training.seeds import RunOptions, Seed
 from tests.baselines.training.small import about, timeless, tiny
 from tests.spawning import dies_with_seed_7
@@ -143,15 +142,6 @@ def test_no_method(capsys):
     printed = capsys.readouterr()
     assert "Methods: ppo, sac, td3, apg, observe." in printed.out
     assert printed.err.startswith("error: expected a method, one of ppo, sac, ")
-
-
-@pytest.mark.parametrize("arguments", [[], *([name] for name in METHODS), ["repeat"]])
-def test_help(arguments, capsys):
-    with pytest.raises(SystemExit, match="0"):
-        main([*arguments, "--help"])
-    text = capsys.readouterr().out
-    for word in ["ppo", "smoke", "varga7-random", "repeat"] if not arguments else ["--out", "--resume"]:
-        assert word in text
 
 
 @pytest.mark.parametrize(
