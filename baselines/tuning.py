@@ -303,8 +303,6 @@ def _begin(file: pathlib.Path, search: Search) -> None:
         changes = ", ".join(f"{name} ({known.get(name)!r} there, {search.about[name]!r} here)" for name in names)
         raise ResultsError(f"{file} has another search of {search.spec}: {changes}. Choose another folder.")
     study.set_user_attr("about", search.about)
-    for trial in study.get_trials(deepcopy=False, states=[TrialState.COMPLETE]):
-        trial.user_attrs["settings"]  # a lost line is noticed here
     for trial in study.get_trials(deepcopy=False, states=[TrialState.RUNNING]):  # of a process that was killed
         study.tell(trial.number, state=TrialState.FAIL)
 
