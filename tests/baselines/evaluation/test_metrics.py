@@ -258,13 +258,8 @@ def test_a_row_survives_json(test_set):
     assert list(there) == [field.name for field in dataclasses.fields(Row)]
     assert restored(there) == row
     assert restored(there).key == row.key
-
-
-def test_numbers_that_are_not_finite_become_null():
-    row = dataclasses.replace(row_of(position_scenario(), handmade()), total_cost=math.inf, qdot_rms=math.nan)
-    there = row.to_json()
+    there = dataclasses.replace(row, total_cost=math.inf).to_json()
     assert there["total_cost"] is None
-    assert there["qdot_rms"] is None
     assert math.isnan(restored(there).total_cost)
 
 
