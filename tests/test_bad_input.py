@@ -1,7 +1,5 @@
 """Bad input: a table of fields and values made from annotations, and a table of calls that are refused."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import re

@@ -1,7 +1,5 @@
 """Prose, tables and snippets hold: they are executed, or compared with what the code says."""
 
-from __future__ import annotations
-
 import re
 import shlex
 import subprocess

@@ -1,7 +1,5 @@
 """The documentation as a site: every page has its place, nothing is broken, and it needs no network."""
 
-from __future__ import annotations
-
 import importlib
 import importlib.util
 import json

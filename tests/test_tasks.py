@@ -1,7 +1,5 @@
 """Task coordinates, their errors and Jacobians."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation

@@ -1,7 +1,5 @@
 """Data sets of Minari: the environment plays them again bit for bit, and a killed process is resumed."""
 
-from __future__ import annotations
-
 import pathlib
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Policies under bad input: one clear error each, and none that costs a compilation."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The contract of all policies, over the registry."""
 
-from __future__ import annotations
-
 import copy
 import dataclasses
 import functools

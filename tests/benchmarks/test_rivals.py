@@ -1,7 +1,5 @@
 """Other people's solvers see the same problem, and find its optimum."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.optimize import lsq_linear

@@ -1,7 +1,5 @@
 """Learning environments can be drawn and recorded: one arm, N arms, and those of Stable-Baselines3."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode, SyncVectorEnv

@@ -1,7 +1,5 @@
 """Files of agents: round trips; other files are refused with one error that names the file."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

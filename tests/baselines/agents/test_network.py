@@ -1,7 +1,5 @@
 """Networks of agents: the forward pass and its checks."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 

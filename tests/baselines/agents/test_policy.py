@@ -1,7 +1,5 @@
 """Agents from files as policies: the contract, the scenarios that they play, and the agents of the package."""
 
-from __future__ import annotations
-
 import copy
 
 import gymnasium as gym

@@ -1,7 +1,5 @@
 """The command line of training: exit codes, several seeds, repetition."""
 
-from __future__ import annotations
-
 import importlib.util
 import json
 import pathlib

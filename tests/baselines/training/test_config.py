@@ -1,7 +1,5 @@
 """Configurations and presets."""
 
-from __future__ import annotations
-
 import json
 import os
 

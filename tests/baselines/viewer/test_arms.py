@@ -1,7 +1,5 @@
 """Arms in the scene: frames where the kinematics are, and meshes of a URDF file that describes the arm."""
 
-from __future__ import annotations
-
 import io
 import os
 import zipfile

@@ -1,7 +1,5 @@
 """Videos: what is drawn when, and files that can be played."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """The bilinear agent: its features and its law."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

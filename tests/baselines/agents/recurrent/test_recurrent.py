@@ -1,7 +1,5 @@
 """Agents with memory: their network, their filter, and the arms that they refuse."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

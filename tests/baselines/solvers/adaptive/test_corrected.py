@@ -1,7 +1,5 @@
 """What wrappers that correct a model show to the base policy, and what becomes of its tracking."""
 
-from __future__ import annotations
-
 import functools
 
 import numpy as np

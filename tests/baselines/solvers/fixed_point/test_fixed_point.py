@@ -1,7 +1,5 @@
 """The fixed-point transformation: its identities, its limit of convergence, its variants and statuses."""
 
-from __future__ import annotations
-
 import gymnasium as gym
 import numpy as np
 import pytest

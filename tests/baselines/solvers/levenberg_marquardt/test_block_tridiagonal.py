@@ -1,7 +1,5 @@
 """The horizon by blocks against the printed dense formula (27)."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

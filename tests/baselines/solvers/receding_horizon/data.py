@@ -1,7 +1,5 @@
 """Horizons for the tests of the kernels."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """What the preset for real time does at the beginning of an episode, far off its trajectory, and at each horizon."""
 
-from __future__ import annotations
-
 import gymnasium as gym
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Varga's method against the paper written down once more in plain NumPy, and its statuses."""
 
-from __future__ import annotations
-
 import gymnasium as gym
 import numpy as np
 import pytest

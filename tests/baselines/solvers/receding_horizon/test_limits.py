@@ -1,7 +1,5 @@
 """Receding horizons under limits of acceleration: their optima are IPOPT's, and the plant holds nothing back."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

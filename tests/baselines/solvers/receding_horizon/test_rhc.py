@@ -1,7 +1,5 @@
 """The receding horizon against IPOPT and gradient descent, its limits, and what it does along episodes."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 

@@ -1,7 +1,5 @@
 """Initial trajectories of others, played."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The formulas of resolved rate against NumPy, for Jacobians and task shifts of any kind, and the feedback law."""
 
-from __future__ import annotations
-
 import gymnasium as gym
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """The 90° ambiguity of skew coordinates is resolved by how they came about: policies then track whole poses."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

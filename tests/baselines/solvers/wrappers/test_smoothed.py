@@ -1,7 +1,5 @@
 """Second-order smoothing: the filter, what the inner policy sees, and what is refused."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import gymnasium as gym

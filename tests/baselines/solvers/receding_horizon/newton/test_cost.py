@@ -1,7 +1,5 @@
 """The cost of a path against the environment's, its derivatives against central differences."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
