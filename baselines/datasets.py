@@ -1,7 +1,5 @@
 """Episodes of a policy as a data set of Minari: ``ikgym dataset``."""
 
-from __future__ import annotations
-
 import contextlib
 import pathlib
 import shutil

@@ -12,8 +12,6 @@ A parameter with a dot is a key of a parameter that is a table itself: ``"option
 One file, although long: the checks of ranges and of a folder of trials need what the search is made of.
 """
 
-from __future__ import annotations
-
 import contextlib
 import dataclasses
 import json

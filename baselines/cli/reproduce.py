@@ -4,8 +4,6 @@
 >>> findings = reproduce(["zhang"])
 """
 
-from __future__ import annotations
-
 import contextlib
 import dataclasses
 import json
