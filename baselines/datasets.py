@@ -1,7 +1,5 @@
 """Episodes of a policy as a data set of Minari: ``ikgym dataset``."""
 
-from __future__ import annotations
-
 import contextlib
 import pathlib
 import shutil
@@ -31,8 +29,6 @@ from ikgym.scenarios import Preview, Scenario
 
 #: Episodes that are written together; they are lost if the process is killed before.
 BLOCK = 16
-#: One number a step of an episode.
-COLUMNS = ("rewards", "terminations", "truncations", "tracking_cost", "velocity_cost")
 
 
 def write(
@@ -92,8 +88,6 @@ def write(
         write_json(out / "dataset.json", about)
         if data.exists():
             return
-        for number in range(0, episodes, BLOCK):
-            _check(blocks / f"{number:06}", jobs[number : number + BLOCK])
         with tqdm(total=episodes, disable=not progress, file=sys.stderr, unit="episode", dynamic_ncols=True) as bar:
             for number in range(0, episodes, BLOCK):
                 block = blocks / f"{number:06}"
@@ -104,7 +98,8 @@ def write(
                 bar.update(min(BLOCK, episodes - number))
         whole = _storage(_environment(first), draft)
         for block in sorted(blocks.iterdir()):
-            whole.update_from_storage(MinariStorage.read(block))
+            with reading(block, "Begin anew with --overwrite."):
+                whole.update_from_storage(MinariStorage.read(block))
         # Minari loses the seeds when it copies episodes.
         seeds = [{"seed": job.seeds.seed} for job in jobs]
         whole.update_episode_metadata([a | b for a, b in zip(seeds, whole.apply(_costs), strict=True)])
@@ -147,27 +142,6 @@ def _environment(job: Job) -> gym.Env[Any, Any]:
 def _storage(env: gym.Env[Any, Any], folder: pathlib.Path) -> MinariStorage:
     spaces = {"observation_space": env.observation_space, "action_space": env.action_space}
     return MinariStorage.new(folder.absolute(), env_spec=env.spec, **spaces)
-
-
-def _check(block: pathlib.Path, jobs: Sequence[Job]) -> None:
-    """Checks the episodes of a block that was written before, if there is one.
-
-    Raises:
-        ResultsError: It cannot be read, or has other arrays.
-    """
-    if not block.exists():
-        return
-    steps, env = jobs[0].scenario.steps, _environment(jobs[0])
-    spaces: Any = env.observation_space
-    expected = {name: (steps + 1, *space.shape) for name, space in spaces.items()}
-    expected |= {"actions": (steps, *(env.action_space.shape or ())), **dict.fromkeys(COLUMNS, (steps,))}
-    with reading(block, "Begin anew with --overwrite."):
-        storage = MinariStorage.read(block)
-        for _, one in zip(jobs, storage.get_episodes(range(storage.total_episodes)), strict=True):
-            arrays = {**one, **one["observations"], **one["infos"]}
-            for name, shape in expected.items():
-                if arrays[name].shape != shape:
-                    raise ValueError(f"expected {name} of shape {shape}, got {arrays[name].shape}")
 
 
 def _record(jobs: Sequence[Job], folder: pathlib.Path) -> None:

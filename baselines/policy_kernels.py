@@ -1,7 +1,5 @@
 """Kernels shared by all policies, from the observation to the cut at the velocity limit."""
 
-from __future__ import annotations
-
 import math
 import types
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """Status of a solve. A failed solve is data, not an exception."""
 
-from __future__ import annotations
-
 import enum
 
 import numpy as np

@@ -9,10 +9,8 @@ A file of ranges has a table a solver, called by its specification, with one lin
 A parameter with a dot is a key of a parameter that is a table itself: ``"options.gain"``. One with ``when = { rule =
 ["chan"] }`` is varied only if a parameter above it has one of these values.
 
-One file, although long: the checks of ranges and of a folder of trials need what the search is made of.
+One file, although long: ranges and folders of trials are checked with the parts of a search.
 """
-
-from __future__ import annotations
 
 import contextlib
 import dataclasses
@@ -303,8 +301,6 @@ def _begin(file: pathlib.Path, search: Search) -> None:
         changes = ", ".join(f"{name} ({known.get(name)!r} there, {search.about[name]!r} here)" for name in names)
         raise ResultsError(f"{file} has another search of {search.spec}: {changes}. Choose another folder.")
     study.set_user_attr("about", search.about)
-    for trial in study.get_trials(deepcopy=False, states=[TrialState.COMPLETE]):
-        trial.user_attrs["settings"]  # a lost line is noticed here
     for trial in study.get_trials(deepcopy=False, states=[TrialState.RUNNING]):  # of a process that was killed
         study.tell(trial.number, state=TrialState.FAIL)
 

@@ -1,7 +1,5 @@
 """Measures speed, prints the tables and writes them: ``python -m benchmarks --out DIR``."""
 
-from __future__ import annotations
-
 import dataclasses
 import datetime
 import pathlib

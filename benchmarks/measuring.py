@@ -1,7 +1,5 @@
 """How speed is measured: the sizes of the tables, and medians of interleaved calls."""
 
-from __future__ import annotations
-
 import dataclasses
 import statistics
 import time

@@ -1,7 +1,5 @@
 """Resets of learning environments: random actions end episodes after some 60 steps."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Runs tutorials word by word, and writes what they print into their pages: ``python -m docs.tutorial [PAGE …]``."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import re

@@ -1,7 +1,5 @@
 """The tracking cost, the score of every policy."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable
 

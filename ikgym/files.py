@@ -1,7 +1,5 @@
 """Files: atomic writing, and bounded reading of files of users."""
 
-from __future__ import annotations
-
 import os
 import pathlib
 import re

@@ -1,7 +1,5 @@
 """Chromium, for tests of pages; they are skipped where it is missing."""
 
-from __future__ import annotations
-
 import contextlib
 import shutil
 

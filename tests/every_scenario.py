@@ -1,7 +1,5 @@
 """Every scenario, as parameters of tests: those that differ in kind in the fast run, all of them in the slow one."""
 
-from __future__ import annotations
-
 import pytest
 
 import ikgym

@@ -1,7 +1,5 @@
 """Scenarios whose arm has limits of all kinds, and runs into them within a few steps."""
 
-from __future__ import annotations
-
 import numpy as np
 
 import ikgym

@@ -1,7 +1,5 @@
 """What spawned processes import: a module of tests would bring PyTorch along, which takes them seconds."""
 
-from __future__ import annotations
-
 import os
 import signal
 

@@ -1,7 +1,5 @@
 """Bad input: a table of fields and values made from annotations, and a table of calls that are refused."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import re
@@ -201,7 +199,9 @@ REFUSED = [
     ("coordinates", lambda: SKEW.error(np.zeros((4, 6)), np.zeros((3, 6)))),
     ("coordinates", lambda: SKEW.error(np.zeros(6), np.full(6, np.nan))),
     ("jacobian", lambda: SKEW.jacobian(np.eye(3), np.zeros((5, 7)))),
-    ("jacobian", lambda: SKEW.error_jacobian(np.zeros(6), np.zeros(6), 3.0)),
+    *(("jacobian: expected shape", lambda x=x: SKEW.error_jacobian(np.zeros((2, 6)), np.zeros((2, 6)), x)) for x in (
+        3.0, np.zeros((6, 7)),
+    )),
     *(("error", lambda x=x: ikgym.TrackingCost().tracking(x)) for x in (np.nan, [np.inf, 0], "a", [], 1.0, [None])),
     ("duration", lambda: PathTrajectory(LINE, Trapezoidal(0.5, 2.0, 2.0))),
     ("approach", lambda: AlongPath([0, 0, 0])),

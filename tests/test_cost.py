@@ -1,7 +1,5 @@
 """The tracking cost against the paper's formula, and its derivatives against central differences."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """Prose, tables and snippets hold: they are executed, or compared with what the code says."""
 
-from __future__ import annotations
-
 import re
 import shlex
 import subprocess
@@ -284,15 +282,6 @@ def test_check_does_everything_in_order():
     places = [next(i for i, line in enumerate(lines) if words in line) for words in wanted]
     assert places == sorted(places)
     assert (ROOT / ".ci" / "run").read_text(encoding="utf-8").rstrip().endswith("make check")
-
-
-def test_demo_tells_the_story_and_can_play_all():
-    (line,) = [line for line in planned("demo") if "ikgym evaluate" in line]
-    assert 9 <= len(line.partition("--policies ")[2].partition(" --")[0].split()) <= 11
-    done = subprocess.run(
-        ["make", "--dry-run", "demo", "DEMO=all"], cwd=ROOT, capture_output=True, text=True, check=True
-    )
-    assert "--policies all " in done.stdout
 
 
 def test_the_citation_is_of_this_version():

@@ -1,7 +1,5 @@
 """Episodes that are entered after some steps, and go on after a loss of track."""
 
-from __future__ import annotations
-
 import gymnasium as gym
 import numpy as np
 import pytest

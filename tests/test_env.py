@@ -1,7 +1,5 @@
 """The single environment against its specification, Gymnasium's checker and Stable-Baselines3's."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

@@ -3,8 +3,6 @@
 A small budget in the suite; `make fuzz` sets IKGYM_FUZZ to a number of examples a property.
 """
 
-from __future__ import annotations
-
 import os
 
 import gymnasium as gym

@@ -1,7 +1,5 @@
 """Registries of arms and scenarios: a bad registration affects no other member."""
 
-from __future__ import annotations
-
 import pytest
 
 import ikgym

@@ -1,7 +1,5 @@
 """`call`, `get_attr`, `set_attr` and `spec`, as Gymnasium's own environments have them."""
 
-from __future__ import annotations
-
 import gymnasium as gym
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """The environment of Stable-Baselines3 is its `DummyVecEnv` of N single ones, bit for bit."""
 
-from __future__ import annotations
-
 import gymnasium as gym
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """The simulator: nominal frames in blocks, memory, copies, and arrays that share nothing."""
 
-from __future__ import annotations
-
 import copy
 import dataclasses
 import functools

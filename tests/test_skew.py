@@ -1,7 +1,5 @@
 """Recovery and right paths on skew coordinates."""
 
-from __future__ import annotations
-
 import json
 
 from docs import skew

@@ -1,7 +1,5 @@
 """Only compiled kernels go without types: mypy lets functions pass that have none at all."""
 
-from __future__ import annotations
-
 import ast
 from pathlib import Path
 

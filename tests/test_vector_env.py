@@ -1,7 +1,5 @@
 """The native vector environment is N single ones, bit for bit."""
 
-from __future__ import annotations
-
 import gymnasium as gym
 import numpy as np
 import pytest

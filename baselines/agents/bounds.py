@@ -1,7 +1,5 @@
 """Actions of agents within the limits of the arm."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import Self
 

@@ -1,7 +1,5 @@
 """Learned agents without memory as policies."""
 
-from __future__ import annotations
-
 import dataclasses
 import os
 import pathlib

@@ -1,7 +1,5 @@
 """The interfaces of networks, and of processings: observations to features, network outputs to actions."""
 
-from __future__ import annotations
-
 import abc
 import dataclasses
 from collections.abc import Mapping

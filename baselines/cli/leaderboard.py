@@ -1,7 +1,5 @@
 """Compares policies on test sets or scenarios in one table with intervals: ``ikgym leaderboard``."""
 
-from __future__ import annotations
-
 import dataclasses
 import pathlib
 from collections.abc import Mapping, Sequence
@@ -87,14 +85,7 @@ def compare(rows: Rows, policies: Sequence[str], out: pathlib.Path) -> str:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """The command line.
-
-    Args:
-        arguments: The words after the command; those of the process if left out.
-
-    Returns:
-        The exit code: 0, 2 after an expected error, 130 after Ctrl-C.
-    """
+    """The command line: words after the command, or those of the process; returns the exit code."""
     return shell.run_resumable(Options, arguments, "ikgym leaderboard", manual, _work, RULES)
 
 

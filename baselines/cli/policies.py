@@ -1,7 +1,5 @@
 """The command ``ikgym policies``."""
 
-from __future__ import annotations
-
 import dataclasses
 import inspect
 import re

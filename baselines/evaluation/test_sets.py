@@ -4,8 +4,6 @@ The digest of scenario, seeds and version of the cost is stated here. A set whos
 results of different sets are never combined.
 """
 
-from __future__ import annotations
-
 import dataclasses
 
 from baselines.fingerprints import set_hash

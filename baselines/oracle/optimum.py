@@ -1,7 +1,5 @@
 """Settings and results of a search."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 

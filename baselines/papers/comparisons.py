@@ -1,7 +1,5 @@
 """Comparisons and thresholds that all claims share: like claims have like thresholds."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

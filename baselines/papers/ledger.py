@@ -1,7 +1,5 @@
 """The ledger: claims of the papers and findings of their tests, as a CSV file and as Markdown."""
 
-from __future__ import annotations
-
 import csv
 import io
 from collections import Counter

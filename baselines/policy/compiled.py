@@ -1,7 +1,5 @@
 """Solvers whose step is one compiled kernel."""
 
-from __future__ import annotations
-
 import abc
 import functools
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Kernels that several solvers share: arrays for a pose, and the task shift of one row."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ikgym.kernels import tasks as task_kernels

@@ -3,8 +3,6 @@
 ``python -m baselines.training.validation`` computes the reference costs anew, in some minutes.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import json

@@ -1,7 +1,5 @@
 """Hooks of MkDocs: generated pages, and links out of the folder of the pages."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

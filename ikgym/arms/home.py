@@ -1,7 +1,5 @@
 """Arms from the poses of their joints at q = 0; the last step of every conversion."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Kernels: joint motions, random control points of splines, and the nominal frames along motions."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Kernels: random numbers as a function of a key and a counter, without a state."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Kernels: the arms, loops and delays that episodes draw."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

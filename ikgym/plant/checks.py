@@ -1,7 +1,5 @@
 """Checks of the fields of a plant."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

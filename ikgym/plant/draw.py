@@ -1,7 +1,5 @@
 """Draws of a plant, once an episode."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import Any
 

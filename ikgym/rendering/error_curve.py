@@ -1,7 +1,5 @@
 """An error over time on a logarithmic axis."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

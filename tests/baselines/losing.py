@@ -1,7 +1,5 @@
 """A cluster that is this process, and whose workers die where a test says so."""
 
-from __future__ import annotations
-
 import contextlib
 import itertools
 

@@ -1,7 +1,5 @@
 """Policies whose package may be missing, and scenarios of real arms that suit them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Agents with random weights, for tests."""
 
-from __future__ import annotations
-
 import itertools
 import pathlib
 

@@ -3,8 +3,6 @@
 The suite tries a few of each; the environment variable IKGYM_FUZZ says how many instead, see `make fuzz`.
 """
 
-from __future__ import annotations
-
 import contextlib
 import functools
 import os

@@ -1,7 +1,5 @@
 """The contract of all policies, over the registry."""
 
-from __future__ import annotations
-
 import copy
 import dataclasses
 import functools
@@ -381,6 +379,9 @@ def test_parameters_out_of_their_range_are_refused_by_name(name):
 #: What depends on more than one number, by scenario: refused with the name of the first parameter and these words.
 REFUSED = {
     "varga7-fast": [
+        ("rhc_gradient", {"alpha_max": 1e-9}, "expected at least alpha_min = 1e-08, got 1e-09"),
+        ("rhc", {"move_blocks": 30}, "expected at most horizon - 1 = 29, a knot at each step, got 30"),
+        ("rhc", {"start_steps": 5, "starts": 3}, "expected 0 where restart_steps is 0, got 5"),
         ("qp", {"secondary_gain": 2000.0}, "expected a number below 2/Δt = 2000, got 2000"),
         ("qp", {"posture": [0.0, 1.0]}, r"expected shape \(7,\), got \(2,\)"),
         ("null_space", {"secondary_gain": 2000.0}, "expected a number below 2/Δt = 2000"),
@@ -531,7 +532,7 @@ def test_a_state_of_another_batch_or_policy_is_refused():
         baselines.make("dls", "varga7-fast").predict(good(), state=state)
 
 
-@pytest.mark.parametrize("start", [[True, False], [[True]], "a", [None]])
+@pytest.mark.parametrize("start", [[True, False], [[True], [True, False]], "a", [None], {True}])
 @pytest.mark.parametrize("name", ["dls", "follow_nominal"])
 def test_bad_episode_starts(name, start):
     policy = baselines.make(name, "varga7-fast")
@@ -540,7 +541,7 @@ def test_bad_episode_starts(name, start):
         policy.predict(good(), state, start)
 
 
-@pytest.mark.parametrize("state", [3, "a", (None,) * 4, [np.zeros(1)] * 4, (np.zeros(1),) * 9])
+@pytest.mark.parametrize("state", [3, "a", (), {}, (None,) * 4, [np.zeros(1)] * 4, (np.zeros(1),) * 9])
 def test_bad_states(state):
     with pytest.raises(InvalidInputError, match=r"state: expected what rhc_gradient.predict returned"):
         baselines.make("rhc_gradient", "varga7-fast").predict(good(), state)

@@ -1,7 +1,5 @@
 """What the steps of all policies share: every number is looked at, and nothing that is returned is used again."""
 
-from __future__ import annotations
-
 import gc
 
 import numpy as np

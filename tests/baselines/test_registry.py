@@ -1,7 +1,5 @@
 """The registry of policies: names without imports, policies of others, and what is refused."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import importlib.metadata

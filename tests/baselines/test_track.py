@@ -1,7 +1,5 @@
 """One episode as a trajectory: `baselines.track`."""
 
-from __future__ import annotations
-
 import csv
 import io
 

@@ -94,12 +94,9 @@ def test_only_the_same_search_is_resumed(tmp_path):
         run(tmp_path, 1)
     with pytest.raises(ResultsError, match=r"another search of dls: seed \(0 there, 1 here\)"):
         run(tmp_path, 1, resume=True, seed=1)
-    lines = (tmp_path / JOURNAL).read_text().splitlines(keepends=True)
-    lost = [line for line in lines if '"settings"' not in line]
-    for damaged in (["{}\n[]\n"], [*lines, "3\n"], [*lines, "null\n"], [*lines, '{"op_code": 99}\n'], lost):
-        (tmp_path / JOURNAL).write_text("".join(damaged))
-        with pytest.raises(ResultsError, match="is damaged"):
-            run(tmp_path, 1, resume=True)
+    (tmp_path / JOURNAL).write_text("{}\n[]\n")
+    with pytest.raises(ResultsError, match="is damaged"):
+        run(tmp_path, 1, resume=True)
     assert run(tmp_path, 1, overwrite=True)[0]["tried"] == 2
 
 
@@ -154,11 +151,8 @@ def test_parameters_within_another_and_under_a_condition():
     ("text", "error", "message"),
     [
         ("dls = 3", InvalidInputError, "expected a table of ranges"),
-        ("[dls", InvalidInputError, "expected TOML"),
         ("[dls]\ngain = {}", InvalidInputError, r"\[dls\] gain: expected low and high, or choices"),
         ("[dls]\ngain = { low = 1.0, high = 0.5 }", InvalidInputError, "expected low and high, or choices"),
-        ("[dls]\ngain = { low = 0.0, high = 0.5, log = true }", InvalidInputError, "expected low and high, or choices"),
-        ('[dls]\ngain = { low = "a", high = 0.5 }', InvalidInputError, "expected low and high, or choices"),
         ("[dls]\ngain = { low = 0.0, hihg = 0.5 }", UnknownNameError, "Did you mean 'high'"),
         ('[dls]\ngain = { low = 1, high = 2, when = { rule = ["a"] } }', UnknownNameError, "parameter above gain"),
         ("[dls]\ndamping = { low = -1.0, high = 1.0 }", InvalidInputError, "damping: expected a finite number above 0"),
@@ -187,11 +181,8 @@ def test_ranges_of_solvers_that_are_not_searched(tmp_path):
         ({"--scenario": "varga7-fast"}, "varga7-fast is the same at every reset"),
         ({"--policies": "dlss"}, "There is no policy 'dlss'. Did you mean 'dls'?"),
         ({"--policies": "rhc_foresight"}, "There are no ranges for the parameters of 'rhc_foresight'"),
-        ({"--seed": "-1"}, "seed: expected a whole number of at least 0, got -1."),
-        ({"--workers": "1000000000000"}, "workers: expected a whole number from 1 to 1000, got 1000000000000"),
         ({"--ranges": "nowhere.toml"}, "Cannot read nowhere.toml"),
         ({"--ranges": str(RANGES), "--policies": "rhc:horizon=7"}, "There are no ranges"),
-        ({"--trials": "0"}, "trials: expected a whole number of at least 1, got 0."),
     ],
 )
 def test_the_command_reports_mistakes_before_anything_is_written(changes, message, tmp_path, monkeypatch, capsys):

@@ -1,7 +1,5 @@
 """Work in other processes: dead workers are replaced, errors reach the caller, and workers end with their parent."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import pathlib

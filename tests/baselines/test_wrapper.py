@@ -1,7 +1,5 @@
 """The base of policies around another one: what a wrapper of a few lines gets from it."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import ClassVar, NamedTuple
 

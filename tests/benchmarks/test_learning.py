@@ -1,7 +1,5 @@
 """How learning is measured, by a model that needs none."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from stable_baselines3 import PPO

@@ -1,7 +1,5 @@
 """The report of a run: a page with all tables."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

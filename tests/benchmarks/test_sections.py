@@ -1,7 +1,5 @@
 """The benchmarks measure what they say; their times are not tested."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

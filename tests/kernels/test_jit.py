@@ -1,7 +1,5 @@
 """Machine code on disk is never stale, and not needed."""
 
-from __future__ import annotations
-
 import logging
 import math
 import os

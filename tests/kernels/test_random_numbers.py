@@ -1,7 +1,5 @@
 """Random numbers that a key and a counter determine."""
 
-from __future__ import annotations
-
 import statistics
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Plants with one effect each, and with all of them."""
 
-from __future__ import annotations
-
 import ikgym
 from ikgym import Plant
 

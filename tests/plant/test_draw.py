@@ -1,7 +1,5 @@
 """What an episode draws: of the right size, from streams of their own, and the same for all who ask."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

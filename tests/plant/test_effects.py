@@ -1,7 +1,5 @@
 """Each effect arrives: in the motion, in the observation or in both, at its size, and nowhere else."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The plant as data: what it refuses, and what it says of itself."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import ikgym

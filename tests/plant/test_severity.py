@@ -1,7 +1,5 @@
 """Plants of other severities."""
 
-from __future__ import annotations
-
 import math
 
 from ikgym import Plant, scenarios

@@ -1,7 +1,5 @@
 """Plants in single, synchronous and native vector environments, bit for bit."""
 
-from __future__ import annotations
-
 import copy
 
 import numpy as np

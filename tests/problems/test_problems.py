@@ -1,7 +1,5 @@
 """The problems of others: complete, as they were published, and in the frames that they are said to be in."""
 
-from __future__ import annotations
-
 import hashlib
 
 import numpy as np

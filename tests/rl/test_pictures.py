@@ -1,13 +1,8 @@
 """Learning environments can be drawn and recorded: one arm, N arms, and those of Stable-Baselines3."""
 
-from __future__ import annotations
-
-import itertools
-
 import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
-from gymnasium.wrappers import RecordVideo
 from gymnasium.wrappers.vector import RecordVideo as RecordVideos
 
 import ikgym
@@ -42,23 +37,6 @@ def test_pictures_of_many_are_those_of_single_ones(mode):
                 envs.reset(options={"reset_mask": truncated})
             ended += truncated.any()
     assert ended == 2 * 2  # two of each
-
-
-def test_episodes_of_one_arm_are_recorded(tmp_path):
-    pytest.importorskip("moviepy")
-    env = RecordVideo(
-        rl.make(SHORT, render_mode="rgb_array"),
-        str(tmp_path / "videos"),
-        episode_trigger=lambda _: True,
-        disable_logger=True,
-    )
-    env.reset(seed=0)
-    for _ in range(STEPS):
-        env.step(np.full(7, 0.5, dtype=np.float32))
-    assert np.array(env.recorded_frames).shape == (STEPS + 1, HEIGHT, WIDTH, 3)
-    assert all((a != b).any() for a, b in itertools.pairwise(env.recorded_frames))
-    env.close()
-    assert len(list(tmp_path.glob("videos/*.mp4"))) == 1
 
 
 def test_episodes_of_many_arms_are_recorded_side_by_side(tmp_path):

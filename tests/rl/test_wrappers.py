@@ -1,7 +1,5 @@
 """Wrappers for learning: one by one, all of them, and N arms at once, bit for bit."""
 
-from __future__ import annotations
-
 import itertools
 import math
 import warnings

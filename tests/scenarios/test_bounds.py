@@ -1,7 +1,5 @@
 """Bounds of a scenario: what would overflow, or fill the memory, is refused in one clear line."""
 
-from __future__ import annotations
-
 import math
 
 import gymnasium as gym

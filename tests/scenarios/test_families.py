@@ -1,7 +1,5 @@
 """The same paths for several arms: each demands what its name says, and no more."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.optimize import linprog

@@ -1,7 +1,5 @@
 """Scenarios as files: nothing is lost on the way, and every mistake in a file is named."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 import tomllib

@@ -1,7 +1,5 @@
 """The ways to name a scenario: an object, a registered name, a file, a place in a module."""
 
-from __future__ import annotations
-
 import pathlib
 import sys
 

@@ -1,7 +1,5 @@
 """Scenarios of imperfect plants: the same gentle paths, and plants as they are said to be."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """What docs/scenarios.md says of scenarios of one's own holds."""
 
-from __future__ import annotations
-
 import dataclasses
 import re
 import tomllib

@@ -1,7 +1,5 @@
 """The problems of others as scenarios."""
 
-from __future__ import annotations
-
 import gymnasium as gym
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Scenarios: data, checks, seeds, and the values that PAPERS prescribes."""
 
-from __future__ import annotations
-
 import itertools
 import pickle
 import threading

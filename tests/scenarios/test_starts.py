@@ -1,7 +1,5 @@
 """Where episodes begin on paths in space: the scenario finds joint coordinates for the first pose."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import gymnasium as gym

@@ -1,7 +1,5 @@
 """Time laws and orientation laws on paths: at rest at both ends, within their limits in between."""
 
-from __future__ import annotations
-
 import pickle
 
 import numpy as np

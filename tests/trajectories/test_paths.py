@@ -1,7 +1,5 @@
 """Paths: their arc length, direction and curvature, and the figures they are meant to be."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation

@@ -1,7 +1,5 @@
 """Random motions within limits: what is drawn is feasible, and the arm that follows it is never held back."""
 
-from __future__ import annotations
-
 import gymnasium as gym
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Cubic splines against SciPy's, and lengths of curves."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy import interpolate

@@ -1,7 +1,5 @@
 """Nominal trajectories against the papers' formulas."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation

@@ -1,7 +1,5 @@
 """Waypoints from arrays and CSV files."""
 
-from __future__ import annotations
-
 import time
 
 import numpy as np

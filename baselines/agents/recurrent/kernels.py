@@ -1,7 +1,5 @@
 """Kernels of agents with memory: features of a measurement, variances from network outputs, and the filter."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

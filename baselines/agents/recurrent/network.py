@@ -1,7 +1,5 @@
 """A gated recurrent network in float32, one kernel a step (Cho et al. 2014, in the form of PyTorch's GRUCell)."""
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 import math

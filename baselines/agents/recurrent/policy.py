@@ -1,7 +1,5 @@
 """Agents with memory as policies."""
 
-from __future__ import annotations
-
 import dataclasses
 import os
 from collections.abc import Mapping

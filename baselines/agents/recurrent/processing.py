@@ -1,7 +1,5 @@
 """The base policy of an agent with memory, and the prior of its filter."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import ClassVar
 

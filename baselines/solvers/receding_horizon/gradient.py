@@ -1,7 +1,5 @@
 """Receding horizon by gradient descent, without Lagrange multipliers (Varga, Issa, Horváth, Tar 2021)."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 from typing import Any, ClassVar
@@ -9,6 +7,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from baselines.policy import Batch, Memory, Solution, SolverPolicy
+from baselines.policy.parameters import choice, parameter
 from baselines.solvers.receding_horizon.descent import (
     DIVERGED,
     GOES_ON,
@@ -23,11 +22,7 @@ from baselines.solvers.receding_horizon.descent import (
 from baselines.solvers.receding_horizon.horizon import ProblemData, analytic_gradient, difference_gradient
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.jit import kernel
-from ikgym.validation import FloatArray, known_name, number, whole_number
-
-GRADIENTS = ("finite_difference", "analytic")
-ALPHA_STARTS = ("restart", "kept")
-WARM_STARTS = ("unshifted", "shifted")
+from ikgym.validation import FloatArray, number, whole_number
 
 # Smaller ones drown in the rounding of the states, which they change by Δt times as much.
 SMALLEST_DIFFERENCE = 1e-9
@@ -73,34 +68,26 @@ class RecedingHorizonGradient(SolverPolicy):
         UnknownNameError: There is no such gradient, start of α or warm start.
     """
 
-    horizon: int = 3
-    tolerance: float = 20.0
-    iterations: int = 450
-    alpha_min: float = 1e-8
-    alpha_max: float = 5e-4
-    alpha_factor: float = 1.2
-    alpha_start: str = "restart"
-    warm_start: str = "unshifted"
-    gradient: str = "finite_difference"
-    difference: float = 1e-3
+    horizon: int = parameter(3, whole_number, at_least=2)
+    tolerance: float = parameter(20.0, number, at_least=0.0)
+    iterations: int = parameter(450, whole_number, at_least=1)
+    alpha_min: float = parameter(1e-8, number, above=0.0)
+    alpha_max: float = parameter(5e-4, number, above=0.0)
+    alpha_factor: float = parameter(1.2, number, at_least=1.0)
+    alpha_start: str = parameter("restart", choice, available=("restart", "kept"))
+    warm_start: str = parameter("unshifted", choice, available=("unshifted", "shifted"))
+    gradient: str = parameter("finite_difference", choice, available=("finite_difference", "analytic"))
+    difference: float = parameter(1e-3, number, at_least=SMALLEST_DIFFERENCE, at_most=1.0)
 
     name: ClassVar[str] = "rhc_gradient"
     grain: ClassVar[int] = 1
 
     def __post_init__(self) -> None:
-        whole_number("horizon", self.horizon, at_least=2)
-        whole_number("iterations", self.iterations, at_least=1)
-        number("tolerance", self.tolerance, at_least=0.0)
-        number("alpha_min", self.alpha_min, above=0.0)
-        if number("alpha_max", self.alpha_max, above=0.0) < self.alpha_min:
+        super().__post_init__()
+        if self.alpha_max < self.alpha_min:
             raise InvalidInputError(
                 f"alpha_max: expected at least alpha_min = {self.alpha_min:g}, got {self.alpha_max:g}."
             )
-        number("alpha_factor", self.alpha_factor, at_least=1.0)
-        number("difference", self.difference, at_least=SMALLEST_DIFFERENCE, at_most=1.0)
-        known_name("gradient", self.gradient, GRADIENTS)
-        known_name("alpha_start", self.alpha_start, ALPHA_STARTS)
-        known_name("warm_start", self.warm_start, WARM_STARTS)
 
     @property
     def preview(self) -> int:
@@ -136,12 +123,12 @@ class RecedingHorizonGradient(SolverPolicy):
         limits: tuple[Any, ...] = (model.lower, model.upper, problem.largest_qdot)
         data = ProblemData(model.chain, kind, cost, problem.dt, *limits)
         settings = DescentSettings(
-            tolerance=float(self.tolerance),
-            steps=int(self.iterations),
-            alpha_min=float(self.alpha_min),
-            alpha_max=float(self.alpha_max),
-            alpha_factor=float(self.alpha_factor),
-            difference=float(self.difference) if self.gradient == "finite_difference" else 0.0,
+            tolerance=self.tolerance,
+            steps=self.iterations,
+            alpha_min=self.alpha_min,
+            alpha_max=self.alpha_max,
+            alpha_factor=self.alpha_factor,
+            difference=self.difference if self.gradient == "finite_difference" else 0.0,
         )
         return data, settings
 

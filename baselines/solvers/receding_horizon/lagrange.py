@@ -1,13 +1,12 @@
 """Receding horizon the traditional way: states, Lagrange multipliers and the reduced gradient (Varga 2021, eq. 3-4)."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 from typing import Any, ClassVar
 
 import numpy as np
 
+from baselines.policy.parameters import parameter
 from baselines.solvers.receding_horizon.descent import (
     DIVERGED,
     GOES_ON,
@@ -29,8 +28,8 @@ from baselines.solvers.receding_horizon.task_constraints import (
     reduced_task_gradient,
     task_system,
 )
-from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.jit import inner, kernel
+from ikgym.validation import flag
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -80,18 +79,13 @@ class RecedingHorizonLagrange(RecedingHorizonGradient):
         UnknownNameError: There is no such gradient, start of α or warm start.
     """
 
-    states: bool = False
+    states: bool = parameter(False, flag)
 
     name: ClassVar[str] = "rhc_lagrange"
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if not isinstance(self.states, (bool, np.bool_)):
-            raise InvalidInputError(f"states: expected True or False, got {self.states!r}.")
-
     def _descend(self) -> Any:
         """See :class:`RecedingHorizonGradient`."""
-        return functools.partial(reduce_rows, bool(self.states))
+        return functools.partial(reduce_rows, self.states)
 
 
 @kernel

@@ -9,8 +9,6 @@ CPU time instead of 0.8. ``recovery_steps=0`` costs 1.000 and 1.01 (1.00 to 1.04
 cost.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from typing import ClassVar
 
@@ -19,16 +17,16 @@ import numpy.typing as npt
 
 from baselines.policy import Memory
 from baselines.policy.compiled import CompiledPolicy
+from baselines.policy.parameters import parameter
 from baselines.solvers.receding_horizon.newton.grid import offsets
 from baselines.solvers.receding_horizon.newton.receding import HorizonMemory, plan_step
 from baselines.solvers.receding_horizon.newton.settings import PlanNumbers, PlanSettings, plain_settings
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios.preview import FARTHEST
-from ikgym.validation import FloatArray, number, whole_number
+from ikgym.validation import FloatArray, flag, number, whole_number
 
 # Range of the kernel's counters and random numbers.
 MOST = 2**31 - 1
-LEAST = {"starts": 1, "restart_steps": 0, "seed": 0, "start_steps": 0, "recovery_steps": 0}
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -87,18 +85,18 @@ class RecedingHorizon(CompiledPolicy):
         InvalidInputError: A parameter is out of its range.
     """
 
-    horizon: int = 30
-    iterations: int | None = None
-    move_blocks: int | None = None
-    terminal_weight: float = 1.0
-    stop_at_end: bool = False
-    starts: int = 1
-    restart_steps: int = 0
-    seed: int = 0
-    start_steps: int = 0
-    recovery_steps: int = 0
-    rate_weight: float = 0.0
-    tolerance: float = 1e-7
+    horizon: int = parameter(30, whole_number, at_least=2, at_most=FARTHEST)
+    iterations: int | None = parameter(None, whole_number, at_least=1, at_most=MOST)
+    move_blocks: int | None = parameter(None, whole_number, at_least=1)
+    terminal_weight: float = parameter(1.0, number, at_least=0.0)
+    stop_at_end: bool = parameter(False, flag)
+    starts: int = parameter(1, whole_number, at_least=1, at_most=MOST)
+    restart_steps: int = parameter(0, whole_number, at_least=0, at_most=MOST)
+    seed: int = parameter(0, whole_number, at_least=0, at_most=MOST)
+    start_steps: int = parameter(0, whole_number, at_least=0, at_most=MOST)
+    recovery_steps: int = parameter(0, whole_number, at_least=0, at_most=MOST)
+    rate_weight: float = parameter(0.0, number, at_least=0.0)
+    tolerance: float = parameter(1e-7, number, above=0.0)
 
     name: ClassVar[str] = "rhc"
     step = plan_step
@@ -109,39 +107,30 @@ class RecedingHorizon(CompiledPolicy):
     _numbers: PlanNumbers = dataclasses.field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        if whole_number("horizon", self.horizon, at_least=2) > FARTHEST:
-            raise InvalidInputError(f"horizon: expected at most {FARTHEST}, got {self.horizon}.")
-        if self.move_blocks is not None and whole_number("move_blocks", self.move_blocks, at_least=1) >= self.horizon:
+        super().__post_init__()
+        if self.move_blocks is not None and self.move_blocks >= self.horizon:
             raise InvalidInputError(
                 f"move_blocks: expected at most horizon - 1 = {self.horizon - 1}, a knot at each step, got "
                 f"{self.move_blocks}."
             )
-        if not isinstance(self.stop_at_end, (bool, np.bool_)):
-            raise InvalidInputError(f"stop_at_end: expected True or False, got {self.stop_at_end!r}.")
-        terminal_weight = number("terminal_weight", self.terminal_weight, at_least=0.0)
-        for name, least in {**LEAST, **({} if self.iterations is None else {"iterations": 1})}.items():
-            if whole_number(name, getattr(self, name), at_least=least) > MOST:
-                raise InvalidInputError(f"{name}: expected at most {MOST}, got {getattr(self, name)}.")
         if self.start_steps and not self.restart_steps:
             raise InvalidInputError(f"start_steps: expected 0 where restart_steps is 0, got {self.start_steps}.")
-        rate_weight = number("rate_weight", self.rate_weight, at_least=0.0)
-        tolerance = number("tolerance", self.tolerance, above=0.0)
         knots = self._knots()
         knots.flags.writeable = False
         object.__setattr__(self, "offsets", knots)
         problem, model = self.problem, self.problem.model
         settings = PlanSettings(
             knots,
-            terminal_weight,
-            bool(self.stop_at_end),
+            self.terminal_weight,
+            self.stop_at_end,
             -1 if self.iterations is None else self.iterations,
-            tolerance,
+            self.tolerance,
             self.starts,
             self.restart_steps,
             self.seed,
             self.start_steps,
             self.recovery_steps,
-            rate_weight,
+            self.rate_weight,
             problem.dt * model.acceleration_limit if self.interior_point else np.zeros(0),
         )
         numbers = PlanNumbers(model.chain.prismatic, *plain_settings(problem.cost.parameters, settings))

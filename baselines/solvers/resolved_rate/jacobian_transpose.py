@@ -1,7 +1,5 @@
 """Resolved rate by the transposed Jacobian: no matrix is inverted."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import ClassVar, NamedTuple
 

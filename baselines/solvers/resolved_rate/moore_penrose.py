@@ -1,7 +1,5 @@
 """Resolved rate by the Moore–Penrose pseudoinverse."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import ClassVar, NamedTuple
 

@@ -1,7 +1,5 @@
 """Resolved rate by the truncated singular value decomposition."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import ClassVar
 

@@ -1,7 +1,5 @@
 """Resolved rate by the pseudoinverse that weighs the joints."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 from typing import ClassVar

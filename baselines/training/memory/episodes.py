@@ -1,7 +1,5 @@
 """Random plants, and measurements on them while they follow their reference joint paths."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple

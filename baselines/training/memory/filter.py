@@ -1,7 +1,5 @@
 """The filter of agents with memory in PyTorch, for gradients of its estimates with respect to network weights."""
 
-from __future__ import annotations
-
 import itertools
 from typing import Protocol
 

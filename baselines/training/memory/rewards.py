@@ -5,8 +5,6 @@ which only the noise differs: the mean return of the others is the baseline of e
 2019), so that no critic is needed.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

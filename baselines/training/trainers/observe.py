@@ -1,7 +1,5 @@
 """Agents with memory: gradients of a filter's estimates over an episode with respect to the network that tunes it."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -9,8 +9,6 @@ postures (q), the orientations and positions of its tip at each, and the limits 
 null where there is none).
 """
 
-from __future__ import annotations
-
 import json
 import sys
 from pathlib import Path

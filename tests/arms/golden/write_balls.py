@@ -7,8 +7,6 @@ A line an arm: the centre of the ball in the frame of the flange, eight recorded
 and, where they published them, the positions of the ball that their own program calculated from these postures.
 """
 
-from __future__ import annotations
-
 import json
 import re
 import sys

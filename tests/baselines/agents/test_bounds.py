@@ -1,7 +1,5 @@
 """Bilinear agents keep to the limits of their arm, as `qp` does."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Networks of agents: the forward pass and its checks."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 
@@ -94,9 +92,3 @@ def test_networks_are_frozen_copies():
 def test_refused(weights, biases, message):
     with pytest.raises(InvalidInputError, match=message):
         Network(weights, biases)
-
-
-@pytest.mark.parametrize("x", [np.ones((1, 2)), np.ones((1, 3), dtype=np.float32), np.ones(2, dtype=np.float32)])
-def test_refused_features(x):
-    with pytest.raises(InvalidInputError, match=r"features: expected float32 of shape \(any, 2\), got"):
-        network((2, 2)).forward(x)

@@ -1,10 +1,6 @@
 """Agents from files as policies: the contract, the scenarios that they play, and the agents of the package."""
 
-from __future__ import annotations
-
 import copy
-import pickle
-import threading
 
 import gymnasium as gym
 import numpy as np
@@ -22,7 +18,6 @@ from baselines.files import ResultsError
 from baselines.policy import Problem
 from baselines.spec import parse_policy
 from baselines.status import Status
-from ikgym import parallel
 from ikgym.exceptions import InvalidInputError
 from tests.baselines.random_agents import OFFSETS, network, random_agent, write_agent
 from tests.comparison import identical
@@ -86,26 +81,6 @@ def test_batch_equals_single_calls(processing, on):
 
 
 @contract
-def test_threads_change_nothing(monkeypatch, processing):
-    policy, threads, solve = agent_on(RANDOM, processing, WHOLE), set(), Agent.solve
-
-    def watched(self, batch, memory):
-        threads.add(threading.get_ident())
-        return solve(self, batch, memory)
-
-    monkeypatch.setattr(Agent, "solve", watched)
-    monkeypatch.setattr(parallel, "cores", lambda: 2)
-    whole, shared = None, None
-    for observation in observations(RANDOM, policy.preview, 5):
-        monkeypatch.setattr(Agent, "grain", 100)
-        expected, whole = policy.predict(observation, whole)
-        monkeypatch.setattr(Agent, "grain", 1)
-        action, shared = policy.predict(observation, shared)
-        assert identical((action, shared), (expected, whole))
-    assert len(threads) > 1
-
-
-@contract
 def test_the_network_is_evaluated_at_intervals(processing):
     """Every third step after the start of an episode, row by row; with feedback in between."""
     every, third = (agent_on(WHOLE, processing, interval=steps) for steps in (1, 3))
@@ -132,19 +107,6 @@ def test_relative_agents_act_as_their_environment():
         observation, *_, wanted = plain.step(policy.predict(observation)[0])
         np.testing.assert_allclose(info["tracking_cost"], wanted["tracking_cost"], rtol=1e-5)
         np.testing.assert_allclose(info["velocity_cost"], wanted["velocity_cost"], rtol=1e-5)
-
-
-def test_parameters_and_copies(file):
-    policy = baselines.make("agent", FAST, path=file)
-    assert policy.parameters == {"path": file, "hash": policy.file.digits, "any_arm": False, "interval": 1}
-    observation = next(observations(FAST, policy.preview, 2))
-    for other in (
-        baselines.make("agent", FAST, **policy.parameters),
-        copy.deepcopy(policy),
-        pickle.loads(pickle.dumps(policy)),
-    ):
-        assert other.parameters == policy.parameters
-        assert identical(other.predict(observation), policy.predict(observation))
 
 
 def test_previews():
@@ -193,7 +155,9 @@ def test_paths(file, monkeypatch, tmp_path):
     monkeypatch.setenv("HOME", str(tmp_path))
     monkeypatch.chdir(tmp_path)
     for path in (tmp_path / "mine.safetensors", "mine.safetensors", "~/mine.safetensors"):
-        assert baselines.make("agent", FAST, path=path).parameters["path"] == str(path)
+        policy = baselines.make("agent", FAST, path=path)
+        assert policy.parameters == {"path": str(path), "hash": policy.file.digits, "any_arm": False, "interval": 1}
+        assert baselines.make("agent", FAST, **policy.parameters).parameters == policy.parameters
     assert parse_policy("agent:runs/lr=1e-3/a b.safetensors") == ("agent", {"path": "runs/lr=1e-3/a b.safetensors"})
 
 

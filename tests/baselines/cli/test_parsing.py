@@ -1,7 +1,5 @@
 """Reading the words after a command: whatever is wrong is refused in one line."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import pytest

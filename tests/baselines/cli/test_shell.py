@@ -1,7 +1,5 @@
 """How commands end: exit codes, missing extras, closed pipes."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 

@@ -1,7 +1,5 @@
 """The jobs of an evaluation, for tests."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 from baselines.evaluation.jobs import Options, plan

@@ -85,9 +85,6 @@ def test_all_stands_for_all():
     plan = planned("all", "all")
     assert {job.scenario.name for job in plan.jobs} == set(ikgym.scenarios.names())
     assert {job.policy for job in plan.jobs} | {s.policy for s in plan.skipped} == set(baselines.names())
-    reasons = {(s.scenario, s.policy): s.reason for s in plan.skipped}
-    for scenario in ("zhang3-helix", "zhang6-lspb"):
-        assert "Cartesian" in reasons[scenario, "follow_nominal"]
 
 
 def test_policies_are_shown_what_they_ask_for():
@@ -125,28 +122,17 @@ def test_text_is_never_run():
         ("varga7-fast", "dls:dampin=1", {}, UnknownNameError, "no parameter of dls 'dampin'. Did you mean 'damping'"),
         ("varga7-fast", "dls:damping", {}, InvalidInputError, "expected name=value,…, got 'damping'"),
         ("varga7-fast", "dls:damping=1,damping=2", {}, InvalidInputError, "'damping' is given twice"),
-        ("varga7-fast", "dls:damping=-1", {}, InvalidInputError, "damping: expected a finite number above 0"),
         ("varga7-fast", [("dls", 3)], {}, InvalidInputError, "expected 'name:parameter=value' or"),
         ("varga7-fast", "dls", {"episodes": 0}, InvalidInputError, "episodes: expected a whole number of at least 1"),
-        ("varga7-fast", "dls", {"steps": 0}, InvalidInputError, "steps: expected a whole number of at least 1, got 0"),
-        ("varga7-fast", "dls", {"workers": 0}, InvalidInputError, "workers: expected a whole number from 1 to 1000"),
         ("varga7-fast", "dls", {"preview": 0}, InvalidInputError, "preview: expected a whole number of at least 1"),
-        ("varga7-fast", "dls", {"timed": 0}, InvalidInputError, "timed: expected a whole number of at least 1, got 0"),
-        ("varga7-fast", "dls", {"noise_seeds": 0}, InvalidInputError, "noise_seeds: expected a whole number"),
         ("varga7-fast", "dls", {"export": "cvs"}, UnknownNameError, "no format of export 'cvs'. Did you mean 'csv'"),
         ("varga7-fast", "dls", {"export": "csv"}, InvalidInputError, "export: expected a folder for the files"),
         ("varga7-fast", "dls", {"wrap": lambda env: env}, InvalidInputError, "wrap: expected a policy that uses it"),
         ("varga7-fast", 3, {}, InvalidInputError, "expected a name, 'package.module:Class', a class, or an object"),
         ("varga7-fast", dict, {}, InvalidInputError, "expected a class with the predict of Stable-Baselines3"),
-        ("varga7-fast", "no_such_module:Policy", {}, InvalidInputError, "No module named 'no_such_module'"),
         ((), "dls", {"test_sets": "varga7-randm"}, UnknownNameError, "no test set 'varga7-randm'. Did you mean"),
         ("varga7-fast", "dls", SET, InvalidInputError, "A test set defines what is played"),
         ((), "dls", {**SET, "episodes": 2}, InvalidInputError, "A test set defines what is played"),
-        ((), "dls", {**SET, "steps": 5}, InvalidInputError, "A test set defines what is played"),
-        ((), "dls", {**SET, "noise_seeds": 2}, InvalidInputError, "A test set defines what is played"),
-        ("varga7-fast", "dls", {"split": "tset"}, UnknownNameError, "no split 'tset'. Did you mean 'test'"),
-        ("varga7-fast", "rhc_gradient", {"preview": 1}, InvalidInputError, "needs to be shown 2 steps ahead"),
-        ("zhang3-helix", "follow_nominal", {}, InvalidInputError, "Nothing to evaluate: follow_nominal in"),
         ([], "dls", {}, InvalidInputError, "Nothing to evaluate"),
     ],
 )  # fmt: skip
@@ -344,43 +330,20 @@ def test_what_cannot_be_compared_is_not_gone_on_with(tmp_path, change, options, 
     assert file.read_bytes() == before
 
 
-@pytest.mark.parametrize(
-    ("content", "message"),
-    [
-        ("", "is damaged, or was written by another version: Expecting value"),
-        ("{}", "expected a list of rows, got dict"),
-        ('[{"scenario": "a"}]', "in row 0 the key 'policy' is missing"),
-    ],
-)
-def test_damaged_results_are_named_and_kept(tmp_path, content, message):
-    file = tmp_path / "results.json"
-    file.write_bytes(content.encode("utf-8", "surrogateescape"))
-    with pytest.raises(ResultsError, match=message) as caught:
-        run_all(tmp_path, resume=True)
-    assert str(file) in str(caught.value)
-    assert file.read_bytes() == content.encode("utf-8", "surrogateescape")
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        lambda row: {name: value for name, value in row.items() if name != "iterations"},
-        lambda row: {**row, "qdddot_peak": 1.0},
-    ],
-)
-def test_rows_of_another_version_are_refused_with_its_number(tmp_path, change):
+def test_rows_of_another_version_are_refused_with_its_number(tmp_path):
     arguments = {"steps": 5, "out": tmp_path}
     evaluate("varga7-random", "dls", **arguments)
     file = tmp_path / "results.json"
     (row,) = strict_json(file)
-    file.write_text(json.dumps([{**change(row), "machine": {**row["machine"], "ikgym": "0.1.0"}}]), encoding="utf-8")
+    del row["iterations"]
+    file.write_text(json.dumps([{**row, "machine": {**row["machine"], "ikgym": "0.1.0"}}]), encoding="utf-8")
     before = file.read_bytes()
     message = rf"was written by ikgym 0\.1\.0, this is {re.escape(ikgym.__version__)}: in row 0 .*evaluate again"
     with pytest.raises(ResultsError, match=message):
         evaluate("varga7-random", "dls", resume=True, **arguments)
     assert file.read_bytes() == before
     # The same in a file of this version is damage.
-    file.write_text(json.dumps([change(row)]), encoding="utf-8")
+    file.write_text(json.dumps([row]), encoding="utf-8")
     with pytest.raises(ResultsError, match=r"is damaged, .*: in row 0"):
         read_rows(file)
     assert len(evaluate("varga7-random", "dls", overwrite=True, **arguments)) == 1

@@ -240,15 +240,6 @@ def test_numbers_of_a_handmade_episode():
     assert (row.total_cost, row.tracking_cost, row.velocity_cost) == (12.0, 10.0, 2.0)
 
 
-def test_costs_are_added_up_from_left_to_right():
-    costs = np.random.default_rng(0).uniform(0, 1e6, 1000) ** 2
-    total = 0.0
-    for cost in costs:
-        total += cost
-    row = row_of(position_scenario(1000), handmade(1000, tracking_cost=costs))
-    assert row.total_cost == total
-
-
 def test_what_was_not_timed_has_no_times():
     row = row_of(position_scenario(), handmade(time_ns=np.empty(0, dtype=np.int64)))
     assert [getattr(row, name) for name in TIME_COLUMNS] == [None] * 4
@@ -267,13 +258,8 @@ def test_a_row_survives_json(test_set):
     assert list(there) == [field.name for field in dataclasses.fields(Row)]
     assert restored(there) == row
     assert restored(there).key == row.key
-
-
-def test_numbers_that_are_not_finite_become_null():
-    row = dataclasses.replace(row_of(position_scenario(), handmade()), total_cost=math.inf, qdot_rms=math.nan)
-    there = row.to_json()
+    there = dataclasses.replace(row, total_cost=math.inf).to_json()
     assert there["total_cost"] is None
-    assert there["qdot_rms"] is None
     assert math.isnan(restored(there).total_cost)
 
 

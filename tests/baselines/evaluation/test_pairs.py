@@ -1,7 +1,5 @@
 """Policies beside themselves on an ideal plant."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Episodes that are played together are those that are played alone."""
 
-from __future__ import annotations
-
 import pytest
 
 import baselines

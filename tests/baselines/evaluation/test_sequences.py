@@ -1,7 +1,5 @@
 """Episodes of one arm in a row, with a policy whose state is handed on, and episodes with other noise."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import ClassVar
 

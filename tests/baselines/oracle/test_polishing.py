@@ -1,7 +1,5 @@
 """Best known costs of arms that are not those of the data sheet, from the optimum of the arm that is."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Best known costs that workers find are those that are found here."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import pytest

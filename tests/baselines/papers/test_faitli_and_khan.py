@@ -1,7 +1,5 @@
 """Faitli and Khan: yanks near the shoulder axis, which both speak of, one threshold for like claims, and conditions."""
 
-from __future__ import annotations
-
 import pathlib
 import re
 import types

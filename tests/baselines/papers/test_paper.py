@@ -1,7 +1,5 @@
 """The data model of reproductions: verdicts, figures in words, the ledger, and the episodes that claims share."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

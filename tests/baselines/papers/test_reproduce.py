@@ -1,7 +1,5 @@
 """Reproductions: every figure of every paper is drawn, every claim tested, and the ledger in the tree is up to date."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 import pathlib

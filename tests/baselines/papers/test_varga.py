@@ -1,7 +1,5 @@
 """Varga: the readings in which claims on the descent are tested, the measures of fluctuation, and the skew part."""
 
-from __future__ import annotations
-
 import itertools
 import time
 import types

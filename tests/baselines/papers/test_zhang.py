@@ -1,7 +1,5 @@
 """Zhang: the tools of the tests, and findings that must come out on any machine."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """What observations have besides the usual keys: ages of measurements and past commands."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import ClassVar
 

@@ -1,7 +1,5 @@
 """What is chosen by an arm's size: measures, weights, and motions that do not depend on the unit of length."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

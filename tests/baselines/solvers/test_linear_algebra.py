@@ -1,7 +1,5 @@
 """Small dense kernels against NumPy."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Runs in processes that are killed at random moments."""
 
-from __future__ import annotations
-
 import multiprocessing
 import pathlib
 import time

@@ -1,7 +1,5 @@
 """Runs that take a moment, for the tests of training."""
 
-from __future__ import annotations
-
 import json
 import pathlib
 from typing import Any

@@ -1,7 +1,5 @@
 """Analytic policy gradient: its gradient is that of its loss, and it learns."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import torch

@@ -1,7 +1,5 @@
 """Training curves are drawn from the validations in `run.json`."""
 
-from __future__ import annotations
-
 import json
 
 from baselines.training.curves import curves, main

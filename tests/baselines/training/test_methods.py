@@ -1,7 +1,5 @@
 """The contract of all methods: a segment depends on state and number alone, and a run can be killed and resumed."""
 
-from __future__ import annotations
-
 import time
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The folder of a run: what is resumed, replaced and refused."""
 
-from __future__ import annotations
-
 import io
 
 import numpy as np

@@ -1,7 +1,5 @@
 """PPO, SAC and TD3 by Stable-Baselines3: settings, exported agents, and the callback."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from stable_baselines3 import A2C, DDPG, PPO, SAC, TD3

@@ -1,7 +1,5 @@
 """Scores on the validation split are those of an evaluation."""
 
-from __future__ import annotations
-
 import json
 import types
 

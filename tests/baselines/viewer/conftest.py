@@ -1,7 +1,5 @@
 """A server of viser on a free port, one for all tests of a module."""
 
-from __future__ import annotations
-
 import pytest
 
 HOST = "127.0.0.1"

@@ -1,7 +1,5 @@
 """Arms in the scene: frames where the kinematics are, and meshes of a URDF file that describes the arm."""
 
-from __future__ import annotations
-
 import io
 import os
 import zipfile
@@ -149,9 +147,8 @@ def test_other_files_are_refused(arm, tmp_path):
         (lambda: urdf(tmp_path, joints=("shoulder", "wrist")), "no joint 'elbow'"),
         (lambda: urdf(tmp_path, shape=""), "no visible shapes"),
         (lambda: urdf(tmp_path, shape='<mesh filename="none.stl"/>'), "no visible shapes"),
-        *((lambda x=x: mesh(tmp_path, x, BOMB), "formats dae, obj, ply, stl") for x in ("a.zip", "a.zae", "a.3mf")),
+        (lambda: mesh(tmp_path, "a.zae", BOMB), "formats dae, obj, ply, stl"),
         (lambda: mesh(tmp_path, "a.dae", BOMB), "expected XML"),
-        (lambda: mesh(tmp_path, "a.dae", DAE.encode("utf-16")), "at most 2000 nodes"),
         (lambda: mesh(tmp_path, "a.dae", DAE.replace('"#0"', '"#40"').encode()), "at most 2000 nodes"),
         (lambda: mesh(tmp_path, "a.ply", points), "expected triangles in space, got a PointCloud"),
         (lambda: text(urdf(tmp_path), "<link", "<link/>" * 2000 + "<link"), "at most 2000 links and shapes"),

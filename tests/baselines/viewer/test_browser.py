@@ -1,7 +1,5 @@
 """The viewer in a real browser: names from files are shown letter by letter, and nothing in them runs."""
 
-from __future__ import annotations
-
 import pytest
 
 import ikgym

@@ -1,7 +1,5 @@
 """Videos: what is drawn when, and files that can be played."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 import sys
@@ -85,12 +83,8 @@ def test_a_video_that_breaks_off_leaves_the_old_one(tmp_path):
         (["--out", "x.gif"], "out: expected a file that ends in .mp4"),
         *((["--width", width], "width: expected") for width in ("476", "481", "3844")),
         (["--fps", "0"], "fps: expected"),
-        (["--fps", "1e6"], "fps: expected a finite number from 0.1 to 1000, got 1000000.0."),
-        (["--fps", "1e300"], "fps: expected 0, or an absolute value from 1e-12 to 1e+12, got 1e+300."),
         (["--speed", "-1"], "speed: expected"),
-        (["--speed", "1e-300"], "speed: expected 0, or an absolute value from 1e-12 to 1e+12, got 1e-300."),
         (["--speed", "1e-9"], "fps, speed: expected at most 100000 pictures, got fps 30 and speed 1e-09."),
-        (["--seed", "1" + 23 * "0"], "seed: expected 0, or an absolute value"),
         (["--policy", "dls", "dlss"], "Did you mean 'dls'?"),  # before dls is played
     ],
 )

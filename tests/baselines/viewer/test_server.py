@@ -1,7 +1,5 @@
 """The viewer serves a page, shows what the session says, does what a browser asks, and ends."""
 
-from __future__ import annotations
-
 import re
 import socket
 import sys

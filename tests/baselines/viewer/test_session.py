@@ -1,7 +1,5 @@
 """What the viewer shows, moment by moment: the episode as the environment has it, and arms that follow a target."""
 
-from __future__ import annotations
-
 import gymnasium as gym
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Kernel: one control period of a receding horizon, row by row."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

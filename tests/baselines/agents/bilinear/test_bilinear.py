@@ -1,20 +1,15 @@
 """The bilinear agent: its features and its law."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
-from gymnasium.utils import seeding
 
 import baselines
 from baselines.agents.bilinear.kernels import action_rows, feature_gradient_rows, seen_rows
 from baselines.agents.bilinear.processing import Bilinear
-from baselines.agents.files import load_agent
 from baselines.episodes import rollouts
 from baselines.policy import Batch, Problem
 from ikgym import arms, scenarios, tasks
 from ikgym.exceptions import InvalidInputError
-from ikgym.simulator import Simulator
 from tests.baselines.random_agents import write_agent
 
 OFFSETS = (1, 5, 20)
@@ -159,22 +154,10 @@ def test_gradients_of_features(arm, task):
         np.testing.assert_allclose(given[:, j], wanted, rtol=1e-6, atol=1e-7)
 
 
-def test_agents_play(tmp_path):
-    """The first action of an agent is that of its parts, also where skew coordinates are shown."""
-    scenario = scenarios.get("varga7-pose-random").replace(steps=20)
+def test_agents_play_alike_where_skew_coordinates_are_shown(tmp_path):
+    scenario, skew = (scenarios.get(name).replace(steps=20) for name in ("varga7-pose-random", "varga7-random"))
     file = write_agent(tmp_path / "a.safetensors", scenario, processing=Bilinear(OFFSETS))
-    policy = baselines.make("agent", scenario, path=file)
-    (episode,) = rollouts(scenario, policy, [3])
-    simulator = Simulator(scenario, 1, OFFSETS)
-    simulator.reset(np.ones(1, dtype=bool), [seeding.np_random(3)[0]])
-    out, problem = simulator.observe(), Problem.of(scenario)
-    batch = Batch(*[getattr(out, name).copy() for name in Batch._fields])
-    output = load_agent(tmp_path / "a.safetensors", (Bilinear,)).network.forward(features(problem, batch))
-    limit = scenario.velocity_limit
-    first = np.clip(qdot(problem, batch, output) / limit, -1.0, 1.0).astype(np.float32) * limit
-    np.testing.assert_allclose(episode.qdot[0], first[0], rtol=1e-12)
-    skew = scenarios.get("varga7-random").replace(steps=20)
-    (shown,) = rollouts(skew, baselines.make("agent", skew, path=file), [3])
+    (episode,), (shown,) = (rollouts(on, baselines.make("agent", on, path=file), [3]) for on in (scenario, skew))
     np.testing.assert_allclose(shown.qdot, episode.qdot, rtol=1e-3, atol=1e-5)
 
 

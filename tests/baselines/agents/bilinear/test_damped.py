@@ -1,7 +1,5 @@
 """The damped inverse of a bilinear agent."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

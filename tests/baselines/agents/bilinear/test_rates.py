@@ -1,7 +1,5 @@
 """Joint rates that the reference ahead requires at predicted postures, and the law that uses them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import torch

@@ -1,7 +1,5 @@
 """Agents with memory whose weights are drawn or chosen."""
 
-from __future__ import annotations
-
 import numpy as np
 
 import ikgym

@@ -1,7 +1,5 @@
 """Agents with memory: their network, their filter, and the arms that they refuse."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -11,7 +9,7 @@ from baselines.agents.files import agent_of, save_agent
 from baselines.agents.policy import FOLDER
 from baselines.agents.recurrent.network import GatedNetwork, shapes
 from baselines.agents.recurrent.policy import RecurrentPolicy
-from baselines.episodes import rollout, rollouts
+from baselines.episodes import rollout
 from baselines.files import ResultsError
 from baselines.training.config import Observe
 from ikgym.exceptions import InvalidInputError
@@ -19,13 +17,6 @@ from tests.baselines.agents.recurrent.recurrent_agents import PROCESSING, SIZES,
 
 SHORT = ikgym.scenarios.get("panda-camera-slow").replace(steps=120)
 SEEDS = ikgym.scenarios.seeds("validation", 3)
-
-
-def test_rows_of_a_batch_are_single_episodes_bit_for_bit():
-    policy = made(scenario=SHORT)
-    together = rollouts(SHORT, policy, SEEDS)
-    for seed, episode in zip(SEEDS, together, strict=True):
-        np.testing.assert_array_equal(rollout(SHORT, policy, seed).q, episode.q)
 
 
 def test_with_constant_outputs_it_is_the_calibration_with_those_settings():

@@ -1,7 +1,5 @@
 """A Panda that is not that of the data sheet, and what its sensors show."""
 
-from __future__ import annotations
-
 import numpy as np
 
 import ikgym

@@ -1,7 +1,5 @@
 """Broyden's formula: secant, smallest change, standing still, and a wrong model."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The extended Kalman filter of an arm's kinematics."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

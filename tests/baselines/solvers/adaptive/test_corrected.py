@@ -1,7 +1,5 @@
 """What wrappers that correct a model show to the base policy, and what becomes of its tracking."""
 
-from __future__ import annotations
-
 import functools
 
 import numpy as np
@@ -10,7 +8,6 @@ import pytest
 import baselines
 import ikgym
 from ikgym import Plant
-from ikgym.exceptions import InvalidInputError
 from tests.baselines.solvers.adaptive.arms import PANDA, noisy, observed, path, perturbed, scenario
 
 NAMES = ["offset_free", "calibrated"]
@@ -103,13 +100,6 @@ def test_noise_is_averaged(name):
     assert max(errors[1:]) < 1.2e-3
     # The deviation itself is of some 3e-3, and one measurement is off by 2.4e-3.
     assert np.linalg.norm(true_deviation(arm, zeros, q[-1])) > 1.5e-3
-
-
-@pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("parameter", ["history"])
-def test_bad_histories(name, parameter):
-    with pytest.raises(InvalidInputError, match="history: expected a whole number of at least 1, got 0"):
-        baselines.make(name, scenario(), **{parameter: 0})
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -1,7 +1,5 @@
 """Deviations of a pose, chains with parameters, and which poses are new."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

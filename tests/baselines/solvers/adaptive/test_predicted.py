@@ -1,7 +1,5 @@
 """Drives with a delay and a lag: known, guessed and identified, and what is refused."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Khan's method on arms that move, against the paper written down once more in plain NumPy."""
 
-from __future__ import annotations
-
 import gymnasium as gym
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Rotations in n dimensions as matrices, and the paper's listing once more in plain NumPy."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.linalg import expm

@@ -1,12 +1,10 @@
 """The horizon by blocks against the printed dense formula (27)."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
 from baselines.solvers.levenberg_marquardt.block_tridiagonal import damped_horizon_step
-from baselines.solvers.linear_algebra import damped_step, ldl, ldl_scaled_inverse, ldl_solve
+from baselines.solvers.linear_algebra import ldl, ldl_scaled_inverse, ldl_solve
 
 
 def printed(jacobians, residuals, damping):
@@ -82,11 +80,3 @@ def test_the_factors(e):
 @pytest.mark.parametrize("matrix", [[[0.0]], [[1.0, 1.0], [1.0, 1.0]], [[1.0, 2.0], [2.0, 1.0]], [[np.nan]]])
 def test_what_is_not_positive_definite_is_refused(matrix):
     assert not ldl(np.array(matrix))
-
-
-def test_one_damped_step():
-    rng = np.random.default_rng(0)
-    jacobian, error, out = rng.normal(size=(6, 7)), rng.normal(size=6), np.empty(7)
-    assert damped_step(jacobian, error, 0.3, np.empty((6, 6)), np.empty(6), out)
-    wanted = np.linalg.solve(jacobian.T @ jacobian + 0.3 * np.eye(7), jacobian.T @ error)  # (5) as printed
-    np.testing.assert_allclose(out, wanted, atol=1e-13)

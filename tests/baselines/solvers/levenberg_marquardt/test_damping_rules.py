@@ -1,7 +1,5 @@
 """The rules for λ against values worked out by hand, and the words for wrong numbers."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

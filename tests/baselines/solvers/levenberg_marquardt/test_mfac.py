@@ -1,7 +1,5 @@
 """MFAC against (11)-(17) written down once more in plain NumPy, its statuses, and the error it leaves on a ramp."""
 
-from __future__ import annotations
-
 import gymnasium as gym
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """MFAPC against (34)-(41) written down once more in plain NumPy, its identities, and both examples."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Paths of arms with limits, short ones."""
 
-from __future__ import annotations
-
 import functools
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The minimum in a box against the optimality conditions and another solver."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.optimize import lsq_linear

@@ -1,7 +1,5 @@
 """The policy `qp` against SciPy's solution of the program that it states, and in motion."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.optimize import linprog, lsq_linear

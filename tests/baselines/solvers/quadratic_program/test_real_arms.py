@@ -1,7 +1,5 @@
 """`qp` on the scenarios of real arms: on feasible paths by micrometres, elsewhere no worse than another project."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

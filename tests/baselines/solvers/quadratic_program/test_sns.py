@@ -1,7 +1,5 @@
 """Saturation in the null space against its source, a linear program, and in motion."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.optimize import linprog

@@ -1,7 +1,5 @@
 """Bounds of the joint velocities: the farthest that braking allows, and never in contradiction."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """What the preset for real time does at the beginning of an episode, far off its trajectory, and at each horizon."""
 
-from __future__ import annotations
-
 import gymnasium as gym
 import numpy as np
 import pytest
@@ -9,7 +7,6 @@ import pytest
 import baselines
 import ikgym
 from baselines.episodes import rollouts
-from ikgym.exceptions import InvalidInputError
 
 SCENARIO = "varga7-pose-random"
 # Off by so much in [rad] in each joint; recovered with errors below 10 mm and 0.3 rad.
@@ -96,8 +93,3 @@ def test_knots_of_each_horizon(horizon, knots):
     assert policy.offsets[-1] == horizon - 1
     assert np.array_equal(policy.offsets[:-1], full[: knots - 1])
     assert np.diff(policy.offsets).max(initial=1) <= 101
-
-
-def test_initial_guesses_after_the_first_are_restart_candidates():
-    with pytest.raises(InvalidInputError, match="start_steps: expected 0 where restart_steps is 0, got 5"):
-        baselines.make("rhc", SCENARIO, starts=3, start_steps=5)

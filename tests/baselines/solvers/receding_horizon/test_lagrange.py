@@ -1,8 +1,5 @@
 """The traditional way against eq. 3-4 in plain NumPy, and against the plain method."""
 
-from __future__ import annotations
-
-import gymnasium as gym
 import numpy as np
 import pytest
 
@@ -17,7 +14,6 @@ from baselines.solvers.receding_horizon.horizon import (
 )
 from baselines.solvers.receding_horizon.lagrange import factorise, reduce_gradient
 from baselines.status import Status
-from ikgym.exceptions import InvalidInputError, UnknownNameError
 from tests.baselines.solvers.receding_horizon.data import constraints, data_of, problem
 from tests.every_scenario import ONE_OF_EACH
 
@@ -114,31 +110,3 @@ def test_diverges_as_printed_with_alpha_kept_and_says_so(states):
     episode = run("rhc_lagrange", 150, alpha_start="kept", states=states)
     assert Status.DIVERGED in episode.status
     assert np.isfinite(episode.qdot).all()
-
-
-@pytest.mark.parametrize("states", [False, True])
-@KINDS
-def test_a_blow_up_is_not_taken_for_convergence(kind, states):
-    common = {"alpha_min": 1.0, "alpha_max": 1.0, "iterations": 3, "gradient": kind}
-    policy = baselines.make("rhc_lagrange", "varga7-fast", states=states, **common)
-    env = gym.make("RedundantIK-v0")
-    env.reset()
-    observation = env.step(np.full(7, 0.01, dtype=np.float32))[0]
-    action, state = policy.predict(observation)
-    assert policy.report(state).status[0] == Status.DIVERGED
-    np.testing.assert_array_equal(action, 0.0)
-    np.testing.assert_array_equal(state[2], 0.0)
-
-
-@pytest.mark.parametrize(
-    ("change", "error", "message"),
-    [
-        ({"horizon": 1}, InvalidInputError, "horizon: expected a whole number of at least 2, got 1"),
-        ({"alpha_max": 1e-9}, InvalidInputError, "alpha_max: expected at least alpha_min"),
-        ({"gradient": "analytc"}, UnknownNameError, "Did you mean 'analytic'"),
-        ({"states": "yes"}, InvalidInputError, "states: expected True or False, got 'yes'"),
-    ],
-)
-def test_bad_parameters(change, error, message):
-    with pytest.raises(error, match=message):
-        baselines.make("rhc_lagrange", "varga7-fast", **change)

@@ -1,7 +1,5 @@
 """Receding horizons under limits of acceleration: their optima are IPOPT's, and the plant holds nothing back."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -30,8 +28,9 @@ def states(golden):
     return problem, horizons, observe(problem, q, nominal, qdot)
 
 
-def check_plans(golden):
+def test_plans_are_ipopts_and_a_batch_is_its_rows():
     """To convergence the plan is IPOPT's, and what is applied is its first velocity."""
+    golden = GOLDEN[8:13]
     problem, horizons, observation = states(golden)
     policy = baselines.get("rhc")(problem, horizon=KNOTS + 1, tolerance=1e-8)
     action, state = policy.predict(observation)
@@ -42,20 +41,10 @@ def check_plans(golden):
         velocity = row * problem.velocity_limit
         np.testing.assert_allclose(velocity, (plan[0] - horizon.q) / DT, atol=1e-6)
         assert (abs(velocity - horizon.qdot) <= DT * problem.model.acceleration_limit + 1e-6).all()
-    return policy, observation, action, state
-
-
-def test_plans_are_ipopts_and_a_batch_is_its_rows():
-    policy, observation, action, state = check_plans(GOLDEN[8:13])
     for row in (0, 3):
         alone, own = policy.predict({name: array[row] for name, array in observation.items()})
         np.testing.assert_array_equal(alone, action[row])
         np.testing.assert_array_equal(policy.plan(own)[0], policy.plan(state)[row])
-
-
-@pytest.mark.slow
-def test_plans_are_ipopts_on_50_states():
-    check_plans(GOLDEN)
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,5 @@
 """The receding horizon against IPOPT and gradient descent, its limits, and what it does along episodes."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 
@@ -14,7 +12,6 @@ import ikgym
 from baselines.status import Status
 from benchmarks.rivals.casadi_horizon import CasadiHorizon
 from benchmarks.rivals.numpy_horizon import Horizon, plan_cost
-from ikgym.exceptions import InvalidInputError
 from tests.comparison import identical
 
 VARGA = ["varga7-fast", "varga7-slow", "varga7-literal-fast", "varga7-literal-slow"]
@@ -343,19 +340,3 @@ def test_status_and_iterations_are_said():
     _, state = policy.predict(observe(policy.problem, q + 0.01, nominal), state)
     assert policy.report(state).status[0] == Status.ITERATION_LIMIT
     assert policy.report(state).iterations[0] == 1
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"horizon": 1}, "horizon: expected a whole number of at least 2, got 1"),
-        ({"move_blocks": 30}, "move_blocks: expected at most horizon - 1 = 29, a knot at each step, got 30"),
-        ({"terminal_weight": -1.0}, "terminal_weight: expected a finite number of at least 0"),
-        ({"stop_at_end": 1}, "stop_at_end: expected True or False, got 1"),
-        ({"starts": 0}, "starts: expected a whole number of at least 1"),
-        ({"tolerance": 0.0}, "tolerance: expected a finite number above 0"),
-    ],
-)
-def test_bad_parameters(change, message):
-    with pytest.raises(InvalidInputError, match=message):
-        baselines.make("rhc", "varga7-fast", **change)

@@ -1,7 +1,5 @@
 """Task coordinates as unknowns of a horizon, against eq. 3-4 in plain NumPy and against the plain method."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

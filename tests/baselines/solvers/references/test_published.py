@@ -1,7 +1,5 @@
 """Initial trajectories of others, played."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -49,8 +47,6 @@ def test_joints_without_limits_go_on_instead_of_jumping():
     ("make", "error", "message"),
     [
         (lambda: registry.make("published", "varga7-fast"), InvalidInputError, "with a published path, got 'varga7"),
-        (lambda: registry.make("published", "rlitg-random"), InvalidInputError, "a seed says which episode"),
-        (lambda: registry.make("published", "rlitg-random", seed=-1), InvalidInputError, "seed: expected a whole"),
         (lambda: registry.make("published", "rlitg-kaist"), UnknownNameError, "Available: none"),
         (lambda: registry.make("published", SHORT, method="clonin"), UnknownNameError, "Did you mean 'cloning'"),
     ],

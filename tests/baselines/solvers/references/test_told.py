@@ -1,7 +1,5 @@
 """`told` knows the arm that moves and its drives, and is a reference."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The null space term: no task velocity, and the way to each of the three aims."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The files that an arm is written to are that arm: MuJoCo and Pinocchio say where its tool is."""
 
-from __future__ import annotations
-
 import mujoco
 import numpy as np
 import pinocchio as pin

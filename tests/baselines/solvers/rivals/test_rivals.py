@@ -1,7 +1,5 @@
 """Solvers of other projects: what they are told, what they keep, and what they say when they cannot."""
 
-from __future__ import annotations
-
 import importlib
 
 import numpy as np

@@ -1,17 +1,14 @@
 """The 90° ambiguity of skew coordinates is resolved by how they came about: policies then track whole poses."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
 import baselines
-from baselines.episodes import rollout, rollouts
+from baselines.episodes import rollouts
 from baselines.policy import Batch, Problem
 from baselines.solvers.wrappers.full_orientation import resolve_one, resolve_orientation, start_memory
 from ikgym import scenarios, tasks
 from ikgym.kernels.rotations import rodrigues
-from tests.baselines.random_agents import write_agent
 
 DLS = {"damping": 1e-2, "gain": 0.3}
 
@@ -74,11 +71,3 @@ def test_arms_that_turn_back_at_90_degrees_go_on():
     skew = costs(scenario, baselines.make("dls", scenario, damping=1e-2), seeds)
     resolved = costs(scenario, baselines.make("full_orientation", scenario, options={"damping": 1e-2}), seeds)
     assert (skew > 30.0 * resolved).all()
-
-
-def test_batches_of_agents_that_know_whole_poses_are_single_calls(tmp_path):
-    scenario = scenarios.get("varga7-random").replace(steps=40)
-    file = write_agent(tmp_path / "a.safetensors", with_poses(scenario))
-    policy, seeds = baselines.make("agent", scenario, path=file), scenarios.seeds("train", 3)
-    for seed, together in zip(seeds, rollouts(scenario, policy, seeds), strict=True):
-        np.testing.assert_array_equal(rollout(scenario, policy, seed).q, together.q)

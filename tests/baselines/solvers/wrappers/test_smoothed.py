@@ -1,7 +1,5 @@
 """Second-order smoothing: the filter, what the inner policy sees, and what is refused."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import gymnasium as gym
@@ -12,7 +10,6 @@ import baselines
 import ikgym
 from baselines.episodes import rollout
 from baselines.status import Status
-from ikgym.exceptions import InvalidInputError
 
 STEPS = 200
 
@@ -66,38 +63,6 @@ def test_a_constant_velocity_is_followed_2_over_lambda_late():
     np.testing.assert_allclose(lag, 2.0 / 100.0 * 1.0, rtol=0.06)
 
 
-@pytest.mark.parametrize("feedback", ["calculated", "measured"])
-def test_what_the_inner_policy_sees(feedback, monkeypatch):
-    scenario = short("khan8-q1")
-    policy = smoothed(scenario, policy="dls", options={"gain": 0.1}, feedback=feedback)
-    seen = []
-    act = type(policy.inner).act
-
-    def listening(self, batch, memory):
-        if self is policy.inner:
-            seen.append({key: value.copy() for key, value in batch._asdict().items() if value is not None})
-        return act(self, batch, memory)
-
-    monkeypatch.setattr(type(policy.inner), "act", listening)
-    env = gym.make("RedundantIK-v0", scenario=scenario, preview=1)
-    observation, _ = env.reset()
-    state = None
-    for _ in range(5):
-        action, state = policy.predict(observation, state)
-        shown = seen[-1]
-        np.testing.assert_array_equal(shown["nominal"][0], observation["nominal"])
-        if feedback == "measured":
-            for key in ("q", "qdot", "pose"):
-                np.testing.assert_array_equal(shown[key][0], observation[key])
-        else:
-            wanted = scenario.task.coordinates(*scenario.model.forward(shown["q"][0]))
-            np.testing.assert_allclose(shown["pose"][0], wanted, atol=1e-12)
-        observation, *_ = env.step(action)
-    if feedback == "calculated":
-        assert np.abs(seen[-1]["q"][0] - observation["q"]).max() > 1e-4
-        np.testing.assert_allclose(seen[-1]["q"] - seen[-2]["q"], scenario.dt * seen[-1]["qdot"], atol=1e-12)
-
-
 def test_measured_feedback_corrects_what_the_calculated_path_cannot_know():
     scenario = short("faitli3-regular", 1500, plant=ikgym.Plant(bias=0.3))
     errors = {}
@@ -127,10 +92,6 @@ def test_euler_is_stable_up_to_its_bound():
     errors = rollout(scenario, smoothed(scenario, policy="moore_penrose", relaxation=1900.0), 0).position_error
     assert errors[:20].max() > 1e-4
     assert errors[-100:].max() < 1e-7
-    with pytest.raises(InvalidInputError, match="explicit Euler is stable below 2/Δt = 2000, got 2000"):
-        smoothed(scenario, relaxation=2000.0)
-    with pytest.raises(InvalidInputError, match="stable below 2/Δt = 2, got 300"):
-        smoothed("zhang3-helix")
     assert smoothed("zhang3-helix", relaxation=0.3, policy="dls").preview == 1
 
 

@@ -1,7 +1,5 @@
 """The compiled segment is the environment, and its adjoint the gradient: by central differences in float64."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The filter in PyTorch against that of the runtime, and random plants."""
 
-from __future__ import annotations
-
 import numpy as np
 import torch
 

@@ -1,7 +1,5 @@
 """PPO of agents with memory: its mean gradient is that of the costs of the estimates."""
 
-from __future__ import annotations
-
 import torch
 
 from baselines.training.memory.filter import costs, loss

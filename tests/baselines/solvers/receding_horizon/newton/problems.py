@@ -1,7 +1,5 @@
 """Joint paths at which the kernels are tested: near their nominal one, with kinks, multipliers and limits in play."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -1,7 +1,5 @@
 """States of the Panda from which a horizon has to make up for an error within the limits of its joints."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

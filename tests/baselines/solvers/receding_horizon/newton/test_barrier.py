@@ -1,7 +1,5 @@
 """The barrier function: its derivatives by differences, and the terms that it is made of by plain NumPy."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The time grid: where its knots lie, what they count, and how a path slides along it."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """Minima within limits of acceleration: against those that IPOPT finds, and by hand."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

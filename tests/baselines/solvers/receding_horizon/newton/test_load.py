@@ -1,7 +1,5 @@
 """A payload at some knots: it is what the kinematics see, and nothing else."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Newton steps by blocks against a dense solve, and minima that can be found by hand."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

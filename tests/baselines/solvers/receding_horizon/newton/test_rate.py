@@ -1,7 +1,5 @@
 """Changes of velocity: their cost by plain NumPy, its derivatives, the pentadiagonal Newton step, and IPOPT."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import casadi

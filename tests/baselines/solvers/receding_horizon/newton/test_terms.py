@@ -1,7 +1,5 @@
 """The smooth terms of kinks and limits: by their definitions, and their derivatives by differences."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

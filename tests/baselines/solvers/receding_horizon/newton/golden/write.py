@@ -7,8 +7,6 @@ IPOPT finds from rest at the start, and how many positions, velocities and accel
 States at which IPOPT finds no optimum are left out, and counted at the end.
 """
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
