@@ -10,7 +10,7 @@ import sys
 import tyro
 
 from baselines.files import write
-from benchmarks import environments, horizons, policies, poses, resets
+from benchmarks import environments, horizons, loop, policies, poses, resets
 from benchmarks.measuring import FULL, QUICK
 from benchmarks.table import Table, page
 
@@ -19,6 +19,7 @@ SECTIONS = {
     "resets": resets.tables,
     "kinematics": poses.tables,
     "policies": policies.tables,
+    "loop": loop.tables,
     "horizons": horizons.tables,
 }
 

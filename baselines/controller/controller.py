@@ -13,7 +13,8 @@ from baselines.controller.drives import IDENTIFY, Drives, identified, policy_for
 from baselines.controller.guards import Guards, StopReason
 from baselines.controller.reference import Pose, Window, coordinates, numbers
 from baselines.controller.timing import Timing, timing_of, warn_if_slow
-from baselines.policy import Memory, Report, SolverPolicy
+from baselines.policy import Batch, Memory, Report, SolverPolicy
+from baselines.policy.arguments import remembered
 from baselines.spec import PolicySpec
 from baselines.status import Status
 from ikgym import scenarios
@@ -21,7 +22,7 @@ from ikgym.arms.limits import limit_rows
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.tasks import pose_rows
 from ikgym.scenarios import Scenario
-from ikgym.scenarios.preview import furthest
+from ikgym.scenarios.preview import furthest, offsets
 from ikgym.validation import FloatArray, whole_number
 
 logger = logging.getLogger("ikgym")
@@ -86,6 +87,7 @@ class Controller:
         self._limits = limit_rows(problem.model, problem.largest_qdot, problem.dt)
         self._unit, self._change = np.array(problem.velocity_limit), self._guards.deceleration(problem)
         self._bounds, self._numbers = self._guards.bounds(problem), self._guards.numbers()
+        self._shown = len(offsets(self.policy.preview))
         self._window, self._joints, self._kind = Window(problem.task), problem.model.joints, problem.task.kind
         self.reset()
 
@@ -130,8 +132,8 @@ class Controller:
         measured = numbers("q", q, (n,))
         speed = self._last.copy() if qdot is None else numbers("qdot", qdot, (n,))
         seen, nominal = self._seen(pose, measured), self._window.ahead(reference)
-        if len(nominal) == 0:
-            raise InvalidInputError("reference: expected at least one pose, got none.")
+        if len(nominal) != self._shown:
+            nominal = self._wanted(nominal)
         if self._stopped is None:
             ages = float(q_age), float(pose_age)
             reason = kernels.watch(
@@ -197,19 +199,25 @@ class Controller:
         pose_rows(self._problem.model.chain, self._kind, q[None], out)
         return out.ravel()
 
+    def _wanted(self, nominal: FloatArray) -> FloatArray:
+        """The poses that the policy looks at, of those ahead. Shapes (p, m)."""
+        if len(nominal) < self.ahead:
+            raise InvalidInputError(
+                f"reference: expected {self.ahead} poses, so far {self.policy.name} looks ahead, got {len(nominal)}."
+            )
+        preview = self.policy.preview
+        return nominal[:preview] if isinstance(preview, int) else nominal[np.array(preview) - 1]
+
     def _commanded(
         self, q: FloatArray, qdot: FloatArray, pose: FloatArray, nominal: FloatArray, ages: tuple[float, float]
     ) -> FloatArray:
         """The policy's command within the limits, or that of a stop where it fails. Shape (n,)."""
         left = ENDLESS if self._steps is None else max(self._steps - self._made, 0)
-        remaining = np.array([float(left)])
-        observation = {"q": q, "qdot": qdot, "pose": pose, "nominal": nominal, "remaining": remaining}
-        if ages != (0.0, 0.0):
-            observation |= {"q_age": np.array(ages[:1]), "pose_age": np.array(ages[1:])}
+        parts = q[None], qdot[None], pose[None], nominal[None], np.array([[float(left)]])
+        batch = Batch(*parts, *np.array(ages).reshape(2, 1, 1)) if ages != (0.0, 0.0) else Batch(*parts)
         try:
-            action, self._state = self.policy.predict(observation, self._state)
-        except InvalidInputError:  # the reference is too short
-            raise
+            memory = self.policy.memory(1) if self._state is None else remembered(self._state)
+            action, self._state = self.policy.act(batch, memory)
         except Exception:
             logger.exception("The policy %s raised an error: the arm is stopped.", self.policy.name)
             self._stopped = StopReason.POLICY
@@ -221,7 +229,7 @@ class Controller:
             self._last[:] = qdot
         self._made += 1
         out = np.empty_like(q)
-        kernels.command(self._limits, q, action, self._unit, self._last, self._problem.dt, self._kept, out)
+        kernels.command(self._limits, q, action[0], self._unit, self._last, self._problem.dt, self._kept, out)
         return out
 
     def _braked(self) -> FloatArray:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from baselines.controller.kernels import convert, slid
+from baselines.controller.kernels import convert, same
 from ikgym.exceptions import InvalidInputError
 from ikgym.tasks import Task
 from ikgym.validation import FloatArray, shortened
@@ -67,7 +67,7 @@ def coordinates(name: str, task: Task, pose: Any) -> FloatArray:
         return numbers(name, pose, (task.size,))
     rotation, position = numbers(name, pose[0], (3, 3)), numbers(name, pose[1], (3,))
     out: FloatArray = np.empty((1, task.size))
-    convert(task.kind, rotation[None], position[None], np.empty((1, 12)), out)
+    convert(task.kind, rotation[None], position[None], out)
     return out.ravel()
 
 
@@ -87,9 +87,9 @@ class Window:
 
     def clear(self, length: int = 0) -> None:
         """Forgets all poses, and makes room for others."""
-        room = 2 * length
-        self._length, self._start = length, 0
-        self._frames, self._coordinates = np.full((room, 12), np.nan), np.empty((room, self._task.size))
+        room, self._length, self._start = 2 * length, length, 0
+        self._rotations, self._positions = np.full((room, 3, 3), np.nan), np.full((room, 3), np.nan)
+        self._coordinates = np.full((room, self._task.size), np.nan)
 
     def ahead(self, reference: Pose) -> FloatArray:
         """Task coordinates of the poses ahead. Shape (p, m).
@@ -106,24 +106,29 @@ class Window:
         positions = numbers("reference", reference[1], (len(rotations), 3))  # type: ignore[index]
         if len(positions) != self._length:
             self.clear(len(positions))
-        frames, known = self._frames[self._start : self._start + self._length], self._length
-        if slid(rotations, positions, frames, 1):
+        if self._matches(rotations, positions, 1):
             self._move_up()
-            self._convert(rotations, positions, known - 1)
-        elif not slid(rotations, positions, frames, 0):
+            self._convert(rotations, positions, self._length - 1)
+        elif not self._matches(rotations, positions, 0):
             self._convert(rotations, positions, 0)
         return self._coordinates[self._start : self._start + self._length]
+
+    def _matches(self, rotations: FloatArray, positions: FloatArray, shift: int) -> bool:
+        """Whether poses are those of before without the first ones, but for as many at the end."""
+        here = slice(self._start + shift, self._start + self._length)
+        left = self._length - shift
+        return bool(same(positions[:left], self._positions[here]) and same(rotations[:left], self._rotations[here]))
 
     def _move_up(self) -> None:
         """Drops the first pose; where the room ends, the others are copied to its beginning."""
         self._start += 1
-        if self._start + self._length > len(self._frames):
-            for array in (self._frames, self._coordinates):
+        if self._start + self._length > len(self._coordinates):
+            for array in (self._rotations, self._positions, self._coordinates):
                 array[: self._length - 1] = array[self._start : self._start + self._length - 1]
             self._start = 0
 
     def _convert(self, rotations: FloatArray, positions: FloatArray, first: int) -> None:
         """Converts the poses from one on."""
         here = slice(self._start + first, self._start + self._length)
-        given = rotations[first:], positions[first:]
-        convert(self._task.kind, *given, self._frames[here], self._coordinates[here])
+        self._rotations[here], self._positions[here] = rotations[first:], positions[first:]
+        convert(self._task.kind, rotations[first:], positions[first:], self._coordinates[here])

@@ -114,7 +114,7 @@ def test_a_measured_velocity_is_what_the_acceleration_starts_from():
         ((["a"] * 7, None, np.zeros((2, 6))), "q: expected an array of real numbers"),
         ((np.zeros(7), np.zeros(5), np.zeros((2, 6))), r"pose: expected shape \(6,\), got \(5,\)"),
         ((np.zeros(7), None, np.zeros(6)), r"reference: expected shape \(any, 6\), got \(6,\)"),
-        ((np.zeros(7), None, np.zeros((1, 6))), "rhc_gradient needs to be shown 2 steps ahead"),
+        ((np.zeros(7), None, np.zeros((1, 6))), "reference: expected 2 poses, so far rhc_gradient looks ahead, got 1"),
     ],
 )
 def test_what_has_a_wrong_shape_is_refused(arguments, message):

@@ -17,7 +17,7 @@ LENGTH = 5
 def counted(monkeypatch):
     """How many poses were converted in each call."""
     calls, real = [], reference.convert
-    monkeypatch.setattr(reference, "convert", lambda *given: (calls.append(len(given[2])), real(*given)))
+    monkeypatch.setattr(reference, "convert", lambda *given: (calls.append(len(given[1])), real(*given)))
     return calls
 
 
@@ -53,6 +53,12 @@ def test_one_pose_ahead():
     for k in range(3):
         given = rotations[k : k + 1], positions[k : k + 1]
         np.testing.assert_array_equal(window.ahead(given), task.coordinates(*given))
+
+
+def test_poses_that_are_no_numbers_stay_so():
+    task, (rotations, positions) = ikgym.tasks.get("pose"), poses(LENGTH)
+    rotations[:-1], positions[:-1] = np.nan, np.nan
+    assert np.isnan(Window(task).ahead((rotations, positions))[:-1]).all()
 
 
 def test_changes_of_the_caller_are_seen():

@@ -33,13 +33,13 @@ def test_a_warm_controller_is_like_a_fresh_one():
 
 
 def test_a_period_that_is_not_kept_is_warned_of(monkeypatch):
-    scenario, fast = circle("panda", 4e-3), QuadraticProgram.predict
+    scenario, fast = circle("panda", 4e-3), QuadraticProgram.act
 
-    def slow(policy, observation, state=None, *rest):
+    def slow(policy, batch, memory):
         time.sleep(6e-3)
-        return fast(policy, observation, state, *rest)
+        return fast(policy, batch, memory)
 
-    monkeypatch.setattr(QuadraticProgram, "predict", slow)
+    monkeypatch.setattr(QuadraticProgram, "act", slow)
     with pytest.warns(RuntimeWarning, match="qp does not keep the control period of 4 ms: 99 % of its calls take"):
         assert Controller(scenario, drives=Drives()).warm_up(5).p50 > 6e-3
     with warnings.catch_warnings():
