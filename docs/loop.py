@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import tyro
 
 import baselines
@@ -39,14 +40,26 @@ SECONDS, FIRST = 2.0, 1.0
 UPRIGHT = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 
 
-def circle(period: float) -> ikgym.Scenario:
-    """The scenario with a control period in [s]."""
-    arm = ikgym.arms.get("panda").replace(acceleration_limit=np.full(7, np.inf))
-    rotation, position = arm.forward(arm.home)
+def circle(arm: ikgym.Arm, start: npt.ArrayLike, period: float, seconds: float = SECONDS) -> ikgym.Scenario:
+    """A scenario whose tool goes upright on the circle, from where the arm stands.
+
+    Args:
+        arm: The arm.
+        start: Its joint coordinates in [rad] or [m]. Shape (n,).
+        period: Δt in [s].
+        seconds: How long it is played.
+    """
+    rotation, position = arm.forward(start)
     path = Circle(position - 0.1 * UPRIGHT[:, 0], 0.1, rotation=UPRIGHT)
     trajectory = PathTrajectory(path, Trapezoidal(0.1, 0.5), FixedOrientation(rotation))
-    task, steps = ikgym.tasks.get("pose"), round(SECONDS / period)
-    return ikgym.Scenario("loop", arm, task, trajectory, dt=period, steps=steps, start=arm.home)
+    fields: dict[str, Any] = {"dt": period, "steps": round(seconds / period), "start": start}
+    return ikgym.Scenario("loop", arm, ikgym.tasks.get("pose"), trajectory, **fields)
+
+
+def with_drives(scenario: ikgym.Scenario, drives: Drives) -> ikgym.Scenario:
+    """The same on drives with a delay and a lag."""
+    bandwidth = np.inf if drives.bandwidth is None else drives.bandwidth
+    return scenario.replace(plant=ikgym.Plant(command_delay=drives.delay, bandwidth=bandwidth))
 
 
 def played(controller: Controller, scenario: ikgym.Scenario) -> tuple[Any, Any]:
@@ -60,17 +73,23 @@ def played(controller: Controller, scenario: ikgym.Scenario) -> tuple[Any, Any]:
     return np.array(errors), np.array(commands)
 
 
+def peaks(scenario: ikgym.Scenario, policy: str = "qp") -> Any:
+    """The largest joint velocities on perfect drives, in [rad/s] or [m/s]. Shape (n,)."""
+    return np.abs(baselines.track(scenario, policy).qdot).max(axis=0)
+
+
 def measured(policy: str, told: str, period: float, lag: float | None, delay: int) -> dict[str, Any]:
     """One line of the table."""
-    scenario, drives = circle(period), Drives(delay, lag)
-    bandwidth = np.inf if drives.bandwidth is None else drives.bandwidth
-    on = scenario.replace(plant=ikgym.Plant(command_delay=delay, bandwidth=bandwidth))
+    arm, drives = ikgym.arms.get("panda"), Drives(delay, lag)
+    scenario = circle(arm.replace(acceleration_limit=np.full(7, np.inf)), arm.home, period)
     lost = Guards(position_error=None, orientation_error=None)
     known = {"perfect": Drives(), "given": drives, "identify": "identify"}[told]
-    errors, commands = played(Controller(scenario, policy, known, guards=lost), on)
-    peaks = np.abs(baselines.track(scenario, policy).qdot).max(axis=0)
+    errors, commands = played(Controller(scenario, policy, known, guards=lost), with_drives(scenario, drives))
     line = {"policy": policy, "drives": told, "period_ms": 1e3 * period, "lag_ms": 1e3 * (lag or 0.0), "delay": delay}
-    error, times = 1e6 * errors[round(FIRST / period) :].max(), (np.abs(commands).max(axis=0) / peaks).max()
+    error, times = (
+        1e6 * errors[round(FIRST / period) :].max(),
+        (np.abs(commands).max(axis=0) / peaks(scenario, policy)).max(),
+    )
     return line | {"error_um": float(error), "times_peak": float(times)}
 
 

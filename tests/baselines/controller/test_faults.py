@@ -90,7 +90,7 @@ def faulty(scenario, controller, nominal, kind, rng):
 
 def check(number, seed=20):
     rng = np.random.default_rng(seed)
-    scenario = circle("panda", 4e-3, steps=600)
+    scenario = circle("panda", 4e-3, seconds=2.4)
     controller = Controller(scenario)
     nominal, arm = scenario.nominal(0, controller.ahead), scenario.arm
     for i in range(number):

@@ -7,14 +7,15 @@ import pytest
 
 import ikgym
 from baselines import Controller, Drives
-from tests.baselines.controller.circles import circle, looped, peaks, with_drives
+from docs.loop import peaks, played, with_drives
+from tests.baselines.controller.circles import circle
 
 LAG = 0.02
 
 
 def check(controller, scenario, drives, first=1.0):
     """Errors after the first second, and commands of each joint, as the issue of this loop wants them."""
-    errors, commands = looped(controller, with_drives(scenario, drives.delay, drives.time_constant))
+    errors, commands = played(controller, with_drives(scenario, drives))
     assert controller.stopped is None
     assert errors[round(first / scenario.dt) :].max() < 1e-4
     assert (np.abs(commands).max(axis=0) < 1.3 * peaks(scenario)).all()
@@ -52,7 +53,7 @@ def test_known_drives(drives):
 def test_wrong_drives_are_followed_late_and_calmly():
     """Twelve periods that nobody knows of: the gain is stable, and errors stay below those of the lag itself."""
     scenario = circle("panda", 4e-3, seconds=2.0)
-    errors, commands = looped(Controller(scenario, drives=Drives(0, LAG)), with_drives(scenario, 12, LAG))
+    errors, commands = played(Controller(scenario, drives=Drives(0, LAG)), with_drives(scenario, Drives(12, LAG)))
     assert 1e-5 < errors[250:].max() < 0.1 * (12 * scenario.dt + LAG)
     assert (np.abs(commands).max(axis=0) < 1.3 * peaks(scenario)).all()
 
@@ -64,7 +65,7 @@ def test_nothing_is_said_of_drives_that_have_not_moved():
         controller.step(scenario.start, None, still)
     assert controller.stopped is None
     assert controller.drives is None
-    looped(controller, scenario.replace(steps=100))
+    played(controller, scenario.replace(steps=100))
     assert controller.drives.delay == 0
     assert (controller.drives.time_constant or 0.0) < 0.1 * scenario.dt
     controller.reset()
@@ -81,7 +82,7 @@ def test_other_policies_are_predicted_for_too():
 def test_measurements_of_a_known_age():
     """Encoders that are read 8 periods late, on drives with delay."""
     scenario = circle("panda", 4e-3, seconds=1.6)
-    on = scenario.replace(plant=with_drives(scenario, 2, LAG).plant.replace(q_delay=8, pose_delay=8))
+    on = scenario.replace(plant=with_drives(scenario, Drives(2, LAG)).plant.replace(q_delay=8, pose_delay=8))
     controller = Controller(scenario)
     env = ikgym.RedundantIKEnv(on, preview=controller.ahead)
     seen, _ = env.reset(seed=0)
