@@ -3,13 +3,12 @@
 >>> import baselines
 >>> policy = baselines.make("qp", "varga7-fast")
 
-`baselines.evaluate.evaluate` and `baselines.track` are imported when they are first used.
+`baselines.evaluate.evaluate`, `baselines.track` and `baselines.Controller` are imported when they are first used.
 """
 
 from __future__ import annotations
 
 import importlib
-from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from baselines.policy import SolverPolicy
@@ -17,11 +16,27 @@ from baselines.registry import get, make, names, register
 from baselines.status import Status
 
 if TYPE_CHECKING:
+    from baselines.controller import Controller, Drives, Guards, StopReason
     from baselines.evaluation.foreign import Wrap
     from baselines.evaluation.tracking import Tracking
     from ikgym.scenarios import Preview, Scenario
 
-__all__ = ["SolverPolicy", "Status", "get", "make", "names", "register", "track"]
+__all__ = [
+    "Controller",
+    "Drives",
+    "Guards",
+    "SolverPolicy",
+    "Status",
+    "StopReason",
+    "get",
+    "make",
+    "names",
+    "register",
+    "track",
+]
+
+#: Names of :mod:`baselines.controller`.
+CONTROLLER = frozenset({"Controller", "Drives", "Guards", "StopReason"})
 
 
 def track(
@@ -39,8 +54,10 @@ def track(
     return tracking.track(scenario, policy, seed=seed, preview=preview, steps=steps, wrap=wrap)
 
 
-def __getattr__(name: str) -> ModuleType:
-    """Modules of the package that are imported when they are first used."""
+def __getattr__(name: str) -> Any:
+    """What is imported when it is first used: modules, and the names of the controller."""
     if name in {"controller", "evaluate"}:
         return importlib.import_module(f"baselines.{name}")
+    if name in CONTROLLER:
+        return getattr(importlib.import_module("baselines.controller"), name)
     raise AttributeError(f"module 'baselines' has no attribute {name!r}")

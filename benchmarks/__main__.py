@@ -8,7 +8,7 @@ import sys
 import tyro
 
 from baselines.files import write
-from benchmarks import environments, horizons, policies, poses, resets
+from benchmarks import environments, horizons, loop, policies, poses, resets
 from benchmarks.measuring import FULL, QUICK
 from benchmarks.table import Table, page
 
@@ -17,6 +17,7 @@ SECTIONS = {
     "resets": resets.tables,
     "kinematics": poses.tables,
     "policies": policies.tables,
+    "loop": loop.tables,
     "horizons": horizons.tables,
 }
 

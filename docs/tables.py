@@ -24,6 +24,7 @@ from baselines.oracle import best_known
 from baselines.oracle.best_known import MARGIN
 from baselines.registry import get
 from baselines.status import Status
+from docs import loop
 from docs.paper_pages import claims
 
 PAGES = Path(__file__).parent
@@ -179,6 +180,7 @@ TABLES = {
     "statuses": statuses,
     "test_sets": test_sets,
     "records": records,
+    "loop": loop.table,
 }
 #: Texts that are no tables.
 TEXTS: dict[str, Callable[[], str]] = {

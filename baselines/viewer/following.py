@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from baselines.controller import Controller
+from baselines.controller import Controller, Drives, Guards
 from baselines.episodes import Seeds
 from baselines.evaluation.policies import specification
 from baselines.policy import SolverPolicy
@@ -18,6 +18,8 @@ from ikgym.scenarios.preview import offsets
 from ikgym.trajectories import StraightLine
 from ikgym.validation import FloatArray
 
+# A target may be dragged out of reach.
+GUARDS = Guards(position_error=None, orientation_error=None)
 # Share of the way for each parabolic blend of the straight line: next to none.
 BLEND = 1e-9
 
@@ -73,7 +75,7 @@ class Follower:
     """
 
     def __init__(self, scenario: Scenario, policy: SolverPolicy, q: FloatArray) -> None:
-        self._scenario, self._controller = scenario, Controller(policy)
+        self._scenario, self._controller = scenario, Controller(scenario, policy, Drives(), guards=GUARDS)
         self._ahead = np.array(offsets(policy.preview))
         self.place(q)
 
@@ -95,7 +97,8 @@ class Follower:
             self.status = str(e)
             return
         self.q = np.clip(self.q + self._scenario.dt * qdot, arm.lower, arm.upper)
-        self.status = Status(int(self._controller.report.status[0])).label
+        stopped = self._controller.stopped
+        self.status = Status(int(self._controller.report.status[0])).label if stopped is None else stopped.label
 
     def errors(self, approach: Approach) -> tuple[float, float]:
         """Distance in [m] and angle in [rad] from where the reference is now; NaN where the task has no orientation."""

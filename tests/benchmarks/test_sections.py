@@ -8,7 +8,7 @@ import pytest
 import baselines
 import ikgym
 from baselines.policy import Problem
-from benchmarks import environments, horizon_solvers, horizons, measuring, policies, poses, resets
+from benchmarks import environments, horizon_solvers, horizons, loop, measuring, policies, poses, resets
 from benchmarks.rivals.numpy_horizon import Horizon, plan_cost
 
 
@@ -42,6 +42,13 @@ def test_random_actions_lose_the_track_where_they_may():
     (table,) = resets.tables(measuring.QUICK)
     assert list(table.rows) == ["N = 3"]
     assert all(value > 0.0 for value in table.rows["N = 3"])
+
+
+def test_the_loop_is_timed_beside_its_policy(monkeypatch):
+    monkeypatch.setattr(loop, "LOOPS", {name: loop.LOOPS[name] for name in list(loop.LOOPS)[1:4:2]})
+    (table,) = loop.tables(measuring.QUICK)
+    assert all(step > 0.0 and 0.0 < predict < 1e9 for predict, step, *_ in table.rows.values())
+    assert len(table.rows) == 2
 
 
 def test_both_kinematics_are_of_the_same_arm():

@@ -61,6 +61,7 @@ class PredictedMemory(NamedTuple):
         arm_q: Joint coordinates of the arm without delay and lag, in [rad] or [m]. Shape (B, n).
         arm_qdot: Its joint velocities in [rad/s] or [m/s]. Shape (B, n).
         offset: Measured task coordinates minus those that the model has at the same time, filtered. Shape (B, m).
+        fastest: The largest velocity of that arm in the last second or so, in [rad/s] or [m/s]. Shape (B, n).
     """
 
     begun: BoolArray
@@ -76,6 +77,7 @@ class PredictedMemory(NamedTuple):
     arm_q: FloatArray
     arm_qdot: FloatArray
     offset: FloatArray
+    fastest: FloatArray
 
 
 def start_memory(rows: int, sizes: tuple[int, int], hypotheses: Hypotheses, history: int) -> PredictedMemory:
@@ -102,6 +104,7 @@ def start_memory(rows: int, sizes: tuple[int, int], hypotheses: Hypotheses, hist
         np.zeros((rows, n)),
         np.zeros((rows, n)),
         np.zeros((rows, m)),
+        np.zeros((rows, n)),
     )
 
 
@@ -194,6 +197,33 @@ def _best_lag(squares, lags, guess, weight):
         if value < least:
             lag, least = lags[f] + share * (lags[f + 1] - lags[f]), value
     return lag, max(least, 0.0)
+
+
+@kernel
+def evidence_rows(lags, memory, out):
+    """How much more likely the delays in use are than the next best ones.
+
+    Args:
+        lags: Shape (L,).
+        memory: A plain :class:`PredictedMemory`.
+        out: Receives the logarithm of the likelihood ratio: 0 before the arm has moved, inf where only one delay is
+            considered. Shape (B,).
+    """
+    squares, samples, delay = memory[5], memory[6], memory[7]
+    for row in range(out.shape[0]):
+        least, other, used = LEAST_VARIANCE * samples[row], np.inf, 0.0
+        for i in range(squares.shape[1]):
+            value = _best_lag(squares[row, i], lags, 1.0, 0.0)[1]
+            # One delay for each row of sums, from 0.
+            if i == delay[row]:
+                used = value
+            else:
+                other = min(other, value)
+        out[row] = 0.0
+        if other == np.inf:
+            out[row] = np.inf
+        elif samples[row] > 0:
+            out[row] = 0.5 * samples[row] * math.log((other + least) / (used + least))
 
 
 @inlined

@@ -14,6 +14,10 @@ from ikgym.validation import FloatArray
 
 #: Share of the largest acceleration that corrects an error.
 SHARE = 0.2
+#: Commands within this share of the largest velocity are never too fast.
+SLOW = 0.01
+#: For how long the fastest velocity that was wanted is remembered, in [s].
+REMEMBERED = 1.0
 
 
 class Servo(NamedTuple):
@@ -25,6 +29,7 @@ class Servo(NamedTuple):
         unit: Joint velocity of an action of 1, in [rad/s] or [m/s]. Shape (n,).
         largest: The largest velocities in [rad/s] or [m/s]. Shape (n,).
         change: How much they change at most in a step; inf where there is no limit. Shape (n,).
+        overdrive: How many times faster than what was wanted lately a command may be; inf where that does not matter.
     """
 
     gain: float
@@ -32,6 +37,7 @@ class Servo(NamedTuple):
     unit: FloatArray
     largest: FloatArray
     change: FloatArray
+    overdrive: float
 
 
 @kernel
@@ -61,6 +67,8 @@ def follow_rows(error, wanted, lags, servo, memory, qdot):
 
     A command is the velocity wanted and a share of the error, through the inverse of the lag. Where accelerations are
     limited, large errors are taken back no faster than the arm can stop: a share of them would overshoot ever more.
+    A command is at most so many times faster than what was wanted in the last second, or slow: the inverse of a lag
+    makes peaks of steps, and a wrong one of errors.
 
     Args:
         error: How far the arm will be behind when the command takes effect, in [rad] or [m]. Shape (B, n).
@@ -70,8 +78,8 @@ def follow_rows(error, wanted, lags, servo, memory, qdot):
         memory: A plain :class:`PredictedMemory`, changed in place.
         qdot: Receives the commands in [rad/s] or [m/s]. Shape (B, n).
     """
-    gain, dt, unit, largest, change = servo
-    velocity, path, lag, sent = memory[2], memory[3], memory[8], memory[9]
+    gain, dt, unit, largest, change, overdrive = servo
+    velocity, path, lag, sent, fastest = memory[2], memory[3], memory[8], memory[9], memory[13]
     for row in range(qdot.shape[0]):
         low, high, share = mixture(lag[row], lags)
         a, b = (1.0 - share) / lags[low], share / lags[high]
@@ -82,6 +90,10 @@ def follow_rows(error, wanted, lags, servo, memory, qdot):
             target = wanted[row, j] + back
             free = (1.0 - share - a) * velocity[row, low, j] + (share - b) * velocity[row, high, j]
             command, last = (target - free) / (a + b), sent[row, j]
+            fastest[row, j] = max((1.0 - dt / REMEMBERED) * fastest[row, j], abs(wanted[row, j]))
+            if overdrive < np.inf:
+                most = max(overdrive * fastest[row, j], SLOW * largest[j])
+                command = min(max(command, -most), most)
             command = min(max(command, last - change[j]), last + change[j])
             qdot[row, j] = min(max(command, -largest[j]), largest[j])
             # The command is a float32 share of the unit.

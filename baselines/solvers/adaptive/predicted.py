@@ -10,9 +10,16 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from baselines.policy import Batch, Memory, Solution
+from baselines.policy import Batch, Memory, Problem, Solution
 from baselines.policy.parameters import parameter
-from baselines.solvers.adaptive.drives import Hypotheses, PredictedMemory, identify_rows, past_rows, start_memory
+from baselines.solvers.adaptive.drives import (
+    Hypotheses,
+    PredictedMemory,
+    evidence_rows,
+    identify_rows,
+    past_rows,
+    start_memory,
+)
 from baselines.solvers.adaptive.following import Servo, follow_rows, move_rows
 from baselines.wrapper import NamedWrapper
 from ikgym.arms.limits import limit_rows
@@ -58,6 +65,9 @@ class Predicted(NamedWrapper):
             steps are not compensated for: at 0.06 up to 25.
         oldest: The oldest measurements that there may be, in steps, see ``q_age`` and ``pose_age`` of observations;
             older ones are taken to be of that age.
+        reserve: Share of the velocity limits that is left for corrections: the base policy has the rest.
+        overdrive: How many times faster a command may be than the fastest that the base policy wanted within the last
+            second; up to 1 % of the limit always. None for any command within the limits.
 
     Raises:
         UnknownNameError: There is no such policy, or parameter of it.
@@ -71,6 +81,8 @@ class Predicted(NamedWrapper):
     lowest_bandwidth: float = parameter(8.0, number, above=0.0)
     gain: float = parameter(0.06, number, above=0.0, at_most=1.0)
     oldest: int = parameter(0, whole_number, at_least=0)
+    reserve: float = parameter(0.0, number, at_least=0.0, below=1.0)
+    overdrive: float | None = parameter(None, number, at_least=1.0)
 
     name: ClassVar[str] = "predicted"
 
@@ -85,6 +97,14 @@ class Predicted(NamedWrapper):
             raise InvalidInputError(
                 f"bandwidth: expected a guess of at least lowest_bandwidth = {lowest:g} Hz, got {self.bandwidth:g}."
             )
+
+    def inner_problem(self) -> Problem:
+        """See :meth:`NamedWrapper.inner_problem`."""
+        if self.reserve == 0.0:
+            return self.problem
+        left, model = 1.0 - self.reserve, self.problem.model
+        slower = model.replace(velocity_limit=left * model.velocity_limit)
+        return self.problem.replace(model=slower, velocity_limit=left * self.problem.velocity_limit)
 
     @property
     def preview(self) -> int:
@@ -105,16 +125,22 @@ class Predicted(NamedWrapper):
         behind = kept.arm_q - self._past(np.zeros_like(kept.delay), kept) - off
         qdot = np.empty_like(batch.q)
         limits, servo = self._limits
-        move_rows(limits, self.problem.dt, step.action * self.problem.velocity_limit, kept.arm_q, kept.arm_qdot)
+        move_rows(limits, self.problem.dt, step.action * self.inner.problem.velocity_limit, kept.arm_q, kept.arm_qdot)
         follow_rows(behind, kept.arm_qdot, self._hypotheses.lags, servo, tuple(kept), qdot)
         return self.solution(qdot, kept, step)
 
     def diagnostics(self, state: Memory) -> dict[str, FloatArray]:
-        """Those of the base policy; ``delay`` in steps and ``time_constant`` of the lag in [s], as assumed."""
+        """Those of the base policy; ``delay`` in steps and ``time_constant`` of the lag in [s], as assumed.
+
+        ``evidence`` is the logarithm of the likelihood ratio between that delay and the next best one.
+        """
         own, _ = self.split(self.memory_of(state))
         with np.errstate(divide="ignore"):  # no lag at T = 1
             constants = -self.problem.dt / np.log1p(-1.0 / own.lag)
-        return {**super().diagnostics(state), "delay": own.delay.astype(np.float64), "time_constant": constants}
+        evidence = np.empty(len(own.lag))
+        evidence_rows(self._hypotheses.lags, tuple(own), evidence)
+        told = {"delay": own.delay.astype(np.float64), "time_constant": constants, "evidence": evidence}
+        return {**super().diagnostics(state), **told}
 
     @functools.cached_property
     def _hypotheses(self) -> Hypotheses:
@@ -134,8 +160,10 @@ class Predicted(NamedWrapper):
         """The limits of the arm, see :func:`limit_rows`, and a plain :class:`Servo`."""
         problem, model = self.problem, self.problem.model
         change = np.array(model.acceleration_limit * problem.dt)
-        servo = Servo(self.gain, problem.dt, np.array(problem.velocity_limit), np.array(problem.largest_qdot), change)
-        return limit_rows(model, problem.largest_qdot, problem.dt), tuple(servo)
+        overdrive = math.inf if self.overdrive is None else self.overdrive
+        unit, largest = np.array(problem.velocity_limit), np.array(problem.largest_qdot)
+        servo = Servo(self.gain, problem.dt, unit, largest, change, overdrive)
+        return limit_rows(model, self.inner.problem.largest_qdot, problem.dt), tuple(servo)
 
     def _observe(self, batch: Batch, kept: PredictedMemory) -> FloatArray:
         """Takes in what is measured, and tells how far the arm is from where the drives should have brought it."""

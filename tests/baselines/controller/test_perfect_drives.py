@@ -1,4 +1,4 @@
-"""A policy on an arm, without an environment."""
+"""The loop on perfect drives: the policy acts on the measurements, as in the environment."""
 
 from __future__ import annotations
 
@@ -7,11 +7,17 @@ import pytest
 
 import baselines
 import ikgym
-from baselines.controller import Controller
-from ikgym.exceptions import InvalidInputError
+from baselines import Controller, Drives, Guards
+from ikgym.exceptions import InvalidInputError, UnknownNameError
 from tests.limited import limited
 
 STEPS = 25
+#: For paths that an arm cannot follow.
+LOST = Guards(position_error=None, orientation_error=None)
+
+
+def perfect(which, name, **parameters):
+    return Controller(which, baselines.make(name, which, **parameters), Drives(), guards=LOST)
 
 
 def scenario(name="varga7-fast"):
@@ -20,7 +26,7 @@ def scenario(name="varga7-fast"):
 
 def driven(which, name, pose, **parameters):
     """Joint coordinates of a loop of our own, after each step."""
-    controller = Controller(baselines.make(name, which, **parameters), STEPS)
+    controller = Controller(which, (name, parameters), Drives(), guards=LOST, steps=STEPS)
     nominal, q = which.nominal(0, controller.ahead), np.array(which.first_q(which.trajectory))
     out = []
     for k in range(STEPS):
@@ -51,7 +57,7 @@ def test_it_moves_the_arm_as_the_environment_does(name, parameters, pose):
 
 def test_it_remembers_until_it_is_reset():
     which = scenario()
-    controller = Controller(baselines.make("smoothed", which))
+    controller = perfect(which, "smoothed")
     q, nominal = which.first_q(which.trajectory), which.nominal(0, 3)[1:]
     made = [controller.step(q, None, nominal) for _ in range(3)]
     assert (made[0] != made[2]).any()
@@ -65,12 +71,12 @@ def test_it_remembers_until_it_is_reset():
 
 def test_joint_velocities_stay_within_their_limit_and_are_our_own():
     which = scenario().replace(velocity_limit=0.01)
-    controller = Controller(baselines.make("dls", which))
+    controller = perfect(which, "dls")
     qdot = controller.step(which.first_q(which.trajectory), None, which.nominal(0)[-1:] + 0.1)
     assert np.abs(qdot).max() == pytest.approx(0.01)
     qdot[:] = 99.0
     controller.step(which.first_q(which.trajectory), None, which.nominal(0)[-1:])
-    assert controller._qdot.max() <= 0.01 + 1e-9
+    assert controller._last.max() <= 0.01 + 1e-9
 
 
 @pytest.mark.parametrize(("name", "parameters"), [("dls", {}), ("rhc", {"horizon": 8, "rate_weight": 10.0})])
@@ -79,7 +85,7 @@ def test_an_arm_with_limits_is_driven_within_them_and_the_policy_sees_how(name, 
     which = limited(steps=40)
     policy = baselines.make(name, which, **parameters)
     env = ikgym.RedundantIKEnv(which, preview=policy.preview)
-    controller, state = Controller(policy), None
+    controller, state = Controller(which, policy, Drives(), guards=LOST), None
     seen, _ = env.reset(seed=4)
     held = np.zeros(3)
     for _ in range(which.steps):
@@ -96,7 +102,7 @@ def test_a_measured_velocity_is_what_the_acceleration_starts_from():
     most = which.dt * which.arm.acceleration_limit[0]
     q, there = np.zeros(7), which.nominal(0)[1:] + 0.5
     for measured in (0.0, 2.0, -3.0):
-        controller = Controller(baselines.make("dls", which))
+        controller = perfect(which, "dls")
         qdot = controller.step(q, None, there, qdot=np.full(7, measured))
         assert abs(qdot[0] - measured) <= most + 1e-12
 
@@ -105,21 +111,44 @@ def test_a_measured_velocity_is_what_the_acceleration_starts_from():
     ("arguments", "message"),
     [
         ((np.zeros(6), None, np.zeros((2, 6))), r"q: expected shape \(7,\), got \(6,\)"),
-        ((np.full(7, np.nan), None, np.zeros((2, 6))), "q: expected finite numbers"),
+        ((["a"] * 7, None, np.zeros((2, 6))), "q: expected an array of real numbers"),
         ((np.zeros(7), np.zeros(5), np.zeros((2, 6))), r"pose: expected shape \(6,\), got \(5,\)"),
         ((np.zeros(7), None, np.zeros(6)), r"reference: expected shape \(any, 6\), got \(6,\)"),
-        ((np.zeros(7), None, np.zeros((1, 6))), "rhc_gradient needs to be shown 2 steps ahead"),
+        ((np.zeros(7), None, np.zeros((1, 6))), "reference: expected 2 poses, so far rhc_gradient looks ahead, got 1"),
     ],
 )
-def test_bad_measurements_are_refused(arguments, message):
+def test_what_has_a_wrong_shape_is_refused(arguments, message):
     with pytest.raises(InvalidInputError, match=message):
-        Controller(baselines.make("rhc_gradient", scenario())).step(*arguments)
+        perfect(scenario(), "rhc_gradient").step(*arguments)
 
 
 def test_who_may_control():
-    with pytest.raises(InvalidInputError, match="expected a SolverPolicy, got 'dls'"):
-        Controller("dls")
+    which = scenario()
+    with pytest.raises(UnknownNameError, match="Did you mean 'dls'"):
+        Controller(which, "dlss")
+    with pytest.raises(InvalidInputError, match="policy: expected 'name:parameter=value' or"):
+        Controller(which, 3)
     with pytest.raises(InvalidInputError, match="privileged information on one episode: give its steps"):
-        Controller(baselines.make("follow_nominal", scenario()))
+        Controller(which, "follow_nominal", Drives())
+    with pytest.raises(InvalidInputError, match="expected one that acts on what it sees, got the reference"):
+        Controller(which, "follow_nominal")
     with pytest.raises(InvalidInputError, match="steps: expected a whole number of at least 1"):
-        Controller(baselines.make("dls", scenario()), 0)
+        Controller(which, "dls", steps=0)
+    with pytest.raises(InvalidInputError, match="expected one for 7 joints, the task 'skew' and Δt"):
+        Controller(which, baselines.make("dls", "panda-circle"))
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda: Drives(-1), "delay: expected a whole number of at least 0, got -1"),
+        (lambda: Drives(2, -0.02), "time_constant: expected a finite number from 0 to"),
+        (lambda: Controller("varga7-fast", drives="known"), "drives: expected Drives.…. or 'identify', got 'known'"),
+        (lambda: Guards(age=-1), "age: expected a whole number of at least 0"),
+        (lambda: Guards(tolerance=None), "tolerance: expected a finite number above 0, got None"),
+        (lambda: Guards(position_error=np.inf), "position_error: expected a finite number above 0, got inf"),
+    ],
+)
+def test_drives_and_guards_that_cannot_be(change, message):
+    with pytest.raises(InvalidInputError, match=message):
+        change()

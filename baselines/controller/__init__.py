@@ -1,0 +1,10 @@
+"""A policy on a real arm, without an environment: what was measured goes in, joint velocities come out."""
+
+from __future__ import annotations
+
+from baselines.controller.controller import Controller
+from baselines.controller.drives import Drives
+from baselines.controller.guards import Guards, StopReason
+from baselines.controller.timing import Timing
+
+__all__ = ("Controller", "Drives", "Guards", "StopReason", "Timing")

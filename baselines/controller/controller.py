@@ -1,0 +1,254 @@
+"""The control loop: a policy that is called once in each control period, behind guards."""
+
+from __future__ import annotations
+
+import logging
+import time
+
+import numpy as np
+import numpy.typing as npt
+
+from baselines.controller import kernels
+from baselines.controller.drives import IDENTIFY, Drives, identified, policy_for
+from baselines.controller.guards import Guards, StopReason
+from baselines.controller.reference import Pose, Window, coordinates, numbers
+from baselines.controller.timing import Timing, timing_of, warn_if_slow
+from baselines.policy import Batch, Memory, Report, SolverPolicy
+from baselines.policy.arguments import remembered
+from baselines.spec import PolicySpec
+from baselines.status import Status
+from ikgym import scenarios
+from ikgym.arms.limits import limit_rows
+from ikgym.exceptions import InvalidInputError
+from ikgym.kernels.tasks import pose_rows
+from ikgym.scenarios import Scenario
+from ikgym.scenarios.preview import furthest, offsets
+from ikgym.validation import FloatArray, whole_number
+
+logger = logging.getLogger("ikgym")
+
+#: Steps left where nobody says when the episode ends.
+ENDLESS = 1_000_000
+_DIVERGED = int(Status.DIVERGED)
+#: Calls that :meth:`Controller.warm_up` times.
+WARM_UP = 500
+
+
+class Controller:
+    """Calls a policy once in each control period: measurements go in, joint velocities come out.
+
+    >>> controller = baselines.Controller(scenario)
+    >>> controller.warm_up()
+    >>> while running and controller.stopped is None:
+    ...     qdot = controller.step(q, pose, reference)
+
+    *Drives.* The policy moves a model without delay and lag, and the arm is made to follow it, see ``predicted``.
+    Delay and lag are given, or identified while the arm moves. Until then errors are taken back by 6 % a period, which
+    is stable up to 25 periods of delay and is the price: an error halves in 11 periods, where a policy on perfect
+    drives takes it back in one. With perfect drives, ``Drives()``, the policy acts on the measurements themselves.
+
+    *Limits.* Commands stay within the velocities and accelerations of the model, and end at its stops, as in the
+    environment. With imperfect drives they are at most 1.25 times as fast as the policy wanted to be within the last
+    second.
+
+    *Guards.* What cannot be right ends in a controlled stop, which lasts until :meth:`reset`, see :class:`Guards` and
+    :attr:`stopped`. Joint coordinates must not jump by 2π: unwrap them. Only arrays of a wrong shape raise an error.
+
+    Args:
+        scenario: Model, task, Δt and velocity limit, as :func:`ikgym.scenarios.find` takes it.
+        policy: The policy, as text such as ``"qp:damping=1e-4"``, as a pair of name and parameters, or made for the
+            scenario.
+        drives: The drives, or ``"identify"``.
+        guards: The guards.
+        steps: Control periods until the end of the task, for policies that look at it; no end in sight if left out.
+
+    Raises:
+        InvalidInputError: The policy is none, does not suit the scenario, or has privileged information on an episode
+            that is not said to end; or the drives are none.
+        UnknownNameError: There is no such scenario or policy, or parameter of it.
+    """
+
+    def __init__(
+        self,
+        scenario: str | Scenario,
+        policy: PolicySpec | SolverPolicy = "qp",
+        drives: Drives | str = IDENTIFY,
+        *,
+        guards: Guards | None = None,
+        steps: int | None = None,
+    ) -> None:
+        self._scenario, self._guards = scenarios.find(scenario), Guards() if guards is None else guards
+        self.policy = policy_for(self._scenario, policy, drives, self._guards.age)
+        if self.policy.reference and steps is None:
+            raise InvalidInputError(f"{self.policy.name} has privileged information on one episode: give its steps.")
+        self._steps = None if steps is None else whole_number("steps", steps, at_least=1)
+        self._given = drives if isinstance(drives, Drives) else None
+        problem = self._problem = self.policy.problem
+        self._limits = limit_rows(problem.model, problem.largest_qdot, problem.dt)
+        self._unit, self._change = np.array(problem.velocity_limit), self._guards.deceleration(problem)
+        self._bounds, self._numbers = self._guards.bounds(problem), self._guards.numbers()
+        self._shown = len(offsets(self.policy.preview))
+        self._window, self._joints, self._kind = Window(problem.task), problem.model.joints, problem.task.kind
+        self.reset()
+
+    def reset(self) -> None:
+        """Begins anew: the memory is cleared, the arm stands, and no guard has stopped it."""
+        n = self._joints
+        self._state: Memory | None = None
+        self._stopped: StopReason | None = None
+        self._last, self._kept, self._counters = np.zeros(n), np.zeros((2, n)), np.zeros(3)
+        self._made = 0
+        self._window.clear()
+
+    def step(
+        self,
+        q: npt.ArrayLike,
+        pose: Pose | None,
+        reference: Pose,
+        *,
+        qdot: npt.ArrayLike | None = None,
+        q_age: float = 0,
+        pose_age: float = 0,
+    ) -> FloatArray:
+        """The joint velocities for the next control period.
+
+        Args:
+            q: Measured joint coordinates in [rad] or [m]. Shape (n,).
+            pose: Measured pose of the tool: task coordinates of shape (m,), or rotation (3, 3) and position (3,) in
+                [m]. None where it is not measured: then it is the model's at q.
+            reference: The pose wanted at the end of this period, and then as many as the policy looks ahead, see
+                :attr:`ahead`: task coordinates (p, m), or rotations (p, 3, 3) and positions (p, 3) in [m].
+            qdot: Measured joint velocities in [rad/s] or [m/s]; what was returned last if left out. Shape (n,).
+            q_age: Control periods since q was measured.
+            pose_age: The same of the pose.
+
+        Returns:
+            Joint velocities in [rad/s] or [m/s], within the limits. Shape (n,).
+
+        Raises:
+            InvalidInputError: Something has a wrong shape, or the reference is too short.
+        """
+        n = self._joints
+        measured = numbers("q", q, (n,))
+        speed = self._last.copy() if qdot is None else numbers("qdot", qdot, (n,))
+        seen, nominal = self._seen(pose, measured), self._window.ahead(reference)
+        if len(nominal) != self._shown:
+            nominal = self._wanted(nominal)
+        if self._stopped is None:
+            ages = float(q_age), float(pose_age)
+            reason = kernels.watch(
+                *(measured, speed, seen, nominal, *ages),
+                *(self._kind, self._bounds, self._numbers, self._kept, self._counters),
+            )
+            if reason == 0:
+                return self._commanded(measured, speed, seen, nominal, ages)
+            self._stopped = StopReason(reason)
+        return self._braked()
+
+    def warm_up(self, calls: int = WARM_UP) -> Timing:
+        """Compiles, and plays the scenario's own reference on a perfect arm; then begins anew.
+
+        Warns where the policy does not keep the control period.
+
+        Args:
+            calls: How many calls are timed.
+
+        Returns:
+            The duration of a call.
+        """
+        calls = whole_number("calls", calls, at_least=1)
+        self.reset()
+        timing = timing_of(self._play(calls))
+        self.reset()
+        warn_if_slow(self.policy.name, timing, self._problem.dt)
+        return timing
+
+    @property
+    def stopped(self) -> StopReason | None:
+        """Why the arm was stopped; None if it was not."""
+        return self._stopped
+
+    @property
+    def drives(self) -> Drives | None:
+        """The drives as given, or as identified; None while there is no evidence of them."""
+        if self._given is not None or self._state is None:
+            return self._given
+        return identified(self.policy.diagnostics(self._state))
+
+    @property
+    def ahead(self) -> int:
+        """Number of reference poses that the policy looks ahead."""
+        return furthest(self.policy.preview)
+
+    @property
+    def report(self) -> Report:
+        """Status and iterations of the last step.
+
+        Raises:
+            InvalidInputError: There was no step yet.
+        """
+        if self._state is None:
+            raise InvalidInputError("report: expected a step to be made first.")
+        return self.policy.report(self._state)
+
+    def _seen(self, pose: Pose | None, q: FloatArray) -> FloatArray:
+        """Task coordinates of the measured pose, or of the model's at q. Shape (m,)."""
+        if pose is not None:
+            return coordinates("pose", self._problem.task, pose)
+        out: FloatArray = np.empty((1, self._problem.task.size))
+        pose_rows(self._problem.model.chain, self._kind, q[None], out)
+        return out.ravel()
+
+    def _wanted(self, nominal: FloatArray) -> FloatArray:
+        """The poses that the policy looks at, of those ahead. Shapes (p, m)."""
+        if len(nominal) < self.ahead:
+            raise InvalidInputError(
+                f"reference: expected {self.ahead} poses, so far {self.policy.name} looks ahead, got {len(nominal)}."
+            )
+        preview = self.policy.preview
+        return nominal[:preview] if isinstance(preview, int) else nominal[np.array(preview) - 1]
+
+    def _commanded(
+        self, q: FloatArray, qdot: FloatArray, pose: FloatArray, nominal: FloatArray, ages: tuple[float, float]
+    ) -> FloatArray:
+        """The policy's command within the limits, or that of a stop where it fails. Shape (n,)."""
+        left = ENDLESS if self._steps is None else max(self._steps - self._made, 0)
+        parts = q[None], qdot[None], pose[None], nominal[None], np.array([[float(left)]])
+        batch = Batch(*parts, *np.array(ages).reshape(2, 1, 1)) if ages != (0.0, 0.0) else Batch(*parts)
+        try:
+            memory = self.policy.memory(1) if self._state is None else remembered(self._state)
+            action, self._state = self.policy.act(batch, memory)
+        except Exception:
+            logger.exception("The policy %s raised an error: the arm is stopped.", self.policy.name)
+            self._stopped = StopReason.POLICY
+            return self._braked()
+        if self._state[0][0] == _DIVERGED:
+            self._stopped = StopReason.POLICY
+            return self._braked()
+        if self._made == 0:
+            self._last[:] = qdot
+        self._made += 1
+        out = np.empty_like(q)
+        kernels.command(self._limits, q, action[0], self._unit, self._last, self._problem.dt, self._kept, out)
+        return out
+
+    def _braked(self) -> FloatArray:
+        """The next command of a stop. Shape (n,)."""
+        out = np.empty_like(self._last)
+        kernels.brake(self._change, self._last, out)
+        return out
+
+    def _play(self, calls: int) -> list[float]:
+        """Durations in [s] of calls along the scenario's reference, on a perfect arm; one more compiles."""
+        scenario, ahead, spent = self._scenario, self.ahead, []
+        nominal, start = scenario.nominal(0, ahead), scenario.first_q(scenario.episode(0))
+        q, k = start, 0
+        for _ in range(calls + 1):
+            begin = time.perf_counter()
+            qdot = self.step(q, None, nominal[k + 1 : k + 1 + ahead])
+            spent.append(time.perf_counter() - begin)
+            q, k = q + scenario.dt * qdot, k + 1
+            if k == scenario.steps or self._stopped is not None:
+                self.reset()
+                q, k = start, 0
+        return spent[1:]

@@ -1,0 +1,82 @@
+"""Guards of a control loop: what is not to be believed, or not to go on, and ends in a stop."""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+
+import numpy as np
+
+from baselines.controller import kernels
+from baselines.policy import Problem
+from ikgym.validation import FloatArray, Frozen, number, whole_number
+
+
+class StopReason(enum.IntEnum):
+    """Why a controller has stopped the arm."""
+
+    #: A measurement, or the reference, has numbers that are not finite.
+    NOT_FINITE = kernels.NOT_FINITE
+    #: A measurement is too old, or repeats itself while the arm should move.
+    STALE = kernels.STALE
+    #: Joint coordinates moved farther than the arm can.
+    JUMP = kernels.JUMP
+    #: Joint coordinates lie outside their limits.
+    OUTSIDE_LIMITS = kernels.OUTSIDE
+    #: The tool is too far from the reference.
+    PATH_ERROR = kernels.PATH_ERROR
+    #: The policy diverged, or raised an error.
+    POLICY = 6
+
+    @property
+    def label(self) -> str:
+        """The name in messages, for example ``path_error``."""
+        return self.name.lower()
+
+
+@dataclasses.dataclass(frozen=True)
+class Guards(Frozen):
+    """Bounds of what a controller accepts, and how it stops.
+
+    Args:
+        age: The oldest measurements, in control periods. Joint coordinates that do not change at all count as old, too,
+            once the commands since then should have moved a joint by more than `tolerance`.
+        tolerance: By how much joint coordinates may move farther than at the velocity limit from one measurement to the
+            next, and lie outside their limits, in [rad] or [m].
+        position_error: The largest distance of the tool from the reference, in [m]; None for any.
+        orientation_error: The largest angle from it, in [rad]; None for any. With the tasks ``matrix`` and ``skew`` it
+            is the length of what coordinates differ by.
+        stopping_time: In which time a joint stops from its velocity limit where the model has no limit of its
+            acceleration, in [s].
+
+    Raises:
+        InvalidInputError: A number is out of its range.
+    """
+
+    age: int = 10
+    tolerance: float = 0.01
+    position_error: float | None = 0.02
+    orientation_error: float | None = 0.2
+    stopping_time: float = 0.25
+
+    def __post_init__(self) -> None:
+        self._settle(age=whole_number("age", self.age, at_least=0))
+        for name in ("tolerance", "position_error", "orientation_error", "stopping_time"):
+            if getattr(self, name) is not None or name in {"tolerance", "stopping_time"}:
+                self._settle(**{name: number(name, getattr(self, name), above=0.0)})
+
+    def bounds(self, problem: Problem) -> FloatArray:
+        """Least and largest joint coordinates in [rad] or [m], and the farthest way in a period. Shape (3, n)."""
+        model = problem.model
+        fastest = np.where(np.isfinite(model.velocity_limit), model.velocity_limit, problem.largest_qdot)
+        return np.array([model.lower - self.tolerance, model.upper + self.tolerance, problem.dt * fastest])
+
+    def numbers(self) -> FloatArray:
+        """Age, tolerance, and largest errors; inf where there is none. Shape (4,)."""
+        errors = [np.inf if one is None else one for one in (self.position_error, self.orientation_error)]
+        return np.array([self.age, self.tolerance, *errors])
+
+    def deceleration(self, problem: Problem) -> FloatArray:
+        """How much velocities change in a period of a stop, in [rad/s] or [m/s]. Shape (n,)."""
+        limit = problem.model.acceleration_limit
+        return problem.dt * np.where(np.isfinite(limit), limit, problem.largest_qdot / self.stopping_time)

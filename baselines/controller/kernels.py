@@ -1,0 +1,141 @@
+"""Kernels of a control loop: guards, limits, stops, and the sliding window of a reference."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from baselines.policy_kernels import all_finite
+from ikgym.kernels import tasks
+from ikgym.kernels.jit import kernel
+from ikgym.kernels.limits import applied
+
+# Reasons to stop, see :class:`baselines.controller.StopReason`; 0 for none.
+NOT_FINITE, STALE, JUMP, OUTSIDE, PATH_ERROR = range(1, 6)
+# Rows of bounds, and numbers, see :class:`baselines.controller.Guards`.
+LOWER, UPPER, WAY = range(3)
+AGE, TOLERANCE, POSITION, ORIENTATION = range(4)
+# Rows of what is remembered: joint coordinates, how far commands should have moved the joints since they changed.
+MEASURED, TRAVEL = range(2)
+# Counters: whether there was a measurement, its age, and for how many periods it has not changed.
+BEGUN, BEFORE, REPEATED = range(3)
+
+
+@kernel
+def watch(q, qdot, pose, nominal, q_age, pose_age, kind, bounds, numbers, kept, counters):
+    """The first guard that refuses what was measured.
+
+    Args:
+        q: Joint coordinates in [rad] or [m]. Shape (n,).
+        qdot: Joint velocities in [rad/s] or [m/s]. Shape (n,).
+        pose: Task coordinates. Shape (m,).
+        nominal: The reference ahead. Shape (p, m).
+        q_age: How many periods ago q was measured.
+        pose_age: The same of the pose.
+        kind: The kind of task coordinates.
+        bounds: Shape (3, n).
+        numbers: Shape (4,).
+        kept: The last measurement, changed in place. Shape (2, n).
+        counters: What is counted, changed in place. Shape (3,).
+
+    Returns:
+        The reason to stop; 0 if there is none.
+    """
+    ages = np.array([q_age, pose_age])
+    if not all_finite(q, qdot, pose, nominal, ages):
+        return NOT_FINITE
+    same, jump, outside, due = True, False, False, False
+    periods = max(1.0 + counters[BEFORE] - q_age, 0.0)
+    for j in range(q.shape[0]):
+        way = abs(q[j] - kept[MEASURED, j])
+        same = same and way == 0.0
+        jump = jump or way > periods * bounds[WAY, j] + numbers[TOLERANCE]
+        outside = outside or not bounds[LOWER, j] <= q[j] <= bounds[UPPER, j]
+        due = due or abs(kept[TRAVEL, j]) > numbers[TOLERANCE]
+    first, counters[BEGUN], counters[BEFORE] = counters[BEGUN] == 0.0, 1.0, q_age
+    counters[REPEATED] = counters[REPEATED] + 1.0 if same and not first else 0.0
+    frozen = due and counters[REPEATED] > numbers[AGE]
+    if frozen or not (0.0 <= q_age <= numbers[AGE] and 0.0 <= pose_age <= numbers[AGE]):
+        return STALE
+    if outside:
+        return OUTSIDE
+    if jump and not first:
+        return JUMP
+    kept[MEASURED] = q
+    if not same:
+        kept[TRAVEL] = 0.0
+    distance, angle = _errors(kind, nominal[0], pose)
+    return 0 if distance <= numbers[POSITION] and angle <= numbers[ORIENTATION] else PATH_ERROR
+
+
+@kernel
+def _errors(kind, nominal, pose):
+    """Distance in [m] and angle in [rad] of a pose from the reference."""
+    m = pose.shape[0]
+    error = np.empty(tasks.error_size(kind, m))
+    tasks.error(kind, nominal, pose, error)
+    e, square, turned = error.shape[0], 0.0, 0.0
+    for i in range(3):
+        square += (nominal[m - 3 + i] - pose[m - 3 + i]) ** 2
+    # Errors of POSE and AXIS begin with the position, coordinates end with it.
+    begin = 3 if kind in (tasks.POSE, tasks.AXIS) else 0
+    for i in range(begin, begin + e - 3):
+        turned += error[i] ** 2
+    return math.sqrt(square), math.sqrt(turned)
+
+
+@kernel
+def command(limits, q, action, unit, last, dt, kept, out):
+    """The joint velocities that limits make of an action, as in a step of the environment.
+
+    Args:
+        limits: See :func:`ikgym.kernels.limits.applied`; shape (0, n) where there are none.
+        q: Joint coordinates in [rad] or [m]. Shape (n,).
+        action: Shape (n,).
+        unit: Joint velocity of an action of 1, in [rad/s] or [m/s]. Shape (n,).
+        last: Joint velocities of the last command, changed in place. Shape (n,).
+        dt: Δt in [s].
+        kept: See :func:`watch`, changed in place. Shape (2, n).
+        out: Receives joint velocities in [rad/s] or [m/s]. Shape (n,).
+    """
+    wanted = np.empty(q.shape[0])
+    for j in range(q.shape[0]):
+        wanted[j] = action[j] * unit[j]
+        out[j] = wanted[j]
+    if limits.shape[0] > 0:
+        applied(limits, q, wanted, last, dt, out)
+    for j in range(q.shape[0]):
+        last[j] = out[j]
+        kept[TRAVEL, j] += dt * out[j]
+
+
+@kernel
+def brake(change, last, out):
+    """A step of a stop: velocities change by so much at most. Shapes (n,); ``last`` is changed in place."""
+    for j in range(last.shape[0]):
+        last[j] = math.copysign(max(abs(last[j]) - change[j], 0.0), last[j])
+        out[j] = last[j]
+
+
+@kernel
+def same(given, kept):
+    """Whether arrays of one shape have the same numbers, bit for bit: as integers, several at a time."""
+    here, there, different = given.ravel().view(np.int64), kept.ravel().view(np.int64), np.int64(0)
+    for i in range(here.shape[0]):
+        different |= here[i] ^ there[i]
+    return different == 0
+
+
+@kernel
+def convert(kind, rotations, positions, out):
+    """Task coordinates of poses.
+
+    Args:
+        kind: The kind of task coordinates.
+        rotations: Shape (p, 3, 3).
+        positions: In [m]. Shape (p, 3).
+        out: Receives the task coordinates. Shape (p, m).
+    """
+    for k in range(positions.shape[0]):
+        tasks.coordinates(kind, rotations[k], positions[k], out[k])

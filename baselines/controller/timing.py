@@ -1,0 +1,38 @@
+"""How long the calls of a control loop take."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+
+class Timing(NamedTuple):
+    """Durations of calls in [s].
+
+    Attributes:
+        p50: The median.
+        p99: What 99 % of the calls stay below.
+    """
+
+    p50: float
+    p99: float
+
+
+def timing_of(spent: Sequence[float]) -> Timing:
+    """What durations in [s] come to."""
+    p50, p99 = np.percentile(spent, (50, 99))
+    return Timing(float(p50), float(p99))
+
+
+def warn_if_slow(name: str, timing: Timing, period: float) -> None:
+    """Warns where calls of a policy take longer than a control period in [s]."""
+    if timing.p99 > period:
+        warnings.warn(
+            f"{name} does not keep the control period of {1e3 * period:g} ms: 99 % of its calls take up to "
+            f"{1e3 * timing.p99:.2g} ms, half of them {1e3 * timing.p50:.2g} ms.",
+            RuntimeWarning,
+            stacklevel=3,
+        )

@@ -1,0 +1,77 @@
+"""The control loop: what a step costs beside the `predict` of its policy."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import numpy as np
+
+import ikgym
+from baselines import Controller, Drives
+from benchmarks.measuring import FULL, Effort
+from benchmarks.table import Table
+
+#: The rows: policy, scenario, drives, and whether references are rotations and positions.
+LOOPS: dict[str, tuple[str, str, Drives | str, bool]] = {
+    "`qp`, perfect drives": ("qp", "panda-circle", Drives(), False),
+    "`qp`, perfect drives, rotations": ("qp", "panda-circle", Drives(), True),
+    "`qp`, drives given": ("qp", "panda-circle", Drives(2, 0.02), False),
+    "`qp`, drives identified": ("qp", "panda-circle", "identify", False),
+    "`rhc_foresight`, perfect drives": ("rhc_foresight", "varga7-pose-random", Drives(), False),
+    "`rhc_foresight`, perfect drives, rotations": ("rhc_foresight", "varga7-pose-random", Drives(), True),
+}
+#: Turns of `effort.steps` calls of each.
+TURNS = 10
+
+
+def tables(effort: Effort = FULL) -> list[Table]:
+    """Medians of `predict` and of :meth:`Controller.step`, and the 99th percentile of the latter."""
+    rows: dict[str, tuple[float | None, ...]] = {}
+    for name, loop in LOOPS.items():
+        predict, step = measured(*loop, effort.steps, TURNS if effort is FULL else 1)
+        rows[name] = np.median(predict), np.median(step), np.median(step) - np.median(predict), np.percentile(step, 99)
+    note = f"One call, along {TURNS} times {effort.steps:,} steps of `panda-circle` or `varga7-pose-random`."
+    return [Table("Control loop", note, ("`predict` [µs]", "`step` [µs]", "more [µs]", "`step`, p99 [µs]"), rows)]
+
+
+def measured(policy: str, scenario: str, drives: Drives | str, pairs: bool, steps: int, turns: int) -> tuple[Any, Any]:
+    """Durations of `predict`, and of steps on the same measurements, in [µs]; they take turns."""
+    which = ikgym.scenarios.get(scenario)
+    controller = Controller(which, policy, drives)
+    controller.warm_up(1)
+    predict, step = [], []
+    for _ in range(turns):
+        durations, seen = _steps(controller, which, pairs, steps)
+        step += durations
+        predict += _predictions(controller.policy, seen)
+    return 1e-3 * np.array(predict), 1e-3 * np.array(step)
+
+
+def _steps(controller: Controller, scenario: ikgym.Scenario, pairs: bool, steps: int) -> tuple[list[int], list[Any]]:
+    """Durations of steps on a perfect arm in [ns], and what its policy saw."""
+    controller.reset()
+    ahead, durations, observations = controller.ahead, [], []
+    frames = scenario.frames(scenario.episode(0), scenario.steps + ahead + 1)
+    nominal, rotations, positions = scenario.nominal(0, ahead), frames[:, :9].reshape(-1, 3, 3), frames[:, 9:].copy()
+    q, qdot = np.array(scenario.start_of(0)), np.zeros(scenario.joints)
+    for k in range(min(steps, scenario.steps)):
+        here = slice(k + 1, k + 1 + ahead)
+        pose = scenario.task.coordinates(*scenario.arm.forward(q))
+        reference = (rotations[here], positions[here]) if pairs else nominal[here]
+        begin = time.perf_counter_ns()
+        command = controller.step(q, pose, reference)
+        durations.append(time.perf_counter_ns() - begin)
+        left = np.array([1e6])
+        observations.append({"q": q, "qdot": qdot, "pose": pose, "nominal": nominal[here], "remaining": left})
+        q, qdot = q + scenario.dt * command, command
+    return durations, observations
+
+
+def _predictions(policy: Any, observations: list[Any]) -> list[int]:
+    durations, state = [], None
+    for observation in observations:
+        begin = time.perf_counter_ns()
+        _, state = policy.predict(observation, state)
+        durations.append(time.perf_counter_ns() - begin)
+    return durations
