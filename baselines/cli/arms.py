@@ -6,38 +6,26 @@ import dataclasses
 import textwrap
 from collections import Counter
 from collections.abc import Sequence
-from typing import Annotated
 
 import numpy as np
-import tyro
 
 from baselines.cli import shell
 from baselines.cli.parsing import Rule
+from baselines.cli.robot import ROBOT_OPTIONS, RobotOptions
 from ikgym import arms, scenarios
 from ikgym.arms import Arm, Tip
 from ikgym.scenarios import toml
-from ikgym.validation import per_joint
 
 #: Most tips in a table; names alone of the others.
 MOST_TIPS = 8
 
 
 @dataclasses.dataclass(frozen=True)
-class Arguments(shell.Names):
+class Arguments(RobotOptions, shell.Names):
     """Arguments of the command line."""
 
-    base: Annotated[str | None, tyro.conf.arg(metavar="LINK")] = None
-    """Link of a URDF file at which the arm begins; the root if left out."""
-    tip: Annotated[str | None, tyro.conf.arg(metavar="LINK")] = None
-    """Link at which it ends; needed where several could."""
-    tool: Annotated[tuple[float, float, float] | None, tyro.conf.arg(metavar="X Y Z")] = None
-    """Tool point in the frame of the tip, in [m]."""
-    acceleration: Annotated[tuple[float, ...], tyro.conf.arg(metavar="A …")] = ()
-    """Acceleration limit, or one a joint, in [rad/s²] or [m/s²]; a URDF file states none."""
 
-
-OPTIONS = ("--base", "--tip", "--tool", "--acceleration")
-RULES = (Rule(OPTIONS, lambda given: any(_is_urdf(name) for name in given.names), "without a URDF file"),)
+RULES = (Rule(ROBOT_OPTIONS, lambda given: any(_is_urdf(name) for name in given.names), "without a URDF file"),)
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -79,10 +67,7 @@ def _shown(name: str, given: Arguments) -> str:
 
 def _from_urdf(name: str, tip: str | None, given: Arguments) -> str:
     """The arm of a URDF file, and how a scenario file names it."""
-    arm = arms.from_urdf(name, base=given.base, tip=tip, tool=given.tool)
-    if given.acceleration:
-        limit = given.acceleration[0] if len(given.acceleration) == 1 else given.acceleration
-        arm = arm.replace(acceleration_limit=per_joint("--acceleration", limit, arm.joints))
+    arm = dataclasses.replace(given, tip=tip).robot(name)
     title = name if tip is None else f"{name} to {tip}"
     return f"{_table(title, arm)}\n\n{_scenario_table(name, tip, given, arm)}"
 

@@ -60,18 +60,18 @@ def _path(scenario: Scenario) -> dict[str, object]:
     if (time := durations.duration(scenario.trajectory)) is not None:
         cut = f": {scenario.cut_off:.3g} s are cut off" if scenario.cut_off else ""
         out["path takes"] = f"{time:.3g} s, the episode {scenario.steps * scenario.dt:.3g} s{cut}"
-    return out | {"within reach": _reach(scenario)}
+    return out | {"poses in reach": _reach(scenario)}
 
 
 def _reach(scenario: Scenario) -> str:
-    """The poses of a path that the arm cannot reach."""
+    """The poses of a path that the arm cannot reach, wherever it comes from."""
     missed = scenarios.gaps(scenario)
     if not missed:
-        return "all sampled poses"
+        return f"all, taken one by one; {shell.CONSOLE} path follows them from the start"
     worst = max(missed, key=lambda gap: (gap.distance, gap.angle))
     first, last = (f"{gap.time:.3g} s" for gap in (missed[0], missed[-1]))
     far = f"{worst.distance:.3g} m and {worst.angle:.3g} rad"
-    return f"not all poses: missed from {first} to {last}, at ({shell.numbers(worst.position)}) m by {far}"
+    return f"not all: missed from {first} to {last}, at ({shell.numbers(worst.position)}) m by {far}"
 
 
 SCENARIOS = shell.Catalogue(

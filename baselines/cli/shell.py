@@ -35,6 +35,7 @@ EXTRAS = {
     "h5py": "data",
     "minari": "data",
     "pinocchio": "urdf",
+    "toppra": "paths",
     "moviepy": "video",
     "ray": "cluster",
     "trimesh": "view",

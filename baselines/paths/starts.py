@@ -11,7 +11,7 @@ from ikgym.trajectories import RetimedTrajectory
 from ikgym.validation import FloatArray
 
 #: Random postures from which the first pose is searched, and the most branches that are kept.
-SEARCHES, BRANCHES = 256, 12
+SEARCHES, BRANCHES = 256, 10
 #: Branches differ by at least this angle in one joint in [rad], or this share of the arm's length.
 APART = 0.2
 #: Time and control period in [s] in which redundant joints come to rest at the first pose.
@@ -21,27 +21,43 @@ SETTLING, PERIOD = 12.0, 0.1
 def starts(scenario: Scenario) -> FloatArray:
     """Joint coordinates at the first pose of a path, one a branch, the scenario's own first; shape (N, n).
 
-    Redundant joints stand where `qp` leads them, so that they are at rest when the path begins.
+    Most of them are where `qp` leads redundant joints while the pose is held, so that they are at rest when the path
+    begins; few others are not.
 
     Args:
         scenario: A result of :func:`baselines.paths.motion.ideal`.
     """
-    own = scenario.first_q(scenario.trajectory)
+    own = scenario.first_q(scenario.trajectory)[None]
     found = solutions(scenario)
+    if not len(found):
+        return own
     settled = played(_held(scenario), _middlemost(scenario.arm, found))
     still = settled.q[-1][settled.position_error[-1] < 1e-6]
-    return _distinct(scenario.arm, np.vstack([own[None], still, found]))
+    return _distinct(scenario.arm, _distinct(scenario.arm, own, still, BRANCHES), found, BRANCHES)
 
 
 def solutions(scenario: Scenario) -> FloatArray:
     """Joint coordinates within the limits at the first pose, from random postures. Shape (k, n)."""
-    arm = scenario.arm
+    arm, rng = scenario.arm, np.random.default_rng(0)
     frame = scenario.frames(scenario.trajectory, 1)[0]
-    rotation = frame[:9].reshape(3, 3) if scenario.task.error_size >= 6 else None
-    lower, upper = _ranges(arm)
-    random = np.random.default_rng(0).uniform(lower, upper, (SEARCHES, arm.joints))
+    rotation = _rotations(frame, scenario.task.error_size, rng)
+    random = rng.uniform(*_ranges(arm), (SEARCHES, arm.joints))
     q, converged = arm.inverse(rotation, frame[-3:], start=random, tolerance=1e-9, restarts=0)
     return q[converged]
+
+
+def _rotations(frame: FloatArray, errors: int, rng: np.random.Generator) -> FloatArray | None:
+    """Rotations of the tool that will do; None where all will, and random ones about its z axis where that is free."""
+    if errors < 5:
+        return None
+    rotation = frame[:9].reshape(3, 3)
+    if errors > 5:
+        return rotation
+    angle = rng.uniform(-np.pi, np.pi, SEARCHES)
+    c, s, zero = np.cos(angle), np.sin(angle), np.zeros(SEARCHES)
+    turns = np.array([[c, -s, zero], [s, c, zero], [zero, zero, zero + 1.0]]).transpose(2, 0, 1)
+    turned: FloatArray = rotation @ turns
+    return turned
 
 
 def _held(scenario: Scenario) -> Scenario:
@@ -65,13 +81,13 @@ def _middlemost(arm: Arm, q: FloatArray) -> FloatArray:
     return q - 2 * np.pi * turns
 
 
-def _distinct(arm: Arm, q: FloatArray) -> FloatArray:
-    """Postures that differ from each other, each the farthest from those before. Shape (N, n)."""
+def _distinct(arm: Arm, known: FloatArray, q: FloatArray, most: int) -> FloatArray:
+    """Known postures and others that differ from them, each the farthest from those before. Shape (N, n)."""
     size = np.where(arm.prismatic, arm.reach(np.zeros(arm.joints)) or 1.0, 1.0)
-    chosen, distance = [0], np.full(len(q), np.inf)
-    while len(chosen) < BRANCHES:
-        distance = np.minimum(distance, np.abs((q - q[chosen[-1]]) / size).max(axis=1))
+    chosen = list(known)
+    while len(chosen) < most and len(q):
+        distance = np.min([np.abs((q - one) / size).max(axis=1) for one in chosen], axis=0)
         if distance.max() < APART:
             break
-        chosen.append(int(np.argmax(distance)))
-    return q[chosen]
+        chosen.append(q[np.argmax(distance)])
+    return np.array(chosen)

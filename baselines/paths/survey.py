@@ -19,9 +19,12 @@ REACHED = 1e-3
 FOLLOWED = 5e-5, 5e-4
 #: Shares of the limits of velocity and acceleration that a timing uses.
 USED = 0.985, 0.96
-#: The path is played in the time asked for, then in so many times the time before, until half of the branches reach all
-#: of it, or none gets farther than before by this share.
-SLOWER, PLAYS, FARTHER = 1.6, 8, 0.005
+#: The path is played in the time asked for, and where most branches miss poses, in so many times the time: as slowly as
+#: can be, then slower and slower until half of the branches reach all of it.
+SLOWEST, SLOWER = 30.0, (1.6, 2.5, 4.0, 6.5, 10.0, 16.0)
+#: In a slower play the first so many seconds do not count as accelerations: redundant joints leave their start, at
+#: whatever speed the path is played.
+SETTLED = 0.3
 #: Steps of such a play: a longer path is sampled at larger intervals, a shorter one at smaller ones.
 FEWEST_STEPS, MOST_STEPS = 1000, 4000
 #: Timings that take no more than so many times what is asked count as the same. Joints nearer to a stop than the first
@@ -35,18 +38,20 @@ class Branch:
 
     Args:
         start: Joint coordinates in [rad] or [m]. Shape (n,).
+        given: Whether the scenario states this start.
         slowing: How many times the time asked for the motion took, the first one that reaches the whole path.
         reached: Share of the path's poses that are reached before the first that is not.
         position_error: The largest in [m].
         orientation_error: The largest in [rad]; 0 where the task has no orientation.
-        velocity: The largest joint velocities of this motion, were it as fast as asked, in [rad/s] or [m/s]. Shape (n,).
-        acceleration: The same of accelerations in [rad/s²] or [m/s²]. Shape (n,).
+        velocity: The largest joint velocities, were this motion as fast as asked, in [rad/s] or [m/s]. Shape (n,).
+        acceleration: The same of accelerations, in [rad/s²] or [m/s²]. Shape (n,).
         room: The least distance of each joint from its stops in [rad] or [m], inf where there is none. Shape (n,).
         shortest: The shortest timing of this motion in which all limits hold; None if poses are missed.
         asked: The same, nowhere faster than asked.
     """
 
     start: FloatArray
+    given: bool
     slowing: float
     reached: float
     position_error: float
@@ -63,12 +68,13 @@ class Branch:
         return self.asked is not None and self.shortest is not None
 
     def rank(self) -> tuple[float, ...]:
-        """The smaller, the better: by share of the path, time as asked, room to the stops, shortest time."""
+        """The smaller, the better: by share of the path, time as asked, a given start, room, shortest time."""
         if self.asked is None or self.shortest is None:
             return -self.reached, self.position_error
         slowing = max(self.asked.duration / self.asked.progress[-1], SLOWING)
         room = float(self.room.min())
-        return -2.0, float(room < NARROW), round(slowing, 2), -min(round(room, 1), ENOUGH), self.shortest.duration
+        enough = min(round(room, 1), ENOUGH)
+        return -2.0, room < NARROW, round(slowing, 2), not self.given, -enough, self.shortest.duration
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -120,27 +126,36 @@ def survey(scenario: Scenario) -> Survey:
         InvalidInputError: The path is random, or its first pose is out of reach.
         ModuleNotFoundError: toppra is not installed.
     """
-    duration, plain = path_duration(scenario), ideal(scenario)
-    remaining, branches, farthest = starts(plain), [], 0.0
-    half = 0.5 * len(remaining)
-    for play in range(PLAYS):
-        timing = Timing.uniform(duration, SLOWER**play)
-        motion = _motion(plain, timing, remaining)
-        shares = _shares(motion)
-        done = shares == 1.0
-        hopeless = play > 0 and not branches and shares.max() < farthest + FARTHER
-        last = hopeless or len(branches) + done.sum() >= half or play == PLAYS - 1
-        branches += [branch_of(scenario, motion.of(row), timing) for row in np.flatnonzero(done | last)]
-        remaining, farthest = remaining[~done], shares.max()
-        if last:
-            break
+    duration = path_duration(scenario)
+    begin = starts(ideal(scenario))
+    branches = _branches(scenario, begin, 1.0)
+    if sum(branch.whole for branch in branches) < 0.5 * len(branches):
+        # What is missed even in the slowest play is out of reach.
+        _play_again(scenario, branches, [not branch.whole for branch in branches], SLOWEST)
+    for factor in SLOWER:
+        slowest = [branch.whole and branch.slowing == SLOWEST for branch in branches]
+        if sum(slowest) > 0.5 * sum(branch.whole for branch in branches):
+            _play_again(scenario, branches, slowest, factor)
     return Survey(scenario, duration, tuple(sorted(branches, key=Branch.rank)))
 
 
-def _motion(plain: Scenario, timing: Timing, starts: FloatArray) -> Motion:
-    """A play with a number of steps that a survey can afford."""
-    dt = timing.duration / min(max(timing.duration / plain.dt, FEWEST_STEPS), MOST_STEPS)
-    return played(ideal(plain, trajectory=timing.of(plain.trajectory), start=starts[0], dt=dt), starts)
+def _play_again(scenario: Scenario, branches: list[Branch], chosen: list[bool], slowing: float) -> None:
+    """Replaces the chosen branches by those of a slower play, where it reaches the path or is the slowest one."""
+    rows = np.flatnonzero(chosen).tolist()
+    if rows:
+        starts = np.array([branches[row].start for row in rows])
+        for row, branch in zip(rows, _branches(scenario, starts, slowing), strict=True):
+            if branch.whole or slowing == SLOWEST:
+                branches[row] = branch
+
+
+def _branches(scenario: Scenario, starts: FloatArray, slowing: float) -> list[Branch]:
+    """Branches from starts of shape (N, n), played in so many times the time that is asked for."""
+    timing = Timing.uniform(path_duration(scenario), slowing)
+    dt = timing.duration / min(max(timing.duration / scenario.dt, FEWEST_STEPS), MOST_STEPS)
+    trajectory = timing.of(scenario.trajectory)
+    motion = played(ideal(scenario, trajectory=trajectory, start=starts[0], dt=dt), starts)
+    return [branch_of(scenario, motion.of(row), timing) for row in range(len(starts))]
 
 
 def _shares(motion: Motion) -> FloatArray:
@@ -160,6 +175,7 @@ def branch_of(scenario: Scenario, motion: Motion, timing: Timing) -> Branch:
     """
     q, dt, arm = motion.q[:, 0], motion.times[1], scenario.arm
     slowing = timing.duration / float(timing.progress[-1])
+    moving = q[int(SETTLED / dt) if slowing > 1.0 else 0 :]
     reached = float(_shares(motion)[0])
     timings: list[Timing | None] = [None, None]
     if reached == 1.0:
@@ -168,12 +184,13 @@ def branch_of(scenario: Scenario, motion: Motion, timing: Timing) -> Branch:
         timings = [shortest(path, Limits(*limits, rate)) for rate in (np.inf, 1.0)]
     return Branch(
         start=q[0],
+        given=scenario.start is not None and bool((q[0] == scenario.start).all()),
         slowing=slowing,
         reached=reached,
         position_error=float(motion.position_error.max()),
         orientation_error=float(motion.orientation_error.max()),
         velocity=np.abs(np.diff(q, axis=0)).max(axis=0) / dt * slowing,
-        acceleration=np.abs(np.diff(q, n=2, axis=0)).max(axis=0) / dt**2 * slowing**2,
+        acceleration=np.abs(np.diff(moving, n=2, axis=0)).max(axis=0) / dt**2 * slowing**2,
         room=np.minimum(q - arm.lower, arm.upper - q).min(axis=0),
         shortest=timings[0],
         asked=timings[1],

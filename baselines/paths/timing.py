@@ -103,21 +103,22 @@ def shortest(path: JointPath, limits: Limits) -> Timing | None:
 
     logging.getLogger("toppra").setLevel(logging.ERROR)
     moved = np.abs(np.diff(path.q, axis=0)) / limits.velocity
-    fastest = min(limits.rate, FASTEST * path.progress[-1] / max(float(moved.max(axis=1).sum()), 1e-12))
+    # In terms of the time that the velocity limits alone would take, so that rates are about 1.
+    unit = path.progress[-1] / max(float(moved.max(axis=1).sum()), 1e-9)
+    along, fastest = path.progress / unit, min(limits.rate / unit, FASTEST)
     # The rate is the velocity of one more coordinate: the progress itself.
-    curve = toppra.SplineInterpolator(path.progress, np.column_stack([path.q, path.progress]))
+    curve = toppra.SplineInterpolator(along, np.column_stack([path.q, along]))
     bounds = np.append(limits.velocity, fastest)
     hardest = np.append(np.minimum(limits.acceleration, limits.velocity / AT_ONCE), fastest / AT_ONCE)
     constraints = [toppra.constraint.JointVelocityConstraint(bounds)]
     constraints += [toppra.constraint.JointAccelerationConstraint(hardest)]
-    search = _search()(constraints, curve, gridpoints=path.progress, solver_wrapper="seidel")
-    ends = [_at_rest(curve(path.progress[i], 1)[:-1], limits, fastest) for i in (0, -1)]
+    search = _search()(constraints, curve, gridpoints=along, solver_wrapper="seidel")
+    ends = [_at_rest(curve(along[i], 1)[:-1], limits, fastest) for i in (0, -1)]
     first = search.compute_controllable_sets(0.0, ends[1])[0]
     if np.isnan(first).any():
         return None
-    start = min(ends[0], 0.999 * float(np.sqrt(first[1])))
-    rates = search.compute_parameterization(start, ends[1])[1]
-    return None if rates is None or np.isnan(rates).any() else _timing(path.progress, rates)
+    rates = search.compute_parameterization(min(ends[0], 0.999 * float(np.sqrt(first[1]))), ends[1])[1]
+    return None if rates is None or np.isnan(rates).any() else _timing(path.progress, rates * unit)
 
 
 def _at_rest(slope: FloatArray, limits: Limits, most: float) -> float:

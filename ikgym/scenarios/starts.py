@@ -6,8 +6,12 @@ import numpy as np
 
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
-from ikgym.kernels.rotations import geodesic_angle
+from ikgym.kernels.rotations import geodesic_angle, quaternion_of
+from ikgym.trajectories.orientations import matrices
 from ikgym.validation import FloatArray, read_only
+
+#: So many times the length of an arm away, positions are more likely in [mm] than in [m].
+MILLIMETRES = 50.0
 
 
 def found(name: str, arm: Arm, frame: FloatArray) -> FloatArray:
@@ -32,10 +36,28 @@ def found(name: str, arm: Arm, frame: FloatArray) -> FloatArray:
         gap = f"{distance:.3g} m" if rotation is None else f"{distance:.3g} m and {angle:.3g} rad"
         raise InvalidInputError(
             f"Scenario {name!r}: expected a trajectory that begins where arm {arm.name!r} can be, got one that begins "
-            f"{gap} from the nearest joint coordinates that were found within its limits; give a start, or another "
-            "trajectory."
+            f"{gap} from the nearest joint coordinates that were found within its limits; "
+            f"{_likely(arm, rotation, position)}."
         )
     return read_only(q)
+
+
+def _likely(arm: Arm, rotation: FloatArray | None, position: FloatArray) -> str:
+    """The mistake that most likely leads to a first pose out of reach."""
+    reach, away = arm.reach(np.zeros(arm.joints)), float(np.linalg.norm(position))
+    if away > MILLIMETRES * reach:
+        return f"it is {away:.4g} m away, and the arm {reach:.3g} m long: are positions in [mm]? Expected [m]"
+    if rotation is not None:
+        w, x, y, z = quaternion_of(*rotation)
+        for order, other in {"x, y, z, w": (z, w, x, y), "w, x, y, z": (x, y, z, w)}.items():
+            if arm.inverse(_rotation(*other), position)[1]:
+                return f"with quaternions read as {order} it is in reach: is that their order? Expected w, x, y, z"
+    return "give a start, or another trajectory"
+
+
+def _rotation(w: float, x: float, y: float, z: float) -> FloatArray:
+    rotation: FloatArray = matrices(np.array([[w, x, y, z]]))[0]
+    return rotation
 
 
 def distances(arm: Arm, q: FloatArray, rotation: FloatArray | None, position: FloatArray) -> tuple[float, float]:

@@ -83,3 +83,30 @@ def test_what_the_start_is_found_from_belongs_to_the_digest():
     moved = PANDA.replace(home=PANDA.home + 0.1)
     assert fingerprint(scenario()) != fingerprint(scenario(arm=moved))
     assert fingerprint(scenario(start=PANDA.home)) == fingerprint(scenario(start=PANDA.home, arm=moved))
+
+
+def written(tmp_path, rows, columns="x, y, z, qw, qx, qy, qz"):
+    file = tmp_path / "points.csv"
+    file.write_text("\n".join([columns, *(", ".join(map(str, row)) for row in rows)]), encoding="utf-8")
+    return ikgym.trajectories.from_csv(file, speed=0.1, acceleration=1.0)
+
+
+# Below its base a Panda points its tool down, not up.
+LOW = [(0.6, 0.0, -0.1), (0.6, 0.1, -0.1)]
+
+
+def test_positions_in_millimetres_are_named(tmp_path):
+    far = [(*(1000.0 * x for x in point), 0, 1, 0, 0) for point in LOW]
+    with pytest.raises(InvalidInputError, match=r"it is 60[08]\.\d* m away, and the arm 1\.\d+ m long: .* in \[mm\]"):
+        scenario(trajectory=written(tmp_path, far))
+
+
+def test_quaternions_in_another_order_are_named(tmp_path):
+    down = written(tmp_path, [(*point, 0, 1, 0, 0) for point in LOW])
+    assert scenario(trajectory=down).first_q(down).shape == (7,)
+    up = written(tmp_path, [(*point, 1, 0, 0, 0) for point in LOW])
+    with pytest.raises(InvalidInputError, match="quaternions read as x, y, z, w it is in reach: is that their order"):
+        scenario(trajectory=up)
+    up = written(tmp_path, [(*point, 0, 0, 1, 0) for point in LOW], "x, y, z, qx, qy, qz, qw")
+    with pytest.raises(InvalidInputError, match="quaternions read as w, x, y, z it is in reach: is that their order"):
+        scenario(trajectory=up)

@@ -34,7 +34,7 @@ def test_it_is_installed():
 def test_help_lists_the_commands(arguments, capsys):
     assert main(arguments) == 0
     text = capsys.readouterr().out
-    learning, scoring = "evaluate train tune dataset", "reproduce leaderboard robustness view video oracle"
+    learning, scoring = "evaluate compare train tune dataset", "reproduce leaderboard robustness view video path oracle"
     words = f"{learning} {scoring} arms scenarios policies".split()
     assert re.findall(r"^  (\w+)  ", text, re.MULTILINE) == words
     assert max(map(len, text.splitlines())) <= 80
@@ -101,6 +101,14 @@ SIZE = "expected 0, or an absolute value from 1e-12 to 1e+12"
         (["arms", "mine.toml"], "Cannot read mine.toml"),
         (["arms", "mine.xacro"], "There is no arm 'mine.xacro'."),
         (["arms", "panda", "--tip", "hand"], "--tip has no effect without a URDF file."),
+        (["compare"], "required"),
+        (
+            ["compare", "varga7-random"],
+            "Expected a path that is the same at every reset, got scenario 'varga7-random'.",
+        ),
+        (["compare", "panda", "none.csv", "--speed", "1"], "Cannot read none.csv"),
+        (["compare", "pandas", "none.csv", "--speed", "1"], "There is no arm 'pandas'. Did you mean 'panda'?"),
+        (["compare", "panda-line", "--tip", "hand"], "--tip has no effect without a CSV file."),
         (["train", "ppo", "--preset", "smok", "--out", "x"], "There is no preset 'smok'. Did you mean 'smoke'?"),
         (["train", "apg", "--preset", "smoke", "--preset", "quick", "--out", "x"], "--preset is given twice"),
         (["train", "apg", "--preset", "smoke", "--out", ""], "--out: expected a value, got an empty text."),
@@ -143,7 +151,7 @@ APG, OBSERVE = (["train", method, "--preset", "smoke", "--out", "x"] for method 
     ("arguments", "option", "otherwise"),
     [
         *((["evaluate"], option, "without --out") for option in (
-            "--resume", "--overwrite", "--no-report",
+            "--resume", "--overwrite", "--plots", "--no-report",
         )),
         *((["evaluate", "--test-sets", "varga7-random"], f"{option}=1", "with --test-sets") for option in (
             "--episodes", "--steps", "--noise-seeds",
@@ -238,11 +246,11 @@ def test_files_are_shown_like_members(tmp_path, monkeypatch, capsys):
     text = capsys.readouterr().out
     assert text.startswith("mine: 3600 steps of 0.001 s\n\n  arm  ")
     assert re.search(r"^  path takes +3\.5\d* s, the episode 3\.6 s$", text, re.MULTILINE)
-    assert re.search(r"^  within reach +not all poses: missed from 1\.\d+ s to 2\.\d+ s, at \(0\.8", text, re.MULTILINE)
+    assert re.search(r"^  poses in reach +not all: missed from 1\.\d+ s to 2\.\d+ s, at \(0\.8", text, re.MULTILINE)
     assert main(["scenarios", "panda-line"]) == 0
-    assert re.search(r"^  within reach +all sampled poses$", capsys.readouterr().out, re.MULTILINE)
+    assert "all, taken one by one; ikgym path follows them from the start" in capsys.readouterr().out
     assert main(["scenarios", "panda-random"]) == 0
-    assert "within reach" not in capsys.readouterr().out
+    assert "poses in reach" not in capsys.readouterr().out
 
 
 def test_the_table_fits_the_terminal_and_the_readme_has_the_command(tmp_path, capsys):

@@ -1,0 +1,102 @@
+"""A path of the user's own on the command line: a scenario, or a CSV file of waypoints with an arm."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import pathlib
+from typing import Annotated, Any
+
+import tyro
+
+from baselines.cli.parsing import Rule
+from baselines.paths.motion import path_duration
+from ikgym import arms, scenarios, tasks
+from ikgym.arms import Arm
+from ikgym.exceptions import InvalidInputError
+from ikgym.scenarios import Scenario
+from ikgym.trajectories import from_csv
+from ikgym.validation import number, per_joint
+
+#: Where nobody states the acceleration of the tool, it comes to its speed within this time in [s].
+SPEEDING_UP = 0.2
+
+
+@dataclasses.dataclass(frozen=True)
+class OwnPath:
+    """Options that make a scenario."""
+
+    file: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="FILE")]
+    """FILE.toml, the name of a scenario, or FILE.csv with waypoints."""
+    arm: Annotated[str | None, tyro.conf.arg(metavar="ARM")] = None
+    """For a CSV file: the name of an arm, or FILE.urdf."""
+    base: Annotated[str | None, tyro.conf.arg(metavar="LINK")] = None
+    """Link of a URDF file at which the arm begins; the root if left out."""
+    tip: Annotated[str | None, tyro.conf.arg(metavar="LINK")] = None
+    """Link at which it ends; needed where several could."""
+    tool: Annotated[tuple[float, float, float] | None, tyro.conf.arg(metavar="X Y Z")] = None
+    """Tool point in the frame of the tip, in [m]."""
+    acceleration: Annotated[tuple[float, ...], tyro.conf.arg(metavar="A …")] = ()
+    """Acceleration limit, or one a joint, in [rad/s²] or [m/s²]; a URDF file states none."""
+    speed: Annotated[float | None, tyro.conf.arg(metavar="V")] = None
+    """Speed of the tool in [m/s]; needed for a CSV file without times."""
+    tool_acceleration: Annotated[float | None, tyro.conf.arg(metavar="A")] = None
+    """Acceleration of the tool in [m/s²]; by default it comes to its speed within 0.2 s."""
+    corner_radius: Annotated[float | None, tyro.conf.arg(metavar="R")] = None
+    """Radius of the arcs that round corners in [m]; a smooth curve through all points if left out."""
+    task: Annotated[str | None, tyro.conf.arg(metavar="TASK")] = None
+    """Task coordinates: pose, axis (free about the tool's z axis) or position; by default pose where the file has
+    orientations."""
+    dt: Annotated[float | None, tyro.conf.arg(metavar="T")] = None
+    """Control period in [s]: 0.004 by default, or that of the scenario."""
+
+
+_WITH_CSV = ("--base", "--tip", "--tool", "--speed", "--tool-acceleration", "--corner-radius", "--task")
+RULES = (Rule(("--arm", *_WITH_CSV), lambda given: given.file.endswith(".csv"), "without a CSV file"),)
+
+
+def scenario_of(options: OwnPath) -> Scenario:
+    """The scenario that the options mean, over its whole path where they name a CSV file.
+
+    Raises:
+        UnknownNameError: There is no such scenario, arm, link or task.
+        InvalidInputError: A file cannot be read, or an option is missing or wrong.
+        MissingDependencyError: A URDF file is named, and Pinocchio is not installed.
+    """
+    if options.file.endswith(".csv"):
+        return _from_csv(options)
+    scenario = scenarios.find(options.file)
+    changes: dict[str, Any] = {} if options.dt is None else {"dt": options.dt}
+    if options.acceleration:
+        changes["arm"] = accelerated(scenario.arm, options.acceleration)
+    return scenario.replace(**changes) if changes else scenario
+
+
+def arm_of(options: OwnPath) -> Arm:
+    """The arm that the options name."""
+    if options.arm is None:
+        raise InvalidInputError(f"--arm: expected the name of an arm or FILE.urdf beside {options.file}, got none.")
+    if options.arm.endswith(".urdf"):
+        arm = arms.from_urdf(options.arm, base=options.base, tip=options.tip, tool=options.tool)
+    else:
+        arm = arms.get(options.arm)
+    return accelerated(arm, options.acceleration) if options.acceleration else arm
+
+
+def accelerated(arm: Arm, given: tuple[float, ...]) -> Arm:
+    """The arm with acceleration limits, one number or one a joint, in [rad/s²] or [m/s²]."""
+    limits = per_joint("--acceleration", given[0] if len(given) == 1 else given, arm.joints)
+    return arm.replace(acceleration_limit=limits)
+
+
+def _from_csv(options: OwnPath) -> Scenario:
+    arm, speed = arm_of(options), options.speed
+    law: dict[str, Any] = {}
+    if speed is not None:
+        usual = number("--speed", speed, above=0.0) / SPEEDING_UP
+        law = {"speed": speed, "acceleration": options.tool_acceleration or usual}
+    trajectory = from_csv(options.file, corner_radius=options.corner_radius, **law)
+    task = options.task or ("pose" if trajectory.has_orientation else "position")
+    dt = 0.004 if options.dt is None else options.dt
+    scenario = Scenario(pathlib.Path(options.file).stem, arm, tasks.get(task), trajectory, dt=dt, steps=1)
+    return scenario.replace(steps=max(math.ceil(path_duration(scenario) / scenario.dt), 1))

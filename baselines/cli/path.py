@@ -1,0 +1,165 @@
+"""The command ``ikgym path``: whether an arm can drive a path, from which start, and how fast."""
+
+from __future__ import annotations
+
+import dataclasses
+import pathlib
+from collections.abc import Sequence
+from typing import Annotated
+
+import numpy as np
+import tyro
+
+from baselines.cli import shell
+from baselines.cli.own_path import RULES, OwnPath, scenario_of
+from baselines.cli.parsing import parse
+from baselines.paths import Branch, Retimed, Survey, retime, survey
+from baselines.paths.speeds import Speeds, speed_limit
+from baselines.paths.survey import REACHED
+from ikgym.arms import Arm
+from ikgym.exceptions import InvalidInputError
+from ikgym.scenarios import Scenario
+from ikgym.validation import FloatArray, whole_number
+
+PROGRAM = f"{shell.CONSOLE} path"
+#: Most branches in the table.
+SHOWN = 8
+
+
+@dataclasses.dataclass(frozen=True)
+class Options(OwnPath):
+    """Options of the command."""
+
+    retime: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="OUT.toml")] = None
+    """Writes the scenario that can be driven: the best start, slower where a limit binds."""
+    fastest: bool = False
+    """Times the path as fast as the limits allow, not only as fast as asked."""
+    branch: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
+    """Takes the start in this line of the table; collisions are known to you alone."""
+
+
+def manual() -> str:
+    """The text of ``--help`` above the options."""
+    return f"""\
+Says whether an arm can drive a path, from which start and how fast: qp plays it from several postures at the first
+pose, and toppra finds the shortest time in which the limits hold. Needs pip install "ikgym[paths]".
+
+Examples:
+  {PROGRAM} weld.toml --retime weld-retimed.toml
+  {PROGRAM} weld.csv --arm arm.urdf --tip tool0 --speed 0.2 --acceleration 5"""
+
+
+def main(arguments: Sequence[str]) -> int:
+    """The command line: a file, or the name of a scenario, and options; returns the exit code."""
+    options = parse(Options, arguments, prog=PROGRAM, description=manual(), rules=RULES)
+    if options.retime is not None and options.retime.suffix != ".toml":
+        raise InvalidInputError(f"--retime: expected a file that ends in .toml, got {str(options.retime)!r}.")
+    found = survey(scenario_of(options))
+    if options.branch is not None:
+        row = whole_number("--branch", options.branch, at_least=1, at_most=len(found.branches)) - 1
+        found = dataclasses.replace(found, branches=found.branches[row : row + 1])
+    driven = retime(found, fastest=options.fastest) if found.best.whole else None
+    print("\n".join([*_head(found), "", _table(found), "", *_verdict(found, driven)]))
+    if options.retime is not None:
+        if driven is None:
+            raise InvalidInputError(f"--retime: no start reaches all of the path, {options.retime} is not written.")
+        driven.scenario.save(options.retime)
+        print(f"\n{options.retime}: {driven.scenario.steps} steps of {driven.scenario.dt:g} s")
+    return 0
+
+
+def _head(found: Survey) -> list[str]:
+    scenario = found.scenario
+    title = f"{scenario.name}: {scenario.arm.name}, task {scenario.task.name}, {found.duration:.3g} s"
+    return [title, "", *_tool(scenario), *_no_acceleration(found)]
+
+
+def _tool(scenario: Scenario) -> list[str]:
+    """The tool at the first pose, and its speeds."""
+    frame, speeds = scenario.frames(scenario.trajectory, 1)[0], Speeds.of(scenario)
+    begins = f"  begins at ({shell.numbers(frame[-3:])}) m"
+    if len(frame) == 12:
+        begins += f", the tool's z axis along ({shell.numbers(frame[2:9:3])})"
+    limit = speed_limit(scenario.trajectory)
+    asked = "" if limit is None else f", {limit[0]:.3g} m/s was asked, but {limit[1]}"
+    turning = f", the tool turns by {speeds.angular:.3g} rad/s" if speeds.angular > 1e-6 else ""
+    lines = [begins, f"  fastest {speeds.linear:.3g} m/s{asked}{turning}"]
+    short = scenario.steps * scenario.dt
+    if short < 0.999 * getattr(scenario.trajectory, "duration", 0.0):
+        lines.append(f"  the episode ends after {short:.3g} s, before the path: give it more steps")
+    return lines
+
+
+def _no_acceleration(found: Survey) -> list[str]:
+    """What is not checked where nobody states the accelerations."""
+    arm = found.scenario.arm
+    if np.isfinite(arm.acceleration_limit).all():
+        return []
+    line = "  acceleration limits are not stated (see --acceleration): velocities alone are checked"
+    if found.best.whole:
+        joint = int(np.argmax(np.where(np.isfinite(arm.acceleration_limit), 0.0, found.best.acceleration)))
+        line += f", peak {found.best.acceleration[joint]:.3g} {_unit(arm, joint)}/s² at {arm.joint_names[joint]}"
+    return [line]
+
+
+def _table(found: Survey) -> str:
+    head = ("", "reaches", "velocity", "acceleration", "to a stop", "shortest", "start [rad or m]")
+    rows = [_row(i, branch, found.scenario) for i, branch in enumerate(found.branches[:SHOWN], 1)]
+    return shell.aligned([head, *rows], shell.width())
+
+
+def _row(number: int, branch: Branch, scenario: Scenario) -> tuple[str, ...]:
+    arm = scenario.arm
+    far, turned = branch.position_error, branch.orientation_error
+    missed = f"{100 * branch.reached:.0f} %, misses {_small(far, 'm') if far > REACHED else _small(turned, 'rad')}"
+    joint, room = int(np.argmin(branch.room)), float(branch.room.min())
+    return (
+        str(number),
+        "all" if branch.reached == 1.0 else missed,
+        _share(arm, branch.velocity / scenario.largest_qdot) if branch.whole else "–",
+        _share(arm, branch.acceleration / arm.acceleration_limit) if branch.whole else "–",
+        f"{room:.2f} {_unit(arm, joint)} {arm.joint_names[joint]}" if np.isfinite(room) else "–",
+        "–" if branch.shortest is None else f"{branch.shortest.duration:.3g} s",
+        shell.numbers(np.round(branch.start, 2)),
+    )
+
+
+def _small(value: float, unit: str) -> str:
+    """A number in thousandths of its unit."""
+    return f"{1e3 * value:.2g} m{unit}"
+
+
+def _share(arm: Arm, shares: FloatArray) -> str:
+    """The joint that uses the largest share of its limit."""
+    joint = int(np.argmax(shares))
+    return f"{100 * shares[joint]:.0f} % {arm.joint_names[joint]}" if shares[joint] > 0.0 else "–"
+
+
+def _unit(arm: Arm, joint: int) -> str:
+    return "m" if arm.prismatic[joint] else "rad"
+
+
+def _verdict(found: Survey, driven: Retimed | None) -> list[str]:
+    if driven is None:
+        return _unreached(found)
+    motion, start = driven.motion, shell.numbers(np.round(driven.motion.q[0, 0], 4))
+    how = f"qp follows within {_small(motion.position_error.max(), 'm')}"
+    if found.scenario.task.has_orientation:
+        how += f" and {_small(motion.orientation_error.max(), 'rad')}"
+    speed = f"at up to {Speeds.of(driven.scenario).linear:.3g} m/s"
+    if found.drivable:
+        can = "It can be driven as it is"
+        more = f"; in {driven.duration:.3g} s {speed}" if driven.duration != found.duration else ""
+    else:
+        can = f"It cannot be driven in {found.duration:.3g} s, but in {driven.duration:.3g} s, {speed}"
+        more = ""
+    return [f"{can}{more}: {how}, all limits hold.", f"start = [{start}]"]
+
+
+def _unreached(found: Survey) -> list[str]:
+    best, scenario = found.best, found.scenario
+    time = best.reached * found.duration
+    x = scenario.trajectory.frames(np.array([time]), scenario.arm)[0, -3:]
+    where = f"from {time:.3g} s on, at ({shell.numbers(np.round(x, 4))}) m"
+    far = f"{best.position_error:.3g} m and {best.orientation_error:.3g} rad"
+    return [f"It cannot be driven: no start reaches all of it. The farthest misses poses {where}, and by up to {far}."]

@@ -1,0 +1,96 @@
+"""The command ``ikgym path``."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import baselines
+import ikgym
+from baselines.cli import main
+
+ROBOTS = Path(__file__).parents[2] / "robots"
+CHAINS = {
+    "ur10": ("base_link", "tool0"),
+    "ur10_rail": ("world", "tool0"),
+    "baxter": ("torso", "left_gripper"),
+    "pr2": ("base_link", "r_gripper_tool_frame"),
+}
+
+
+@pytest.fixture(autouse=True)
+def called_by_its_name(monkeypatch, tmp_path):
+    monkeypatch.setattr(sys, "argv", ["ikgym"])
+    monkeypatch.setenv("COLUMNS", "140")
+    monkeypatch.chdir(tmp_path)
+
+
+def command(robot, *more):
+    base, tip = CHAINS[robot]
+    arm = ["--arm", str(ROBOTS / f"{robot}.urdf"), "--base", base, "--tip", tip]
+    return ["path", str(ROBOTS / f"{robot}.csv"), *arm, "--speed", "0.2", "--corner-radius", "0.03", *more]
+
+
+@pytest.mark.parametrize(
+    "robot", ["ur10", *(pytest.param(name, marks=pytest.mark.slow) for name in ("ur10_rail", "baxter", "pr2"))]
+)
+def test_arms_that_are_not_in_the_catalogue(robot, capsys):
+    limits = ("--acceleration", "5") if robot != "pr2" else ()
+    assert main(command(robot, "--retime", "out.toml", *limits)) == 0
+    text = capsys.readouterr().out
+    assert "fastest 0.146 m/s, 0.2 m/s was asked, but its bends of 0.03 m allow no more with 1 m/s²" in text
+    assert ("acceleration limits are not stated" in text) == (not limits)
+    assert "It can be driven as it is: qp follows within 0.0" in text
+    scenario = ikgym.scenarios.load("out.toml")
+    assert any(name in text for name in scenario.arm.joint_names)
+    tracking = baselines.track(scenario, "qp")
+    assert tracking.position_error.max() < 5e-5
+    assert tracking.orientation_error.max() < 5e-4
+    np.testing.assert_allclose(tracking.nominal[-1], scenario.nominal()[-1])
+
+
+def test_a_path_that_is_too_fast(capsys):
+    assert main(["path", "panda-fast", "--retime", "slow.toml"]) == 0
+    text = capsys.readouterr().out
+    assert "It cannot be driven in 0.589 s, but in 1." in text
+    assert "% panda_joint" in text
+    scenario = ikgym.scenarios.load("slow.toml")
+    assert f"slow.toml: {scenario.steps} steps of 0.001 s" in text
+
+
+def test_a_path_out_of_reach(capsys):
+    assert main(["path", "panda-edge", "--retime", "edge.toml"]) == 2
+    out, err = capsys.readouterr()
+    assert "It cannot be driven: no start reaches all of it. The farthest misses poses from 1.5 s on, at (0.7" in out
+    assert "--retime: no start reaches all of the path, edge.toml is not written" in err
+    assert not Path("edge.toml").exists()
+
+
+def test_a_branch_of_ones_own_choice(capsys):
+    assert main(["path", "panda-turn", "--branch", "2"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    start = next(line for line in lines if line.startswith("1  all")).split()[-7].rstrip(",")
+    assert lines[-1].startswith(f"start = [{start}")
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["path"], "FILE"),
+        (["path", "nowhere.toml"], "nowhere.toml"),
+        (["path", "panda-fast", "--speed", "0.1"], "--speed has no effect without a CSV file"),
+        (["path", "panda-fast", "--retime", "out.csv"], "--retime: expected a file that ends in .toml"),
+        (["path", "panda-fast", "--branch", "99"], "--branch: expected"),
+        (["path", "panda-random"], "the same at every reset"),
+        (["path", str(ROBOTS / "ur10.csv"), "--speed", "0.1"], "--arm: expected the name of an arm or FILE.urdf"),
+        (["path", str(ROBOTS / "ur10.csv"), "--arm", "panda"], "speed: expected a number, or times of the waypoints"),
+        (["path", str(ROBOTS / "ur10.csv"), "--arm", "panda", "--speed", "-1"], "--speed"),
+        (command("ur10", "--acceleration", "1", "2"), "--acceleration"),
+    ],
+)
+def test_bad_input(words, message, capsys):
+    assert main(words) == 2
+    assert message in capsys.readouterr().err

@@ -1,0 +1,117 @@
+"""Branches of a path, and paths in the time in which they can be driven, played by the environment itself."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import baselines
+import ikgym
+from baselines.paths import retime, survey
+from baselines.paths.motion import ideal, path_duration, played
+from baselines.paths.survey import FOLLOWED, follows
+from baselines.paths.timing import Timing
+from ikgym.exceptions import InvalidInputError
+
+
+def faster(name, times):
+    """A path of the catalogue at so many times its speed."""
+    scenario = ikgym.scenarios.get(name)
+    law = scenario.trajectory.time_law
+    law = dataclasses.replace(law, speed=times * law.speed, acceleration=times**2 * law.acceleration)
+    return scenario.replace(name=f"{name}-{times}", trajectory=scenario.trajectory.replace(time_law=law))
+
+
+def follows_uniformly(scenario, start, factor):
+    trajectory = Timing.uniform(path_duration(scenario), factor).of(scenario.trajectory)
+    return follows(played(ideal(scenario, trajectory=trajectory, start=start), start[None]))
+
+
+def by_bisection(scenario, start):
+    """The shortest time that is a multiple of what is asked, in [s]; inf where 30 times as much is too little."""
+    low, high = 1.0, 1.5
+    while not follows_uniformly(scenario, start, high):
+        low, high = high, 1.5 * high
+        if high > 30.0:
+            return np.inf
+    while high > 1.01 * low:
+        middle = np.sqrt(low * high)
+        low, high = (low, middle) if follows_uniformly(scenario, start, middle) else (middle, high)
+    return high * path_duration(scenario)
+
+
+def check_driven(retimed):
+    """The environment plays what was promised: on the path, within all limits, nobody held back."""
+    scenario = retimed.scenario
+    tracking = baselines.track(scenario, "qp")
+    assert tracking.position_error.max() <= FOLLOWED[0]
+    assert np.nan_to_num(tracking.orientation_error).max() <= FOLLOWED[1]
+    q, qdot, arm = tracking.q, tracking.qdot, scenario.arm
+    assert (arm.lower <= q).all()
+    assert (q <= arm.upper).all()
+    assert (np.abs(qdot) <= (1.0 + 1e-6) * arm.velocity_limit).all()
+    qddot = np.diff(np.vstack([np.zeros(arm.joints), qdot]), axis=0) / scenario.dt
+    assert (np.abs(qddot) <= (1.0 + 1e-4) * arm.acceleration_limit).all()
+    end = retimed.scenario.trajectory.frames(np.array([retimed.duration]), arm)
+    np.testing.assert_allclose(tracking.nominal[-1][-3:], end[0, -3:], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "tiago-fast",
+        *(pytest.param(name, marks=pytest.mark.slow) for name in ("panda-fast", "iiwa14-fast")),
+        *(pytest.param(pair, marks=pytest.mark.slow) for pair in (("panda-square", 8), ("panda-lemniscate", 8))),
+    ],
+    ids=str,
+)
+def test_a_path_that_is_too_fast(name):
+    scenario = ikgym.scenarios.get(name) if isinstance(name, str) else faster(*name)
+    found = survey(scenario)
+    assert not found.drivable
+    retimed = retime(found)
+    check_driven(retimed)
+    starts = {"own": scenario.start_of(), "best": retimed.scenario.start}
+    assert retimed.duration <= 1.05 * min(by_bisection(scenario, start) for start in starts.values())
+    # The same places in space, later.
+    base = retimed.scenario.trajectory.base_times(np.linspace(0.0, retimed.duration, 50))
+    assert (np.diff(base) > 0.0).all()
+    assert base[-1] == pytest.approx(path_duration(scenario))
+
+
+def test_another_start_drives_what_the_own_one_does_not():
+    scenario = ikgym.scenarios.get("panda-turn")
+    assert baselines.track(scenario, "qp").position_error.max() > 1e-3
+    found = survey(scenario)
+    assert found.drivable
+    retimed = retime(found)
+    assert retimed.duration == found.duration
+    check_driven(retimed)
+    assert retime(found, fastest=True).duration < 0.8 * found.duration
+
+
+def test_a_start_that_is_given_is_kept_where_it_will_do():
+    scenario = ikgym.scenarios.get("panda-square")
+    best = survey(scenario).best
+    other = next(b for b in survey(scenario).branches[1:] if b.whole and b.room.min() > 0.05 and b.slowing == 1.0)
+    assert not best.given
+    given = survey(scenario.replace(start=other.start)).best
+    assert given.given
+    np.testing.assert_array_equal(given.start, other.start)
+
+
+def test_a_path_out_of_reach():
+    found = survey(ikgym.scenarios.get("panda-edge"))
+    assert not found.best.whole
+    assert 0.3 < found.best.reached < 0.5
+    # The farthest point of the circle is 4 % of the reach out of reach.
+    assert 0.02 < found.best.position_error < 0.06
+    with pytest.raises(InvalidInputError, match=r"'panda-edge': expected a path .* starts reach 4\d\.\d % at most"):
+        retime(found)
+
+
+def test_random_paths_are_refused():
+    with pytest.raises(InvalidInputError, match="the same at every reset, got scenario 'panda-random'"):
+        survey(ikgym.scenarios.get("panda-random"))

@@ -1,0 +1,62 @@
+"""The shortest time of a joint path, against what can be worked out by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from baselines.paths.timing import JointPath, Limits, Timing, shortest
+from ikgym.trajectories import Trajectory
+
+FAR = 2.0
+VELOCITY, ACCELERATION = np.array([1.0, 3.0]), np.array([4.0, 12.0])
+
+
+def rest_to_rest(times):
+    """Two joints, the second one twice as far, from rest to rest within 1 s."""
+    u = np.clip(times, 0.0, 1.0)
+    return np.column_stack([FAR * u**3 * (10.0 + u * (6.0 * u - 15.0))]) * np.array([1.0, 2.0])
+
+
+def path():
+    times = np.linspace(0.0, 1.0, 1001)
+    return JointPath.of(times, rest_to_rest(times), VELOCITY)
+
+
+def joints(timing, dt):
+    times = np.arange(0.0, timing.duration + dt, dt)
+    base = timing.of(_Any()).base_times(times)
+    return rest_to_rest(base)
+
+
+class _Any(Trajectory):
+    """A trajectory of which nothing is asked."""
+
+
+def test_a_straight_line_takes_a_trapezoid():
+    timing = shortest(path(), Limits(VELOCITY, ACCELERATION, 1e-3))
+    trapezoid = FAR / 1.0 + 1.0 / 4.0  # the first joint is the slow one
+    assert trapezoid * 0.999 < timing.duration < trapezoid * 1.01
+    q = joints(timing, 1e-3)
+    velocity, acceleration = np.diff(q, axis=0) / 1e-3, np.diff(q, n=2, axis=0) / 1e-6
+    assert (np.abs(velocity).max(axis=0) <= 1.001 * VELOCITY).all()
+    assert (np.abs(acceleration).max(axis=0) <= 1.06 * ACCELERATION).all()
+    np.testing.assert_allclose(q[-1], [FAR, 2.0 * FAR], atol=1e-9)
+
+
+def test_velocities_alone():
+    timing = shortest(path(), Limits(VELOCITY, np.full(2, np.inf), 1e-3))
+    assert FAR * 0.999 < timing.duration < FAR * 1.02
+
+
+def test_nowhere_faster_than_asked():
+    timing = shortest(path(), Limits(10.0 * VELOCITY, 100.0 * ACCELERATION, 1e-3, rate=1.0))
+    assert timing.duration == pytest.approx(1.0, rel=5e-3)
+    assert timing.rates.max() <= 1.0 + 1e-9
+
+
+def test_the_same_in_another_time():
+    timing = Timing.uniform(3.0, 2.0)
+    assert timing.duration == 6.0
+    np.testing.assert_array_equal(timing.of(_Any()).base_times(np.array([0.0, 3.0, 6.0])), [0.0, 1.5, 3.0])
+    assert timing.slower(1.5).duration == 9.0

@@ -1,0 +1,61 @@
+"""A trajectory in another time."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import ikgym
+from ikgym.exceptions import InvalidInputError
+from ikgym.trajectories import RandomSinusoid, RetimedTrajectory
+
+SCENARIO = ikgym.scenarios.get("panda-square")
+BASE = SCENARIO.trajectory
+# Rates 0, 1, 1 at 0, 2, 4 s: progress t²/4, then t - 1.
+TIMES, PROGRESS, RATES = [0.0, 2.0, 4.0], [0.0, 1.0, 3.0], [0.0, 1.0, 1.0]
+SLOWER = RetimedTrajectory(BASE, TIMES, PROGRESS, RATES)
+
+
+def test_poses_are_those_of_the_other_trajectory():
+    times = np.linspace(0.0, 5.0, 101)
+    expected = np.where(times < 2.0, times**2 / 4.0, np.minimum(times - 1.0, 3.0))
+    np.testing.assert_allclose(SLOWER.base_times(times), expected, atol=1e-14)
+    np.testing.assert_array_equal(
+        SLOWER.frames(times, SCENARIO.arm), BASE.frames(SLOWER.base_times(times), SCENARIO.arm)
+    )
+    assert SLOWER.duration == 4.0
+    assert SLOWER.has_orientation
+
+
+def test_joint_paths_too():
+    base = ikgym.scenarios.get("panda-singular").trajectory
+    slower = RetimedTrajectory(base, TIMES, PROGRESS, RATES)
+    times = np.linspace(0.0, 4.0, 9)
+    np.testing.assert_array_equal(slower.joint_path(times), base.joint_path(slower.base_times(times)))
+    np.testing.assert_array_equal(slower.first_joints(), base.first_joints())
+    np.testing.assert_array_equal(slower.joint_bound(), base.joint_bound())
+
+
+@pytest.mark.parametrize("base", ["panda-square", "panda-singular", "cppflow-panda-square"])
+def test_a_file_gives_it_back(base, tmp_path):
+    found = ikgym.scenarios.get(base)
+    scenario = found.replace(trajectory=RetimedTrajectory(found.trajectory, TIMES, PROGRESS, RATES), steps=900)
+    scenario.save(tmp_path / "slower.toml")
+    np.testing.assert_array_equal(ikgym.scenarios.load(tmp_path / "slower.toml").nominal(), scenario.nominal())
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"times": [0.0, 2.0, 2.0]}, "times: expected numbers that rise, got 0"),
+        ({"times": [1.0, 2.0, 4.0]}, "times: expected 0 s as the first, got 1 s"),
+        ({"times": [0.0]}, "times: expected from 2 to 200000 waypoints, got 1"),
+        ({"progress": [0.0, 2.0, 1.0]}, "progress: expected numbers that never fall, got -1"),
+        ({"rates": [0.0, -1.0, 1.0]}, "rates: expected numbers that are at least 0, got -1"),
+        ({"rates": [0.0, 1.0]}, "rates: expected shape"),
+        ({"trajectory": RandomSinusoid(np.ones(2), np.ones(2))}, "expected a Trajectory that is not random"),
+    ],
+)
+def test_bad_input(changes, message):
+    with pytest.raises(InvalidInputError, match=message):
+        SLOWER.replace(**changes)
