@@ -65,7 +65,7 @@ def test_a_path_out_of_reach(capsys):
     assert main(["path", "panda-edge", "--retime", "edge.toml"]) == 2
     out, err = capsys.readouterr()
     assert "It cannot be driven: no start reaches all of it. The farthest misses poses from 1.5 s on, at (0.7" in out
-    assert "--retime: no start reaches all of the path, edge.toml is not written" in err
+    assert "--retime: the path cannot be driven, edge.toml is not written" in err
     assert not Path("edge.toml").exists()
 
 
