@@ -55,12 +55,12 @@ def main(arguments: Sequence[str]) -> int:
     options = parse(Options, arguments, prog=PROGRAM, description=manual(), rules=RULES)
     if options.retime is not None and options.retime.suffix != ".toml":
         raise InvalidInputError(f"--retime: expected a file that ends in .toml, got {str(options.retime)!r}.")
-    found = survey(scenario_of(options))
+    every = found = survey(scenario_of(options))
     if options.branch is not None:
-        row = whole_number("--branch", options.branch, at_least=1, at_most=len(found.branches)) - 1
-        found = dataclasses.replace(found, branches=found.branches[row : row + 1])
+        row = whole_number("--branch", options.branch, at_least=1, at_most=len(every.branches)) - 1
+        found = dataclasses.replace(every, branches=every.branches[row : row + 1])
     driven = retimed(found, fastest=options.fastest)
-    print("\n".join([*_head(found), "", _table(found), "", *_verdict(found, driven)]))
+    print("\n".join([*_head(found), "", _table(every), "", *_verdict(found, driven)]))
     if options.retime is not None:
         if driven is None:
             raise InvalidInputError(f"--retime: the path cannot be driven, {options.retime} is not written.")
@@ -121,7 +121,7 @@ def _row(number: int, branch: Branch, scenario: Scenario) -> tuple[str, ...]:
         _share(arm, branch.acceleration / arm.acceleration_limit) if branch.whole else "–",
         f"{room:.2f} {_unit(arm, joint)} {arm.joint_names[joint]}" if np.isfinite(room) else "–",
         "–" if branch.shortest is None else f"{branch.shortest.duration:.3g} s",
-        shell.numbers(np.round(branch.start, 2)),
+        " ".join(f"{q + 0.0:.1f}" for q in np.round(branch.start, 1)),
     )
 
 
