@@ -116,7 +116,6 @@ def _played(name: str, scenario: str, lines: Sequence[Line], episodes: int) -> l
         "timed": TIMED,
         "out": folder,
         "resume": True,
-        "plots": False,
         "report": False,
     }
     return records(evaluate(scenario, played, progress=True, **options), [line["policy"] for line in lines])

@@ -122,7 +122,7 @@ def test_the_environment_runs_from_the_wheel(installed):
 def test_agents_are_evaluated_from_the_wheel(installed):
     run, _, folder = installed
     policies = ("dls", "agent_alone")
-    done = run("ikgym", "evaluate", "--scenarios", "varga7-random", "--policies", *policies, "--out", "out")
+    done = run("ikgym", "evaluate", "--scenarios", "varga7-random", "--policies", *policies, "--out", "out", "--plots")
     assert "varga7-random" in done.stdout
     rows = json.loads((folder / "out" / "results.json").read_text())
     rows = rows["rows"] if isinstance(rows, dict) else rows

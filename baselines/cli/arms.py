@@ -2,18 +2,42 @@
 
 from __future__ import annotations
 
+import dataclasses
+import textwrap
+from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
 
 from baselines.cli import shell
-from ikgym import arms
-from ikgym.arms import Arm
+from baselines.cli.parsing import Rule
+from baselines.cli.robot import ROBOT_OPTIONS, RobotOptions
+from ikgym import arms, scenarios
+from ikgym.arms import Arm, Tip
+from ikgym.scenarios import toml
+
+#: Most tips in a table; names alone of the others.
+MOST_TIPS = 8
+
+
+@dataclasses.dataclass(frozen=True)
+class Arguments(shell.Names, RobotOptions):
+    """Arguments of the command line."""
+
+
+RULES = (Rule(ROBOT_OPTIONS, lambda given: any(_is_urdf(name) for name in given.names), "without a URDF file"),)
 
 
 def main(arguments: Sequence[str]) -> int:
     """The command line: names, or options; returns the exit code."""
-    return shell.list_members("arms", ARMS, arguments)
+    given = shell.members("arms", ARMS, arguments, Arguments, RULES)
+    if given.names:
+        print("\n\n".join(_shown(name, given) for name in given.names))
+    return 0
+
+
+def _is_urdf(name: str) -> bool:
+    return name.endswith(".urdf")
 
 
 def _arm_row(name: str) -> tuple[str, ...]:
@@ -28,19 +52,69 @@ def kinds_of_limits(arm: Arm) -> list[str]:
     return [kind for kind, values in kinds.items() if np.isfinite(values).any()]
 
 
-def _arm(name: str) -> str:
-    arm = arms.from_urdf(name) if name.endswith(".urdf") else arms.get(name)
-    rows: list[tuple[str, ...]] = [("joint", "kind", "lower", "upper", "velocity limit", "acceleration limit")]
-    numbers = zip(arm.prismatic, arm.lower, arm.upper, arm.velocity_limit, arm.acceleration_limit, strict=True)
-    for joint, (prismatic, *limits) in enumerate(numbers, 1):
+def _shown(name: str, given: Arguments) -> str:
+    """An arm in full: of the catalogue, of a scenario file, or of a URDF file."""
+    if name.endswith(".toml"):
+        return _table(name, scenarios.find(name).arm)
+    if not _is_urdf(name):
+        return _table(name, arms.get(name))
+    found = arms.tips(name, base=given.base) if given.tip is None else ()
+    if len(found) < 2:
+        return _from_urdf(name, given.tip, given)
+    first = found[0]
+    return _choice(name, found) + ("" if first.fault else f"\n\n{_from_urdf(name, first.link, given)}")
+
+
+def _from_urdf(name: str, tip: str | None, given: Arguments) -> str:
+    """The arm of a URDF file, and how a scenario file names it."""
+    arm = dataclasses.replace(given, tip=tip).robot(name)
+    title = name if tip is None else f"{name} to {tip}"
+    return f"{_table(title, arm)}\n\n{_scenario_table(name, tip, given, arm)}"
+
+
+def _choice(name: str, found: Sequence[Tip]) -> str:
+    """The links of a file that can be the tip, likely ones first, and how to choose one."""
+    rows = [("tip", "joints", "kinds", "from … to"), *map(_tip_row, found[:MOST_TIPS])]
+    others = [tip.link for tip in found[MOST_TIPS:]]
+    title = (
+        f"{name}: no link can be the tip"
+        if found[0].fault
+        else f"{name}: {len(found)} links can be the tip; choose one with --tip, such as --tip {found[0].link}"
+    )
+    table = shell.aligned(rows, shell.width())
+    return "\n".join([title, "", table, *([shell.listing("others", others)] if others else [])])
+
+
+def _tip_row(tip: Tip) -> tuple[str, ...]:
+    kinds = ", ".join(f"{count} {kind}" for kind, count in Counter(tip.kinds).items())
+    ends = f"cannot be read: {tip.fault}" if tip.fault else f"{tip.joints[0]} … {tip.joints[-1]}"
+    return tip.link, str(len(tip.joints)), kinds, ends
+
+
+def _table(name: str, arm: Arm) -> str:
+    """The joints of an arm with their limits."""
+    rows: list[tuple[str, ...]] = [("joint", "kind", "lower", "upper", "velocity", "acceleration")]
+    numbers = zip(arm.lower, arm.upper, arm.velocity_limit, arm.acceleration_limit, strict=True)
+    for joint, prismatic, limits in zip(arm.joint_names, arm.prismatic, numbers, strict=True):
         unit = "m" if prismatic else "rad"
         units = unit, unit, f"{unit}/s", f"{unit}/s²"
-        cells = [f"{value:.4g} {ending}" for value, ending in zip(limits, units, strict=True)]
-        rows.append((str(joint), "prismatic" if prismatic else "revolute", *cells))
+        cells = [f"{x:.4g} {per}" if np.isfinite(x) else "none" for x, per in zip(limits, units, strict=True)]
+        rows.append((joint, "prismatic" if prismatic else "revolute", *cells))
     tool = shell.numbers(arm.forward(np.zeros(arm.joints))[1])
     home = "none stated" if arm.home is None else f"({shell.numbers(arm.home)}) rad or m"
     title = f"{name}: {arm.joints} joints, tool at ({tool}) m where q = 0, home posture {home}"
-    return f"{title}\n\n{shell.aligned(rows, 80)}"
+    return f"{textwrap.fill(title, shell.width())}\n\n{shell.aligned(rows, shell.width())}"
 
 
-ARMS = shell.Catalogue("arm", arms.names, ("arm", "joints", "prismatic", "limits"), _arm_row, _arm, ".urdf")
+def _scenario_table(name: str, tip: str | None, given: Arguments, arm: Arm) -> str:
+    """The arm as a scenario file has it."""
+    stated = bool(np.isfinite(arm.acceleration_limit).any())
+    limit = arm.acceleration_limit if stated else None
+    table = {"urdf": name, "base": given.base, "tip": tip, "tool": given.tool, "acceleration_limit": limit}
+    head = "In a scenario file:" if stated else "In a scenario file (add acceleration_limit, which no URDF states):"
+    return f"{head}\n\n{toml.document({'arm': table}).strip()}"
+
+
+ARMS = shell.Catalogue(
+    "arm", arms.names, ("arm", "joints", "prismatic", "limits"), _arm_row, endings=(".urdf", ".toml")
+)

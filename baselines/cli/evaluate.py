@@ -98,9 +98,9 @@ Examples:
 Files in the folder of --out, each replaced in one go, so that a run may be stopped at any time:
   results.json  a list of rows, one an episode, written anew after each batch
   results.csv   the same as a table
-  README.md     tables, plots and conditions
+  README.md     tables and conditions
   report.html   a table that sorts and filters, plots, and replays of the arms: open it in a browser
-  plots/        for each scenario: tracking and errors, joint velocities, joint paths, cost against time
+  plots/        with --plots, for each scenario: errors and position, joint motion, cost against time
   series/       the data of the plots, as .npz
   export/       with --export, the joint motion of each episode
 

@@ -140,7 +140,6 @@ def _work(options: Options, command: str) -> None:
         overwrite=options.overwrite,
         workers=options.workers,
         cluster=options.cluster,
-        plots=False,
         report=False,
         progress=True,
     )

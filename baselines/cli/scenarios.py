@@ -68,5 +68,5 @@ SCENARIOS = shell.Catalogue(
     ("scenario", "arm", "task", "steps", "source"),
     _scenario_row,
     _scenario,
-    ".toml",
+    (".toml",),
 )

@@ -155,7 +155,10 @@ class Names:
     """Arguments of a list."""
 
     names: Annotated[tyro.conf.Positional[tuple[str, ...]], tyro.conf.arg(metavar="NAME …")] = ()
-    """Names to show in full, or files: .urdf for arms, .toml for scenarios. The list if left out."""
+    """Names to show in full, or files: .urdf or .toml for arms, .toml for scenarios. The list if left out."""
+
+
+N = TypeVar("N", bound=Names)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -167,42 +170,49 @@ class Catalogue:
         names: Gives the names of all members.
         head: Heads of the columns; the last column fills the line.
         row: The other cells of a member's line.
-        full: The full description of a member.
-        ending: Suffix of files that are shown in full like members; none if empty.
+        full: The full description of a member; the command prints its own where there is none.
+        endings: Suffixes of files that are shown in full like members.
     """
 
     kind: str
     names: Callable[[], Sequence[str]]
     head: tuple[str, ...]
     row: Callable[[str], tuple[str, ...]]
-    full: Callable[[str], str]
-    ending: str = ""
+    full: Callable[[str], str] | None = None
+    endings: tuple[str, ...] = ()
 
 
 def list_members(word: str, catalogue: Catalogue, arguments: Sequence[str]) -> int:
-    """A command that prints a catalogue, or some of its members in full.
+    """A command that prints a catalogue, or some of its members in full; see :func:`members`."""
+    given = members(word, catalogue, arguments, Names)
+    if given.names and catalogue.full is not None:
+        print("\n\n".join(_refilled(catalogue.full(name), width()) for name in given.names))
+    return 0
+
+
+def members(word: str, catalogue: Catalogue, arguments: Sequence[str], kind: type[N], rules: Iterable[Rule] = ()) -> N:
+    """The arguments of a command that shows members of a catalogue; prints the catalogue where none is named.
 
     Args:
         word: The command.
         catalogue: The catalogue.
         arguments: Names, or options.
+        kind: The type of the arguments.
+        rules: See :func:`parse`.
 
     Raises:
         UnknownNameError: There is no such member; the message has the nearest name.
-        InvalidInputError: A file cannot be read.
-        MissingDependencyError: A URDF file is to be read, and Pinocchio is not installed.
+        InvalidInputError: An option is refused.
     """
-    prog = f"{CONSOLE} {word}"
-    given = parse(Names, arguments, prog=prog, description=f"Lists the {word}, or shows some in full.").names
+    description = f"Lists the {word}, or shows some in full."
+    given = parse(kind, arguments, prog=f"{CONSOLE} {word}", description=description, rules=rules)
     known = catalogue.names()
-    for name in given:
-        if name not in known and not (catalogue.ending and name.endswith(catalogue.ending)):
+    for name in given.names:
+        if name not in known and not name.endswith(catalogue.endings):
             raise UnknownNameError(catalogue.kind, name, known)
-    if given:
-        print("\n\n".join(_refilled(catalogue.full(name), width()) for name in given))
-    else:
+    if not given.names:
         print(aligned([catalogue.head, *((name, *catalogue.row(name)) for name in known)], width()))
-    return 0
+    return given
 
 
 def aligned(rows: Sequence[Sequence[str]], most: int) -> str:

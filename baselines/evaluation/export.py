@@ -122,9 +122,10 @@ def trajectory_log(scenario: Scenario, seeds: Seeds, episode: Episode) -> Trajec
     Returns:
         ``time`` in [s], of shape (k,), and over it ``nominal`` and ``pose`` (k, m), ``q`` and ``qdot`` (k, n),
         ``position_error`` and, where there is one, ``orientation_error`` (k,); ``nominal_q`` (k, n) where there is a
-        nominal joint path; ``prismatic``, which joints are prismatic, and the limits ``lower``, ``upper`` and
-        ``velocity_limit`` of the arm, infinite where there is none, all of shape (n,). If there are limits of
-        acceleration, ``acceleration_limit`` (n,), and ``qddot`` (k, n): the change of q̇ in the step by Δt, from rest.
+        nominal joint path; ``joint_names``; ``prismatic``, which joints are prismatic, and the limits ``lower``,
+        ``upper`` and ``velocity_limit`` of the arm, infinite where there is none, all of shape (n,). If there are
+        limits of acceleration, ``acceleration_limit`` (n,), and ``qddot`` (k, n): the change of q̇ in the step by Δt,
+        from rest.
         For replays, at f <= :data:`FRAMES` of these steps, whose rows are ``frame`` (f,): ``joint_points``
         (f, n, 2, 3), the ends of the joints of the arm that moves, and ``tool`` (f, 3), both in [m], and
         ``tool_rotation`` (f, 3, 3).
@@ -138,6 +139,7 @@ def trajectory_log(scenario: Scenario, seeds: Seeds, episode: Episode) -> Trajec
         "q": episode.q[kept],
         "qdot": episode.qdot[kept],
         "position_error": episode.position_error[kept],
+        "joint_names": np.array(scenario.arm.joint_names),
         "prismatic": np.array(scenario.arm.prismatic, dtype=np.bool_),
         "lower": scenario.arm.lower,
         "upper": scenario.arm.upper,
@@ -161,7 +163,7 @@ AXES: Mapping[str, tuple[str | int, ...]] = {
     **dict.fromkeys(("nominal", "pose"), ("k", "m")),
     **dict.fromkeys(("q", "qdot", "nominal_q", "qddot"), ("k", "n")),
     **dict.fromkeys(("time", "position_error", "orientation_error"), ("k",)),
-    **dict.fromkeys(("prismatic", "lower", "upper", "velocity_limit", "acceleration_limit"), ("n",)),
+    **dict.fromkeys(("joint_names", "prismatic", "lower", "upper", "velocity_limit", "acceleration_limit"), ("n",)),
     "frame": ("f",),
     "joint_points": ("f", "n", 2, 3),
     "tool": ("f", 3),
@@ -174,7 +176,7 @@ def check_log(log: Mapping[str, npt.NDArray[Any]]) -> None:
     """Checks names, shapes and types of the arrays of a log that was read.
 
     Raises:
-        ValueError: One is missing, unknown or not numeric, or lengths do not fit together.
+        ValueError: One is missing, unknown or of another type, or lengths do not fit together.
     """
     known_names("array of a log", log, tuple(AXES))
     lengths: dict[str | int, int] = {2: 2, 3: 3}
@@ -182,8 +184,9 @@ def check_log(log: Mapping[str, npt.NDArray[Any]]) -> None:
         if name not in log and name in OPTIONAL:
             continue
         shape = log[name].shape if name in log else None
-        if shape is None or log[name].dtype.kind not in "fiub" or len(shape) != len(axes):
-            raise ValueError(f"expected numbers of shape {axes} in the array {name}, got shape {shape}")
+        kinds, what = ("U", "texts") if name == "joint_names" else ("fiub", "numbers")
+        if shape is None or log[name].dtype.kind not in kinds or len(shape) != len(axes):
+            raise ValueError(f"expected {what} of shape {axes} in the array {name}, got shape {shape}")
         if any(lengths.setdefault(axis, length) != length for axis, length in zip(axes, shape, strict=True)):
             raise ValueError(f"the shape {shape} of the array {name} does not fit the others")
 

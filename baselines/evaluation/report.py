@@ -13,7 +13,7 @@ from baselines.canonical import canonical
 from baselines.evaluation.jobs import Skipped
 from baselines.evaluation.metrics import FOLLOWED_ORIENTATION, FOLLOWED_POSITION, LOST_ORIENTATION, LOST_POSITION, Row
 from baselines.evaluation.summary import Paired, Spread, Summary, by_scenario, is_reference, summarise
-from baselines.evaluation.table import NOTHING, Column, code, escaped, fitting, markdown, number, plain
+from baselines.evaluation.table import NOTHING, Column, code, escaped, filled, fitting, markdown, number, plain
 from baselines.oracle import best_known
 
 #: Characters that a line of the printed tables may have.
@@ -93,7 +93,7 @@ def table(rows: Sequence[Row], skipped: Sequence[Skipped] = (), *, width: int = 
     absent: dict[str, None] = {}
     for scenario, summaries in by_scenario(rows).items():
         columns = fitting(COLUMNS, summaries, width)
-        absent.update(dict.fromkeys(column.title for column in COLUMNS if column not in columns))
+        absent.update(dict.fromkeys(column.title for column in filled(COLUMNS, summaries) if column not in columns))
         parts.append(f"{heading(scenario, summaries)}\n{plain(columns, summaries, width)}")
         if spread := _spread(summaries):
             parts.append(f"{_score(summaries)} over the episodes of {scenario}\n{plain(spread, summaries, width)}")
@@ -212,10 +212,9 @@ def remarks(rows: Sequence[Row]) -> list[str]:
     summaries = summarise(rows)
     notes = [REFERENCE_NOTE] * any(is_reference(row.policy) for row in rows)
     notes += [STOP_NOTE] * any(row.steps_at_joint_limit for row in rows)
-    notes.append(
-        "cost ratio: total cost / best known cost, – where none is known; p50, p99: time of a call after the first; "
-        "misses: such calls longer than Δt"
-    )
+    ratio = "cost ratio: total cost / best known cost, – where none is known; "
+    ratio *= any(row.cost_ratio is not None for row in rows)
+    notes.append(f"{ratio}p50, p99: time of a call after the first; misses: such calls longer than Δt")
     notes.append(
         "pos, ori: position and orientation error; q̇, q̈ peak: joint velocity and acceleration in rad/s and rad/s², in "
         "m/s and m/s² for prismatic joints"

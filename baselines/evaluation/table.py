@@ -68,8 +68,8 @@ class Column:
 
 def fitting(columns: Sequence[Column], summaries: Sequence[Summary], width: int) -> list[Column]:
     """The columns that fit a line."""
-    kept = list(columns)
-    for column in sorted(columns, key=lambda column: -column.drop):
+    kept = filled(columns, summaries)
+    for column in sorted(kept, key=lambda column: -column.drop):
         rule = next(line for line in plain(kept, summaries, 0).splitlines() if set(line) == {"-"})
         if not column.drop or len(rule) <= width:
             break
@@ -77,14 +77,20 @@ def fitting(columns: Sequence[Column], summaries: Sequence[Summary], width: int)
     return kept
 
 
+def filled(columns: Iterable[Column], summaries: Sequence[Summary]) -> list[Column]:
+    """The columns that have a value in some line."""
+    return [column for column in columns if any(column.cell(one) != NOTHING for one in summaries)]
+
+
 def plain(columns: Sequence[Column], summaries: Sequence[Summary], width: int) -> str:
     """A table as plain text.
 
     Args:
-        columns: Its columns, the first one the names of the policies.
+        columns: Its columns, the first one the names of the policies; empty ones are left out, as in all tables.
         summaries: Its lines.
         width: Characters that a line may have; columns stand closer together if they would not fit.
     """
+    columns = filled(columns, summaries)
     heads = [[column.title for column in columns], [column.unit for column in columns]]
     heads, body = heads[: 1 + any(heads[1])], [[column.cell(one) for column in columns] for one in summaries]
     sizes = [max(_width(line[i]) for line in [*heads, *body]) for i in range(len(columns))]
@@ -113,6 +119,7 @@ def _width(text: str) -> int:
 
 def markdown(columns: Sequence[Column], summaries: Sequence[Summary]) -> str:
     """A table as Markdown."""
+    columns = filled(columns, summaries)
     text = [i for i, column in enumerate(columns) if column.left(summaries[0])]
     cells = [[escaped(column.cell(one)) for column in columns] for one in summaries]
     return grid([column.head for column in columns], cells, text=text)
@@ -120,6 +127,7 @@ def markdown(columns: Sequence[Column], summaries: Sequence[Summary]) -> str:
 
 def html(columns: Sequence[Column], summaries: Sequence[Summary]) -> str:
     """A table as HTML, complete without scripts; the value of a line's checkbox is the number of its summary."""
+    columns = filled(columns, summaries)
     heads = [("policy", "* has privileged information"), ("scenario", "name of the scenario")]
     heads += [(column.head, column.about) for column in columns]
     out = ['<table id="results"><thead><tr><th class="pick" scope="col" aria-label="in the plots"></th>']

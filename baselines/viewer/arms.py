@@ -17,7 +17,7 @@ from baselines.viewer.readings import FREE, Colour, Reading
 from baselines.viewer.replay import size
 from ikgym.arms import Arm
 from ikgym.arms.urdf import MAX_BYTES
-from ikgym.arms.urdf_check import parse
+from ikgym.arms.urdf.xml import parse
 from ikgym.exceptions import InvalidInputError
 from ikgym.files import read_user_file
 from ikgym.validation import FloatArray

@@ -101,10 +101,12 @@ class Arm(Frozen):
         upper = checks.limits(self.name, "upper", self.upper, n, np.inf)
         fastest = checks.limits(self.name, "velocity_limit", self.velocity_limit, n, np.inf, positive=True)
         hardest = checks.limits(self.name, "acceleration_limit", self.acceleration_limit, n, np.inf, positive=True)
+        joint_names = checks.joint_names(self.name, self.joint_names, n)
         if (lower >= upper).any():
             i = int(np.argmax(lower >= upper))
             raise InvalidInputError(
-                f"Limits of arm {self.name!r}: expected lower < upper, got {lower[i]:g} and {upper[i]:g} at joint {i}."
+                f"Limits of arm {self.name!r}: expected lower < upper, got {lower[i]:g} and {upper[i]:g} at joint "
+                f"{joint_names[i]!r}."
             )
         chain = Chain(offsets, axes, np.array(prismatic, dtype=np.bool_), tool, tool_rotation)
         chain.prismatic.flags.writeable = False
@@ -118,7 +120,7 @@ class Arm(Frozen):
             upper=upper,
             velocity_limit=fastest,
             acceleration_limit=hardest,
-            joint_names=checks.joint_names(self.name, self.joint_names, n),
+            joint_names=joint_names,
             chain=chain,
         )
         if self.home is not None:
@@ -252,7 +254,7 @@ class Arm(Frozen):
         if outside.any():
             row, joint = np.argwhere(outside)[0].tolist()
             raise InvalidInputError(
-                f"{name}: expected joint {joint} of arm {self.name!r} within its limits, from "
+                f"{name}: expected joint {self.joint_names[joint]!r} of arm {self.name!r} within its limits, from "
                 f"{float(self.lower[joint])!r} to {float(self.upper[joint])!r} "
                 f"[{'m' if self.prismatic[joint] else 'rad'}], got {float(rows[row, joint])!r}."
             )

@@ -32,11 +32,11 @@ def velocity_scale(arm: Arm, given: npt.ArrayLike | None) -> FloatArray:
     Raises:
         InvalidInputError: Nothing is given and a joint has no limit; or a number is too small or too large.
     """
-    without = np.flatnonzero(~np.isfinite(arm.velocity_limit)).tolist()
+    without = [repr(name) for name, limit in zip(arm.joint_names, arm.velocity_limit, strict=True) if limit == np.inf]
     if given is None and without:
         raise InvalidInputError(
             f"velocity_limit: expected a number, or one a joint, since arm {arm.name!r} has no velocity limit of its "
-            f"own at joint {', '.join(map(str, without))}."
+            f"own at joint {', '.join(without)}."
         )
     scale = per_joint("velocity_limit", arm.velocity_limit if given is None else given, arm.joints, at_most=LARGEST)
     if (scale < SMALLEST).any():

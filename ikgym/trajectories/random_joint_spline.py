@@ -131,7 +131,7 @@ class RandomJointSpline(Trajectory):
             if not within.all():
                 i = int(np.argmin(within))
                 raise InvalidInputError(
-                    f"Trajectory: expected {name} of joint {i} within that of arm {model.name!r}, "
+                    f"Trajectory: expected {name} of joint {model.joint_names[i]!r} within that of arm {model.name!r}, "
                     f"{getattr(model, name)[i]:g}, so that each draw is feasible, got {getattr(self, name)[i]:g}."
                 )
 

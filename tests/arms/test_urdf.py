@@ -93,6 +93,16 @@ def test_forward_kinematics_is_that_of_pinocchio(write, base, tip, moving):
         np.testing.assert_allclose(position, expected.translation, rtol=0, atol=1e-12)
 
 
+def test_vendor_tags_of_an_undeclared_prefix_are_passed_over_as_pinocchio_does(write):
+    inside = '<vendor:limit lower="9"/>' + LIMIT
+    xml = robot(joint("j1", "a", "b", inside=inside), links="ab", extra='<vendor:link name="no"/>')
+    xml = xml.replace("<robot ", '<robot vendor:model="7" ')
+    arm = from_urdf(write(xml))
+    expected = pinocchio_pose(xml, "a", "b", {"j1": 0.3})
+    np.testing.assert_allclose(arm.forward([0.3])[0], expected.rotation, rtol=0, atol=1e-12)
+    assert (arm.joint_names, arm.lower[0]) == (("j1",), -1.5)
+
+
 def test_limits_and_kinds_are_read(write):
     arm = from_urdf(write(WHOLE), tip="tool")
     assert arm.name == "r2"
@@ -102,11 +112,12 @@ def test_limits_and_kinds_are_read(write):
     np.testing.assert_array_equal(arm.velocity_limit, [3, np.inf, 0.1, 3])
 
 
-def test_the_only_leaf_below_the_base_is_the_tip(write):
-    xml = robot(joint("left", "a", "b"), joint("right", "a", "c"), joint("wrist", "c", "d"), links="abcd")
-    assert from_urdf(write(xml), base="c").joints == 1
-    with pytest.raises(InvalidInputError, match="expected a tip, since there are several: 'b', 'd'"):
-        from_urdf(write(xml))
+def test_the_only_leaf_below_the_base_that_moves_is_the_tip(write):
+    joints = joint("left", "a", "b"), joint("right", "a", "c"), joint("wrist", "c", "d")
+    path = write(robot(*joints, joint("mount", "c", "e", "fixed"), links="abcde"))
+    assert from_urdf(path, base="c").joint_names == ("wrist",)
+    with pytest.raises(InvalidInputError, match="expected a tip, since there are several: 'd', 'b', 'e'"):
+        from_urdf(path)
 
 
 PAIR = (joint("j1", "a", "b"), joint("j2", "b", "c"))
@@ -155,6 +166,7 @@ BAD_FILES = [
     (with_joint("fixed"), "a joint that moves"),
     (with_joint(inside=""), "expected a <limit>"),
     (with_joint("prismatic", ""), "expected a <limit>"),
+    (robot(joint("mount", "a", "b", "fixed"), joint("mast", "a", "c", "fixed")), "a joint that moves below link 'a'"),
     (limits('lower="-1" upper="1"'), '<limit velocity="…">'),
     (limits('upper="1" velocity="0"'), "velocity limit above 0"),
     (limits('lower="2" upper="1" velocity="1"'), "limits lower < upper, got 2 and 1"),

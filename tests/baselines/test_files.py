@@ -37,7 +37,7 @@ def test_a_second_process_is_told_who_has_the_folder_and_a_dead_one_has_none(tmp
             with pytest.raises(ResultsError, match=said), locked(tmp_path):
                 pass
             with pytest.raises(ResultsError, match=said):
-                evaluate("varga7-fast", "dls", steps=5, out=tmp_path, overwrite=True, plots=False)
+                evaluate("varga7-fast", "dls", steps=5, out=tmp_path, overwrite=True)
         finally:
             process.send_signal(signal.SIGKILL)
     assert (tmp_path / LOCK).exists()
@@ -60,7 +60,7 @@ def test_a_folder_that_cannot_be_made(tmp_path):
 
 
 def command(out, *policies, options=()):
-    line = [sys.executable, "-m", "baselines.evaluate", "--scenarios", "varga7-fast", "--steps", "300", "--no-plots"]
+    line = [sys.executable, "-m", "baselines.evaluate", "--scenarios", "varga7-fast", "--steps", "300"]
     return [*line, "--out", str(out), *options, "--policies", *policies]
 
 

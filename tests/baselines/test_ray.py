@@ -114,7 +114,7 @@ def test_one_of_two_nodes_is_killed_half_way(cluster, monkeypatch, tmp_path, cap
             nodes.remove_node(other, allow_graceful=False)
         check(self, batch, *results)
 
-    given = {"scenarios": "varga7-random", "policies": "dls", "episodes": EPISODES + 1, "steps": 50, "plots": False}
+    given = {"scenarios": "varga7-random", "policies": "dls", "episodes": EPISODES + 1, "steps": 50}
     alone = evaluate(**given)
     for name, instead in {"BLOCK": 1, "work": work}.items():
         monkeypatch.setattr(playing, name, instead)

@@ -186,11 +186,12 @@ def test_a_start_outside_the_limits_is_refused_with_its_joint(make):
     env.reset(seed=3, options={"q": [0.8, -1.0, 0, 3, 0, -5, 2.0]})  # at the stops, and beyond where there are none
     env.reset(seed=3)
     message = (
-        r"options\['q'\]: expected joint 4 of arm 'limited7' within its limits, from -1.6 to 1.6 \[rad\], got 1.601"
+        r"options\['q'\]: expected joint 'joint_5' of arm 'limited7' within its limits, "
+        r"from -1.6 to 1.6 \[rad\], got 1.601"
     )
     with pytest.raises(InvalidInputError, match=message):
         env.reset(options={"q": [0, 0, 0, 0, 1.601, 9, 0]})
-    with pytest.raises(InvalidInputError, match=r"joint 2 of arm .* from -1.2 to 1.2 \[m\], got -1.3"):
+    with pytest.raises(InvalidInputError, match=r"joint 'joint_3' of arm .* from -1.2 to 1.2 \[m\], got -1.3"):
         env.reset(options={"q": [0, 0, -1.3, 0, 0, 0, 0]})
     assert identical(env.reset(seed=3)[0], before)
 
@@ -216,7 +217,7 @@ def test_an_action_of_1_means_the_limits_of_the_arm():
     free = scenario.arm.replace(velocity_limit=None)
     assert scenario.replace(arm=free).velocity_limit.tolist() == [2.0]
     assert one_joint().replace(arm=faster).velocity_limit.tolist() == [SCALE]
-    with pytest.raises(InvalidInputError, match="arm 'slide' has no velocity limit of its own at joint 0"):
+    with pytest.raises(InvalidInputError, match="arm 'slide' has no velocity limit of its own at joint 'joint_1'"):
         ikgym.Scenario("own", **{**made, "arm": free})
-    with pytest.raises(InvalidInputError, match=r"has no velocity limit of its own at joint 1, 3\."):
+    with pytest.raises(InvalidInputError, match=r"has no velocity limit of its own at joint 'joint_2', 'joint_4'\."):
         limited(velocity_limit=None)

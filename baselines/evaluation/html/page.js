@@ -6,7 +6,7 @@ const ENTRIES = JSON.parse(document.getElementById("data").textContent);
 const COLOURS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#a0622d", "#8a8f98"];
 const LIMITS = ["joint", "acceleration", "velocity", "stop"]; // colours of a joint by its limit
 const MOST_ARMS = 4; // browsers keep few WebGL contexts
-const NEAREST = 1e-4; // smallest excess of a cost ratio on its axis
+const NEAREST = 0.01; // smallest cost above the best known on its axis, in [%]
 const SMALLEST = 1e-10; // errors below are rounding, in [m] and [rad]
 const CONFIG = { responsive: true, displaylogo: false, modeBarButtonsToRemove: ["lasso2d", "select2d"] };
 
@@ -85,7 +85,7 @@ function drawCostTime() {
   const scenario = chosen()[0]?.scenario ?? ENTRIES[0]?.scenario;
   const all = ENTRIES.filter((entry) => entry.scenario === scenario);
   const ratio = all.every((entry) => entry.quantity === "cost ratio");
-  const height = (value) => (ratio ? Math.max(value - 1, NEAREST) : Math.max(value, 1e-12));
+  const height = (value) => (ratio ? Math.max(100 * (value - 1), NEAREST) : Math.max(value, 1e-12));
   const traces = all.filter((entry) => entry.time !== null && entry.value !== null && (ratio || entry.quantity === "total cost")).map((entry) => {
     const picked = chosen().includes(entry);
     const y = height(entry.value);
@@ -97,20 +97,20 @@ function drawCostTime() {
       marker: { color: colour(entry), size: picked ? 13 : 9, symbol: entry.reference ? "diamond-open" : "circle" },
     };
   });
-  const ratios = [...[-4, -3, -2, -1, 0].map((k) => 1 + 10 ** k), ...Array.from({ length: 9 }, (_, k) => 10 ** (k + 1))];
-  const ticks = ratio ? { tickvals: ratios.map((one) => one - 1), ticktext: ratios.map((one) => `${one}`) } : { exponentformat: "power", dtick: 1 };
   return Plotly.react("cost-time", traces, layout({
     height: 440, margin: { l: 56, r: 24, t: 30, b: 44 }, hovermode: "closest",
-    xaxis: axis({ type: "log", title: { text: "median time per step [µs]" }, dtick: "D2" }),
-    yaxis: axis({ type: "log", title: { text: ratio ? "cost ratio" : "total cost" }, ...ticks }),
+    xaxis: axis({ type: "log", title: { text: "median time per step [µs]" } }),
+    yaxis: axis({ type: "log", title: { text: ratio ? "cost above the best known [%]" : "total cost" }, exponentformat: "power" }),
   }), CONFIG);
 }
 
-// Panels over time, one above the other: { title, values(entry), limits, log }.
+// Panels over time, one above the other: { title, name, values(entry), limits, log }.
 function drawPanels(id, panels, height) {
   const traces = [];
   const axes = {};
   const shapes = [];
+  const annotations = [];
+  const named = panels.some((panel) => panel.name);
   panels.forEach((panel, k) => {
     const place = k ? `${k + 1}` : "";
     const seen = [];
@@ -127,14 +127,16 @@ function drawPanels(id, panels, height) {
       if (limit === null || limit < low - (high - low) / 2 || limit > high + (high - low) / 2) continue;
       shapes.push({ type: "line", xref: `x${place} domain`, yref: `y${place}`, x0: 0, x1: 1, y0: limit, y1: limit, line: { color: themed("stop"), dash: "dot" } });
     }
-    const scale = panel.log ? { type: "log", exponentformat: "power", dtick: 1 } : {};
+    const corner = { xref: `x${place} domain`, yref: `y${place} domain`, x: 0, y: 1, xanchor: "left", yanchor: "bottom" };
+    if (panel.name) annotations.push({ ...corner, text: escaped(panel.name), showarrow: false });
+    const scale = panel.log ? { type: "log", exponentformat: "power", ...(high > 30 * low ? { dtick: 1 } : {}) } : {};
     axes[`yaxis${place}`] = axis({ title: { text: panel.title, standoff: 4 }, ...scale });
     axes[`xaxis${place}`] = axis({ matches: k ? "x" : undefined, title: { text: k === panels.length - 1 ? "time [s]" : "" } });
   });
   return Plotly.react(id, traces, layout({
-    height: height * Math.max(panels.length, 1) + 70, margin: { l: 62, r: 16, t: 10, b: 44 }, shapes, ...axes,
-    grid: { rows: Math.max(panels.length, 1), columns: 1, pattern: "independent", ygap: 0.2 },
-    legend: { orientation: "h", y: 1.01, yanchor: "bottom" },
+    height: height * Math.max(panels.length, 1) + 70, margin: { l: 62, r: 16, t: 10, b: 44 }, shapes, annotations, ...axes,
+    grid: { rows: Math.max(panels.length, 1), columns: 1, pattern: "independent", ygap: named ? 0.4 : 0.2 },
+    legend: { orientation: "h", y: 1 + (named ? 20 : 4) / (height * Math.max(panels.length, 1)), yanchor: "bottom" },
   }), CONFIG);
 }
 
@@ -152,7 +154,7 @@ function drawJoints() {
   const bounds = { q: (j) => [series.lower[j], series.upper[j]], qdot: (j) => both(series.velocity_limit[j]), qddot: (j) => both(series.acceleration_limit?.[j]) }[quantity];
   const both = (limit) => (limit === null || limit === undefined ? [] : [-limit, limit]);
   return drawPanels("joints", (series?.prismatic ?? []).map((prismatic, joint) => ({
-    title: `${symbol}<sub>${joint + 1}</sub> [${prismatic ? "m" : "rad"}${suffix}]`, limits: bounds(joint),
+    title: `${symbol}<sub>${joint + 1}</sub> [${prismatic ? "m" : "rad"}${suffix}]`, name: series.joint_names[joint], limits: bounds(joint),
     values: (entry) => array(entry, quantity) && column(array(entry, quantity), joint),
   })), 150);
 }

@@ -71,7 +71,8 @@ def page(results: Results, skipped: Sequence[Skipped] = (), *, command: str, dat
     numbers = {"scenarios": len(scenarios), "policies": len({one.label for one in shown}), "episodes": len(rows)}
     parts = {
         "style": _file("page.css"),
-        "title": escape(", ".join(scenarios)),
+        "title": escape(", ".join(scenarios[:2]) + " …" * (len(scenarios) > 2)),
+        "scenarios": escape(", ".join(scenarios)),
         "subtitle": f"{', '.join(f'{name}: {n}' for name, n in numbers.items())}; {date:%Y-%m-%d %H:%M} UTC",
         "table": html(COLUMNS, shown),
         "notes": _items(

@@ -30,8 +30,8 @@ def thinned(log: TrajectoryLog, size: int) -> dict[str, Any]:
         ``arrays`` as :func:`encoded` gives them: ``time``, ``nominal`` positions, ``points`` of the links from the base
         to the tool, ``rotation`` of the tool, and ``q`` at the frames that are kept; of all steps since the one before,
         the largest errors, the ``qdot`` and ``qddot`` that are largest in magnitude, and the worst ``limit``. Besides
-        how many steps there were (``rows``), the limits, which joints are prismatic, and which points are ends of
-        joints (``joint_ends``). A log without frames has no data for a replay.
+        how many steps there were (``rows``), the limits, ``joint_names``, which joints are prismatic, and which points
+        are ends of joints (``joint_ends``). A log without frames has no data for a replay.
     """
     frames = log.get("frame", frame_rows(len(log["time"]), FRAMES))
     picked = frame_rows(len(frames), max(FEWEST, size // _row_size(log["q"].shape[1])))
@@ -44,7 +44,10 @@ def thinned(log: TrajectoryLog, size: int) -> dict[str, Any]:
             arrays[name] = np.fmax.reduceat(log[name], starts)
     arrays |= {name: _largest(log[name], starts) for name in ("qdot", "qddot") if name in log}
     arrays["limit"] = np.maximum.reduceat(limits(log), starts)
-    out: dict[str, Any] = {"rows": len(log["time"]), "prismatic": log["prismatic"].tolist()}
+    out: dict[str, Any] = {
+        "rows": len(log["time"]),
+        **{name: log[name].tolist() for name in ("joint_names", "prismatic")},
+    }
     if "joint_points" in log:
         arrays["points"], out["joint_ends"] = _links(log, picked)
         arrays["rotation"] = log["tool_rotation"][picked].reshape(-1, 9)

@@ -67,9 +67,9 @@ def _figures(results: Results, scenario: str, summaries: Sequence[Summary]) -> I
     logs = [(one, results.series(one.first)) for one in summaries]
     pages = [logs[i : i + tracking.MOST] for i in range(0, len(logs), tracking.MOST)]
     for number, page in enumerate(pages, 1):
-        caption = f"Nominal and actual task coordinates, and errors, in {episode}"
+        caption = f"Errors, and nominal and actual position, in {episode}"
         named = [(literal(one.label + " *" * one.reference), log) for one, log in page]
-        figure = tracking.draw(literal(f"{episode}: task coordinates and errors"), named)
+        figure = tracking.draw(literal(f"{episode}: errors and position"), named)
         yield OVERVIEW, f"tracking{f'-{number}' if len(pages) > 1 else ''}", caption, figure
     for one, log in logs:
         for quantity in joints.QUANTITIES:

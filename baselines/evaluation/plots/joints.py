@@ -60,7 +60,7 @@ def draw(title: str, log: Series, quantity: Quantity) -> Figure:
     count = values.shape[1]
     columns = 2 if count > 3 else 1
     rows = -(-count // columns)
-    drawn = style.figure(0.9 + 1.25 * rows)
+    drawn = style.figure(0.9 + 1.4 * rows)
     grid = drawn.add_gridspec(rows, columns)
     for joint in range(count):
         axes = drawn.add_subplot(grid[joint // columns, joint % columns])
@@ -73,6 +73,7 @@ def draw(title: str, log: Series, quantity: Quantity) -> Figure:
             axes,
             ylabel=rf"${quantity.symbol}_{{{joint + 1}}}$ {unit}",
             xlabel="time [s]" if joint + columns >= count else "",
+            title=style.literal(str(log["joint_names"][joint])),
             ticks=12 // columns,
         )
         axes.margins(x=0.01)

@@ -1,4 +1,4 @@
-"""Task coordinates over time, nominal and actual, and the errors: all policies of a scenario in one picture."""
+"""Errors over time, and the position with that of the reference: all policies of a scenario in one picture."""
 
 from __future__ import annotations
 
@@ -19,7 +19,8 @@ Series = Mapping[str, npt.NDArray[Any]]
 MOST = len(style.COLOURS)
 # Errors below are rounding, which would flatten the other curves.
 SMALLEST = 1e-10  # [m] and [rad]
-COLUMNS = 3
+ERRORS = {"position_error": "position error [m]", "orientation_error": "orientation error [rad]"}
+HEIGHT = 1.75  # of a panel, in [in]
 
 
 def draw(title: str, logs: Sequence[tuple[str, Series]]) -> Figure:
@@ -32,45 +33,32 @@ def draw(title: str, logs: Sequence[tuple[str, Series]]) -> Figure:
             they agree.
     """
     first = logs[0][1]
-    coordinates = first["nominal"].shape[1]
-    oriented = "orientation_error" in first
-    rows, errors = -(-coordinates // COLUMNS), 1 + oriented
-    drawn = style.figure(0.7 + 1.45 * rows + 1.75 * errors)
-    grid = drawn.add_gridspec(rows + errors, COLUMNS, height_ratios=[1.45] * rows + [1.75] * errors)
-
-    lines: list[Any] = []
-    for place, (column, label) in enumerate(zip(order(coordinates), coordinate_labels(coordinates), strict=True)):
-        axes = drawn.add_subplot(grid[place // COLUMNS, place % COLUMNS])
-        nominal = first["nominal"][:, column]
-        lines = axes.plot(first["time"], nominal, color="#c4c4c4", lw=5.0, solid_capstyle="round")
-        for number, (_, log) in reversed(list(enumerate(logs))):
-            lines += axes.plot(log["time"], log["pose"][:, column], lw=_width(number, len(logs)), **style.looks(number))
-        _limit(axes, nominal, [log["pose"][:, column] for _, log in logs])
-        style.dress(axes, ylabel=label, xlabel="time [s]" if place >= coordinates - COLUMNS else "", ticks=4)
-        axes.margins(x=0.02)
-    style.legend(drawn, title, [lines[0], *lines[:0:-1]], ["nominal", *(name for name, _ in logs)])
-
-    kinds = [("position_error", "position error [m]"), ("orientation_error", "orientation error [rad]")][:errors]
-    for place, (kind, label) in enumerate(kinds):
-        axes = drawn.add_subplot(grid[rows + place, :])
+    kinds = [kind for kind in ERRORS if kind in first]
+    drawn = style.figure(0.7 + HEIGHT * (len(kinds) + 1))
+    grid = drawn.add_gridspec(len(kinds) + 1, 3)
+    for row, kind in enumerate(kinds):
+        axes = drawn.add_subplot(grid[row, :])
         _draw_errors(axes, [(name, log[kind]) for name, log in logs], first["time"])
-        style.dress(axes, ylabel=label, xlabel="time [s]" if place + 1 == errors else "")
+        style.dress(axes, ylabel=ERRORS[kind])
+    lines: list[Any] = []
+    for place, letter in enumerate("xyz"):
+        lines = _draw_position(drawn.add_subplot(grid[-1, place]), f"{letter} [m]", place - 3, logs)
+    style.legend(drawn, title, [lines[0], *lines[:0:-1]], ["nominal", *(name for name, _ in logs)])
     drawn.align_ylabels()
     return drawn
 
 
-def order(coordinates: int) -> list[int]:
-    """The columns of task coordinates in the order of their panels: the position, which comes last, first."""
-    return [*range(coordinates - 3, coordinates), *range(coordinates - 3)]
-
-
-def coordinate_labels(coordinates: int) -> list[str]:
-    """Names and units of task coordinates in the order of their panels, see :mod:`ikgym.tasks`."""
-    indices = {3: [], 6: ["12", "13", "23"], 12: [f"{i}{j}" for i in "123" for j in "123"]}.get(
-        coordinates, [str(i) for i in range(coordinates - 3)]
-    )
-    letter = "O^A" if coordinates == 6 else "R"
-    return ["x [m]", "y [m]", "z [m]", *(rf"${letter}_{{{index}}}$ [1]" for index in indices)]
+def _draw_position(axes: Axes, label: str, column: int, logs: Sequence[tuple[str, Series]]) -> list[Any]:
+    """One component of the position, the last three of the task coordinates; returns the lines, the nominal first."""
+    first = logs[0][1]
+    nominal = first["nominal"][:, column]
+    lines: list[Any] = axes.plot(first["time"], nominal, color="#c4c4c4", lw=5.0, solid_capstyle="round")
+    for number, (_, log) in reversed(list(enumerate(logs))):
+        lines += axes.plot(log["time"], log["pose"][:, column], lw=_width(number, len(logs)), **style.looks(number))
+    _limit(axes, nominal, [log["pose"][:, column] for _, log in logs])
+    style.dress(axes, ylabel=label, xlabel="time [s]", ticks=4)
+    axes.margins(x=0.02)
+    return lines
 
 
 def _draw_errors(axes: Axes, errors: Sequence[tuple[str, FloatArray]], time: FloatArray) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
@@ -16,18 +17,18 @@ NO_LIMIT = 1e21
 
 
 def joint_name(i: int) -> str:
-    """Name of joint i in the files, counted from 0."""
+    """Name of joint i in an MJCF, counted from 0."""
     return f"joint{i + 1}"
 
 
 def urdf(arm: Arm) -> str:
-    """The chain of an arm from link ``base`` to link ``tool``, with its limits of position and velocity."""
+    """The chain of an arm from link ``base`` to link ``tool``, with its names and limits of position and velocity."""
     n = arm.joints
     links = [f'<link name="{name}"/>' for name in (BASE, *(f"link{i}" for i in range(1, n + 1)), TIP)]
     lower, upper = np.maximum(arm.lower, -NO_LIMIT), np.minimum(arm.upper, NO_LIMIT)
     velocity = np.minimum(arm.velocity_limit, NO_LIMIT)
     joints = [
-        f'<joint name="{joint_name(i)}" type="{"prismatic" if arm.prismatic[i] else "revolute"}">'
+        f'<joint name={quoteattr(arm.joint_names[i])} type="{"prismatic" if arm.prismatic[i] else "revolute"}">'
         f'<parent link="{f"link{i}" if i else BASE}"/><child link="link{i + 1}"/>'
         f'<origin xyz="{_text(arm.offsets[i])}" rpy="0 0 0"/><axis xyz="{_text(arm.axes[i])}"/>'
         f'<limit lower="{float(lower[i])!r}" upper="{float(upper[i])!r}" '
@@ -38,7 +39,7 @@ def urdf(arm: Arm) -> str:
         f'<joint name="tool_joint" type="fixed"><parent link="link{n}"/><child link="{TIP}"/>'
         f'<origin xyz="{_text(arm.tool)}" rpy="{_text(roll_pitch_yaw(arm.tool_rotation))}"/></joint>'
     )
-    return f'<robot name="{arm.name}">{"".join([*links, *joints, tool])}</robot>'
+    return f"<robot name={quoteattr(arm.name)}>{''.join([*links, *joints, tool])}</robot>"
 
 
 def mjcf(arm: Arm) -> str:

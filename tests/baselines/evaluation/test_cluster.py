@@ -44,7 +44,7 @@ def on_another_machine(monkeypatch, factor, processor=None):
 
 
 def play(**options):
-    return evaluate("varga7-random", "dls", episodes=4, steps=STEPS, plots=False, **options)
+    return evaluate("varga7-random", "dls", episodes=4, steps=STEPS, **options)
 
 
 @pytest.fixture(scope="module")

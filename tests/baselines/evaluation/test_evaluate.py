@@ -38,7 +38,7 @@ def strict_json(file):
 
 
 def run_all(out=None, **changes):
-    options = {"episodes": 2, "steps": STEPS, "plots": False, "out": out, **changes}
+    options = {"episodes": 2, "steps": STEPS, "out": out, **changes}
     return evaluate(["varga7-random", "zhang3-helix"], ["dls", "moore_penrose", "follow_nominal"], **options)
 
 
@@ -194,7 +194,7 @@ def test_what_is_timed_changes_nothing_but_the_times():
 
 
 def test_episodes_that_are_to_be_timed_after_all_are_played_again(tmp_path):
-    options = {"episodes": 3, "steps": 5, "out": tmp_path, "plots": False}
+    options = {"episodes": 3, "steps": 5, "out": tmp_path}
     rows = evaluate("varga7-random", "dls", **options)
     again = evaluate("varga7-random", "dls", timed=2, resume=True, **options)
     assert [row.time_first_us is not None for row in again] == [True, True, False]
@@ -250,7 +250,7 @@ def test_files(tmp_path):
 
 def test_series_are_the_trajectory_log_of_the_first_episode_at_the_steps_that_count(tmp_path):
     held = ikgym.scenarios.get("khan8-q7q8")
-    (row,) = evaluate(held, "dls", steps=620, out=tmp_path, plots=False)
+    (row,) = evaluate(held, "dls", steps=620, out=tmp_path)
     plan = planned(held, "dls", steps=620)
     series = Results(tmp_path, plan.jobs, describe(), Options(resume=True)).series(row)
     counted = np.flatnonzero(plan.jobs[0].scenario.counted())
@@ -313,10 +313,10 @@ def test_a_trajectory_log_that_is_missing_is_played_again(tmp_path):
 
 
 def test_resuming_adds_episodes_and_policies(tmp_path):
-    evaluate("varga7-random", "dls", steps=5, out=tmp_path, plots=False)
-    rows = evaluate("varga7-random", "dls", episodes=2, steps=5, out=tmp_path, resume=True, plots=False)
+    evaluate("varga7-random", "dls", steps=5, out=tmp_path)
+    rows = evaluate("varga7-random", "dls", episodes=2, steps=5, out=tmp_path, resume=True)
     assert [row.seed for row in rows] == [2_000_000, 2_000_001]
-    rows = evaluate("varga7-random", "moore_penrose", steps=5, out=tmp_path, resume=True, plots=False)
+    rows = evaluate("varga7-random", "moore_penrose", steps=5, out=tmp_path, resume=True)
     assert [row.policy for row in rows] == ["moore_penrose"]
     there = read_rows(tmp_path / "results.json")
     assert [row.policy for row in there] == ["dls", "dls", "moore_penrose"]
@@ -335,12 +335,12 @@ def test_resuming_adds_episodes_and_policies(tmp_path):
     ],
 )
 def test_what_cannot_be_compared_is_not_gone_on_with(tmp_path, change, options, message):
-    evaluate("varga7-random", "dls", steps=5, out=tmp_path, plots=False)
+    evaluate("varga7-random", "dls", steps=5, out=tmp_path)
     file = tmp_path / "results.json"
     file.write_text(json.dumps([{**row, **change} for row in strict_json(file)]), encoding="utf-8")
     before = file.read_bytes()
     with pytest.raises(ResultsError, match=message):
-        evaluate("varga7-random", "dls", **{"steps": 5, **options}, out=tmp_path, resume=True, plots=False)
+        evaluate("varga7-random", "dls", **{"steps": 5, **options}, out=tmp_path, resume=True)
     assert file.read_bytes() == before
 
 
@@ -369,7 +369,7 @@ def test_damaged_results_are_named_and_kept(tmp_path, content, message):
     ],
 )
 def test_rows_of_another_version_are_refused_with_its_number(tmp_path, change):
-    arguments = {"steps": 5, "out": tmp_path, "plots": False}
+    arguments = {"steps": 5, "out": tmp_path}
     evaluate("varga7-random", "dls", **arguments)
     file = tmp_path / "results.json"
     (row,) = strict_json(file)
@@ -399,7 +399,7 @@ def test_a_folder_that_cannot_be_written_is_refused_before_any_work(tmp_path, mo
 
 def test_ctrl_c_says_how_to_go_on(capsys, tmp_path, monkeypatch):
     interrupted(monkeypatch, 1)
-    arguments = ["--policies", "dls", "moore_penrose", "--steps", "5", "--no-plots", "--out", str(tmp_path)]
+    arguments = ["--policies", "dls", "moore_penrose", "--steps", "5", "--out", str(tmp_path)]
     assert main(arguments) == 130
     assert "continue with --resume" in capsys.readouterr().err
     assert len(read_rows(tmp_path / "results.json")) == 1

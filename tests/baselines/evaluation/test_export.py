@@ -64,7 +64,7 @@ def read_csv(file):
 
 def test_csv_holds_the_episode_from_its_start_to_the_last_digit(tmp_path):
     scenario = named()
-    evaluate(scenario, "dls", out=tmp_path, export="csv", plots=False)
+    evaluate(scenario, "dls", out=tmp_path, export="csv")
     (file,) = (tmp_path / "export" / "zhang6-lspb").iterdir()
     head, table = read_csv(file)
     names = [f"slider_{i}" for i in range(6)]
@@ -81,7 +81,7 @@ def test_csv_holds_the_episode_from_its_start_to_the_last_digit(tmp_path):
 def test_units_of_prismatic_joints(tmp_path):
     scenario = circle("tiago", steps=3)
     baselines.track(scenario, "dls").to_joint_trajectory(tmp_path / "motion.json")
-    evaluate(scenario, "dls", out=tmp_path, export=["csv", "csv"], plots=False)
+    evaluate(scenario, "dls", out=tmp_path, export=["csv", "csv"])
     (name,) = files(tmp_path)
     head, _ = read_csv(tmp_path / "export" / name)
     assert head[1:3] == ["torso_lift_joint [m]", "arm_1_joint [rad]"]
@@ -92,7 +92,7 @@ def test_units_of_prismatic_joints(tmp_path):
 
 def test_joint_trajectory_is_a_whole_message(tmp_path):
     scenario = named(dt=0.3)
-    evaluate(scenario, "dls", out=tmp_path, export="joint-trajectory", plots=False)
+    evaluate(scenario, "dls", out=tmp_path, export="joint-trajectory")
     (name,) = files(tmp_path)
     text = (tmp_path / "export" / name).read_text(encoding="utf-8")
     content = json.loads(text)
@@ -115,7 +115,6 @@ def test_joint_trajectory_is_a_whole_message(tmp_path):
 def test_every_episode_in_every_format(tmp_path):
     rows = evaluate(
         "varga7-random", ["dls", "dls:damping=1e-2"], episodes=2, steps=STEPS, out=tmp_path, export=list(FORMATS),
-        plots=False,
     )  # fmt: skip
     found = files(tmp_path)
     assert len(found) == len(rows) * len(FORMATS) == 8
@@ -128,7 +127,7 @@ def test_every_episode_in_every_format(tmp_path):
 
 
 def test_resuming_plays_what_is_not_exported_yet_and_overwriting_removes_it(tmp_path, monkeypatch):
-    given = {"steps": 3, "out": tmp_path, "plots": False}
+    given = {"steps": 3, "out": tmp_path}
     evaluate("varga7-fast", "dls", **given, export="csv")
     played = []
     monkeypatch.setattr(command, "run", lambda jobs, *_, **__: played.append(len(jobs)) or iter(()))

@@ -379,7 +379,7 @@ def test_others_go_to_worker_processes_if_they_can():
 
 
 def test_results_of_an_object_are_never_taken_for_those_of_another(tmp_path):
-    options = {"steps": 3, "out": tmp_path, "plots": False}
+    options = {"steps": 3, "out": tmp_path}
     evaluate(HELIX, [Borrowed(), here("Borrowed")], **options)
     with pytest.raises(
         ResultsError, match="results of the object Borrowed cannot be distinguished from those of another"
@@ -419,7 +419,7 @@ def test_a_policy_of_fifteen_lines_outside_the_tree_is_evaluated_by_one_command(
     assert len([line for line in MINE.splitlines() if line.strip()]) <= 15
     command = ["-m", "baselines.evaluate", "--policies", "mine:Proportional:gain=0.5", "dls"]
     done = subprocess.run(
-        [sys.executable, "-W", "error", *command, "--scenarios", "mine:slow", "--out", "out", "--no-plots"],
+        [sys.executable, "-W", "error", *command, "--scenarios", "mine:slow", "--out", "out"],
         cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(ROOT)}, capture_output=True, text=True, timeout=120,
         check=False,
     )  # fmt: skip

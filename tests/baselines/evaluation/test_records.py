@@ -139,10 +139,18 @@ def test_the_front_is_what_no_other_beats():
     assert [one["policy"] for one in comparison.front(lines)] == ["fast", "good"]
 
 
+def shown(axis):
+    """Ticks in sight."""
+    low, high = axis.get_view_interval()
+    return [tick for tick in axis.get_ticklocs() if low <= tick <= high]
+
+
 def test_plots_show_every_line():
     lines = [line("a", 3.0, 10.0), line("b", 1.1, 50.0, foresight=9)]
     drawn = comparison.cost_time(lines, "title")
     assert [text.get_text() for text in drawn.legends[0].get_texts()] == ["a", "b"]
+    close = comparison.cost_time([line("a", 1.30, 11.0), line("b", 1.32, 12.0)], "title").axes[0]
+    assert min(len(shown(axis)) for axis in (close.xaxis, close.yaxis)) >= 2
     drawn = comparison.foresight(lines, "title", "policy")
     assert [text.get_text() for text in drawn.legends[0].get_texts()] == ["policy: a", "policy: b"]
     cells = [line("a", 2.0, None, knowledge=k, drives=d) for k in (0, 1) for d in (0, 1)]

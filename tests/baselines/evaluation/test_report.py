@@ -84,13 +84,16 @@ def test_table():
     text = report.table([BASE, REFERENCE])
     lines = text.split("\n")
     assert lines[0] == "varga7-fast: 3000 steps"
-    cells = "dls 1.423e7 301.2 – 1.416 16.88 13.31 500.0 16.21 28.79 1 no converged"
+    cells = "dls 1.423e7 301.2 1.416 16.88 13.31 500.0 16.21 28.79 1 no converged"
     assert lines[4].split() == cells.split()
     assert lines[5].startswith("follow_nominal *")
     assert "* reference: has privileged information" in text
     assert "[mm]" in lines[2]
     assert "[mrad]" in lines[2]
     assert "episodes" not in text
+    assert "cost ratio" not in text  # no cost is known
+    lines = report.table([dataclasses.replace(BASE, cost_ratio=2.0), REFERENCE]).split("\n")
+    assert [line.split()[-10] for line in lines[4:6]] == ["2.000", "–"]
 
 
 def test_a_policy_with_a_joint_at_a_stop_is_marked():
@@ -194,7 +197,7 @@ def test_readme():
     assert "`damping=0.001`" in text
     tables = [line for line in text.split("\n") if line.startswith("|")]
     heads = {len(re.findall(r"(?<!\\)\|", line)) for line in tables}
-    assert heads == {14, 4}  # thirteen columns of results, three of parameters
+    assert heads == {13, 4}  # twelve columns of results, three of parameters
 
 
 HOSTILE = (
@@ -231,7 +234,7 @@ def test_plots_of_a_small_run(tmp_path):
     """Accelerations are drawn where they have limits."""
     names = ["cost-time.png", "joints-dls.png", "tracking.png", "velocities-dls.png"]
     scenarios = [circle(steps=8).replace(name=r"$\no_formula{$"), "faitli3-regular"]
-    evaluate(scenarios, "dls", steps=8, out=tmp_path, report=False)
+    evaluate(scenarios, "dls", steps=8, out=tmp_path, report=False, plots=True)
     made = sorted(file.relative_to(tmp_path / "plots").as_posix() for file in tmp_path.glob("plots/*/*"))
     found = [("_no_formula_", ["accelerations-dls.png", *names]), ("faitli3-regular", names)]
     assert made == [f"{folder}/{name}" for folder, some in found for name in some]
@@ -251,7 +254,7 @@ def test_the_log_has_the_accelerations_of_the_steps_from_rest():
 
 def test_a_damaged_log_is_named_before_anything_is_played(tmp_path, monkeypatch):
     given = {"scenarios": "faitli3-regular", "steps": 5, "out": tmp_path}
-    evaluate(**given, policies="dls", plots=False)
+    evaluate(**given, policies="dls")
     monkeypatch.setattr(run, "run", None)
     (file,) = tmp_path.glob("series/*/*.npz")
     with np.load(file) as arrays:
@@ -283,6 +286,7 @@ def log_of(steps=60, coordinates=6, joints=7, **changes):
         "qdot": rng.normal(size=(steps, joints)),
         "position_error": rng.uniform(1e-3, 1, steps),
         "orientation_error": rng.uniform(1e-3, 1, steps),
+        "joint_names": np.array([f"joint{j}" for j in range(joints)]),
         "prismatic": np.arange(joints) == 2,
         "lower": np.full(joints, -np.inf),
         "upper": np.full(joints, np.inf),
@@ -299,18 +303,25 @@ def assert_every_axis_has_a_label_and_a_unit(figure):
 
 
 @pytest.mark.parametrize("coordinates", [3, 12])
-def test_axes_of_the_tracking_have_labels_and_units(coordinates):
+def test_the_tracking_shows_errors_and_then_the_position(coordinates):
     one = log_of(coordinates=coordinates)
     figure = tracking.draw("t", [("a", one), ("b *", one)])
     assert_every_axis_has_a_label_and_a_unit(figure)
-    assert len(figure.axes) == coordinates + 2
+    labels = [axes.get_ylabel() for axes in figure.axes]
+    assert labels == ["position error [m]", "orientation error [rad]", "x [m]", "y [m]", "z [m]"]
+    heights = [axes.get_position().height for axes in figure.axes]
+    assert max(heights) < 1.01 * min(heights)
+    for axes, nominal in zip(figure.axes[2:], one["nominal"].T[-3:], strict=True):
+        np.testing.assert_array_equal(axes.lines[0].get_ydata(), nominal)
 
 
 @pytest.mark.parametrize("quantity", joints.QUANTITIES)
 def test_axes_of_the_joints_have_labels_and_units(quantity):
     one = log_of()
     accelerations = {"qddot": one["qdot"], "acceleration_limit": np.full(7, 9.0)}
-    assert_every_axis_has_a_label_and_a_unit(joints.draw("j", {**one, **accelerations}, quantity))
+    figure = joints.draw("j", {**one, "joint_names": np.array(list("abcdef$")), **accelerations}, quantity)
+    assert_every_axis_has_a_label_and_a_unit(figure)
+    assert [axes.get_title(loc="left") for axes in figure.axes] == [*"abcdef", r"\$"]
 
 
 def bands_of(axes):
@@ -337,14 +348,14 @@ def test_limits_that_are_near_are_shaded():
 def test_a_reference_below_the_errors_of_the_others_is_named():
     good = log_of(position_error=np.full(60, 1e-13))
     figure = tracking.draw("t", [("dls", log_of()), ("follow_nominal *", good)])
-    (axes,) = (axes for axes in figure.axes if axes.get_ylabel() == "position error [m]")
+    axes = figure.axes[0]
     assert axes.get_title(loc="right") == "below the axis: follow_nominal *"
     assert axes.get_ylim()[0] > 1e-4
 
 
 def test_the_nominal_is_in_sight_even_where_a_policy_has_lost_it():
     lost = log_of(pose=np.full((60, 6), 1e6))
-    axes = tracking.draw("t", [("dls", lost)]).axes[0]
+    axes = tracking.draw("t", [("dls", lost)]).axes[2]
     nominal = lost["nominal"][:, 3]
     span = np.ptp(nominal)
     low, high = axes.get_ylim()

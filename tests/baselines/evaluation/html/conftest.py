@@ -16,5 +16,5 @@ def folder(tmp_path_factory):
     out = tmp_path_factory.mktemp("report")
     scenarios = [limited(steps=STEPS, name=NASTY, dt=0.001), limited(steps=20, name="short")]
     policies = ["dls", "moore_penrose", "dls:damping=0.05", "follow_nominal"]
-    evaluate(scenarios, policies, episodes=EPISODES, out=out, plots=False)
+    evaluate(scenarios, policies, episodes=EPISODES, out=out)
     return out

@@ -12,10 +12,13 @@ import numpy.typing as npt
 
 from ikgym.arms.arm import Arm, UrdfReference
 from ikgym.arms.home import from_home
-from ikgym.arms.urdf_check import MOVING, UrdfJoint, read_chain
+from ikgym.arms.urdf.chain import read_chain
+from ikgym.arms.urdf.joint import MOVING, UrdfJoint
+from ikgym.arms.urdf.tips import Tip, likely_tips
+from ikgym.arms.urdf.tree import Tree
 from ikgym.exceptions import InvalidInputError, MissingDependencyError
 from ikgym.files import read_user_file
-from ikgym.validation import FloatArray, frozen_array, rotation_matrix
+from ikgym.validation import FloatArray, frozen_array, known_name, rotation_matrix
 
 # Descriptions of whole humanoids take a few hundred kilobytes.
 MAX_BYTES = 16 * 2**20
@@ -54,7 +57,7 @@ def from_urdf(
         path: The file.
         base: The link to begin at, whose frame becomes the base frame. The root link if it is left out.
         tip: The link to end at, whose frame becomes the tool's if there is no tool offset. The only leaf below the
-            base if it is left out.
+            base that moves if it is left out; :func:`tips` lists them.
         name: Name of the arm, by default that of the robot in the file.
         tool: Tool point in the frame of the tip, in [m]; the frame's origin if it is left out. Shape (3,).
         tool_rotation: Orientation of the tool in the frame of the tip, a rotation matrix; that of the frame if it
@@ -90,6 +93,30 @@ def from_urdf(
         )
         object.__setattr__(arm, "urdf", UrdfReference(Path(path).resolve(), base, tip, tool, tool_rotation))
         return arm
+    except InvalidInputError as error:
+        raise InvalidInputError(f"{path}: {error}") from error
+
+
+def tips(path: str | PathLike[str], *, base: str | None = None) -> tuple[Tip, ...]:
+    """The links of a URDF file that may be the tip: leaves that move, likely ones first.
+
+    Those whose chain :func:`from_urdf` reads come before all others; among them tool frames by their names, then those
+    with the most joints.
+
+    Args:
+        path: The file.
+        base: The link to begin at, the root if it is left out.
+
+    Raises:
+        InvalidInputError: The file cannot be read, or is no URDF.
+        UnknownNameError: There is no link of that name.
+    """
+    content = read_user_file(path, MAX_BYTES)
+    try:
+        tree = Tree(content)
+        if base is not None:
+            known_name("link", base, tree.links)
+        return tuple(likely_tips(tree, tree.root if base is None else base))
     except InvalidInputError as error:
         raise InvalidInputError(f"{path}: {error}") from error
 

@@ -1,0 +1,119 @@
+"""Solvers on a path as it is, retimed, and with late drives, in one table."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import textwrap
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from baselines.evaluation import report
+from baselines.evaluation.compare.rule import PREFERRED, Recommendation, Rows, fault, needs_retiming, recommend
+from baselines.evaluation.metrics import Row
+from baselines.evaluation.run import evaluate
+from baselines.evaluation.summary import summarise
+from baselines.evaluation.table import Column, plain
+from baselines.paths import retime
+from ikgym.exceptions import InvalidInputError
+from ikgym.plant import Plant
+from ikgym.scenarios import Scenario
+
+#: Names of the paths in tables.
+AS_IT_IS, RETIMED, LATE = "as it is", "retimed", "late drives"
+#: Drives with a lag of first order, its time constant in [s], and a delay in steps.
+LAG, DELAY = 0.02, 2
+#: What plays with late drives: any solver, shown the arm as it will be.
+WRAPPER = "predicted"
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Comparison:
+    """What solvers do on a path.
+
+    Args:
+        dt: The control period in [s].
+        rows: Rows of all solvers, path by path.
+        recommendation: The solver to take.
+        notes: What else is to be known.
+    """
+
+    dt: float
+    rows: Sequence[Row]
+    recommendation: Recommendation
+    notes: Sequence[str]
+
+    def table(self, width: int = report.WIDTH) -> str:
+        """Table, notes and recommendation as plain text.
+
+        Args:
+            width: Characters that a line may have.
+        """
+        follows = Column("follows", "", lambda one: "no" if fault(one.first, self.dt) else "yes")
+        columns = (*COLUMNS, follows)
+        texts = [f"late drives: {1e3 * LAG:g} ms of lag, {DELAY} steps of delay; each solver as {WRAPPER}:policy=…"]
+        below = [textwrap.fill(text, width, subsequent_indent="  ") for text in (*texts, *self.notes)]
+        last = textwrap.fill(str(self.recommendation), width)
+        return "\n".join([plain(columns, summarise(self.rows), width), "", *below, "", last])
+
+
+def solver_of(row: Row) -> str:
+    """The solver of a row, also of one with late drives."""
+    return str(row.parameters["policy"] if row.policy == WRAPPER else row.policy)
+
+
+COLUMNS = (
+    Column("solver", "", lambda one: solver_of(one.first)),
+    Column("path", "", lambda one: one.first.scenario),
+    *report.ERRORS,
+    Column("at stop", "[steps]", lambda one: one.total("steps_at_joint_limit")),
+    *report.TIMES[:2],
+)
+
+
+def compare(scenario: Scenario, *, progress: bool = False) -> Comparison:
+    """Plays solvers on a path, and recommends one by :func:`baselines.evaluation.compare.rule.recommend`.
+
+    Args:
+        scenario: A scenario whose path is the same at every reset.
+        progress: Whether to show bars on stderr.
+
+    Raises:
+        InvalidInputError: The path is random, or no solver suits the scenario.
+    """
+    if scenario.random:
+        raise InvalidInputError(f"Expected a path that is the same at every reset, got scenario {scenario.name!r}.")
+    notes = [] if np.isfinite(scenario.arm.acceleration_limit).all() else [UNLIMITED]
+    paths = [scenario.replace(name=AS_IT_IS), *_retimed(scenario, notes)]
+    played = evaluate(paths, PREFERRED, progress=progress)
+    notes += [f"left out: {one.policy}: {one.reason}" for one in played.skipped if one.scenario == AS_IT_IS]
+    as_it_is, retimed = (_by_solver(played, name) for name in (AS_IT_IS, RETIMED))
+    taken = paths[needs_retiming(as_it_is, retimed, scenario.dt)]
+    driven = taken.replace(name=LATE, plant=late(scenario.plant))
+    delayed = evaluate(driven, [f"{WRAPPER}:policy={name}" for name in as_it_is], progress=progress)
+    chosen = recommend(as_it_is, retimed, _by_solver(delayed, LATE), scenario.dt)
+    return Comparison(scenario.dt, [*played, *delayed], chosen, notes)
+
+
+UNLIMITED = "no limits of acceleration are known for all joints: state them, for example with --acceleration"
+
+
+def late(plant: Plant) -> Plant:
+    """The plant with late drives."""
+    return plant.replace(bandwidth=1.0 / (2.0 * math.pi * LAG), command_delay=DELAY)
+
+
+def _retimed(scenario: Scenario, notes: list[str]) -> list[Scenario]:
+    """The path in a time in which it can be driven, if there is one; a note says in which, or why there is none."""
+    try:
+        found = retime(scenario)
+    except (InvalidInputError, ModuleNotFoundError) as error:
+        notes.append(f"not retimed: {error}")
+        return []
+    notes.append(f"retimed: from the best start, in {found.duration:.4g} s where {found.asked:.4g} s were asked for")
+    return [found.scenario.replace(name=RETIMED)]
+
+
+def _by_solver(rows: Iterable[Row], path: str) -> Rows:
+    return {solver_of(row): row for row in rows if row.scenario == path}

@@ -1,0 +1,117 @@
+"""The rule that recommends a solver for a path, from measured rows."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+
+from baselines.evaluation.metrics import Row
+
+#: Solvers in the order in which they are preferred.
+PREFERRED = ("qp", "sns", "rhc_foresight", "dls", "pink", "mink")
+#: Share of the control period that the median call may take. Its 99th percentile, on a computer without real time, is
+#: that of other programs.
+SHARE = 0.5
+#: How many times the least joint acceleration of a solver counts as calm.
+CALM = 3.0
+
+#: One row a solver, by its name.
+Rows = Mapping[str, Row]
+
+
+@dataclasses.dataclass(frozen=True)
+class Recommendation:
+    """A solver for a path.
+
+    Args:
+        solver: Its name; None where no solver follows the path.
+        retimed: Whether it follows the retimed path alone.
+        late: Whether it follows with late drives, too.
+        reason: Why this one.
+    """
+
+    solver: str | None
+    retimed: bool
+    late: bool
+    reason: str
+
+    def __str__(self) -> str:
+        if self.solver is None:
+            return f"Recommended: none of these solvers. {self.reason}"
+        path = " on the retimed path, which ikgym path --retime writes" * self.retimed
+        return f"Recommended: {self.solver}{path}. {self.reason}"
+
+
+def fault(row: Row, dt: float) -> str:
+    """Why a solver does not follow a path; empty where it does.
+
+    Args:
+        row: Its row.
+        dt: The control period in [s].
+    """
+    if not row.followed:
+        turned = row.orientation_error_max
+        return f"errs by {1e3 * row.position_error_max:.3g} mm" + (f", {1e3 * turned:.3g} mrad" if turned else "")
+    if row.steps_at_joint_limit:
+        return "has a joint at a stop"
+    if row.time_p50_us is not None and row.time_p50_us > SHARE * 1e6 * dt:
+        return f"takes {row.time_p50_us:.0f} µs a call of a period of {1e6 * dt:.0f} µs"
+    return ""
+
+
+def followers(rows: Rows, dt: float) -> list[str]:
+    """The solvers that follow, the preferred first."""
+    return [name for name in PREFERRED if name in rows and not fault(rows[name], dt)]
+
+
+def needs_retiming(as_it_is: Rows, retimed: Rows, dt: float) -> bool:
+    """Whether no solver follows the path as it is, and one does retimed."""
+    return not followers(as_it_is, dt) and bool(followers(retimed, dt))
+
+
+def recommend(as_it_is: Rows, retimed: Rows, late: Rows, dt: float) -> Recommendation:
+    """The solver to take.
+
+    1. The path is taken as it is if a solver follows it, else retimed.
+    2. Of the solvers that follow it, those are kept that follow with late drives, if any do.
+    3. Of these, those are kept whose largest joint acceleration is at most three times the least.
+    4. Of these, the first is taken in the order of :data:`PREFERRED`.
+
+    Args:
+        as_it_is: Rows on the path as it is.
+        retimed: Rows on the retimed path; empty where there is none.
+        late: Rows with late drives.
+        dt: The control period in [s].
+    """
+    slower = needs_retiming(as_it_is, retimed, dt)
+    rows = retimed if slower else as_it_is
+    able = followers(rows, dt)
+    missed = f"No solver follows the path{' as it is' * slower}: {_first_fault(as_it_is, dt)}."
+    if not able:
+        return Recommendation(None, False, False, missed)
+    robust = [name for name in able if name in followers(late, dt)]
+    kept = robust or able
+    least = min(rows[name].qddot_peak for name in kept)
+    solver = next(name for name in kept if rows[name].qddot_peak <= CALM * least)
+    before = [name for name in PREFERRED[: PREFERRED.index(solver)] if name in rows]
+    also = f"with late drives too, as predicted:policy={solver}" if robust else "but not with late drives"
+    reasons = [
+        *[missed] * slower,
+        *(f"{name} {_drawback(name, rows, late if robust else {}, dt, least)}." for name in before),
+        f"{solver} follows the path, {also}.",
+    ]
+    return Recommendation(solver, slower, bool(robust), " ".join(reasons))
+
+
+def _drawback(name: str, rows: Rows, late: Rows, dt: float, least: float) -> str:
+    """Why a solver was passed over."""
+    if why := fault(rows[name], dt):
+        return why
+    if name in late and (why := fault(late[name], dt)):
+        return f"{why} with late drives"
+    return f"needs {rows[name].qddot_peak / least:.3g} times the acceleration of the calmest"
+
+
+def _first_fault(rows: Rows, dt: float) -> str:
+    name = next(name for name in PREFERRED if name in rows)
+    return f"{name} {fault(rows[name], dt)}"

@@ -1,0 +1,58 @@
+"""The chain of a URDF file between two links, checked before Pinocchio reads it."""
+
+from __future__ import annotations
+
+from ikgym.arms.urdf import xml
+from ikgym.arms.urdf.joint import BOUNDED, MOVING, UrdfJoint, read_joint
+from ikgym.arms.urdf.tips import likely_tips
+from ikgym.arms.urdf.tree import Tree
+from ikgym.exceptions import InvalidInputError
+from ikgym.validation import known_names
+
+
+def read_chain(data: bytes, base: str | None, tip: str | None) -> tuple[str, list[UrdfJoint]]:
+    """The name of the robot and the joints between two of its links.
+
+    The links of the whole file must be a tree. Numbers are checked between the two links only: no other joint
+    has a say in where the tip is.
+
+    Args:
+        data: Content of the file.
+        base: Link to begin at, the root if it is None.
+        tip: Link to end at, the only leaf below the base that moves if it is None.
+
+    Returns:
+        The name, and the joints from base to tip.
+
+    Raises:
+        InvalidInputError: The file is no URDF, or has no chain of readable joints from base to tip.
+        UnknownNameError: There is no such link.
+    """
+    tree = Tree(data)
+    known_names("link", [link for link in (base, tip) if link is not None], tree.links)
+    base = tree.root if base is None else base
+    tip = only_tip(tree, base) if tip is None else tip
+    path = tree.path(base, tip)
+    if without := [xml.label(joint) for joint in path if joint.get("type") in BOUNDED and joint.find("limit") is None]:
+        raise InvalidInputError(
+            f"{', '.join(without)}: expected a <limit>, got none; an endless joint is of type 'continuous'."
+        )
+    joints = list(map(read_joint, path))
+    if not any(joint.kind in MOVING for joint in joints):
+        raise InvalidInputError(f"expected a joint that moves between links {base!r} and {tip!r}, got none.")
+    return tree.name, joints
+
+
+def only_tip(tree: Tree, base: str) -> str:
+    """The one leaf below the base that moves; the only leaf where none does.
+
+    Raises:
+        InvalidInputError: There are several, and the message has them, likely ones first; or none of several moves.
+    """
+    leaves = tree.leaves(base)
+    found = [tip.link for tip in likely_tips(tree, base)] if len(leaves) > 1 else leaves
+    if not found:
+        raise InvalidInputError(f"expected a joint that moves below link {base!r}, got none.")
+    if len(found) > 1:
+        raise InvalidInputError(f"expected a tip, since there are several: {xml.listing(found)}.")
+    return found[0]

@@ -1,0 +1,85 @@
+"""The rule that recommends a solver, on made-up rows."""
+
+import dataclasses
+
+import pytest
+
+from baselines.evaluation.compare.rule import PREFERRED, fault, recommend
+from tests.baselines.evaluation.test_report import BASE
+
+DT = 0.004
+GOOD = dataclasses.replace(
+    BASE, followed=True, position_error_max=1e-6, orientation_error_max=1e-6, qddot_peak=1.0, time_p50_us=20.0
+)
+MISSES = {"followed": False, "position_error_max": 0.0123, "orientation_error_max": None}
+STOPPED, SLOW, HARSH = {"steps_at_joint_limit": 1}, {"time_p50_us": 2001.0}, {"qddot_peak": 3.1}
+
+
+def rows(**changes):
+    """Rows of three solvers, good ones but for the changes."""
+    return {name: dataclasses.replace(GOOD, **changes.get(name, {})) for name in ("sns", "dls", "qp")}
+
+
+ALL_MISS = rows(qp=MISSES, sns=MISSES, dls=MISSES)
+
+
+def test_qp_is_taken_where_nothing_stands_in_the_way():
+    chosen = recommend(rows(), rows(), rows(), DT)
+    assert (chosen.solver, chosen.retimed, chosen.late) == ("qp", False, True)
+    assert str(chosen) == "Recommended: qp. qp follows the path, with late drives too, as predicted:policy=qp."
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        (MISSES, "qp errs by 12.3 mm."),
+        (STOPPED, "qp has a joint at a stop."),
+        (SLOW, "qp takes 2001 µs a call of a period of 4000 µs."),
+        (HARSH, "qp needs 3.1 times the acceleration of the calmest."),
+    ],
+)
+def test_the_next_one_is_taken_where_qp_has_a_fault(change, reason):
+    chosen = recommend(rows(qp=change), {}, rows(), DT)
+    assert chosen.solver == "sns"
+    assert reason in chosen.reason
+
+
+def test_limits_of_the_rule_belong_to_what_is_allowed():
+    edge = {"qddot_peak": 3.0, "time_p50_us": 2000.0}
+    assert recommend(rows(qp=edge), {}, rows(), DT).solver == "qp"
+
+
+def test_the_calmest_is_one_of_those_that_follow():
+    assert recommend(rows(sns={**STOPPED, "qddot_peak": 0.1}), {}, rows(), DT).solver == "qp"
+
+
+def test_who_follows_with_late_drives_takes_precedence():
+    chosen = recommend(rows(), {}, rows(qp=MISSES), DT)
+    assert (chosen.solver, chosen.late) == ("sns", True)
+    assert "qp errs by 12.3 mm with late drives." in chosen.reason
+    chosen = recommend(rows(), {}, ALL_MISS, DT)
+    assert (chosen.solver, chosen.late) == ("qp", False)
+    assert chosen.reason == "qp follows the path, but not with late drives."
+    chosen = recommend(rows(qp=HARSH), {}, ALL_MISS, DT)
+    assert chosen.reason.startswith("qp needs 3.1 times the acceleration of the calmest. sns follows the path, but not")
+
+
+def test_a_path_is_retimed_only_where_no_solver_follows_it():
+    chosen = recommend(rows(qp=MISSES, sns=MISSES), rows(), rows(), DT)
+    assert (chosen.solver, chosen.retimed) == ("dls", False)
+    chosen = recommend(ALL_MISS, rows(sns=MISSES), rows(), DT)
+    assert (chosen.solver, chosen.retimed) == ("qp", True)
+    assert str(chosen).startswith("Recommended: qp on the retimed path, which ikgym path --retime writes. No solver")
+    assert "No solver follows the path as it is: qp errs by 12.3 mm. qp follows" in chosen.reason
+
+
+def test_no_solver_is_an_answer():
+    chosen = recommend(ALL_MISS, rows(qp=STOPPED, sns=MISSES, dls=SLOW), rows(), DT)
+    assert (chosen.solver, chosen.retimed) == (None, False)
+    assert str(chosen) == "Recommended: none of these solvers. No solver follows the path: qp errs by 12.3 mm."
+
+
+def test_faults_state_both_errors():
+    turned = dataclasses.replace(GOOD, followed=False, orientation_error_max=2e-3)
+    assert fault(turned, DT) == "errs by 0.001 mm, 2 mrad"
+    assert PREFERRED[0] == "qp"
