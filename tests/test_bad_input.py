@@ -85,6 +85,7 @@ ALLOWED = {
 } | {
     ("Scenario", "velocity_limit"): ("none",),
     ("Scenario", "model"): ("none",),
+    ("Scenario", "steps"): ("none",),
     ("Plant", "bandwidth"): ("inf",),
     ("RandomSinusoid", "amplitude"): ("longer",),
     ("JointSpline", "control"): ("longer",),

@@ -21,7 +21,7 @@ MOST_TIPS = 8
 
 
 @dataclasses.dataclass(frozen=True)
-class Arguments(shell.Names, RobotOptions):
+class Arguments(RobotOptions, shell.Names):
     """Arguments of the command line."""
 
 

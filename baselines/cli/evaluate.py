@@ -5,7 +5,8 @@ from __future__ import annotations
 import dataclasses
 import inspect
 import re
-from collections.abc import Callable, Mapping, Sequence
+import sys
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Annotated, ClassVar
 
 import tyro
@@ -68,6 +69,7 @@ RULES = (
     Rule(("--episodes", "--split"), _any(varies), "on scenarios that are the same at every reset"),
     Rule(("--noise-seeds",), _any(lambda scenario: scenario.plant.noisy), "on plants without noise"),
     Rule(("--pairs",), _any(lambda scenario: not scenario.plant.ideal), "on ideal plants"),
+    Rule(("--accelerations",), lambda given: bool(given.export), "without --export"),
     ONE_KIND,
     Rule(("--cluster",), lambda given: given.timed != "all", "with --timed all, since timed episodes are played here"),
 )
@@ -130,7 +132,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return shell.run_resumable(Arguments, arguments, program, manual, _work, RULES)
 
 
+def cut_off(played: Iterable[Scenario]) -> list[str]:
+    """Warnings of paths whose end is not played."""
+    return [
+        f"warning: {one.name}: the last {one.cut_off:.3g} s of the path are cut off, since {one.steps} steps take "
+        f"{one.steps * one.dt:.4g} s; without `steps` the whole path is played."
+        for one in played
+        if one.cut_off
+    ]
+
+
 def _work(given: Arguments, command: str) -> None:
+    for warning in cut_off(given.played()) if given.steps is None else ():
+        print(warning, file=sys.stderr)
     carry_out(
         dataclasses.replace(given, progress=True),
         command=command,

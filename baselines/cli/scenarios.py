@@ -8,7 +8,8 @@ import numpy as np
 
 from baselines.cli import shell
 from ikgym import scenarios
-from ikgym.scenarios import Scenario
+from ikgym.arms import Arm
+from ikgym.scenarios import Scenario, durations
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -31,14 +32,24 @@ def _scenario(name: str) -> str:
 def _parts(scenario: Scenario) -> dict[str, object]:
     limit = np.unique(scenario.velocity_limit)
     return {
-        "arm": scenario.arm.name,
+        "arm": f"{scenario.arm.name}: {', '.join(scenario.arm.joint_names)}",
         "nominal model": scenario.model.name,
         "task": scenario.task.name,
         "trajectory": type(scenario.trajectory).__name__,
         "random": "yes, by the seed" if scenario.random else "no",
         "velocity limit": f"{', '.join(f'{x:g}' for x in limit)} rad/s or m/s",
+        "accelerations": _accelerations(scenario.arm),
         "cost": scenario.cost,
     } | _path(scenario)
+
+
+def _accelerations(arm: Arm) -> str:
+    """The limits of acceleration, and the joints that have none."""
+    without = [name for name, one in zip(arm.joint_names, arm.acceleration_limit, strict=True) if not np.isfinite(one)]
+    if len(without) == arm.joints:
+        return "no limit stated"
+    stated = ", ".join(f"{x:g}" for x in np.unique(arm.acceleration_limit) if np.isfinite(x))
+    return f"{stated} rad/s² or m/s²" + (f"; no limit stated for {', '.join(without)}" if without else "")
 
 
 def _path(scenario: Scenario) -> dict[str, object]:
@@ -46,8 +57,9 @@ def _path(scenario: Scenario) -> dict[str, object]:
     if scenario.random or scenario.trajectory.joint_path(np.zeros(1)) is not None:
         return {}
     out: dict[str, object] = {}
-    if (duration := getattr(scenario.trajectory, "duration", None)) is not None:  # some go on for ever
-        out["path takes"] = f"{duration:.3g} s, the episode {scenario.steps * scenario.dt:.3g} s"
+    if (time := durations.duration(scenario.trajectory)) is not None:
+        cut = f": {scenario.cut_off:.3g} s are cut off" if scenario.cut_off else ""
+        out["path takes"] = f"{time:.3g} s, the episode {scenario.steps * scenario.dt:.3g} s{cut}"
     return out | {"poses in reach": _reach(scenario)}
 
 

@@ -1,10 +1,10 @@
-"""An episode as files: the trajectory log behind plots, joint motions as tables, and messages for ROS 2."""
+"""An episode as files: the trajectory log behind plots, joint motions as tables, and as messages for ROS 2."""
 
 from __future__ import annotations
 
 import csv
+import importlib.util
 import io
-import json
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, NamedTuple
 
@@ -12,6 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.episodes import Episode, Seeds
+from baselines.evaluation.motion import Motion, joint_trajectory, mcap
+from baselines.evaluation.motion.played import by_joint
+from ikgym.exceptions import MissingDependencyError
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray, known_names
 
@@ -19,26 +22,6 @@ from ikgym.validation import FloatArray, known_names
 FRAMES = 400
 #: Arrays by name, see :func:`trajectory_log`.
 TrajectoryLog = dict[str, npt.NDArray[Any]]
-
-
-class Motion(NamedTuple):
-    """The joint motion of an episode, from its start.
-
-    Attributes:
-        times: From 0, in [s]. Shape (steps + 1,).
-        q: Joint coordinates at these times, in [rad] or [m]. Shape (steps + 1, n).
-        qdot: Joint velocities of the step that ends then, 0 at the start, in [rad/s] or [m/s]. Shape (steps + 1, n).
-    """
-
-    times: FloatArray
-    q: FloatArray
-    qdot: FloatArray
-
-    @classmethod
-    def of(cls, scenario: Scenario, seeds: Seeds, episode: Episode) -> Motion:
-        """The motion of an episode."""
-        q = np.vstack([scenario.start_of(seeds.seed, seeds.arm_seed), episode.q])
-        return cls(scenario.times(scenario.steps + 1), q, np.vstack([np.zeros(scenario.joints), episode.qdot]))
 
 
 def table(columns: Mapping[str, npt.NDArray[Any]]) -> bytes:
@@ -51,52 +34,30 @@ def table(columns: Mapping[str, npt.NDArray[Any]]) -> bytes:
     return text.getvalue().encode()
 
 
-def motion_table(scenario: Scenario, seeds: Seeds, episode: Episode) -> bytes:
+def motion_table(scenario: Scenario, seeds: Seeds, episode: Episode, accelerations: bool = False) -> bytes:
     """The joint motion as CSV: times, joint coordinates and velocities, from the start, with units in the head."""
-    times, q, qdot = Motion.of(scenario, seeds, episode)
-    columns: dict[str, npt.NDArray[Any]] = {"time [s]": times}
-    for values, per in ((q, ""), (qdot, "/s")):
-        for joint, (name, prismatic) in enumerate(zip(scenario.arm.joint_names, scenario.arm.prismatic, strict=True)):
-            columns[f"{name} [{'m' if prismatic else 'rad'}{per}]"] = values[:, joint]
-    return table(columns)
-
-
-def joint_trajectory(scenario: Scenario, seeds: Seeds, episode: Episode) -> bytes:
-    """The joint motion as a `trajectory_msgs/msg/JointTrajectory` in JSON, which `ros2 topic pub` reads.
-
-    The header's time of 0 means at once. Accelerations and efforts are left to the controller: a velocity is that of a
-    whole step, and so has none.
-    """
-    times, q, qdot = Motion.of(scenario, seeds, episode)
-    points = zip(times.tolist(), q.tolist(), qdot.tolist(), strict=True)
-    message = {
-        "header": {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""},
-        "joint_names": list(scenario.arm.joint_names),
-        "points": [
-            {
-                "positions": positions,
-                "velocities": velocities,
-                "accelerations": [],
-                "effort": [],
-                "time_from_start": dict(zip(("sec", "nanosec"), divmod(round(1e9 * time), 10**9), strict=True)),
-            }
-            for time, positions, velocities in points
-        ],
+    motion = Motion.of(scenario, seeds, episode)
+    columns = {
+        "time [s]": motion.times,
+        **by_joint(scenario.arm, motion.q),
+        **by_joint(scenario.arm, motion.qdot, "/s"),
     }
-    return (json.dumps(message, ensure_ascii=False, allow_nan=False) + "\n").encode()
+    return table(columns | (by_joint(scenario.arm, motion.qddot, "/s²") if accelerations else {}))
 
 
 class Format(NamedTuple):
-    """A kind of file: the suffix of its name, and its content."""
+    """A kind of file: the suffix of its name, and its content, with accelerations or without."""
 
     suffix: str
-    content: Callable[[Scenario, Seeds, Episode], bytes]
+    content: Callable[[Scenario, Seeds, Episode, bool], bytes]
+    package: str = ""
 
 
 #: Formats of joint motions by name.
 FORMATS: Mapping[str, Format] = {
     "csv": Format(".csv", motion_table),
     "joint-trajectory": Format(".json", joint_trajectory),
+    "mcap": Format(".mcap", mcap, "rosbags"),
 }
 
 
@@ -105,9 +66,13 @@ def formats(names: str | Iterable[str]) -> tuple[str, ...]:
 
     Raises:
         UnknownNameError: There is no format of a name.
+        MissingDependencyError: The package of a format is not installed.
     """
     given = (names,) if isinstance(names, str) else tuple(names)
     known_names("format of export", given, tuple(FORMATS))
+    for name in given:
+        if (package := FORMATS[name].package) and importlib.util.find_spec(package) is None:
+            raise MissingDependencyError(f'Format {name!r} needs {package}: pip install "ikgym[paths]"')
     return tuple(dict.fromkeys(given))
 
 

@@ -77,7 +77,9 @@ class Options:
     """Write report.html into the folder: table, plots and replays in one page that opens without a network."""
     export: Annotated[tuple[str, ...], tyro.conf.arg(metavar="FORMAT …")] = ()
     """Write the joint motion of each episode into the folder: csv for a table of times, joint coordinates and
-    velocities, joint-trajectory for a ROS 2 message as JSON, or both."""
+    velocities, joint-trajectory for a ROS 2 message as JSON, mcap for the same in a file of rosbag2."""
+    accelerations: bool = False
+    """Write accelerations into these files, too: controllers then interpolate by quintics, else cubically."""
     noise_seeds: Annotated[int, tyro.conf.arg(metavar="N")] = 1
     """Times that each episode is played, each time with other noise in sensors and drives, the same for all policies.
     Episodes without noise are played once. The cost of an episode is the geometric mean over its noise seeds."""

@@ -82,6 +82,7 @@ class Row:
         arm_seed: Seed of the arm; None if the reset seed sets it.
         noise_seed: Seed of the noise in sensors and drives; 0 is the noise of the reset seed.
         ideal: Fingerprint of the scenario with an ideal plant; its own if the plant is ideal.
+        acceleration_stated: Whether each joint has an acceleration limit, or the arm has no limits at all.
     """
 
     scenario: str
@@ -120,6 +121,7 @@ class Row:
     arm_seed: int | None = None
     noise_seed: int = 0
     ideal: str | None = None
+    acceleration_stated: bool = True
 
     @property
     def lost(self) -> bool:
@@ -234,6 +236,7 @@ def measure(
         arm_seed=seeds.arm_seed,
         noise_seed=seeds.noise_seed,
         ideal=ideal,
+        acceleration_stated=bool(np.isfinite(scenario.arm.acceleration_limit).all()) or not scenario.arm.limited,
     )
 
 

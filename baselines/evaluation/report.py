@@ -24,6 +24,7 @@ Pictures = Mapping[str, Sequence[tuple[str, pathlib.PurePath]]]
 OVERVIEW = "overview"
 REFERENCE_NOTE = "* reference: has privileged information"
 STOP_NOTE = "† a joint was at a stop, a limit of its coordinate"
+STATED_NOTE = "‡ no acceleration limit stated for some joint: the peak is what was used"
 
 
 def _policy(summary: Summary) -> str:
@@ -50,7 +51,12 @@ ERRORS = (
     ),
     Column("q̇ peak", "", lambda s: s.largest("qdot_peak"), about="largest joint velocity, in rad/s or m/s", drop=2),
     Column(
-        "q̈ peak", "", lambda s: s.largest("qddot_peak"), about="largest joint acceleration, in rad/s² or m/s²", drop=3
+        "q̈ peak",
+        "",
+        lambda s: s.largest("qddot_peak"),
+        text=lambda s: number(s.largest("qddot_peak")) + " ‡" * (not s.first.acceleration_stated),
+        about="largest joint acceleration, in rad/s² or m/s²; ‡ no limit stated",
+        drop=3,
     ),
 )
 TIMES = (
@@ -141,7 +147,7 @@ def readme(
             parameters.append(f"| {escaped(scenario)} | {escaped(one.label)} | {values} |")
     out += ["## Notes", "", *(f"- {escaped(note)}" for note in remarks(rows)), ""]
     if skipped:
-        out += ["Skipped, since the policy does not suit the scenario:", ""]
+        out += ["Skipped:", ""]
         out += [f"- {escaped(f'{s.policy} in {s.scenario}: {s.reason}')}" for s in skipped] + [""]
     out += ["## Parameters", "", *parameters, "", "## Conditions", "", f"- command: {code(command)}"]
     out += [f"- finished: {date:%Y-%m-%d %H:%M} UTC", *(f"- {escaped(one)}" for one in machines(rows))]
@@ -212,6 +218,7 @@ def remarks(rows: Sequence[Row]) -> list[str]:
     summaries = summarise(rows)
     notes = [REFERENCE_NOTE] * any(is_reference(row.policy) for row in rows)
     notes += [STOP_NOTE] * any(row.steps_at_joint_limit for row in rows)
+    notes += [STATED_NOTE] * (not all(row.acceleration_stated for row in rows))
     ratio = "cost ratio: total cost / best known cost, – where none is known; "
     ratio *= any(row.cost_ratio is not None for row in rows)
     notes.append(f"{ratio}p50, p99: time of a call after the first; misses: such calls longer than Δt")

@@ -31,6 +31,7 @@ from baselines.files import (
     write,
     write_json,
 )
+from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import SPLITS
 from ikgym.scenarios.preview import furthest
 
@@ -46,7 +47,7 @@ class Rows(list[Row]):
     """The rows of an evaluation.
 
     Attributes:
-        skipped: Policies that do not suit a scenario, with the reasons.
+        skipped: Policies that do not suit a scenario and motions that no controller would accept, with the reasons.
     """
 
     def __init__(self, rows: Iterable[Row] = (), skipped: Sequence[Skipped] = ()) -> None:
@@ -58,7 +59,7 @@ class Results:
     """The folder of an evaluation.
 
     `results.json` holds all rows and is written anew after each batch of episodes; the trajectory logs of the first
-    episodes are in `series/SCENARIO/POLICY-….npz`, joint motions in `export/SCENARIO/POLICY-…-seed-N.csv` and `.json`.
+    episodes are in `series/SCENARIO/POLICY-….npz`, joint motions in `export/SCENARIO/POLICY-…-seed-N.csv` and so on.
     Every file is replaced in one go, so that none is ever half written.
 
     Args:
@@ -76,6 +77,9 @@ class Results:
         self, directory: pathlib.Path, jobs: Sequence[Job], machine: Mapping[str, Any], options: Options
     ) -> None:
         self._export = [FORMATS[name] for name in options.export]
+        self._accelerations = options.accelerations
+        #: Motions that could not be exported, with the reason.
+        self.not_exported: list[Skipped] = []
         self._order = [job.key for job in jobs]
         self.directory = directory
         self._file = directory / "results.json"
@@ -128,8 +132,17 @@ class Results:
                 np.savez_compressed(file, allow_pickle=False, **trajectory_log(job.scenario, job.seeds, episode))
                 write(self.series_file(row), file.getvalue())
             for kind in self._export:
-                write(self.export_file(row, kind), kind.content(job.scenario, job.seeds, episode))
+                self._write_motion(job, row, kind, episode)
         self.save()
+
+    def _write_motion(self, job: Job, row: Row, kind: Format, episode: Episode) -> None:
+        try:
+            content = kind.content(job.scenario, job.seeds, episode, self._accelerations)
+        except InvalidInputError as error:
+            reason = f"no {kind.suffix} of seed {row.seed}: {error}"
+            self.not_exported.append(Skipped(row.scenario, row.policy, reason))
+            return
+        write(self.export_file(row, kind), content)
 
     def save(self) -> None:
         """Writes results.json.

@@ -88,6 +88,8 @@ def carry_out(
                 rows.update({row.key: row for row, _ in some})
                 if results is not None:
                     results.add(batch, some)
+        if results is not None:
+            skipped += results.not_exported
         out = Rows([rows[job.key] for job in jobs], skipped)
         if show is not None:
             show(out)

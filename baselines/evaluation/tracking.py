@@ -13,8 +13,10 @@ from matplotlib.figure import Figure
 from threadpoolctl import threadpool_limits
 
 from baselines.episodes import Episode, Seeds, add_up
-from baselines.evaluation.export import Motion, joint_trajectory, table, trajectory_log
+from baselines.evaluation.export import table, trajectory_log
 from baselines.evaluation.foreign import Wrap
+from baselines.evaluation.motion import Motion, joint_trajectory, mcap
+from baselines.evaluation.motion.played import by_joint
 from baselines.evaluation.play import play_episodes
 from baselines.evaluation.plots import tracking as picture
 from baselines.evaluation.policies import AnyPolicy, bind
@@ -81,10 +83,9 @@ class Tracking:
 
     def columns(self) -> dict[str, npt.NDArray[Any]]:
         """All numbers by name and unit, one number a step, as :meth:`to_csv` writes them."""
-        units = ["m" if prismatic else "rad" for prismatic in self.prismatic]
+        arm = self._played[0].arm
         out: dict[str, npt.NDArray[Any]] = {"time [s]": self.times}
-        out |= {f"q{j} [{unit}]": self.q[:, j - 1] for j, unit in enumerate(units, 1)}
-        out |= {f"qdot{j} [{unit}/s]": self.qdot[:, j - 1] for j, unit in enumerate(units, 1)}
+        out |= {**by_joint(arm, self.q), **by_joint(arm, self.qdot, "/s")}
         for name, values in (("pose", self.pose), ("nominal", self.nominal)):
             # The position comes last; parts of a rotation have no unit.
             parts = [("1" if i < values.shape[1] - 3 else "m") for i in range(values.shape[1])]
@@ -104,13 +105,22 @@ class Tracking:
         """
         write(pathlib.Path(file), table(self.columns()))
 
-    def to_joint_trajectory(self, file: str | os.PathLike[str]) -> None:
-        """Writes the joint motion, from the start, as a ROS 2 `JointTrajectory` in JSON.
+    def to_joint_trajectory(self, file: str | os.PathLike[str], *, accelerations: bool = False) -> None:
+        """Writes the joint motion, from rest to rest, as a ROS 2 `JointTrajectory` in JSON.
+
+        Args:
+            file: The file.
+            accelerations: Whether points have accelerations.
 
         Raises:
+            InvalidInputError: The episode ends in motion, and has no room to stop.
             ResultsError: The file cannot be written.
         """
-        write(pathlib.Path(file), joint_trajectory(*self._played))
+        write(pathlib.Path(file), joint_trajectory(*self._played, accelerations))
+
+    def to_mcap(self, file: str | os.PathLike[str], *, accelerations: bool = False) -> None:
+        """Likewise as an MCAP file, by rosbags; see :meth:`to_joint_trajectory`."""
+        write(pathlib.Path(file), mcap(*self._played, accelerations))
 
     def plot(self) -> Figure:
         """Task coordinates with those of the reference, and errors, over time, at the steps that count."""

@@ -20,6 +20,7 @@ from ikgym.exceptions import InvalidInputError
 from ikgym.files import read_user_toml
 from ikgym.registry import Registry
 from ikgym.scenarios import files
+from ikgym.scenarios.durations import duration
 from ikgym.scenarios.importing import imported
 from ikgym.scenarios.preview import Preview
 from ikgym.scenarios.reachability import Gap, gaps
@@ -76,7 +77,11 @@ def load(file: str | os.PathLike[str]) -> Scenario:
     with files.located("", file):
         base = get(table.pop("like")) if "like" in table else None
         fields = files.arguments(Scenario, table, pathlib.Path(file).parent, like=base is not None)
-        return Scenario(**fields) if base is None else base.replace(**fields)
+        if base is None:
+            return Scenario(**fields)
+        if "trajectory" in fields and duration(fields["trajectory"]) is not None:
+            fields.setdefault("steps", None)  # those of the new path
+        return base.replace(**fields)
 
 
 _registry: Registry[Scenario] = Registry("scenario", Scenario)

@@ -18,7 +18,7 @@ from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.kinematics import Chain, stacked
 from ikgym.plant import DrawnPlant, Plant
 from ikgym.plant.draw import Draws, arm_key, episode_key
-from ikgym.scenarios import checks, files, starts
+from ikgym.scenarios import checks, durations, files, starts
 from ikgym.scenarios.reference import Reference
 from ikgym.tasks import Task
 from ikgym.trajectories import Trajectory, first_joints_of
@@ -41,7 +41,8 @@ class Scenario(Frozen, Reference):
             the arm's velocity limits, if all of them are finite.
         cost: The stage cost. The worst episode costs at most 1e150.
         dt: Δt in [s].
-        steps: Steps of an episode, 100,000,000 at most.
+        steps: Steps of an episode, 100,000,000 at most. By default those of the whole path and 0.25 s of rest; 1000 for
+            trajectories that go on for ever or are drawn.
         model: The arm that solvers know, and through which nominal joint paths are mapped; by default the arm itself.
         start: Joint coordinates at the start in [rad] or [m], within the limits of the arm. By default
             the nominal or published ones, or for other Cartesian trajectories those that :meth:`Arm.inverse` finds for
@@ -65,7 +66,7 @@ class Scenario(Frozen, Reference):
     velocity_limit: FloatArray = None  # type: ignore[assignment]  # that of the arm
     cost: TrackingCost = dataclasses.field(default_factory=TrackingCost)
     dt: float = 1e-3
-    steps: int = 1000
+    steps: int = None  # type: ignore[assignment]  # those of the path
     model: Arm = None  # type: ignore[assignment]  # the arm itself
     start: FloatArray | None = None
     initial_pose: FloatArray | None = None
@@ -79,7 +80,6 @@ class Scenario(Frozen, Reference):
         self._settle(model=self.arm if self.model is None else self.model)
         self._settle(velocity_limit=velocity_scale(self.arm, self.velocity_limit))
         self._settle(dt=number("dt", self.dt, at_least=SMALLEST, at_most=LARGEST))
-        self._settle(steps=checks.step_count("steps", self.steps, n))
         if self.start is not None:
             self._settle(start=frozen_array("start", self.start, (n,), at_most=LARGEST))
         elif self.random and not self.starts_nominally:
@@ -93,6 +93,8 @@ class Scenario(Frozen, Reference):
             raise InvalidInputError("iterations_per_point: expected at least one number, got none.")
         held = tuple(checks.step_count("iterations_per_point", number_of_steps, n) for number_of_steps in held)
         self._settle(iterations_per_point=held)
+        steps = durations.default_steps(self.trajectory, self.dt, held) if self.steps is None else self.steps
+        self._settle(steps=checks.step_count("steps", steps, n))
         self.plant.check(self.arm, self.steps)
         if not self.starts_nominally or (self.arm.limited and not self.random):
             self.first_q(self.trajectory)  # raises if the arm cannot be there
@@ -132,6 +134,13 @@ class Scenario(Frozen, Reference):
         if type(self) is not Scenario:
             raise InvalidInputError(f"save: expected a Scenario itself, got a {type(self).__name__}.")
         files.save(self._fields(), file)
+
+    @property
+    def cut_off(self) -> float:
+        """The time in [s] at the end of a path for which the steps do not suffice; 0 where they do."""
+        time = durations.duration(self.trajectory)
+        missing = 0.0 if time is None else time - self.dt * float(self.points()[-1])
+        return missing if missing > 1e-6 * self.dt else 0.0
 
     @property
     def joints(self) -> int:

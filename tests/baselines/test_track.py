@@ -66,12 +66,12 @@ def test_csv_has_units_and_every_digit(tmp_path, scenario):
     assert len(rows) == STEPS
     names = list(rows[0])
     arm = ikgym.scenarios.get(scenario).arm
-    units = ["m" if prismatic else "rad" for prismatic in arm.prismatic]
-    assert names[: 1 + 2 * arm.joints] == [
-        "time [s]",
-        *(f"q{j} [{unit}]" for j, unit in enumerate(units, 1)),
-        *(f"qdot{j} [{unit}/s]" for j, unit in enumerate(units, 1)),
+    joints = [
+        (name, "m" if prismatic else "rad") for name, prismatic in zip(arm.joint_names, arm.prismatic, strict=True)
     ]
+    assert names[: 1 + 2 * arm.joints] == [
+        "time [s]", *(f"{name} [{unit}]" for name, unit in joints), *(f"{name} [{unit}/s]" for name, unit in joints),
+    ]  # fmt: skip
     assert names[-5:] == [
         "position_error [m]", "orientation_error [rad]", "tracking_cost [1]", "velocity_cost [1]", "solver_status",
     ]  # fmt: skip
@@ -79,7 +79,7 @@ def test_csv_has_units_and_every_digit(tmp_path, scenario):
     assert [name for name in names if name.startswith("pose")] == [
         f"pose{i} [{'m' if i > size - 3 else '1'}]" for i in range(1, size + 1)
     ]
-    np.testing.assert_array_equal([float(row["q1 [rad]"]) for row in rows], track.q[:, 0])
+    np.testing.assert_array_equal([float(row["joint_1 [rad]"]) for row in rows], track.q[:, 0])
     np.testing.assert_array_equal([float(row[f"nominal{size} [m]"]) for row in rows], track.nominal[:, -1])
     assert rows[0]["solver_status"] == Status(int(track.statuses[0])).label
     empty = {row["orientation_error [rad]"] == "" for row in rows}

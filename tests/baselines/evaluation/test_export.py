@@ -7,12 +7,16 @@ import json
 import re
 
 import numpy as np
+import pytest
+from rosbags.rosbag2 import Reader
+from rosbags.typesys import Stores, get_typestore
 
 import baselines
 import ikgym
 from baselines.evaluate import evaluate
 from baselines.evaluation import run as command
 from baselines.evaluation.export import FORMATS
+from ikgym.exceptions import MissingDependencyError
 from tests.baselines.making import circle
 
 STEPS = 12
@@ -98,18 +102,65 @@ def test_joint_trajectory_is_a_whole_message(tmp_path):
     content = json.loads(text)
     check(content, MESSAGE)
     assert content["joint_names"] == [f"slider_{i}" for i in range(6)]
-    track = baselines.track(scenario, "dls")
-    points = content["points"]
-    np.testing.assert_array_equal([point["positions"] for point in points], np.vstack([scenario.start, track.q]))
-    np.testing.assert_array_equal([point["velocities"] for point in points], np.vstack([np.zeros(6), track.qdot]))
+    points, track = content["points"], baselines.track(scenario, "dls")
+    assert len(points) > STEPS + 1  # the episode ends in motion
+    np.testing.assert_array_equal(points[0]["positions"], scenario.start)
+    assert points[0]["velocities"] == points[-1]["velocities"] == [0.0] * 6
+    assert [point["accelerations"] for point in points] == [[]] * len(points)
     times = [point["time_from_start"] for point in points]
     assert times[0] == {"sec": 0, "nanosec": 0}
     assert times[4] == {"sec": 1, "nanosec": 200_000_000}
     assert all(0 <= time["nanosec"] < 10**9 for time in times)
     seconds = [time["sec"] + 1e-9 * time["nanosec"] for time in times]
-    np.testing.assert_allclose(seconds, 0.3 * np.arange(STEPS + 1), atol=1e-9)
+    np.testing.assert_allclose(seconds, 0.3 * np.arange(len(points)), atol=1e-9)
     track.to_joint_trajectory(tmp_path / "again.json")
     assert (tmp_path / "again.json").read_text(encoding="utf-8") == text
+
+
+def test_accelerations_are_an_option(tmp_path):
+    scenario = named()
+    given = {"out": tmp_path, "export": ["csv", "joint-trajectory"], "accelerations": True}
+    evaluate(scenario, "dls", **given)
+    folder = tmp_path / "export" / "zhang6-lspb"
+    head, rows = read_csv(next(folder.glob("*.csv")))
+    assert head[-1] == "slider_5 [rad/s²]"
+    np.testing.assert_allclose(rows[1:, 13:], np.diff(rows[:, 7:13], axis=0) / scenario.dt, rtol=1e-12)
+    points = json.loads(next(folder.glob("*.json")).read_text(encoding="utf-8"))["points"]
+    assert {len(point["accelerations"]) for point in points} == {6}
+    assert points[-1]["accelerations"] == [0.0] * 6
+
+
+def test_mcap_is_read_without_ros_and_holds_the_same_message(tmp_path, monkeypatch):
+    track = baselines.track(named(), "dls")
+    track.to_joint_trajectory(tmp_path / "motion.json", accelerations=True)
+    track.to_mcap(tmp_path / "motion.mcap", accelerations=True)
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    with Reader(tmp_path / "motion.mcap") as reader:
+        ((connection, _, data),) = reader.messages()
+        read = store.deserialize_cdr(data, connection.msgtype)
+    written = json.loads((tmp_path / "motion.json").read_text(encoding="utf-8"))
+    assert connection.topic == "/joint_trajectory_controller/joint_trajectory"
+    assert connection.msgtype == "trajectory_msgs/msg/JointTrajectory"
+    assert read.joint_names == written["joint_names"]
+    assert len(read.points) == len(written["points"])
+    for point, other in zip(read.points, written["points"], strict=True):
+        for key in ("positions", "velocities", "accelerations", "effort"):
+            np.testing.assert_array_equal(getattr(point, key), other[key])
+        assert {"sec": point.time_from_start.sec, "nanosec": point.time_from_start.nanosec} == other["time_from_start"]
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    with pytest.raises(MissingDependencyError, match=r"needs rosbags: pip install \"ikgym\[paths\]\""):
+        evaluate(named(), "dls", out=tmp_path / "out", export="mcap")
+
+
+def test_a_motion_without_room_to_stop_is_named_and_the_others_are_written(tmp_path):
+    scenario = circle(dt=2e-3)
+    shoulder = np.array([0.0, 1.7627, 0.0, -1.57, 0.0, 1.57, 0.0])
+    lost = scenario.replace(name="lost", start=shoulder, steps=5)
+    rows = evaluate([scenario.replace(steps=5), lost], "dls", out=tmp_path, export="joint-trajectory")
+    assert len(rows) == 2
+    names = {skipped.scenario: skipped.reason for skipped in rows.skipped}
+    assert names.keys() <= {"lost"}
+    assert len(files(tmp_path)) == 2 - len(names)
 
 
 def test_every_episode_in_every_format(tmp_path):
@@ -117,8 +168,8 @@ def test_every_episode_in_every_format(tmp_path):
         "varga7-random", ["dls", "dls:damping=1e-2"], episodes=2, steps=STEPS, out=tmp_path, export=list(FORMATS),
     )  # fmt: skip
     found = files(tmp_path)
-    assert len(found) == len(rows) * len(FORMATS) == 8
-    pattern = re.compile(r"varga7-random/dls-[0-9a-f]{8}-seed-200000[01]\.(csv|json)")
+    assert len(found) == len(rows) * len(FORMATS) == 12
+    pattern = re.compile(r"varga7-random/dls-[0-9a-f]{8}-seed-200000[01]\.(csv|json|mcap)")
     assert all(map(pattern.fullmatch, found))
     scenario = ikgym.scenarios.get("varga7-random")
     for seed in (2_000_000, 2_000_001):

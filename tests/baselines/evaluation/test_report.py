@@ -109,6 +109,25 @@ def test_a_policy_with_a_joint_at_a_stop_is_marked():
     assert summarise([stopped, dataclasses.replace(stopped, seed=1)])[0].total("steps_at_joint_limit") == 6
 
 
+def test_a_peak_that_no_limit_was_stated_for_is_marked():
+    text = report.table([BASE, row(policy="qp", scenario="own", acceleration_stated=False)])
+    assert re.search(r"^qp:damping=0.001 .* 500\.0 ‡ ", text, re.MULTILINE)
+    assert text.count("500.0 ‡") == 1
+    assert report.STATED_NOTE in text
+    assert "‡" not in report.table([BASE])
+
+
+@pytest.mark.parametrize(
+    ("changes", "stated"),
+    [({}, True), ({"acceleration_limit": None}, False), ({"acceleration_limit": [9.0] * 6 + [np.inf]}, False)],
+)
+def test_a_row_knows_whether_accelerations_are_stated(changes, stated):
+    (played,) = evaluate(circle(**changes), "dls", steps=3)
+    assert played.acceleration_stated is stated
+    (unlimited,) = evaluate("varga7-fast", "dls", steps=3)
+    assert unlimited.acceleration_stated
+
+
 def test_several_episodes_are_put_together():
     costs = {2_000_000: 10.0, 2_000_001: 1000.0, 2_000_002: 1e6}
     text = report.table([row(scenario="varga7-random", seed=seed, total_cost=cost) for seed, cost in costs.items()])

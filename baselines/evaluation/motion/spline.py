@@ -1,0 +1,86 @@
+"""Points of a cubic spline from a motion of steps, as trajectory controllers interpolate it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ikgym.validation import FloatArray
+
+#: Accelerations of the spline may be so many times those of the motion.
+EXCESS = 1.09
+#: Accelerations below this share of the largest one of all joints count as so large.
+FLOOR = 1e-2
+#: Periods in which the spline catches up with a motion that begins with a jump of its velocity.
+CATCH_UP = 36
+
+
+class Points(NamedTuple):
+    """Points of a trajectory, one a period, from rest to rest.
+
+    Attributes:
+        q: Joint coordinates in [rad] or [m]. Shape (k, n).
+        qdot: Velocities in [rad/s] or [m/s], 0 at both ends. Shape (k, n).
+        qddot: Accelerations in [rad/s²] or [m/s²], 0 at the end. Shape (k, n).
+    """
+
+    q: FloatArray
+    qdot: FloatArray
+    qddot: FloatArray
+
+
+def smooth(q: FloatArray, dt: float) -> Points:
+    """Points between which a cubic Hermite spline accelerates at most 1.09 times as hard as the motion.
+
+    The first of these that does: points through the coordinates themselves, which suit gradual accelerations; points of
+    the cubic B-spline that has the coordinates as its control points, within q̈ Δt² / 6 of them; the same for a motion
+    whose velocity jumps at the start, caught up with from rest, within 6 q̈ Δt²; else, after a wait of one period.
+
+    Args:
+        q: Joint coordinates, one row a period, from rest; the last two are equal. Shape (k, n).
+        dt: The period in [s].
+    """
+    played = np.abs(np.diff(q, 2, axis=0, prepend=q[:1])).max(axis=0) / dt**2
+    most = EXCESS * np.maximum(played, FLOOR * played.max())
+    for points in (_points(q, dt), _points(q, dt, smoothed=True), _points(q + from_rest(q), dt, smoothed=True)):
+        if (accelerations(points, dt) <= most).all():
+            return points
+    return _points(np.vstack([q[:1], q]), dt, smoothed=True)
+
+
+def from_rest(q: FloatArray) -> FloatArray:
+    """What takes the velocity at the start from a motion, and gives the way back within some periods. Shape (k, n)."""
+    if len(q) < 3:
+        return np.zeros_like(q)
+    jump = 0.5 * (-3.0 * q[0] + 4.0 * q[1] - q[2])  # in one period
+    return -np.outer(np.arange(len(q)) * (1.0 - _passed(len(q))) ** 2, jump)
+
+
+def accelerations(points: Points, dt: float) -> FloatArray:
+    """The largest accelerations of the cubic Hermite spline of some points, in [rad/s²] or [m/s²]. Shape (n,)."""
+    slope, first, last = np.diff(points.q, axis=0) / dt, points.qdot[:-1], points.qdot[1:]
+    ends = (6.0 * slope - 4.0 * first - 2.0 * last, -6.0 * slope + 2.0 * first + 4.0 * last)
+    peaks: FloatArray = np.abs(ends).max(axis=(0, 1)) / dt
+    return peaks
+
+
+def _points(q: FloatArray, dt: float, *, smoothed: bool = False) -> Points:
+    """Points with central differences, at the coordinates or where the B-spline is, from the first coordinates on."""
+    # The motion is continued as its own mirror image before the start, and at rest after the end.
+    padded = np.vstack([q[1:2], q, q[-1:]])
+    bend = np.diff(padded, 2, axis=0)
+    moved = q + (bend - np.outer(_fading(len(q)), bend[0])) / 6.0 if smoothed else q
+    return Points(moved, (padded[2:] - padded[:-2]) / (2.0 * dt), bend / dt**2)
+
+
+def _fading(count: int) -> FloatArray:
+    """From 1 to 0, with slopes of 0 at both ends. Shape (count,)."""
+    u = _passed(count)
+    out: FloatArray = 1.0 - u**2 * (3.0 - 2.0 * u)
+    return out
+
+
+def _passed(count: int) -> FloatArray:
+    """The share of :data:`CATCH_UP` that has passed, all of it before the last two rows. Shape (count,)."""
+    return np.minimum(np.arange(count) / max(1, min(CATCH_UP, count - 2)), 1.0)
