@@ -81,7 +81,7 @@ def test_scenarios_snippets_run(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for part in ("_makers", "_made"):
         monkeypatch.setattr(ikgym.scenarios._registry, part, dict(getattr(ikgym.scenarios._registry, part)))
-    inverse, published, path, own = snippets_of("scenarios.md")
+    inverse, published, path, own, driven = snippets_of("scenarios.md")
     names: dict = {}
     exec(inverse, names)
     assert names["converged"]
@@ -93,6 +93,8 @@ def test_scenarios_snippets_run(tmp_path, monkeypatch):
     exec(own, names)
     assert names["env"].unwrapped.scenario.name == "planar4-wave"
     assert ikgym.scenarios.load("mine.toml").steps == names["scenario"].steps
+    exec(driven, names)
+    assert names["driven"].duration == names["found"].duration
 
 
 @pytest.mark.slow
