@@ -24,7 +24,7 @@ Pictures = Mapping[str, Sequence[tuple[str, pathlib.PurePath]]]
 OVERVIEW = "overview"
 REFERENCE_NOTE = "* reference: has privileged information"
 STOP_NOTE = "† a joint was at a stop, a limit of its coordinate"
-STATED_NOTE = "‡ no acceleration limit stated for some joint: the peak is what was used"
+STATED_NOTE = "§ no acceleration limit stated for some joint: the peak is what was used"
 
 
 def _policy(summary: Summary) -> str:
@@ -54,8 +54,8 @@ ERRORS = (
         "q̈ peak",
         "",
         lambda s: s.largest("qddot_peak"),
-        text=lambda s: number(s.largest("qddot_peak")) + " ‡" * (not s.first.acceleration_stated),
-        about="largest joint acceleration, in rad/s² or m/s²; ‡ no limit stated",
+        text=lambda s: number(s.largest("qddot_peak")) + " §" * (not s.first.acceleration_stated),
+        about="largest joint acceleration, in rad/s² or m/s²; § no limit stated",
         drop=3,
     ),
 )
