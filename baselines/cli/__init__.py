@@ -12,6 +12,7 @@ from ikgym.exceptions import InvalidInputError, UnknownNameError
 #: A summary of each command, and the module with its function ``main``.
 COMMANDS = {
     "evaluate": ("play policies on scenarios: table, files and plots", "baselines.cli.evaluate"),
+    "path": ("say whether a path can be driven, from which start, how fast", "baselines.cli.path"),
     "compare": ("recommend a solver for an arm and a path", "baselines.cli.compare"),
     "train": ("train an agent", "baselines.cli.train"),
     "tune": ("search settings of solvers", "baselines.cli.tune"),
@@ -21,7 +22,6 @@ COMMANDS = {
     "robustness": ("map the cost of policies over severities of an imperfect plant", "baselines.cli.robustness"),
     "view": ("show policies side by side in a browser, live and in an episode", "baselines.cli.view"),
     "video": ("write an episode as a video", "baselines.cli.video"),
-    "path": ("say whether a path can be driven, from which start, how fast", "baselines.cli.path"),
     "oracle": ("search best known costs", "baselines.cli.oracle"),
     "arms": ("list the arms, or show some", "baselines.cli.arms"),
     "scenarios": ("list the scenarios, or show some", "baselines.cli.scenarios"),

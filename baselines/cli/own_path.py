@@ -10,34 +10,27 @@ from typing import Annotated, Any
 import tyro
 
 from baselines.cli.parsing import Rule
+from baselines.cli.robot import RobotOptions
 from baselines.paths.motion import path_duration
-from ikgym import arms, scenarios, tasks
+from ikgym import scenarios, tasks
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
 from ikgym.trajectories import from_csv
-from ikgym.validation import number, per_joint
+from ikgym.validation import number
 
 #: Where nobody states the acceleration of the tool, it comes to its speed within this time in [s].
 SPEEDING_UP = 0.2
 
 
 @dataclasses.dataclass(frozen=True)
-class OwnPath:
+class OwnPath(RobotOptions):
     """Options that make a scenario."""
 
     file: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="FILE")]
     """FILE.toml, the name of a scenario, or FILE.csv with waypoints."""
     arm: Annotated[str | None, tyro.conf.arg(metavar="ARM")] = None
     """For a CSV file: the name of an arm, or FILE.urdf."""
-    base: Annotated[str | None, tyro.conf.arg(metavar="LINK")] = None
-    """Link of a URDF file at which the arm begins; the root if left out."""
-    tip: Annotated[str | None, tyro.conf.arg(metavar="LINK")] = None
-    """Link at which it ends; needed where several could."""
-    tool: Annotated[tuple[float, float, float] | None, tyro.conf.arg(metavar="X Y Z")] = None
-    """Tool point in the frame of the tip, in [m]."""
-    acceleration: Annotated[tuple[float, ...], tyro.conf.arg(metavar="A …")] = ()
-    """Acceleration limit, or one a joint, in [rad/s²] or [m/s²]; a URDF file states none."""
     speed: Annotated[float | None, tyro.conf.arg(metavar="V")] = None
     """Speed of the tool in [m/s]; needed for a CSV file without times."""
     tool_acceleration: Annotated[float | None, tyro.conf.arg(metavar="A")] = None
@@ -68,7 +61,7 @@ def scenario_of(options: OwnPath) -> Scenario:
     scenario = scenarios.find(options.file)
     changes: dict[str, Any] = {} if options.dt is None else {"dt": options.dt}
     if options.acceleration:
-        changes["arm"] = accelerated(scenario.arm, options.acceleration)
+        changes["arm"] = options.accelerated(scenario.arm)
     return scenario.replace(**changes) if changes else scenario
 
 
@@ -76,17 +69,7 @@ def arm_of(options: OwnPath) -> Arm:
     """The arm that the options name."""
     if options.arm is None:
         raise InvalidInputError(f"--arm: expected the name of an arm or FILE.urdf beside {options.file}, got none.")
-    if options.arm.endswith(".urdf"):
-        arm = arms.from_urdf(options.arm, base=options.base, tip=options.tip, tool=options.tool)
-    else:
-        arm = arms.get(options.arm)
-    return accelerated(arm, options.acceleration) if options.acceleration else arm
-
-
-def accelerated(arm: Arm, given: tuple[float, ...]) -> Arm:
-    """The arm with acceleration limits, one number or one a joint, in [rad/s²] or [m/s²]."""
-    limits = per_joint("--acceleration", given[0] if len(given) == 1 else given, arm.joints)
-    return arm.replace(acceleration_limit=limits)
+    return options.robot(options.arm)
 
 
 def _from_csv(options: OwnPath) -> Scenario:

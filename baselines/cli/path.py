@@ -13,9 +13,10 @@ import tyro
 from baselines.cli import shell
 from baselines.cli.own_path import RULES, OwnPath, scenario_of
 from baselines.cli.parsing import parse
-from baselines.paths import Branch, Retimed, Survey, retime, survey
+from baselines.paths import Branch, Retimed, Survey, survey
+from baselines.paths.retiming import refusal, retimed
 from baselines.paths.speeds import Speeds, speed_limit
-from baselines.paths.survey import REACHED
+from baselines.paths.survey import REACHED, follows
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
@@ -54,15 +55,15 @@ def main(arguments: Sequence[str]) -> int:
     options = parse(Options, arguments, prog=PROGRAM, description=manual(), rules=RULES)
     if options.retime is not None and options.retime.suffix != ".toml":
         raise InvalidInputError(f"--retime: expected a file that ends in .toml, got {str(options.retime)!r}.")
-    found = survey(scenario_of(options))
+    every = found = survey(scenario_of(options))
     if options.branch is not None:
-        row = whole_number("--branch", options.branch, at_least=1, at_most=len(found.branches)) - 1
-        found = dataclasses.replace(found, branches=found.branches[row : row + 1])
-    driven = retime(found, fastest=options.fastest) if found.best.whole else None
-    print("\n".join([*_head(found), "", _table(found), "", *_verdict(found, driven)]))
+        row = whole_number("--branch", options.branch, at_least=1, at_most=len(every.branches)) - 1
+        found = dataclasses.replace(every, branches=every.branches[row : row + 1])
+    driven = retimed(found, fastest=options.fastest)
+    print("\n".join([*_head(found), "", _table(every), "", *_verdict(found, driven)]))
     if options.retime is not None:
         if driven is None:
-            raise InvalidInputError(f"--retime: no start reaches all of the path, {options.retime} is not written.")
+            raise InvalidInputError(f"--retime: the path cannot be driven, {options.retime} is not written.")
         driven.scenario.save(options.retime)
         print(f"\n{options.retime}: {driven.scenario.steps} steps of {driven.scenario.dt:g} s")
     return 0
@@ -111,7 +112,7 @@ def _table(found: Survey) -> str:
 def _row(number: int, branch: Branch, scenario: Scenario) -> tuple[str, ...]:
     arm = scenario.arm
     far, turned = branch.position_error, branch.orientation_error
-    missed = f"{100 * branch.reached:.0f} %, misses {_small(far, 'm') if far > REACHED else _small(turned, 'rad')}"
+    missed = f"{100 * branch.reached:.0f} %, misses {_small(far, 'm') if far > REACHED[0] else _small(turned, 'rad')}"
     joint, room = int(np.argmin(branch.room)), float(branch.room.min())
     return (
         str(number),
@@ -120,13 +121,13 @@ def _row(number: int, branch: Branch, scenario: Scenario) -> tuple[str, ...]:
         _share(arm, branch.acceleration / arm.acceleration_limit) if branch.whole else "–",
         f"{room:.2f} {_unit(arm, joint)} {arm.joint_names[joint]}" if np.isfinite(room) else "–",
         "–" if branch.shortest is None else f"{branch.shortest.duration:.3g} s",
-        shell.numbers(np.round(branch.start, 2)),
+        " ".join(f"{q + 0.0:.1f}" for q in np.round(branch.start, 1)),
     )
 
 
 def _small(value: float, unit: str) -> str:
     """A number in thousandths of its unit."""
-    return f"{1e3 * value:.2g} m{unit}"
+    return f"{1e3 * value:.3g} m{unit}"
 
 
 def _share(arm: Arm, shares: FloatArray) -> str:
@@ -141,25 +142,16 @@ def _unit(arm: Arm, joint: int) -> str:
 
 def _verdict(found: Survey, driven: Retimed | None) -> list[str]:
     if driven is None:
-        return _unreached(found)
+        return [f"It cannot be driven: {refusal(found)}"]
     motion, start = driven.motion, shell.numbers(np.round(driven.motion.q[0, 0], 4))
     how = f"qp follows within {_small(motion.position_error.max(), 'm')}"
     if found.scenario.task.has_orientation:
         how += f" and {_small(motion.orientation_error.max(), 'rad')}"
-    speed = f"at up to {Speeds.of(driven.scenario).linear:.3g} m/s"
-    if found.drivable:
-        can = "It can be driven as it is"
-        more = f"; in {driven.duration:.3g} s {speed}" if driven.duration != found.duration else ""
-    else:
-        can = f"It cannot be driven in {found.duration:.3g} s, but in {driven.duration:.3g} s, {speed}"
-        more = ""
-    return [f"{can}{more}: {how}, all limits hold.", f"start = [{start}]"]
-
-
-def _unreached(found: Survey) -> list[str]:
-    best, scenario = found.best, found.scenario
-    time = best.reached * found.duration
-    x = scenario.trajectory.frames(np.array([time]), scenario.arm)[0, -3:]
-    where = f"from {time:.3g} s on, at ({shell.numbers(np.round(x, 4))}) m"
-    far = f"{best.position_error:.3g} m and {best.orientation_error:.3g} rad"
-    return [f"It cannot be driven: no start reaches all of it. The farthest misses poses {where}, and by up to {far}."]
+    if not follows(motion):
+        how += " (no closer: a stop or a singularity is near)"
+    can = "It can be driven as it is"
+    if driven.duration != found.duration:
+        speed = f"in {driven.duration:.3g} s, at up to {Speeds.of(driven.scenario).linear:.3g} m/s"
+        as_asked = found.drivable_within(REACHED)
+        can = f"{can}, and {speed}" if as_asked else f"It cannot be driven in {found.duration:.3g} s, but {speed}"
+    return [f"{can}: {how}, all limits hold.", f"start = [{start}]"]

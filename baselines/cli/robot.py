@@ -12,7 +12,7 @@ from ikgym.arms import Arm
 from ikgym.validation import per_joint
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class RobotOptions:
     """The chain of a URDF file, and what the file does not say."""
 

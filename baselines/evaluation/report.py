@@ -24,15 +24,15 @@ Pictures = Mapping[str, Sequence[tuple[str, pathlib.PurePath]]]
 OVERVIEW = "overview"
 REFERENCE_NOTE = "* reference: has privileged information"
 STOP_NOTE = "† a joint was at a stop, a limit of its coordinate"
-STATED_NOTE = "‡ no acceleration limit stated for some joint: the peak is what was used"
+STATED_NOTE = "§ no acceleration limit stated for some joint: the peak is what was used"
 TIMING_NOTE = (
-    "§ free timing: slower where limits bind; path time: when the end of the path was reached, – if it was not; path "
+    "‡ free timing: slower where limits bind; path time: when the end of the path was reached, – if it was not; path "
     "err: largest distance from the reference at the policy's own progress; all else is on the clock of the scenario"
 )
 
 
 def _policy(summary: Summary) -> str:
-    marks = " *" * summary.reference + " †" * bool(summary.total("steps_at_joint_limit")) + " §" * summary.free_timing
+    marks = " *" * summary.reference + " †" * bool(summary.total("steps_at_joint_limit")) + " ‡" * summary.free_timing
     return summary.label + marks
 
 
@@ -59,8 +59,8 @@ ERRORS = (
         "q̈ peak",
         "",
         lambda s: s.largest("qddot_peak"),
-        text=lambda s: number(s.largest("qddot_peak")) + " ‡" * (not s.first.acceleration_stated),
-        about="largest joint acceleration, in rad/s² or m/s²; ‡ no limit stated",
+        text=lambda s: number(s.largest("qddot_peak")) + " §" * (not s.first.acceleration_stated),
+        about="largest joint acceleration, in rad/s² or m/s²; § no limit stated",
         drop=3,
     ),
 )

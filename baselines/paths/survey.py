@@ -14,7 +14,7 @@ from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray
 
 #: Errors in [m] and [rad] within which a pose of the path counts as reached.
-REACHED = 1e-3
+REACHED = 1e-3, 1e-3
 #: Errors in [m] and [rad] within which `qp` follows a path.
 FOLLOWED = 5e-5, 5e-4
 #: Shares of the limits of velocity and acceleration that a timing uses.
@@ -104,13 +104,17 @@ class Survey:
     @property
     def drivable(self) -> bool:
         """Whether `qp` follows the path from the best start, in the time that is asked for and within all limits."""
-        return self.best.whole and self.best.slowing == 1.0 and follows(self.as_asked)
+        return self.drivable_within(FOLLOWED)
+
+    def drivable_within(self, errors: tuple[float, float]) -> bool:
+        """The same with other errors in [m] and [rad]."""
+        return self.best.whole and self.best.slowing == 1.0 and follows(self.as_asked, errors)
 
 
-def follows(motion: Motion) -> bool:
-    """Whether all poses are met within :data:`FOLLOWED`, and no limit of the arm holds back a joint."""
-    errors = motion.position_error.max(), motion.orientation_error.max()
-    return bool(errors[0] <= FOLLOWED[0] and errors[1] <= FOLLOWED[1] and not motion.held_back.any())
+def follows(motion: Motion, errors: tuple[float, float] = FOLLOWED) -> bool:
+    """Whether all poses are met within errors in [m] and [rad], and no limit of the arm holds back a joint."""
+    position, orientation = motion.position_error.max(), motion.orientation_error.max()
+    return bool(position <= errors[0] and orientation <= errors[1] and not motion.held_back.any())
 
 
 def survey(scenario: Scenario) -> Survey:
@@ -160,7 +164,7 @@ def _branches(scenario: Scenario, starts: FloatArray, slowing: float) -> list[Br
 
 def _shares(motion: Motion) -> FloatArray:
     """The shares of the path that are reached before the first pose that is not. Shape (N,)."""
-    missed = (motion.position_error > REACHED) | (motion.orientation_error > REACHED)
+    missed = (motion.position_error > REACHED[0]) | (motion.orientation_error > REACHED[1])
     shares: FloatArray = np.where(missed.any(axis=0), np.argmax(missed, axis=0) / len(missed), 1.0)
     return shares
 

@@ -89,7 +89,7 @@ def test_csv_has_units_and_every_digit(tmp_path, scenario):
 def test_plot_is_a_figure():
     figure = baselines.track("varga7-fast", "dls", steps=STEPS).plot()
     drawn = [line for axes in figure.axes for line in axes.lines]
-    assert len(drawn) >= 2 * 6 + 2
+    assert len(drawn) == 2 + 3 * 2  # errors, and nominal and actual position
     assert len(style.png(figure)) > 1000
 
 

@@ -15,7 +15,7 @@ from baselines.evaluation.metrics import Row
 from baselines.evaluation.run import evaluate
 from baselines.evaluation.summary import summarise
 from baselines.evaluation.table import Column, plain
-from baselines.paths import Retimed, retime
+from baselines.paths import retime
 from ikgym.exceptions import InvalidInputError
 from ikgym.plant import Plant
 from ikgym.scenarios import Scenario
@@ -85,17 +85,15 @@ def compare(scenario: Scenario, *, progress: bool = False) -> Comparison:
     if scenario.random:
         raise InvalidInputError(f"Expected a path that is the same at every reset, got scenario {scenario.name!r}.")
     notes = [] if np.isfinite(scenario.arm.acceleration_limit).all() else [UNLIMITED]
-    slower = _retimed(scenario, notes)
-    paths = [scenario.replace(name=AS_IT_IS), *([slower.scenario.replace(name=RETIMED)] if slower else [])]
+    paths = [scenario.replace(name=AS_IT_IS), *_retimed(scenario, notes)]
     played = evaluate(paths, PREFERRED, progress=progress)
     notes += [f"left out: {one.policy}: {one.reason}" for one in played.skipped if one.scenario == AS_IT_IS]
     as_it_is, retimed = (_by_solver(played, name) for name in (AS_IT_IS, RETIMED))
-    driven = paths[needs_retiming(as_it_is, retimed, scenario.dt)].replace(name=LATE, plant=late(scenario.plant))
-    names = [f"{WRAPPER}:policy={name}" for name in as_it_is]
-    delayed = evaluate(driven, names, progress=progress)
-    rows = [*played, *delayed]
+    taken = paths[needs_retiming(as_it_is, retimed, scenario.dt)]
+    driven = taken.replace(name=LATE, plant=late(scenario.plant))
+    delayed = evaluate(driven, [f"{WRAPPER}:policy={name}" for name in as_it_is], progress=progress)
     chosen = recommend(as_it_is, retimed, _by_solver(delayed, LATE), scenario.dt)
-    return Comparison(scenario.dt, rows, chosen, notes)
+    return Comparison(scenario.dt, [*played, *delayed], chosen, notes)
 
 
 UNLIMITED = "no limits of acceleration are known for all joints: state them, for example with --acceleration"
@@ -106,15 +104,15 @@ def late(plant: Plant) -> Plant:
     return plant.replace(bandwidth=1.0 / (2.0 * math.pi * LAG), command_delay=DELAY)
 
 
-def _retimed(scenario: Scenario, notes: list[str]) -> Retimed | None:
-    """The path in a time in which it can be driven; None with a note where there is none."""
+def _retimed(scenario: Scenario, notes: list[str]) -> list[Scenario]:
+    """The path in a time in which it can be driven, if there is one; a note says in which, or why there is none."""
     try:
         found = retime(scenario)
     except (InvalidInputError, ModuleNotFoundError) as error:
         notes.append(f"not retimed: {error}")
-        return None
+        return []
     notes.append(f"retimed: from the best start, in {found.duration:.4g} s where {found.asked:.4g} s were asked for")
-    return found
+    return [found.scenario.replace(name=RETIMED)]
 
 
 def _by_solver(rows: Iterable[Row], path: str) -> Rows:

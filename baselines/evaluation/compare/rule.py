@@ -86,23 +86,21 @@ def recommend(as_it_is: Rows, retimed: Rows, late: Rows, dt: float) -> Recommend
     slower = needs_retiming(as_it_is, retimed, dt)
     rows = retimed if slower else as_it_is
     able = followers(rows, dt)
-    missed = f"No solver follows the path{' as it is' * bool(retimed)}: {_first_fault(as_it_is, dt)}."
+    missed = f"No solver follows the path{' as it is' * slower}: {_first_fault(as_it_is, dt)}."
     if not able:
         return Recommendation(None, False, False, missed)
     robust = [name for name in able if name in followers(late, dt)]
     kept = robust or able
     least = min(rows[name].qddot_peak for name in kept)
     solver = next(name for name in kept if rows[name].qddot_peak <= CALM * least)
-    reasons = [missed] * slower
-    reasons += [f"{name} {_drawback(name, rows, late, dt, least)}." for name in _before(solver, rows)]
+    before = [name for name in PREFERRED[: PREFERRED.index(solver)] if name in rows]
     also = f"with late drives too, as predicted:policy={solver}" if robust else "but not with late drives"
-    reasons.append(f"{solver} follows the path, {also}.")
+    reasons = [
+        *[missed] * slower,
+        *(f"{name} {_drawback(name, rows, late if robust else {}, dt, least)}." for name in before),
+        f"{solver} follows the path, {also}.",
+    ]
     return Recommendation(solver, slower, bool(robust), " ".join(reasons))
-
-
-def _before(solver: str, rows: Rows) -> list[str]:
-    """The solvers that would have been preferred."""
-    return [name for name in PREFERRED[: PREFERRED.index(solver)] if name in rows]
 
 
 def _drawback(name: str, rows: Rows, late: Rows, dt: float, least: float) -> str:

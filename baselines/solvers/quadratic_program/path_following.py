@@ -28,7 +28,7 @@ from baselines.solvers.quadratic_program.velocity_box import velocity_box
 from baselines.solvers.resolved_rate.base import APPLIED
 from baselines.status import Status
 from ikgym.kernels import tasks
-from ikgym.kernels.jit import inner, kernel
+from ikgym.kernels.jit import inlined, inner, kernel
 from ikgym.kernels.kinematics import forward_and_jacobian
 from ikgym.kernels.limits import CHANGE, FASTEST
 from ikgym.validation import FloatArray, number
@@ -40,8 +40,8 @@ FEWEST = 4
 SOLVES = 2
 # What is aimed at for the speed of the reference, since the damping takes something off, and what is no progress.
 AMPLE, STUCK = 1.05, 1e-6
-# The speed that no limit of the path ahead goes below, the error in [m] or [rad] at which the reference waits for the
-# arm, and a short part of a step.
+# The speed that no limit of the path ahead goes below, the error in [m] or [rad] from which on the reference slows down
+# for the arm, and a short part of a step.
 CRAWL, AWAY, SHORT = 1e-3, 0.01, 0.1
 
 
@@ -110,6 +110,12 @@ def path_step(model, numbers, seen, memory, answer):
         answer.status[row] = SATURATED if held or stuck else APPLIED if found else LIMIT
 
 
+@inlined
+def _readiness(error):
+    """Share of the speed that an arm off the path is left: none from twice AWAY on."""
+    return min(max(2.0 - error / AWAY, 0.0), 1.0)
+
+
 @inner
 def _path_ahead(model, numbers, samples, progress, last, pose, q, jacobian, motion, missing):
     """Where the path is, and where it leads.
@@ -141,7 +147,7 @@ def _path_ahead(model, numbers, samples, progress, last, pose, q, jacobian, moti
     joint_path_ahead(model, numbers.program, samples, first, passed, motion, q, numbers.stride, tangents)
     speed = path_speed(tangents, numbers.stride, part, last, numbers.fastest, numbers.change)
     slope(moves, part, max(speed, SHORT), motion)  # that of this step
-    speed = (max(speed, CRAWL) if speed < 1.0 else AMPLE) * max(1.0 - math.sqrt(dot(missing, missing)) / AWAY, 0.0)
+    speed = (max(speed, CRAWL) if speed < 1.0 else AMPLE) * _readiness(math.sqrt(dot(missing, missing)))
     forward_and_jacobian(model.chain, q, rotation, position, geometric)
     tasks.jacobian(model.kind, rotation, geometric, jacobian)
     return speed
@@ -158,8 +164,8 @@ class PathFollowing(VelocityProgram):
 
     s* is the largest speed from which the arm can come to rest where the view ends, within the limits of velocity and
     acceleration (:func:`path_speed`), along the joint path of the smallest joint motions. Samples of the reference are
-    remembered until they are passed, and are joined by a cubic spline. Off the path the progress is slower; from 1 cm
-    or 0.01 rad on the reference waits for the arm.
+    remembered until they are passed, and are joined by a cubic spline. More than 1 cm or
+    0.01 rad off the path the progress is slower, and from twice that on the reference waits for the arm.
 
     The status is ``saturated`` where a joint stands at a bound and the error that is left weighs more than the motion,
     and where the arm is as late as it may be, and is led on at full speed.

@@ -19,7 +19,9 @@ SEGMENTS = 20
 
 @inner
 def joint_path_ahead(model, program, samples, first, done, now, q, stride, tangents):
-    """Tangents of the joint path along the reference ahead: the smallest joint motions in one step of the reference.
+    """Tangents of the joint path along the reference ahead: joint motions in one step of the reference.
+
+    They are the smallest in terms of the largest velocities: a slow joint is left to itself, as at its limit.
 
     Args:
         model: The :class:`Model`.
@@ -35,7 +37,8 @@ def joint_path_ahead(model, program, samples, first, done, now, q, stride, tange
     n, e, length = q.shape[0], done.shape[0], samples.shape[0]
     rotation, position, geometric = np.empty((3, 3)), np.empty(3), np.empty((6, n))
     jacobian, move, way, ahead = np.empty((e, n)), np.empty(e), np.empty(e), q.copy()
-    hessian, linear, rest = np.empty((n, n)), np.empty(n), np.zeros(n)
+    hessian, linear, rest, fastest = np.empty((n, n)), np.empty(n), np.zeros(n), program.limits[FASTEST]
+    scale = fastest / fastest.max()
     for i in range(tangents.shape[0]):
         here = first + i * stride
         tasks.error(model.kind, samples[(here + 1) % length], samples[here % length], move)
@@ -46,14 +49,16 @@ def joint_path_ahead(model, program, samples, first, done, now, q, stride, tange
         forward_and_jacobian(model.chain, ahead, rotation, position, geometric)
         tasks.jacobian(model.kind, rotation, geometric, jacobian)
         weigh_rotation(model.kind, program.rotation_weight, jacobian, move, way)
-        weight = motion_weight(jacobian, move, program.damping, 0.0, program.limits[FASTEST])
+        jacobian *= scale
+        weight = motion_weight(jacobian, move, program.damping, 0.0, fastest)
         curvature(jacobian, weight, hessian)
         goal(jacobian, move, 0.0, rest, tangents[i])
         goal(jacobian, way, 0.0, rest, linear)
         if cholesky(hessian):
             cholesky_solve(hessian, tangents[i])
             cholesky_solve(hessian, linear)
-            ahead += linear
+            tangents[i] *= scale
+            ahead += scale * linear
 
 
 @kernel

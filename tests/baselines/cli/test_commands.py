@@ -34,7 +34,7 @@ def test_it_is_installed():
 def test_help_lists_the_commands(arguments, capsys):
     assert main(arguments) == 0
     text = capsys.readouterr().out
-    learning, scoring = "evaluate compare train tune dataset", "reproduce leaderboard robustness view video path oracle"
+    learning, scoring = "evaluate path compare train tune dataset", "reproduce leaderboard robustness view video oracle"
     words = f"{learning} {scoring} arms scenarios policies".split()
     assert re.findall(r"^  (\w+)  ", text, re.MULTILINE) == words
     assert max(map(len, text.splitlines())) <= 80

@@ -9,7 +9,7 @@ import baselines
 import ikgym
 from baselines.paths import retime, survey
 from baselines.paths.motion import path_duration
-from baselines.paths.survey import FOLLOWED
+from baselines.paths.survey import FOLLOWED, REACHED
 from docs.retimed import PATHS, by_one_factor, faster
 from ikgym.exceptions import InvalidInputError
 
@@ -74,10 +74,19 @@ def test_a_path_out_of_reach():
     assert 0.3 < found.best.reached < 0.5
     # The farthest point of the circle is 4 % of the reach out of reach.
     assert 0.02 < found.best.position_error < 0.06
-    with pytest.raises(InvalidInputError, match=r"'panda-edge': expected a path .* starts reach 4\d\.\d % at most"):
+    with pytest.raises(InvalidInputError, match=r"'panda-edge': expected a path .* misses poses from 1\.\d+ s on"):
         retime(found)
 
 
 def test_random_paths_are_refused():
     with pytest.raises(InvalidInputError, match="the same at every reset, got scenario 'panda-random'"):
         survey(ikgym.scenarios.get("panda-random"))
+
+
+@pytest.mark.slow
+def test_a_path_that_nothing_follows_closely():
+    """Through singularities `qp` errs by some tenths of a millimetre at any speed."""
+    found = survey(ikgym.scenarios.get("panda-singular"))
+    retimed = retime(found)
+    assert FOLLOWED[0] < retimed.motion.position_error.max() <= REACHED[0]
+    assert baselines.track(retimed.scenario, "qp").position_error.max() <= REACHED[0]

@@ -60,6 +60,8 @@ def test_who_follows_with_late_drives_takes_precedence():
     chosen = recommend(rows(), {}, ALL_MISS, DT)
     assert (chosen.solver, chosen.late) == ("qp", False)
     assert chosen.reason == "qp follows the path, but not with late drives."
+    chosen = recommend(rows(qp=HARSH), {}, ALL_MISS, DT)
+    assert chosen.reason.startswith("qp needs 3.1 times the acceleration of the calmest. sns follows the path, but not")
 
 
 def test_a_path_is_retimed_only_where_no_solver_follows_it():
@@ -74,8 +76,7 @@ def test_a_path_is_retimed_only_where_no_solver_follows_it():
 def test_no_solver_is_an_answer():
     chosen = recommend(ALL_MISS, rows(qp=STOPPED, sns=MISSES, dls=SLOW), rows(), DT)
     assert (chosen.solver, chosen.retimed) == (None, False)
-    assert str(chosen).endswith("none of these solvers. No solver follows the path as it is: qp errs by 12.3 mm.")
-    assert recommend(ALL_MISS, {}, rows(), DT).reason == "No solver follows the path: qp errs by 12.3 mm."
+    assert str(chosen) == "Recommended: none of these solvers. No solver follows the path: qp errs by 12.3 mm."
 
 
 def test_faults_state_both_errors():

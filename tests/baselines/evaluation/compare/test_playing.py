@@ -1,0 +1,50 @@
+"""Solvers on three paths; two of them, so that it takes little time."""
+
+import math
+
+import pytest
+
+import ikgym
+from baselines.evaluation.compare import playing
+from baselines.evaluation.compare.playing import compare
+from ikgym.exceptions import InvalidInputError
+from ikgym.plant import Plant
+
+
+def test_late_drives_have_a_time_constant_and_keep_the_rest_of_the_plant():
+    plant = playing.late(Plant(q_noise=1e-4))
+    share = 1.0 - math.exp(-2.0 * math.pi * plant.bandwidth * playing.LAG)  # of the gap, closed in one time constant
+    assert share == pytest.approx(1.0 - math.exp(-1.0))
+    assert (plant.command_delay, plant.q_noise) == (playing.DELAY, 1e-4)
+
+
+def test_a_path_out_of_reach_has_no_solver(monkeypatch):
+    monkeypatch.setattr(playing, "PREFERRED", ("qp", "dls"))
+    found = compare(ikgym.scenarios.get("panda-edge").replace(dt=0.01, steps=300))
+    assert found.recommendation.solver is None
+    assert found.notes[0].startswith("not retimed: ")
+    assert [(row.scenario, playing.solver_of(row)) for row in found.rows] == [
+        (path, solver) for path in (playing.AS_IT_IS, playing.LATE) for solver in ("qp", "dls")
+    ]
+    text = found.table(100)
+    assert "Recommended: none of these solvers. No solver follows the path: qp errs by" in text
+    assert max(map(len, text.splitlines())) <= 100
+
+
+def test_what_is_left_out_is_named(monkeypatch):
+    def missing(scenario):
+        raise ModuleNotFoundError("No module named 'toppra'")
+
+    monkeypatch.setattr(playing, "PREFERRED", ("qp", "pink"))
+    monkeypatch.setattr(playing, "retime", missing)
+    found = compare(ikgym.scenarios.get("varga7-slow").replace(steps=20))
+    unlimited, retimed, rival = found.notes
+    assert unlimited == playing.UNLIMITED
+    assert retimed == "not retimed: No module named 'toppra'"
+    assert rival.startswith("left out: pink: ")
+    assert {row.policy for row in found.rows} == {"qp", "predicted"}
+
+
+def test_random_paths_are_refused():
+    with pytest.raises(InvalidInputError, match="the same at every reset"):
+        compare(ikgym.scenarios.get("varga7-random"))
