@@ -85,9 +85,8 @@ def _tool(scenario: Scenario) -> list[str]:
     asked = "" if limit is None else f", {limit[0]:.3g} m/s was asked, but {limit[1]}"
     turning = f", the tool turns by {speeds.angular:.3g} rad/s" if speeds.angular > 1e-6 else ""
     lines = [begins, f"  fastest {speeds.linear:.3g} m/s{asked}{turning}"]
-    short = scenario.steps * scenario.dt
-    if short < 0.999 * getattr(scenario.trajectory, "duration", 0.0):
-        lines.append(f"  the episode ends after {short:.3g} s, before the path: give it more steps")
+    if scenario.cut_off:
+        lines.append(f"  the episode ends {scenario.cut_off:.3g} s before the path: give it more steps, or none")
     return lines
 
 
@@ -112,7 +111,7 @@ def _table(found: Survey) -> str:
 def _row(number: int, branch: Branch, scenario: Scenario) -> tuple[str, ...]:
     arm = scenario.arm
     far, turned = branch.position_error, branch.orientation_error
-    missed = f"{100 * branch.reached:.0f} %, misses {_small(far, 'm') if far > REACHED[0] else _small(turned, 'rad')}"
+    missed = f"{100 * branch.reached:.0f} %, {_small(far, 'm') if far > REACHED[0] else _small(turned, 'rad')}"
     joint, room = int(np.argmin(branch.room)), float(branch.room.min())
     return (
         str(number),
